@@ -77,7 +77,7 @@ pub fn vectors(bytes: &[u8]) {
     let linear = Registry::builtin().structures("linear");
     let linear = linear.expect("a structure");
     // Certificates grow with the fourth power of the planes.
-    let is_small = |v: &Vector| v.planes.iter().flatten().count() < 9 && v.boxes.len() < 99;
+    let is_small = |v: &Vector| v.planes().iter().flatten().count() < 9 && v.boxes().len() < 99;
     for vector in read(read_vectors(bytes, "fuzz.json")).unwrap_or_default() {
         if is_small(&vector) {
             let _ = replay(&vector, &linear);

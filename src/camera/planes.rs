@@ -9,7 +9,7 @@ use super::margin::{LARGEST_SUM, Margin, TINY, check_sums, largest_sum};
 use super::projection::{double, single};
 use super::{Camera, CameraError, ClipSpace, Frame, Lens, LensKind};
 use crate::geometry::{
-    ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume, VolumeError,
+    Aabb, ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume, VolumeError,
 };
 
 named! {
@@ -64,6 +64,16 @@ pub struct Surroundings {
     /// nothing. Zero is "not known": the epsilon is then the volume's own (and
     /// too small without a far plane), and no sum is watched for items.
     pub reach: Vec3,
+}
+
+impl Surroundings {
+    /// Surroundings of boxes whose coordinates are those of the world.
+    pub fn of_boxes(items: &[Aabb]) -> Surroundings {
+        Surroundings {
+            origin: DVec3::ZERO,
+            reach: Aabb::union_of(items).reach(),
+        }
+    }
 }
 
 impl Camera {

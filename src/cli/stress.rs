@@ -66,7 +66,7 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         let structures: Vec<StructureSpec> = structures.iter().map(by_kernel).collect();
         let mut found = Vec::new();
         for vector in vectors.iter().take_while(|_| !interrupt::asked()) {
-            bar.set_message(text::plain(&vector.id));
+            bar.set_message(text::plain(&vector.id.0));
             add_vector(&mut found, vector, &structures);
             bar.inc(1);
         }
@@ -149,14 +149,14 @@ impl Progress for Shown<'_> {
 /// The rows of a vector, under its category.
 fn add_vector(sections: &mut Vec<Section>, vector: &Vector, structures: &[StructureSpec]) {
     let rows = replay(vector, structures);
-    let place = sections.iter().position(|s| s.name == vector.category);
+    let place = sections.iter().position(|s| s.name == vector.category());
     let place = place.unwrap_or_else(|| {
-        sections.push(Section::new(&vector.category));
+        sections.push(Section::new(vector.category()));
         sections.len() - 1
     });
     let section = &mut sections[place];
     section.cases += 1;
-    section.boxes += vector.boxes.len() as u64;
+    section.boxes += vector.boxes().len() as u64;
     section.rows.extend(rows);
 }
 

@@ -1,5 +1,5 @@
-//! Spring arms, and the six methods that step them: a camera on a spring behind a target
-//! that is known where frames end, and moves on a straight line in between.
+//! Spring arms, and the six methods that step them: a camera on a spring behind a
+//! target that is known where frames end, and moves on a straight line in between.
 
 use super::closed_form::chased;
 pub use super::closed_form::{Arm, Line, State};
@@ -37,11 +37,10 @@ impl Chase {
             frames.push(Line { start, base, speed });
             start = end;
         }
-        let friction = 2.0 * stiffness.sqrt();
         Chase {
             arm: Arm {
                 stiffness,
-                friction,
+                friction: 2.0 * stiffness.sqrt(),
                 stiffening,
                 stop,
             },
@@ -51,8 +50,8 @@ impl Chase {
         }
     }
 
-    /// Steps through all frames, `count` equal steps each, and hands out the state at
-    /// the end of each frame.
+    /// Steps through all frames, `count` equal steps each, and passes the state at the
+    /// end of each frame to `keep`.
     #[inline(always)]
     pub fn follow(
         &self,
@@ -81,7 +80,7 @@ impl Chase {
     }
 }
 
-/// Steps a chase, so many steps per frame.
+/// Steps a chase, with a number of steps per frame.
 pub type Follow = fn(&Chase, u32, &mut dyn FnMut(State));
 
 /// A method of the study.
@@ -120,6 +119,13 @@ pub const METHODS: &[Method] = rows! { Method { name, summary, order, substeps, 
 pub fn rk4(chase: &Chase, count: u32, keep: &mut dyn FnMut(State)) {
     chase.follow(count, keep, |arm, line, t, y, h| {
         arm.rk4(|t| line.at(t), t, y, h)
+    });
+}
+
+/// RK4 behind `sin t` itself instead of the lines between frame ends.
+pub fn rk4_of_sine(chase: &Chase, count: u32, keep: &mut dyn FnMut(State)) {
+    chase.follow(count, keep, |arm, line, t, y, h| {
+        arm.rk4(|t| libm::sin(line.start + t), t, y, h)
     });
 }
 
@@ -164,14 +170,12 @@ impl Arm {
         let b = self.slope(target(t + half), along(y, half, a));
         let c = self.slope(target(t + half), along(y, half, b));
         let d = self.slope(target(t + h), along(y, h, c));
-        along(
-            y,
-            h / 6.0,
-            [0, 1].map(|i| a[i] + 2.0 * (b[i] + c[i]) + d[i]),
-        )
+        let sum = [0, 1].map(|i| a[i] + 2.0 * (b[i] + c[i]) + d[i]);
+        along(y, h / 6.0, sum)
     }
 
-    /// `Y = base + g F(Y)` by Newton's iteration from `guess`: one step on a linear arm.
+    /// Solves `Y = base + g F(Y)` by Newton's iteration from `guess`: one step on a
+    /// linear arm.
     fn stage(&self, target: f64, base: State, guess: State, g: f64) -> State {
         let mut y = guess;
         for _ in 0..MOST_ITERATIONS {
@@ -225,13 +229,8 @@ mod tests {
             let chase = Chase::new(ArmKind::Linear, stiffness, 30.0, 1.0);
             let omega = stiffness.sqrt();
             let count = (omega / 30.0 / 1e-3).ceil() as u32;
-            let truth = |chase: &Chase, count, keep: &mut dyn FnMut(State)| {
-                chase.follow(count, keep, |arm, line, t, y, h| {
-                    arm.rk4(|t| libm::sin(line.start + t), t, y, h)
-                });
-            };
             let closed = linear_way(omega, chase.frame_s, chase.frames.len());
-            for (a, b) in chase.states(truth, count).iter().zip(&closed) {
+            for (a, b) in chase.states(rk4_of_sine, count).iter().zip(&closed) {
                 assert!((a[0] - b[0]).abs() < 1e-12, "{stiffness}: {a:?} {b:?}");
             }
             let exact = METHODS.iter().find(|m| m.name == EXACT).expect("a row");

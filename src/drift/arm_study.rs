@@ -1,11 +1,11 @@
-//! The study of spring arms: every method with every number of steps per frame on every
-//! arm, stiffness and frame rate, with its errors and its time, and which one to take.
+//! The study of spring arms: every method with every number of steps per frame on
+//! every arm, stiffness and frame rate, its errors and its time, and which one to take.
 
 use std::hint::black_box;
 
 use serde::Serialize;
 
-use super::arm::{ArmKind, Chase, EXACT, METHODS, Method, State, rk4};
+use super::arm::{ArmKind, Chase, EXACT, METHODS, Method, State, rk4, rk4_of_sine};
 use super::exact::linear_way;
 use super::rated::{Candidate, Recommendation, per_unit, recommended, small_margin};
 use super::stability;
@@ -50,7 +50,8 @@ pub struct ArmPoint {
     pub method: &'static str,
     /// Equal steps per frame.
     pub substeps: u32,
-    /// Largest over the ends of all frames, from the arm's true way; null if it blew up.
+    /// Largest distance from the arm's true way at the ends of all frames; null if it
+    /// blew up.
     pub position_error: Option<f64>,
     /// The same of the velocity, per second.
     pub velocity_error: Option<f64>,
@@ -91,12 +92,13 @@ pub fn settings(options: &ArmOptions) -> Vec<Setting> {
     let mut all = Vec::new();
     for &arm in &options.arms {
         for &stiffness in &options.stiffnesses {
-            all.extend(options.rates_hz.iter().map(|&rate_hz| Setting {
+            let setting = |&rate_hz: &f64| Setting {
                 arm,
                 stiffness,
                 rate_hz,
                 omega_h: stiffness.sqrt() / rate_hz,
-            }));
+            };
+            all.extend(options.rates_hz.iter().map(setting));
         }
     }
     all
@@ -124,23 +126,16 @@ fn ways(setting: &Setting, chase: &Chase) -> [Vec<State>; 2] {
     let count = (setting.omega_h / REFERENCE_STEP).ceil() as u32;
     let truth = match setting.arm {
         ArmKind::Linear => linear_way(setting.stiffness.sqrt(), chase.frame_s, chase.frames.len()),
-        ArmKind::Collision => {
-            let follow = |chase: &Chase, count, keep: &mut dyn FnMut(State)| {
-                chase.follow(count, keep, |arm, line, t, y, h| {
-                    arm.rk4(|t| libm::sin(line.start + t), t, y, h)
-                });
-            };
-            chase.states(follow, count)
-        }
+        ArmKind::Collision => chase.states(rk4_of_sine, count),
     };
     [truth, chase.states(rk4, count)]
 }
 
-/// A state that is so many times as large as anything the arm should do has blown up.
+/// Size of a state that has blown up, in units of the arm's own motion.
 const BLOWN_UP: f64 = 1e3;
 /// Errors below this are rounding and have no order.
 const LEAST_ORDERED: f64 = 1e-11;
-/// So much below the classical order is less than that order.
+/// Distance from the classical order that counts as a reduced order.
 const REDUCED_BY: f64 = 0.5;
 
 /// The errors of all points of a setting.
@@ -185,8 +180,8 @@ pub fn errors(setting: Setting, seconds: f64) -> Vec<ArmPoint> {
 /// Steps of one query, about: a round is some tens of microseconds.
 const STEPS: usize = 750;
 
-/// The tasks of all points of a setting, and the simulated seconds of one query of each:
-/// the arm on its way in.
+/// The tasks of all points of a setting, each with the simulated seconds of one query.
+/// They time the arm on its way in.
 pub fn tasks(setting: Setting) -> impl Iterator<Item = (TimedTask<'static>, f64)> {
     setting.efforts().map(move |(method, substeps)| {
         let chase = setting.chase(1.0);
@@ -203,8 +198,8 @@ pub fn tasks(setting: Setting) -> impl Iterator<Item = (TimedTask<'static>, f64)
     })
 }
 
-/// Fills in the times of the points of one setting from the tasks from `first` on, and
-/// chooses.
+/// Fills in the times of the points of one setting, whose tasks begin at `first`, and
+/// chooses a method.
 pub fn conclude(
     points: &mut [ArmPoint],
     times: &OverProcesses,
@@ -221,10 +216,11 @@ pub fn conclude(
                 error,
                 ln_ns: ln_ns.map(|ns| ns - seconds.ln()).collect(),
             });
-            let us = per_unit(times, task, 1e3 * seconds);
-            point.us_per_second = us[0];
-            point.us_per_second_lower = us[1];
-            point.us_per_second_upper = us[2];
+            [
+                point.us_per_second,
+                point.us_per_second_lower,
+                point.us_per_second_upper,
+            ] = per_unit(times, task, 1e3 * seconds);
         }
     }
     let rule = format!("an error within {tolerance:e}");

@@ -1,5 +1,5 @@
-//! The spring arm in closed form, for every damping. What is not linear in an arm is
-//! frozen as it is when the step begins.
+//! The spring arm in closed form, for every damping. A stiffening spring is frozen as
+//! it is when the step begins.
 
 /// Position and velocity.
 pub type State = [f64; 2];
@@ -37,8 +37,8 @@ impl Line {
 /// series instead of being divided by; their first term left out is 3e-17.
 const SERIES_BELOW: f64 = 1e-2;
 
-/// `exp(-zeta angle) (cosh r, sinh(r)/r)` with `r = angle sqrt(zeta^2 - 1)`, imaginary
-/// below critical damping.
+/// `exp(-zeta angle) (cosh r, sinh(r)/r)` with `r = angle sqrt(zeta^2 - 1)`.
+/// Below critical damping `r` is imaginary.
 ///
 /// The usual formulas divide by r, which is zero at critical damping and
 /// without digits beside it. Written as functions of `r^2` both are smooth

@@ -1,7 +1,5 @@
-//! References in arithmetic of about 200 bits: rotations with the measures of how far
-//! one is off, and the way of a linear spring arm.
-
-use std::ops::Neg;
+//! References in arithmetic of about 200 bits: rotations with the errors of an
+//! approximate one, and the way of a linear spring arm.
 
 use glam::DMat3;
 
@@ -11,8 +9,12 @@ use crate::arithmetic::{Expansion, exact};
 /// power 1e10, that still leaves more than 50 digits.
 const TERMS: usize = 4;
 
-/// Sine and cosine of an angle in degrees, after whole turns are taken off, which is
-/// exact in degrees.
+/// Changes of a series that end it: below the last digit of one.
+const NEGLIGIBLE: f64 = 1e-70;
+
+/// Sine and cosine of an angle in degrees.
+///
+/// Whole turns are taken off first, which is exact in degrees.
 fn sin_cos_degrees(degrees: &Expansion) -> (Expansion, Expansion) {
     let turns = (degrees.estimate() / 360.0).round();
     let rest = degrees - &Expansion::product(360.0, turns);
@@ -20,52 +22,33 @@ fn sin_cos_degrees(degrees: &Expansion) -> (Expansion, Expansion) {
     exact::sin_cos(&radians.leading(TERMS), TERMS)
 }
 
-/// `exp(-x)` of a number that is not negative; zero below 1e-300.
-fn decay(x: &Expansion) -> Expansion {
-    if x.estimate() > 690.0 {
-        return Expansion::ZERO;
-    }
-    // Halved ten times, and the result squared as often.
-    let small = exact::series(1.0.into(), &-&x.scaled(-10), |n| n, TERMS);
-    (0..10).fold(small, |power, _| (&power * &power).leading(TERMS))
-}
-
-/// The way of the linear arm `x'' = omega^2 (sin t - x) - 2 omega x'` from rest at one:
-/// position and velocity at the ends of so many frames. The closed form is
-/// `A sin t + B cos t + exp(-omega t) (1 - B + D t)`.
+/// Position and velocity of the linear arm `x'' = omega^2 (sin t - x) - 2 omega x'` at
+/// the ends of `frames` frames, from rest at one.
+///
+/// Position, velocity, sine and cosine of the time are one linear system: each frame
+/// multiplies them by the exponential of its matrix.
 pub fn linear_way(omega: f64, frame_s: f64, frames: usize) -> Vec<[f64; 2]> {
-    let product = |a: &Expansion, b: &Expansion| (a * b).leading(TERMS);
-    let (one, omega) = (Expansion::from(1.0), Expansion::from(omega));
-    let square = product(&omega, &omega);
-    let gain = &square + &one;
-    let gain = product(&square, &product(&gain, &gain).reciprocal(TERMS + 1));
-    let a = product(&gain, &(&square - &one));
-    let b = product(&gain, &omega.scaled(1)).neg();
-    let c = &one - &b;
-    let d = &product(&omega, &c) - &a;
-    let (step_sin, step_cos) = exact::sin_cos(&frame_s.into(), TERMS);
-    let step_fall = decay(&product(&omega, &frame_s.into()));
-    let (mut sin, mut cos, mut fall) = (Expansion::ZERO, one.clone(), one);
-    let mut frame = |n: usize| {
-        (sin, cos) = (
-            (&(&sin * &step_cos) + &(&cos * &step_sin)).leading(TERMS),
-            (&(&cos * &step_cos) - &(&sin * &step_sin)).leading(TERMS),
-        );
-        fall = product(&fall, &step_fall);
-        let in_fall = &c + &product(&d, &Expansion::product(frame_s, n as f64));
-        let x = &(&product(&a, &sin) + &product(&b, &cos)) + &product(&fall, &in_fall);
-        let slower = &d - &product(&omega, &in_fall);
-        let v = &(&product(&a, &cos) - &product(&b, &sin)) + &product(&fall, &slower);
-        [x.estimate(), v.estimate()]
+    let square = Expansion::product(omega, omega);
+    let mut rates = Matrix::from_entries(|_, _| Expansion::ZERO);
+    rates.0[0][1] = 1.0.into();
+    rates.0[1] = [-&square, (-2.0 * omega).into(), square, Expansion::ZERO];
+    rates.0[2][3] = 1.0.into();
+    rates.0[3][2] = (-1.0).into();
+    let step = rates.scaled(&frame_s.into()).exponential();
+    let mut state: [Expansion; 4] = [1.0, 0.0, 0.0, 1.0].map(Expansion::from);
+    let frame = |_| {
+        state = step.applied(&state);
+        [state[0].estimate(), state[1].estimate()]
     };
-    (1..=frames).map(&mut frame).collect()
+    (0..frames).map(frame).collect()
 }
 
-/// A matrix of three rows; for a frame its columns are u, v and n.
+/// A square matrix of numbers of 200 bits; that of a camera basis has the columns u, v
+/// and n.
 #[derive(Clone, Debug)]
-pub struct Matrix([[Expansion; 3]; 3]);
+pub struct Matrix<const N: usize = 3>([[Expansion; N]; N]);
 
-impl Matrix {
+impl<const N: usize> Matrix<N> {
     fn from_entries(entry: impl Fn(usize, usize) -> Expansion) -> Self {
         let row = |i| std::array::from_fn(|j| entry(i, j));
         Matrix(std::array::from_fn(row))
@@ -75,33 +58,35 @@ impl Matrix {
         Matrix::from_entries(|i, j| Expansion::from(f64::from(u8::from(i == j))))
     }
 
-    /// The turn by exact degrees about the axis 0, 1 or 2, counter-clockwise.
-    pub fn about(axis: usize, degrees: &Expansion) -> Self {
-        let (sin, cos) = sin_cos_degrees(degrees);
-        let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut turn = Matrix::identity();
-        turn.0[next][next] = cos.clone();
-        turn.0[last][last] = cos;
-        turn.0[next][last] = -&sin;
-        turn.0[last][next] = sin;
-        turn
+    fn scaled(&self, factor: &Expansion) -> Self {
+        Matrix::from_entries(|i, j| (&self.0[i][j] * factor).leading(TERMS))
     }
 
-    pub fn times(&self, other: &Matrix) -> Matrix {
-        Matrix::from_entries(|i, j| {
-            let product = |k: usize| (&self.0[i][k] * &other.0[k][j]).leading(TERMS);
-            (0..3)
-                .fold(Expansion::ZERO, |sum, k| &sum + &product(k))
-                .leading(TERMS)
-        })
+    fn plus(&self, other: &Self) -> Self {
+        Matrix::from_entries(|i, j| (&self.0[i][j] + &other.0[i][j]).leading(TERMS))
     }
 
-    pub fn transposed(&self) -> Matrix {
+    pub fn times(&self, other: &Self) -> Self {
+        let columns = other.transposed().0.map(|column| self.applied(&column));
+        Matrix(columns).transposed()
+    }
+
+    /// The product with a column.
+    fn applied(&self, column: &[Expansion; N]) -> [Expansion; N] {
+        let sum = |row: &[Expansion; N]| {
+            let products = row.iter().zip(column).map(|(a, b)| (a * b).leading(TERMS));
+            let sum = products.fold(Expansion::ZERO, |sum, product| &sum + &product);
+            sum.leading(TERMS)
+        };
+        self.0.each_ref().map(sum)
+    }
+
+    fn transposed(&self) -> Self {
         Matrix::from_entries(|i, j| self.0[j][i].clone())
     }
 
     /// The matrix `exponent` times over, by repeated squaring.
-    pub fn power(&self, mut exponent: u64) -> Matrix {
+    pub fn power(&self, mut exponent: u64) -> Self {
         let (mut power, mut square) = (Matrix::identity(), self.clone());
         while exponent > 0 {
             if exponent & 1 == 1 {
@@ -113,20 +98,53 @@ impl Matrix {
         power
     }
 
+    /// The exponential: halved until its series converges, then squared as often.
+    fn exponential(&self) -> Self {
+        let size = self.largest_difference(&Matrix::from_entries(|_, _| Expansion::ZERO));
+        let halvings = (size.log2().ceil() as i32 + 4).max(0);
+        let small = Matrix::from_entries(|i, j| self.0[i][j].scaled(-halvings));
+        let (mut sum, mut term, mut n) = (Matrix::identity(), Matrix::identity(), 0.0);
+        loop {
+            n += 1.0;
+            let next = term.times(&small);
+            term = Matrix::from_entries(|i, j| next.0[i][j].over(n, TERMS));
+            let longer = sum.plus(&term);
+            if longer.largest_difference(&sum) <= NEGLIGIBLE {
+                return (0..halvings).fold(longer, |power, _| power.times(&power));
+            }
+            sum = longer;
+        }
+    }
+
     /// Largest entry of `X^T X - I`: zero for a rotation.
     pub fn orthogonality_error(&self) -> f64 {
         let gram = self.transposed().times(self);
         gram.largest_difference(&Matrix::identity())
     }
 
-    pub fn largest_difference(&self, other: &Matrix) -> f64 {
+    pub fn largest_difference(&self, other: &Self) -> f64 {
         let entries = self.0.iter().flatten().zip(other.0.iter().flatten());
         let differences = entries.map(|(a, b)| (a - b).estimate().abs());
-        // `max` would lose a NaN.
-        differences.fold(
-            0.0,
-            |worst, d| if d > worst || d.is_nan() { d } else { worst },
-        )
+        differences.fold(0.0, larger)
+    }
+}
+
+/// The larger of two errors. NaN is the largest: `max` would lose it.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}
+
+impl Matrix {
+    /// The turn by exact degrees about the axis 0, 1 or 2, counter-clockwise.
+    pub fn about(axis: usize, degrees: &Expansion) -> Self {
+        let (sin, cos) = sin_cos_degrees(degrees);
+        let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut turn = Matrix::identity();
+        turn.0[next][next] = cos.clone();
+        turn.0[last][last] = cos;
+        turn.0[next][last] = -&sin;
+        turn.0[last][next] = sin;
+        turn
     }
 
     /// Length of the difference of two columns, and how much longer than one
@@ -154,16 +172,15 @@ impl Matrix {
         if !scale.is_finite() {
             return None;
         }
-        let scale = Expansion::from(scale);
-        let mut x = Matrix::from_entries(|i, j| (&self.0[i][j] * &scale).leading(TERMS));
+        let mut x = self.scaled(&scale.into());
         for _ in 0..100 {
             let gram = x.transposed().times(&x);
             if gram.largest_difference(&Matrix::identity()) < 1e-40 {
                 return Some(x);
             }
-            let three = |i, j| Expansion::from(if i == j { 3.0 } else { 0.0 });
             let step = Matrix::from_entries(|i, j| {
-                &(&three(i, j) - &gram.0[i][j]) * &Expansion::from(0.5)
+                let three = Expansion::from(if i == j { 3.0 } else { 0.0 });
+                &(&three - &gram.0[i][j]) * &Expansion::from(0.5)
             });
             x = x.times(&step);
         }

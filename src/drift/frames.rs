@@ -1,5 +1,5 @@
-//! Ways to keep a camera's frame while it is turned step by step. It owns the
-//! arithmetic in both precisions; how wrong it gets is found in `rotation`.
+//! Ways to keep a camera basis while it is turned step by step, and to carry an eye
+//! around a centre, in both precisions.
 
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ pub use super::walk::Turn;
 use super::walk::walk;
 use crate::camera::{self, look_at};
 
-/// How the axes of a frame are corrected.
+/// Corrections of the axes of a frame.
 pub const NONE: u8 = 0;
 pub const GRAM_SCHMIDT: u8 = 1;
 pub const POLAR: u8 = 2;
@@ -17,13 +17,20 @@ pub const POLAR: u8 = 2;
 /// Rotations between two polar corrections, as in the toolkit's camera.
 pub const CORRECT_EVERY: u32 = 100;
 
-/// How angles are summed.
+/// Units of summed angles.
 pub const RADIANS: u8 = 0;
 pub const DEGREES: u8 = 1;
 pub const WRAPPED: u8 = 2;
 
-/// The same text in both precisions. Every step is handed its angles anew, as
-/// a mouse would do, and takes their sines and cosines.
+/// Distance from the centre of the orbit to the eye. A camera that looks at
+/// the centre has its eye at `centre + 10 n`.
+pub const ORBIT_RADIUS: f64 = 10.0;
+
+const CENTRE: DVec3 = DVec3::new(5.0, -1.0, 2.0);
+const START: DVec3 = DVec3::new(CENTRE.x + ORBIT_RADIUS, CENTRE.y, CENTRE.z);
+
+/// The same text in both precisions. Every step gets its angles as if from a mouse,
+/// and takes their sines and cosines.
 macro_rules! precision {
     ($module:ident, $real:ident, $vector:ident, $quaternion:ident, $matrix:ident, $sin:path, $cos:path) => {
         pub mod $module {
@@ -118,6 +125,23 @@ macro_rules! precision {
                     wide(*axes)
                 })
             }
+
+            /// An eye that is turned about the centre; `RESTORED` corrects its distance.
+            pub fn carried<const RESTORED: bool>(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+                let [centre, start] = [CENTRE, START].map(|p| p.to_array().map(|x| x as $real));
+                let (centre, start) = ($vector::from(centre), $vector::from(start));
+                let step = |eye: &mut $vector, turn: &Turn| {
+                    let (sin, cos) = sin_cos(turn.yaw_deg as $real * DEGREE / 2.0);
+                    let turn = $quaternion::from_xyzw(0.0, 0.0, sin, cos);
+                    let mut offset = turn * (*eye - centre);
+                    if RESTORED {
+                        offset = offset.normalize() * ORBIT_RADIUS as $real;
+                    }
+                    *eye = centre + offset;
+                };
+                let place = |eye: &$vector| from_centre(eye.to_array().map(f64::from).into());
+                walk(start, turn, looks, step, place)
+            }
         }
     };
 }
@@ -125,12 +149,39 @@ macro_rules! precision {
 precision!(single, f32, Vec3, Quat, Mat3, libm::sinf, libm::cosf);
 precision!(double, f64, DVec3, DQuat, DMat3, libm::sin, libm::cos);
 
-/// The camera of this toolkit.
+/// The offset of an eye from the centre, in radii, as column u.
+fn from_centre(eye: DVec3) -> DMat3 {
+    DMat3::from_cols((eye - CENTRE) / ORBIT_RADIUS, DVec3::ZERO, DVec3::ZERO)
+}
+
+/// Orbit of this toolkit's camera.
+pub fn toolkit_orbit(by: &Turn, looks: &[u64]) -> Vec<DMat3> {
+    let frame = look_at(START, CENTRE, DVec3::Z);
+    let frame = frame.expect("two points and an up vector make a frame");
+    let step = |frame: &mut camera::Frame, by: &Turn| {
+        let turned = frame.orbit(CENTRE, DVec3::Z, by.yaw_deg, 0.0);
+        turned.expect("the z axis is an axis");
+    };
+    walk(frame, by, looks, step, |frame| from_centre(frame.eye))
+}
+
+/// An eye that is computed from the sum of its angles.
+pub fn summed_orbit(by: &Turn, looks: &[u64]) -> Vec<DMat3> {
+    let step = |(sum, eye): &mut (f64, DVec3), by: &Turn| {
+        *sum = (*sum + by.yaw_deg) % 360.0;
+        let angle = sum.to_radians();
+        let direction = DVec3::new(libm::cos(angle), libm::sin(angle), 0.0);
+        *eye = CENTRE + direction * ORBIT_RADIUS;
+    };
+    walk((0.0, START), by, looks, step, |(_, eye)| from_centre(*eye))
+}
+
+/// Basis of this toolkit's camera.
 pub fn toolkit(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
     stretched(turn, looks, 1.0)
 }
 
-/// The same, with angles as the lecture's programs have them.
+/// The same with the angles of the lecture's programs.
 pub fn lecture(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
     #[expect(clippy::approx_constant, reason = "it is what is measured")]
     const STRETCH: f64 = 3.142 / PI;

@@ -1,6 +1,5 @@
-//! Small errors that add up: camera bases that are turned step by step, eyes that are
-//! carried around, and a chase camera on a spring arm. The methods that are compared,
-//! their references and what follows from the figures.
+//! Small errors that add up, in bases, orbits and spring arms of cameras: the methods
+//! that are compared, their references, and which method to take.
 
 mod arm;
 mod arm_study;
@@ -25,10 +24,11 @@ pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 pub use stability::StabilityLimit;
 
 use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
+use exact::larger;
 use orbit::{CARRIERS, SWING};
-use rated::rated;
+use rated::{per_unit, rated};
 use rotation::{METHODS, Method, STEADY, moments};
-use walk::{QUERIES, walking};
+use walk::{QUERIES, QUERY_STEPS, walking};
 
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
 pub const MOST_STEPS: u64 = 1_000_000_000;
@@ -98,7 +98,7 @@ pub struct DriftReport {
     pub arm: ArmReport,
 }
 
-/// Jobs that `progress` of [`prepare`] is told of.
+/// Number of jobs that [`prepare`] reports to `progress`.
 pub fn jobs(options: &DriftOptions) -> usize {
     METHODS.len() + CARRIERS.len() + arm_study::settings(&options.arm).len()
 }
@@ -110,8 +110,10 @@ fn looks(most: u64) -> Vec<u64> {
     below.chain([most]).collect()
 }
 
-/// Finds all errors: a report without times. `progress` gets each job's name before it
-/// starts, and ends the work early by returning true.
+/// Finds all errors: a report without times.
+///
+/// `progress` gets each job's name before it starts, and ends the work early by
+/// returning true.
 pub fn prepare(
     options: &DriftOptions,
     mut progress: impl FnMut(&str) -> bool,
@@ -153,7 +155,7 @@ pub fn prepare(
     Some(report)
 }
 
-/// All that is timed: frames, eyes, arms.
+/// All timed tasks: bases, eyes, arms.
 fn tasks(options: &DriftOptions) -> Vec<TimedTask<'static>> {
     let frames = METHODS.iter().map(|method| walking(method.walk, STEADY));
     let eyes = CARRIERS.iter().map(|carrier| walking(carrier.walk, SWING));
@@ -162,33 +164,32 @@ fn tasks(options: &DriftOptions) -> Vec<TimedTask<'static>> {
     frames.chain(eyes).chain(arms).collect()
 }
 
-/// Plans how everything is timed, the same in every process.
+/// Plans the timed pass, the same in every process.
 pub fn plan(options: &DriftOptions, protocol: &Protocol) -> Schedule {
     Schedule::new(QUERIES, &tasks(options), protocol)
 }
 
-/// Times in this process what was planned; `None` if stopped.
+/// Times the planned tasks in this process; `None` if stopped.
 pub fn time(
     options: &DriftOptions,
     schedule: &Schedule,
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
 ) -> Option<ProcessTimes> {
-    let timed = timed(&tasks(options), schedule, protocol, &|_| stop())?;
-    Some(ProcessTimes::of(&timed))
+    let timed = timed(&tasks(options), schedule, protocol, &|_| stop());
+    timed.map(|timed| ProcessTimes::of(&timed))
 }
 
 impl DriftReport {
-    /// Fills in the times of all processes, of so many rounds, and what follows.
+    /// Fills in the times of all processes, `rounds` in each, and the choices.
     pub fn conclude(&mut self, processes: &[ProcessTimes], rounds: u32) {
         let times = OverProcesses::of(processes);
         (self.processes, self.rounds) = (processes.len(), rounds as usize);
-        let turned = frame_errors(METHODS.iter(), &self.rotation);
-        let carried = CARRIERS.iter().map(|carrier| {
-            let mut own = self.orbit.iter().rev();
-            let last = own.find(|d| d.method == carrier.name);
-            (carrier, last.map(|d| d.position_error / ORBIT_RADIUS))
-        });
+        let turned = self.rotation.chunk_by(|a, b| a.method == b.method);
+        let turned = METHODS.iter().zip(turned.map(frame_error));
+        let carried = self.orbit.chunk_by(|a, b| a.method == b.method);
+        let carried = carried.map(|own| Some(own.last()?.position_error / ORBIT_RADIUS));
+        let carried = CARRIERS.iter().zip(carried);
         let limit = (self.tolerance_rad, self.steps);
         let turned = rated(turned, &times, 0, limit);
         let carried = rated(carried, &times, METHODS.len(), limit);
@@ -204,9 +205,9 @@ impl DriftReport {
     }
 }
 
-/// Ways to turn a frame with their errors after the most steps, timed in this process
-/// alone.
-pub fn rotations(names: &[&str], steps: u64, tolerance: f64) -> Vec<Rated> {
+/// Errors of ways to turn after a number of steps and their ns per step, timed in this
+/// process alone. `None` for a basis that is lost; names without a method are left out.
+pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
     let protocol = Protocol {
         rounds: [5, 5],
         task_ns: 0.0,
@@ -215,35 +216,24 @@ pub fn rotations(names: &[&str], steps: u64, tolerance: f64) -> Vec<Rated> {
         seed: 1,
         cache_bytes: 0,
     };
-    let methods = || METHODS.iter().filter(|method| names.contains(&method.name));
+    let of = |name: &&str| METHODS.iter().find(|method| method.name == *name);
+    let methods: Vec<&Method> = names.iter().filter_map(of).collect();
     let moments = moments(&[steps]);
-    let drifts: Vec<_> = methods().flat_map(|m| m.drift(&moments)).collect();
-    let tasks: Vec<TimedTask> = methods().map(|m| walking(m.walk, STEADY)).collect();
+    let tasks: Vec<TimedTask> = methods.iter().map(|m| walking(m.walk, STEADY)).collect();
     let timed = crate::measure::timed_rounds(QUERIES, &tasks, &protocol, &|| false);
     let times = OverProcesses::of(&[ProcessTimes::of(&timed.unwrap_or_default())]);
-    rated(
-        frame_errors(methods(), &drifts),
-        &times,
-        0,
-        (tolerance, steps),
-    )
-    .0
+    let row = |(task, method): (usize, &&Method)| {
+        let [ns, ..] = per_unit(&times, task, QUERY_STEPS as f64);
+        (frame_error(&method.drift(&moments)), ns.unwrap_or(f64::NAN))
+    };
+    methods.iter().enumerate().map(row).collect()
 }
 
-/// The larger error of each method after the most steps.
-fn frame_errors<'m>(
-    methods: impl Iterator<Item = &'m Method>,
-    drifts: &[RotationDrift],
-) -> impl Iterator<Item = (&'m Method, Option<f64>)> {
-    methods.map(|method| {
-        let last = drifts.iter().rfind(|d| d.method == method.name);
-        // NaN is no maximum to `max`: a frame that is lost has no error.
-        let error = last.filter(|d| !(d.angle_error_rad + d.orthogonality_error).is_nan());
-        (
-            method,
-            error.map(|d| d.angle_error_rad.max(d.orthogonality_error)),
-        )
-    })
+/// The larger error of the last drift; `None` for a basis that is lost.
+fn frame_error(drifts: &[RotationDrift]) -> Option<f64> {
+    let last = drifts.last()?;
+    let error = larger(last.angle_error_rad, last.orthogonality_error);
+    (!error.is_nan()).then_some(error)
 }
 
 #[cfg(test)]

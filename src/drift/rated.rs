@@ -56,8 +56,8 @@ pub fn per_unit(times: &OverProcesses, task: usize, units: f64) -> [Option<f64>;
     found.map_or([None; 3], |ns| [Some(ns.value), ns.lower, ns.upper])
 }
 
-/// Methods with their errors, and the times of the tasks from `first` on; which to take
-/// of those within a tolerance after so many steps.
+/// Rates methods by their errors and the times of the tasks from `first` on, and
+/// recommends one within a tolerance after `steps` steps.
 pub fn rated<'m>(
     rows: impl Iterator<Item = (&'m Method, Option<f64>)>,
     times: &OverProcesses,
@@ -91,10 +91,10 @@ pub fn rated<'m>(
     (all, recommended(&candidates, tolerance, &rule))
 }
 
-/// Margins below this share of a limit are said.
+/// Smaller margins, as a share of a limit, are reported.
 const SMALL_MARGIN: f64 = 0.05;
 
-/// The words for a figure near its limit; nothing for others.
+/// Words for a figure near its limit; empty for others.
 pub fn small_margin(figure: &str, limit: &str, margin: Option<f64>) -> String {
     match margin {
         Some(margin) if margin < SMALL_MARGIN => {
@@ -104,7 +104,7 @@ pub fn small_margin(figure: &str, limit: &str, margin: Option<f64>) -> String {
     }
 }
 
-/// The most precise of the candidates within the tolerance that none is faster than, by a
+/// Recommends the most precise of the fastest candidates within the tolerance, by a
 /// paired test over the processes.
 pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Recommendation {
     let good = candidates.iter().filter(|c| c.error <= tolerance);
@@ -114,15 +114,12 @@ pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Reco
     fastest.sort_by(|a, b| a.error.total_cmp(&b.error));
     let as_fast: Vec<String> = fastest.iter().skip(1).map(|c| c.name.clone()).collect();
     let nearest = candidates.iter().min_by(|a, b| a.error.total_cmp(&b.error));
+    let (count, others) = (good.len(), as_fast.join(", "));
     let mut reason = match (fastest.len(), nearest) {
         (0, None) => format!("no method has {rule}"),
         (0, Some(near)) => format!("no method has {rule}: {} has {:.1e}", near.name, near.error),
-        (1, _) => format!("the cheapest of {} with {rule}", good.len()),
-        _ => format!(
-            "the most precise of the cheapest (as fast: {}) of {} with {rule}",
-            as_fast.join(", "),
-            good.len()
-        ),
+        (1, _) => format!("the cheapest of {count} with {rule}"),
+        _ => format!("the most precise of the cheapest (as fast: {others}) of {count} with {rule}"),
     };
     let margin = fastest.first().map(|c| 1.0 - c.error / tolerance);
     reason += &small_margin("its error", "the limit", margin);

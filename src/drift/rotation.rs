@@ -1,12 +1,12 @@
-//! How far frames drift from the exact rotation: one row of [`METHODS`] for
-//! each way to keep one, which are in `frames`. The eye that circles a point
-//! by itself is in `orbit`.
+//! Drift of camera bases from the exact rotation: one row of [`METHODS`] for each way
+//! to keep one.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::exact::Matrix;
+use super::exact::{Matrix, larger};
+pub use super::frames::ORBIT_RADIUS;
 use super::frames::{
     CORRECT_EVERY, DEGREES, GRAM_SCHMIDT, NONE, POLAR, RADIANS, Turn, WRAPPED, double, lecture,
     single, toolkit,
@@ -28,11 +28,7 @@ pub const ONE_DEGREE: Turn = Turn {
     roll_deg: 0.0,
 };
 
-/// Distance from the centre of the orbit to the eye. A camera that looks at
-/// the centre has its eye at `centre + 10 n`.
-pub const ORBIT_RADIUS: f64 = 10.0;
-
-/// Yaw, pitch and roll by so many times the angles of [`STEADY`], to more than 40 digits.
+/// Yaw, pitch and roll by `times` times [`STEADY`], to more than 40 digits.
 fn turned(times: u64) -> Matrix {
     let about = |axis, degrees| Matrix::about(axis, &Expansion::product(degrees, times as f64));
     let turned = about(1, STEADY.yaw_deg).times(&about(0, STEADY.pitch_deg));
@@ -95,8 +91,7 @@ pub const PERIOD: u64 = (CORRECT_EVERY as u64).div_ceil(ROTATIONS);
 /// Rotations of a step: yaw, pitch and roll.
 const ROTATIONS: u64 = 3;
 
-/// How far one method is off after so many steps: the most in the [`PERIOD`] that ends
-/// there.
+/// Largest errors of a method in the [`PERIOD`] that ends after a number of steps.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RotationDrift {
     /// Name of the method.
@@ -113,7 +108,7 @@ pub struct RotationDrift {
     pub orbit_radius_error: f64,
 }
 
-/// How far a method is off after whole turns in steps of one degree.
+/// Error of a method after whole turns in steps of one degree.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TurnDrift {
     /// Name of the method.
@@ -141,12 +136,11 @@ pub fn moments(looks: &[u64]) -> Vec<Moment> {
         let mut turns = step.power(steps.start() - 1);
         let moment = |steps| {
             turns = turns.times(&step);
-            let (turns, angles) = (turns.clone(), turned(steps));
             Moment {
                 last,
                 steps,
-                turns,
-                angles,
+                turns: turns.clone(),
+                angles: turned(steps),
             }
         };
         steps.map(moment).collect::<Vec<_>>()
@@ -157,6 +151,7 @@ pub fn moments(looks: &[u64]) -> Vec<Moment> {
 }
 
 impl Method {
+    /// Largest errors of every period.
     pub fn drift(&self, moments: &[Moment]) -> Vec<RotationDrift> {
         let steps: Vec<u64> = moments.iter().map(|moment| moment.steps).collect();
         let mut worst: BTreeMap<u64, [f64; 4]> = BTreeMap::new();
@@ -173,12 +168,8 @@ impl Method {
                 ORBIT_RADIUS * position,
                 (ORBIT_RADIUS * longer).abs(),
             ];
-            // NaN is the largest.
-            for (worst, now) in worst.entry(moment.last).or_default().iter_mut().zip(now) {
-                if now > *worst || now.is_nan() {
-                    *worst = now;
-                }
-            }
+            let worst = worst.entry(moment.last).or_default();
+            *worst = std::array::from_fn(|i| larger(worst[i], now[i]));
         }
         let row = |(steps, worst): (u64, [f64; 4])| RotationDrift {
             method: self.name,
@@ -191,8 +182,8 @@ impl Method {
         worst.into_iter().map(row).collect()
     }
 
-    /// After each of the ascending numbers of whole turns the camera ought to
-    /// be where it was: at that moment alone, since no other is a whole turn.
+    /// Errors after ascending numbers of whole turns, which end where they began.
+    /// They hold at that moment alone, since no other is a whole turn.
     pub fn turn_drift(&self, turns: &[u64]) -> Vec<TurnDrift> {
         let steps: Vec<u64> = turns.iter().map(|turns| 360 * turns).collect();
         let reached = (self.walk)(&ONE_DEGREE, &steps);

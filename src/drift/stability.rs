@@ -1,5 +1,5 @@
-//! Largest `omega h` up to which each method of the spring arm is stable, and the share
-//! of an error that one step leaves beyond: found by trying the very step that runs.
+//! Limits of stability of the spring arm's methods in `omega h`, and the share of an
+//! error that one step leaves beyond: found by trying the very step that runs.
 
 use serde::Serialize;
 
@@ -17,33 +17,32 @@ const ALWAYS: f64 = 1e4;
 /// Slack of the conditions of stability, for rounding.
 const SLACK: f64 = 1e-12;
 
-/// Relative distance of two eigenvalues below which they are one: the discriminant of a
-/// double one is the rounding of its terms.
+/// Relative distance of two eigenvalues below which they are one.
+///
+/// The discriminant of a double one is the rounding of its terms.
 const DOUBLE: f64 = 1e-9;
 
-/// Trace and determinant of the matrix of one step of an arm whose target rests at zero.
+/// Trace and determinant of the matrix of one step, for a target at rest at zero.
 /// `omega` is one and `h` is `omega_h`.
 fn trace_and_determinant(method: &Method, zeta: f64, omega_h: f64) -> (f64, f64) {
-    let column = |start| {
-        let rest = Line {
-            start: 0.0,
-            base: 0.0,
-            speed: 0.0,
-        };
-        let arm = Arm {
-            stiffness: 1.0,
-            friction: 2.0 * zeta,
-            stiffening: 0.0,
-            stop: f64::INFINITY,
-        };
-        let chase = Chase {
-            arm,
-            start,
-            frames: vec![rest],
-            frame_s: omega_h,
-        };
-        chase.states(method.follow, 1)[0]
+    let arm = Arm {
+        stiffness: 1.0,
+        friction: 2.0 * zeta,
+        stiffening: 0.0,
+        stop: f64::INFINITY,
     };
+    let rest = Line {
+        start: 0.0,
+        base: 0.0,
+        speed: 0.0,
+    };
+    let column = |start| Chase {
+        arm,
+        start,
+        frames: vec![rest],
+        frame_s: omega_h,
+    };
+    let column = |start| column(start).states(method.follow, 1)[0];
     let ([a, c], [b, d]) = (column([1.0, 0.0]), column([0.0, 1.0]));
     (a + d, a * d - b * c)
 }
@@ -66,7 +65,7 @@ fn left_per_step(method: &Method, zeta: f64, omega_h: f64) -> f64 {
     }
 }
 
-/// The first place above zero where a method is no longer stable, by growing steps and
+/// The least `omega h` where a method is no longer stable, by growing steps and
 /// bisection; `None` if it is stable up to [`ALWAYS`].
 pub fn limit(method: &Method, zeta: f64) -> Option<f64> {
     let (mut good, mut bad) = (1e-3, 1e-3);
@@ -135,8 +134,7 @@ mod tests {
         f64::hypot(x, y)
     }
 
-    /// The eigenvalues of the arm are `omega (-zeta +- sqrt(zeta^2 - 1))`; explicit Euler
-    /// and RK4 are stable while `|R(h lambda)| <= 1` (on the negative axis RK4 up to the
+    /// The eigenvalues are `omega (-zeta +- sqrt(zeta^2 - 1))`; explicit Euler and RK4 are stable while `|R(h lambda)| <= 1` (on the negative axis RK4 up to the
     /// root of z^3 + 4 z^2 + 12 z + 24: Hairer and Wanner 1996, "Solving Ordinary
     /// Differential Equations II", IV.2), semi-implicit Euler by Jury's conditions.
     #[test]
@@ -169,8 +167,7 @@ mod tests {
         }
     }
 
-    /// At critical damping the eigenvalue is R(-omega h), a double one: 1 + z for explicit
-    /// Euler, 1/(1 - z) for implicit Euler, exp(z), and for TR-BDF2
+    /// At critical damping R(-omega h) is a double eigenvalue: 1 + z for explicit Euler, 1/(1 - z) for implicit Euler, exp(z), and for TR-BDF2
     /// `(1 + (sqrt(2) - 1) z) / (1 - (1 - 1/sqrt(2)) z)^2`, which is below zero from
     /// `omega h = sqrt(2) + 1` on and tends to zero from below.
     #[test]

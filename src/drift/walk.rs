@@ -1,4 +1,4 @@
-//! Many steps of one kind with looks at where they led, and such steps as tasks of the
+//! Walks of many equal steps with looks on the way, and such steps as tasks of the
 //! timed pass.
 
 use std::hint::black_box;

@@ -1,55 +1,42 @@
-//! The stiff and extreme suite: every test vector on every structure, at
-//! planes and at camera level. It defines the rows that come out and what counts
-//! as passed; what is typed and printed is the command line's.
+//! The stiff and extreme suite: test vectors and generated extremes on every
+//! structure, at planes and at camera level. This file defines the rows that come out.
 
 pub mod extremes;
 mod margin;
 mod replay;
 mod sheet;
-mod vector;
 mod vectors;
 
 use serde::Serialize;
 
-use crate::camera::Surroundings;
-use crate::geometry::Aabb;
-use glam::DVec3;
-
-use margin::slack;
 pub use replay::{Replay, replay};
-pub use vector::{Names, Vector, VectorCamera, VectorPoint};
-pub use vectors::{BUILT_IN, BUILT_IN_NAME, built_in, read_vectors, read_vectors_file};
+pub use vectors::{
+    BUILT_IN, BUILT_IN_NAME, Name, Names, Vector, VectorBox, VectorCamera, VectorPoint, built_in,
+    read_vectors, read_vectors_file,
+};
 
-/// What is taken to be exact: the planes, or the camera's numbers.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Level {
-    /// The f32 planes are exact.
-    Planes,
-    /// The camera's f64 numbers are exact; planes are rounded.
-    Camera,
+named! {
+    /// Numbers that are taken to be exact.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Level {
+        /// The f32 planes; the camera plays no part.
+        Planes = "planes",
+        /// The camera's f64 numbers; planes are rounded.
+        Camera = "camera",
+    }
 }
 
-/// How a check came out.
+/// Outcome of a check.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// As declared.
+    /// The declared outcome.
     Pass,
-    /// Not as declared.
+    /// Another outcome.
     Fail,
     /// Impossible, and refused as it must be.
     Refused,
-}
-
-impl Level {
-    /// As JSON has it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Level::Planes => "planes",
-            Level::Camera => "camera",
-        }
-    }
 }
 
 /// Names of boxes, or words.
@@ -62,21 +49,15 @@ pub enum Said {
     Text(String),
 }
 
-impl From<&Names> for Said {
-    fn from(names: &Names) -> Said {
-        Said::Names(names.iter().cloned().collect())
+impl Said {
+    fn of_names<'n>(names: impl IntoIterator<Item = &'n Name>) -> Said {
+        Said::Names(names.into_iter().map(|name| name.0.clone()).collect())
     }
 }
 
-impl From<String> for Said {
-    fn from(text: String) -> Said {
-        Said::Text(text)
-    }
-}
-
-impl From<&str> for Said {
-    fn from(text: &str) -> Said {
-        Said::Text(text.to_owned())
+impl<T: Into<String>> From<T> for Said {
+    fn from(text: T) -> Said {
+        Said::Text(text.into())
     }
 }
 
@@ -89,22 +70,22 @@ impl std::fmt::Display for Said {
     }
 }
 
-/// One check: a case asked of a structure with a culling test.
+/// One check: a case on a structure with a culling test.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Row {
     /// A case, or a case and the box that went wrong.
     pub id: String,
-    /// What was taken to be exact.
+    /// Numbers that were taken to be exact.
     pub level: Level,
     /// Name of the structure.
     pub structure: String,
     /// Name of the culling test.
     pub test: String,
-    /// How it came out.
+    /// Outcome of the check.
     pub status: Status,
-    /// What was declared.
+    /// Declared outcome.
     pub expected: Said,
-    /// What the structure answered.
+    /// Answer of the structure.
     pub got: Said,
 }
 
@@ -115,9 +96,9 @@ pub struct Section {
     pub name: String,
     /// Number of cases.
     pub cases: u64,
-    /// Boxes asked about.
+    /// Number of boxes in all cases.
     pub boxes: u64,
-    /// What the oracle said of them (extremes at camera level).
+    /// Verdicts of the oracle (extremes at camera level).
     pub tally: extremes::Tally,
     /// Checks with their outcome.
     pub rows: Vec<Row>,
@@ -135,13 +116,5 @@ impl Section {
     /// Number of checks with this status.
     pub fn count(&self, status: Status) -> usize {
         self.rows.iter().filter(|row| row.status == status).count()
-    }
-}
-
-/// What the planes must know of boxes about the scene origin zero.
-fn surroundings(items: &[Aabb]) -> Surroundings {
-    Surroundings {
-        origin: DVec3::ZERO,
-        reach: Aabb::union_of(items).reach(),
     }
 }

@@ -1,90 +1,141 @@
-//! The rows of one vector at one level: asking structures, comparing sets of
-//! names, and the rows that come of it. Which questions a vector has is decided in
-//! `replay`.
+//! Rows of one vector at one level: queries of structures and the comparison of
+//! their answers, as sets of names, with the declared ones.
 
-use super::margin::slack;
-use super::{Level, Names, Row, Said, Status, Vector};
+use glam::Vec3;
+
+use super::{Level, Name, Names, Row, Said, Status, Vector};
 use crate::arithmetic::Expansion;
-use crate::camera::{Camera, Surroundings};
 use crate::culling::CullingTest;
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{BuildError, DynIndex, caught};
 use crate::oracle::{Oracle, Verdict};
-use crate::query::{AnyVolume, ItemId, QueryCost};
-use crate::verify::explain_visibility;
-use glam::Vec3;
+use crate::query::{AnyVolume, QueryCost};
 
-/// The name that the oracle's own rows have in place of a structure.
+/// Name of the oracle's own rows in place of a structure.
 const ORACLE: &str = "oracle";
 
-/// A structure by its label, built over the boxes of a vector or not.
-pub(super) type Built<'a> = (&'a str, Result<Box<dyn DynIndex>, BuildError>);
+/// A structure by its label, built over the boxes of a vector or refused.
+pub type Built<'a> = (&'a str, Result<Box<dyn DynIndex>, BuildError>);
+
+/// Names of the boxes that a query returned, sorted, or why there are none.
+pub type Answer = Result<Vec<Name>, String>;
 
 /// One level of one vector.
 pub struct Sheet<'a> {
     pub vector: &'a Vector,
     pub level: Level,
-    pub names: &'a [String],
+    pub names: &'a [Name],
     pub items: &'a [Aabb],
     pub rows: Vec<Row>,
 }
 
 impl Sheet<'_> {
+    /// Adds a row about the whole vector, or about one of its boxes or points.
     pub fn row(
         &mut self,
-        id: String,
-        structure: &str,
-        test: &str,
+        about: Option<&Name>,
+        [structure, test]: [&str; 2],
         status: Status,
-        expected: Said,
-        got: Said,
+        expected: impl Into<Said>,
+        got: impl Into<Said>,
     ) {
+        let id = &self.vector.id.0;
         self.rows.push(Row {
-            id,
+            id: about.map_or(id.clone(), |name| format!("{id}/{}", name.0)),
             level: self.level,
             structure: structure.to_owned(),
             test: test.to_owned(),
             status,
-            expected,
-            got,
+            expected: expected.into(),
+            got: got.into(),
         });
     }
 
-    /// The names of those boxes.
-    fn names_of(&self, is_one: impl Fn(&Aabb) -> bool) -> Names {
+    /// Adds the row of an answer, which fails if it holds an empty box.
+    pub fn answered(
+        &mut self,
+        about: Option<&Name>,
+        subject: [&str; 2],
+        is_right: bool,
+        wanted: &Names,
+        answer: &Answer,
+    ) {
+        let empty = self.vector.expect_empty_boxes.iter().flatten();
+        let is_empty = |name: &Name| empty.clone().any(|empty| empty == name);
+        let has_empty = answer.iter().flatten().any(is_empty);
+        let status = match is_right && !has_empty {
+            true => Status::Pass,
+            false => Status::Fail,
+        };
+        let got = match answer {
+            Ok(names) => Said::of_names(names),
+            Err(text) => Said::Text(text.clone()),
+        };
+        self.row(about, subject, status, Said::of_names(wanted), got);
+    }
+
+    /// Adds the row of an answer and a row for each box that is wrong in it.
+    ///
+    /// `fault` describes a difference: a box, and whether it is wanted; `None` if the
+    /// difference is allowed.
+    pub fn compared(
+        &mut self,
+        subject: [&str; 2],
+        wanted: &Names,
+        answer: &Answer,
+        fault: impl Fn(&Aabb, bool) -> Option<String>,
+    ) {
+        let found: Names = answer.iter().flatten().cloned().collect();
+        let mut faults = Vec::new();
+        for name in wanted.symmetric_difference(&found) {
+            let is_wanted = wanted.contains(name);
+            let got = match self.box_named(name) {
+                Some(b) => fault(b, is_wanted),
+                None => Some("no such box".to_owned()),
+            };
+            faults.extend(got.map(|got| (name, is_wanted, got)));
+        }
+        let is_unique = answer
+            .as_ref()
+            .is_ok_and(|names| names.len() == found.len());
+        let is_right = is_unique && faults.is_empty();
+        self.answered(None, subject, is_right, wanted, answer);
+        for (name, is_wanted, got) in faults.into_iter().filter(|_| answer.is_ok()) {
+            let expected = if is_wanted { "visible" } else { "not visible" };
+            self.row(Some(name), subject, Status::Fail, expected, got);
+        }
+    }
+
+    fn box_named(&self, name: &Name) -> Option<&Aabb> {
+        let index = self.names.iter().position(|n| n == name)?;
+        self.items.get(index)
+    }
+
+    /// Names of the boxes that satisfy a condition.
+    pub fn names_of(&self, is_one: impl Fn(&Aabb) -> bool) -> Names {
         let boxes = self.names.iter().zip(self.items);
         let those = boxes.filter(|(_, b)| is_one(b));
         those.map(|(name, _)| name.clone()).collect()
     }
 
-    pub fn box_named(&self, name: &str) -> Option<&Aabb> {
-        let at = self.names.iter().position(|n| n == name)?;
-        self.items.get(at)
+    /// Names of the boxes that the oracle sees. Boxes that are not finite are none.
+    pub fn seen_by(&self, oracle: &Oracle) -> Names {
+        self.names_of(|b| b.is_finite() && oracle.verdict(b) != Verdict::Out)
     }
 
-    /// The names of an answer; ids that come twice or do not exist show.
-    pub fn named(&self, ids: &[ItemId]) -> Vec<String> {
-        let name = |&id: &ItemId| match self.names.get(id as usize) {
-            Some(name) => name.clone(),
-            None => format!("(no item {id})"),
-        };
-        let mut names: Vec<String> = ids.iter().map(name).collect();
-        names.sort_unstable();
-        names
-    }
-
-    /// Asks for something twice, counted and not.
-    pub fn answer(
+    /// Queries a structure, counted and not. Returned items that `keep` rejects are
+    /// dropped; unknown ids show in the answer.
+    pub fn query(
         &self,
         built: &Result<Box<dyn DynIndex>, BuildError>,
-        ask: impl Fn(&dyn DynIndex, Option<&mut QueryCost>, &mut Vec<ItemId>),
-    ) -> Result<Vec<String>, String> {
+        volume: AnyVolume<'_>,
+        keep: impl Fn(&Aabb) -> bool,
+    ) -> Answer {
         let index = built.as_ref().map_err(BuildError::to_string)?;
         let (mut plain, mut counted) = (Vec::new(), Vec::new());
         caught(|| {
-            ask(index.as_ref(), None, &mut plain);
-            let cost = &mut QueryCost::default();
-            ask(index.as_ref(), Some(cost), &mut counted);
+            index.query(volume, &mut plain);
+            index.query_counted(volume, &mut counted, &mut QueryCost::default());
         })
         .map_err(|text| format!("panicked: {text}"))?;
         if plain != counted {
@@ -92,72 +143,18 @@ impl Sheet<'_> {
                 "counting changes the answer: {plain:?}, {counted:?}"
             ));
         }
-        Ok(self.named(&plain))
-    }
-
-    pub fn see(
-        &self,
-        built: &Result<Box<dyn DynIndex>, BuildError>,
-        view: AnyVolume<'_>,
-    ) -> Result<Vec<String>, String> {
-        self.answer(built, |index, cost, out| match cost {
-            None => index.query(view, out),
-            Some(cost) => index.query_counted(view, out, cost),
-        })
-    }
-
-    pub fn given_planes<E: std::fmt::Display>(
-        &mut self,
-        volume: Result<ConvexVolume, E>,
-        built: &[Built],
-    ) {
-        let vector = self.vector;
-        let volume = match (volume, &vector.planes_error) {
-            (Ok(volume), None) => volume,
-            (volume, declared) => {
-                let (status, got) = match (&volume, declared) {
-                    (Err(error), Some(_)) => (Status::Refused, error.to_string()),
-                    (Err(error), None) => (Status::Fail, error.to_string()),
-                    (Ok(_), _) => (Status::Fail, "accepted as planes".to_owned()),
-                };
-                let expected = match declared {
-                    Some(text) => Said::from(text.as_str()),
-                    None => Said::from("planes"),
-                };
-                for (spec, _) in built {
-                    let (id, got) = (vector.id.clone(), got.clone().into());
-                    let six = CullingTest::SixPlane.name();
-                    self.row(id, spec, six, status, expected.clone(), got);
-                }
-                return;
-            }
+        let name = |id: u32| match (self.items.get(id as usize), self.names.get(id as usize)) {
+            (Some(b), Some(name)) => keep(b).then(|| name.clone()),
+            _ => Some(Name(format!("(no item {id})"))),
         };
-        let scalar = || self.names_of(|b| volume.sees(b));
-        let wanted = vector.six_plane.clone().unwrap_or_else(scalar);
-        for (spec, built) in built {
-            let found = self.see(built, (&volume).into());
-            let list: Vec<String> = wanted.iter().cloned().collect();
-            let right = found.as_ref() == Ok(&list);
-            self.answered(spec, CullingTest::SixPlane.name(), right, &wanted, &found);
-            let Ok(found) = &found else { continue };
-            let found: Names = found.iter().cloned().collect();
-            for name in wanted.symmetric_difference(&found) {
-                let got = match self.box_named(name) {
-                    Some(b) => explain_visibility(b, &volume),
-                    None => "no such box".to_owned(),
-                };
-                self.offending(spec, CullingTest::SixPlane.name(), name, &wanted, got);
-            }
-        }
-        self.without_rounding(&volume);
-        let oracle = Oracle::of_volume(&volume);
-        self.verdicts(&oracle, &vector.visible_planes, &vector.touch_planes);
+        let mut names: Vec<Name> = plain.into_iter().filter_map(name).collect();
+        names.sort_unstable();
+        Ok(names)
     }
 
-    /// What the file says of the six-plane test in real numbers, beside what it
-    /// says of f32.
-    fn without_rounding(&mut self, volume: &ConvexVolume) {
-        let Some(wanted) = &self.vector.six_plane_exact else {
+    /// Adds the row of the six-plane test in real numbers, if the file declares it.
+    pub fn without_rounding(&mut self, volume: &ConvexVolume) {
+        let Some(wanted) = &self.vector.p_vertex_exact_visible else {
             return;
         };
         let seen = self.names_of(|b| {
@@ -165,168 +162,47 @@ impl Sheet<'_> {
             !b.is_empty() && !volume.planes().iter().any(excluded)
         });
         let got = Ok(seen.iter().cloned().collect());
-        self.answered(ORACLE, "six-plane exact", seen == *wanted, wanted, &got);
+        let subject = [ORACLE, "six-plane exact"];
+        self.answered(None, subject, seen == *wanted, wanted, &got);
     }
 
-    /// The row of an answer; empty boxes must not be in it.
-    pub fn answered(
-        &mut self,
-        spec: &str,
-        test: &str,
-        right: bool,
-        wanted: &Names,
-        found: &Result<Vec<String>, String>,
-    ) {
-        let got = match found {
-            Ok(names) => Said::Names(names.clone()),
-            Err(text) => Said::Text(text.clone()),
-        };
-        let empty = &self.vector.empty_boxes;
-        let ghost = found.iter().flatten().any(|name| empty.contains(name));
-        let status = match right && !ghost {
-            true => Status::Pass,
-            false => Status::Fail,
-        };
-        let id = self.vector.id.clone();
-        self.row(id, spec, test, status, Said::from(wanted), got);
-    }
-
-    /// The row of a box that is wrong in an answer.
-    pub fn offending(&mut self, spec: &str, test: &str, name: &str, wanted: &Names, got: String) {
-        let expected = match wanted.contains(name) {
-            true => "visible",
-            false => "not visible",
-        };
-        let id = format!("{}/{name}", self.vector.id);
-        self.row(id, spec, test, Status::Fail, expected.into(), got.into());
-    }
-
-    /// A structure at camera level: all that is wanted must come. More may,
-    /// but for the exact test only what lies within its margin.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "one place calls it, in a row of loops"
-    )]
-    pub fn seen(
-        &mut self,
-        spec: &str,
-        built: &Result<Box<dyn DynIndex>, BuildError>,
-        test: &str,
-        view: AnyVolume<'_>,
-        wanted: &Names,
-        around: &Surroundings,
-        exact: Option<(&Oracle, &Camera)>,
-    ) {
-        let answer = self.see(built, view);
-        let found: Names = answer.iter().flatten().cloned().collect();
-        let mut offenders: Vec<(String, String)> = Vec::new();
-        for name in wanted.difference(&found) {
-            let got = match (self.box_named(name), exact) {
-                (None, _) => "no such box".to_owned(),
-                (Some(b), Some((oracle, _))) => {
-                    format!("dropped, {:e} deep", oracle.depth(b))
-                }
-                _ => "dropped".to_owned(),
-            };
-            offenders.push((name.clone(), got));
-        }
-        if let Some((oracle, camera)) = exact {
-            for name in found.difference(wanted) {
-                let Some(b) = self.box_named(name) else {
-                    offenders.push((name.clone(), "no such item".to_owned()));
-                    continue;
-                };
-                let (depth, slack) = (oracle.depth(b), slack(camera, around, b));
-                if depth < -slack {
-                    let got = format!("returned, {:e} away; the margin is {slack:e}", -depth);
-                    offenders.push((name.clone(), got));
-                }
-            }
-        }
-        let unique = answer.as_ref().is_ok_and(|list| list.len() == found.len());
-        let known = found.iter().all(|name| self.box_named(name).is_some());
-        let right = unique && known && offenders.is_empty();
-        self.answered(spec, test, right, wanted, &answer);
-        if answer.is_ok() {
-            for (name, got) in offenders {
-                self.offending(spec, test, &name, wanted, got);
-            }
-        }
-    }
-
-    pub fn seen_by(&self, oracle: &Oracle) -> Names {
-        // What is not finite is no box, and nothing is built with it.
-        self.names_of(|b| b.is_finite() && oracle.verdict(b) != Verdict::Out)
-    }
-
-    /// The oracle's own verdicts: visible and touching exactly as stated.
+    /// Adds rows of the oracle's verdicts: visible and touching exactly as declared.
     pub fn verdicts(&mut self, oracle: &Oracle, visible: &Option<Names>, touch: &Option<Names>) {
         let Some(listed) = visible.as_ref().or(touch.as_ref()) else {
             return;
         };
-        let got = self.seen_by(oracle);
         let mut wrong = Vec::new();
         let boxes = self.names.iter().zip(self.items);
         for (name, b) in boxes.filter(|(_, b)| b.is_finite()) {
-            let said = oracle.verdict(b);
-            let names = |list: &Option<Names>| list.as_ref().map(|names| names.contains(name));
-            let wanted = match (names(visible), names(touch)) {
+            let found = oracle.verdict(b);
+            let lists = |list: &Option<Names>| list.as_ref().map(|names| names.contains(name));
+            let wanted = match (lists(visible), lists(touch)) {
                 (_, Some(true)) => Verdict::Touch,
                 (Some(false), _) => Verdict::Out,
                 (Some(true), Some(false)) => Verdict::In,
-                // A file that does not tell one of the two is content with either.
-                (Some(true), None) if said == Verdict::Out => Verdict::In,
-                (None, Some(false)) if said == Verdict::Touch => Verdict::In,
-                _ => said,
+                // A file without one of the two lists accepts either.
+                (Some(true), None) if found == Verdict::Out => Verdict::In,
+                (None, Some(false)) if found == Verdict::Touch => Verdict::In,
+                _ => found,
             };
-            if said != wanted {
-                wrong.push((name.clone(), format!("{wanted:?}"), format!("{said:?}")));
+            if found != wanted {
+                wrong.push((name, wanted, format!("{found:?}").to_lowercase()));
             }
         }
         let names = visible.iter().chain(touch).flatten();
         let unknown = names.filter(|name| self.box_named(name).is_none());
-        wrong.extend(unknown.map(|name| (name.clone(), "In".to_owned(), "no such box".to_owned())));
-        let test = CullingTest::Exact.name();
-        let got = Ok(got.into_iter().collect());
-        self.answered(ORACLE, test, wrong.is_empty(), listed, &got);
+        wrong.extend(unknown.map(|name| (name, Verdict::In, "no such box".to_owned())));
+        let subject = [ORACLE, CullingTest::Exact.name()];
+        let got = Ok(self.seen_by(oracle).into_iter().collect());
+        self.answered(None, subject, wrong.is_empty(), listed, &got);
         for (name, expected, got) in wrong {
-            let id = format!("{}/{name}", self.vector.id);
-            let (expected, got) = (expected.to_lowercase(), got.to_lowercase());
-            let fail = Status::Fail;
-            self.row(id, ORACLE, test, fail, expected.into(), got.into());
-        }
-    }
-
-    /// Region search; the middle of an empty box must not find it either.
-    pub fn points(&mut self, built: &[Built]) {
-        let vector = self.vector;
-        for (spec, built) in built {
-            for point in &vector.points {
-                let holds = |id: &ItemId| {
-                    let b = &self.items[*id as usize];
-                    let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
-                    point.p.cmpge(min).all() && point.p.cmple(max).all()
-                };
-                // Boxes are f32: a point that is none can only find too many.
-                let found = self.answer(built, |index, cost, out| {
-                    match cost {
-                        None => index.locate(point.p.as_vec3(), out),
-                        Some(cost) => index.query_counted(point.p.as_vec3().into(), out, cost),
-                    }
-                    out.retain(holds);
-                });
-                let list: Vec<String> = point.containing.iter().cloned().collect();
-                let right = found.as_ref() == Ok(&list);
-                self.answered(spec, "locate", right, &point.containing, &found);
-                if let Some(row) = self.rows.last_mut() {
-                    row.id = format!("{}/{}", vector.id, point.id);
-                }
-            }
+            let expected = format!("{expected:?}").to_lowercase();
+            self.row(Some(name), subject, Status::Fail, expected, got);
         }
     }
 }
 
-/// A plane's value at a point without any rounding: f64 holds the products.
+/// Value of a plane at a point without any rounding: f64 holds the products.
 fn value_at(plane: &Plane, p: Vec3) -> Expansion {
     let products = plane.normal.as_dvec3() * p.as_dvec3();
     let mut value = Expansion::from(plane.d);

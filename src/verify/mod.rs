@@ -38,7 +38,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Whether the answer is the reference's.
+    /// True if the answer is the reference's.
     pub fn is_none(&self) -> bool {
         *self == Difference::default()
     }
@@ -97,10 +97,9 @@ pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyVolume<'v>>) -> Strin
 /// The same for region search.
 pub fn explain_containment(b: &Aabb, p: Vec3) -> String {
     let [min, max] = [b.min, b.max].map(|corner| corner.to_array());
-    let holds = if b.contains_point(p) {
-        "holds"
-    } else {
-        "does not hold"
+    let holds = match b.contains_point(p) {
+        true => "holds",
+        false => "does not hold",
     };
     format!("box {min:?} to {max:?} {holds} the point {p:?}")
 }

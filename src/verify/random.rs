@@ -1,6 +1,6 @@
 //! Random differential cases: small scenes made to be unpleasant (touching
-//! faces, repeated and flat boxes, wild sizes) and volumes of every kind, a point and a box. A
-//! case is its seed, so that any failure is one number.
+//! faces, repeated and flat boxes, wild sizes) and volumes of every kind, a point and
+//! a box. A case is its seed, so that any failure is one number.
 
 use glam::{DVec3, Vec3};
 
@@ -63,9 +63,7 @@ impl RandomCase {
             region: item(&mut rng, scale),
         }
     }
-}
 
-impl RandomCase {
     /// The items that overlap the region, by the six comparisons.
     pub fn overlapping(&self) -> impl Iterator<Item = ItemId> {
         let items = (0..).zip(&self.items);
@@ -87,15 +85,15 @@ fn item(rng: &mut SeededRng, scale: f64) -> Aabb {
         // A point, a flat box, a needle, an inverted (empty) box.
         0 => Aabb::new(a, a),
         1 => Aabb::new(a.min(b), a.max(b).with_z(a.min(b).z)),
-        2 => Aabb::new(
-            a.min(b).with_y(a.y).with_z(a.z),
-            a.max(b).with_y(a.y).with_z(a.z),
-        ),
+        2 => {
+            let along_x = |end: Vec3| end.with_y(a.y).with_z(a.z);
+            Aabb::new(along_x(a.min(b)), along_x(a.max(b)))
+        }
         3 => Aabb::new(a.max(b) + Vec3::splat(scale as f32), a.min(b)),
-        4 => Aabb::new(
-            a,
-            a + Vec3::splat((scale * libm::exp2(-rng.unit() * 20.0)) as f32),
-        ),
+        4 => {
+            let edge = scale * libm::exp2(-rng.unit() * 20.0);
+            Aabb::new(a, a + Vec3::splat(edge as f32))
+        }
         // Overlapping boxes of the scene's own size.
         _ => Aabb::new(a.min(b), a.max(b)),
     }
@@ -109,11 +107,7 @@ fn volume(rng: &mut SeededRng, kind: usize, scale: f64, items: &[Aabb]) -> Optio
             // planes are no longer mirror images.
             let straight = camera_volume(rng, 0, scale, items)?;
             let [a, b] = [(); 2].map(|()| rng.between(-1.0, 1.0) as f32);
-            let sheared = straight.planes().iter().map(|p| {
-                let n = p.normal;
-                Plane::new(Vec3::new(n.x, n.y + a * n.x, n.z + b * n.x), p.d)
-            });
-            ConvexVolume::from_planes(&sheared.collect::<Vec<_>>()).ok()
+            ConvexVolume::from_planes(&sheared(straight.planes(), [a, b])).ok()
         }
         5 => {
             let count = 1 + rng.below(5);
@@ -132,6 +126,15 @@ fn volume(rng: &mut SeededRng, kind: usize, scale: f64, items: &[Aabb]) -> Optio
             ConvexVolume::from_planes(planes).ok()
         }
     }
+}
+
+/// Planes whose x is sheared along y and z.
+pub fn sheared(planes: &[Plane], [a, b]: [f32; 2]) -> Vec<Plane> {
+    let shear = |n: Vec3| Vec3::new(n.x, n.y + a * n.x, n.z + b * n.x);
+    planes
+        .iter()
+        .map(|p| Plane::new(shear(p.normal), p.d))
+        .collect()
 }
 
 /// Planes near the middle of the scene, facing it more often than not; some
@@ -183,10 +186,7 @@ fn camera_volume(
             Lens::off_axis([low, high, -near, near * aspect], near, Some(far))
         }
     };
-    let around = Surroundings {
-        origin: DVec3::ZERO,
-        reach: Aabb::union_of(items).reach(),
-    };
+    let around = Surroundings::of_boxes(items);
     let mut options = PlaneOptions::default();
     if rng.unit() < 0.5 {
         options.epsilon = 0.0;

@@ -8,7 +8,7 @@ use crate::geometry::Aabb;
 use crate::index::caught;
 use crate::query::{AnyVolume, ItemId};
 
-/// What is wrong with an answer.
+/// A fault of an answer.
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Fault {
@@ -31,7 +31,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// For questions about so many items.
+    /// A trial for queries of `items` items.
     pub fn new(items: usize) -> Trial {
         Trial {
             marks: vec![0; items],
@@ -79,7 +79,7 @@ impl Trial {
         }
     }
 
-    /// What was answered last, right or wrong.
+    /// The last answer, right or wrong.
     pub fn answer(&self) -> &[ItemId] {
         &self.answer
     }
@@ -128,10 +128,7 @@ impl Fault {
             Fault::Panicked(message) => format!("panicked: {message}"),
             Fault::Differs(difference) => {
                 let why = difference.first.and_then(|id| explain(id as usize));
-                match why {
-                    Some(why) => format!("{difference}: {why}"),
-                    None => difference.to_string(),
-                }
+                why.map_or(difference.to_string(), |why| format!("{difference}: {why}"))
             }
         }
     }

@@ -46,12 +46,12 @@ pub struct ErrorCount {
     /// Out, but returned.
     #[serde(rename = "false_positive_count")]
     pub false_positives: u64,
-    /// Of the false positives those whose stored box, which is rounded outward
-    /// to f32, is truly visible.
+    /// False positives whose stored box, which is rounded outward to f32, is truly
+    /// visible.
     #[serde(rename = "excess_by_storage_count", default)]
     pub by_storage: u64,
-    /// Of the others those that the camera's planes would drop by the six-plane
-    /// test if they were neither rounded nor moved. The rest is the test's own.
+    /// Other false positives, dropped by the six-plane test if the camera's planes
+    /// were neither rounded nor moved. The rest is the test's own.
     #[serde(rename = "excess_by_planes_count", default)]
     pub by_planes: u64,
     /// How deep the deepest false negative reaches into the volume, world
@@ -128,30 +128,29 @@ impl Truth {
         };
         let world = of(DVec3::ZERO)?;
         let judgements = boxes.iter().map(|b| world.judge_wide(b.min, b.max));
-        let mut truth = Truth::of_judgements(stored, judgements);
+        let mut truth = Truth::of_judgements(stored, judgements.collect());
         truth.written = Some((world, scene.originals.clone()));
         Some(truth)
     }
 
-    /// The truth as an oracle has it.
+    /// The verdicts of an oracle. O(items).
     pub fn new(oracle: Oracle, items: &[Aabb]) -> Truth {
-        let judgements: Vec<Judgement> = items.iter().map(|item| oracle.judge(item)).collect();
-        Truth::of_judgements(oracle, judgements.into_iter())
+        let judgements = items.iter().map(|item| oracle.judge(item)).collect();
+        Truth::of_judgements(oracle, judgements)
     }
 
-    fn of_judgements(oracle: Oracle, judgements: impl Iterator<Item = Judgement>) -> Truth {
-        let (mut undecided, mut visible) = (0, 0);
-        let verdicts = judgements.map(|judgement| {
-            undecided += u64::from(judgement.undecided);
-            visible += u64::from(judgement.verdict != Verdict::Out);
-            judgement.verdict
-        });
+    fn of_judgements(oracle: Oracle, judgements: Vec<Judgement>) -> Truth {
+        let count =
+            |is_one: fn(&&Judgement) -> bool| judgements.iter().filter(is_one).count() as u64;
         Truth {
-            verdicts: verdicts.collect(),
-            oracle,
             written: None,
-            undecided,
-            visible,
+            undecided: count(|judgement| judgement.undecided),
+            visible: count(|judgement| judgement.verdict != Verdict::Out),
+            verdicts: judgements
+                .iter()
+                .map(|judgement| judgement.verdict)
+                .collect(),
+            oracle,
         }
     }
 
@@ -170,18 +169,22 @@ impl Truth {
         &self.verdicts
     }
 
-    /// The items that an answer lacks though they are in, each with how deep it
-    /// reaches into the volume, world units. O(items).
+    /// Every item of the truth: its id, its verdict, and whether it is in the answer.
+    fn answered(&self, answer: &[ItemId]) -> impl Iterator<Item = (usize, Verdict, bool)> {
+        let mut returned = vec![false; self.verdicts.len()];
+        answer.iter().for_each(|&id| returned[id as usize] = true);
+        let items = self.verdicts.iter().zip(returned).enumerate();
+        items.map(|(id, (&verdict, returned))| (id, verdict, returned))
+    }
+
+    /// Items that are in and not in the answer, each with how deep it reaches into
+    /// the volume, world units. O(items).
     pub fn misses(&self, items: &[Aabb], answer: &[ItemId]) -> Vec<(ItemId, f64)> {
-        let mut returned = vec![false; items.len()];
-        for &id in answer {
-            returned[id as usize] = true;
-        }
-        let verdicts = self.verdicts.iter().zip(returned).zip(0..);
-        let missed =
-            verdicts.filter(|((verdict, returned), _)| **verdict == Verdict::In && !returned);
-        let with_depth = missed.map(|(_, id)| (id, self.depth(id as usize, &items[id as usize])));
-        with_depth.collect()
+        let answered = self.answered(answer);
+        let missed = answered.filter(|(_, verdict, returned)| *verdict == Verdict::In && !returned);
+        missed
+            .map(|(id, ..)| (id as ItemId, self.depth(id, &items[id])))
+            .collect()
     }
 
     /// The errors of an answer (any order, no id twice) about the very items
@@ -192,12 +195,8 @@ impl Truth {
             undecided: self.undecided,
             ..ErrorCount::default()
         };
-        let mut returned = vec![false; items.len()];
-        for &id in answer {
-            returned[id as usize] = true;
-        }
-        let answers = self.verdicts.iter().zip(returned).zip(items);
-        for (id, ((verdict, returned), item)) in answers.enumerate() {
+        for (id, verdict, returned) in self.answered(answer) {
+            let item = &items[id];
             match (verdict, returned) {
                 (Verdict::In, false) => {
                     count.false_negatives += 1;

@@ -1,9 +1,8 @@
 //! One camera, every kind of volume: what a structure must get right beyond
 //! the six planes of a perspective view.
 
-use glam::Vec3;
-
 use super::VOLUME_KINDS;
+use super::random::sheared;
 use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
 use crate::geometry::{ConvexVolume, Plane};
 
@@ -33,10 +32,7 @@ pub fn variants(
     let planes = straight.planes().to_vec();
     let ortho = Lens::orthographic(0.3 * far, 1.5, -0.1 * far, 0.6 * far);
     let window = [-0.2, 0.9, -0.7, 0.1].map(|edge| edge * near);
-    let sheared = planes.iter().map(|p| {
-        let n = p.normal;
-        Plane::new(Vec3::new(n.x, n.y + 0.4 * n.x, n.z - 0.3 * n.x), p.d)
-    });
+    let sheared = sheared(&planes, [0.4, -0.3]);
     let mut turned = *camera;
     turned.frame.yaw(25.0);
     turned.frame.pitch(-10.0);
@@ -55,7 +51,7 @@ pub fn variants(
         Lens::off_axis(window, near, Some(far)).and_then(with).ok(),
     ];
     let few = planes[..1 + seed % 5].to_vec();
-    let (sheared, twelve, many) = (sheared.collect(), twelve.clone().collect(), many.collect());
+    let (twelve, many) = (twelve.clone().collect(), many.collect());
     for planes in [sheared, few, twelve, many, vec![planes[0], away]] {
         volumes.push(ConvexVolume::from_planes(&planes).ok());
     }
@@ -67,7 +63,7 @@ pub fn variants(
 mod tests {
     use super::*;
     use crate::camera::look_at;
-    use glam::DVec3;
+    use glam::{DVec3, Vec3};
 
     #[test]
     fn every_kind_is_what_it_is_called() {

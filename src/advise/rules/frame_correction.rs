@@ -5,7 +5,7 @@
 use super::super::case::Case;
 use super::super::omission::{By, Draft, LeftOutIf, Omission};
 use super::super::rule::{Rule, Unfit, not_applicable};
-use crate::drift::{Rated, rotations};
+use crate::drift::rotations;
 use crate::statistics::Estimate;
 
 pub(super) const RULE: Rule = Rule {
@@ -31,26 +31,23 @@ const LEFT_OUT: &str = "f32";
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let tolerance = case.options.tolerance;
     let steps = case.workload.cameras.len() as u64;
-    let rated = rotations(&[KEPT, LEFT_OUT], steps, tolerance);
-    let of = |name: &str| -> Option<&Rated> { rated.iter().find(|r| r.name == name) };
-    let (Some(kept), Some(left_out)) = (of(KEPT), of(LEFT_OUT)) else {
+    let rotations = rotations(&[KEPT, LEFT_OUT], steps);
+    let &[(kept, kept_ns), (left_out, left_out_ns)] = &rotations[..] else {
         return Err(not_applicable("no such method"));
     };
-    let walked = |rated: &Rated| match rated.error {
+    let walked = |error: Option<f64>| match error {
         Some(error) => format!("{error:.1e}"),
         None => "lost".to_owned(),
     };
     let (kept_error, left_out_error) = (walked(kept), walked(left_out));
     let mut omission = omission.compares(steps as f64 * DRIFT, tolerance * MUCH_LESS);
     // What was walked outweighs the estimate.
-    if let Some(error) = left_out.error {
+    if let Some(error) = left_out {
         omission.confirmed = omission.predicted.map(|said| said == (error <= tolerance));
         omission.predicted = Some(error <= tolerance);
     }
     let mut draft = omission.draft(Vec::new());
-    draft.once_ns = [left_out, kept]
-        .map(|rated| rated.ns_per_step.unwrap_or(f64::NAN))
-        .into();
+    draft.once_ns = vec![left_out_ns, kept_ns];
     Ok(draft.finished_by(move |omission, aside| {
         let ([left_out_ns, kept_ns], Some(ratio)) = (&aside.once_ns[..], &aside.once_ratio) else {
             return;

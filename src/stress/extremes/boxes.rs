@@ -1,7 +1,6 @@
 //! Boxes that make rounding as bad as it gets: most touch the view volume at a
 //! point of a face, an edge or a corner, and are then shifted by up to two
-//! ulps per axis; the rest lie about anywhere. It defines shapes and places; what is visible is the oracle's
-//! to say.
+//! ulps per axis; the rest lie about anywhere.
 
 use glam::{DVec3, Vec3};
 
@@ -10,7 +9,7 @@ use crate::geometry::Aabb;
 use crate::kernel::each;
 use crate::scene::SeededRng;
 
-/// What the boxes of a case look like.
+/// Shapes of the boxes of a case.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Shapes {
     /// Points, cubes, slivers, specks and boxes larger than the volume.
@@ -34,7 +33,7 @@ struct Hull {
     normals: [DVec3; 6],
 }
 
-/// An infinite volume is probed up to a depth of so many times near.
+/// Depth up to which an infinite volume is probed / near.
 const DEEP: f64 = 1e4;
 
 impl Hull {
@@ -183,7 +182,7 @@ fn sizes(rng: &mut SeededRng, shapes: Shapes, scale: f64) -> [f64; 3] {
     }
 }
 
-/// So many representable numbers up or down.
+/// The number `ulps` representable numbers above `x`, or below.
 fn shifted(x: f32, ulps: i32) -> f32 {
     (0..ulps.abs()).fold(x, |x, _| if ulps > 0 { x.next_up() } else { x.next_down() })
 }

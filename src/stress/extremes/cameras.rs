@@ -11,156 +11,93 @@ use crate::scene::SeededRng;
 
 /// One way of being extreme.
 pub struct CameraFamily {
-    /// As the table of results has it.
+    /// Name in the table of results.
     pub name: &'static str,
     /// Parameters of the family, mildest first.
     pub variants: &'static [f64],
-    /// How a variant is named in ids.
+    /// Name of a variant in ids.
     pub label: fn(f64) -> String,
     /// Makes an ordinary camera one of the family, for a parameter.
     adjust: fn(&mut Draft, &mut SeededRng, f64),
 }
 
-const fn family(
-    name: &'static str,
-    variants: &'static [f64],
-    adjust: fn(&mut Draft, &mut SeededRng, f64),
-) -> CameraFamily {
-    CameraFamily {
-        name,
-        variants,
-        label: plain,
-        adjust,
-    }
-}
-
 /// Distances from zero.
 const OFFSETS: &[f64] = &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15];
 
+/// Far / near.
+const RATIOS: &[f64] = &[1e3, 1e6, 1e9, f64::INFINITY];
+
 /// All families of cameras, in the order of the table of results.
-pub static CAMERA_FAMILIES: &[CameraFamily] = &[
+pub static CAMERA_FAMILIES: &[CameraFamily] = rows! { CameraFamily { name, variants, label, adjust }
     // Far / near from 1e3 to 1e9, and infinite.
-    family(
-        "near-far",
-        &[1e3, 1e6, 1e9, f64::INFINITY],
-        |draft, _, ratio| draft.depth(ratio),
-    ),
+    "near-far", RATIOS, plain, |draft, _, ratio| draft.depth(ratio);
     // The same with planes from a reversed-Z matrix in f64.
-    family(
-        "reversed-z",
-        &[1e3, 1e6, 1e9, f64::INFINITY],
-        |draft, _, ratio| {
-            draft.depth(ratio);
-            draft.planes.method = PlaneMethod::GhRevzF64;
-        },
-    ),
+    "reversed-z", RATIOS, plain, |draft, _, ratio| {
+        draft.depth(ratio);
+        draft.planes.method = PlaneMethod::GhRevzF64;
+    };
     // Vertical field of view from 1e-9 to 179.9999999 degrees.
-    family(
-        "fov",
-        &[
-            1e-9,
-            1e-6,
-            1e-3,
-            1.0,
-            90.0,
-            170.0,
-            179.99,
-            179.99999,
-            179.9999999,
-        ],
-        |draft, _, fov| draft.fovy_deg = fov,
-    ),
+    "fov", &[1e-9, 1e-6, 1e-3, 1.0, 90.0, 170.0, 179.99, 179.99999, 179.9999999], plain,
+        |draft, _, fov| draft.fovy_deg = fov;
     // Width / height from 1e-8 to 1e8.
-    family(
-        "aspect",
-        &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8],
-        |draft, _, aspect| draft.aspect = aspect,
-    ),
+    "aspect", &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8], plain, |draft, _, aspect| draft.aspect = aspect;
     // A camera 1e4 to 1e15 depths of 1 away from the scene's zero.
-    family("offset", OFFSETS, |draft, rng, offset| {
-        draft.carry_off(rng, offset)
-    }),
+    "offset", OFFSETS, plain, |draft, rng, offset| draft.carry_off(rng, offset);
     // The same in coordinates about a point near the camera.
-    family("rebased", OFFSETS, |draft, rng, offset| {
+    "rebased", OFFSETS, plain, |draft, rng, offset| {
         draft.carry_off(rng, offset);
         draft.origin = draft.eye.round();
-    }),
+    };
     // Up within 1e-6 to 1e-15 rad of the direction of view.
-    family(
-        "condition",
-        &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15],
-        |draft, rng, angle| {
-            draft.until_it_has_a_frame(rng, |draft, rng| {
-                draft.to_look = rng.below(2) == 0;
-                // Along the view as f64 has it, and hardly away from it: rounding can bring
-                // one camera's up too near to the view whatever its length is.
-                let length = libm::exp2(rng.between(-4.0, 4.0));
-                let away = angle * draft.forward.length() / draft.up.length();
-                let across = draft.up * away * rng.between(0.9, 1.5);
-                draft.up = (draft.forward + across) * length;
-            });
-        },
-    ),
+    "condition", &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15], plain, |draft, rng, angle| {
+        draft.until_it_has_a_frame(rng, |draft, rng| {
+            draft.to_look = rng.below(2) == 0;
+            // Along the view as f64 has it, and hardly away from it: rounding can bring
+            // one camera's up too near to the view whatever its length is.
+            let length = libm::exp2(rng.between(-4.0, 4.0));
+            let away = angle * draft.forward.length() / draft.up.length();
+            let across = draft.up * away * rng.between(0.9, 1.5);
+            draft.up = (draft.forward + across) * length;
+        });
+    };
     // Eye and look 1e-6 to 1e-15 of their coordinates apart.
-    family(
-        "near-look",
-        &[1e-6, 1e-9, 1e-12, 1e-15],
-        |draft, rng, share| {
-            draft.until_it_has_a_frame(rng, |draft, _| {
-                draft.to_look = true;
-                let size = draft.eye.abs().max_element();
-                draft.forward *= 4.0 * share * size / draft.forward.length();
-            });
-        },
-    ),
+    "near-look", &[1e-6, 1e-9, 1e-12, 1e-15], plain, |draft, rng, share| {
+        draft.until_it_has_a_frame(rng, |draft, _| {
+            draft.to_look = true;
+            let size = draft.eye.abs().max_element();
+            draft.forward *= 4.0 * share * size / draft.forward.length();
+        });
+    };
     // A volume about zero, seen from 1e3 to 1e15 depths away.
-    family(
-        "shell",
-        &[1e3, 1e6, 1e9, 1e12, 1e15],
-        |draft, _, distance| {
-            let half = draft.far.unwrap_or(1.0) / 2.0;
-            let distance = distance * half;
-            draft.eye = draft.forward.normalize() * -distance;
-            draft.fovy_deg = (half / distance).to_degrees();
-            (draft.near, draft.far) = (distance - half, Some(distance + half));
-        },
-    ),
-    // The whole scene scaled by 2^-148 to 2^127; what may overflow may be refused.
-    CameraFamily {
-        label: |power| format!("2^{power}"),
-        ..family(
-            "scale",
-            &[
-                -148.0, -140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0, 122.0, 124.0, 127.0,
-            ],
-            |draft, _, power| draft.scale(libm::exp2(power)),
-        )
-    },
+    "shell", &[1e3, 1e6, 1e9, 1e12, 1e15], plain, |draft, _, distance| {
+        let half = draft.far.unwrap_or(1.0) / 2.0;
+        let distance = distance * half;
+        draft.eye = draft.forward.normalize() * -distance;
+        draft.fovy_deg = (half / distance).to_degrees();
+        (draft.near, draft.far) = (distance - half, Some(distance + half));
+    };
+    // The whole scene scaled by 2^-148 to 2^127; views that may overflow may be refused.
+    "scale", &[-148.0, -140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0, 122.0, 124.0, 127.0],
+        |power| format!("2^{power}"), |draft, _, power| draft.scale(libm::exp2(power));
     // Boxes 1e-3 and 1e3 times as wide as the view, side by side.
-    family("size-ratio", &[1e6], |draft, _, _| {
-        draft.shapes = Shapes::Ratio
-    }),
+    "size-ratio", &[1e6], plain, |draft, _, _| draft.shapes = Shapes::Ratio;
     // Sixteen boxes, over and over.
-    family("coincident", &[16.0], |draft, _, _| {
-        draft.shapes = Shapes::Coincident
-    }),
+    "coincident", &[16.0], plain, |draft, _, _| draft.shapes = Shapes::Coincident;
     // Lines, plates and points without thickness.
-    family("needles", &[64.0], |draft, _, _| {
-        draft.shapes = Shapes::Needles
-    }),
+    "needles", &[64.0], plain, |draft, _, _| draft.shapes = Shapes::Needles;
     // A 90 degree camera on a grid of integers with its boxes: exact ties and one-ulp shifts.
-    family("ties", &[8.0, 64.0, 4096.0], |draft, rng, far| {
+    "ties", &[8.0, 64.0, 4096.0], plain, |draft, rng, far| {
         draft.shapes = Shapes::Grid;
         draft.eye = draft.eye.round();
         draft.forward = [DVec3::X, -DVec3::Y, DVec3::Z][rng.below(3)];
         draft.up = DVec3::new(draft.forward.z, draft.forward.x, draft.forward.y);
         (draft.fovy_deg, draft.aspect) = (90.0, 1.0);
         (draft.near, draft.far) = (1.0, Some(far));
-    }),
+    };
     // Orthographic, off-axis, and off-axis without a far plane.
-    CameraFamily {
-        label: |kind| ["orthographic", "off-axis", "off-axis inf"][kind as usize].to_owned(),
-        ..family("lens", &[0.0, 1.0, 2.0], |draft, rng, kind| {
+    "lens", &[0.0, 1.0, 2.0],
+        |kind| ["orthographic", "off-axis", "off-axis inf"][kind as usize].to_owned(),
+        |draft, rng, kind| {
             let half = draft.near * libm::tan(draft.fovy_deg.to_radians() / 2.0);
             let shift = half * rng.between(-3.0, 3.0);
             let window = [shift - half, shift + half, -half, half * draft.aspect];
@@ -170,9 +107,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
                 1 => Lens::off_axis(window, draft.near, draft.far),
                 _ => Lens::off_axis(window, draft.near, None),
             });
-        })
-    },
-];
+        };
+};
 
 impl CameraFamily {
     /// Draws a camera for a parameter.
@@ -200,15 +136,15 @@ pub struct Draft {
     aspect: f64,
     near: f64,
     far: Option<f64>,
-    /// Whether the pose names a point to look at.
+    /// True if the pose names a point to look at.
     to_look: bool,
-    /// Instead of the perspective one.
+    /// Replaces the perspective lens.
     other_lens: Option<Result<Lens, CameraError>>,
     /// Scene-local zero in world coordinates.
     pub origin: DVec3,
-    /// How its planes are derived.
+    /// Derivation of its planes.
     pub planes: PlaneOptions,
-    /// How the boxes about it are drawn.
+    /// Shapes of the boxes about it.
     pub shapes: Shapes,
 }
 
@@ -255,7 +191,7 @@ impl Draft {
         }
     }
 
-    /// Into some corner of space.
+    /// Moves the eye into some corner of space.
     fn carry_off(&mut self, rng: &mut SeededRng, offset: f64) {
         self.eye += rng.point().map(|c| (c - 0.5).signum() * offset);
     }
@@ -275,18 +211,20 @@ impl Draft {
         self.far = self.far.map(|far| far * factor);
     }
 
-    /// Where the camera stands.
+    /// Position and orientation, exact.
     pub fn pose(&self) -> Pose {
         let (eye, forward, up) = (self.eye, self.forward, self.up);
-        if self.to_look {
-            let look = eye + forward;
-            Pose::LookAt { eye, look, up }
-        } else {
-            Pose::Forward { eye, forward, up }
+        match self.to_look {
+            true => Pose::LookAt {
+                eye,
+                look: eye + forward,
+                up,
+            },
+            false => Pose::Forward { eye, forward, up },
         }
     }
 
-    /// What it takes in.
+    /// The lens, or why there is none.
     pub fn lens(&self) -> Result<Lens, CameraError> {
         let other = self.other_lens.clone();
         other.unwrap_or_else(|| Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far))

@@ -1,26 +1,23 @@
-//! One generated case under test: what every structure and culling test makes
-//! of its boxes, against the scalar loop and the oracle. It defines what counts
-//! as a fault; cameras and boxes come from the files beside it.
+//! One generated case under test: every structure and culling test on its
+//! boxes, against the scalar loop and the oracle. This file defines what counts as a
+//! fault.
 
 use glam::DVec3;
 
+use super::findings::{Built, Findings, SCALAR, Tally};
 use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::Aabb;
-use crate::index::{DynIndex, StructureSpec};
+use crate::index::StructureSpec;
 use crate::oracle::{Judgement, Oracle, Pose, Verdict};
-use crate::query::{AnyVolume, ItemId};
-use crate::stress::slack;
-use crate::verify::{self, Trial};
-
-/// The rows of the scalar loop have this in place of a structure.
-pub const SCALAR: &str = "scalar";
+use crate::query::AnyVolume;
+use crate::stress::margin::slack;
 
 /// A camera with boxes and the truth about them.
 pub struct Case {
     /// The camera that is culled for.
     pub camera: Camera,
-    /// How its planes are derived.
+    /// Derivation of its planes.
     pub planes: PlaneOptions,
     /// Size of the scene about it, for the epsilon.
     pub around: Surroundings,
@@ -30,7 +27,7 @@ pub struct Case {
     judgements: Vec<Judgement>,
 }
 
-/// What an answer lost.
+/// Items that an answer lost.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct Drops {
     /// Boxes that reach into the view and were not returned.
@@ -43,68 +40,6 @@ pub struct Drops {
     pub first: Option<usize>,
     /// How deep the deepest false negative reaches into the volume.
     pub deepest: f64,
-}
-
-/// Sums over cases.
-#[derive(Clone, Copy, Default, PartialEq, Debug)]
-pub struct Tally {
-    /// Boxes judged at camera level.
-    pub boxes: u64,
-    /// Boxes that are in or touch.
-    pub seen: u64,
-    /// Boxes that touch, to all that is known.
-    pub ties: u64,
-    /// Ties that the oracle cannot prove.
-    pub undecided: u64,
-    /// Boxes that reach into the view and were not returned.
-    pub false_negatives: u64,
-    /// Boxes that touch the view and were not returned.
-    pub touch_dropped: u64,
-    /// Views that were refused because their sums could overflow.
-    pub refused: u64,
-    /// What the six planes would lose without their epsilon.
-    pub lost_bare: u64,
-}
-
-impl std::ops::AddAssign for Tally {
-    fn add_assign(&mut self, other: Tally) {
-        self.boxes += other.boxes;
-        self.seen += other.seen;
-        self.ties += other.ties;
-        self.undecided += other.undecided;
-        self.false_negatives += other.false_negatives;
-        self.touch_dropped += other.touch_dropped;
-        self.refused += other.refused;
-        self.lost_bare += other.lost_bare;
-    }
-}
-
-/// Something that must not be.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Fault {
-    /// Name of the structure, or [`SCALAR`].
-    pub structure: String,
-    /// Name of the culling test.
-    pub test: String,
-    /// Index of the box; `None` where the whole answer is wrong.
-    pub item: Option<usize>,
-    /// What the oracle says.
-    pub expected: String,
-    /// What the structure did.
-    pub got: String,
-}
-
-/// The questions that were asked, and what came of it.
-#[derive(Clone, Default, Debug)]
-pub struct Findings {
-    /// Boxes asked about.
-    pub boxes: u64,
-    /// What the oracle says of them at camera level.
-    pub tally: Tally,
-    /// Structure and test of every question.
-    pub asked: Vec<(String, String)>,
-    /// In the order in which they were found.
-    pub faults: Vec<Fault>,
 }
 
 impl Case {
@@ -128,7 +63,7 @@ impl Case {
         })
     }
 
-    /// What a test loses that sees these items.
+    /// Items that a test loses that sees these.
     pub fn drops(&self, seen: &[bool]) -> Drops {
         let mut drops = Drops::default();
         for (i, (&seen, judgement)) in seen.iter().zip(&self.judgements).enumerate() {
@@ -146,21 +81,17 @@ impl Case {
         drops
     }
 
-    /// Puts every culling test and every structure to the test. Structures are
-    /// built over the first `share` items.
+    /// Checks every culling test and every structure. Structures are built over
+    /// the first `share` items.
     pub fn check(&self, structures: &[StructureSpec], share: usize) -> Findings {
-        let mut found = Findings::default();
-        let verdicts = self.judgements.iter();
-        let count = |of: fn(&&Judgement) -> bool| verdicts.clone().filter(of).count() as u64;
-        found.boxes = self.items.len() as u64;
-        found.tally.boxes = found.boxes;
-        found.tally.seen = count(|j| j.verdict != Verdict::Out);
-        found.tally.ties = count(|j| j.verdict == Verdict::Touch);
-        found.tally.undecided = count(|j| j.undecided);
+        let mut found = self.judged();
         let share = share.min(self.items.len());
-        let six = self.built(structures, &self.items[..share], &mut found);
         let cubes = CullingTest::Sphere.items(&self.items);
-        let spheres = self.built(structures, &cubes[..share], &mut found);
+        let boxes = (
+            &self.items[..],
+            found.built(structures, &self.items[..share]),
+        );
+        let spheres = (&cubes[..], found.built(structures, &cubes[..share]));
         for (arithmetic, arithmetic_name, _) in ARITHMETICS {
             for (test, test_name, _) in TESTS {
                 let is_f32 = arithmetic == Arithmetic::F32;
@@ -179,86 +110,104 @@ impl Case {
                 };
                 let view = match culling.view(&self.camera, &self.around) {
                     Ok(view) => view,
-                    // Declared: what could overflow is refused in one line.
-                    Err(CullingError::Camera(CameraError::Sums { .. })) => {
-                        found.tally.refused += 1;
-                        continue;
-                    }
-                    Err(CullingError::Camera(CameraError::Volume(_))) if self.size() > HUGE => {
+                    Err(error) if self.may_refuse(&error) => {
                         found.tally.refused += 1;
                         continue;
                     }
                     Err(error) => {
-                        found.fault(SCALAR, &name, None, "a view", error.to_string());
+                        found.fault([SCALAR, &name], None, "a view", error.to_string());
                         continue;
                     }
                 };
                 let (items, built) = match test {
-                    CullingTest::Sphere => (&cubes[..], &spheres),
-                    _ => (&self.items[..], &six),
+                    CullingTest::Sphere => &spheres,
+                    _ => &boxes,
                 };
-                let view = view.as_any();
-                let seen: Vec<bool> = items.iter().map(|b| view.sees(b)).collect();
+                let seen = seen(items, view.as_any());
                 self.scalar(&culling, &name, &seen, &mut found);
-                ask(built, &name, view, &seen[..share], &self.items, &mut found);
+                found.compare(built, &name, view.as_any(), &seen[..share]);
             }
         }
-        let bare = Culling {
-            planes: PlaneOptions {
+        self.check_without_epsilon(&boxes.1, &cubes, share, &mut found);
+        found.described(|item| self.describe(item))
+    }
+
+    /// Counts the verdicts of the oracle.
+    fn judged(&self) -> Findings {
+        let verdicts = self.judgements.iter();
+        let count = |of: fn(&&Judgement) -> bool| verdicts.clone().filter(of).count() as u64;
+        let boxes = self.items.len() as u64;
+        Findings {
+            boxes,
+            tally: Tally {
+                boxes,
+                seen: count(|j| j.verdict != Verdict::Out),
+                ties: count(|j| j.verdict == Verdict::Touch),
+                undecided: count(|j| j.undecided),
+                ..Tally::default()
+            },
+            ..Findings::default()
+        }
+    }
+
+    /// Tests for a declared refusal: a view whose sums could overflow.
+    fn may_refuse(&self, error: &CullingError) -> bool {
+        match error {
+            CullingError::Camera(CameraError::Sums { .. }) => true,
+            CullingError::Camera(CameraError::Volume(_)) => self.size() > HUGE,
+            _ => false,
+        }
+    }
+
+    /// The boxes lie within ulps of these planes, not of the moved ones: here
+    /// structures that round otherwise show.
+    fn check_without_epsilon(
+        &self,
+        built: &Built,
+        cubes: &[Aabb],
+        share: usize,
+        found: &mut Findings,
+    ) {
+        let view = |test| {
+            let planes = PlaneOptions {
                 epsilon: 0.0,
                 ..self.planes
-            },
-            ..Culling::default()
-        };
-        if let Ok(view) = bare.view(&self.camera, &self.around) {
-            let view = view.as_any();
-            let seen: Vec<bool> = self.items.iter().map(|b| view.sees(b)).collect();
-            let drops = self.drops(&seen);
-            found.tally.lost_bare = drops.false_negatives + drops.touch_dropped;
-            // The boxes are within ulps of these planes, not of the moved
-            // ones: here structures that round otherwise show.
-            let name = "six-plane epsilon 0";
-            ask(&six, name, view, &seen[..share], &self.items, &mut found);
-            // A sphere holds its box: what the box test sees it must see too.
-            let bare = Culling {
-                test: CullingTest::Sphere,
-                ..bare
             };
-            if let Ok(view) = bare.view(&self.camera, &self.around) {
-                let name = "sphere epsilon 0";
-                found.asked.push((SCALAR.to_owned(), name.to_owned()));
-                let boxes = seen.iter().zip(&cubes[..]);
-                let mut lost = boxes.map(|(seen, cube)| *seen && !view.as_any().sees(cube));
-                if let Some(item) = lost.position(|lost| lost) {
-                    let expected = "all that the six planes see";
-                    found.fault(SCALAR, name, Some(item), expected, "dropped".to_owned());
-                }
-            }
+            let culling = Culling {
+                test,
+                planes,
+                ..Culling::default()
+            };
+            culling.view(&self.camera, &self.around)
+        };
+        let Ok(six) = view(CullingTest::SixPlane) else {
+            return;
+        };
+        let seen = seen(&self.items, six.as_any());
+        let drops = self.drops(&seen);
+        found.tally.lost_bare = drops.false_negatives + drops.touch_dropped;
+        found.compare(built, "six-plane epsilon 0", six.as_any(), &seen[..share]);
+        let Ok(sphere) = view(CullingTest::Sphere) else {
+            return;
+        };
+        // A sphere holds its box: what the box test sees it must see too.
+        let subject = [SCALAR, "sphere epsilon 0"];
+        found.check(subject);
+        let mut boxes = seen.iter().zip(cubes);
+        let lost = boxes.position(|(seen, cube)| *seen && !sphere.as_any().sees(cube));
+        if lost.is_some() {
+            found.fault(
+                subject,
+                lost,
+                "all that the six planes see",
+                "dropped".to_owned(),
+            );
         }
-        found
     }
 
-    fn built<'s>(
-        &self,
-        structures: &'s [StructureSpec],
-        items: &[Aabb],
-        found: &mut Findings,
-    ) -> Vec<(&'s str, Box<dyn DynIndex>)> {
-        let mut built = Vec::with_capacity(structures.len());
-        for spec in structures {
-            match spec.build(items) {
-                Ok(index) => built.push((spec.label.as_str(), index)),
-                Err(error) => {
-                    found.fault(&spec.label, "build", None, "built", error.to_string());
-                }
-            }
-        }
-        built
-    }
-
-    /// What the scalar loop may and may not lose.
+    /// Checks the losses of the scalar loop.
     fn scalar(&self, culling: &Culling, name: &str, seen: &[bool], found: &mut Findings) {
-        found.asked.push((SCALAR.to_owned(), name.to_owned()));
+        found.check([SCALAR, name]);
         let drops = self.drops(seen);
         let promised = culling.arithmetic != Arithmetic::F64;
         // Without a margin f64 is as good as its own roundings. Planes that
@@ -283,7 +232,7 @@ impl Case {
                 "{} false negatives (deepest {:e}), {} boundary contacts dropped, {} empty boxes returned",
                 drops.false_negatives, drops.deepest, drops.touch_dropped, drops.ghosts
             );
-            found.fault(SCALAR, name, drops.first, &expected, got);
+            found.fault([SCALAR, name], drops.first, expected, got);
         }
         if culling.test == CullingTest::Exact && culling.arithmetic == Arithmetic::F32 {
             self.tight(name, seen, found);
@@ -306,7 +255,7 @@ impl Case {
             let margin = slack(&self.camera, &self.around, b);
             if away > margin {
                 let expected = format!("nothing returned that is farther out than {margin:e}");
-                found.fault(SCALAR, name, Some(i), &expected, format!("{away:e} out"));
+                found.fault([SCALAR, name], Some(i), expected, format!("{away:e} out"));
                 return;
             }
         }
@@ -321,7 +270,7 @@ impl Case {
         own + depth + self.around.reach.as_dvec3().element_sum()
     }
 
-    /// The box and what is known of it, so that a reader can check by hand.
+    /// The box and the truth about it, so that a reader can check by hand.
     pub fn describe(&self, item: usize) -> String {
         let b = &self.items[item];
         let judgement = &self.judgements[item];
@@ -337,82 +286,16 @@ impl Case {
     }
 }
 
-/// Of the magnitudes: a normal of unit length is true to a few units of
-/// 2^-53 in each component, the offset is a dot product of it with the eye,
-/// and the test itself rounds seven times: 2^-48 is twice all of that.
+/// Error of a plane test in f64, as a share of the magnitudes: a normal of unit
+/// length is true to a few units of 2^-53 in each component, the offset is a dot
+/// product of it with the eye, and the test itself rounds seven times. 2^-48 is twice
+/// all of that.
 const F64_MARGIN: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Planes of volumes this large may not fit f32.
 const HUGE: f64 = 1e38;
 
-/// Every structure must return exactly what the scalar loop does.
-fn ask(
-    built: &[(&str, Box<dyn DynIndex>)],
-    name: &str,
-    view: AnyVolume<'_>,
-    seen: &[bool],
-    items: &[Aabb],
-    found: &mut Findings,
-) {
-    let mut trial = Trial::new(seen.len());
-    let wanted = seen.iter().zip(0..).filter(|(seen, _)| **seen);
-    trial.expect(wanted.map(|(_, id): (_, ItemId)| id));
-    for (structure, index) in built {
-        found.tried(&mut trial, structure, name, items.len(), |out| {
-            index.query(view, out);
-        });
-    }
-}
-
-impl Findings {
-    /// Puts a question of the scalar loop to a structure.
-    pub fn tried(
-        &mut self,
-        trial: &mut Trial,
-        structure: &str,
-        test: &str,
-        items: usize,
-        ask: impl FnOnce(&mut Vec<ItemId>),
-    ) {
-        self.asked.push((structure.to_owned(), test.to_owned()));
-        match trial.ask(ask).map(drop) {
-            Ok(()) => {}
-            Err(verify::Fault::Panicked(text)) => self.panicked(structure, test, &text),
-            Err(verify::Fault::Differs(difference)) => {
-                let item = difference.first.map(|id| id as usize);
-                let known = item.filter(|&item| item < items);
-                let expected = format!("the {} items of the scalar loop", trial.expected());
-                self.fault(structure, test, known, &expected, difference.to_string());
-            }
-        }
-    }
-
-    /// A structure ended in place of answering.
-    pub fn panicked(&mut self, structure: &str, test: &str, text: &str) {
-        self.fault(
-            structure,
-            test,
-            None,
-            "an answer",
-            format!("panicked: {text}"),
-        );
-    }
-
-    /// Notes that an answer is not what was expected.
-    pub fn fault(
-        &mut self,
-        structure: &str,
-        test: &str,
-        item: Option<usize>,
-        expected: &str,
-        got: String,
-    ) {
-        self.faults.push(Fault {
-            structure: structure.to_owned(),
-            test: test.to_owned(),
-            item,
-            expected: expected.to_owned(),
-            got,
-        });
-    }
+/// Answer of the scalar loop, by item.
+fn seen(items: &[Aabb], view: AnyVolume<'_>) -> Vec<bool> {
+    items.iter().map(|b| view.sees(b)).collect()
 }

@@ -1,30 +1,33 @@
 //! Generated extremes: families of seeded cases with their outcome declared,
-//! and the loop that runs them. Each file beside this one owns one part:
-//! cameras, boxes, what counts as a fault, bare planes.
+//! and the loop that runs them.
 
 mod boxes;
 mod cameras;
 mod check;
+mod findings;
 mod volumes;
 
-use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Mutex;
 
-use super::{Level, Row, Section, Status, surroundings};
-use crate::camera::Camera;
+use super::{Level, Row, Section, Status};
+use crate::camera::{Camera, Surroundings};
+use crate::geometry::Aabb;
 use crate::index::StructureSpec;
 use crate::scene::SeededRng;
+use crate::threads;
 
 pub use boxes::Shapes;
 use boxes::adversarial;
 pub use cameras::{CAMERA_FAMILIES, CameraFamily, Draft};
-pub use check::{Case, Drops, Fault, Findings, SCALAR, Tally};
+pub use check::{Case, Drops};
+pub use findings::{Fault, Findings, SCALAR, Tally};
 pub use volumes::{PLANES_FAMILIES, PlanesCase, PlanesFamily};
 
 /// Cases of each variant that make ten million boxes at camera level.
 pub const DEFAULT_CASES: u64 = 66;
 
-/// How many extremes to generate.
+/// Number of extremes to generate.
 #[derive(Clone, Copy)]
 pub struct Extremes<'a> {
     /// Structures that are queried.
@@ -39,20 +42,23 @@ pub struct Extremes<'a> {
 
 /// Boxes of one case.
 pub const BOXES: usize = 2048;
-/// Boxes that structures are built over: all in every so many cases, else few.
+/// Structures are built over all boxes in one case of `ALL_EVERY`, else over `FEW`.
 const ALL_EVERY: u64 = 16;
 const FEW: usize = 256;
 
-/// How the run goes on: told of each case, asked whether to stop.
+/// Receiver of progress, and source of interrupts.
 pub trait Progress: Sync {
-    /// A case of this family has been judged.
+    /// Counts one judged case of a family.
     fn case_done(&self, family: &str);
-    /// Whether to leave out the cases that are left.
+    /// Returns true to skip the remaining cases.
     fn stop(&self) -> bool;
 }
 
+/// A case that was run: its seed, its group of rows, and its findings.
+type Outcome = (u64, String, Findings);
+
 impl Extremes<'_> {
-    /// How many cases there will be, for a progress bar.
+    /// Number of cases, for a progress bar.
     pub fn total(&self) -> u64 {
         let variants: usize = CAMERA_FAMILIES.iter().map(|f| f.variants.len()).sum();
         let at_planes: u64 = PLANES_FAMILIES.iter().map(|f| f.factor).sum();
@@ -61,147 +67,115 @@ impl Extremes<'_> {
 
     /// All families, a section each.
     pub fn run(&self, progress: &dyn Progress) -> Vec<Section> {
-        let mut sections = Vec::new();
-        for family in PLANES_FAMILIES {
-            sections.push(self.planes_family(family, progress));
-        }
-        for family in CAMERA_FAMILIES {
-            sections.push(self.camera_family(family, progress));
-        }
-        sections
+        let planes = PLANES_FAMILIES
+            .iter()
+            .map(|f| self.planes_family(f, progress));
+        let cameras = CAMERA_FAMILIES
+            .iter()
+            .map(|f| self.camera_family(f, progress));
+        planes.chain(cameras).collect()
     }
 
-    /// Every variant of a family of cameras.
-    pub fn camera_family(&self, family: &CameraFamily, progress: &dyn Progress) -> Section {
+    fn camera_family(&self, family: &CameraFamily, progress: &dyn Progress) -> Section {
         let mut section = Section::new(&format!("generated {}", family.name));
         for &variant in family.variants {
-            let label = (family.label)(variant);
-            let group = format!("{}/{label}", family.name);
-            let case = |nth: u64, seed: u64| {
-                let case = match camera_case(family, variant, seed) {
-                    Ok(case) => case,
-                    Err(reason) => {
-                        let mut findings = Findings::default();
-                        findings.fault(SCALAR, "camera", None, "a camera with boxes", reason);
-                        return Outcome::new(findings, |_| String::new());
-                    }
-                };
+            let group = format!("{}/{}", family.name, (family.label)(variant));
+            let outcomes = self.run_cases(family.name, self.cases, progress, |nth, seed| {
                 let share = if nth.is_multiple_of(ALL_EVERY) {
                     BOXES
                 } else {
                     FEW
                 };
-                let findings = case.check(self.structures, share);
-                Outcome::new(findings, |item| case.describe(item))
-            };
-            let outcomes = self.share_out(family.name, self.cases, progress, case);
-            self.gather(&mut section, Level::Camera, |_| group.clone(), outcomes);
+                let findings = match camera_case(family, variant, seed) {
+                    Ok(case) => case.check(self.structures, share),
+                    Err(reason) => {
+                        let mut findings = Findings::default();
+                        let subject = [SCALAR, "camera"];
+                        findings.fault(subject, None, "a camera with boxes", reason);
+                        findings
+                    }
+                };
+                (group.clone(), findings)
+            });
+            self.gather(&mut section, Level::Camera, outcomes);
         }
         section
     }
 
-    /// Every case of a family at planes level.
-    pub fn planes_family(&self, family: &PlanesFamily, progress: &dyn Progress) -> Section {
+    fn planes_family(&self, family: &PlanesFamily, progress: &dyn Progress) -> Section {
         let mut section = Section::new(&format!("generated {}", family.name));
         let cases = self.cases.saturating_mul(family.factor);
-        let case = |_, seed| {
+        let outcomes = self.run_cases(family.name, cases, progress, |_, seed| {
             let case = (family.case)(seed);
-            let findings = case.check(self.structures);
-            let mut outcome = Outcome::new(findings, |item| case.describe(item));
-            outcome.kind = case.kind;
-            outcome
-        };
-        let outcomes = self.share_out(family.name, cases, progress, case);
-        let group = |outcome: &Outcome| match outcome.kind == family.name {
-            true => family.name.to_owned(),
-            false => format!("{}/{}", family.name, outcome.kind),
-        };
-        self.gather(&mut section, Level::Planes, group, outcomes);
+            let group = match case.kind == family.name {
+                true => family.name.to_owned(),
+                false => format!("{}/{}", family.name, case.kind),
+            };
+            (group, case.check(self.structures))
+        });
+        self.gather(&mut section, Level::Planes, outcomes);
         section
     }
 
-    /// The cases of a group with their seeds, shared out among threads; what
-    /// comes out does not depend on their number.
-    fn share_out(
+    /// Runs cases by their number and seed on all threads. The outcomes are in
+    /// the order of the seeds, whatever the number of threads.
+    fn run_cases(
         &self,
         name: &str,
         cases: u64,
         progress: &dyn Progress,
-        case: impl Fn(u64, u64) -> Outcome + Sync,
-    ) -> Vec<(u64, Outcome)> {
-        let next = AtomicU64::new(0);
-        let work = || {
-            let mut done = Vec::new();
-            loop {
-                let nth = next.fetch_add(1, Ordering::Relaxed);
-                if nth >= cases || progress.stop() {
-                    return done;
-                }
-                let seed = self.seed.wrapping_add(nth);
-                done.push((seed, case(nth, seed)));
-                progress.case_done(name);
-            }
-        };
-        let mut done = std::thread::scope(|scope| {
-            let others: Vec<_> = (1..self.threads).map(|_| scope.spawn(work)).collect();
-            let mut done = work();
-            for other in others {
-                match other.join() {
-                    Ok(more) => done.extend(more),
-                    Err(panic) => std::panic::resume_unwind(panic),
-                }
-            }
-            done
+        case: impl Fn(u64, u64) -> (String, Findings) + Sync,
+    ) -> Vec<Outcome> {
+        let done = Mutex::new(Vec::new());
+        let numbers = (0..cases).take_while(|_| !progress.stop());
+        threads::share(self.threads, numbers, |nth| {
+            let seed = self.seed.wrapping_add(nth);
+            let (group, findings) = case(nth, seed);
+            let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            done.push((nth, (seed, group, findings)));
+            progress.case_done(name);
         });
-        done.sort_by_key(|(seed, _)| seed.wrapping_sub(self.seed));
-        done
+        let mut done = done
+            .into_inner()
+            .unwrap_or_else(|poisoned| poisoned.into_inner());
+        done.sort_by_key(|(nth, _)| *nth);
+        done.into_iter().map(|(_, outcome)| outcome).collect()
     }
 
-    /// Rows of a group: one for each question that came out well every time,
-    /// and for each fault one with its seed.
-    fn gather(
-        &self,
-        section: &mut Section,
-        level: Level,
-        group: impl Fn(&Outcome) -> String,
-        outcomes: Vec<(u64, Outcome)>,
-    ) {
-        let mut sums: BTreeMap<(String, String, String), Sum> = BTreeMap::new();
-        for (seed, outcome) in outcomes {
-            let name = group(&outcome);
+    /// Adds a row for each fault with its seed, and one for each structure and
+    /// test of a group without a fault.
+    fn gather(&self, section: &mut Section, level: Level, outcomes: Vec<Outcome>) {
+        let mut checked: BTreeMap<[String; 3], u64> = BTreeMap::new();
+        let mut failed = BTreeSet::new();
+        for (seed, group, findings) in outcomes {
             section.cases += 1;
-            section.boxes += outcome.findings.boxes;
-            section.tally += outcome.findings.tally;
-            for (structure, test) in outcome.findings.asked {
-                let sum = sums.entry((name.clone(), structure, test)).or_default();
-                sum.cases += 1;
+            section.boxes += findings.boxes;
+            section.tally += findings.tally;
+            for [structure, test] in findings.checked {
+                *checked.entry([group.clone(), structure, test]).or_default() += 1;
             }
-            for (fault, about) in outcome.findings.faults.iter().zip(&outcome.described) {
-                let key = (name.clone(), fault.structure.clone(), fault.test.clone());
-                sums.entry(key).or_default().failed = true;
-                let id = format!("{name}/seed {seed}");
+            for fault in findings.faults {
+                failed.insert([group.clone(), fault.structure.clone(), fault.test.clone()]);
                 section
                     .rows
-                    .extend(rows_of(&id, level, fault, about.as_deref()));
+                    .extend(fault.rows(&format!("{group}/seed {seed}"), level));
             }
         }
-        for ((name, structure, test), sum) in sums {
-            if sum.failed {
-                continue;
-            }
+        checked.retain(|key, _| !failed.contains(key));
+        for ([group, structure, test], cases) in checked {
             let expected = match (structure.as_str(), level) {
                 (SCALAR, Level::Camera) => "drops nothing that is inside or touches",
                 (SCALAR, Level::Planes) => "drops nothing but what rounding hides",
                 _ => "returns the very set of the scalar loop",
             };
             section.rows.push(Row {
-                id: format!("{name}/from seed {}", self.seed),
+                id: format!("{group}/from seed {}", self.seed),
                 level,
                 structure,
                 test,
                 status: Status::Pass,
                 expected: expected.into(),
-                got: format!("so in all of {} cases", sum.cases).into(),
+                got: format!("so in all of {cases} cases").into(),
             });
         }
     }
@@ -223,62 +197,13 @@ pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Cas
     let lens = lens.map_err(|error| error.to_string())?;
     let frame = pose.frame().map_err(|error| error.to_string())?;
     let camera = Camera { frame, lens };
-    let mut around = surroundings(&[]);
+    let mut around = Surroundings::default();
     around.origin = draft.origin;
     let items = adversarial(rng, &camera, &around, draft.shapes, BOXES);
     let items = items.ok_or("a lens without corners")?;
-    around.reach = surroundings(&items).reach;
+    around.reach = Aabb::union_of(&items).reach();
     let case = Case::new(camera, &pose, draft.planes, around, items);
     case.ok_or_else(|| "the oracle has no such camera".to_owned())
-}
-
-/// A case that was run.
-struct Outcome {
-    findings: Findings,
-    /// The box of each fault that is about one.
-    described: Vec<Option<String>>,
-    kind: &'static str,
-}
-
-impl Outcome {
-    fn new(findings: Findings, describe: impl Fn(usize) -> String) -> Outcome {
-        let faults = findings.faults.iter();
-        let described = faults.map(|fault| fault.item.map(&describe)).collect();
-        Outcome {
-            findings,
-            described,
-            kind: "",
-        }
-    }
-}
-
-/// Questions of one kind.
-#[derive(Default)]
-struct Sum {
-    cases: u64,
-    failed: bool,
-}
-
-/// A row for a fault, and one for the box it is about.
-fn rows_of(id: &str, level: Level, fault: &Fault, about: Option<&str>) -> Vec<Row> {
-    let row = Row {
-        id: id.to_owned(),
-        level,
-        structure: fault.structure.clone(),
-        test: fault.test.clone(),
-        status: Status::Fail,
-        expected: fault.expected.as_str().into(),
-        got: fault.got.as_str().into(),
-    };
-    let mut rows = vec![row.clone()];
-    if let (Some(item), Some(about)) = (fault.item, about) {
-        rows.push(Row {
-            id: format!("{id}/box {item}"),
-            got: about.into(),
-            ..row
-        });
-    }
-    rows
 }
 
 #[cfg(test)]

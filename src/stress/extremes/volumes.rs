@@ -4,15 +4,15 @@
 
 use glam::Vec3;
 
-use super::check::{Findings, SCALAR};
+use super::findings::{Findings, SCALAR};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, Plane, RelativeVolume, Spheres, sphere_cube,
 };
 use crate::index::StructureSpec;
 use crate::oracle::{Oracle, Verdict};
 use crate::query::AnyVolume;
-use crate::scene::{Regions, SeededRng};
-use crate::verify::{RandomCase, Trial, VOLUME_KINDS, explain_visibility};
+use crate::scene::SeededRng;
+use crate::verify::{RandomCase, VOLUME_KINDS, explain_visibility};
 
 /// A volume and boxes, at planes level.
 pub struct PlanesCase {
@@ -22,7 +22,7 @@ pub struct PlanesCase {
     pub volume: ConvexVolume,
     /// A point to be located among the boxes.
     pub point: Vec3,
-    /// What kind of volume it is.
+    /// Kind of the volume.
     pub kind: &'static str,
     /// Every operation of the plane test is exact: so must its answer be.
     pub exact: bool,
@@ -30,7 +30,7 @@ pub struct PlanesCase {
 
 /// A way to make cases at planes level.
 pub struct PlanesFamily {
-    /// As the table of results has it.
+    /// Name in the table of results.
     pub name: &'static str,
     /// Makes the case of a seed.
     pub case: fn(u64) -> PlanesCase,
@@ -39,30 +39,24 @@ pub struct PlanesFamily {
 }
 
 /// All families at planes level, in the order of the table of results.
-pub static PLANES_FAMILIES: &[PlanesFamily] = &[
-    PlanesFamily {
-        name: "volumes",
-        // Every kind of volume (unbounded, empty, up to 31 planes) about flat, inverted
-        // and touching boxes.
-        case: |seed| {
-            let random = RandomCase::new(seed);
-            PlanesCase {
-                items: random.items,
-                volume: random.volume,
-                point: random.point,
-                kind: VOLUME_KINDS[random.kind],
-                exact: false,
-            }
-        },
-        factor: 20,
-    },
-    PlanesFamily {
-        name: "denormals",
-        // Planes and boxes of denormal numbers: nothing may be flushed to zero.
-        case: denormals,
-        factor: 2,
-    },
-];
+pub static PLANES_FAMILIES: &[PlanesFamily] = rows! { PlanesFamily { name, factor, case }
+    // Every kind of volume (unbounded, empty, up to 31 planes) about flat, inverted and
+    // touching boxes.
+    "volumes", 20, random;
+    // Planes and boxes of denormal numbers: nothing may be flushed to zero.
+    "denormals", 2, denormals;
+};
+
+fn random(seed: u64) -> PlanesCase {
+    let random = RandomCase::new(seed);
+    PlanesCase {
+        items: random.items,
+        volume: random.volume,
+        point: random.point,
+        kind: VOLUME_KINDS[random.kind],
+        exact: false,
+    }
+}
 
 /// Normals of -1, 0 and 1, offsets and bounds of whole multiples of the least
 /// number: no operation rounds, and all of them work on denormals.
@@ -107,7 +101,7 @@ fn denormals(seed: u64) -> PlanesCase {
 const MOST_PLANES: usize = 12;
 
 impl PlanesCase {
-    /// Puts the views and structures to the test.
+    /// Checks every kind of volume of the planes, and the point, on every structure.
     pub fn check(&self, structures: &[StructureSpec]) -> Findings {
         let mut found = Findings {
             boxes: self.items.len() as u64,
@@ -116,49 +110,37 @@ impl PlanesCase {
         self.scalar(&mut found);
         let wide = ConvexVolumeF64::from(&self.volume);
         let spheres = Spheres::new(&self.volume);
-        let relative = RelativeVolume::about(self.point, &self.volume);
-        let cubes: Vec<Aabb> = self.items.iter().map(sphere_cube).collect();
-        let mut views: Vec<(&str, AnyVolume, &[Aabb])> = vec![
-            ("six-plane", (&self.volume).into(), &self.items),
-            ("six-plane f64", (&wide).into(), &self.items),
-            ("sphere", (&spheres).into(), &cubes),
-        ];
         // Offsets about the point may be beyond f32.
-        if let Ok(relative) = &relative {
-            views.push(("six-plane f32-relative", relative.into(), &self.items));
-        }
-        let mut trial = Trial::new(self.items.len());
-        for spec in structures {
-            let built = [spec.build(&self.items), spec.build(&cubes)];
-            let [boxes, spheres] = match &built {
-                [Ok(boxes), Ok(spheres)] => [boxes, spheres],
-                [Err(error), _] | [_, Err(error)] => {
-                    found.fault(&spec.label, "build", None, "built", error.to_string());
-                    continue;
-                }
-            };
-            for (name, view, items) in &views {
-                let index = if *name == "sphere" { spheres } else { boxes };
-                trial.see(items, *view);
-                found.tried(&mut trial, &spec.label, name, self.items.len(), |out| {
-                    index.query(*view, out);
-                });
+        let relative = RelativeVolume::about(self.point, &self.volume).ok();
+        let cubes: Vec<Aabb> = self.items.iter().map(sphere_cube).collect();
+        let boxes = (&self.items, found.built(structures, &self.items));
+        let cubes = (&cubes, found.built(structures, &cubes));
+        let views: [(&str, Option<AnyVolume>, _); 5] = [
+            ("six-plane", Some((&self.volume).into()), &boxes),
+            ("six-plane f64", Some((&wide).into()), &boxes),
+            (
+                "six-plane f32-relative",
+                relative.as_ref().map(Into::into),
+                &boxes,
+            ),
+            ("sphere", Some((&spheres).into()), &cubes),
+            ("locate", Some(self.point.into()), &boxes),
+        ];
+        for (name, view, (items, built)) in views {
+            if let Some(view) = view {
+                let seen: Vec<bool> = items.iter().map(|b| view.sees(b)).collect();
+                found.compare(built, name, view, &seen);
             }
-            trial.expect(Regions::Items.holding(self.point, &self.items));
-            found.tried(&mut trial, &spec.label, "locate", self.items.len(), |out| {
-                boxes.locate(self.point, out);
-            });
         }
-        found
+        found.described(|item| explain_visibility(&self.items[item], &self.volume))
     }
 
     /// The scalar loop against the oracle: without an epsilon it may drop what
     /// is no deeper than the roundings of the test itself, and it must never
     /// return what is wholly outside one plane by more.
     fn scalar(&self, found: &mut Findings) {
-        found
-            .asked
-            .push((SCALAR.to_owned(), "six-plane".to_owned()));
+        let subject = [SCALAR, "six-plane"];
+        found.check(subject);
         if self.volume.planes().len() > MOST_PLANES {
             return;
         }
@@ -176,11 +158,9 @@ impl PlanesCase {
                 ("nothing dropped but what rounding hides", deep)
             };
             if wrong {
-                let got = format!(
-                    "{}; the oracle: {verdict:?}",
-                    if seen { "seen" } else { "dropped" }
-                );
-                found.fault(SCALAR, "six-plane", Some(i), expected, got);
+                let answer = if seen { "seen" } else { "dropped" };
+                let got = format!("{answer}; the oracle: {verdict:?}");
+                found.fault(subject, Some(i), expected, got);
                 return;
             }
         }
@@ -195,7 +175,7 @@ impl PlanesCase {
         })
     }
 
-    /// What evaluating a plane at the box may be wrong by, for unit length: 3
+    /// Error of evaluating a plane at the box, for unit length: 3
     /// roundings of each product, one of the sum with d; 4 u of the magnitudes
     /// and what underflows.
     fn roundings(&self, b: &Aabb) -> f64 {
@@ -211,10 +191,5 @@ impl PlanesCase {
                 (4.0 * UNIT_ROUNDOFF * size + TINY) / normal.length()
             });
         errors.fold(0.0, f64::max)
-    }
-
-    /// The box with the plane that decides about it.
-    pub fn describe(&self, item: usize) -> String {
-        explain_visibility(&self.items[item], &self.volume)
     }
 }

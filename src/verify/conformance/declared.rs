@@ -20,12 +20,8 @@ pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
         if let Some(ids) = index.tree_order() {
             for volume in &asked.volumes {
                 let mut ranges = Vec::new();
-                let _ = ask(
-                    index,
-                    volume,
-                    &mut Ranges::onto(&mut ranges),
-                    &mut NoRecorder,
-                );
+                let mut sink = Ranges::onto(&mut ranges);
+                let _ = ask(index, volume, &mut sink, &mut NoRecorder);
                 let places = ranges.into_iter().flatten();
                 let found = places.map(|place| ids.get(place as usize).copied());
                 let found: Option<Vec<ItemId>> = found.collect();

@@ -15,7 +15,7 @@ pub fn region_search_is_the_closed_box_scan<T: RegionIndex>() -> Outcome {
     each(scenes, |asked, index: &mut T| asked.locate_is_right(index))
 }
 
-/// `query_many` hands over, for every point in order, what `query` does:
+/// `query_many` passes the ids of `query` for every point in order:
 /// whatever the size of the batch, with points that come again, lie on faces or
 /// outside, or are no numbers; and stops where its sink does.
 pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
@@ -39,7 +39,7 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
                 format!("{} of {count} points answered, {flow:?}", many.len())
             })?;
             for (&p, found) in points.iter().zip(many.iter()) {
-                trial.expect(asked.holding(p));
+                trial.expect(scan(&asked.items, &p));
                 let alone = seen(index, &p);
                 let answer = trial.ask(|ids| ids.extend_from_slice(found));
                 let fault = answer.err().map(|fault| fault.explained(|_| None));
@@ -80,22 +80,13 @@ impl ManySink for StopsAfter {
 /// and beside the block.
 fn cells() -> Questions {
     const SIDE: u16 = 11;
-    let grid = |i: u16| {
-        Vec3::new(
-            f32::from(i % SIDE),
-            f32::from(i / SIDE % SIDE),
-            f32::from(i / SIDE / SIDE),
-        )
-    };
+    let at = |x: u16, y: u16, z: u16| Vec3::from([x, y, z].map(f32::from));
+    let grid = |i: u16| at(i % SIDE, i / SIDE % SIDE, i / SIDE / SIDE);
     let items = (0..SIDE * SIDE * SIDE).map(|i| Aabb::new(grid(i), grid(i) + 1.0));
     // Halves: every other coordinate is a face.
     let points = (0..2 * SIDE * SIDE).map(|i| {
         let step = i.wrapping_mul(31);
-        Vec3::new(
-            f32::from(i % 23),
-            f32::from(step % 23),
-            f32::from(step / 23 % 25),
-        ) * 0.5
+        at(i % 23, step % 23, step / 23 % 25) * 0.5
     });
     Questions {
         scene: "cells".to_owned(),

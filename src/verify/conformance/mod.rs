@@ -1,7 +1,6 @@
-//! What every structure must do, one function per property of the contract in
-//! [`RegionIndex`].
-//! [`conformance!`](crate::conformance)
-//! makes a test of each; an error says what differed and on which scene.
+//! The properties of every structure, one function per property of the contract in
+//! [`RegionIndex`]. [`conformance!`](crate::conformance) makes a test of each; an
+//! error names the difference and the scene.
 
 mod declared;
 mod locate;
@@ -16,12 +15,12 @@ use glam::Vec3;
 use super::Trial;
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{BuildError, Input, RegionIndex};
-use crate::query::{Containment, ItemId, NoRecorder, Predicate, QueryCost, Sink};
+use crate::query::{Containment, ItemId, NoRecorder, Predicate, Sink};
 use crate::scene::SeededRng;
 
 use questions::{
-    Outcome, Questions, ask, build, cases, each, edges, ensure, generated_scenes, points, seen,
-    sorted,
+    Outcome, Questions, ask, build, cases, counts_are_plausible, each, edges, ensure,
+    generated_scenes, is_right, points, scan, seen, sorted,
 };
 
 pub use declared::declared_capabilities_are_true;
@@ -87,7 +86,7 @@ macro_rules! conformance {
 /// A property of the contract, for one structure.
 #[derive(Clone, Copy, Debug)]
 pub struct Property {
-    /// As in the name of its test.
+    /// Name of its test.
     pub name: &'static str,
     /// `Err` says what differed, and on which scene.
     pub check: fn() -> Outcome,
@@ -209,22 +208,20 @@ struct Slices {
 }
 
 impl Slices {
-    fn up_to(breaks_at: usize) -> Slices {
-        let slices = Vec::new();
-        Slices { slices, breaks_at }
-    }
-
-    /// Takes what the camera of a random case sees, or what holds its point.
-    fn ask<T: RegionIndex>(
-        &mut self,
+    /// The answer for the camera of a random case, or for its point, up to a break.
+    fn of<T: RegionIndex>(
         index: &T,
         case: &Questions,
         region_search: bool,
-    ) -> ControlFlow<()> {
-        match case.points.last() {
-            Some(p) if region_search => ask(index, p, self, &mut NoRecorder),
-            _ => ask(index, &case.volumes[0], self, &mut NoRecorder),
-        }
+        breaks_at: usize,
+    ) -> (Slices, ControlFlow<()>) {
+        let slices = Vec::new();
+        let mut sink = Slices { slices, breaks_at };
+        let flow = match case.points.last() {
+            Some(p) if region_search => ask(index, p, &mut sink, &mut NoRecorder),
+            _ => ask(index, &case.volumes[0], &mut sink, &mut NoRecorder),
+        };
+        (sink, flow)
     }
 }
 
@@ -238,24 +235,23 @@ impl Sink for Slices {
     }
 }
 
-/// No id is handed over twice or does not exist, in one slice or over all;
+/// No id is passed twice or does not exist, in one slice or over all;
 /// the query ends with `Continue`; any sink gets the same ids.
 pub fn each_id_comes_once<T: RegionIndex>() -> Outcome {
     each(cases(SEEDS), |asked, index: &mut T| {
         let located = asked.points.last().map(|p| seen(index, p));
         let answers = [seen(index, &asked.volumes[0]), located.unwrap_or_default()];
         for (region_search, collected) in [false, true].into_iter().zip(answers) {
-            let mut sink = Slices::up_to(usize::MAX);
-            let flow = sink.ask(index, asked, region_search);
-            let handed = sink.slices.concat();
-            let ids = sorted(handed.clone());
+            let (sink, flow) = Slices::of(index, asked, region_search, usize::MAX);
+            let passed = sink.slices.concat();
+            let ids = sorted(passed.clone());
             let twice = ids.windows(2).find(|pair| pair[0] == pair[1]);
             let unknown = ids.last().filter(|id| **id as usize >= asked.items.len());
             let wrong = twice.map(|pair| pair[0]).or(unknown.copied());
             ensure(wrong.is_none(), || {
                 format!("id {wrong:?} comes twice or is none")
             })?;
-            ensure(handed == collected && flow.is_continue(), || {
+            ensure(passed == collected && flow.is_continue(), || {
                 format!("two sinks got different ids, or {flow:?}")
             })?;
         }
@@ -306,15 +302,11 @@ pub fn a_sink_that_breaks_is_not_called_again<T: RegionIndex>() -> Outcome {
     let mut broken = 0;
     each(cases(SEEDS), |asked, index: &mut T| {
         for region_search in [false, true] {
-            let mut all = Slices::up_to(usize::MAX);
-            let _ = all.ask(index, asked, region_search);
+            let (all, _) = Slices::of(index, asked, region_search, usize::MAX);
             let calls = all.slices.len();
-            for call in [1, 2, calls / 2, calls] {
-                if !(1..=calls).contains(&call) {
-                    continue;
-                }
-                let mut sink = Slices::up_to(call);
-                let flow = sink.ask(index, asked, region_search);
+            let possible = |call: &usize| (1..=calls).contains(call);
+            for call in [1, 2, calls / 2, calls].into_iter().filter(possible) {
+                let (sink, flow) = Slices::of(index, asked, region_search, call);
                 broken += 1;
                 let right = sink.slices == all.slices[..call] && flow.is_break();
                 ensure(right, || {
@@ -333,25 +325,9 @@ pub fn a_sink_that_breaks_is_not_called_again<T: RegionIndex>() -> Outcome {
 pub fn counters_are_plausible<T: RegionIndex>() -> Outcome {
     let scenes = generated_scenes(500)?.into_iter().chain(cases(SEEDS));
     each(scenes, |asked, index: &mut T| {
-        let counted = |ids: Vec<ItemId>, plain: Vec<ItemId>, cost: QueryCost, planes: usize| {
-            let looked_at = cost.items_tested + cost.items_accepted_untested;
-            let most = cost.comparisons() * planes as u64;
-            let right = ids == plain && looked_at >= ids.len() as u64 && cost.planes_tested <= most;
-            ensure(right, || {
-                let (plain, ids) = (plain.len(), ids.len());
-                format!("{plain} ids, {ids} when counted, {planes} planes: {cost:?}")
-            })
-        };
-        for volume in &asked.volumes {
-            let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
-            let _ = ask(index, volume, &mut ids, &mut cost);
-            counted(ids, seen(index, volume), cost, volume.planes().len())?;
-        }
-        for p in &asked.points {
-            let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
-            let _ = ask(index, p, &mut ids, &mut cost);
-            counted(ids, seen(index, p), cost, 0)?;
-        }
-        Ok(())
+        let mut volumes = asked.volumes.iter();
+        volumes.try_for_each(|volume| counts_are_plausible(index, volume))?;
+        let mut points = asked.points.iter();
+        points.try_for_each(|p| counts_are_plausible(index, p))
     })
 }

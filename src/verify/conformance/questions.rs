@@ -1,6 +1,5 @@
-//! What the properties ask: volumes and points of a scene, and how an answer is
-//! got and compared with the reference. What must hold for them is in the
-//! properties.
+//! Queries of the properties: volumes and points of a scene, and the comparison of
+//! an answer with the reference.
 
 use std::ops::{ControlFlow, Range};
 
@@ -8,11 +7,11 @@ use glam::{DVec3, Vec3};
 
 use super::super::{RandomCase, Trial, edge_scenes, edge_volumes};
 use super::super::{explain_containment, explain_visibility};
-use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
+use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::index::{Input, RegionIndex};
 use crate::kernel::BASELINE;
-use crate::query::{ItemId, NoRecorder, QueryContext, QueryVolume, Recorder, Sink};
+use crate::query::{ItemId, NoRecorder, QueryContext, QueryCost, QueryVolume, Recorder, Sink};
 use crate::scene;
 
 /// Why a property does not hold.
@@ -22,7 +21,7 @@ pub(super) fn build<T: RegionIndex>(items: &[Aabb]) -> Result<T, String> {
     T::build(&Input::new(items), &T::Params::default()).map_err(|error| error.to_string())
 }
 
-/// Asks by the portable instruction set; `Break` if the sink broke off.
+/// Queries by the portable instruction set; `Break` if the sink broke off.
 pub(super) fn ask<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder>(
     index: &T,
     volume: &Q,
@@ -50,7 +49,7 @@ pub(super) fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome
     if holds { Ok(()) } else { Err(otherwise()) }
 }
 
-/// A scene and what an index is asked in it.
+/// A scene and the queries of an index in it.
 pub(super) struct Questions {
     pub(super) scene: String,
     pub(super) items: Vec<Aabb>,
@@ -58,8 +57,8 @@ pub(super) struct Questions {
     pub(super) points: Vec<Vec3>,
 }
 
-/// Whether a property holds for a structure, built over each of the scenes. An
-/// error begins with the names of both.
+/// Tests a property of a structure, built over each of the scenes. An error begins
+/// with the names of both.
 pub(super) fn each<T: RegionIndex>(
     scenes: impl IntoIterator<Item = Questions>,
     mut holds: impl FnMut(&mut Questions, &mut T) -> Outcome,
@@ -105,25 +104,17 @@ pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = Questions> {
 
 impl Questions {
     pub(super) fn visible_is_right<T: RegionIndex>(&self, index: &T) -> Outcome {
-        let mut trial = Trial::new(self.items.len());
-        for (i, volume) in self.volumes.iter().enumerate() {
-            trial.see(&self.items, volume);
-            let answer = trial.ask(|ids| *ids = seen(index, volume));
-            let why = |id: usize| Some(explain_visibility(self.items.get(id)?, volume));
-            answer.map_err(|fault| format!("volume {i}: {}", fault.explained(why)))?;
-        }
-        Ok(())
+        self.volumes.iter().enumerate().try_for_each(|(i, volume)| {
+            let why = |b: &Aabb| explain_visibility(b, volume);
+            is_right(&format!("volume {i}"), index, &self.items, volume, why)
+        })
     }
 
     pub(super) fn locate_is_right<T: RegionIndex>(&self, index: &T) -> Outcome {
-        let mut trial = Trial::new(self.items.len());
-        for &p in &self.points {
-            trial.expect(self.holding(p));
-            let answer = trial.ask(|ids| *ids = seen(index, &p));
-            let why = |id: usize| Some(explain_containment(self.items.get(id)?, p));
-            answer.map_err(|fault| format!("point {p}: {}", fault.explained(why)))?;
-        }
-        Ok(())
+        self.points.iter().try_for_each(|p| {
+            let why = |b: &Aabb| explain_containment(b, *p);
+            is_right(&format!("point {p}"), index, &self.items, p, why)
+        })
     }
 
     pub(super) fn both_are_right<T: RegionIndex>(&self, index: &T) -> Outcome {
@@ -131,19 +122,53 @@ impl Questions {
         self.locate_is_right(index)
     }
 
-    /// The items whose closed box holds a point.
-    pub(super) fn holding(&self, p: Vec3) -> impl Iterator<Item = ItemId> {
-        let items = self.items.iter().zip(0..);
-        let holding = items.filter(move |(b, _)| b.contains_point(p));
-        holding.map(|(_, id)| id)
-    }
-
     /// All answers in the structure's own order: equal for equal structures.
     pub(super) fn answers<T: RegionIndex>(&self, index: &T) -> Vec<Vec<ItemId>> {
         let visible = self.volumes.iter().map(|volume| seen(index, volume));
-        let holding = self.points.iter().map(|&p| seen(index, &p));
+        let holding = self.points.iter().map(|p| seen(index, p));
         visible.chain(holding).collect()
     }
+}
+
+/// Tests that a structure returns exactly the items that the scan does; `explain`
+/// says why an item is in the answer or not.
+pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
+    kind: &str,
+    index: &T,
+    items: &[Aabb],
+    volume: &Q,
+    explain: impl Fn(&Aabb) -> String,
+) -> Outcome {
+    let mut trial = Trial::new(items.len());
+    trial.expect(scan(items, volume));
+    let answer = trial.ask(|ids| *ids = seen(index, volume));
+    let why = |id: usize| Some(explain(items.get(id)?));
+    let right = answer.map(drop);
+    right.map_err(|fault| format!("{kind}: {}", fault.explained(why)))
+}
+
+/// Tests that a counted query returns the same ids, tests or accepts with a subtree
+/// every item that it returns, and evaluates no plane twice.
+pub(super) fn counts_are_plausible<T: RegionIndex, Q: QueryVolume>(
+    index: &T,
+    volume: &Q,
+) -> Outcome {
+    let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
+    let _ = ask(index, volume, &mut ids, &mut cost);
+    let (plain, planes) = (seen(index, volume), Q::planes_open(volume.mask()));
+    let looked_at = cost.items_tested + cost.items_accepted_untested;
+    let most = cost.comparisons() * u64::from(planes);
+    let right = ids == plain && looked_at >= ids.len() as u64 && cost.planes_tested <= most;
+    ensure(right, || {
+        let (plain, ids) = (plain.len(), ids.len());
+        format!("{plain} ids, {ids} when counted, {planes} planes: {cost:?}")
+    })
+}
+
+/// The reference answer: a look at every item.
+pub(super) fn scan<Q: QueryVolume>(items: &[Aabb], volume: &Q) -> impl Iterator<Item = ItemId> {
+    let seen = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));
+    seen.map(|(_, id)| id)
 }
 
 /// Corners and centres of some boxes, and points one step of a float beside.
@@ -175,10 +200,7 @@ pub(super) fn generated_scenes(n: usize) -> Result<Vec<Questions>, String> {
 fn camera_volumes(scene: &scene::Scene) -> Result<Vec<ConvexVolume>, CameraError> {
     let centre = scene.origin + scene.bounds.centre().as_dvec3();
     let radius = scene.bounds.extent().as_dvec3().length() / 2.0;
-    let around = Surroundings {
-        origin: scene.origin,
-        reach: scene.bounds.reach(),
-    };
+    let around = scene.surroundings();
     let volume = |i: u32| {
         let angle = std::f64::consts::TAU * f64::from(i) / 8.0;
         let arm = DVec3::new(libm::cos(angle), libm::sin(angle), 0.3) * radius;

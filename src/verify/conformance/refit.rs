@@ -1,5 +1,5 @@
-//! The properties of a structure that follows its items: refitted, or built
-//! anew where it declines.
+//! The properties of a structure that follows its items: refitted, or built again
+//! where it declines.
 
 use super::*;
 
@@ -18,7 +18,7 @@ fn update<T: RegionIndex>(index: &mut T, asked: &Questions, moved: &[ItemId]) ->
 }
 
 /// After 0.1 %, 1 %, 10 % and 100 % of the items have moved, one after the
-/// other, a structure that refits answers as one built anew.
+/// other, a structure that refits answers as a newly built one.
 pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     let degenerate = ["all the same", "needles", "inverted among sound"];
     let degenerate = edges().filter(|asked| degenerate.contains(&asked.scene.as_str()));
@@ -38,14 +38,9 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
                 *b = Aabb::new(b.min + by, b.max + by);
             }
             update(index, asked, &moved)?;
-            let moved_points = moved
-                .iter()
-                .take(20)
-                .map(|&id| asked.items[id as usize].max);
-            asked.points = points(&asked.items)
-                .into_iter()
-                .chain(moved_points)
-                .collect();
+            asked.points = points(&asked.items);
+            let corners = moved.iter().map(|&id| asked.items[id as usize].max);
+            asked.points.extend(corners.take(20));
             let right = asked.both_are_right(index);
             right.map_err(|error| format!("after {} moves: {error}", moved.len()))?;
         }

@@ -22,7 +22,7 @@ pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// Asks with every kind of view of some of the volumes.
+/// Queries with every kind of view of some of the volumes.
 fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize) -> Outcome {
     let items = &asked.items;
     let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
@@ -40,16 +40,10 @@ fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize)
         }
     }
     // A box at either end, and all of them.
-    for sought in [
-        items.first().copied(),
-        items.last().copied(),
-        Some(Aabb::union_of(items)),
-    ] {
-        if let Some(sought) = sought.filter(|b| !b.is_empty()) {
-            right("a box", index, items, &sought)?;
-        }
-    }
-    Ok(())
+    let ends = [items.first(), items.last()].into_iter().flatten().copied();
+    let sought = ends.chain([Aabb::union_of(items)]);
+    let mut sound = sought.filter(|b| !b.is_empty());
+    sound.try_for_each(|sought| right("a box", index, items, &sought))
 }
 
 /// Planes that are none of f32.
@@ -65,22 +59,7 @@ fn right<T: RegionIndex, Q: QueryVolume>(
     items: &[Aabb],
     view: &Q,
 ) -> Outcome {
-    let mut trial = Trial::new(items.len());
-    let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-    trial.expect(wanted.map(|(_, id)| id));
-    let answer = trial.ask(|ids| {
-        let _ = ask(index, view, ids, &mut NoRecorder);
-    });
-    let why = |id: usize| {
-        let b = items.get(id)?;
-        Some(format!("{b:?} is seen: {}", view.sees(b)))
-    };
-    let found = answer.map_err(|fault| format!("{kind}: {}", fault.explained(why)))?;
-    let (mut counted, mut cost) = (Vec::new(), QueryCost::default());
-    let _ = ask(index, view, &mut counted, &mut cost);
-    let most = cost.comparisons() * u64::from(Q::planes_open(view.mask()));
-    ensure(found == counted && cost.planes_tested <= most, || {
-        let (plain, counted) = (found.len(), counted.len());
-        format!("{kind}: {plain} ids, {counted} when counted, {cost:?}")
-    })
+    let why = |b: &Aabb| format!("{b:?} is seen: {}", view.sees(b));
+    is_right(kind, index, items, view, why)?;
+    counts_are_plausible(index, view).map_err(|error| format!("{kind}: {error}"))
 }
