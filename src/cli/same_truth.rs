@@ -8,7 +8,7 @@ use crate::culling::Culling;
 use crate::index::Registry;
 use crate::measure::{Protocol, Subject, Workload, judge};
 use crate::path::CameraPath;
-use crate::precision::{PrecisionInput, measure_points};
+use crate::precision::{self, PrecisionInput};
 use crate::scene::{Scene, WorldBox};
 use crate::stress::extremes::Case;
 use glam::DVec3;
@@ -86,8 +86,10 @@ fn missed(camera: Camera) -> [bool; 4] {
         most_cameras: 1,
         protocol: &protocol,
     };
-    let measured = measure_points(&input, &|| false);
-    let measured = measured.expect("no refusal").expect("not stopped");
+    let prepared = precision::prepare(&input, &|| false);
+    let prepared = prepared.expect("no refusal").expect("not stopped");
+    let times = precision::time(&input, &prepared.plan, &|| false);
+    let measured = prepared.conclude(&[times.expect("no refusal").expect("not stopped")]);
     let by_precision = measured.points.iter().any(|point| {
         let is_default = point.errors.names.test == "six-plane"
             && point.errors.names.arithmetic == "f32"

@@ -1,5 +1,5 @@
-//! What a culling answers to every camera by the plain loop, and how wrong that
-//! is. No structure and no clock.
+//! Answers of a culling to every camera by the plain loop, and their errors. No
+//! structure and no clock.
 
 use serde::ser::Error as _;
 use serde::{Serialize, Serializer};
@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 use super::point::{Dimension, Point};
 use crate::camera::Camera;
 use crate::culling::{CameraView, Culling, CullingTest};
+use crate::geometry::Aabb;
 use crate::measure::Status;
 use crate::path::CameraPath;
 use crate::query::ItemId;
@@ -41,7 +42,7 @@ impl Names {
 /// Errors of a culling over all cameras, and what it costs per item.
 #[derive(Clone, Debug, Serialize)]
 pub struct CullingErrors {
-    /// What structures are asked with.
+    /// Test, arithmetic and planes.
     #[serde(flatten)]
     pub names: Names,
     /// False positives / visible items, by camera.
@@ -77,7 +78,7 @@ pub(super) fn counts_or_null<S: Serializer>(
 /// them its neighbour on the path, for what changes from frame to frame.
 pub(super) struct Shots {
     pub cameras: Vec<Camera>,
-    /// As many, or none for a path of one camera.
+    /// One for each camera, or none for a path of one camera.
     neighbours: Vec<Camera>,
 }
 
@@ -87,12 +88,9 @@ impl Shots {
         let wanted = most.max(1).min(count);
         let chosen = (0..wanted).map(|i| i * count / wanted);
         // The last one's is the one before it.
-        let beside = |i: usize| {
-            if i + 1 < count {
-                Some(i + 1)
-            } else {
-                i.checked_sub(1)
-            }
+        let beside = |i: usize| match i + 1 < count {
+            true => Some(i + 1),
+            false => i.checked_sub(1),
         };
         Shots {
             cameras: chosen.clone().map(|i| path.cameras[i]).collect(),
@@ -119,7 +117,7 @@ pub(super) struct Truths {
     neighbours: Vec<Truth>,
 }
 
-/// What one camera's answer gets wrong.
+/// Errors of the answer to one camera.
 #[derive(Clone, Copy, Default)]
 struct CameraErrors {
     counts: ErrorCount,
@@ -130,11 +128,12 @@ struct CameraErrors {
     flicker: Option<u64>,
 }
 
-/// What one culling answers to every camera, and how wrong that is.
+/// Answers of one culling to every camera, and their errors.
+#[derive(Default)]
 pub(super) struct Judged {
     pub culling: Culling,
     pub views: Vec<CameraView>,
-    /// By camera; nothing without a truth.
+    /// Ids of each camera; empty without a truth.
     pub answers: Vec<Vec<ItemId>>,
     by_camera: Vec<CameraErrors>,
     /// Why there are no such views.
@@ -146,10 +145,7 @@ impl Judged {
     pub fn new(scene: &Scene, shots: &Shots, truths: Option<&Truths>, culling: Culling) -> Judged {
         let mut judged = Judged {
             culling,
-            views: Vec::new(),
-            answers: Vec::new(),
-            by_camera: Vec::new(),
-            refused: None,
+            ..Judged::default()
         };
         judged.refused = judged.judge(scene, shots, truths).err();
         judged
@@ -162,14 +158,10 @@ impl Judged {
         truths: Option<&Truths>,
     ) -> Result<(), String> {
         let around = scene.surroundings();
-        let items = self.culling.test.items(&scene.items);
         let culling = self.culling;
+        let items = culling.test.items(&scene.items);
         let view_of = |camera: &Camera| culling.view(camera, &around).map_err(|e| e.to_string());
-        let answer = |view: &CameraView| -> Vec<ItemId> {
-            let view = view.as_any();
-            let seen = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-            seen.map(|(_, id)| id).collect()
-        };
+        let answer = |view: &CameraView| scan(&items, view);
         for camera in &shots.cameras {
             self.views.push(view_of(camera)?);
         }
@@ -200,18 +192,17 @@ impl Judged {
 
     /// The culling's errors as a point of a structure, without a time.
     pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point<CullingErrors> {
-        let known = self.by_camera.iter().filter(|_| self.refused.is_none());
+        let is_judged = self.refused.is_none();
+        let known = || self.by_camera.iter().filter(|_| is_judged);
         let mut counts = ErrorCount::default();
-        known.clone().for_each(|camera| counts += camera.counts);
+        known().for_each(|camera| counts += camera.counts);
         let rate_of = |count: fn(&CameraErrors) -> u64| -> Option<Rate> {
-            let clusters = known.clone();
-            let clusters = clusters.map(|c| [count(c) as f64, c.counts.visible as f64]);
+            let clusters = known().map(|c| [count(c) as f64, c.counts.visible as f64]);
             rate(&clusters.collect::<Vec<_>>())
         };
         let has_neighbours = self.by_camera.iter().any(|c| c.flicker.is_some());
         let flicker = rate_of(|c| c.flicker.unwrap_or(0)).filter(|_| has_neighbours);
-        let worst_miss_px = known.clone().map(|c| c.worst_miss_px).fold(0.0, f64::max);
-        let is_judged = self.refused.is_none();
+        let worst_miss_px = known().map(|c| c.worst_miss_px).fold(0.0, f64::max);
         let errors = CullingErrors {
             names: Names::of(&self.culling),
             excess: rate_of(|c| c.counts.false_positives),
@@ -222,20 +213,12 @@ impl Judged {
             ns_per_item: None,
             memory_bytes_per_item,
         };
-        let sampled = |value: f64, of: fn(&CameraErrors) -> f64| Dimension {
-            value,
-            by_camera: known.clone().map(of).collect(),
-        };
-        let count = |value: u64, of: fn(&CameraErrors) -> f64| sampled(value as f64, of);
         let dimensions = vec![
-            count(counts.false_negatives, |c| c.counts.false_negatives as f64),
-            count(counts.touch_dropped, |c| c.counts.touch_dropped as f64),
-            count(counts.false_positives, |c| c.counts.false_positives as f64),
-            sampled(worst_miss_px, |c| c.worst_miss_px),
-            Dimension {
-                value: memory_bytes_per_item,
-                by_camera: Vec::new(),
-            },
+            Dimension::sum(known().map(|c| c.counts.false_negatives as f64)),
+            Dimension::sum(known().map(|c| c.counts.touch_dropped as f64)),
+            Dimension::sum(known().map(|c| c.counts.false_positives as f64)),
+            Dimension::worst(known().map(|c| c.worst_miss_px)),
+            Dimension::fixed(memory_bytes_per_item),
         ];
         let mut point = Point::new(structure, errors, dimensions);
         point.reason = self.refused.clone();
@@ -246,6 +229,13 @@ impl Judged {
         };
         point
     }
+}
+
+/// The answer of the plain loop.
+pub(super) fn scan(items: &[Aabb], view: &CameraView) -> Vec<ItemId> {
+    let view = view.as_any();
+    let seen = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
+    seen.map(|(_, id)| id).collect()
 }
 
 /// Items whose answer changes from one camera to another while the truth about

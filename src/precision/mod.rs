@@ -13,7 +13,7 @@ mod sweeps;
 
 pub use judged::{CullingErrors, Names};
 pub use point::{Point, Times};
-pub use points::{PointPlan, Precision, PrecisionInput, Prepared, measure_points, prepare, time};
+pub use points::{PointPlan, Precision, PrecisionInput, Prepared, prepare, time};
 pub use region_search::{POINTS_PER_CAMERA, RegionErrors};
 pub use size_sweep::{SIZE_RATIOS, SizeError, SizeRow, size_sweep};
 pub use stability::StableAfter;

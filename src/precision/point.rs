@@ -1,15 +1,15 @@
-//! A point of a diagram: a structure, what it is asked with, its errors and its
-//! time, and when one point dominates another. How it is measured is in `points`.
+//! A point of a diagram: a structure, its queries, its errors and its time, and when
+//! one point dominates another.
 
 use serde::Serialize;
 
-use crate::measure::{OverProcesses, Status};
+use crate::measure::{OverProcesses, Status, Verdict};
 use crate::statistics::{ALPHA, dominance, shows_less};
 
 /// Thread CPU time, over the processes as in a run; null where it has none.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize)]
 pub struct Times {
-    /// Of a query.
+    /// Time of a query.
     pub query_ns: Option<f64>,
     /// Lower end of the 95 % interval of `query_ns`.
     pub query_ns_lower: Option<f64>,
@@ -24,9 +24,37 @@ pub struct Times {
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Dimension {
     /// Value of the point.
-    pub value: f64,
-    /// Value at each camera; nothing for what has no sampling error.
-    pub by_camera: Vec<f64>,
+    value: f64,
+    /// Value at each camera; nothing for a cost without a sampling error.
+    by_camera: Vec<f64>,
+}
+
+impl Dimension {
+    /// A count over all cameras.
+    pub fn sum(by_camera: impl Iterator<Item = f64>) -> Dimension {
+        let by_camera: Vec<f64> = by_camera.collect();
+        Dimension {
+            value: by_camera.iter().sum(),
+            by_camera,
+        }
+    }
+
+    /// The worst of all cameras.
+    pub fn worst(by_camera: impl Iterator<Item = f64>) -> Dimension {
+        let by_camera: Vec<f64> = by_camera.collect();
+        Dimension {
+            value: by_camera.iter().copied().fold(0.0, f64::max),
+            by_camera,
+        }
+    }
+
+    /// A cost that is the same for all cameras.
+    pub fn fixed(value: f64) -> Dimension {
+        Dimension {
+            value,
+            by_camera: Vec::new(),
+        }
+    }
 }
 
 /// One way to answer, with its errors `E` and its time.
@@ -34,7 +62,7 @@ pub(super) struct Dimension {
 pub struct Point<E> {
     /// Label of the structure.
     pub structure: String,
-    /// What it is asked with, and its errors.
+    /// Queries and their errors.
     #[serde(flatten)]
     pub errors: E,
     /// How building, counting and timing ended.
@@ -47,9 +75,9 @@ pub struct Point<E> {
     /// Index of a point of the front that is no worse in anything and better in
     /// something, where the samples show that it is dominated.
     pub dominated_by: Option<usize>,
-    /// Whether it is dominated by the values alone: it shares the front.
+    /// True if it is dominated by the values alone: it shares the front.
     pub is_tie: bool,
-    /// Whether no point is shown to dominate it.
+    /// True if no point is shown to dominate it.
     pub on_front: bool,
     #[serde(skip)]
     dimensions: Vec<Dimension>,
@@ -71,7 +99,16 @@ impl<E> Point<E> {
         }
     }
 
-    /// Takes over the time of a task, per so many of its queries, or why it has none.
+    /// Takes over the outcome of a check; true if it passed.
+    pub(super) fn accepts(&mut self, checked: Result<(), Verdict>) -> bool {
+        let wrong = checked.err();
+        if let Some(wrong) = &wrong {
+            (self.status, self.reason) = (wrong.status, wrong.reason.clone());
+        }
+        wrong.is_none()
+    }
+
+    /// Takes over the time of a task, divided by `per`, or why it has none.
     pub(super) fn time(&mut self, times: &OverProcesses, task: usize, per: f64) {
         if let Some(wrong) = times.failure(task) {
             (self.status, self.reason) = (wrong.status, wrong.reason.clone());
@@ -87,7 +124,7 @@ impl<E> Point<E> {
         };
     }
 
-    /// What less is better of: the dimensions and time.
+    /// Values of which less is better: the dimensions and time.
     fn values(&self) -> Vec<f64> {
         let dimensions = self.dimensions.iter().map(|d| d.value);
         dimensions.chain(self.times.query_ns).collect()
@@ -131,19 +168,13 @@ mod tests {
     /// A point with false negatives, dropped touches and false positives, each the
     /// same number at four cameras, the depth of its worst miss, its memory and time.
     fn point(errors: [f64; 3], depth: f64, memory: f64, ns: Option<f64>) -> Point<()> {
-        let sampled = |value: f64| Dimension {
-            value,
-            by_camera: vec![value / 4.0; 4],
-        };
+        let sampled = |value: f64| Dimension::sum([value / 4.0; 4].into_iter());
         let mut dimensions = errors.map(sampled).to_vec();
         dimensions.push(Dimension {
             value: depth,
             by_camera: vec![0.0; 4],
         });
-        dimensions.push(Dimension {
-            value: memory,
-            by_camera: Vec::new(),
-        });
+        dimensions.push(Dimension::fixed(memory));
         let mut point = Point::new("linear", (), dimensions);
         point.times.query_ns = ns;
         point.times.task = ns.map(|ns| ns as usize);

@@ -1,6 +1,6 @@
-//! Measuring the points of the diagram for one scene and path: every structure
-//! with every culling, checked, judged against the exact truth, and timed side
-//! by side; and region search likewise.
+//! Points of the diagrams of one scene and path: every structure with every culling,
+//! checked, judged against the exact truth, and timed side by side; and region search
+//! likewise.
 
 use serde::{Deserialize, Serialize};
 
@@ -50,7 +50,7 @@ pub struct Precision {
     pub stability: Vec<StableAfter>,
 }
 
-/// What all processes time: the plan is the same for each.
+/// The timed tasks, the same in every process.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PointPlan {
     tasks: Vec<PlannedTask>,
@@ -60,28 +60,22 @@ pub struct PointPlan {
 /// One way to answer, timed.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct PlannedTask {
-    key: Key,
-    /// Whether the same is timed a second time, as a check.
+    /// Index among all ways: those of the first diagram, then those of the other.
+    way: usize,
+    /// True if the same is timed a second time, as a check.
     is_twin: bool,
-    /// Ids of every query.
+    /// Number of ids of every query.
     expected: Vec<u64>,
-}
-
-/// Index of a point, as all of them were before any was timed.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-enum Key {
-    Culling(usize),
-    Region(usize),
 }
 
 /// All points, checked and judged, but not timed.
 pub struct Prepared {
-    /// What the other processes are to measure.
+    /// Tasks of the other processes.
     pub plan: PointPlan,
     precision: Precision,
 }
 
-/// What a diagram is drawn of.
+/// Input of a diagram.
 #[derive(Clone, Copy)]
 pub struct PrecisionInput<'a> {
     /// Items to be culled.
@@ -90,7 +84,7 @@ pub struct PrecisionInput<'a> {
     pub path: &'a CameraPath,
     /// Structures to be measured with every test.
     pub structures: &'a [StructureSpec],
-    /// Of the path, evenly spread.
+    /// Largest number of cameras of the path, evenly spread.
     pub most_cameras: usize,
     /// Rounds and times of a process.
     pub protocol: &'a Protocol,
@@ -172,38 +166,13 @@ struct Built<'a> {
     queries: RegionQueries<'a>,
 }
 
-/// One way to answer: a structure with a culling.
+/// One way to answer the queries of a diagram.
 #[derive(Clone, Copy)]
-struct Way<'b> {
-    structure: &'b str,
-    index: &'b dyn DynIndex,
-    judged: &'b Judged,
-}
-
-impl Way<'_> {
-    fn ask(&self, n: usize, out: &mut Vec<ItemId>) {
-        self.index.query(self.judged.views[n].as_any(), out);
-    }
-
-    /// Asks every query once; what was wrong, if anything.
-    fn checked(&self, items: usize) -> Result<(), Verdict> {
-        let mut trial = Trial::new(items);
-        for (n, answer) in self.judged.answers.iter().enumerate() {
-            trial.expect(answer.iter().copied());
-            trial
-                .ask(|out| self.ask(n, out))
-                .map_err(|fault| Verdict::new(Status::of(&fault), fault.explained(|_| None)))?;
-        }
-        Ok(())
-    }
-}
-
-/// One way to search for a region: a structure, or a loop over all regions.
-#[derive(Clone, Copy)]
-struct RegionWay<'b> {
-    structure: &'b str,
-    index: Option<&'b dyn DynIndex>,
-    numbers: RegionNumbers,
+enum Way<'b> {
+    /// A structure with a culling.
+    Culling(&'b Indexes<'b>, &'b Judged),
+    /// Region search by a structure, or by a loop over all regions.
+    Region(Option<&'b Indexes<'b>>, RegionNumbers),
 }
 
 impl<'a> Built<'a> {
@@ -223,74 +192,86 @@ impl<'a> Built<'a> {
         })
     }
 
-    /// All points in their order.
+    /// All ways to cull, then all ways to search for a region: f32 by every structure,
+    /// the other numbers by a loop.
     fn ways(&self) -> Vec<Way<'_>> {
-        let structures = self.structures.iter();
-        let each = structures.flat_map(|indexes| self.judged.iter().map(move |own| (indexes, own)));
-        let ways = each.map(|(indexes, judged)| Way {
-            structure: indexes.structure,
-            index: indexes.of(judged.culling.test),
-            judged,
-        });
-        ways.collect()
+        let mut ways = Vec::new();
+        for indexes in &self.structures {
+            ways.extend(
+                self.judged
+                    .iter()
+                    .map(|judged| Way::Culling(indexes, judged)),
+            );
+        }
+        for indexes in &self.structures {
+            let numbers = [RegionNumbers::F32, RegionNumbers::Checked];
+            ways.extend(numbers.map(|numbers| Way::Region(Some(indexes), numbers)));
+        }
+        let scans = [RegionNumbers::F64, RegionNumbers::Exact];
+        ways.extend(scans.map(|numbers| Way::Region(None, numbers)));
+        ways
     }
 
-    /// All ways to search for a region: f32 by every structure, the others by a
-    /// loop over all regions.
-    fn region_ways(&self) -> Vec<RegionWay<'_>> {
-        let by_index = self.structures.iter().flat_map(|indexes| {
-            [RegionNumbers::F32, RegionNumbers::Checked].map(|numbers| RegionWay {
-                structure: indexes.structure,
-                index: Some(indexes.regions()),
-                numbers,
-            })
-        });
-        let by_loop = [RegionNumbers::F64, RegionNumbers::Exact].map(|numbers| RegionWay {
-            structure: "scan",
-            index: None,
-            numbers,
-        });
-        by_index.chain(by_loop).collect()
-    }
-
-    fn task<'b>(&'b self, planned: &PlannedTask) -> TimedTask<'b> {
-        let expected = planned.expected.clone();
-        match planned.key {
-            Key::Culling(place) => {
-                let way = self.ways()[place];
-                TimedTask::new(expected, move |n, out| way.ask(n, out))
+    /// Appends the answer to the query of a camera.
+    fn answer(&self, way: Way, camera: usize, out: &mut Vec<ItemId>) {
+        match way {
+            Way::Culling(indexes, judged) => {
+                let index = indexes.of(judged.culling.test);
+                index.query(judged.views[camera].as_any(), out);
             }
-            Key::Region(place) => {
-                let RegionWay { index, numbers, .. } = self.region_ways()[place];
-                let queries = &self.queries;
-                TimedTask::new(expected, move |n, out| queries.ask(numbers, index, n, out))
+            Way::Region(indexes, numbers) => {
+                let index = indexes.map(Indexes::regions);
+                self.queries.answer(numbers, index, camera, out);
             }
         }
     }
 
+    /// Compares the answers of a way to cull with those of the plain loop.
+    fn check(&self, way: Way, judged: &Judged, items: usize) -> Result<(), Verdict> {
+        let mut trial = Trial::new(items);
+        judged
+            .answers
+            .iter()
+            .enumerate()
+            .try_for_each(|(n, answer)| {
+                trial.expect(answer.iter().copied());
+                let asked = trial.ask(|out| self.answer(way, n, out)).map(drop);
+                asked.map_err(|fault| Verdict::new(Status::of(&fault), fault.explained(|_| None)))
+            })
+    }
+
+    /// Compares the answers of a way to search with those by the same numbers.
+    fn check_regions(
+        &self,
+        way: Way,
+        judged: &RegionJudged,
+        cameras: usize,
+    ) -> Result<(), Verdict> {
+        let is_right = |n: usize| {
+            let mut out = Vec::new();
+            self.answer(way, n, &mut out);
+            judged.is_right(n, &out)
+        };
+        match (0..cameras).all(is_right) {
+            true => Ok(()),
+            false => Err(Verdict::new(Status::Wrong, "other regions".to_owned())),
+        }
+    }
+
     fn tasks(&self, planned: &[PlannedTask]) -> Vec<TimedTask<'_>> {
-        planned.iter().map(|planned| self.task(planned)).collect()
+        let ways = self.ways();
+        let task = |planned: &PlannedTask| {
+            let way = ways[planned.way];
+            TimedTask::new(planned.expected.clone(), move |n, out| {
+                self.answer(way, n, out)
+            })
+        };
+        planned.iter().map(task).collect()
     }
 }
 
-/// Measures all points in this process alone: times without intervals. `None` if
-/// stopped. With more processes: [`prepare`], [`time`] in each of them,
-/// [`Prepared::conclude`].
-///
-/// # Errors
-/// A structure that refuses the scene.
-pub fn measure_points(
-    input: &PrecisionInput,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<Precision>, BuildError> {
-    let Some(prepared) = prepare(input, stop)? else {
-        return Ok(None);
-    };
-    let times = time(input, &prepared.plan, stop)?;
-    Ok(times.map(|times| prepared.conclude(&[times])))
-}
-
 /// Checks and judges all points, and plans how they are timed; `None` if stopped.
+/// [`time`] and [`Prepared::conclude`] follow.
 ///
 /// Every answer is compared with the plain loop before it is timed, and the
 /// plain loop with the exact truth: O(cameras * items) verdicts of some 50 ns
@@ -308,47 +289,45 @@ pub fn prepare(
     let shots = Shots::of(input.path, input.most_cameras);
     let cameras = shots.cameras.len();
     let built = Built::new(input, &shots, Some(&shots.truths(scene)))?;
-    let planned = |key, expected| PlannedTask {
-        key,
-        is_twin: false,
-        expected,
-    };
-    let (mut points, mut tasks, mut twin) = (Vec::new(), Vec::new(), None);
-    for (place, way) in built.ways().into_iter().enumerate() {
+    let region_judged = built.queries.judged();
+    let (mut points, mut region_points) = (Vec::new(), Vec::new());
+    let (mut tasks, mut twin) = (Vec::new(), None);
+    for (index, way) in built.ways().into_iter().enumerate() {
         if stop() {
             return Ok(None);
         }
-        let judged = way.judged;
-        let memory = way.index.memory().total() as f64 / items as f64;
-        let mut point = judged.point(way.structure, memory);
-        if judged.refused.is_none() {
-            match way.checked(items) {
-                Ok(()) => {
-                    let task = planned(Key::Culling(place), judged.counts());
-                    if judged.culling == Culling::default() && twin.is_none() {
-                        twin = Some(PlannedTask {
-                            is_twin: true,
-                            ..task.clone()
-                        });
-                    }
-                    tasks.push(task);
-                }
-                Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
+        let (is_sound, expected) = match way {
+            Way::Culling(indexes, judged) => {
+                let test = judged.culling.test;
+                let memory = indexes.of(test).memory().total() as f64 / items as f64;
+                let mut point = judged.point(indexes.structure, memory);
+                let is_sound =
+                    judged.refused.is_none() && point.accepts(built.check(way, judged, items));
+                points.push(point);
+                (is_sound, judged.counts())
             }
+            Way::Region(indexes, numbers) => {
+                let judged = &region_judged[numbers as usize];
+                let mut point = judged.point(indexes.map_or("scan", |own| own.structure));
+                let is_sound = point.accepts(built.check_regions(way, judged, cameras));
+                region_points.push(point);
+                (is_sound, judged.counts())
+            }
+        };
+        if !is_sound {
+            continue;
         }
-        points.push(point);
-    }
-    let region_judged = built.queries.judged();
-    let mut region_points = Vec::new();
-    for (place, way) in built.region_ways().into_iter().enumerate() {
-        let own = &region_judged[way.numbers as usize];
-        let mut point = own.point(way.structure);
-        if region_is_right(&built.queries, &way, own, cameras) {
-            tasks.push(planned(Key::Region(place), own.counts()));
-        } else {
-            (point.status, point.reason) = (Status::Wrong, Some("other regions".to_owned()));
+        let task = |is_twin| PlannedTask {
+            way: index,
+            is_twin,
+            expected: expected.clone(),
+        };
+        tasks.push(task(false));
+        if let Way::Culling(_, judged) = way
+            && judged.culling == Culling::default()
+        {
+            twin.get_or_insert_with(|| task(true));
         }
-        region_points.push(point);
     }
     tasks.extend(twin);
     let schedule = Schedule::new(cameras, &built.tasks(&tasks), input.protocol);
@@ -370,7 +349,7 @@ pub fn prepare(
     }))
 }
 
-/// Times in this process what was planned; `None` if stopped.
+/// Times the planned tasks in this process; `None` if stopped.
 ///
 /// # Errors
 /// A structure that refuses the scene.
@@ -388,12 +367,10 @@ pub fn time(
     let tasks = built.tasks(&plan.tasks);
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| {
-        let by_camera = timed.iter().map(|timed| match timed {
-            Ok(timed) => by_camera(timed, cameras),
-            Err(_) => Vec::new(),
-        });
+        let laps = timed.iter().map(|timed| timed.as_ref().ok());
+        let laps = laps.map(|timed| timed.map(|timed| by_camera(timed, cameras)));
         ProcessTimes {
-            by_camera: by_camera.collect(),
+            by_camera: laps.map(Option::unwrap_or_default).collect(),
             ..ProcessTimes::of(&timed)
         }
     }))
@@ -407,24 +384,21 @@ impl Prepared {
             plan,
         } = self;
         let times = OverProcesses::of(processes);
-        // The twin comes last: the first of its key is the original.
-        let original = |key| plan.tasks.iter().position(|planned| planned.key == key);
+        // The twin comes last: the first task of its way is the original.
+        let original = |way| plan.tasks.iter().position(|planned| planned.way == way);
         let mut culled = Vec::new();
         for (task, planned) in plan.tasks.iter().enumerate() {
-            match planned.key {
-                key if planned.is_twin => {
-                    precision.twin = original(key).and_then(|own| times.ratio(task, own));
-                }
-                Key::Culling(place) => {
-                    culled.push(task);
-                    let point = &mut precision.points[place];
-                    point.time(&times, task, 1.0);
-                    let ns = point.times.query_ns;
-                    point.errors.ns_per_item = ns.map(|ns| ns / precision.items as f64);
-                }
-                Key::Region(place) => {
-                    precision.region_points[place].time(&times, task, POINTS_PER_CAMERA as f64);
-                }
+            let way = planned.way;
+            if planned.is_twin {
+                precision.twin = original(way).and_then(|own| times.ratio(task, own));
+            } else if let Some(point) = precision.points.get_mut(way) {
+                culled.push(task);
+                point.time(&times, task, 1.0);
+                let ns = point.times.query_ns;
+                point.errors.ns_per_item = ns.map(|ns| ns / precision.items as f64);
+            } else {
+                let point = &mut precision.region_points[way - precision.points.len()];
+                point.time(&times, task, POINTS_PER_CAMERA as f64);
             }
         }
         culled.retain(|&task| times.failure(task).is_none());
@@ -436,18 +410,4 @@ impl Prepared {
         precision.processes = processes.len();
         precision
     }
-}
-
-fn region_is_right(
-    queries: &RegionQueries,
-    way: &RegionWay,
-    own: &RegionJudged,
-    cameras: usize,
-) -> bool {
-    let mut out = Vec::new();
-    (0..cameras).all(|n| {
-        out.clear();
-        queries.ask(way.numbers, way.index, n, &mut out);
-        own.is_right(n, &out)
-    })
 }

@@ -26,8 +26,8 @@ named! {
 
 /// Points that are searched for at each camera, asked as one query.
 pub const POINTS_PER_CAMERA: usize = 16;
-/// Of them those that lie anywhere in the scene; one is the eye, and the rest lie
-/// within an ulp of f32 of a region's face.
+/// Points per camera before those near faces: the eye, and points anywhere in the
+/// scene. The rest lie within an ulp of f32 of a region's face.
 const ANYWHERE: usize = 5;
 const SEED: u64 = 18;
 
@@ -52,19 +52,19 @@ pub struct RegionErrors {
 pub(super) struct RegionQueries<'a> {
     scene: &'a Scene,
     by_camera: Vec<Vec<Sought>>,
-    /// Of the regions, in the world, rounded to f64.
+    /// Boxes of the regions, in the world, rounded to f64.
     boxes: Vec<[DVec3; 2]>,
 }
 
-/// What is found by one kind of numbers, by camera and point, and how wrong it is.
+/// Answers in one kind of numbers, and their errors.
 pub(super) struct RegionJudged {
     numbers: RegionNumbers,
     answers: Answers,
-    /// By camera: wrong answers, false regions, missed regions, worst.
+    /// Wrong answers, false regions, missed regions and worst of each camera.
     by_camera: Vec<[f64; 4]>,
 }
 
-/// By camera and point.
+/// Regions by camera and point.
 type Answers = Vec<Vec<Vec<ItemId>>>;
 
 fn boxes_of(scene: &Scene) -> Vec<[DVec3; 2]> {
@@ -72,26 +72,22 @@ fn boxes_of(scene: &Scene) -> Vec<[DVec3; 2]> {
         Regions::Tiling(tiling) => &tiling.originals,
         _ => &scene.originals,
     };
-    match (&scene.regions, originals.boxes()) {
-        (Regions::Items | Regions::Tiling(_), Some(written)) => {
-            written.iter().map(|b| [b.min, b.max]).collect()
-        }
-        _ => {
-            let stored = scene.regions.boxes(&scene.items).iter();
-            let world = stored.map(|b| [b.min, b.max].map(|p| p.as_dvec3() + scene.origin));
-            world.collect()
-        }
+    if let (Regions::Items | Regions::Tiling(_), Some(written)) =
+        (&scene.regions, originals.boxes())
+    {
+        return written.iter().map(|b| [b.min, b.max]).collect();
     }
+    let stored = scene.regions.boxes(&scene.items).iter();
+    let world = stored.map(|b| [b.min, b.max].map(|p| p.as_dvec3() + scene.origin));
+    world.collect()
 }
 
 impl RegionQueries<'_> {
     pub fn new<'a>(scene: &'a Scene, shots: &Shots) -> RegionQueries<'a> {
         let boxes = boxes_of(scene);
         let mut rng = SeededRng::new(SEED);
-        let bounds = boxes
-            .iter()
-            .copied()
-            .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        let corners = boxes.iter().copied();
+        let bounds = corners.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
         let [low, high] = bounds.unwrap_or_default();
         let mut of_camera = |eye: DVec3| {
             let mut points = vec![scene.sought(eye)];
@@ -148,8 +144,8 @@ impl RegionQueries<'_> {
         }));
     }
 
-    /// Answers query `camera`: the regions of all its points, appended.
-    pub fn ask(
+    /// Appends the regions of all points of a camera.
+    pub fn answer(
         &self,
         numbers: RegionNumbers,
         index: Option<&dyn DynIndex>,
@@ -161,8 +157,7 @@ impl RegionQueries<'_> {
         }
     }
 
-    /// What each kind of numbers finds, judged by the exact answer. O(points *
-    /// regions).
+    /// Answers in every kind of numbers, judged by the exact one. O(points * regions).
     pub fn judged(&self) -> Vec<RegionJudged> {
         let truth = self.answers(RegionNumbers::Exact);
         let of = |numbers| {
@@ -180,7 +175,7 @@ impl RegionQueries<'_> {
                 answers,
             }
         };
-        RegionNumbers::ALL.into_iter().map(of).collect()
+        RegionNumbers::ALL.map(of).into()
     }
 
     fn answers(&self, numbers: RegionNumbers) -> Answers {
@@ -236,7 +231,7 @@ impl RegionJudged {
         self.answers.iter().map(count).collect()
     }
 
-    /// Whether what was found for a query, points in their order, is this answer.
+    /// Compares the regions found for a camera, points in their order, with this answer.
     pub fn is_right(&self, camera: usize, found: &[ItemId]) -> bool {
         let mut rest = found;
         self.answers[camera].iter().all(|answer| {
@@ -264,12 +259,12 @@ impl RegionJudged {
             missed_region_count: missed as u64,
             worst_false,
         };
-        let dimensions = [(missed, 2), (falsely, 1), (worst_false, 3)];
-        let dimensions = dimensions.map(|(value, k)| Dimension {
-            value,
-            by_camera: column(k).collect(),
-        });
-        let mut point = Point::new(structure, errors, dimensions.into());
+        let dimensions = vec![
+            Dimension::sum(column(2)),
+            Dimension::sum(column(1)),
+            Dimension::worst(column(3)),
+        ];
+        let mut point = Point::new(structure, errors, dimensions);
         if missed > 0.0 {
             point.status = Status::Unsafe;
         }
@@ -311,7 +306,7 @@ mod tests {
         for judged in &judged {
             assert_eq!(judged.point("x").errors.missed_region_count, 0);
             let mut out = Vec::new();
-            queries.ask(judged.numbers, None, 3, &mut out);
+            queries.answer(judged.numbers, None, 3, &mut out);
             assert!(judged.is_right(3, &out), "{:?}", judged.numbers);
             out.push(0);
             assert!(!judged.is_right(3, &out));

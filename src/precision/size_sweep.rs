@@ -1,19 +1,19 @@
 //! Error against the ratio of item size to view depth: cubes strewn about one
 //! frustum after another, tested with sphere, faces, bounds, silhouettes and
-//! all of them. Ratios are what counts, so the unit of length is the depth.
+//! all of them. The unit of length is the depth.
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
-use crate::culling::{bounds, extended, farthest_corner, silhouettes};
-use crate::geometry::{
-    Aabb, BoxBlocks, ConvexVolume, ConvexVolumeF64, MAX_PLANES, PlaneF64, Spheres, sphere_cube,
+use crate::culling::{
+    Arithmetic, CameraView, Culling, CullingError, CullingTest, farthest_corner, silhouettes,
 };
+use crate::geometry::{Aabb, BoxBlocks, MAX_PLANES, sphere_cube};
 use crate::kernel::BASELINE;
 use crate::measure::Stopwatch;
 use crate::oracle::{Oracle, Pose, Verdict};
-use crate::query::QueryVolume;
+use crate::query::{QueryVolume, each_volume};
 use crate::scene::SeededRng;
 use crate::statistics::{Rate, median, rate};
 
@@ -41,7 +41,7 @@ pub struct SizeRow {
 pub struct SizeError {
     /// Name of the test.
     pub test: &'static str,
-    /// By frustum; null if nothing is visible.
+    /// False positives / visible cubes, by frustum; null if nothing is visible.
     pub excess: Option<Rate>,
     /// Visible cubes that were not returned.
     pub false_negative_count: u64,
@@ -53,7 +53,7 @@ pub struct SizeError {
 /// evenly they tell a frustum's share better than as many anywhere.
 const GRID: usize = 8;
 const BATCH: usize = GRID * GRID * GRID;
-/// One frustum of so many is timed, its cubes so often in turn.
+/// One frustum of `REPEATS` is timed, its cubes `REPEATS` times in turn.
 const REPEATS: usize = 32;
 const FOVY_DEG: f64 = 60.0;
 const ASPECT: f64 = 16.0 / 9.0;
@@ -81,7 +81,7 @@ pub fn size_sweep(
     cubes: usize,
     seed: u64,
     stop: &dyn Fn() -> bool,
-) -> Result<Option<Vec<SizeRow>>, CameraError> {
+) -> Result<Option<Vec<SizeRow>>, CullingError> {
     let mut rng = SeededRng::new(seed);
     let mut tallies = SIZE_RATIOS.map(|_| Tally::default());
     for n in 0..cubes.div_ceil(BATCH) {
@@ -92,7 +92,7 @@ pub fn size_sweep(
         let Some(oracle) = Oracle::of_camera(&Pose::of(&camera), &camera.lens, DVec3::ZERO) else {
             continue;
         };
-        let views = Views::of(&camera)?;
+        let views = views(&camera)?;
         for (tally, ratio) in tallies.iter_mut().zip(SIZE_RATIOS) {
             let cubes = strewn(&mut rng, &camera, ratio);
             tally.add(&oracle, &views, &cubes, n % REPEATS == 0);
@@ -102,15 +102,22 @@ pub fn size_sweep(
     Ok(Some(rows.map(|(tally, ratio)| tally.row(ratio)).collect()))
 }
 
+/// Sums over the cubes of one ratio.
 #[derive(Default)]
 struct Tally {
     cubes: u64,
     visible: u64,
-    /// Per test and frustum: returned though out, visible.
-    extra: [Vec<[f64; 2]>; TESTS.len()],
-    /// Per test: not returned though in, times.
-    missed: [u64; TESTS.len()],
-    times: [Vec<f64>; TESTS.len()],
+    tests: [TestTally; TESTS.len()],
+}
+
+#[derive(Default)]
+struct TestTally {
+    /// Returned though out, and visible, by frustum.
+    extra: Vec<[f64; 2]>,
+    /// Cubes that are in and not returned.
+    missed: u64,
+    /// Nanoseconds per box.
+    times: Vec<f64>,
 }
 
 /// A frustum in any direction, at zero, of depth 1.
@@ -159,59 +166,74 @@ fn strewn(rng: &mut SeededRng, camera: &Camera, ratio: f64) -> Vec<Aabb> {
     (0..BATCH).map(cube).collect()
 }
 
-/// The planes of one frustum in the form that each test takes.
-struct Views {
-    spheres: Spheres,
-    volumes: [ConvexVolume; 5],
-    exact: ConvexVolumeF64,
-}
-
-impl Views {
-    fn of(camera: &Camera) -> Result<Views, CameraError> {
-        let around = Surroundings::default();
-        let wide = camera.convex_volume_f64(&around)?;
-        let faces = wide.planes();
-        let reach = farthest_corner(faces);
-        let moved = PlaneOptions::default();
-        let bare = PlaneOptions {
-            epsilon: 0.0,
-            ..moved
+/// Views of one frustum, in the order of [`TESTS`].
+fn views(camera: &Camera) -> Result<[CameraView; TESTS.len()], CullingError> {
+    let around = Surroundings::default();
+    let moved = PlaneOptions::default();
+    let bare = PlaneOptions {
+        epsilon: 0.0,
+        ..moved
+    };
+    let of = |test, arithmetic, planes| {
+        let culling = Culling {
+            test,
+            arithmetic,
+            planes,
         };
-        let with = |more: &[PlaneF64], options| camera.volume_with(more, options, &around);
-        let silhouettes = silhouettes(faces, MAX_PLANES - faces.len(), reach);
-        let all = extended(faces, reach);
-        let six = with(&[], &bare)?;
-        Ok(Views {
-            spheres: Spheres::new(&six),
-            volumes: [
-                six,
-                with(&bounds(faces, reach), &bare)?,
-                with(&silhouettes, &bare)?,
-                with(&all, &bare)?,
-                with(&all, &moved)?,
-            ],
-            exact: ConvexVolumeF64::from_planes(&[faces, &all].concat())?,
-        })
-    }
+        culling.view(camera, &around)
+    };
+    let in_f32 = |test| of(test, Arithmetic::F32, bare);
+    let wide = camera.convex_volume_f64(&around)?;
+    let faces = wide.planes();
+    let more = silhouettes(faces, MAX_PLANES - faces.len(), farthest_corner(faces));
+    Ok([
+        in_f32(CullingTest::Sphere)?,
+        in_f32(CullingTest::SixPlane)?,
+        in_f32(CullingTest::SixBox)?,
+        CameraView::Volume(camera.volume_with(&more, &bare, &around)?),
+        in_f32(CullingTest::Exact)?,
+        of(CullingTest::Exact, Arithmetic::F32, moved)?,
+        of(CullingTest::Exact, Arithmetic::F64, bare)?,
+    ])
 }
 
 impl Tally {
-    fn add(&mut self, oracle: &Oracle, views: &Views, cubes: &[Aabb], is_timed: bool) {
+    fn add(&mut self, oracle: &Oracle, views: &[CameraView], cubes: &[Aabb], is_timed: bool) {
         let verdicts: Vec<Verdict> = cubes.iter().map(|cube| oracle.verdict(cube)).collect();
         self.cubes += cubes.len() as u64;
         self.visible += verdicts.iter().filter(|v| **v != Verdict::Out).count() as u64;
         let balls: Vec<Aabb> = cubes.iter().map(sphere_cube).collect();
         let (boxes, balls) = (blocks(cubes), blocks(&balls));
-        self.take(0, &views.spheres, &balls, &verdicts, is_timed);
-        for (test, volume) in (1..).zip(&views.volumes) {
-            self.take(test, volume, &boxes, &verdicts, is_timed);
+        for (test, view) in self.tests.iter_mut().zip(views) {
+            let blocks = match view {
+                CameraView::Spheres(_) => &balls,
+                _ => &boxes,
+            };
+            each_volume!(view.as_any(), volume => test.add(volume, blocks, &verdicts, is_timed));
         }
-        self.take(6, &views.exact, &boxes, &verdicts, is_timed);
     }
 
-    fn take<V: QueryVolume>(
+    fn row(&self, ratio: f64) -> SizeRow {
+        let tests = TESTS.iter().zip(&self.tests);
+        let tests = tests.map(|(test, own)| SizeError {
+            test,
+            excess: rate(&own.extra),
+            false_negative_count: own.missed,
+            ns_per_box: median(&own.times),
+        });
+        SizeRow {
+            size_over_depth: ratio,
+            frusta: self.tests[0].extra.len(),
+            cubes: self.cubes,
+            visible: self.visible,
+            tests: tests.collect(),
+        }
+    }
+}
+
+impl TestTally {
+    fn add<V: QueryVolume>(
         &mut self,
-        test: usize,
         view: &V,
         blocks: &BoxBlocks,
         verdicts: &[Verdict],
@@ -229,32 +251,16 @@ impl Tally {
         }
         if is_timed {
             let tests = (repeats * verdicts.len()) as f64;
-            self.times[test].push(watch.lap().cpu_ns / tests);
+            self.times.push(watch.lap().cpu_ns / tests);
         }
         let (mut extra, mut visible) = (0.0, 0.0);
         for (i, verdict) in verdicts.iter().enumerate() {
             let seen = admitted[i / 16] >> (i % 16) & 1 == 1;
             extra += f64::from(seen && *verdict == Verdict::Out);
             visible += f64::from(*verdict != Verdict::Out);
-            self.missed[test] += u64::from(!seen && *verdict == Verdict::In);
+            self.missed += u64::from(!seen && *verdict == Verdict::In);
         }
-        self.extra[test].push([extra, visible]);
-    }
-
-    fn row(&self, ratio: f64) -> SizeRow {
-        let tests = TESTS.iter().enumerate().map(|(i, test)| SizeError {
-            test,
-            excess: rate(&self.extra[i]),
-            false_negative_count: self.missed[i],
-            ns_per_box: median(&self.times[i]),
-        });
-        SizeRow {
-            size_over_depth: ratio,
-            frusta: self.extra[0].len(),
-            cubes: self.cubes,
-            visible: self.visible,
-            tests: tests.collect(),
-        }
+        self.extra.push([extra, visible]);
     }
 }
 
@@ -271,16 +277,15 @@ mod tests {
     fn judged(camera: &Camera, cubes: &[Aabb]) -> Tally {
         let oracle = Oracle::of_camera(&Pose::of(camera), &camera.lens, DVec3::ZERO).unwrap();
         let mut tally = Tally::default();
-        tally.add(&oracle, &Views::of(camera).unwrap(), cubes, false);
+        tally.add(&oracle, &views(camera).unwrap(), cubes, false);
         tally
     }
 
     fn extra(tally: &Tally) -> [f64; TESTS.len()] {
-        tally.extra.each_ref().map(|by| by[0][0])
+        tally.tests.each_ref().map(|test| test.extra[0][0])
     }
 
-    /// What lies beside the region would have to be counted if any test
-    /// returned it.
+    /// Cubes beside the region would have to be counted if any test returned them.
     #[test]
     fn nothing_beside_the_region_is_returned_by_any_test() {
         let mut rng = SeededRng::new(5);
@@ -309,7 +314,10 @@ mod tests {
                 assert!(within.visible > 0, "{ratio}");
                 spheres_extra += extra(&within)[0];
                 let exact = TESTS.len() - 1;
-                assert_eq!((extra(&within)[exact], within.missed[exact]), (0.0, 0));
+                assert_eq!(
+                    (extra(&within)[exact], within.tests[exact].missed),
+                    (0.0, 0)
+                );
             }
             assert!(spheres_extra > 0.0, "{ratio}");
         }

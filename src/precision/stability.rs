@@ -56,18 +56,12 @@ pub(super) fn stability(
         let chosen = |camera: usize| (camera * used) % cameras < used;
         let some: Vec<f64> = tasks.iter().map(|&task| spent(task, &chosen)).collect();
         let pairs = (0..all.len()).flat_map(|i| (i + 1..all.len()).map(move |k| (i, k)));
-        let (mut same, mut total) = (0u64, 0u64);
-        for (i, k) in pairs {
-            total += 1;
-            same += u64::from((some[i] < some[k]) == (all[i] < all[k]));
-        }
+        let is_same = |&(i, k): &(usize, usize)| (some[i] < some[k]) == (all[i] < all[k]);
+        let (same, total) = (pairs.clone().filter(is_same).count(), pairs.count());
         rows.push(StableAfter {
             cameras: used,
-            pairs_in_order: if total == 0 {
-                1.0
-            } else {
-                same as f64 / total as f64
-            },
+            // No pair is out of order where there is none.
+            pairs_in_order: same.max(usize::from(total == 0)) as f64 / total.max(1) as f64,
             seconds: some.iter().sum::<f64>() * rounds as f64 / 1e9,
         });
         count *= 2;
@@ -80,7 +74,7 @@ mod tests {
     use super::*;
     use crate::measure::Sample;
 
-    /// Two rounds; each number is the mean of a batch of so many cameras.
+    /// Two rounds; each number is the mean of a batch of `queries` cameras.
     fn timed(batches: &[f64], queries: u32) -> Timed {
         let sample = |round: u32, i: usize| Sample {
             round,

@@ -7,19 +7,18 @@
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::judged::{Names, counts_or_null};
+use super::judged::{Names, counts_or_null, scan};
 use crate::camera::{
     Camera, CameraError, Frame, Lens, LensKind, PLANE_METHODS, PlaneOptions, Pose, Surroundings,
 };
 use crate::culling::{Arithmetic, CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
-use crate::query::ItemId;
 use crate::scene::SeededRng;
 use crate::statistics::{Rate, rate};
 use crate::verify::{ErrorCount, Truth};
 
 named! {
-    /// What is swept over.
+    /// Quantity that is swept over.
     #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Sweep, SWEEPS {
@@ -35,7 +34,7 @@ named! {
 }
 
 impl Sweep {
-    /// What the others are while one is swept over is among them.
+    /// Values of the sweep, from the mildest on.
     pub fn values(self) -> [f64; 5] {
         match self {
             Sweep::Offset => [0.0, 1e4, 1e5, 1e6, 1e7],
@@ -51,7 +50,7 @@ impl Sweep {
 /// One plane test at one value of a sweep.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SweepRow {
-    /// What is varied.
+    /// Quantity that is varied.
     pub sweep: Sweep,
     /// Its value, in the sweep's own unit.
     pub value: f64,
@@ -69,9 +68,10 @@ pub struct SweepRow {
     pub refused: Option<String>,
 }
 
-/// Mean depth of the views of a world of size 1, and how many boxes each camera looks
-/// at. Depths are drawn: what rounding does to one lens it does to all views by it.
+/// Mean depth of the views of a world of size 1. Depths are drawn: rounding does the
+/// same to all views by one lens.
 const DEPTH: f64 = 100.0;
+/// Boxes of each camera.
 const BOXES: usize = 500;
 
 /// A culling, by the toolkit's frame or by a plain one.
@@ -90,25 +90,25 @@ fn tests() -> Vec<SweptTest> {
         has_plain_frame,
     };
     let bare = |arithmetic, method| {
-        let planes = PlaneOptions {
-            method,
-            epsilon: 0.0,
-        };
         let culling = Culling {
             arithmetic,
-            planes,
+            planes: PlaneOptions {
+                method,
+                epsilon: 0.0,
+            },
             ..Culling::default()
         };
         with(culling, false)
     };
     let method = PlaneOptions::default().method;
-    let mut tests = vec![
-        with(Culling::default(), false),
-        with(Culling::default(), true),
-    ];
-    tests.extend([Arithmetic::F64, Arithmetic::F32Relative].map(|a| bare(a, method)));
-    tests.extend(PLANE_METHODS.map(|(method, ..)| bare(Arithmetic::F32, method)));
-    tests
+    let defaults = [false, true].map(|is_plain| with(Culling::default(), is_plain));
+    let arithmetics = [Arithmetic::F64, Arithmetic::F32Relative].map(|a| bare(a, method));
+    let methods = PLANE_METHODS.map(|(method, ..)| bare(Arithmetic::F32, method));
+    defaults
+        .into_iter()
+        .chain(arithmetics)
+        .chain(methods)
+        .collect()
 }
 
 impl SweptTest {
@@ -166,7 +166,7 @@ pub fn sweep(
     Some(rows)
 }
 
-/// What one test gets wrong, by camera.
+/// Errors of one test, by camera.
 #[derive(Default)]
 struct Judged {
     errors: Vec<ErrorCount>,
@@ -238,19 +238,14 @@ fn judge(rng: &mut SeededRng, sweep: Sweep, value: f64, tests: &[SweptTest], all
         return;
     };
     let boxes = boxes_about(rng, &camera);
-    let around = Surroundings {
-        origin: DVec3::ZERO,
-        reach: Aabb::union_of(&boxes).reach(),
-    };
+    let around = Surroundings::of_boxes(&boxes);
     let Some(truth) = Truth::of_camera(&camera, DVec3::ZERO, &boxes) else {
         return;
     };
     for (test, judged) in tests.iter().zip(all) {
         match test.view(&camera, &around) {
             Ok(view) => {
-                let view = view.as_any();
-                let seen = boxes.iter().zip(0..).filter(|(b, _)| view.sees(b));
-                let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
+                let answer = scan(&boxes, &view);
                 judged.errors.push(truth.errors(&boxes, &answer));
             }
             Err(error) => judged.refused = Some(error.to_string()),
