@@ -6,8 +6,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+use obvhs::ploc::morton::morton_encode_u64;
 
-use super::exact::normal;
+use super::exact::{faces, normal};
+use super::eye::Eye;
 use crate::geometry::Aabb;
 use crate::kernel::each;
 use crate::scene::Surfaces;
@@ -113,8 +115,10 @@ impl Clusters {
         self.surfaces.two_sided[self.surfaces.item_of(triangle)]
     }
 
-    fn close(&mut self) {
-        self.starts.push(self.triangles.len() as u32);
+    /// Returns `true` if the eye sees a triangle's front, exactly, or if it has two sides.
+    pub fn is_seen(&self, eye: &Eye, cluster: usize, bit: usize) -> bool {
+        let corners = || self.surfaces.corners(self.triangles_of(cluster)[bit]);
+        self.is_two_sided(cluster) || faces(eye, corners())
     }
 }
 
@@ -134,14 +138,9 @@ fn grow(surfaces: &Surfaces, item: usize, most: usize, out: &mut Clusters) {
     let first = surfaces.of_item[item].start;
     let mut nodes = nodes(surfaces, item);
     let order = along_the_curve(&nodes, &surfaces.bounds(item));
-    let mut seeds = order.iter().copied().peekable();
+    let mut seeds = order.into_iter();
     let mut frontier: Vec<u32> = Vec::new();
-    loop {
-        while seeds
-            .next_if(|&seed| nodes[seed as usize].is_used)
-            .is_some()
-        {}
-        let Some(&seed) = seeds.peek() else { break };
+    while let Some(seed) = seeds.find(|&seed| !nodes[seed as usize].is_used) {
         frontier.clear();
         let mut next = Some(seed);
         let (mut centres, mut normals, mut count) = (DVec3::ZERO, DVec3::ZERO, 0);
@@ -170,14 +169,10 @@ fn grow(surfaces: &Surfaces, item: usize, most: usize, out: &mut Clusters) {
             let best = costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             next = best.map(|(_, index)| index).or_else(|| {
                 // The piece is used up: on to the next along the curve.
-                while seeds
-                    .next_if(|&seed| nodes[seed as usize].is_used)
-                    .is_some()
-                {}
-                seeds.peek().copied()
+                seeds.find(|&seed| !nodes[seed as usize].is_used)
             });
         }
-        out.close();
+        out.starts.push(out.triangles.len() as u32);
     }
 }
 
@@ -216,20 +211,12 @@ fn along_the_curve(nodes: &[Node], bounds: &Aabb) -> Vec<u32> {
     let low = bounds.min.as_dvec3();
     let edge = (bounds.max.as_dvec3() - low).max_element();
     let scale = if edge > 0.0 { 2_097_151.0 / edge } else { 0.0 };
-    let spread = |x: f64| {
-        let mut x = x as u64 & 0x1F_FFFF;
-        x = (x | x << 32) & 0x001F_0000_0000_FFFF;
-        x = (x | x << 16) & 0x001F_0000_FF00_00FF;
-        x = (x | x << 8) & 0x100F_00F0_0F00_F00F;
-        x = (x | x << 4) & 0x10C3_0C30_C30C_30C3;
-        (x | x << 2) & 0x1249_2492_4924_9249
-    };
     let mut keyed: Vec<(u64, u32)> = nodes
         .iter()
         .enumerate()
         .map(|(index, node)| {
-            let [x, y, z] = ((node.centre - low) * scale).to_array().map(spread);
-            (x | y << 1 | z << 2, index as u32)
+            let [x, y, z] = ((node.centre - low) * scale).to_array().map(|x| x as u32);
+            (morton_encode_u64(x, y, z), index as u32)
         })
         .collect();
     keyed.sort_unstable();

@@ -1,7 +1,6 @@
-//! What a back end delivered, held against the exact truth.
+//! The exact truth of the stage, and the answer of a back end compared with it.
 
 use super::clusters::Clusters;
-use super::exact::faces;
 use super::eye::Eye;
 use super::selection::Selection;
 
@@ -9,10 +8,7 @@ use super::selection::Selection;
 /// and all two-sided ones. Exact; one predicate per triangle, no shared structure.
 pub fn facing(clusters: &Clusters, eye: &Eye, candidates: &Selection) -> Selection {
     let mut truth = candidates.clone();
-    truth.retain(|cluster, bit| {
-        let triangle = clusters.triangles_of(cluster)[bit];
-        clusters.is_two_sided(cluster) || faces(eye, clusters.surfaces.corners(triangle))
-    });
+    truth.retain(|cluster, bit| clusters.is_seen(eye, cluster, bit));
     truth
 }
 

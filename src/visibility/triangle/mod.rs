@@ -1,44 +1,36 @@
-//! The triangle stage: which triangles of the items that are left can be seen. One
-//! file a back end; the table names them all.
+//! The triangle stage: which triangles of the remaining items can be seen. One file per back
+//! end, all of them in one table.
 
 mod clusters;
-mod cone_block;
-mod cone_f32;
-mod cone_safe;
+mod cones;
 mod contract;
 mod exact;
 mod eye;
-#[cfg(feature = "peers")]
-mod meshopt;
 mod metrics;
-mod none;
 mod normal_cone;
 mod per_triangle;
-mod plane_blocks;
+mod plain_cones;
 mod selection;
-mod several_cones;
 
 pub use clusters::{Clusters, MOST_TRIANGLES};
-pub use cone_f32::PlainCones;
-pub use cone_safe::SafeCones;
+pub use cones::{Cones, SafeCones};
 pub use contract::{TriangleCull, TriangleRow};
 pub use exact::{faces, normal};
 pub use eye::Eye;
-#[cfg(feature = "peers")]
-pub use meshopt::MeshoptCones;
 pub use metrics::{Counts, facing};
 pub use normal_cone::Cone;
+pub use plain_cones::PlainCones;
 pub use selection::Selection;
 
 /// All back ends of this stage.
 pub const TRIANGLE_ROWS: &[TriangleRow] = &[
-    none::ROW,
+    contract::NONE,
     per_triangle::ROW,
-    cone_f32::ROW,
-    cone_safe::ROW,
-    several_cones::ROW,
+    plain_cones::ROW,
+    cones::ROW,
+    cones::ROW_SEVERAL,
     #[cfg(feature = "peers")]
-    meshopt::ROW,
+    plain_cones::ROW_MESHOPT,
 ];
 
 #[cfg(test)]

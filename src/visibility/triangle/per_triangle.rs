@@ -9,24 +9,24 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
 use super::contract::{TriangleCull, TriangleRow};
-use super::exact::{faces, normal};
+use super::exact::normal;
 use super::eye::Eye;
-use super::plane_blocks::{PlaneBlocks, Planes};
+use super::metrics::facing;
 use super::selection::Selection;
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
+use crate::visibility::Guarantee;
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
     name: "per-triangle",
     summary: "The side of each triangle's plane, exactly (f32, f64, then expansions)",
     guarantee: Guarantee::Exact,
-    build,
+    build: |clusters| Box::new(PerTriangle::of(clusters)),
 };
 
 /// Error per unit of the way: see above.
@@ -36,39 +36,77 @@ const FAR: f32 = (1u64 << 59) as f32;
 /// For what underflows.
 const LEAST: f64 = 1e-30;
 
+/// Sixteen triangles: normals, scaled, and first corners.
+///
+/// Without area, or without a triangle, the normal of a lane is NaN: never in front.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Planes {
+    normal: [[f32; LANES]; 3],
+    corner: [[f32; LANES]; 3],
+}
+
+impl Planes {
+    const EMPTY: Planes = Planes {
+        normal: [[f32::NAN; LANES]; 3],
+        corner: [[0.0; LANES]; 3],
+    };
+}
+
 struct PerTriangle {
     clusters: Arc<Clusters>,
-    /// Without area, or without a triangle, a lane is NaN: never in front.
-    planes: PlaneBlocks,
-    /// Whether all corners are near enough for f32.
+    /// First planes of each cluster; one more at the end. A two-sided cluster has none.
+    starts: Vec<u32>,
+    planes: Vec<Planes>,
+    /// `true` if all corners are near enough for f32.
     is_near: bool,
 }
 
-fn build(clusters: &Arc<Clusters>) -> Box<dyn TriangleCull> {
-    let scaled = |corners| {
-        let n = normal(corners);
-        (n != DVec3::ZERO).then(|| (n / n.abs().max_element()).as_vec3())
-    };
-    let points = &clusters.surfaces.points;
-    Box::new(PerTriangle {
-        clusters: clusters.clone(),
-        planes: PlaneBlocks::of(clusters, f32::NAN, scaled),
-        is_near: points.iter().all(|p| p.abs().max_element() < FAR),
-    })
+impl PerTriangle {
+    /// O(t).
+    fn of(clusters: &Arc<Clusters>) -> PerTriangle {
+        let (mut starts, mut planes) = (vec![0], Vec::new());
+        for cluster in 0..clusters.len() {
+            let first = planes.len();
+            if !clusters.is_two_sided(cluster) {
+                let rows = clusters.triangles_of(cluster).len().div_ceil(LANES);
+                planes.resize(first + rows, Planes::EMPTY);
+                for (bit, corners) in clusters.corners_of(cluster).enumerate() {
+                    let (row, lane): (&mut Planes, _) =
+                        (&mut planes[first + bit / LANES], bit % LANES);
+                    let n = normal(corners);
+                    let n = match n == DVec3::ZERO {
+                        true => Vec3::NAN,
+                        false => (n / n.abs().max_element()).as_vec3(),
+                    };
+                    for k in 0..3 {
+                        row.normal[k][lane] = n[k];
+                        row.corner[k][lane] = corners[0][k];
+                    }
+                }
+            }
+            starts.push(planes.len() as u32);
+        }
+        let points = &clusters.surfaces.points;
+        PerTriangle {
+            clusters: clusters.clone(),
+            starts,
+            planes,
+            is_near: points.iter().all(|p| p.abs().max_element() < FAR),
+        }
+    }
 }
 
 impl TriangleCull for PerTriangle {
     fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
-        let all = self;
-        if !(self.is_near && eye.nearest.abs().max_element() < FAR) {
-            let clusters = &self.clusters;
-            kept.retain(|cluster, bit| {
-                let triangle = clusters.triangles_of(cluster)[bit];
-                clusters.is_two_sided(cluster) || faces(eye, clusters.surfaces.corners(triangle))
-            });
-            return;
+        match self.is_near && eye.nearest.abs().max_element() < FAR {
+            true => kernel.run(Query {
+                all: self,
+                eye,
+                kept,
+            }),
+            false => *kept = facing(&self.clusters, eye, kept),
         }
-        kernel.run(Query { all, eye, kept });
     }
 }
 
@@ -84,8 +122,9 @@ impl Work for Query<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         let eye = Lanes::of(isa, self.eye);
+        let PerTriangle { starts, planes, .. } = self.all;
         for (cluster, word) in self.kept.words_mut().iter_mut().enumerate() {
-            let rows = self.all.planes.of_cluster(cluster);
+            let rows = &planes[starts[cluster] as usize..starts[cluster + 1] as usize];
             if *word == 0 || rows.is_empty() {
                 continue;
             }
@@ -111,8 +150,7 @@ fn in_doubt(clusters: &Clusters, cluster: usize, mut left: u64, eye: &Eye) -> u6
     while left != 0 {
         let bit = left.trailing_zeros();
         left &= left - 1;
-        let triangle = clusters.triangles_of(cluster)[bit as usize];
-        front |= u64::from(faces(eye, clusters.surfaces.corners(triangle))) << bit;
+        front |= u64::from(clusters.is_seen(eye, cluster, bit as usize)) << bit;
     }
     front
 }

@@ -1,19 +1,21 @@
-//! One cone per cluster as meshoptimizer computes and tests it, in f32 without a
-//! term for rounding: a stand-in, written from the formulas in the documentation of
-//! `meshopt_computeClusterBounds`, one cluster at a time.
+//! One cone per cluster as meshoptimizer computes and tests it, one cluster at a time.
+//!
+//! In f32 without a term for rounding: a stand-in, written from the formulas in the
+//! documentation of `meshopt_computeClusterBounds`, and the cones of the crate `meshopt`
+//! (Kapoulkine's meshoptimizer) itself.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
 use super::contract::{TriangleCull, TriangleRow};
 use super::eye::Eye;
 use super::selection::Selection;
 use crate::kernel::Kernel;
+use crate::visibility::Guarantee;
 
-/// The row of this file.
+/// The row of the cones fitted here.
 pub const ROW: TriangleRow = TriangleRow {
     name: "cone-f32",
     summary: "One normal cone per cluster as meshoptimizer tests it (stand-in, scalar)",
@@ -21,15 +23,24 @@ pub const ROW: TriangleRow = TriangleRow {
     build: |clusters| Box::new(PlainCones::of(clusters)),
 };
 
+/// The row of the crate.
+#[cfg(feature = "peers")]
+pub const ROW_MESHOPT: TriangleRow = TriangleRow {
+    name: "meshopt",
+    summary: "One cone per cluster: crate meshopt's bounds and documented test, scalar",
+    guarantee: Guarantee::Unproven,
+    build: |clusters| Box::new(PlainCones::by_meshopt(clusters)),
+};
+
 /// Below this cosine a cone is taken for useless.
 const LEAST_COSINE: f32 = 0.1;
 
 /// A cone as the library documents it.
 #[derive(Clone, Copy, Debug)]
-pub struct PlainCone {
-    pub apex: Vec3,
-    pub axis: Vec3,
-    pub cutoff: f32,
+struct PlainCone {
+    apex: Vec3,
+    axis: Vec3,
+    cutoff: f32,
 }
 
 /// The cones of clusters.
@@ -39,19 +50,39 @@ pub struct PlainCones {
 }
 
 impl PlainCones {
-    /// One cone per cluster. O(t).
+    /// One cone per cluster, fitted here. O(t).
     pub fn of(clusters: &Arc<Clusters>) -> PlainCones {
-        let cone = |cluster| {
+        PlainCones::by(clusters, |cluster| {
             let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
-            let never = PlainCone {
-                apex: Vec3::ZERO,
-                axis: Vec3::ZERO,
-                cutoff: 1.0,
-            };
-            match clusters.is_two_sided(cluster) {
-                true => never,
-                false => PlainCone::of(&triangles).unwrap_or(never),
-            }
+            PlainCone::of(&triangles)
+        })
+    }
+
+    /// One cone per cluster, fitted by the crate. O(t).
+    #[cfg(feature = "peers")]
+    pub fn by_meshopt(clusters: &Arc<Clusters>) -> PlainCones {
+        let surfaces = &clusters.surfaces;
+        let points: Vec<[f32; 3]> = surfaces.points.iter().map(|p| p.to_array()).collect();
+        let bytes: &[u8] = bytemuck::cast_slice(&points);
+        let vertices = meshopt::VertexDataAdapter::new(bytes, size_of::<[f32; 3]>(), 0)
+            .expect("points are whole triples");
+        PlainCones::by(clusters, |cluster| {
+            let triangles = clusters.triangles_of(cluster).iter();
+            let corners = triangles.flat_map(|&t| surfaces.triangles[t as usize]);
+            let corners: Vec<u32> = corners.collect();
+            let bounds = meshopt::compute_cluster_bounds(&corners, &vertices);
+            Some(PlainCone {
+                apex: bounds.cone_apex.into(),
+                axis: bounds.cone_axis.into(),
+                cutoff: bounds.cone_cutoff,
+            })
+        })
+    }
+
+    fn by(clusters: &Clusters, fit: impl Fn(usize) -> Option<PlainCone>) -> PlainCones {
+        let cone = |cluster| match clusters.is_two_sided(cluster) {
+            true => PlainCone::NEVER,
+            false => fit(cluster).unwrap_or(PlainCone::NEVER),
         };
         PlainCones {
             cones: (0..clusters.len()).map(cone).collect(),
@@ -60,6 +91,13 @@ impl PlainCones {
 }
 
 impl PlainCone {
+    /// The cone of a cluster that is always kept, as the library gives it.
+    const NEVER: PlainCone = PlainCone {
+        apex: Vec3::ZERO,
+        axis: Vec3::ZERO,
+        cutoff: 1.0,
+    };
+
     fn of(triangles: &[[Vec3; 3]]) -> Option<PlainCone> {
         let planes: Vec<(Vec3, Vec3)> = triangles
             .iter()
@@ -119,27 +157,16 @@ fn ball(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, f32)> {
     Some((centre, radius))
 }
 
-/// Takes the clusters away whose cones see nothing, one by one.
-#[inline(always)]
-pub fn cull_one_by_one<C>(
-    cones: &[C],
-    plain: impl Fn(&C) -> PlainCone,
-    eye: &Eye,
-    kept: &mut Selection,
-) {
-    let each = cones.iter().map(plain).zip(kept.words_mut());
-    if eye.weight == 0.0 {
-        // `dot(view, cone_axis) >= cone_cutoff` for a parallel lens.
-        let gone = each.filter(|(cone, _)| (-eye.nearest).dot(cone.axis) >= cone.cutoff);
-        gone.for_each(|(_, word)| *word = 0);
-    } else {
-        let gone = each.filter(|(cone, _)| cone.rejects(eye.nearest));
-        gone.for_each(|(_, word)| *word = 0);
-    }
-}
-
 impl TriangleCull for PlainCones {
     fn cull(&self, eye: &Eye, _: Kernel, kept: &mut Selection) {
-        cull_one_by_one(&self.cones, |cone| *cone, eye, kept);
+        let each = self.cones.iter().zip(kept.words_mut());
+        if eye.weight == 0.0 {
+            // `dot(view, cone_axis) >= cone_cutoff` for a parallel lens.
+            let gone = each.filter(|(cone, _)| (-eye.nearest).dot(cone.axis) >= cone.cutoff);
+            gone.for_each(|(_, word)| *word = 0);
+        } else {
+            let gone = each.filter(|(cone, _)| cone.rejects(eye.nearest));
+            gone.for_each(|(_, word)| *word = 0);
+        }
     }
 }
