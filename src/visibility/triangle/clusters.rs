@@ -1,6 +1,7 @@
-//! Clusters: at most 64 neighbouring triangles of one item, so that a word has a bit
-//! for each. Grown greedily over common edges, along the Morton curve (Kapoulkine's
-//! meshoptimizer grows meshlets in the same spirit). Deterministic.
+//! Clusters: at most 64 neighbouring triangles of one item, a bit of a word for each.
+//!
+//! Grown greedily over common edges, along the Morton curve (as Kapoulkine's meshoptimizer
+//! grows meshlets). Deterministic.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -21,21 +22,21 @@ pub const MOST_TRIANGLES: usize = 64;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Clusters {
-    /// What they are of.
+    /// The surfaces that were clustered.
     pub surfaces: Arc<Surfaces>,
     /// Indices of triangles, cluster after cluster.
     pub triangles: Vec<u32>,
-    /// Where each cluster begins in `triangles`; one more at the end.
+    /// First index in `triangles` of each cluster; one more at the end.
     pub starts: Vec<u32>,
     /// The clusters of each item.
     pub of_item: Vec<Range<u32>>,
 }
 
 impl Clusters {
-    /// Clusters of at most so many triangles, 1 to 64. O(t log t).
+    /// Clusters of at most `most` triangles, 1 to 64. O(t log t).
     ///
     /// # Panics
-    /// If the number is outside 1..=64.
+    /// If `most` is outside 1..=64.
     pub fn of(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
         let mut clusters = Clusters::none_of(&surfaces, most);
         for item in 0..surfaces.items() {
@@ -46,11 +47,12 @@ impl Clusters {
         clusters
     }
 
-    /// Clusters of so many triangles of an item as they are listed, 1 to 64, without
-    /// any growing: two are the faces of a box. O(t).
+    /// Clusters of `most` triangles, 1 to 64, in the order of the list. O(t).
+    ///
+    /// Two are the faces of a box.
     ///
     /// # Panics
-    /// If the number is outside 1..=64.
+    /// If `most` is outside 1..=64.
     pub fn as_listed(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
         let mut clusters = Clusters::none_of(&surfaces, most);
         clusters
@@ -79,7 +81,7 @@ impl Clusters {
     }
 
     /// How many clusters there are.
-    #[allow(clippy::len_without_is_empty)] // Nobody asks whether there is none.
+    #[allow(clippy::len_without_is_empty)] // No caller needs `is_empty`.
     pub fn len(&self) -> usize {
         self.starts.len() - 1
     }
@@ -103,19 +105,19 @@ impl Clusters {
         }
     }
 
-    /// The clusters that are seen from one side only, with the corners of their triangles.
+    /// The one-sided clusters, with the corners of their triangles.
     pub fn one_sided(&self) -> impl Iterator<Item = (usize, Vec<[Vec3; 3]>)> {
         let clusters = (0..self.len()).filter(|&cluster| !self.is_two_sided(cluster));
         clusters.map(|cluster| (cluster, self.corners_of(cluster).collect()))
     }
 
-    /// Whether the triangles of a cluster are seen from both sides.
+    /// Returns `true` if the triangles of a cluster are seen from both sides.
     pub fn is_two_sided(&self, cluster: usize) -> bool {
         let triangle = self.triangles_of(cluster)[0];
         self.surfaces.two_sided[self.surfaces.item_of(triangle)]
     }
 
-    /// Returns `true` if the eye sees a triangle's front, exactly, or if it has two sides.
+    /// Exact: returns `true` if a triangle has two sides or the eye sees its front.
     pub fn is_seen(&self, eye: &Eye, cluster: usize, bit: usize) -> bool {
         let corners = || self.surfaces.corners(self.triangles_of(cluster)[bit]);
         self.is_two_sided(cluster) || faces(eye, corners())
@@ -125,10 +127,10 @@ impl Clusters {
 /// No neighbour across an edge.
 const NONE: u32 = u32::MAX;
 
-/// What growing needs to know of a triangle of an item.
+/// A triangle of an item, to be added to a cluster.
 struct Node {
     centre: DVec3,
-    /// Of unit length, or zero.
+    /// Unit length, or zero.
     normal: DVec3,
     neighbours: [u32; 3],
     is_used: bool,

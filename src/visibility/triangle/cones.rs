@@ -1,4 +1,4 @@
-//! Cones per cluster in f32, with a proven margin for rounding, sixteen clusters at a time.
+//! Cones per cluster in f32 with a proven margin, sixteen clusters at a time.
 //!
 //! The test is that of `normal_cone` in lanes. With several cones per cluster each is that of
 //! triangles turned alike.
@@ -76,8 +76,9 @@ impl<const N: usize> Cones<N> {
         }
     }
 
-    /// Reads all cones once: a lower bound of any test of them. The value only keeps the
-    /// compiler from omitting the reads.
+    /// Reads all cones once: a lower bound of any test of them.
+    ///
+    /// The value only keeps the compiler from omitting the reads.
     pub fn read(&self, kernel: Kernel) -> u64 {
         kernel.run(Read(bytemuck::cast_slice(self.cones.as_flattened())))
     }
@@ -136,8 +137,9 @@ impl Work for Read<'_> {
     }
 }
 
-/// The triangles in groups of like normals, a bit per triangle: the farthest directions
-/// first, then each to the nearest mean (Lloyd 1982).
+/// The triangles in groups of like normals, a bit per triangle.
+///
+/// The farthest directions first, then each to the nearest mean (Lloyd 1982).
 fn groups<const N: usize>(triangles: &[[Vec3; 3]]) -> [u64; N] {
     let normals: Vec<DVec3> = triangles
         .iter()

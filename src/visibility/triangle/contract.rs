@@ -10,8 +10,9 @@ use crate::visibility::Guarantee;
 
 /// A back end, built for certain clusters.
 pub trait TriangleCull: Send + Sync {
-    /// Removes triangles that cannot be seen from `kept`; adds none. The answer is the same
-    /// with every kernel.
+    /// Removes triangles that cannot be seen from `kept`; adds none.
+    ///
+    /// The answer is the same with every kernel.
     fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection);
 }
 

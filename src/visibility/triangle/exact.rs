@@ -1,4 +1,4 @@
-//! Which side of a triangle an eye is on, exactly: the truth of this stage.
+//! The side of a triangle that an eye is on, exactly: the truth of this stage.
 
 use glam::{DVec3, Vec3};
 
@@ -13,9 +13,10 @@ use crate::kernel::each;
 /// order of operations); 16 is twice that.
 const FILTER: f64 = 16.0 / (1u64 << 53) as f64;
 
-/// Whether the eye is strictly in front of a triangle: its corners turn
-/// counter-clockwise as seen from there. Behind it or in its plane a one-sided
-/// triangle cannot be seen; nor can one without area from anywhere.
+/// Returns `true` if the eye is strictly in front of a triangle.
+///
+/// Its corners turn counter-clockwise seen from there. A one-sided triangle is not seen from
+/// behind or from its plane, and one without area from nowhere.
 ///
 /// Exact for finite corners and an eye whose coordinates are zero or between
 /// 2^-500 and 2^500.

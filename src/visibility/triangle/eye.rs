@@ -1,4 +1,4 @@
-//! Where a view is taken from, exactly: a point, or a direction for a parallel lens.
+//! The eye of a view, exactly: a point, or a direction for a parallel lens.
 
 use glam::{DVec3, Vec3};
 
@@ -16,7 +16,7 @@ use crate::camera::Camera;
 pub struct Eye {
     /// The larger part.
     pub high: DVec3,
-    /// What rounding took from it: at most half an ulp of `high`.
+    /// The rest, which rounding took from it: at most half an ulp of `high`.
     pub low: DVec3,
     /// 1 for a point, 0 for a direction.
     pub weight: f32,

@@ -16,11 +16,11 @@ pub fn facing(clusters: &Clusters, eye: &Eye, candidates: &Selection) -> Selecti
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 #[non_exhaustive]
 pub struct Counts {
-    /// What the stage was given.
+    /// Triangles that the stage was given.
     pub candidates: usize,
-    /// What it delivered.
+    /// Triangles that it delivered.
     pub delivered: usize,
-    /// What it should have delivered.
+    /// Triangles that it should have delivered.
     pub truth: usize,
     /// Delivered, but not in the truth.
     pub false_positives: usize,

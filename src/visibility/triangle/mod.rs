@@ -1,5 +1,6 @@
-//! The triangle stage: which triangles of the remaining items can be seen. One file per back
-//! end, all of them in one table.
+//! The triangle stage: the triangles of the remaining items that can be seen.
+//!
+//! One file per back end, all of them in one table.
 
 mod clusters;
 mod cones;

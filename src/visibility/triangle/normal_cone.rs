@@ -1,5 +1,4 @@
-//! The cone of eyes that see no triangle of a cluster, with the rounding of the
-//! test proven into it.
+//! The cone of eyes that see no triangle of a cluster, with a proof of its rounding.
 //!
 //! Let all normals be within the angle alpha of the axis A, and the apex P not in
 //! front of any triangle. For an eye e with v = P - e and v.A >= sin(alpha) |A| |v|,
@@ -29,12 +28,12 @@ use super::exact::{faces, normal};
 use super::eye::Eye;
 use crate::arithmetic::rounding::round_up;
 
-/// What is added to the sine for the rounding of the test: see above.
+/// Slack of the sine for the rounding of the test: see above.
 const SLACK: f64 = 10.0 / (1u64 << 24) as f64;
 /// Error of a cosine of two normals in f64, with the error of the normals (2^-50
 /// each): some units of 2^-50.
 const COSINE: f64 = 64.0 / (1u64 << 53) as f64;
-/// Where products of three numbers may overflow.
+/// Coordinate above which products of three numbers may overflow.
 const FAR: f32 = (1u64 << 59) as f32;
 /// Least margin in world units.
 const LEAST_MARGIN: f64 = 1.0 / (1u64 << 40) as f64;
@@ -53,8 +52,7 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// The cone of some triangles; `None` where the normals leave no eye that sees none of
-    /// them.
+    /// The cone of some triangles; `None` if every eye may see one of them.
     pub fn fit(triangles: &[[Vec3; 3]]) -> Option<Cone> {
         // A triangle without area is never seen.
         let with_area = triangles.iter().map(|corners| (*corners, normal(*corners)));
@@ -83,8 +81,9 @@ impl Cone {
         })
     }
 
-    /// The share of all directions of view along which all triangles face away: a cap of
-    /// 90° - alpha about the axis.
+    /// The share of all directions of view along which all triangles face away.
+    ///
+    /// They are a cap of 90° - alpha about the axis.
     pub fn turned_away(&self) -> f64 {
         ((1.0 - self.sine) / 2.0).max(0.0)
     }
@@ -138,14 +137,14 @@ fn apex_of(planes: &[([Vec3; 3], DVec3)], axis: DVec3) -> Option<Vec3> {
     None
 }
 
-/// What a test needs of a view.
+/// A view, prepared for tests of cones.
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared {
     /// The eye in f32, negated: a difference is then a sum.
     pub minus_eye: [f32; 3],
     /// -M.
     pub minus_margin: f32,
-    /// Whether the eye is at infinity: the apex does not matter.
+    /// `true` if the eye is at infinity: the apex does not matter.
     pub is_parallel: bool,
 }
 

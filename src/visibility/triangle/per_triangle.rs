@@ -31,7 +31,7 @@ pub const ROW: TriangleRow = TriangleRow {
 
 /// Error per unit of the way: see above.
 const ERROR: f32 = 8.0 / (1u32 << 24) as f32;
-/// Where sums may overflow.
+/// Coordinate above which sums may overflow.
 const FAR: f32 = (1u64 << 59) as f32;
 /// For what underflows.
 const LEAST: f64 = 1e-30;

@@ -1,6 +1,6 @@
-//! One cone per cluster as meshoptimizer computes and tests it, one cluster at a time.
+//! One cone per cluster as meshoptimizer computes and tests it.
 //!
-//! In f32 without a term for rounding: a stand-in, written from the formulas in the
+//! One cluster at a time, in f32 without a term for rounding: a stand-in, written from the formulas in the
 //! documentation of `meshopt_computeClusterBounds`, and the cones of the crate `meshopt`
 //! (Kapoulkine's meshoptimizer) itself.
 

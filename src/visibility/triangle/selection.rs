@@ -47,13 +47,14 @@ impl Selection {
         &self.blocks.as_flattened()[..self.clusters]
     }
 
-    /// To take triangles away. Bits beyond the triangles of a cluster stay zero.
+    /// The words, to remove triangles. Bits beyond the triangles of a cluster stay zero.
     pub fn words_mut(&mut self) -> &mut [u64] {
         &mut self.blocks.as_flattened_mut()[..self.clusters]
     }
 
-    /// The words of sixteen clusters at a time; of the last ones too, where those beyond
-    /// the clusters are zero and stay so.
+    /// The words of sixteen clusters at a time.
+    ///
+    /// Those beyond the last cluster are zero and stay so.
     pub(super) fn blocks_mut(&mut self) -> &mut [[u64; LANES]] {
         &mut self.blocks
     }
@@ -72,7 +73,7 @@ impl Selection {
         pairs.map(|(a, b)| (a & !b).count_ones() as usize).sum()
     }
 
-    /// Keeps the triangles that a rule keeps: `(cluster, bit)`.
+    /// Keeps the triangles for which `keep(cluster, bit)` is true.
     #[inline(always)]
     pub fn retain(&mut self, mut keep: impl FnMut(usize, usize) -> bool) {
         for (cluster, word) in self.words_mut().iter_mut().enumerate() {

@@ -1,5 +1,5 @@
 //! A search for lost triangles: eyes next to the boundary of a cluster's cone, of
-//! flat, thin and far clusters. What a back end removes is held against the exact
+//! flat, thin and far clusters. What a back end removes is compared with the exact
 //! test.
 
 use std::sync::Arc;
@@ -27,7 +27,7 @@ named! {
     }
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Audit {
     /// Pairs of a cluster and an eye.
@@ -47,7 +47,7 @@ pub struct Audit {
 const WORLD: usize = 16;
 const EYES: usize = 64;
 
-/// Tries at least so many pairs. The same ones for every back end and machine.
+/// Tries at least `pairs` pairs. The same ones for every back end and machine.
 pub fn audit(row: &TriangleRow, pairs: usize, seed: u64, eyes: EyeKind) -> Audit {
     let mut rng = SeededRng::new(seed);
     let mut found = Audit {
@@ -127,7 +127,9 @@ fn patch(rng: &mut SeededRng) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// An eye near the boundary: in the plane of a triangle but for some ulps, where the
+/// An eye near the boundary.
+///
+/// It is in the plane of a triangle but for some ulps, where the
 /// cone of the cluster touches that plane or anywhere. And the direction to it, also
 /// off by some ulps.
 fn boundary(clusters: &Clusters, cluster: usize, rng: &mut SeededRng) -> [DVec3; 2] {
