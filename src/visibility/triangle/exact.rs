@@ -43,16 +43,14 @@ pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
 /// The sign of the determinant by expansions.
 #[cold]
 fn orientation(eye: &Eye, corners: [Vec3; 3]) -> i32 {
-    let normal = exact_normal(corners);
     let a = corners[0] * eye.weight;
-    let mut sum = Expansion::ZERO;
-    for k in 0..3 {
-        let mut w = Expansion::from(eye.low[k]);
-        w.grow(eye.high[k]);
-        w.grow(f64::from(-a[k]));
-        sum = &sum + &(&w * &normal[k]);
-    }
-    sum.sign()
+    let way = [0, 1, 2].map(|k| {
+        let mut sum = Expansion::from(eye.low[k]);
+        sum.grow(eye.high[k]);
+        sum.grow(f64::from(-a[k]));
+        sum
+    });
+    exact::dot(&way, &exact_normal(corners)).sign()
 }
 
 /// A normal of a triangle, each component true to 2^-50 of itself; zero exactly

@@ -1,4 +1,4 @@
-//! The cone of eyes that see no triangle of a cluster, with a proof of its rounding.
+//! The cone of eyes that see no triangle of a cluster, with rounding proven.
 //!
 //! Let all normals be within the angle alpha of the axis A, and the apex P not in
 //! front of any triangle. For an eye e with v = P - e and v.A >= sin(alpha) |A| |v|,

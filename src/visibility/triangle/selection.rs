@@ -47,7 +47,9 @@ impl Selection {
         &self.blocks.as_flattened()[..self.clusters]
     }
 
-    /// The words, to remove triangles. Bits beyond the triangles of a cluster stay zero.
+    /// The words, to remove triangles.
+    ///
+    /// Bits beyond the triangles of a cluster stay zero.
     pub fn words_mut(&mut self) -> &mut [u64] {
         &mut self.blocks.as_flattened_mut()[..self.clusters]
     }
