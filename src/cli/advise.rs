@@ -6,58 +6,41 @@ use std::io::{self, Write};
 
 use super::args::AdviseArgs;
 use super::interrupt::Interrupted;
-use super::processes::{Said, Workers};
+use super::processes::Said;
 use super::protocol::{Job, Timing};
-use super::study::Study;
+use super::study::{Setting, Study};
 use super::table::Table;
-use super::{Ending, interrupt, load_scene, print, tell, text};
+use super::{Ending, interrupt, print, tell, text};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,
     TestChoice, TrialPlan,
 };
 use crate::culling::Culling;
 use crate::index::Registry;
-use crate::measure::{
-    Group, Part, Plan, PlannedScene, ProcessTimes, Protocol, Share, cameras_within,
-};
-use crate::path;
-use crate::scene;
+use crate::measure::{Group, Part, Plan, PlannedScene, ProcessTimes, Share, cameras_within};
 use crate::statistics::Estimate;
 
-/// More tell no more about a scene, and every rule holds views of all of them: some 20 KB
-/// a camera.
+/// Most cameras of a path: every rule holds views of all, some 20 KB per camera.
 const MOST_CAMERAS: usize = 4096;
 /// Rounds of a task, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 25];
 
 pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> {
     let options = options(args);
-    let plan = plan(registry, args)?;
-    let scene = load_scene(&args.scene, &args.scene_args, plan.structures.len())?;
-    let path = path::load(&args.path, &scene, &plan.lens)?;
-    let all = path.cameras.len();
-    let path = path.at_most(MOST_CAMERAS);
-    if path.cameras.len() < all {
+    let (setting, all) = setting(registry, args, None)?;
+    let input = input(&setting, &options);
+    if setting.path.cameras.len() < all {
         tell(&format!(
             "note: {} of {}, evenly spread, are looked at",
-            text::count(path.cameras.len()),
+            text::count(setting.path.cameras.len()),
             text::counted(all, "camera")
         ));
     }
-    let protocol = protocol(args, 0, scene.items.len());
-    let input = AdviseInput {
-        scene: &scene,
-        path: &path,
-        structures: &plan.structures,
-        options: &options,
-        protocol: &protocol,
-    };
     input.check()?;
     interrupt::from_now_on_finish();
-    let workers = Workers::of_study()?;
-    let processes = plan.effort.processes;
-    let about = format!("{}, {}: ", args.scene, args.path);
-    let study = Study::new(about, processes.into(), &args.spread);
+    let processes = args.study.spread.processes;
+    let about = format!("{}, {}: ", args.study.scene, args.study.path);
+    let study = Study::new(about, processes.into(), &args.study.spread)?;
     let begin = |step: &str| study.begin(step);
     let mut parts: Vec<Part> = Vec::new();
     for process in 0..processes {
@@ -71,7 +54,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
             share,
             samples: false,
         };
-        let found = workers.found(process, scene, &begin)?;
+        let found = study.workers.found(process, scene, &begin)?;
         parts.extend(found.into_iter().filter_map(|said| match said {
             Said::Part(part, _) => Some(*part),
             _ => None,
@@ -83,7 +66,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let prepared = prepared.ok_or(Interrupted)?;
     let trials = |timing| Job::Trials(prepared.plan.clone(), timing);
     let step = "with and without every rule";
-    let times = study.times(&workers, step, path.lens_scale, trials)?;
+    let times = study.times(step, setting.path.lens_scale, trials)?;
     let advice = prepared.conclude(&times);
     print(args.format, &advice, || show(&advice))?;
     Ok(Ending::of(!advice.found_wrong_answers()))
@@ -91,29 +74,51 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
 
 /// How structures are measured before rules are: as a run does it.
 pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
+    let study = &args.study;
     Ok(Plan {
         scenes: vec![PlannedScene {
-            source: args.scene.clone(),
-            paths: vec![args.path.clone()],
+            source: study.scene.clone(),
+            paths: vec![study.path.clone()],
             caches: vec![false],
         }],
-        structures: args.kernel.structures(registry, &args.structure)?,
+        structures: study.kernel.structures(registry, &study.structure)?,
         cullings: vec![Culling::default()],
-        lens: args.lens.defaults()?,
-        load: args.scene_args.options(0),
+        lens: study.lens.defaults()?,
+        load: study.scene_args.options(0),
         most_cameras: MOST_CAMERAS,
-        effort: args.spread.effort(ROUNDS),
+        effort: study.spread.effort(ROUNDS),
         bounds: false,
-        seed: args.spread.seed,
+        seed: study.spread.seed,
     })
 }
 
-fn protocol(args: &AdviseArgs, process: u32, items: usize) -> Protocol {
-    let cameras = cameras_within(args.spread.effort(ROUNDS).pass_ns, items);
-    args.spread.protocol(ROUNDS, process, cameras)
+/// The inputs of the command itself or of a worker, and the cameras of the whole path.
+fn setting(
+    registry: &Registry,
+    args: &AdviseArgs,
+    timing: Option<&Timing>,
+) -> anyhow::Result<(Setting, usize)> {
+    let study = &args.study;
+    let held = |structures| study.scene_args.options(structures);
+    let mut setting = Setting::load(registry, study, &study.path, ROUNDS, timing, held)?;
+    let all = setting.path.cameras.len();
+    setting.path = setting.path.at_most(MOST_CAMERAS);
+    let pass_ns = study.spread.effort(ROUNDS).pass_ns;
+    setting.protocol.cameras = cameras_within(pass_ns, setting.scene.items.len());
+    Ok((setting, all))
 }
 
-/// One process's share of the trials.
+fn input<'s>(setting: &'s Setting, options: &'s AdviseOptions) -> AdviseInput<'s> {
+    AdviseInput {
+        scene: &setting.scene,
+        path: &setting.path,
+        structures: &setting.structures,
+        options,
+        protocol: &setting.protocol,
+    }
+}
+
+/// Times the trials in one process.
 pub fn time(
     registry: &Registry,
     args: &AdviseArgs,
@@ -121,18 +126,12 @@ pub fn time(
     timing: &Timing,
     stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Option<ProcessTimes>> {
-    let plan = plan(registry, args)?;
-    let scene = scene::load(&args.scene, &plan.load)?;
-    let path = path::load_scaled(&args.path, &scene, &plan.lens, timing.lens_scale)?;
-    let path = path.at_most(MOST_CAMERAS);
-    let input = AdviseInput {
-        scene: &scene,
-        path: &path,
-        structures: &plan.structures,
-        options: &options(args),
-        protocol: &protocol(args, timing.process, scene.items.len()),
-    };
-    Ok(advise::time(&input, trials, stop)?)
+    let (setting, _) = setting(registry, args, Some(timing))?;
+    Ok(advise::time(
+        &input(&setting, &options(args)),
+        trials,
+        stop,
+    )?)
 }
 
 fn options(args: &AdviseArgs) -> AdviseOptions {

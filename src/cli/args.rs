@@ -5,13 +5,12 @@ use std::path::PathBuf;
 
 use crate::drift::{ARMS, ArmKind};
 use crate::funnel::StageKind;
-use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::funnel_args::FunnelArgs;
 use super::scene_args::SceneCommand;
 use super::shared_args::{
-    CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, TableFormat,
+    CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs, TableFormat,
 };
 use super::values;
 
@@ -362,15 +361,8 @@ pub struct VerifyArgs {
 
 #[derive(Args, Debug)]
 pub struct PrecisionArgs {
-    /// A scene: boxes CSV, Doom WAD, built-in name or spec
-    #[arg(long)]
-    pub scene: String,
-    /// A camera path: a spec or a cameras CSV
-    #[arg(long, visible_alias = "cameras", value_name = "PATH", default_value = DEFAULT_PATH)]
-    pub path: String,
-    /// Structures, e.g. linear,bvh:leaf=4
-    #[arg(long, value_name = "LIST", default_value = "default")]
-    pub structure: String,
+    #[command(flatten)]
+    pub study: StudyArgs,
     /// Cameras of the path to look at, evenly spread
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = values::whole(1..=u32::MAX))]
     pub frames: u32,
@@ -383,29 +375,15 @@ pub struct PrecisionArgs {
     /// Another stage of the funnel in place of the frustum: occlusion (over the sizes of its buffer), region (portals) or triangle (cones); the first structure does the object stage, the path is street if none is named
     #[arg(long, value_name = "STAGE", value_parser = values::stage)]
     pub stage: Option<StageKind>,
-    #[command(flatten)]
-    pub spread: SpreadArgs,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
-    #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
-    pub lens: LensArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]
+#[command(mut_arg("structure", |arg| arg.help("Structures to choose from, e.g. linear,bvh:leaf=4")))]
 pub struct AdviseArgs {
-    /// A scene: boxes CSV, Doom WAD, built-in name or spec
-    #[arg(long)]
-    pub scene: String,
-    /// A camera path: a spec or a cameras CSV
-    #[arg(long, visible_alias = "cameras", value_name = "PATH", default_value = DEFAULT_PATH)]
-    pub path: String,
-    /// Structures to choose from, e.g. linear,bvh:leaf=4
-    #[arg(long, value_name = "LIST", default_value = "default")]
-    pub structure: String,
+    #[command(flatten)]
+    pub study: StudyArgs,
     /// Cost of drawing an item that cannot be seen, ns
     #[arg(long, value_name = "NS", default_value_t = 1000.0, value_parser = values::at_least_zero)]
     pub draw_ns: f64,
@@ -421,16 +399,8 @@ pub struct AdviseArgs {
     /// Queries between two updates
     #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = values::at_least_zero)]
     pub queries_per_update: f64,
-    #[command(flatten)]
-    pub spread: SpreadArgs,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
-    #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
-    pub lens: LensArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]

@@ -6,12 +6,11 @@ use std::io::{self, Write};
 
 use super::args::DriftArgs;
 use super::interrupt::Interrupted;
-use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::study::Study;
 use super::table::Table;
 use super::{
-    Ending, drift_arms, drift_diagram, expect_place_for, interrupt, print, text, write_text,
+    Ending, drift_arms, drift_chart, expect_place_for, interrupt, print, text, write_text,
 };
 use crate::drift::{
     self, ArmKind, ArmOptions, DriftOptions, DriftReport, ORBIT_RADIUS, Rated, Recommendation,
@@ -29,9 +28,8 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     expect_place_for("--svg", args.svg.as_deref())?;
     let options = options(args);
     interrupt::from_now_on_finish();
-    let workers = Workers::of_study()?;
     let jobs = drift::jobs(&options);
-    let study = Study::new(String::new(), jobs as u64, &args.spread);
+    let study = Study::new(String::new(), jobs as u64, &args.spread)?;
     let work = text::counted(jobs, "study");
     let steps = options.steps as f64;
     let seconds = options.arm.seconds;
@@ -47,13 +45,13 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let mut report = report.ok_or(Interrupted)?;
     let schedule = drift::plan(&options, &protocol(args, 0));
     let job = |timing| Job::Drift(schedule.clone(), timing);
-    let times = study.times(&workers, "everything, timed", None, job)?;
+    let times = study.times("everything, timed", None, job)?;
     report.conclude(&times, schedule.rounds);
     print(args.format, &report, || {
         show(&report, &mut io::stdout().lock())
     })?;
     if let Some(file) = &args.svg {
-        write_text(file, &drift_diagram::draw(&report.arm)?)?;
+        write_text(file, &drift_chart::draw(&report.arm)?)?;
     }
     Ok(Ending::Ok)
 }

@@ -11,20 +11,20 @@ use anyhow::{Context, bail};
 use super::document::{Block, to_html};
 use super::funnel_args::{FunnelArgs, FunnelFormat};
 use super::interrupt::Interrupted;
-use super::processes::Workers;
 use super::protocol::{Job, Timing};
-use super::study::Study;
+use super::shared_args::StudyArgs;
+use super::study::{Setting, Study};
 use super::{
-    Ending, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt, load_scene_by,
-    print_json, text, unread_is_fine, write_text,
+    Ending, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt, print_json, text,
+    unread_is_fine, write_text,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
-use crate::measure::{ProcessTimes, Protocol};
-use crate::path::{self, CameraPath};
-use crate::scene::{self, LoadOptions, Scene};
+use crate::measure::ProcessTimes;
+use crate::scene::{LoadOptions, Scene};
 use crate::spec::SpecError;
+use crate::visibility::occlusion::OccluderChoice;
 use crate::visibility::region::Pvs;
 use crate::visibility::{Guarantee, SampleGrid};
 
@@ -38,37 +38,22 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     ];
     let inputs = [
         args.pvs.as_deref(),
-        Some(args.scene.as_ref()),
-        Some(args.path.as_ref()),
+        Some(args.study.scene.as_ref()),
+        Some(args.study.path.as_ref()),
     ];
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     expect_places(&outputs, &inputs)?;
     if args.mirror.is_some() && args.cut_out.is_some() {
         bail!("--mirror shows whole boxes; expected no --cut-out with it");
     }
-    let structures = args.kernel.structures(registry, &args.structure)?;
-    let load = LoadOptions {
-        per_triangle: funnel::BYTES_PER_TRIANGLE,
-        ..args.scene_args.options(structures.len() + 2)
-    };
-    // A lens that cannot be is told before anything is loaded.
-    args.lens.defaults()?;
-    let scene = load_scene_by(&args.scene, &load)?;
-    if scene.items.is_empty() {
-        bail!("scene '{}' has no items; expected at least one", scene.name);
-    }
-    let first = Timing {
-        process: 0,
-        lens_scale: None,
-    };
-    let setting = Setting::of(args, structures, scene, &first)?;
+    let stages = Stages::of(registry, args, None)?;
     interrupt::from_now_on_finish();
-    let workers = Workers::of_study()?;
-    let study = Study::new(format!("{}, {}: ", args.scene, args.path), 1, &args.spread);
-    let input = setting.input(args)?;
+    let about = format!("{}, {}: ", args.study.scene, args.study.path);
+    let study = Study::new(about, 1, &args.study.spread)?;
+    let input = stages.input(args)?;
     let begun = Cell::new(0);
     let begin = |step: &str| {
-        // The first step refuses what it cannot take; of that is one line said.
+        // The first step may refuse the scene, in one line.
         if begun.replace(begun.get() + 1) == 1 {
             study.announce(&work(&input), "minutes");
         }
@@ -77,8 +62,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let prepared = funnel::prepare(&input, &begin, &interrupt::asked)?.ok_or(Interrupted)?;
     study.advance();
     let job = |timing| Job::Funnel(prepared.plan.clone(), timing);
-    let lens_scale = setting.path.lens_scale;
-    let times = study.times(&workers, "every stage, timed", lens_scale, job)?;
+    let lens_scale = stages.setting.path.lens_scale;
+    let times = study.times("every stage, timed", lens_scale, job)?;
     if let Some(verdict) = funnel::failure(&times) {
         bail!(
             "a stage failed when it was timed: {}",
@@ -107,7 +92,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     Ok(Ending::of(keep_their_word(&report.stages)))
 }
 
-/// How much there is to do.
+/// Amount of work.
 fn work(input: &FunnelInput) -> String {
     let SampleGrid { width, height } = input.samples;
     format!(
@@ -117,8 +102,8 @@ fn work(input: &FunnelInput) -> String {
     )
 }
 
-/// Whether nothing that promises not to lose what is visible has lost it. Stages behind
-/// an unproven one of the chain miss what that has lost.
+/// Returns true if no back end with a guarantee lost a visible item. Stages behind an
+/// unproven one of the chain miss what that has lost.
 fn keep_their_word(stages: &[StageRow]) -> bool {
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Guarantee::Unproven;
     let chosen = stages.iter().filter(|row| row.is_chosen);
@@ -132,7 +117,7 @@ fn keep_their_word(stages: &[StageRow]) -> bool {
     judged.all(|row| row.errors.false_negative_count == 0.0)
 }
 
-/// What was typed for each stage, or what suits the scene.
+/// The back ends that were named, and those that suit the scene.
 fn chain(
     args: &FunnelArgs,
     scene: &Scene,
@@ -178,54 +163,83 @@ fn claim(file: Option<&Path>) -> anyhow::Result<Option<Arc<Pvs>>> {
     Ok(Some(Arc::new(pvs)))
 }
 
-/// All that a funnel is studied on.
-struct Setting {
-    scene: Scene,
-    path: CameraPath,
-    structures: Vec<StructureSpec>,
+/// Inputs of a funnel, loaded.
+struct Stages {
+    setting: Setting,
     chain: Chain,
     claim: Option<Arc<Pvs>>,
-    protocol: Protocol,
 }
 
-impl Setting {
+impl Stages {
     fn of(
+        registry: &Registry,
         args: &FunnelArgs,
-        structures: Vec<StructureSpec>,
-        scene: Scene,
-        timing: &Timing,
-    ) -> anyhow::Result<Setting> {
-        let lens = args.lens.defaults()?;
-        Ok(Setting {
-            path: path::load_scaled(&args.path, &scene, &lens, timing.lens_scale)?,
-            chain: chain(args, &scene, &structures)?,
+        timing: Option<&Timing>,
+    ) -> anyhow::Result<Stages> {
+        let held = |structures| LoadOptions {
+            per_triangle: funnel::BYTES_PER_TRIANGLE,
+            ..args.study.scene_args.options(structures + 2)
+        };
+        let setting = Setting::load(
+            registry,
+            &args.study,
+            &args.study.path,
+            ROUNDS,
+            timing,
+            held,
+        )?;
+        Ok(Stages {
+            chain: chain(args, &setting.scene, &setting.structures)?,
             claim: claim(args.pvs.as_deref())?,
-            protocol: args.spread.protocol(ROUNDS, timing.process, usize::MAX),
-            structures,
-            scene,
+            setting,
         })
     }
 
     fn input<'s>(&'s self, args: &'s FunnelArgs) -> anyhow::Result<FunnelInput<'s>> {
+        let plain = plain_input(
+            &self.setting,
+            &self.chain,
+            args.frames,
+            args.samples,
+            &args.study,
+        )?;
         Ok(FunnelInput {
-            scene: &self.scene,
-            path: &self.path,
-            most_views: args.frames as usize,
-            samples: args.samples,
             cut_outs: args.cut_out.as_ref(),
             mirror: args.mirror,
-            chain: &self.chain,
-            structures: &self.structures,
-            protocol: &self.protocol,
             claim: self.claim.as_ref(),
             occluders: args.occluders,
             inner_boxes: args.inner_boxes.map(|most| most as usize),
-            execution: args.kernel.execution()?,
+            ..plain
         })
     }
 }
 
-/// One process's share of the times.
+/// The input of a funnel without any option.
+pub fn plain_input<'s>(
+    setting: &'s Setting,
+    chain: &'s Chain,
+    frames: u32,
+    samples: SampleGrid,
+    args: &StudyArgs,
+) -> anyhow::Result<FunnelInput<'s>> {
+    Ok(FunnelInput {
+        scene: &setting.scene,
+        path: &setting.path,
+        most_views: frames as usize,
+        samples,
+        cut_outs: None,
+        mirror: None,
+        chain,
+        structures: &setting.structures,
+        protocol: &setting.protocol,
+        claim: None,
+        occluders: OccluderChoice::All,
+        inner_boxes: None,
+        execution: args.kernel.execution()?,
+    })
+}
+
+/// Times every stage in one process.
 pub fn time(
     registry: &Registry,
     args: &FunnelArgs,
@@ -233,10 +247,8 @@ pub fn time(
     timing: &Timing,
     stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Option<ProcessTimes>> {
-    let scene = scene::load(&args.scene, &args.scene_args.options(0))?;
-    let structures = args.kernel.structures(registry, &args.structure)?;
-    let setting = Setting::of(args, structures, scene, timing)?;
-    Ok(funnel::time(&setting.input(args)?, plan, stop)?)
+    let stages = Stages::of(registry, args, Some(timing))?;
+    Ok(funnel::time(&stages.input(args)?, plan, stop)?)
 }
 
 #[cfg(test)]
@@ -282,7 +294,7 @@ mod tests {
             region(Conservative, 1.0),
             occlusion(Unproven, 2.0)
         ]));
-        // What the region stage has lost, the next one cannot hand on.
+        // What the region stage has lost, the next one cannot return.
         assert!(keeps([region(Unproven, 1.0), occlusion(Conservative, 1.0)]));
         let other = StageRow {
             is_chosen: false,

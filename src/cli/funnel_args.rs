@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs};
+use super::shared_args::StudyArgs;
 use super::values;
 use crate::query::ItemId;
 use crate::visibility::SampleGrid;
@@ -37,18 +37,13 @@ picking takes every item for solid.";
 
 #[derive(Args, Debug)]
 #[command(after_help = FUNNEL_HELP)]
+#[command(mut_arg("path", |arg| arg.default_value("street:frames=32")))]
+#[command(mut_arg("structure", |arg| arg
+    .default_value("wide,bvh,linear")
+    .help("Structures for the object stage; the first is the chain's")))]
 pub struct FunnelArgs {
-    /// A scene: boxes CSV, Doom WAD, built-in name or spec
-    #[arg(long)]
-    pub scene: String,
-    /// A camera path: a spec or a cameras CSV
-    #[arg(
-        long,
-        visible_alias = "cameras",
-        value_name = "PATH",
-        default_value = "street:frames=32"
-    )]
-    pub path: String,
+    #[command(flatten)]
+    pub study: StudyArgs,
     /// Cameras of the path to look at, evenly spread
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = values::whole(1..=u32::MAX))]
     pub frames: u32,
@@ -65,9 +60,6 @@ pub struct FunnelArgs {
     /// Back end of the region stage [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,
-    /// Structures for the object stage; the first is the chain's
-    #[arg(long, value_name = "LIST", default_value = "wide,bvh,linear")]
-    pub structure: String,
     /// Back end of the occlusion stage
     #[arg(long, value_name = "NAME")]
     pub occlusion: Option<String>,
@@ -93,16 +85,8 @@ pub struct FunnelArgs {
     /// Draw the first view from above, each item by the stage that removed it
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    #[command(flatten)]
-    pub spread: SpreadArgs,
     #[arg(long, value_enum, default_value = "table")]
     pub format: FunnelFormat,
-    #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
-    pub lens: LensArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]

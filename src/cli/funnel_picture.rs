@@ -1,10 +1,9 @@
 //! The picture of `cullbench funnel`: the first view from above, every item in the
 //! colour of the stage that removed it.
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::picture::{Drawn, svg};
+use super::chart::{Area, Drawn, legend, svg};
 use super::text;
 use crate::funnel::{Fate, FunnelReport, PlanView, StageKind};
 
@@ -38,7 +37,7 @@ pub fn draw(report: &FunnelReport) -> anyhow::Result<String> {
     svg("the picture", SIZE, |root| draw_on(root, report))
 }
 
-fn draw_on(root: &DrawingArea<SVGBackend, Shift>, report: &FunnelReport) -> Drawn {
+fn draw_on(root: &Area, report: &FunnelReport) -> Drawn {
     let plan = &report.plan_view;
     let reach = reach(plan);
     let [x, y] = plan.eye;
@@ -80,13 +79,7 @@ fn draw_on(root: &DrawingArea<SVGBackend, Shift>, report: &FunnelReport) -> Draw
         chart.draw_series([PathElement::new(line, BLACK.stroke_width(1))])?;
     }
     chart.draw_series([Circle::new((x, y), 4, BLACK.filled())])?;
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.3))
-        .draw()?;
-    Ok(())
+    legend(&mut chart, SeriesLabelPosition::UpperLeft)
 }
 
 /// Half of the side of what is drawn: all items, but never without an extent.

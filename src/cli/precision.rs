@@ -2,60 +2,45 @@
 //! sweeps over item size and ill-conditioned cameras behind it. How it is shown is
 //! in `precision_tables` and `precision_conclusions`.
 
-use anyhow::bail;
-
 use super::args::PrecisionArgs;
 use super::interrupt::Interrupted;
-use super::processes::Workers;
 use super::protocol::{Job, Timing};
-use super::study::Study;
+use super::study::{Setting, Study};
 use super::{
-    Ending, expect_places, interrupt, load_scene, precision_conclusions, precision_diagram,
-    precision_tables, print, stage_sweep, write_text,
+    Ending, expect_places, interrupt, precision_chart, precision_conclusions, precision_tables,
+    print, stage_sweep, write_text,
 };
 use crate::index::Registry;
-use crate::measure::{ProcessTimes, Protocol, Status};
-use crate::path;
+use crate::measure::{ProcessTimes, Status};
 use crate::precision::{self, PointPlan, PrecisionInput, SWEEPS, size_sweep, sweep};
-use crate::scene;
 
 /// Rounds of a point, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
-/// Cameras of each value of the other sweeps: one for so many cubes, and no more
-/// than this.
+/// Cubes for each camera of the other sweeps, and the most cameras of each value.
 const CUBES_PER_CAMERA: usize = 10_000;
 const SWEEP_CAMERAS: usize = 200;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<Ending> {
-    let inputs = [args.scene.as_ref(), args.path.as_ref()];
+    let inputs = [args.study.scene.as_ref(), args.study.path.as_ref()];
     expect_places(&[("--svg", args.svg.as_deref())], &inputs)?;
     if let Some(stage) = args.stage {
         return stage_sweep::sweep(registry, args, stage);
     }
-    let structures = args.kernel.structures(registry, &args.structure)?;
-    let defaults = args.lens.defaults()?;
-    let scene = load_scene(&args.scene, &args.scene_args, 2 * structures.len())?;
-    if scene.items.is_empty() {
-        bail!("scene '{}' has no items; expected at least one", scene.name);
-    }
-    let path = path::load(&args.path, &scene, &defaults)?;
-    let study = Study::new(format!("{}, {}: ", args.scene, args.path), 0, &args.spread);
+    let setting = setting(registry, args, None)?;
+    let spread = &args.study.spread;
+    let study = Study::new(
+        format!("{}, {}: ", args.study.scene, args.study.path),
+        0,
+        spread,
+    )?;
     study.begin("every point, checked");
-    let protocol = protocol(args, 0);
-    let input = PrecisionInput {
-        scene: &scene,
-        path: &path,
-        structures: &structures,
-        most_cameras: args.frames as usize,
-        protocol: &protocol,
-    };
     // There are no files yet: Ctrl-C ends the program.
     let going_on = &|| false;
-    let prepared = precision::prepare(&input, going_on)?.ok_or(Interrupted)?;
+    let prepared = precision::prepare(&input(args, &setting), going_on)?.ok_or(Interrupted)?;
     let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
     if args.cubes > 0 {
         study.begin("the sweep over sizes");
-        let rows = size_sweep(args.cubes, args.spread.seed, going_on)?;
+        let rows = size_sweep(args.cubes, spread.seed, going_on)?;
         sizes = rows.unwrap_or_default();
         let cameras = args
             .cubes
@@ -63,14 +48,13 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
             .clamp(2, SWEEP_CAMERAS);
         for (which, name, _) in SWEEPS {
             study.begin(&format!("the sweep over {name}"));
-            let rows = sweep(which, cameras, args.spread.seed, going_on);
+            let rows = sweep(which, cameras, spread.seed, going_on);
             sweeps.extend(rows.unwrap_or_default());
         }
     }
     interrupt::from_now_on_finish();
-    let workers = Workers::of_study()?;
     let points = |timing| Job::Points(prepared.plan.clone(), timing);
-    let times = study.times(&workers, "every point, timed", path.lens_scale, points)?;
+    let times = study.times("every point, timed", setting.path.lens_scale, points)?;
     let precision = prepared.conclude(&times);
     let wrong = precision
         .points
@@ -78,7 +62,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         .any(|p| matches!(p.status, Status::Wrong | Status::Panicked));
     let outcome = precision_tables::Outcome {
         precision,
-        seed: args.spread.seed,
+        seed: spread.seed,
         size_sweep: sizes,
         sweeps,
     };
@@ -86,18 +70,40 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         precision_tables::show(&outcome).and_then(|()| precision_conclusions::show(&outcome))
     });
     if let Some(file) = &args.svg {
-        write_text(file, &precision_diagram::draw(&outcome.precision)?)?;
+        write_text(file, &precision_chart::draw(&outcome.precision)?)?;
     }
     shown?;
     Ok(Ending::of(!wrong))
 }
 
-/// Of one of the processes, all cameras.
-fn protocol(args: &PrecisionArgs, process: u32) -> Protocol {
-    args.spread.protocol(ROUNDS, process, usize::MAX)
+/// The inputs of the command itself, or of a worker.
+fn setting(
+    registry: &Registry,
+    args: &PrecisionArgs,
+    timing: Option<&Timing>,
+) -> anyhow::Result<Setting> {
+    let held = |structures| args.study.scene_args.options(2 * structures);
+    Setting::load(
+        registry,
+        &args.study,
+        &args.study.path,
+        ROUNDS,
+        timing,
+        held,
+    )
 }
 
-/// One process's share of the points.
+fn input<'s>(args: &PrecisionArgs, setting: &'s Setting) -> PrecisionInput<'s> {
+    PrecisionInput {
+        scene: &setting.scene,
+        path: &setting.path,
+        structures: &setting.structures,
+        most_cameras: args.frames as usize,
+        protocol: &setting.protocol,
+    }
+}
+
+/// Times all points in one process.
 pub fn time(
     registry: &Registry,
     args: &PrecisionArgs,
@@ -105,14 +111,6 @@ pub fn time(
     timing: &Timing,
     stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Option<ProcessTimes>> {
-    let scene = scene::load(&args.scene, &args.scene_args.options(0))?;
-    let lens = args.lens.defaults()?;
-    let input = PrecisionInput {
-        scene: &scene,
-        path: &path::load_scaled(&args.path, &scene, &lens, timing.lens_scale)?,
-        structures: &args.kernel.structures(registry, &args.structure)?,
-        most_cameras: args.frames as usize,
-        protocol: &protocol(args, timing.process),
-    };
-    Ok(precision::time(&input, plan, stop)?)
+    let setting = setting(registry, args, Some(timing))?;
+    Ok(precision::time(&input(args, &setting), plan, stop)?)
 }

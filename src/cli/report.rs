@@ -9,7 +9,7 @@ use anyhow::Context;
 
 use super::args::ReportArgs;
 use super::document::{Block, to_html, to_markdown};
-use super::surface_diagram::{self, Picture};
+use super::surface_charts::{self, Picture};
 use super::table::Table;
 use super::{Ending, expect_folder, expect_places, surface_tables, tell, text, write_text};
 use crate::index::Registry;
@@ -30,7 +30,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     let mut report = read_report(&args.report)?;
     declare(&mut report, registry);
     let pictures = match args.svg.is_some() || args.html.is_some() {
-        true => surface_diagram::pictures(&surfaces(comparisons(&report)))?,
+        true => surface_charts::pictures(&surfaces(comparisons(&report)))?,
         false => Vec::new(),
     };
     let mut blocks = blocks(&report);

@@ -12,6 +12,7 @@ use crate::measure::{Beside, Effort, Machine, Protocol};
 use crate::path::LensDefaults;
 use crate::scene::LoadOptions;
 use crate::spec::SpecError;
+use crate::suite::DEFAULT_PATH;
 use crate::threads::MOST_THREADS;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -69,6 +70,28 @@ impl KernelArgs {
             threads: self.threads,
         })
     }
+}
+
+/// The scene, cameras and structures of a study, and its processes.
+#[derive(Args, Debug)]
+pub struct StudyArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(long)]
+    pub scene: String,
+    /// A camera path: a spec or a cameras CSV
+    #[arg(long, visible_alias = "cameras", value_name = "PATH", default_value = DEFAULT_PATH)]
+    pub path: String,
+    /// Structures, e.g. linear,bvh:leaf=4
+    #[arg(long, value_name = "LIST", default_value = "default")]
+    pub structure: String,
+    #[command(flatten)]
+    pub spread: SpreadArgs,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
 }
 
 /// How times are spread over processes, for a study of one scene and path.

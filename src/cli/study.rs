@@ -1,6 +1,6 @@
-//! What the commands share that take their times in several processes of their own
-//! (`advise`, `drift`, `funnel`, `precision`): the bar that says what is done, and how
-//! the times of all processes come together.
+//! Commands that take their times in processes of their own (`advise`, `drift`,
+//! `funnel`, `precision`): their inputs, their progress bar, and how the times of all
+//! processes come together.
 
 use std::fmt::Write;
 use std::time::Duration;
@@ -9,11 +9,14 @@ use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
 use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
-use super::shared_args::SpreadArgs;
-use super::{tell, text};
-use crate::measure::ProcessTimes;
+use super::shared_args::{SpreadArgs, StudyArgs};
+use super::{load_scene_by, tell, text};
+use crate::index::{Registry, StructureSpec};
+use crate::measure::{ProcessTimes, Protocol};
+use crate::path::{self, CameraPath};
+use crate::scene::{self, LoadOptions, Scene};
 
-/// A bar of so many parts, with a word for them.
+/// A progress bar of `parts` parts, with a word for them.
 pub fn progress(parts: u64, word: &str) -> ProgressBar {
     // Drawn on stderr, and only if that is a terminal.
     let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}{{left}}  {{msg}}");
@@ -30,10 +33,53 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
     bar
 }
 
+/// Inputs of a study, loaded.
+pub struct Setting {
+    pub scene: Scene,
+    pub path: CameraPath,
+    pub structures: Vec<StructureSpec>,
+    pub protocol: Protocol,
+}
+
+impl Setting {
+    /// Loads what the arguments name: in a worker for its `timing`, in the command itself
+    /// without one and with `held`, the limits of a scene for n structures.
+    pub fn load(
+        registry: &Registry,
+        args: &StudyArgs,
+        path: &str,
+        rounds: [usize; 2],
+        timing: Option<&Timing>,
+        held: impl Fn(usize) -> LoadOptions,
+    ) -> anyhow::Result<Setting> {
+        let structures = args.kernel.structures(registry, &args.structure)?;
+        // An impossible lens is reported before anything is loaded.
+        let lens = args.lens.defaults()?;
+        let scene = match timing {
+            None => load_scene_by(&args.scene, &held(structures.len()))?,
+            Some(_) => scene::load(&args.scene, &args.scene_args.options(0))?,
+        };
+        anyhow::ensure!(
+            !scene.items.is_empty(),
+            "scene '{}' has no items; expected at least one",
+            scene.name
+        );
+        let lens_scale = timing.and_then(|timing| timing.lens_scale);
+        let process = timing.map_or(0, |timing| timing.process);
+        Ok(Setting {
+            path: path::load_scaled(path, &scene, &lens, lens_scale)?,
+            protocol: args.spread.protocol(rounds, process, usize::MAX),
+            structures,
+            scene,
+        })
+    }
+}
+
 /// A study on its way.
 pub struct Study {
+    pub workers: Workers,
     bar: ProgressBar,
-    /// What stands before every step.
+    /// Text before every step.
     about: String,
     /// Steps before the processes that take the times.
     before: u64,
@@ -41,19 +87,24 @@ pub struct Study {
 }
 
 impl Study {
-    pub fn new(about: String, before: u64, spread: &SpreadArgs) -> Study {
+    /// A study of `before` steps and then of the processes that take the times.
+    ///
+    /// # Errors
+    /// See [`Workers::of_study`].
+    pub fn new(about: String, before: u64, spread: &SpreadArgs) -> anyhow::Result<Study> {
         let processes = spread.processes;
         let bar = progress(before + u64::from(processes), "");
         if !bar.is_hidden() {
-            // The time goes on while a step takes long.
+            // Elapsed time advances while a step takes long.
             bar.enable_steady_tick(Duration::from_secs(1));
         }
-        Study {
+        Ok(Study {
+            workers: Workers::of_study()?,
             bar,
             about,
             before,
             processes,
-        }
+        })
     }
 
     /// Prints the amount of work, on a terminal or not, and how long the defaults take.
@@ -66,13 +117,13 @@ impl Study {
         self.bar.suspend(|| tell(&line));
     }
 
-    /// Says what is done now.
+    /// Shows the step that begins.
     pub fn begin(&self, step: &str) {
         let message = format!("{}{step}", self.about);
         self.bar.set_message(text::plain(&message));
     }
 
-    /// One more of the steps before the processes is done.
+    /// Counts a finished step before the processes.
     pub fn advance(&self) {
         self.bar.inc(1);
     }
@@ -80,7 +131,6 @@ impl Study {
     /// The times of all processes, one after the other.
     pub fn times(
         self,
-        workers: &Workers,
         step: &str,
         lens_scale: Option<f64>,
         job: impl Fn(Timing) -> Job,
@@ -95,7 +145,7 @@ impl Study {
                 self.bar.set_position(self.before + u64::from(process));
                 self.begin(step);
             };
-            let found = workers.found(process, job(timing), &told)?;
+            let found = self.workers.found(process, job(timing), &told)?;
             all.extend(found.into_iter().filter_map(|said| match said {
                 Said::Times(times) => Some(times),
                 _ => None,

@@ -1,20 +1,21 @@
-//! What the pictures share: how one becomes a file, their colours, and logarithmic
-//! axes, from the values to a range that always has an end, and which values have a
-//! place on it.
+//! Parts of every picture: SVG, colours, legends, and diagrams with two logarithmic
+//! axes, whose ranges always have an end.
 
 use std::error::Error;
 use std::ops::Range;
 
 use anyhow::anyhow;
-use plotters::coord::Shift;
+use plotters::chart::ChartContext;
+use plotters::coord::combinators::LogCoord;
+use plotters::coord::{CoordTranslate, Shift};
 use plotters::prelude::*;
 
 use super::text;
 
-/// What drawing ends with.
+/// Outcome of drawing.
 pub type Drawn = Result<(), Box<dyn Error>>;
 
-/// Told apart also without colours of their own names: dark to light.
+/// Colours of series, distinguishable by brightness too.
 pub const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -26,12 +27,53 @@ pub const COLOURS: [RGBColor; 8] = [
     RGBColor(120, 120, 120),
 ];
 
-/// A picture of that size on white, as lines of SVG; `what` it is, if it cannot be
-/// drawn.
+/// Part of a picture.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// A diagram with two logarithmic axes.
+type LogLog<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
+
+/// One axis: its title, range and text of a tick.
+pub type Axis<'t> = (&'t str, Range<f64>, &'t dyn Fn(f64) -> String);
+
+/// Draws the caption and the axes, x and y, of a diagram with two logarithmic axes.
+pub fn log_log<'a, 'b: 'a>(
+    area: &'a Area<'b>,
+    caption: &str,
+    [x, y]: [Axis; 2],
+) -> Result<LogLog<'a, 'b>, Box<dyn Error>> {
+    let mut chart = ChartBuilder::on(area)
+        .caption(caption, ("sans-serif", 18))
+        .margin(14)
+        .x_label_area_size(44)
+        .y_label_area_size(72)
+        .build_cartesian_2d(x.1.log_scale(), y.1.log_scale())?;
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE.mix(0.0))
+        .x_desc(x.0)
+        .y_desc(y.0)
+        .x_label_formatter(&|value| x.2(*value))
+        .y_label_formatter(&|value| y.2(*value))
+        .draw()?;
+    Ok(chart)
+}
+
+/// Draws the legend of all labelled series.
+pub fn legend<'a, 'b: 'a, C: CoordTranslate>(
+    chart: &mut ChartContext<'a, SVGBackend<'b>, C>,
+    position: SeriesLabelPosition,
+) -> Drawn {
+    let mut legend = chart.configure_series_labels();
+    legend.position(position).border_style(BLACK.mix(0.3));
+    Ok(legend.background_style(WHITE.mix(0.8)).draw()?)
+}
+
+/// A picture of `size` pixels on white, as lines of SVG. `what` names it in the error.
 pub fn svg(
     what: &str,
     size: (u32, u32),
-    draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Drawn,
+    draw: impl FnOnce(&Area) -> Drawn,
 ) -> anyhow::Result<String> {
     let mut svg = String::new();
     let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
@@ -45,18 +87,17 @@ pub fn svg(
     Ok(text::lines(&svg))
 }
 
-/// What a figure can be and mean something: from far below a nanosecond to the
-/// age of the universe in nanoseconds, and then some. Beyond the range of
-/// floating point, steps along an axis would never come to its end.
+/// Values with a place on a logarithmic axis, far beyond anything measured. Near the
+/// ends of floating point, steps along an axis would never come to its end.
 const DRAWN: Range<f64> = 1e-30..1e30;
 
-/// Whether a value has a place on a logarithmic axis.
+/// Returns true for a value with a place on a logarithmic axis.
 pub fn is_drawn(value: f64) -> bool {
     DRAWN.contains(&value)
 }
 
-/// A range around all values that have a place, wider by a factor at either
-/// end; around 1 if none has.
+/// A range around all values that have a place, wider by a factor at either end;
+/// around 1 if there are none.
 pub fn around(values: impl Iterator<Item = f64>, below: f64, above: f64) -> Range<f64> {
     let (least, most) = values
         .filter(|value| is_drawn(*value))
@@ -69,7 +110,7 @@ pub fn around(values: impl Iterator<Item = f64>, below: f64, above: f64) -> Rang
     }
 }
 
-/// What a picture says of values that it leaves out.
+/// Note in a caption on points that are not drawn.
 pub fn left_out(count: usize) -> String {
     match count {
         0 => String::new(),

@@ -4,10 +4,9 @@
 
 use std::collections::BTreeMap;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::picture::{COLOURS, Drawn, around, is_drawn, left_out, svg};
+use super::chart::{Area, Axis, COLOURS, Drawn, around, is_drawn, left_out, legend, log_log, svg};
 use super::precision_tables::CullingPoint;
 use super::text;
 use crate::precision::{Point, Precision, RegionErrors};
@@ -121,30 +120,23 @@ impl Picture {
             .collect()
     }
 
-    fn draw(&self, area: &DrawingArea<SVGBackend, Shift>) -> Drawn {
+    fn draw(&self, area: &Area) -> Drawn {
         let places: Vec<(f64, f64)> = self.marks.iter().filter_map(|m| self.place(m)).collect();
         let beyond = left_out(self.marks.len() - places.len());
-        let times = around(places.iter().map(|p| p.0), 1.5, 2.0).log_scale();
+        let times = around(places.iter().map(|p| p.0), 1.5, 2.0);
         // From nothing to a hundredth at least.
         let errors = places.iter().map(|p| p.1).chain([self.none, 1.0]);
-        let errors = around(errors, 1.5, 2.0).log_scale();
-        let mut chart = ChartBuilder::on(area)
-            .caption(format!("{}{beyond}", self.caption), ("sans-serif", 18))
-            .margin(14)
-            .x_label_area_size(44)
-            .y_label_area_size(64)
-            .build_cartesian_2d(times, errors)?;
-        chart
-            .configure_mesh()
-            .light_line_style(WHITE.mix(0.0))
-            .x_desc(self.axes[0])
-            .y_desc(self.axes[1])
-            .x_label_formatter(&|x| text::significant(*x))
-            .y_label_formatter(&|y| match *y <= self.none {
-                true => "0".to_owned(),
-                false => text::significant(*y),
-            })
-            .draw()?;
+        let errors = around(errors, 1.5, 2.0);
+        let error = |y| match y <= self.none {
+            true => "0".to_owned(),
+            false => text::significant(y),
+        };
+        let [time_title, error_title] = self.axes;
+        let axes: [Axis; 2] = [
+            (time_title, times, &text::significant),
+            (error_title, errors, &error),
+        ];
+        let mut chart = log_log(area, &format!("{}{beyond}", self.caption), axes)?;
         chart
             .draw_series(LineSeries::new(self.front(), BLACK.mix(0.5)))?
             .label("Pareto front")
@@ -171,12 +163,6 @@ impl Picture {
             let crosses = crosses.into_iter().filter_map(|mark| self.place(mark));
             chart.draw_series(crosses.map(|at| Cross::new(at, 5, colour.stroke_width(2))))?;
         }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .background_style(WHITE.mix(0.8))
-            .border_style(BLACK.mix(0.3))
-            .draw()?;
-        Ok(())
+        legend(&mut chart, SeriesLabelPosition::UpperRight)
     }
 }

@@ -2,10 +2,9 @@
 //! logarithmic, one line for each structure. It draws what was measured and
 //! decides nothing.
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::picture::{COLOURS, Drawn, around, is_drawn, left_out, svg};
+use super::chart::{Area, Axis, COLOURS, Drawn, around, is_drawn, left_out, legend, log_log, svg};
 use super::{surface_tables, text};
 use crate::report::{Place, Surface};
 
@@ -97,24 +96,15 @@ fn slug(words: &str) -> String {
     name.trim_matches(['-', '.']).to_owned()
 }
 
-fn draw(root: &DrawingArea<SVGBackend, Shift>, caption: &str, curves: &[Curve]) -> Drawn {
+fn draw(root: &Area, caption: &str, curves: &[Curve]) -> Drawn {
     let points = || curves.iter().flat_map(|(_, points)| points.iter());
-    let items = around(points().map(|p| p.0 as f64), 1.3, 1.3).log_scale();
-    let times = around(points().map(|p| p.1), 1.3, 1.3).log_scale();
-    let mut chart = ChartBuilder::on(root)
-        .caption(caption, ("sans-serif", 18))
-        .margin(14)
-        .x_label_area_size(44)
-        .y_label_area_size(72)
-        .build_cartesian_2d(items, times)?;
-    chart
-        .configure_mesh()
-        .light_line_style(WHITE.mix(0.0))
-        .x_desc("items")
-        .y_desc("mean time per query (thread CPU)")
-        .x_label_formatter(&|n| text::count(n.round() as usize))
-        .y_label_formatter(&|ns| text::time(*ns))
-        .draw()?;
+    let items = around(points().map(|p| p.0 as f64), 1.3, 1.3);
+    let times = around(points().map(|p| p.1), 1.3, 1.3);
+    let axes: [Axis; 2] = [
+        ("items", items, &|n| text::count(n.round() as usize)),
+        ("mean time per query (thread CPU)", times, &text::time),
+    ];
+    let mut chart = log_log(root, caption, axes)?;
     for (i, (structure, points)) in curves.iter().enumerate() {
         let colour = COLOURS[i % COLOURS.len()];
         // Colours come round again; marks then differ.
@@ -134,13 +124,7 @@ fn draw(root: &DrawingArea<SVGBackend, Shift>, caption: &str, curves: &[Curve]) 
             false => Circle::new(at, 4, colour.filled()),
         }))?;
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.8))
-        .border_style(BLACK.mix(0.3))
-        .draw()?;
-    Ok(())
+    legend(&mut chart, SeriesLabelPosition::UpperLeft)
 }
 
 #[cfg(test)]

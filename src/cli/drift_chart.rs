@@ -1,10 +1,9 @@
 //! The picture of `cullbench drift --svg`: position error against time of the spring
 //! arms, one panel per arm, stiffness and frame rate.
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::picture::{COLOURS, Drawn, around, is_drawn, svg};
+use super::chart::{Area, Axis, COLOURS, Drawn, around, is_drawn, legend, log_log, svg};
 use super::text;
 use crate::drift::{ArmPoint, ArmReport};
 
@@ -33,30 +32,18 @@ pub fn draw(report: &ArmReport) -> anyhow::Result<String> {
     })
 }
 
-fn panel(area: &DrawingArea<SVGBackend, Shift>, points: &[ArmPoint]) -> Drawn {
+fn panel(area: &Area, points: &[ArmPoint]) -> Drawn {
     let places = || points.iter().filter_map(place);
     let setting = points[0].setting;
     let (arm, k, rate) = (setting.arm.name(), setting.stiffness, setting.rate_hz);
-    let mut chart = ChartBuilder::on(area)
-        .caption(
-            format!("{arm} arm, k = {k:e}/s2, {rate} Hz"),
-            ("sans-serif", 14),
-        )
-        .margin(8)
-        .x_label_area_size(36)
-        .y_label_area_size(56)
-        .build_cartesian_2d(
-            around(places().map(|p| p.0), 1.5, 1.5).log_scale(),
-            around(places().map(|p| p.1), 2.0, 2.0).log_scale(),
-        )?;
-    chart
-        .configure_mesh()
-        .light_line_style(WHITE.mix(0.0))
-        .x_desc("us of CPU per simulated second")
-        .y_desc("position error")
-        .x_label_formatter(&|x| text::significant(*x))
-        .y_label_formatter(&|y| format!("{y:.0e}"))
-        .draw()?;
+    let caption = format!("{arm} arm, k = {k:e}/s2, {rate} Hz");
+    let times = around(places().map(|p| p.0), 1.5, 1.5);
+    let errors = around(places().map(|p| p.1), 2.0, 2.0);
+    let axes: [Axis; 2] = [
+        ("us of CPU per simulated second", times, &text::significant),
+        ("position error", errors, &|error| format!("{error:.0e}")),
+    ];
+    let mut chart = log_log(area, &caption, axes)?;
     for (own, colour) in points.chunk_by(|a, b| a.method == b.method).zip(COLOURS) {
         let places: Vec<(f64, f64)> = own.iter().filter_map(place).collect();
         let dots = places.iter().map(|&at| Circle::new(at, 3, colour.filled()));
@@ -66,9 +53,5 @@ fn panel(area: &DrawingArea<SVGBackend, Shift>, points: &[ArmPoint]) -> Drawn {
             .legend(move |(x, y)| Circle::new((x, y), 3, colour.filled()));
         chart.draw_series(dots)?;
     }
-    chart
-        .configure_series_labels()
-        .background_style(WHITE.mix(0.8))
-        .draw()?;
-    Ok(())
+    legend(&mut chart, SeriesLabelPosition::UpperRight)
 }
