@@ -4,7 +4,7 @@
 //! [`judge`]'s; here is how the pairs are run.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -13,46 +13,30 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::interrupt::{self, Interrupted};
-use super::processes::{Ended, Said, Worker, processors, see_through};
+use super::processes::{Said, Worker, processors, see_through};
 use super::protocol::{Job, PROTOCOL, Request};
-use super::run_plan::RunPlan;
 use crate::input;
-use crate::measure::{GroupKey, Known, Part, Share, Status, TaskKind, Verdict};
+use crate::measure::{GroupKey, Known, Part, Plan, Share, Status, TaskKind, Verdict};
 use crate::statistics::{Judgement, interquartile_mean, judge, resolved, trimmed_mean};
 
 /// How long one of a pair runs before the other takes its turn: well below the
 /// time in which a shared machine changes its speed.
 const TURN: Duration = Duration::from_millis(5);
 
-/// The two sides of a comparison.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Side {
-    Old,
-    New,
-}
+/// The sides of a comparison, as indices: the other program and this one.
+const OLD: usize = 0;
+const NEW: usize = 1;
 
-/// How many pairs a comparison takes.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Pairs {
-    pub first: usize,
-    pub more: usize,
-    pub most: usize,
-}
+/// Pairs that are added until the answer is clear.
+const MORE: usize = 2;
 
-impl Pairs {
-    /// Ten for a threshold of 5 %, more for less: the pairs that such a change
-    /// needs on a shared machine.
-    pub fn of(threshold: f64) -> Pairs {
-        let (first, most) = match threshold {
-            t if t >= 0.1 => (6, 32),
-            t if t > 0.04 => (10, 32),
-            _ => (16, 64),
-        };
-        Pairs {
-            first,
-            more: 2,
-            most,
-        }
+/// The first and the most pairs of a comparison: ten for a threshold of 5 %, more for
+/// less, as such a change needs on a shared machine.
+fn pairs(threshold: f64) -> (usize, usize) {
+    match threshold {
+        t if t >= 0.1 => (6, 32),
+        t if t > 0.04 => (10, 32),
+        _ => (16, 64),
     }
 }
 
@@ -60,9 +44,9 @@ impl Pairs {
 pub struct AgainstCell {
     pub group: GroupKey,
     pub structure: String,
-    /// What became of it on the old and on the new side.
+    /// Status on the old and on the new side.
     pub verdicts: [Verdict; 2],
-    /// What it counted on each side, by metric.
+    /// Counters of each side, by metric.
     pub counts: [BTreeMap<String, f64>; 2],
     /// ln ns per query of each pair, on each side.
     pub ln_ns: [Vec<f64>; 2],
@@ -78,96 +62,44 @@ pub struct Against {
     pub seconds: f64,
 }
 
-/// What is compared, and how.
+/// Two programs, and the plan on which they are compared.
 pub struct Duel<'a> {
-    pub plan: &'a RunPlan,
+    pub plan: &'a Plan,
     /// The arguments of `run` that the plan follows from.
     pub args: Vec<String>,
-    pub old: PathBuf,
+    pub programs: [PathBuf; 2],
     pub threshold: f64,
-    pub pairs: Pairs,
     pub patience: Duration,
+    /// Receives the pairs that are done, the most there may be, and the step.
     pub progress: &'a dyn Fn(usize, usize, &str),
 }
 
 impl Duel<'_> {
-    /// Runs it.
+    /// Runs pairs of processes until every change is known to within the threshold.
     ///
     /// # Errors
     /// A program that cannot be started or is of another version, a scene that
     /// it cannot read.
     pub fn run(&self) -> anyhow::Result<Against> {
         let started = Instant::now();
-        let new = std::env::current_exe().context("this program cannot be found again")?;
-        let cpu = processors().last().copied();
-        let scenes = self.plan.plan.scenes.len();
-        let mut seen = [Vec::new(), Vec::new()];
-        for scene in 0..scenes {
-            // The plan is the new side's; the old one keeps to it.
-            for (side, program) in [(Side::New, new.as_path()), (Side::Old, &self.old)] {
-                (self.progress)(0, self.pairs.most, "counting and checking answers");
-                let known = match side {
-                    Side::New => self.nothing(scene),
-                    Side::Old => self.known(scene, &seen[1], None),
-                };
-                let request = self.request(scene, 0, known, true, cpu, 0);
-                let own = &mut seen[side as usize];
-                let ended = see_through(
-                    program,
-                    &request,
-                    self.patience,
-                    &mut |said| {
-                        if let Said::Part(part, _) = said {
-                            own.push(*part);
-                        }
-                        Ok(())
-                    },
-                    &|_| (),
-                )?;
-                match ended {
-                    Ended::Done => {}
-                    Ended::Failed(reason) => bail!("{}: {reason}", program.display()),
-                    Ended::Died(structure, verdict) => bail!(
-                        "{}: {}: {}; expected a program that answers",
-                        program.display(),
-                        structure.unwrap_or_else(|| "the program".to_owned()),
-                        verdict.reason.unwrap_or_default()
-                    ),
-                }
-            }
-        }
+        let (first, most) = pairs(self.threshold);
+        let seen = self.count(most)?;
         let mut cells = self.cells(&seen);
-        let mut rng = Pcg64::seed_from_u64(self.plan.plan.seed);
-        let mut pairs = 0;
-        loop {
-            let wanted = match pairs {
-                0 => self.pairs.first,
-                done => (done + self.pairs.more).min(self.pairs.most),
-            };
-            while pairs < wanted {
-                (self.progress)(pairs, self.pairs.most, "pairs of processes");
-                for scene in 0..scenes {
-                    let both =
-                        self.pair(scene, pairs as u32, &seen, [&self.old, &new], cpu, &mut rng)?;
-                    for (side, parts) in both.iter().enumerate() {
-                        note(&mut cells, side, parts);
-                    }
+        let mut rng = Pcg64::seed_from_u64(self.plan.seed);
+        for pair in 0..most {
+            (self.progress)(pair, most, "pairs of processes");
+            for scene in 0..self.plan.scenes.len() {
+                let both = self.pair(scene, pair as u32, &seen, &mut rng)?;
+                for (side, parts) in both.iter().enumerate() {
+                    note(&mut cells, side, parts);
                 }
-                pairs += 1;
             }
-            let differences: Vec<Vec<f64>> = cells.iter().map(AgainstCell::differences).collect();
-            let judged: Vec<usize> = (0..cells.len())
-                .filter(|&i| cells[i].is_timed() && differences[i].len() >= 3)
-                .collect();
-            let of_judged: Vec<Vec<f64>> = judged.iter().map(|&i| differences[i].clone()).collect();
-            let judgements = judge(&of_judged, self.threshold);
-            let enough = resolved(&judgements, self.threshold);
-            for (&i, judgement) in judged.iter().zip(judgements) {
-                cells[i].judgement = judgement;
-            }
-            if enough || pairs >= self.pairs.most {
-                let [_, new] = seen;
-                let query = new.iter().find_map(|p| p.known.as_ref()?.query.as_ref());
+            let pairs = pair + 1;
+            let is_last = pairs == most;
+            let is_look = pairs >= first && (pairs - first).is_multiple_of(MORE);
+            if (is_look || is_last) && (judge_cells(&mut cells, self.threshold) || is_last) {
+                let mut known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
+                let query = known.find_map(|known| known.query.as_ref());
                 return Ok(Against {
                     cells,
                     pairs,
@@ -177,27 +109,47 @@ impl Duel<'_> {
                 });
             }
         }
+        bail!("a comparison of no pairs")
     }
 
-    fn keys(&self, scene: usize) -> Vec<GroupKey> {
-        let planned = &self.plan.plan.scenes[scene];
-        let questions = self.plan.plan.questions(planned);
-        questions
-            .iter()
-            .map(|question| self.plan.plan.key(planned, question))
-            .collect()
+    /// Has both sides count and check their answers.
+    fn count(&self, most: usize) -> anyhow::Result<[Vec<Part>; 2]> {
+        let mut seen = [Vec::new(), Vec::new()];
+        for scene in 0..self.plan.scenes.len() {
+            // The plan is the new side's; the old one keeps to it.
+            for side in [NEW, OLD] {
+                (self.progress)(0, most, "counting and checking answers");
+                let program = &self.programs[side];
+                let share = self.share(scene, 0, [&seen[NEW], &[]]);
+                let share = Share {
+                    plan_only: true,
+                    ..share
+                };
+                let request = self.request(scene, share, 0);
+                let own = &mut seen[side];
+                let mut keep = |said| {
+                    if let Said::Part(part, _) = said {
+                        own.push(*part);
+                    }
+                    Ok(())
+                };
+                let ended = see_through(program, &request, self.patience, &mut keep, &|_| ())?;
+                ended
+                    .done()
+                    .with_context(|| program.display().to_string())?;
+            }
+        }
+        Ok(seen)
     }
 
-    fn nothing(&self, scene: usize) -> Vec<Option<Known>> {
-        vec![None; self.keys(scene).len()]
-    }
-
-    /// The plan of the new side; the answers of `own`, or none, to be counted.
-    fn known(&self, scene: usize, new: &[Part], own: Option<&[Part]>) -> Vec<Option<Known>> {
-        let keys = self.keys(scene).into_iter();
-        keys.map(|key| {
-            let plan = counted(new, &key)?;
-            let answers = own.and_then(|own| counted(own, &key));
+    /// One process's share of a scene: the plan of the new side, and the answers of its own
+    /// side to be counted.
+    fn share(&self, scene: usize, process: u32, [new, own]: [&[Part]; 2]) -> Share {
+        let planned = &self.plan.scenes[scene];
+        let questions = self.plan.questions(planned);
+        let keys = questions.iter().map(|asked| self.plan.key(planned, asked));
+        let known = keys.map(|key| {
+            let answers = counted(own, &key);
             Some(Known {
                 visible: answers
                     .map(|known| known.visible.clone())
@@ -205,21 +157,19 @@ impl Duel<'_> {
                 located: answers
                     .map(|known| known.located.clone())
                     .unwrap_or_default(),
-                ..plan.clone()
+                ..counted(new, &key)?.clone()
             })
-        })
-        .collect()
+        });
+        Share {
+            process,
+            wanted: vec![true; questions.len()],
+            known: known.collect(),
+            failed: BTreeMap::new(),
+            plan_only: false,
+        }
     }
 
-    fn request(
-        &self,
-        scene: usize,
-        pair: u32,
-        known: Vec<Option<Known>>,
-        plan_only: bool,
-        cpu: Option<usize>,
-        layout: u64,
-    ) -> Request {
+    fn request(&self, scene: usize, share: Share, layout: u64) -> Request {
         Request {
             protocol: PROTOCOL,
             args: self.args.clone(),
@@ -227,16 +177,10 @@ impl Duel<'_> {
             files: input::held_files(),
             job: Job::Scene {
                 scene,
-                share: Share {
-                    process: pair,
-                    wanted: vec![true; known.len()],
-                    known,
-                    failed: BTreeMap::new(),
-                    plan_only,
-                },
+                share,
                 samples: false,
             },
-            cpu,
+            cpu: processors().last().copied(),
             layout,
         }
     }
@@ -247,88 +191,88 @@ impl Duel<'_> {
         scene: usize,
         pair: u32,
         seen: &[Vec<Part>; 2],
-        programs: [&Path; 2],
-        cpu: Option<usize>,
         rng: &mut Pcg64,
     ) -> anyhow::Result<[Vec<Part>; 2]> {
         let mut parts = [Vec::new(), Vec::new()];
-        // Which of the two is started first, and gets the first memory, is drawn
-        // anew for every pair, and apart from it whose turn is first: old, new,
-        // new, old, ...
+        // Which side is started first, and gets the first memory, is drawn for every pair,
+        // and apart from it whose turn is first: old, new, new, old, ...
         let first: usize = rng.random_range(0..2);
         let begins: usize = rng.random_range(0..2);
         let mut workers = [None, None];
         for side in [first, 1 - first] {
-            let known = self.known(scene, &seen[1], Some(&seen[side]));
-            let request = self.request(scene, pair, known, false, cpu, rng.random());
-            workers[side] = Some(Worker::start(programs[side], &request)?);
+            let share = self.share(scene, pair, [&seen[NEW], &seen[side]]);
+            let request = self.request(scene, share, rng.random());
+            workers[side] = Some(Worker::start(&self.programs[side], &request)?);
         }
         let mut turn = 0;
-        workers[1 - begins].iter().for_each(Worker::hold);
+        workers[1 - begins]
+            .iter()
+            .for_each(|other| other.hold(true));
         while workers.iter().any(Option::is_some) {
             if interrupt::asked() {
                 return Err(Interrupted.into());
             }
-            let side = (begins + usize::div_ceil(turn, 2)) % 2;
+            let mut side = (begins + usize::div_ceil(turn, 2)) % 2;
             turn += 1;
-            let side = if workers[side].is_some() {
-                side
-            } else {
-                1 - side
-            };
-            let alone = workers[1 - side].is_none();
-            workers[side].iter().for_each(Worker::go);
+            if workers[side].is_none() {
+                side = 1 - side;
+            }
+            let is_alone = workers[1 - side].is_none();
+            workers[side].iter().for_each(|own| own.hold(false));
             thread::sleep(TURN);
-            if !alone {
-                workers[side].iter().for_each(Worker::hold);
+            if !is_alone {
+                workers[side].iter().for_each(|own| own.hold(true));
             }
             while let Some(worker) = &mut workers[side] {
                 match worker.listen(Duration::ZERO)? {
-                    Said::Part(part, _) => parts[side].push(*part),
-                    Said::Step(_) | Said::Times(_) => {}
-                    Said::Nothing => break,
-                    Said::Ended(Ended::Done) => workers[side] = None,
-                    Said::Ended(Ended::Failed(reason)) => {
-                        bail!("{}: {reason}", programs[side].display())
+                    Some(Said::Part(part, _)) => parts[side].push(*part),
+                    Some(Said::Ended(ended)) => {
+                        let program = || self.programs[side].display().to_string();
+                        ended.done().with_context(program)?;
+                        workers[side] = None;
                     }
-                    Said::Ended(Ended::Died(structure, verdict)) => bail!(
-                        "{}: {} {}: {}; expected a program that answers",
-                        programs[side].display(),
-                        structure.unwrap_or_else(|| "the program".to_owned()),
-                        verdict.status.name(),
-                        verdict.reason.unwrap_or_default()
-                    ),
+                    Some(_) => {}
+                    None => break,
                 }
             }
         }
         Ok(parts)
     }
 
+    /// All cells of the plan, without times.
     fn cells(&self, seen: &[Vec<Part>; 2]) -> Vec<AgainstCell> {
-        let mut cells = Vec::new();
-        for cell in self.plan.plan.cells() {
-            let of = |side: usize| {
-                let part = seen[side].iter().find(|part| part.key == cell.group);
+        let cells = self.plan.cells().into_iter().map(|cell| {
+            let subjects = seen.each_ref().map(|parts| {
+                let part = parts.iter().find(|part| part.key == cell.group);
                 part.and_then(|p| p.subjects.iter().find(|s| s.label == cell.structure))
-            };
-            let verdict = |side: usize| {
-                of(side).map_or_else(
-                    || Verdict::new(Status::LeftOut, "not in this program"),
-                    |subject| subject.verdict.clone(),
-                )
-            };
-            let counts = |side: usize| of(side).map(|s| s.counts.clone()).unwrap_or_default();
-            cells.push(AgainstCell {
-                verdicts: [verdict(0), verdict(1)],
-                counts: [counts(0), counts(1)],
+            });
+            let absent = || Verdict::new(Status::LeftOut, "not in this program");
+            AgainstCell {
+                verdicts: subjects.map(|own| own.map_or_else(absent, |own| own.verdict.clone())),
+                counts: subjects.map(|own| own.map(|own| own.counts.clone()).unwrap_or_default()),
                 ln_ns: [Vec::new(), Vec::new()],
                 judgement: None,
                 group: cell.group,
                 structure: cell.structure,
-            });
-        }
-        cells
+            }
+        });
+        cells.collect()
     }
+}
+
+/// Judges all cells that were timed; true if every change is known to within the
+/// threshold.
+fn judge_cells(cells: &mut [AgainstCell], threshold: f64) -> bool {
+    let timed = cells.iter_mut().filter(|cell| cell.is_timed());
+    let mut timed: Vec<&mut AgainstCell> = timed.collect();
+    timed.retain(|cell| cell.differences().len() >= 3);
+    let differences: Vec<Vec<f64>> = timed.iter().map(|cell| cell.differences()).collect();
+    let judgements = judge(&differences, threshold);
+    let enough = resolved(&judgements, threshold);
+    for (cell, judgement) in timed.into_iter().zip(judgements) {
+        cell.judgement = judgement;
+    }
+    enough
 }
 
 impl AgainstCell {
@@ -336,7 +280,7 @@ impl AgainstCell {
         self.verdicts.iter().all(|v| v.status == Status::Ok)
     }
 
-    /// The times of both sides as they are shown: their quotient is the change.
+    /// The times of both sides, of which the quotient is the change.
     pub fn shown(&self) -> [Option<f64>; 2] {
         let old = trimmed_mean(&self.ln_ns[0]).map(|old| old.mean.exp());
         let ratio = self.judgement.map(|found| found.ratio);
@@ -344,19 +288,19 @@ impl AgainstCell {
     }
 
     /// ln(new / old) of each pair.
-    pub fn differences(&self) -> Vec<f64> {
+    fn differences(&self) -> Vec<f64> {
         let [old, new] = &self.ln_ns;
         old.iter().zip(new).map(|(old, new)| new - old).collect()
     }
 }
 
-/// What a side has answered and counted.
+/// Answers and counters of a side.
 fn counted<'p>(parts: &'p [Part], key: &GroupKey) -> Option<&'p Known> {
     let part = parts.iter().find(|part| part.key == *key)?;
     part.known.as_ref()
 }
 
-/// Takes over the times, and what has failed since, of one process.
+/// Adds the times and the failures of one process.
 fn note(cells: &mut [AgainstCell], side: usize, parts: &[Part]) {
     for cell in cells {
         let Some(part) = parts.iter().find(|part| part.key == cell.group) else {
@@ -370,9 +314,8 @@ fn note(cells: &mut [AgainstCell], side: usize, parts: &[Part]) {
         }
         let mut tasks = part.tasks.iter();
         let task = tasks.find(|t| t.label == cell.structure && t.task == TaskKind::Query);
-        let rounds: Vec<f64> = task
-            .map(|task| task.rounds_ns.iter().map(|ns| ns.ln()).collect())
-            .unwrap_or_default();
+        let rounds = task.into_iter().flat_map(|task| &task.rounds_ns);
+        let rounds: Vec<f64> = rounds.map(|ns| ns.ln()).collect();
         // A pair that lacks a side is no pair: NaN keeps the places.
         cell.ln_ns[side].push(interquartile_mean(&rounds).unwrap_or(f64::NAN));
     }

@@ -9,7 +9,7 @@ use clap::CommandFactory;
 use clap::parser::ValueSource;
 use serde_json::json;
 
-use super::against::{Against, Duel, Pairs};
+use super::against::{Against, Duel};
 use super::args::{Cli, CompareArgs};
 use super::compare_table::{Basis, CompareTable, Side};
 use super::study::progress;
@@ -20,8 +20,8 @@ use crate::report::{Changes, JudgedRow, Lone, work_changes};
 use crate::scene;
 
 const SUITE: &str = "compare";
-/// What is compared where nothing is named: the plain loop over all items takes
-/// most of the time and says least.
+/// Default structures, without the plain loop over all items: it takes most of the time
+/// and says least.
 const STRUCTURES: &str = "linear,bsp,octree,quadtree,bvh,wide";
 
 /// Changes below this are not looked for: two builds of one source differ as much
@@ -50,10 +50,9 @@ pub fn compare_against(
     let bar = progress(0, " pairs");
     let duel = Duel {
         args: arguments()?,
-        plan: &plan,
-        old: binary.to_owned(),
+        plan: &plan.plan,
+        programs: [binary.to_owned(), new],
         threshold,
-        pairs: Pairs::of(threshold),
         patience: Duration::from_secs(args.what.timeout),
         progress: &|done, most, step| {
             bar.set_length(most as u64);
@@ -67,14 +66,13 @@ pub fn compare_against(
     bar.finish_and_clear();
     let found = found?;
     let busy = load.load.filter(|l| *l > 0.5 * load.cores as f64);
-    let mut notes: Vec<String> = Vec::new();
-    notes.extend(busy.map(|busy| {
+    let note = |busy| {
         format!(
             "the machine was busy (load average {busy:.1} on {} cores): both sides suffered \
              alike, and it took more pairs",
             load.cores
         )
-    }));
+    };
     let [old, new] = sides;
     let table = CompareTable {
         old,
@@ -87,7 +85,7 @@ pub fn compare_against(
             found.cameras,
             found.seconds
         ),
-        notes,
+        notes: busy.map(note).into_iter().collect(),
         settings: Vec::new(),
         changes: changes(&found, threshold),
     };
@@ -95,8 +93,7 @@ pub fn compare_against(
     Ok(table.ending())
 }
 
-/// The program that a name stands for, as in a shell: a name without a folder is looked
-/// up in PATH.
+/// The program of a name, as in a shell: one without a folder is looked up in PATH.
 fn program(name: &Path) -> anyhow::Result<PathBuf> {
     let found = match name.parent() {
         Some(folder) if folder.as_os_str().is_empty() => {
@@ -168,37 +165,34 @@ fn changes(found: &Against, threshold: f64) -> Changes {
     changes
 }
 
-/// The options of `run` that were typed behind `compare`: what they were given, by
-/// name.
+/// The options of `run` that were typed behind `compare`.
 fn typed() -> anyhow::Result<Vec<String>> {
     let matches = Cli::command().try_get_matches_from(std::env::args_os())?;
-    let mut typed = Vec::new();
     let Some(matches) = matches.subcommand_matches("compare") else {
-        return Ok(typed);
+        return Ok(Vec::new());
     };
     let command = Cli::command();
-    let run = command.find_subcommand("run");
-    for arg in run.into_iter().flat_map(|run| run.get_arguments()) {
+    let run = command.find_subcommand("run").into_iter();
+    let typed = run.flat_map(|run| run.get_arguments()).filter(|arg| {
         let id = arg.get_id().as_str();
-        let known = matches.try_contains_id(id).unwrap_or(false);
-        if !known || matches.value_source(id) != Some(ValueSource::CommandLine) {
-            continue;
-        }
+        matches.try_contains_id(id).unwrap_or(false)
+            && matches.value_source(id) == Some(ValueSource::CommandLine)
+    });
+    let words = typed.flat_map(|arg| {
+        let id = arg.get_id().as_str();
         let name = arg.get_long().unwrap_or(id);
-        let values: Vec<_> = matches.get_raw(id).into_iter().flatten().collect();
+        let values = matches.get_raw(id).into_iter().flatten();
         match arg.get_action().takes_values() {
-            true => typed.extend(
-                values
-                    .iter()
-                    .map(|value| format!("--{name}={}", value.to_string_lossy())),
-            ),
-            false => typed.push(format!("--{name}")),
+            true => values
+                .map(|value| format!("--{name}={}", value.to_string_lossy()))
+                .collect(),
+            false => vec![format!("--{name}")],
         }
-    }
-    Ok(typed)
+    });
+    Ok(words.collect())
 }
 
-/// The arguments of `run` that ask for the same.
+/// The arguments of `run` for the same measurement.
 fn arguments() -> anyhow::Result<Vec<String>> {
     let mut arguments = vec!["run".to_owned()];
     arguments.extend(typed()?);
@@ -210,7 +204,7 @@ fn arguments() -> anyhow::Result<Vec<String>> {
     Ok(arguments)
 }
 
-/// Refuses what says how to measure where nothing is measured.
+/// Refuses options of a measurement where nothing is measured.
 pub fn expect_none_of_a_run() -> anyhow::Result<()> {
     match typed()?.first().and_then(|typed| typed.split('=').next()) {
         Some(option) => bail!(

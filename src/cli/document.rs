@@ -1,6 +1,5 @@
-//! A document of headings, lines and tables, written as Markdown, as one HTML
-//! page or for a terminal. It defines the escaping of each and knows nothing of
-//! what the document says.
+//! A document of headings, lines and tables, written as Markdown, as one HTML page or
+//! for a terminal, and the escaping of each.
 
 use super::table::Table;
 use super::text;
@@ -49,38 +48,32 @@ fn html_table(table: &Table) -> String {
     )
 }
 
-/// What Markdown could take for its own within a line. A line break would end
+/// Text of a line, with an escape before every mark of Markdown. A line break would end
 /// a table row.
 fn markdown(text: &str) -> String {
-    let mut out = String::new();
-    for c in text::plain(text).chars() {
-        match c {
-            '\\' | '|' | '`' | '*' | '_' | '<' | '[' | '&' => {
-                out.push('\\');
-                out.push(c);
-            }
-            c => out.push(c),
-        }
-    }
-    out
+    let marks = ['\\', '|', '`', '*', '_', '<', '[', '&'];
+    let text = text::plain(text);
+    let escaped = text.chars().flat_map(|c| {
+        let escape = marks.contains(&c).then_some('\\');
+        escape.into_iter().chain([c])
+    });
+    escaped.collect()
 }
 
 fn html(text: &str) -> String {
-    let mut out = String::new();
-    for c in text::plain(text).chars() {
-        match c {
-            '&' => out += "&amp;",
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '"' => out += "&quot;",
-            '\'' => out += "&#39;",
-            c => out.push(c),
-        }
+    let mut text = text::plain(text).replace('&', "&amp;");
+    for (mark, name) in [
+        ("<", "&lt;"),
+        (">", "&gt;"),
+        ("\"", "&quot;"),
+        ("'", "&#39;"),
+    ] {
+        text = text.replace(mark, name);
     }
-    out
+    text
 }
 
-/// The whole as Markdown.
+/// The document as Markdown.
 pub fn to_markdown(blocks: &[Block]) -> String {
     let parts = blocks.iter().filter_map(|block| match block {
         Block::Heading(level, text) => {
@@ -94,12 +87,24 @@ pub fn to_markdown(blocks: &[Block]) -> String {
     parts.collect::<Vec<_>>().join("\n")
 }
 
+/// The document for a terminal of `width` columns.
+pub fn to_terminal(blocks: &[Block], width: usize) -> String {
+    let parts = blocks.iter().map(|block| match block {
+        Block::Heading(_, text) | Block::Line(text) => {
+            text::wrapped(&text::plain(text), width) + "\n"
+        }
+        Block::Table(table) => format!("{table}\n"),
+        Block::Picture(_) => String::new(),
+    });
+    parts.collect()
+}
+
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;max-width:75rem;margin:2rem auto;\
 padding:0 1rem}table{border-collapse:collapse;margin:1rem 0;display:block;overflow-x:auto}\
 th,td{padding:.2rem .6rem;border-bottom:1px solid #ddd;text-align:left;white-space:nowrap}\
 .n{text-align:right;font-variant-numeric:tabular-nums}svg{max-width:100%;height:auto}";
 
-/// The whole as one page that needs nothing else.
+/// The document as one page that needs no other file.
 pub fn to_html(title: &str, blocks: &[Block]) -> String {
     let parts = blocks.iter().map(|block| match block {
         Block::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", html(text)),

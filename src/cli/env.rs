@@ -1,4 +1,4 @@
-//! `cullbench env`: what every report records about where it was made.
+//! `cullbench env`: the machine, toolchain and source that every report records.
 
 use std::io::{self, Write};
 
@@ -21,15 +21,8 @@ pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
         TableFormat::Table => {
             let mut table = Table::of("fact | value");
             for (group, facts) in facts.as_object().into_iter().flatten() {
-                match facts.as_object() {
-                    Some(facts) => {
-                        for (name, value) in facts {
-                            table.add_row([format!("{group}.{name}"), plain(value)]);
-                        }
-                    }
-                    None => {
-                        table.add_row([group.clone(), plain(facts)]);
-                    }
+                for (name, value) in facts.as_object().into_iter().flatten() {
+                    table.add_row([format!("{group}.{name}"), plain(value)]);
                 }
             }
             writeln!(io::stdout(), "{table}")?;
@@ -44,11 +37,10 @@ fn plain(value: &Value) -> String {
         Value::String(text) => text.clone(),
         Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(" "),
         Value::Object(fields) => {
-            let fields: Vec<String> = fields
+            let fields = fields
                 .iter()
-                .map(|(k, v)| format!("{k}={}", plain(v)))
-                .collect();
-            format!("({})", fields.join(", "))
+                .map(|(name, value)| format!("{name}={}", plain(value)));
+            format!("({})", fields.collect::<Vec<_>>().join(", "))
         }
         other => other.to_string(),
     }

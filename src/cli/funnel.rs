@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 
-use super::document::{Block, to_html};
+use super::document::{Block, to_html, to_terminal};
 use super::funnel_args::{FunnelArgs, FunnelFormat};
 use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
@@ -75,7 +75,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         FunnelFormat::Json => print_json(&report),
         FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
         FunnelFormat::Table => {
-            let text = funnel_table::terminal(&funnel_table::blocks(&report));
+            let text = to_terminal(&funnel_table::blocks(&report), funnel_table::WIDTH.into());
             text::terminal().write_all(text.as_bytes())
         }
     });

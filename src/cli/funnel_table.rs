@@ -1,16 +1,18 @@
-//! The tables of `cullbench funnel`: a row for each stage and back end, what each stage
-//! of the chain is worth, and what follows.
+//! The tables of `cullbench funnel`: a row for each stage and back end, the gain of each
+//! stage of the chain, and conclusions.
 
 use super::document::Block;
-use super::table::Table;
+use super::table::{Column, Table};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, LeftOutRow, LevelRow, StageRow, Times};
+use crate::funnel::{
+    BoundRow, FragmentCounts, FunnelReport, Gain, LevelRow, OrderRow, PickRow, StageRow, Times,
+};
 use crate::visibility::Guarantee;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 use crate::visibility::occlusion::OccluderChoice;
 
-/// No line is longer.
-const WIDTH: u16 = 100;
+/// Most columns of a line.
+pub const WIDTH: u16 = 100;
 
 pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     let mut blocks = vec![
@@ -68,18 +70,14 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         blocks.push(Block::Line(line.into()));
     }
     blocks.extend(report.left_out.iter().map(|row| {
-        let LeftOutRow {
-            section,
-            name,
-            reason,
-        } = row;
+        let (section, name, reason) = (row.section, row.name, &row.reason);
         Block::Line(format!("Left out ({section}, {name}): {reason}."))
     }));
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks
 }
 
-/// What the selection of a level saves; nothing where there is but one.
+/// Line on the load that the selection of a level saves; none for a single level.
 fn saved_load(level: &LevelRow) -> Option<String> {
     let [lower, upper] = [level.saved_load_ns_lower?, level.saved_load_ns_upper?];
     let others = text::counted(level.map_count - 1, "other map");
@@ -96,7 +94,7 @@ fn saved_load(level: &LevelRow) -> Option<String> {
     })
 }
 
-/// What hides in a mesh, and what finding it took.
+/// Line on the occluders inside a mesh.
 fn inner_boxes(row: &InnerRow) -> Block {
     let held = row.volume_share.map(|share| {
         let [held, lost] = [share, 1.0 - share].map(|share| share * 100.0);
@@ -115,7 +113,7 @@ fn inner_boxes(row: &InnerRow) -> Block {
     ))
 }
 
-/// What hides below the ground, and what finding it took.
+/// Line on the occluders below the ground.
 fn ground(row: &GroundRow) -> Block {
     let held = row.volume_share.map(|share| {
         let held = share * 100.0;
@@ -130,7 +128,7 @@ fn ground(row: &GroundRow) -> Block {
     ))
 }
 
-/// What hides in a map, and what finding it took.
+/// Line on the occluders in the solid of a map.
 fn solid_blocks(row: &BlocksRow) -> Block {
     Block::Line(match row.unclosed_sector_count {
         0 => format!(
@@ -146,7 +144,7 @@ fn solid_blocks(row: &BlocksRow) -> Block {
     })
 }
 
-/// What the times rest on.
+/// Basis of the times.
 pub fn spread(processes: usize) -> String {
     match processes {
         0..3 => text::over(processes, None),
@@ -157,21 +155,11 @@ pub fn spread(processes: usize) -> String {
     }
 }
 
-/// The blocks for a terminal.
-pub fn terminal(blocks: &[Block]) -> String {
-    let lines = blocks.iter().map(|block| match block {
-        Block::Heading(_, text) | Block::Line(text) => text::wrapped(text, WIDTH.into()),
-        Block::Table(table) => table.to_string(),
-        Block::Picture(_) => String::new(),
-    });
-    lines.map(|line| line + "\n").collect()
-}
-
 fn stages(report: &FunnelReport) -> Table {
     let mut table = Table::of("stage | by | >in | >out | >truth | >FP | >FN | >time | >per item");
     let level = &report.level;
-    let mut first = vec!["level".to_owned(), level.selected.clone()];
-    first.extend([level.input_count, level.output_count].map(|n| n.to_string()));
+    let [given, left] = [level.input_count, level.output_count].map(|n| n.to_string());
+    let mut first = vec!["level".to_owned(), level.selected.clone(), given, left];
     first.resize(table.header.len(), String::new());
     table.add_row(first);
     table.rows.extend(report.stages.iter().map(stage));
@@ -185,7 +173,7 @@ fn by(row: &StageRow) -> String {
     format!("{name}{mark}{}", doubt(row.back_end.guarantee))
 }
 
-/// The mark of what nobody has proven.
+/// Mark of an unproven back end.
 pub fn doubt(guarantee: Guarantee) -> &'static str {
     match guarantee {
         Guarantee::Unproven => "?",
@@ -204,7 +192,7 @@ fn stage(row: &StageRow) -> Vec<String> {
         count(errors.false_positive_count),
         count(errors.false_negative_count),
         of_view(&row.times),
-        row.ns_per_removed.map(text::time).unwrap_or_default(),
+        text::some(row.ns_per_removed, text::time),
     ]
 }
 
@@ -222,39 +210,31 @@ fn count(mean: f64) -> String {
 }
 
 /// Counts of fragments, by the name of a test.
-fn of_fragments() -> Table {
-    Table::of("test | >samples asked | >kept out | >fragments | >clear | >shaded | >covered")
+fn fragment_table<'c>(tests: impl Iterator<Item = (&'c str, &'c FragmentCounts)>) -> Table {
+    let mut table =
+        Table::of("test | >samples asked | >kept out | >fragments | >clear | >shaded | >covered");
+    for (name, counts) in tests {
+        let counts = counts.in_order().into_iter().map(count);
+        table.add_row([name.to_owned()].into_iter().chain(counts));
+    }
+    table
 }
 
 /// The reflected scene on the samples of a mirror, and on all.
 fn mirror(report: &FunnelReport) -> Table {
-    let mut table = of_fragments();
-    let drawn = report.mirror.iter().flat_map(|mirror| {
+    fragment_table(report.mirror.iter().flat_map(|mirror| {
         [
             ("z-test", &mirror.without_stencil),
             ("stencil-test", &mirror.with_stencil),
         ]
-    });
-    table.rows.extend(drawn.map(|(name, counts)| {
-        let mut cells = vec![name.to_owned()];
-        cells.extend(counts.in_order().map(count));
-        cells
-    }));
-    table
+    }))
 }
 
-/// One test alone has nothing to be compared with.
+/// The tests of the fragment stage, if there are several to compare.
 fn fragments(report: &FunnelReport) -> Table {
-    let mut table = of_fragments();
-    let tests = report
-        .stages
-        .iter()
-        .filter_map(|row| Some((row, row.fragments?)));
-    table.rows.extend(tests.map(|(row, counts)| {
-        let mut cells = vec![row.back_end.name.to_owned()];
-        cells.extend(counts.in_order().map(count));
-        cells
-    }));
+    let rows = report.stages.iter();
+    let tests = rows.filter_map(|row| Some((row.back_end.name, row.fragments.as_ref()?)));
+    let mut table = fragment_table(tests);
     if table.rows.len() < 2 {
         table.rows.clear();
     }
@@ -262,74 +242,61 @@ fn fragments(report: &FunnelReport) -> Table {
 }
 
 fn orders(report: &FunnelReport) -> Table {
-    let mut table = Table::of(
-        "order | >fragments | >shaded | >overdraw | >pairs | >wrong | >wrong samples | >time",
-    );
-    table.rows.extend(report.orders.iter().map(|row| {
-        vec![
-            row.name.to_owned(),
-            count(row.fragment_count),
-            count(row.shaded_count),
-            row.overdraw.map(text::significant).unwrap_or_default(),
-            count(row.pair_count),
-            count(row.wrong_pair_count),
-            count(row.wrong_sample_count),
-            of_view(&row.times),
-        ]
-    }));
-    table
+    let columns: &[Column<&OrderRow>] = &[
+        ("order", |row| row.name.to_owned()),
+        (">fragments", |row| count(row.fragment_count)),
+        (">shaded", |row| count(row.shaded_count)),
+        (">overdraw", |row| {
+            text::some(row.overdraw, text::significant)
+        }),
+        (">pairs", |row| count(row.pair_count)),
+        (">wrong", |row| count(row.wrong_pair_count)),
+        (">wrong samples", |row| count(row.wrong_sample_count)),
+        (">time", |row| of_view(&row.times)),
+    ];
+    Table::with(&report.orders, columns)
 }
 
 fn picks(report: &FunnelReport) -> Table {
-    let mut table = Table::of("question | by | >cursors | >wrong | >time per cursor");
-    table.rows.extend(report.picks.iter().map(|row| {
-        vec![
-            row.question.name().to_owned(),
-            format!("{}{}", row.name, doubt(row.guarantee)),
-            row.ray_count.to_string(),
-            row.wrong_count.to_string(),
-            row.ns_per_ray.map(text::time).unwrap_or_default(),
-        ]
-    }));
-    table
+    let columns: &[Column<&PickRow>] = &[
+        ("question", |row| row.question.name().to_owned()),
+        ("by", |row| format!("{}{}", row.name, doubt(row.guarantee))),
+        (">cursors", |row| row.ray_count.to_string()),
+        (">wrong", |row| row.wrong_count.to_string()),
+        (">time per cursor", |row| {
+            text::some(row.ns_per_ray, text::time)
+        }),
+    ];
+    Table::with(&report.picks, columns)
 }
 
 fn bounds(report: &FunnelReport) -> Table {
-    let mut table = Table::of("bound | of | >time | >ratio");
-    table.rows.extend(report.bounds.iter().map(|row| {
-        vec![
-            row.name.to_owned(),
-            row.back_end.to_owned(),
-            of_view(&row.times),
-            row.ratio.map(text::significant).unwrap_or_default(),
-        ]
-    }));
-    table
+    let columns: &[Column<&BoundRow>] = &[
+        ("bound", |row| row.name.to_owned()),
+        ("of", |row| row.back_end.to_owned()),
+        (">time", |row| of_view(&row.times)),
+        (">ratio", |row| text::some(row.ratio, text::significant)),
+    ];
+    Table::with(&report.bounds, columns)
 }
 
 fn gains(report: &FunnelReport) -> Table {
-    let mut table =
-        Table::of("stage | >time with | >without | counted | >with | >without | >pays above");
-    table.rows.extend(report.gains.iter().map(gain));
-    table
-}
-
-fn gain(gain: &Gain) -> Vec<String> {
-    let time = |ns: Option<f64>| ns.map(text::time).unwrap_or_default();
-    vec![
-        format!("{} ({})", gain.stage.name(), gain.back_end),
-        time(gain.with_ns),
-        time(gain.without_ns),
-        gain.unit.to_owned(),
-        count(gain.with_count),
-        count(gain.without_count),
-        match gain.break_even_ns {
-            Some(_) => text::time_plus_minus(
-                gain.break_even_ns,
-                [gain.break_even_ns_lower, gain.break_even_ns_upper],
-            ),
-            None if gain.removed() > 0.0 => String::new(),
-            None => "removes nothing".to_owned(),
-        },
-    ]
+    let columns: &[Column<&Gain>] = &[
+        ("stage", |gain| {
+            format!("{} ({})", gain.stage.name(), gain.back_end)
+        }),
+        (">time with", |gain| text::some(gain.with_ns, text::time)),
+        (">without", |gain| text::some(gain.without_ns, text::time)),
+        ("counted", |gain| gain.unit.to_owned()),
+        (">with", |gain| count(gain.with_count)),
+        (">without", |gain| count(gain.without_count)),
+        (">pays above", |gain| match gain.break_even_ns {
+            None if gain.removed() <= 0.0 => "removes nothing".to_owned(),
+            ns => {
+                let ends = [gain.break_even_ns_lower, gain.break_even_ns_upper];
+                text::time_plus_minus(ns, ends)
+            }
+        }),
+    ];
+    Table::with(&report.gains, columns)
 }

@@ -62,7 +62,7 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// Whether a run times it where no structure is named.
+/// Condition under which a run times a structure.
 fn timed(info: &Info) -> &'static str {
     if info.textbook {
         "if named"

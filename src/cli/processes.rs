@@ -9,7 +9,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use tempfile::NamedTempFile;
 
 use super::interrupt::{self, Interrupted};
@@ -22,7 +22,7 @@ use crate::shown::shortened;
 
 /// Longest wait before looking whether the user wants to stop.
 const GLANCE: Duration = Duration::from_millis(20);
-/// Bytes of a worker's last words that are kept.
+/// Bytes of a worker's last words.
 const LAST_WORDS: usize = 4096;
 
 /// Longest first line of a worker, bytes: another program may never end its first.
@@ -32,13 +32,31 @@ const LONGEST: u64 = 1 << 29;
 /// Lines that wait to be read before the worker does.
 const WAITING: usize = 16;
 
-/// How a share of the work ended.
+/// End of a share of the work.
 pub enum Ended {
     Done,
-    /// It could not do what it was asked to.
+    /// A scene or a path that cannot be read.
     Failed(String),
-    /// It is gone; the structure it was at, and what became of it.
+    /// The process died at this structure, with this verdict.
     Died(Option<String>, Verdict),
+}
+
+impl Ended {
+    /// # Errors
+    /// Any other end than that of the work.
+    pub fn done(self) -> anyhow::Result<()> {
+        let (structure, verdict) = match self {
+            Ended::Done => return Ok(()),
+            Ended::Failed(reason) => bail!("{reason}"),
+            Ended::Died(structure, verdict) => (structure, verdict),
+        };
+        let who = structure.map(|structure| format!("{structure}: "));
+        bail!(
+            "{}{}; expected one that finishes",
+            who.unwrap_or_default(),
+            verdict.reason.unwrap_or_default()
+        )
+    }
 }
 
 /// A worker at work.
@@ -46,22 +64,20 @@ pub struct Worker {
     child: Child,
     /// Kept open: its end tells the worker that its parent is gone.
     _stdin: Option<ChildStdin>,
-    lines: Receiver<std::io::Result<Vec<u8>>>,
+    lines: Receiver<io::Result<Vec<u8>>>,
     last_words: Option<JoinHandle<Vec<u8>>>,
     doing: (Option<String>, String),
     since: Instant,
 }
 
-/// What a worker has said.
+/// A message of a worker, or its end.
 pub enum Said {
     Part(Box<Part>, Vec<TaskSamples>),
     Times(ProcessTimes),
-    /// It does something else now.
+    /// The step that it begins.
     Step(String),
-    /// Its last word, or what is known of its end without one.
+    /// The end, reported or observed.
     Ended(Ended),
-    /// Nothing within the time it was given.
-    Nothing,
 }
 
 impl Worker {
@@ -107,7 +123,7 @@ impl Worker {
         if let Some(stdin) = &mut stdin {
             let mut line = serde_json::to_vec(request)?;
             line.push(b'\n');
-            // A program that does not read it says so in another way.
+            // A program that does not read it fails later.
             let _ = stdin.write_all(&line);
         }
         Ok(Worker {
@@ -120,15 +136,15 @@ impl Worker {
         })
     }
 
-    /// What it says next, if it says it within `wait`.
+    /// Waits for the next message; none within `wait`.
     ///
     /// # Errors
-    /// Something that no worker of this version says.
-    pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Said> {
+    /// A message that no worker of this version sends.
+    pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Said>> {
         let line = match self.lines.recv_timeout(wait) {
             Ok(line) => line?,
-            Err(RecvTimeoutError::Timeout) => return Ok(Said::Nothing),
-            Err(RecvTimeoutError::Disconnected) => return Ok(Said::Ended(self.obituary()?)),
+            Err(RecvTimeoutError::Timeout) => return Ok(None),
+            Err(RecvTimeoutError::Disconnected) => return Ok(Some(Said::Ended(self.obituary()?))),
         };
         self.since = Instant::now();
         let told = str::from_utf8(&line).ok();
@@ -141,17 +157,18 @@ impl Worker {
                  of another version"
             )
         })?;
-        Ok(match message {
-            Message::Ready { protocol: PROTOCOL } => Said::Step("started".to_owned()),
-            Message::Ready { protocol } => bail!(
-                "the program speaks protocol {protocol}; expected {PROTOCOL}: it is of another \
-                 version"
-            ),
+        Ok(Some(match message {
+            Message::Ready { protocol } => {
+                ensure!(
+                    protocol == PROTOCOL,
+                    "the program speaks protocol {protocol}; expected {PROTOCOL}: it is of \
+                     another version"
+                );
+                Said::Step("started".to_owned())
+            }
             Message::Doing { structure, step } => {
-                let said = match &structure {
-                    Some(structure) => format!("{step} {structure}"),
-                    None => step.clone(),
-                };
+                let name = structure.as_deref().unwrap_or_default();
+                let said = format!("{step} {name}").trim_end().to_owned();
                 self.doing = (structure, step);
                 Said::Step(said)
             }
@@ -159,47 +176,34 @@ impl Worker {
             Message::Times(times) => Said::Times(times),
             Message::Failed(reason) => Said::Ended(Ended::Failed(reason)),
             Message::Done => Said::Ended(Ended::Done),
-        })
+        }))
     }
 
-    /// Since when nothing has been heard.
-    pub fn silent_for(&self) -> Duration {
-        self.since.elapsed()
-    }
-
-    /// Ends it; what it was at is what took too long.
+    /// Ends the process; its current step is what took too long.
     fn give_up(mut self, patience: Duration) -> Ended {
-        let (structure, step) = self.doing.clone();
         self.kill();
+        let (structure, step) = &self.doing;
         let reason = format!("{step} took longer than {} s", patience.as_secs());
-        Ended::Died(structure, Verdict::new(Status::TimedOut, reason))
+        Ended::Died(structure.clone(), Verdict::new(Status::TimedOut, reason))
     }
 
-    /// Ends it at once.
-    pub fn kill(&mut self) {
+    fn kill(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 
-    /// It stands still until [`Worker::go`]; where no signal does that, it runs on.
-    pub fn hold(&self) {
+    /// Stops the process or lets it continue; without such signals it runs on.
+    pub fn hold(&self, is_held: bool) {
         #[cfg(unix)]
-        self.signal(rustix::process::Signal::STOP);
-    }
-
-    pub fn go(&self) {
-        #[cfg(unix)]
-        self.signal(rustix::process::Signal::CONT);
-    }
-
-    #[cfg(unix)]
-    fn signal(&self, signal: rustix::process::Signal) {
         if let Some(pid) = rustix::process::Pid::from_raw(self.child.id().cast_signed()) {
-            let _ = rustix::process::kill_process(pid, signal);
+            use rustix::process::{Signal, kill_process};
+            let _ = kill_process(pid, if is_held { Signal::STOP } else { Signal::CONT });
         }
+        #[cfg(not(unix))]
+        let _ = is_held;
     }
 
-    fn obituary(&mut self) -> std::io::Result<Ended> {
+    fn obituary(&mut self) -> io::Result<Ended> {
         let status = self.child.wait()?;
         let words = self.last_words.take().and_then(|words| words.join().ok());
         let words = String::from_utf8_lossy(&words.unwrap_or_default()).into_owned();
@@ -214,36 +218,33 @@ impl Drop for Worker {
     }
 }
 
-/// What the end of a process means.
+/// Verdict on a process that ended by itself.
 fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
-    // What the allocator of std says before it aborts.
+    // The allocator of std says this before it aborts.
     if let Some(at) = words.find("memory allocation of") {
         let said = words[at..].lines().next().unwrap_or_default();
         return Verdict::new(Status::OutOfMemory, format!("while {step}: {said}"));
     }
     #[cfg(unix)]
-    {
-        use std::os::unix::process::ExitStatusExt;
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
         const SIGKILL: i32 = 9;
-        match status.signal() {
-            Some(SIGKILL) => {
-                let reason =
-                    format!("killed while {step}: the system was out of memory, most likely");
-                return Verdict::new(Status::OutOfMemory, reason);
-            }
-            Some(signal) => {
-                let reason = format!("ended by signal {signal} while {step}");
-                return Verdict::new(Status::Panicked, reason);
-            }
-            None => {}
-        }
+        return match signal {
+            SIGKILL => Verdict::new(
+                Status::OutOfMemory,
+                format!("killed while {step}: the system was out of memory, most likely"),
+            ),
+            _ => Verdict::new(
+                Status::Panicked,
+                format!("ended by signal {signal} while {step}"),
+            ),
+        };
     }
     let last = words.lines().rev().find(|line| !line.trim().is_empty());
-    let reason = match last {
-        Some(last) => format!("ended while {step} ({status}): {last}"),
-        None => format!("ended while {step} ({status})"),
-    };
-    Verdict::new(Status::Panicked, reason)
+    let last = last.map(|last| format!(": {last}")).unwrap_or_default();
+    Verdict::new(
+        Status::Panicked,
+        format!("ended while {step} ({status}){last}"),
+    )
 }
 
 /// Starts a worker and sees it through.
@@ -264,13 +265,11 @@ pub fn see_through(
             return Err(Interrupted.into());
         }
         match worker.listen(GLANCE)? {
-            found @ (Said::Part(..) | Said::Times(_)) => keep(found)?,
-            Said::Step(text) => step(&text),
-            Said::Ended(ended) => return Ok(ended),
-            Said::Nothing if worker.silent_for() > patience => {
-                return Ok(worker.give_up(patience));
-            }
-            Said::Nothing => {}
+            Some(found @ (Said::Part(..) | Said::Times(_))) => keep(found)?,
+            Some(Said::Step(text)) => step(&text),
+            Some(Said::Ended(ended)) => return Ok(ended),
+            None if worker.since.elapsed() > patience => return Ok(worker.give_up(patience)),
+            None => {}
         }
     }
 }
@@ -287,7 +286,7 @@ pub struct Workers {
 }
 
 impl Workers {
-    /// For a study, which waits as long as it takes.
+    /// Workers of a study, which waits as long as they take.
     ///
     /// # Errors
     /// As [`Workers::new`]; an argument that is no text.
@@ -352,7 +351,7 @@ impl Workers {
         see_through(&self.program, &request, self.patience, keep, step)
     }
 
-    /// What a job finds that cannot do without any process.
+    /// Runs a job that needs every process; its messages.
     ///
     /// # Errors
     /// As [`see_through`]; a process that does not finish.
@@ -362,18 +361,11 @@ impl Workers {
             found.push(said);
             Ok(())
         };
-        match self.see_through(process, job, &mut keep, step)? {
-            Ended::Done => Ok(found),
-            Ended::Failed(reason) => bail!("{reason}"),
-            Ended::Died(structure, verdict) => bail!(
-                "process {}: {}{}; expected one that finishes",
-                process + 1,
-                structure
-                    .map(|structure| format!("{structure}: "))
-                    .unwrap_or_default(),
-                verdict.reason.unwrap_or_default()
-            ),
-        }
+        let ended = self.see_through(process, job, &mut keep, step)?;
+        ended
+            .done()
+            .with_context(|| format!("process {}", process + 1))?;
+        Ok(found)
     }
 }
 

@@ -32,10 +32,8 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
             value["triangle_count"] = json!(surfaces.triangles.len());
         }
         value["camera_place_count"] = json!(scene.places.len());
-        let names = ["size_min", "size_median", "size_max"];
-        for (name, size) in names.into_iter().zip(sizes) {
-            value[name] = json!(size);
-        }
+        [value["size_min"], value["size_median"], value["size_max"]] =
+            sizes.map(|size| json!(size));
         for labels in &scene.labels {
             value["labels"][&labels.column] = labels.histogram().into_iter().collect();
         }
@@ -84,18 +82,16 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     }
     for labels in &scene.labels {
         let counts = labels.histogram();
-        let mut shown: Vec<String> = counts
+        let shown = counts
             .iter()
-            .take(8)
-            .map(|(label, count)| format!("{label} {}", text::count(*count)))
-            .collect();
-        if counts.len() > shown.len() {
-            shown.push(format!(
-                "and {} more",
-                text::count(counts.len() - shown.len())
-            ));
+            .map(|(label, count)| format!("{label} {}", text::count(*count)));
+        let shown: Vec<String> = shown.collect();
+        let (first, more) = shown.split_at(shown.len().min(8));
+        let mut shown = first.join(", ");
+        if !more.is_empty() {
+            shown += &format!(", and {} more", text::count(more.len()));
         }
-        table.add_row([format!("label {}", labels.column), shown.join(", ")]);
+        table.add_row([format!("label {}", labels.column), shown]);
     }
     table.add_row(["digest (SHA-256)", &info.digest]);
     writeln!(io::stdout(), "{table}")?;
@@ -140,7 +136,7 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     write(kept, out)
 }
 
-/// By the extension; what has none (a pipe, a terminal) gets boxes as well.
+/// Format of the extension. A file without one (a pipe, a terminal) gets boxes too.
 fn format_of(out: Option<&Path>) -> Result<SceneFormat, SpecError> {
     match out.and_then(Path::extension) {
         Some(extension) if !extension.eq_ignore_ascii_case("csv") => {
@@ -154,24 +150,30 @@ fn format_of(out: Option<&Path>) -> Result<SceneFormat, SpecError> {
     }
 }
 
-/// What is in a scene and cannot be in a boxes file.
+/// Parts of a scene that a boxes file cannot hold.
 fn left_behind(scene: &Scene) -> Vec<String> {
-    let mut lost = Vec::new();
-    if !matches!(scene.regions, Regions::Items) {
-        let count = scene.regions.boxes(&scene.items).len();
-        lost.push(text::counted(count, "region"));
-    }
-    if !scene.places.is_empty() {
-        let count = scene.places.len();
-        lost.push(text::counted(count, "camera place"));
-    }
-    if let Some(surfaces) = &scene.surfaces {
-        lost.push(text::counted(surfaces.triangles.len(), "triangle"));
-    }
-    if scene.own_tree.is_some() {
-        lost.push("the map's own tree".to_owned());
-    }
-    lost
+    let regions = match scene.regions {
+        Regions::Items => 0,
+        _ => scene.regions.boxes(&scene.items).len(),
+    };
+    let triangles = scene
+        .surfaces
+        .as_ref()
+        .map_or(0, |surfaces| surfaces.triangles.len());
+    let counts = [
+        (regions, "region"),
+        (scene.places.len(), "camera place"),
+        (triangles, "triangle"),
+    ];
+    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
+    let own_tree = scene
+        .own_tree
+        .is_some()
+        .then(|| "the map's own tree".to_owned());
+    counts
+        .map(|(count, what)| text::counted(count, what))
+        .chain(own_tree)
+        .collect()
 }
 
 fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
@@ -199,7 +201,7 @@ fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// Fails once somebody has asked to stop: the half-written file then goes.
+/// Output that fails after an interrupt; the half-written file is then removed.
 struct UntilInterrupted<W>(W);
 
 impl<W: Write> Write for UntilInterrupted<W> {

@@ -1,4 +1,4 @@
-//! A table, and how it looks on a terminal. Other formats are `document`'s.
+//! A table as rows and columns, and its form on a terminal.
 
 use std::fmt;
 
@@ -7,7 +7,10 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement};
 
 use super::text::plain;
 
-/// A table whose cells may come from anywhere: columns named in `right` hold numbers.
+/// A column of rows `R`: its head, with `>` before that of numbers, and its cell of a row.
+pub type Column<R> = (&'static str, fn(&R) -> String);
+
+/// A table whose cells may hold any text. Columns in `right` hold numbers.
 pub struct Table {
     pub header: Vec<String>,
     pub right: Vec<usize>,
@@ -26,16 +29,27 @@ impl Table {
         }
     }
 
-    /// Of columns that stand there as in the table, with bars between them and `>`
-    /// before those of numbers: "structure | > query | > build | status".
+    /// A table of heads with bars between them and `>` before those of numbers:
+    /// "structure | > query | > build | status".
     pub fn of(columns: &str) -> Table {
-        let columns = || columns.split('|').map(str::trim);
-        let right = columns()
-            .enumerate()
-            .filter(|(_, name)| name.starts_with('>'));
-        let right: Vec<usize> = right.map(|(place, _)| place).collect();
-        let names = columns().map(|name| name.trim_start_matches(['>', ' ']));
-        Table::new(names, &right)
+        let mut table = Table::new(columns.split('|').map(str::trim), &[]);
+        for (n, name) in table.header.iter_mut().enumerate() {
+            if let Some(bare) = name.strip_prefix('>') {
+                table.right.push(n);
+                *name = bare.trim_start().to_owned();
+            }
+        }
+        table
+    }
+
+    /// A row per item.
+    pub fn with<R>(rows: impl IntoIterator<Item = R>, columns: &[Column<R>]) -> Table {
+        let heads: Vec<&str> = columns.iter().map(|column| column.0).collect();
+        let mut table = Table::of(&heads.join("|"));
+        for row in rows {
+            table.add_row(columns.iter().map(|(_, cell)| cell(&row)));
+        }
+        table
     }
 
     /// The first column holds names, all others numbers.
@@ -49,27 +63,27 @@ impl Table {
         self.rows.push(row.into_iter().map(Into::into).collect());
     }
 
-    /// Makes the table no wider, whatever is added to it: columns move together, and if that
-    /// is not enough long cells are broken into lines; names, in the first column, stay
-    /// whole.
+    /// Limits the width: columns move together, and if that is not enough, long cells
+    /// are broken into lines. Names, in the first column, stay whole.
     pub fn fit(mut self, width: u16) -> Table {
         self.width = Some(width);
         self
     }
 
-    /// Without the columns that have nothing in any row.
-    pub fn without_empty_columns(self) -> Table {
-        let is_kept = |column: usize| self.rows.iter().any(|row| !row[column].is_empty());
-        let kept: Vec<usize> = (0..self.header.len()).filter(|c| is_kept(*c)).collect();
-        let of = |cells: &[String]| kept.iter().map(|&column| cells[column].clone()).collect();
-        Table {
-            header: of(&self.header),
-            right: (0..kept.len())
-                .filter(|&place| self.right.contains(&kept[place]))
-                .collect(),
-            rows: self.rows.iter().map(|row| of(row)).collect(),
-            width: self.width,
+    /// The table without the columns that are empty in every row.
+    pub fn without_empty_columns(mut self) -> Table {
+        for column in (0..self.header.len()).rev() {
+            if self.rows.iter().all(|row| row[column].is_empty()) {
+                self.header.remove(column);
+                self.right.retain(|&right| right != column);
+                let after = self.right.iter_mut().filter(|right| **right > column);
+                after.for_each(|right| *right -= 1);
+                self.rows
+                    .iter_mut()
+                    .for_each(|row| drop(row.remove(column)));
+            }
         }
+        self
     }
 }
 

@@ -1,4 +1,4 @@
-//! How figures look on a terminal.
+//! Figures as text.
 
 use std::io::{self, StdoutLock, Write};
 
@@ -7,37 +7,38 @@ use crate::report::{Comparison, Report, ReportCell};
 pub use crate::shown::{count, counted, lines, message, plain};
 use crate::statistics::{Estimate, Rate};
 
-/// What the times of a report rest on, in one sentence.
+/// A figure as text; nothing if there is none.
+pub fn some<T>(value: Option<T>, show: impl FnOnce(T) -> String) -> String {
+    value.map(show).unwrap_or_default()
+}
+
+/// Basis of the times of a report, in one sentence.
 pub fn conclusion(report: &Report) -> String {
     let processes = report.cells.iter().map(|c| c.times.processes);
     let least = processes.filter(|p| *p > 0).min().unwrap_or(0);
     let planned = report.run.processes as usize;
-    let of_planned = |processes: &str| match report.run.finished_at {
+    let of_planned = |processes: String| match report.run.finished_at {
         None if least < planned => format!("{} of {planned} processes", count(least)),
-        _ => processes.to_owned(),
+        _ => processes,
     };
     if least < 3 {
-        let processes = of_planned(&counted(least.max(1), "process"));
         return format!(
-            "{processes}: times without intervals, ranks by their order alone (--processes 10 \
-             gives intervals)"
+            "{}: times without intervals, ranks by their order alone (--processes 10 gives \
+             intervals)",
+            of_planned(counted(least.max(1), "process"))
         );
     }
-    let twins: Vec<bool> = report
-        .noise
-        .twins
-        .iter()
-        .filter_map(|t| t.holds_one())
-        .collect();
-    let held = twins.iter().filter(|holds| **holds).count();
-    let few = match least {
-        ..10 => "; fewer than ten make wide intervals",
-        _ => "",
+    let twins = report.noise.twins.iter().filter_map(|t| t.holds_one());
+    let few = if least < 10 {
+        "; fewer than ten make wide intervals"
+    } else {
+        ""
     };
     format!(
-        "95 % intervals over {}{few}; a structure entered twice agreed with itself in {held} of {}",
-        of_planned(&format!("{least} processes")),
-        counted(twins.len(), "comparison")
+        "95 % intervals over {}{few}; a structure entered twice agreed with itself in {} of {}",
+        of_planned(format!("{least} processes")),
+        twins.clone().filter(|holds| *holds).count(),
+        counted(twins.count(), "comparison")
     )
 }
 
@@ -72,42 +73,40 @@ pub fn significant(value: f64) -> String {
 
 /// A value with its 95 % interval: "4.04 [3.95, 4.16]"; nothing if there is none.
 pub fn estimate(metric: Option<&Metric>) -> String {
-    let shown = |m: &Metric| significant(m.value) + &interval([m.lower, m.upper], 1.0);
-    metric.map(shown).unwrap_or_default()
+    some(metric, |m| {
+        significant(m.value) + &interval([m.lower, m.upper], 1.0)
+    })
 }
 
-/// The same of an estimate.
+/// An estimate with its interval, which may be NaN.
 pub fn within(found: &Estimate) -> String {
     significant(found.value) + &interval([found.lower, found.upper], 1.0)
 }
 
 /// A time with its 95 % interval in the same unit: "1.81 us [1.75, 1.90]".
 pub fn time_estimate(metric: Option<&Metric>) -> String {
-    metric.map_or_else(String::new, |m| {
-        time_within(Some(m.value), [m.lower, m.upper])
-    })
+    some(metric, |m| time_within(Some(m.value), [m.lower, m.upper]))
 }
 
-/// The same of a time in ns; nothing if there is none.
+/// A time in ns with the ends of its interval; nothing if there is none.
 pub fn time_within(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
-    let shown = |ns: f64| time(ns) + &interval(ends, unit(ns).0);
-    ns.map(shown).unwrap_or_default()
+    some(ns, |ns| time(ns) + &interval(ends, unit(ns).0))
 }
 
-/// The same with a margin on both sides: "1.30±0.38 us".
+/// A time with a margin on both sides: "1.30±0.38 us".
 pub fn time_plus_minus(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
-    let shown = |ns: f64| {
+    some(ns, |ns| {
         let (size, name) = unit(ns);
         let of = |end: Option<f64>| Some((end? - ns).abs() / size);
         let margin = of(ends[0]).zip(of(ends[1])).map(|(a, b)| f64::max(a, b));
         format!("{} {name}", plus_minus(ns / size, margin))
-    };
-    ns.map(shown).unwrap_or_default()
+    })
 }
 
-/// A value with a margin, to the digit that the margin leaves, and one more for a value
-/// below that digit: "83.4±0.7", "560000±9000", "70±200", "0.2±4.0". Of nothing seen, what
-/// it is below: "<0.0005".
+/// A value with a margin, to the digit that the margin leaves.
+///
+/// A value below that digit has one more: "83.4±0.7", "560000±9000", "70±200", "0.2±4.0".
+/// Zero is shown by its upper bound: "<0.0005".
 pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     let Some(margin) = margin.filter(|margin| margin.is_finite() && *margin > 0.0) else {
         return significant(value);
@@ -128,29 +127,27 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     }
 }
 
-/// A rate per so many units with half of its 95 % interval; nothing if there is none.
+/// A rate per `units` with half of its 95 % interval; nothing if there is none.
 pub fn rate(rate: Option<Rate>, units: f64) -> String {
-    let shown = |rate: Rate| plus_minus(rate.value, rate.upper.map(|upper| upper - rate.value));
-    rate.map(|rate| shown(rate.per(units))).unwrap_or_default()
+    some(rate.map(|rate| rate.per(units)), |rate| {
+        plus_minus(rate.value, rate.upper.map(|upper| upper - rate.value))
+    })
 }
 
-/// Longer lines are broken at spaces.
+/// Text with line breaks in place of spaces in lines longer than `width`.
 pub fn wrapped(text: &str, width: usize) -> String {
     let mut lines: Vec<String> = Vec::new();
     for line in text.split('\n') {
+        if line.chars().count() <= width {
+            lines.push(line.to_owned());
+            continue;
+        }
         lines.push(String::new());
-        let is_short = line.chars().count() <= width;
-        let words: Vec<&str> = if is_short {
-            vec![line]
-        } else {
-            line.split(' ').collect()
-        };
-        for word in words {
+        for word in line.split(' ') {
             match lines.last_mut() {
                 Some(line) if line.is_empty() => line.push_str(word),
                 Some(line) if line.chars().count() + word.chars().count() < width => {
-                    line.push(' ');
-                    line.push_str(word);
+                    *line += &format!(" {word}");
                 }
                 _ => lines.push(word.to_owned()),
             }
@@ -170,8 +167,8 @@ pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
     }
 }
 
-/// What the times of a study rest on, with the ratio of one thing that was entered
-/// twice: "10 processes (a twin took 1.00 [0.99, 1.01] times as long)".
+/// Basis of the times of a study, with the ratio of a thing that was measured twice:
+/// "10 processes (a twin took 1.00 [0.99, 1.01] times as long)".
 pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     let count = counted(processes, "process");
     match twin.filter(|twin| twin.lower.is_some()) {
@@ -180,31 +177,26 @@ pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     }
 }
 
-/// What the times of a table rest on: "10 processes, 100 rounds each; 64 cameras
-/// timed, 128 checked, 8 of them against the oracle".
+/// Basis of the times of a table: "10 processes, 100 rounds each; 64 cameras timed, 128
+/// checked, 8 of them against the oracle".
 pub fn basis(comparison: &Comparison) -> String {
     if comparison.range(|_| 0).is_none() {
         return "no times".to_owned();
     }
-    let of = |number: fn(&ReportCell) -> usize, one: &str| {
-        let (least, most) = comparison.range(number).unwrap_or_default();
-        let most_shown = match one {
-            "" => count(most),
-            one => counted(most, one),
-        };
-        match least == most {
-            true => most_shown,
-            false => format!("{} to {most_shown}", count(least)),
-        }
+    let of = |number: fn(&ReportCell) -> usize, shown: &dyn Fn(usize) -> String| match comparison
+        .range(number)
+        .unwrap_or_default()
+    {
+        (least, most) if least == most => shown(most),
+        (least, most) => format!("{} to {}", count(least), shown(most)),
     };
-    let judged = comparison.of_any("judged_queries").unwrap_or(0.0) as usize;
     format!(
         "{}, {} each; {} timed, {} checked, {} of them against the oracle",
-        of(|cell| cell.times.processes, "process"),
-        of(|cell| cell.times.rounds, "round"),
-        of(|cell| cell.times.cameras_timed, "camera"),
-        of(|cell| cell.times.cameras_checked, ""),
-        count(judged)
+        of(|cell| cell.times.processes, &|n| counted(n, "process")),
+        of(|cell| cell.times.rounds, &|n| counted(n, "round")),
+        of(|cell| cell.times.cameras_timed, &|n| counted(n, "camera")),
+        of(|cell| cell.times.cameras_checked, &count),
+        count(comparison.of_any("judged_queries").unwrap_or(0.0) as usize)
     )
 }
 
@@ -215,8 +207,8 @@ pub fn false_positives(comparison: &Comparison) -> Option<String> {
     Some(format!("{} %", plus_minus(share.value * 100.0, margin)))
 }
 
-/// Where they come from, as items of all judged cameras: "12/0/80". Nothing if
-/// all are the culling test's own.
+/// Sources of false positives, as items of all judged cameras: "12/0/80". Nothing if all
+/// are the culling test's own.
 pub fn by_source(comparison: &Comparison) -> Option<String> {
     let errors = &comparison.judged()?.errors;
     let others = errors.by_storage > 0 || errors.by_planes > 0;
@@ -224,7 +216,7 @@ pub fn by_source(comparison: &Comparison) -> Option<String> {
     others.then(|| sources.map(|items| items.to_string()).join("/"))
 }
 
-/// What stands over the figures of [`by_source`].
+/// Meaning of the figures of [`by_source`].
 pub const BY_SOURCE: &str = "by storage/planes/test";
 
 /// A share as a percentage, never rounded up to 100.
@@ -236,8 +228,7 @@ pub fn percent(share: f64) -> String {
     format!("{rounded} %")
 }
 
-/// Standard output for people: what came from outside steers no terminal,
-/// wherever it stands in a line.
+/// Standard output for people, without control characters from outside.
 pub fn terminal() -> Terminal<StdoutLock<'static>> {
     Terminal(io::stdout().lock())
 }
