@@ -1,6 +1,5 @@
-//! `cullbench advise`: which structure, which culling test and what to leave out
-//! for a scene and path, shown with the evidence. What is measured and how it is
-//! weighed is the library's.
+//! `cullbench advise`: the structure, the culling test and the work to leave out for a
+//! scene and path, with the evidence. The library measures and weighs it.
 
 use std::io::{self, Write};
 
@@ -9,11 +8,12 @@ use super::interrupt::Interrupted;
 use super::processes::Said;
 use super::protocol::{Job, Timing};
 use super::study::{Setting, Study};
-use super::table::Table;
+use super::table::{Column, Table};
+use super::text::some;
 use super::{Ending, interrupt, print, tell, text};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,
-    TestChoice, TrialPlan,
+    StructureRow, TestChoice, TestRow, TrialPlan,
 };
 use crate::culling::Culling;
 use crate::index::Registry;
@@ -199,21 +199,17 @@ fn show_advice(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
         return writeln!(out, "  no structure answered right");
     };
     let row = choice.rows.first();
-    let times = row.and_then(|row| row.speedup);
-    let times = times.map(|times| format!(", {} x linear", text::significant(times)));
-    let repaid = row.and_then(|row| row.break_even_queries);
-    let repaid = repaid.map(|n| {
-        format!(
-            "; its build is repaid after {}",
-            text::counted(n as usize, "query")
-        )
+    let times = some(row.and_then(|row| row.speedup), |times| {
+        format!(", {} x linear", text::significant(times))
+    });
+    let repaid = some(row.and_then(|row| row.break_even_queries), |n| {
+        let queries = text::counted(n as usize, "query");
+        format!("; its build is repaid after {queries}")
     });
     writeln!(
         out,
-        "  structure: {name}{}{}{}",
-        times.unwrap_or_default(),
-        ties(&choice.ties),
-        repaid.unwrap_or_default()
+        "  structure: {name}{times}{}{repaid}",
+        ties(&choice.ties)
     )?;
     if let Some(name) = &choice.region_search {
         writeln!(
@@ -233,7 +229,7 @@ fn show_advice(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
     Ok(())
 }
 
-fn ties<S: AsRef<str>>(names: &[S]) -> String {
+fn ties(names: &[impl AsRef<str>]) -> String {
     let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     match names.is_empty() {
         true => String::new(),
@@ -242,49 +238,54 @@ fn ties<S: AsRef<str>>(names: &[S]) -> String {
 }
 
 fn structure_table(choice: &StructureChoice) -> Table {
-    let mut table = Table::of(
-        "structure | >query [95 % interval] | >speed-up | >build | >B/item \
-         | >break-even queries | >locate | status",
-    );
-    for row in &choice.rows {
-        let show = |value: Option<f64>, how: fn(f64) -> String| value.map(how).unwrap_or_default();
-        table.add_row([
-            row.structure.clone(),
-            text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper]),
-            show(row.speedup, text::significant),
-            show(row.build_ms, |ms| text::time(ms * 1e6)),
-            show(row.memory_bytes_per_item, |bytes| format!("{bytes:.1}")),
-            show(row.break_even_queries, |n| text::count(n as usize)),
-            show(row.locate_ns, text::time),
-            row.status.to_owned(),
-        ]);
-    }
-    table
+    let columns: &[Column<&StructureRow>] = &[
+        ("structure", |row| row.structure.clone()),
+        (">query [95 % interval]", |row| {
+            text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper])
+        }),
+        (">speed-up", |row| some(row.speedup, text::significant)),
+        (">build", |row| {
+            some(row.build_ms, |ms| text::time(ms * 1e6))
+        }),
+        (">B/item", |row| {
+            some(row.memory_bytes_per_item, |bytes| format!("{bytes:.1}"))
+        }),
+        (">break-even queries", |row| {
+            some(row.break_even_queries, |n| text::count(n as usize))
+        }),
+        (">locate", |row| some(row.locate_ns, text::time)),
+        ("status", |row| row.status.to_owned()),
+    ];
+    Table::with(&choice.rows, columns)
 }
 
 fn test_table(choice: &TestChoice) -> Table {
-    let mut table = Table::of(
-        " | test | >query [95 % interval] | >false positives % | >missed ppm \
-         | >false positives per query | >query and drawing",
-    );
-    for row in &choice.rows {
-        let show = |value: Option<f64>, how: fn(f64) -> String| value.map(how).unwrap_or_default();
-        table.add_row([
-            if choice.name == Some(row.test) {
-                "*"
-            } else {
-                ""
-            }
-            .to_owned(),
-            row.test.to_owned(),
-            text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper]),
-            text::rate(row.excess, 100.0),
-            text::rate(row.false_negative_ppm, 1.0),
-            show(row.false_positives_per_query, text::significant),
-            show(row.total_ns, text::time),
-        ]);
-    }
-    table
+    let columns: &[Column<(bool, &TestRow)>] = &[
+        ("", |(is_chosen, _)| {
+            if *is_chosen { "*" } else { "" }.to_owned()
+        }),
+        ("test", |(_, row)| row.test.to_owned()),
+        (">query [95 % interval]", |(_, row)| {
+            text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper])
+        }),
+        (">false positives %", |(_, row)| {
+            text::rate(row.excess, 100.0)
+        }),
+        (">missed ppm", |(_, row)| {
+            text::rate(row.false_negative_ppm, 1.0)
+        }),
+        (">false positives per query", |(_, row)| {
+            some(row.false_positives_per_query, text::significant)
+        }),
+        (">query and drawing", |(_, row)| {
+            some(row.total_ns, text::time)
+        }),
+    ];
+    let rows = choice.rows.iter();
+    Table::with(
+        rows.map(|row| (choice.name == Some(row.test), row)),
+        columns,
+    )
 }
 
 fn omission_table(omissions: &[Omission]) -> Table {
@@ -293,28 +294,23 @@ fn omission_table(omissions: &[Omission]) -> Table {
          | >kept / left out | >false positives % kept / left out | answers",
     );
     for omission in omissions {
-        let figure = |value: Option<f64>| value.map(general).unwrap_or_default();
         let side = match omission.left_out_if {
-            LeftOutIf::AtMost => "<= ",
-            LeftOutIf::AtLeast => ">= ",
+            LeftOutIf::AtMost => "<=",
+            LeftOutIf::AtLeast => ">=",
         };
         let mut cells = vec![
             omission.rule.to_owned(),
             omission.decision.name().to_owned(),
-            figure(omission.statistic),
-            omission
-                .threshold
-                .map(|t| format!("{side}{}", general(t)))
-                .unwrap_or_default(),
-            omission.saving.map(text::percent).unwrap_or_default(),
+            some(omission.statistic, general),
+            some(omission.threshold, |t| format!("{side} {}", general(t))),
+            some(omission.saving, text::percent),
         ];
         let mut checks = omission.checks.iter();
         cells.extend(checks.next().map(check_cells).into_iter().flatten());
         table.add_row(cells);
         for check in checks {
-            let mut cells = vec![String::new(); 5];
-            cells.extend(check_cells(check));
-            table.add_row(cells);
+            let cells = vec![String::new(); 5].into_iter();
+            table.add_row(cells.chain(check_cells(check)));
         }
     }
     table
@@ -332,12 +328,12 @@ fn check_cells(check: &Check) -> [String; 6] {
         check.on.clone(),
         text::time(check.kept_ns),
         text::time(check.left_out_ns),
-        text::within(&Estimate::within(
-            check.ratio,
-            [check.ratio_lower, check.ratio_upper],
-        )),
-        both.map(|(kept, left_out)| format!("{kept} / {left_out}"))
-            .unwrap_or_default(),
+        text::within(&Estimate {
+            value: check.ratio,
+            lower: check.ratio_lower,
+            upper: check.ratio_upper,
+        }),
+        some(both, |(kept, left_out)| format!("{kept} / {left_out}")),
         match (check.same_answers, check.is_wrong(), missed) {
             (_, true, _) => "WRONG: not the same",
             (_, _, true) => "some missed",

@@ -1,6 +1,5 @@
-//! What `query` and `locate` share: asking one structure after another (a
-//! large scene does not fit in memory several times), noticing when they
-//! disagree, and writing the answers down.
+//! Answers of one structure after another (a large scene does not fit in memory several
+//! times), as `query` and `locate` compare and write them.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
@@ -35,13 +34,14 @@ impl Row {
     }
 }
 
-/// Bytes of answers that are held at once: enough that a structure is rarely built again.
+/// Bytes of answers in memory: enough that a structure is rarely built again.
 const HELD: usize = 64 << 20;
 
-/// Asks every structure every question and hands out the answers, in the order of
-/// questions, then of structures, as soon as so many are there that they would fill memory.
-/// Ids (ascending) are kept only if wanted. False if two structures disagree, which is
-/// told as it comes.
+/// Answers every question by every structure; false if two structures disagree.
+///
+/// `each` receives the answers in the order of questions, then of structures, in blocks of
+/// [`HELD`] bytes. Ids (ascending) are kept only with `keep_ids`. Every disagreement is a
+/// line on standard error.
 pub fn ask_all(
     structures: &[StructureSpec],
     scene: &Scene,
@@ -128,7 +128,7 @@ pub fn ask_all(
     Ok(agree)
 }
 
-/// Says which questions were answered differently; true if none was.
+/// Reports the questions with different answers; true if there are none.
 fn all_agree(rows: &[Row], what: &str) -> bool {
     let mut first: BTreeMap<usize, &Row> = BTreeMap::new();
     let mut agree = true;
@@ -155,12 +155,11 @@ fn all_agree(rows: &[Row], what: &str) -> bool {
     agree
 }
 
-/// Writes the answers that `ask` hands out as CSV or JSON, with a value for each column.
-/// A reader who leaves early changes neither what is asked nor what is found.
+/// Writes the answers that `ask` passes to its argument as CSV or JSON.
+/// A reader who leaves early changes neither questions nor answers.
 pub fn write(
     format: RowFormat,
-    columns: &[&str],
-    row: impl Fn(&Row) -> Vec<Value>,
+    columns: &[(&str, &dyn Fn(&Row) -> Value)],
     ask: impl FnOnce(&mut dyn FnMut(Vec<Row>) -> io::Result<()>) -> anyhow::Result<bool>,
 ) -> anyhow::Result<bool> {
     let mut out = BufWriter::new(Unread(io::stdout().lock()));
@@ -168,13 +167,15 @@ pub fn write(
         RowFormat::Csv => {
             let mut csv = csv::Writer::from_writer(&mut out);
             // Written with the first row: an error before it is all that is said.
-            let mut header = Some(columns);
+            let mut header = Some(columns.iter().map(|column| column.0));
             let agree = ask(&mut |rows| {
                 if let Some(columns) = header.take() {
                     csv.write_record(columns)?;
                 }
-                let mut rows = rows.iter().map(&row);
-                Ok(rows.try_for_each(|row| csv.write_record(row.iter().map(cell)))?)
+                let cells = |row| columns.iter().map(move |(_, value)| cell(&value(row)));
+                Ok(rows
+                    .iter()
+                    .try_for_each(|row| csv.write_record(cells(row)))?)
             });
             if let Some(columns) = header.filter(|_| agree.is_ok()) {
                 csv.write_record(columns)?;
@@ -185,8 +186,15 @@ pub fn write(
         RowFormat::Json => {
             let mut json = serde_json::Serializer::pretty(&mut out);
             let mut array = json.serialize_seq(None)?;
-            let names = || columns.iter().map(|&name| name.to_owned());
-            let object = |a: &Row| names().zip(row(a)).collect::<Map<String, Value>>();
+            let field = |&(name, value): &(&str, &dyn Fn(&Row) -> Value), row: &Row| {
+                (name.to_owned(), value(row))
+            };
+            let object = |row: &Row| {
+                columns
+                    .iter()
+                    .map(|column| field(column, row))
+                    .collect::<Map<_, _>>()
+            };
             let agree = ask(&mut |rows| {
                 let mut rows = rows.iter().map(&object);
                 Ok(rows.try_for_each(|object| array.serialize_element(&object))?)

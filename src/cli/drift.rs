@@ -1,5 +1,5 @@
-//! `cullbench drift`: tables of how far ways to turn, orbit and chase drift
-//! from the truth, what a step of each costs, and what follows from that.
+//! `cullbench drift`: tables of the errors of camera updates (turn, orbit, chase), of the
+//! cost of a step of each, and recommendations.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -9,16 +9,14 @@ use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::Study;
 use super::table::Table;
-use super::{
-    Ending, drift_arms, drift_chart, expect_place_for, interrupt, print, text, write_text,
-};
+use super::{Ending, drift_arms, expect_place_for, interrupt, print, text, write_text};
 use crate::drift::{
-    self, ArmKind, ArmOptions, DriftOptions, DriftReport, ORBIT_RADIUS, Rated, Recommendation,
-    SWING_DEG,
+    self, ArmKind, ArmOptions, DriftOptions, DriftReport, ORBIT_RADIUS, OrbitDrift, Rated,
+    Recommendation, RotationDrift, SWING_DEG, TurnDrift,
 };
 use crate::measure::{ProcessTimes, Protocol, Schedule};
 
-/// Long summaries wrap at this width.
+/// Most columns of a table.
 const WIDTH: u16 = 100;
 
 /// Rounds of what is timed, if one process has them all.
@@ -51,7 +49,7 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
         show(&report, &mut io::stdout().lock())
     })?;
     if let Some(file) = &args.svg {
-        write_text(file, &drift_chart::draw(&report.arm)?)?;
+        write_text(file, &drift_arms::draw(&report.arm)?)?;
     }
     Ok(Ending::Ok)
 }
@@ -82,7 +80,7 @@ fn protocol(args: &DriftArgs, process: u32) -> Protocol {
     args.spread.protocol(ROUNDS, process, usize::MAX)
 }
 
-/// One process's share of the times.
+/// Times everything in one process.
 pub fn time(
     args: &DriftArgs,
     plan: &Schedule,
@@ -148,20 +146,19 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
         turn.yaw_deg, turn.pitch_deg, turn.roll_deg, report.period_steps
     )?;
     let (all, turns) = (&report.rotation, &report.one_degree_turns);
-    type Figure = fn(&drift::RotationDrift) -> f64;
-    let figures: [(&str, Figure); 4] = [
+    let figures: [(&str, fn(&RotationDrift) -> f64); 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
         ("angle off in rad after", |d| d.angle_error_rad),
         ("position on orbit off after", |d| d.orbit_position_error),
         ("radius of orbit off after", |d| d.orbit_radius_error),
     ];
     for (title, figure) in figures {
-        let of = |d: &drift::RotationDrift| (d.method, d.steps, scientific(figure(d)));
+        let of = |d: &RotationDrift| (d.method, d.steps, scientific(figure(d)));
         writeln!(out, "{}", grid(title, steps, all, of))?;
     }
     let title = "in steps of 1 degree: angle off in rad after";
     let head = |turns| text::counted(turns as usize, "turn");
-    let of = |d: &drift::TurnDrift| (d.method, d.turns, format!("{:.3e}", d.angle_error_rad));
+    let of = |d: &TurnDrift| (d.method, d.turns, format!("{:.3e}", d.angle_error_rad));
     writeln!(out, "{}", grid(title, head, turns, of))?;
     let title = format!("bases after {} steps", steps(report.steps));
     show_rated(&title, "error", &report.rotation_methods, out)?;
@@ -171,13 +168,12 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
 fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
     let swing = format!("an eye carried around by {SWING_DEG:.3} degrees per step");
     writeln!(out, "Orbits: {swing}")?;
-    type Figure = fn(&drift::OrbitDrift) -> f64;
-    let figures: [(&str, Figure); 2] = [
+    let figures: [(&str, fn(&OrbitDrift) -> f64); 2] = [
         ("position off after", |d| d.position_error),
         ("radius off after", |d| d.radius_error),
     ];
     for (title, figure) in figures {
-        let of = |d: &drift::OrbitDrift| (d.method, d.steps, scientific(figure(d)));
+        let of = |d: &OrbitDrift| (d.method, d.steps, scientific(figure(d)));
         writeln!(out, "{}", grid(title, steps, &report.orbit, of))?;
     }
     let title = format!("orbits after {} steps", steps(report.steps));
@@ -192,7 +188,7 @@ fn show_rated(title: &str, error: &str, rated: &[Rated], out: &mut impl Write) -
         table.add_row([
             format!("{}{default}", row.name),
             row.error.map_or("unstable".to_owned(), scientific),
-            row.ns_per_step.map(text::significant).unwrap_or_default()
+            text::some(row.ns_per_step, text::significant)
                 + &text::interval([row.ns_per_step_lower, row.ns_per_step_upper], 1.0),
             if row.qualifies { "yes" } else { "no" }.to_owned(),
             row.summary.to_owned(),

@@ -18,7 +18,6 @@ mod compare_table;
 mod document;
 mod drift;
 mod drift_arms;
-mod drift_chart;
 mod env;
 mod funnel;
 mod funnel_args;
@@ -27,7 +26,6 @@ mod funnel_picture;
 mod funnel_table;
 mod interrupt;
 mod list;
-mod locate;
 mod merge;
 mod precision;
 mod precision_chart;
@@ -93,11 +91,17 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// Of a command that holds answers against the truth and came to its end.
+    /// Ending of a command that came to its end.
     fn of(is_right: bool) -> Ending {
-        match is_right {
-            true => Ending::Ok,
-            false => Ending::WrongAnswer,
+        Ending::of_checks(is_right, false)
+    }
+
+    /// Ending of checks: a wrong answer counts before an interrupt.
+    fn of_checks(is_right: bool, interrupted: bool) -> Ending {
+        match (is_right, interrupted) {
+            (false, _) => Ending::WrongAnswer,
+            (true, true) => Ending::Interrupted,
+            (true, false) => Ending::Ok,
         }
     }
 }
@@ -117,22 +121,7 @@ impl Ending {
 pub fn main_with(registry: Registry) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => match usage::one_line(&error) {
-            Some(line) => {
-                tell(&format!("error: {line}"));
-                return ExitCode::from(2);
-            }
-            None => {
-                return match error.print().and_then(|()| io::stdout().flush()) {
-                    Ok(()) => ExitCode::from(u8::from(error.use_stderr()) * 2),
-                    Err(unread) if is_broken_pipe(&unread) => ExitCode::SUCCESS,
-                    Err(full) => {
-                        tell(&format!("error: {full}"));
-                        ExitCode::from(2)
-                    }
-                };
-            }
-        },
+        Err(error) => return refused(&error),
     };
     match cli.command {
         Command::Worker => interrupt::leave_to_the_parent(),
@@ -148,7 +137,7 @@ pub fn main_with(registry: Registry) -> ExitCode {
         Ok(Ending::Regression) => ExitCode::from(3),
         Ok(Ending::Interrupted) => ExitCode::from(INTERRUPTED),
         Err(error) if error.is::<Interrupted>() => ExitCode::from(INTERRUPTED),
-        // Nobody reads on: not our failure.
+        // A reader who left is no failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {
             tell(&format!("error: {}", told_once(&error)));
@@ -157,7 +146,23 @@ pub fn main_with(registry: Registry) -> ExitCode {
     }
 }
 
-/// The one place from which commands are called.
+/// Shows what the argument parser has to say: an error on one line, or the help.
+fn refused(error: &clap::Error) -> ExitCode {
+    let failed = |line: String| {
+        tell(&format!("error: {line}"));
+        ExitCode::from(2)
+    };
+    if let Some(line) = usage::one_line(error) {
+        return failed(line);
+    }
+    match error.print().and_then(|()| io::stdout().flush()) {
+        Ok(()) => ExitCode::from(u8::from(error.use_stderr()) * 2),
+        Err(unread) if is_broken_pipe(&unread) => ExitCode::SUCCESS,
+        Err(full) => failed(full.to_string()),
+    }
+}
+
+/// Runs a command.
 fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
     match command {
         Command::List(args) => list::list(registry, &args),
@@ -166,7 +171,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Report(args) => report::report(registry, &args),
         Command::Compare(args) => compare::compare(registry, &args),
         Command::Query(args) => query::query(registry, &args),
-        Command::Locate(args) => locate::locate(registry, &args),
+        Command::Locate(args) => query::locate(registry, &args),
         Command::Verify(args) => verify::verify(registry, &args),
         Command::Precision(args) => precision::precision(registry, &args),
         Command::Advise(args) => advise::advise(registry, &args),
@@ -178,9 +183,17 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
         Command::Env(args) => env::env(&args),
         Command::Worker => worker::worker(registry),
-        Command::Completions { shell } => completions(shell),
-        Command::Man => man(),
-        Command::Licences => licences(),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "cullbench", &mut script);
+            print_all(&script)
+        }
+        Command::Man => {
+            let mut page = Vec::new();
+            clap_mangen::Man::new(Cli::command()).render(&mut page)?;
+            print_all(&page)
+        }
+        Command::Licences => print_all(NOTICE.as_bytes()),
     }
 }
 
@@ -190,8 +203,7 @@ fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "{}", text::message(line));
 }
 
-/// Loads a scene that so many structures are to be held over at once, and says so
-/// if some of it was left out.
+/// Loads a scene for `structures` structures at once, with a note on bad items.
 fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Result<Scene> {
     load_scene_by(source, &args.options(structures))
 }
@@ -208,42 +220,40 @@ fn load_scene_by(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-/// That files can be written where they are to be, and that none of them is an input or
-/// another output: said before the work, not after it. Inputs may be specs and names.
+/// Checks before the work that outputs can be written, and that none is an input or
+/// another output. Inputs may be specs and names.
 fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow::Result<()> {
-    // As the file system knows it, also where there is none yet.
+    // The file system's own name, also of a file that does not exist yet.
     let known = |file: &Path| -> Option<PathBuf> {
-        let folder = file
-            .parent()
-            .filter(|folder| !folder.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
-        let named = folder.join(file.file_name()?);
-        Some(named.canonicalize().unwrap_or(named))
+        let place = folder_of(file).canonicalize().ok()?.join(file.file_name()?);
+        Some(place.canonicalize().unwrap_or(place))
     };
-    let mut taken: Vec<PathBuf> = Vec::new();
-    taken.extend(
-        inputs
-            .iter()
-            .filter(|file| file.is_file())
-            .filter_map(|file| known(file)),
-    );
+    let files = inputs.iter().filter(|file| file.is_file());
+    let mut taken: Vec<PathBuf> = files.filter_map(|file| known(file)).collect();
     for &(option, file) in outputs {
         expect_place_for(option, file)?;
         let Some(place) = file.and_then(known) else {
             continue;
         };
-        if taken.contains(&place) {
-            let file = place.display();
-            anyhow::bail!(
-                "{file}: an input or another output; expected a file of its own for {option}"
-            );
-        }
+        anyhow::ensure!(
+            !taken.contains(&place),
+            "{}: an input or another output; expected a file of its own for {option}",
+            place.display()
+        );
         taken.push(place);
     }
     Ok(())
 }
 
-/// The same of one file.
+/// The folder that a file is in.
+fn folder_of(file: &Path) -> &Path {
+    let folder = file
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
+/// Checks that one output can be written.
 fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
     let Some(file) = file else {
         return Ok(());
@@ -253,25 +263,26 @@ fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
         "{}: a folder; expected a file for {option}",
         file.display()
     );
-    match file.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => anyhow::bail!(
-            "{}: expected an existing folder for {option}",
-            folder.display()
-        ),
-        _ => Ok(try_place(file)?),
-    }
+    let folder = folder_of(file);
+    anyhow::ensure!(
+        folder.is_dir(),
+        "{}: expected an existing folder for {option}",
+        folder.display()
+    );
+    Ok(try_place(file)?)
 }
 
-/// That a folder can be there and written to: it is, or nothing of its name is.
+/// Checks that a folder is writable, or that one of this name can be made.
 fn expect_folder(option: &str, folder: Option<&Path>) -> anyhow::Result<()> {
-    match folder {
-        Some(folder) if folder.exists() && !folder.is_dir() => anyhow::bail!(
-            "{}: not a folder; expected a folder for {option}",
-            folder.display()
-        ),
-        Some(folder) => Ok(try_folder(folder)?),
-        None => Ok(()),
-    }
+    let Some(folder) = folder else {
+        return Ok(());
+    };
+    anyhow::ensure!(
+        folder.is_dir() || !folder.exists(),
+        "{}: not a folder; expected a folder for {option}",
+        folder.display()
+    );
+    Ok(try_folder(folder)?)
 }
 
 /// One JSON document on standard output, indented.
@@ -281,7 +292,7 @@ fn print_json(document: &impl Serialize) -> io::Result<()> {
     out.flush()
 }
 
-/// What a command found, in the format that is asked for.
+/// Prints the result of a command in its format.
 fn print(
     format: TableFormat,
     document: &impl Serialize,
@@ -293,7 +304,7 @@ fn print(
     })
 }
 
-/// A file of its own for a text.
+/// Writes a text as a file.
 fn write_text(file: &Path, text: &str) -> Result<(), FolderError> {
     write_atomically(file, |out| out.write_all(text.as_bytes()))
 }
@@ -321,7 +332,7 @@ fn told_once(error: &anyhow::Error) -> String {
     text
 }
 
-/// Whether an error is or wraps a broken pipe. `io` and `csv` errors wrap one
+/// Returns true for an error that is or wraps a broken pipe. `io` and `csv` errors wrap one
 /// another without naming each other as the source.
 fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
     if let Some(io) = error.downcast_ref::<io::Error>() {
@@ -334,23 +345,9 @@ fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
     )
 }
 
-fn completions(shell: clap_complete::Shell) -> anyhow::Result<Ending> {
-    // Written to memory first: clap_complete panics on a closed pipe.
-    let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "cullbench", &mut script);
-    io::stdout().write_all(&script)?;
-    Ok(Ending::Ok)
-}
-
-fn man() -> anyhow::Result<Ending> {
-    let mut page = Vec::new();
-    clap_mangen::Man::new(Cli::command()).render(&mut page)?;
-    io::stdout().write_all(&page)?;
-    Ok(Ending::Ok)
-}
-
-fn licences() -> anyhow::Result<Ending> {
-    io::stdout().write_all(NOTICE.as_bytes())?;
+/// Writes a whole text at once: clap's own writers panic on a closed pipe.
+fn print_all(text: &[u8]) -> anyhow::Result<Ending> {
+    io::stdout().write_all(text)?;
     Ok(Ending::Ok)
 }
 

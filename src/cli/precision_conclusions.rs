@@ -18,16 +18,16 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
     out.flush()
 }
 
-/// What the figures say, sentence by sentence.
 fn conclusions(outcome: &Outcome) -> Vec<String> {
     let p = &outcome.precision;
-    let mut all = Vec::new();
-    all.extend(of_points(p));
-    all.extend(of_storage(p));
-    all.extend(of_regions(p));
-    all.extend(of_sizes(&outcome.size_sweep));
-    all.extend(of_sweeps(&outcome.sweeps));
-    all
+    let points = of_points(p).into_iter().chain(of_storage(p));
+    let searches = of_regions(p)
+        .into_iter()
+        .chain(of_sizes(&outcome.size_sweep));
+    points
+        .chain(searches)
+        .chain(of_sweeps(&outcome.sweeps))
+        .collect()
 }
 
 /// No visible item missed, and a time.
@@ -37,10 +37,7 @@ fn is_sound(point: &&CullingPoint) -> bool {
 }
 
 fn missed(point: &CullingPoint) -> u64 {
-    point
-        .errors
-        .counts
-        .map_or(0, |errors| errors.false_negatives)
+    point.errors.counts.unwrap_or_default().false_negatives
 }
 
 fn ratio(a: &CullingPoint, b: &CullingPoint) -> String {
@@ -94,24 +91,19 @@ fn of_storage(p: &Precision) -> Option<String> {
         named(least),
         text::significant(memory(&least)),
         percent(least.errors.excess),
-        least.times.query_ns.map(text::time).unwrap_or_default()
+        text::some(least.times.query_ns, text::time)
     ))
 }
 
 fn of_regions(p: &Precision) -> Option<String> {
-    let of = |numbers: &str| {
-        p.region_points
-            .iter()
-            .find(|point| point.errors.numbers == numbers)
+    let of = |numbers: &'static str| {
+        let points = p.region_points.iter();
+        points.filter(move |point| point.errors.numbers == numbers)
     };
-    let (plain, checked) = (of("f32")?, of("f32 + check")?);
-    let same = p.region_points.iter();
-    let mut same =
-        same.filter(|c| c.errors.numbers == "f32 + check" && c.structure == plain.structure);
-    let cost = same
-        .next()
-        .and_then(|c| c.times.query_ns)
-        .zip(plain.times.query_ns);
+    let (plain, checked) = (of("f32").next()?, of("f32 + check").next()?);
+    let mut same = of("f32 + check").filter(|point| point.structure == plain.structure);
+    let cost = same.next().and_then(|point| point.times.query_ns);
+    let cost = cost.zip(plain.times.query_ns);
     Some(format!(
         "Region search in f32 is wrong for {} % of {} (farthest {} outside); an exact look at the hits \
          leaves {} wrong and takes {} times as long on {}.",
@@ -149,10 +141,8 @@ fn of_sweeps(rows: &[SweepRow]) -> Vec<String> {
         let lost = |row: &&SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
         let worst = own.clone().max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
         let default = own.filter(|row| numbers(&row.names) == "f32 c=8");
-        let default: u64 = default
-            .filter_map(|row| row.errors)
-            .map(|e| e.false_negatives)
-            .sum();
+        let errors = default.filter_map(|row| row.errors);
+        let default: u64 = errors.map(|errors| errors.false_negatives).sum();
         if lost(&worst) == 0.0 {
             return Some(format!("Over {name} nothing is missed by any."));
         }

@@ -1,14 +1,15 @@
-//! What `cullbench precision` prints: tables of errors and times, the Pareto
-//! fronts and the sweeps. What follows from them is in `precision_conclusions`.
+//! Tables of `cullbench precision`: errors and times, the Pareto fronts and the sweeps.
+//! Sentences about them are in `precision_conclusions`.
 
 use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::table::Table;
-use super::text;
+use super::table::{Column, Table};
+use super::text::{self, some};
 use crate::precision::{
-    CullingErrors, Names, Point, Precision, RegionErrors, SIZE_RATIOS, SWEEPS, SizeRow, SweepRow,
+    CullingErrors, Names, Point, Precision, RegionErrors, SIZE_RATIOS, SWEEPS, SizeRow,
+    StableAfter, SweepRow,
 };
 use crate::statistics::Rate;
 use crate::verify::ErrorCount;
@@ -101,15 +102,11 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
 }
 
 pub fn named(point: &CullingPoint) -> String {
-    let Names {
-        test,
-        arithmetic,
-        planes,
-        epsilon,
-    } = point.errors.names;
+    let (structure, names) = (&point.structure, &point.errors.names);
+    let (test, arithmetic, planes) = (names.test, names.arithmetic, names.planes);
     format!(
-        "{} {test} {arithmetic} {planes} eps {epsilon}",
-        point.structure
+        "{structure} {test} {arithmetic} {planes} eps {}",
+        names.epsilon
     )
 }
 
@@ -121,15 +118,18 @@ fn culling(point: &CullingPoint) -> String {
 
 /// Numbers, planes where they are not the frame's, and epsilon.
 pub fn numbers(names: &Names) -> String {
-    let planes = match names.planes {
+    let Names {
+        arithmetic, planes, ..
+    } = names;
+    let planes = match *planes {
         "frame" => String::new(),
         planes => format!(" {planes}"),
     };
-    let epsilon = match names.arithmetic {
+    let epsilon = match *arithmetic {
         "f64" => String::new(),
         _ => format!(" c={}", names.epsilon),
     };
-    format!("{}{planes}{epsilon}", names.arithmetic)
+    format!("{arithmetic}{planes}{epsilon}")
 }
 
 /// The first point of each culling, in their order by test; points come fastest
@@ -150,49 +150,45 @@ pub fn percent(rate: Option<Rate>) -> String {
     text::rate(rate, 100.0)
 }
 
-/// What is returned too much: items by storage, by planes and by the test.
+/// False positives by source: storage, planes and test.
 fn by_source(errors: &ErrorCount) -> String {
-    format!(
-        "{}/{}/{}",
-        errors.by_storage,
-        errors.by_planes,
-        errors.by_test()
-    )
+    let (storage, planes, test) = (errors.by_storage, errors.by_planes, errors.by_test());
+    format!("{storage}/{planes}/{test}")
 }
 
 fn errors_table(points: &[&CullingPoint]) -> Table {
-    let mut table = Table::of("culling | >excess % | >by source | >missed ppm | >px | >flicker %");
-    for point in points {
-        let errors = &point.errors;
-        table.add_row([
-            culling(point),
-            percent(errors.excess),
-            errors.counts.as_ref().map(by_source).unwrap_or_default(),
-            text::rate(errors.false_negative_ppm, 1.0),
-            errors
-                .worst_miss_px
-                .map(text::significant)
-                .unwrap_or_default(),
-            percent(errors.flicker),
-        ]);
-    }
-    table
+    let columns: &[Column<&&CullingPoint>] = &[
+        ("culling", |point| culling(point)),
+        (">excess %", |point| percent(point.errors.excess)),
+        (">by source", |point| {
+            some(point.errors.counts.as_ref(), by_source)
+        }),
+        (">missed ppm", |point| {
+            text::rate(point.errors.false_negative_ppm, 1.0)
+        }),
+        (">px", |point| {
+            some(point.errors.worst_miss_px, text::significant)
+        }),
+        (">flicker %", |point| percent(point.errors.flicker)),
+    ];
+    Table::with(points, columns)
 }
 
 fn times_table(points: &[&CullingPoint]) -> Table {
-    let mut table = Table::of(" | culling | structure | >query [95 % interval] | >B/item | status");
-    for point in points {
-        let structure = point.structure.split(':').next().unwrap_or_default();
-        table.add_row([
-            mark(point.on_front, point.is_tie).to_owned(),
-            culling(point),
-            structure.to_owned(),
-            time(&point.times),
-            format!("{:.1}", point.errors.memory_bytes_per_item),
-            point.status.name().to_owned(),
-        ]);
-    }
-    table
+    let columns: &[Column<&&CullingPoint>] = &[
+        ("", |point| mark(point.on_front, point.is_tie).to_owned()),
+        ("culling", |point| culling(point)),
+        ("structure", |point| {
+            let name = point.structure.split(':').next();
+            name.unwrap_or_default().to_owned()
+        }),
+        (">query [95 % interval]", |point| time(&point.times)),
+        (">B/item", |point| {
+            format!("{:.1}", point.errors.memory_bytes_per_item)
+        }),
+        ("status", |point| point.status.name().to_owned()),
+    ];
+    Table::with(points, columns)
 }
 
 fn mark(on_front: bool, is_tie: bool) -> &'static str {
@@ -213,7 +209,7 @@ fn front_lines(p: &Precision) -> String {
         format!(
             "* {}: {}, {} B/item, excess {} %, missed {} ppm{}",
             named(point),
-            point.times.query_ns.map(text::time).unwrap_or_default(),
+            some(point.times.query_ns, text::time),
             text::significant(point.errors.memory_bytes_per_item),
             percent(point.errors.excess),
             text::rate(point.errors.false_negative_ppm, 1.0),
@@ -224,65 +220,50 @@ fn front_lines(p: &Precision) -> String {
 }
 
 /// The fastest point of each kind of numbers.
-fn region_rows(p: &Precision) -> Vec<&Point<RegionErrors>> {
+fn regions_table(p: &Precision) -> Table {
     let mut rows: Vec<&Point<RegionErrors>> = Vec::new();
     for point in &p.region_points {
-        if !rows
-            .iter()
-            .any(|row| row.errors.numbers == point.errors.numbers)
-        {
+        let is_same = |row: &&Point<RegionErrors>| row.errors.numbers == point.errors.numbers;
+        if !rows.iter().any(is_same) {
             rows.push(point);
         }
     }
-    rows
-}
-
-fn regions_table(p: &Precision) -> Table {
-    let mut table = Table::of(
-        " | numbers | structure | >points | >wrong % | >false | >missed | >farthest \
-         | >per point",
-    );
-    for row in region_rows(p) {
-        table.add_row([
-            mark(row.on_front, row.is_tie).to_owned(),
-            row.errors.numbers.to_owned(),
-            row.structure.clone(),
-            row.errors.points.to_string(),
-            percent(row.errors.wrong),
-            row.errors.false_region_count.to_string(),
-            row.errors.missed_region_count.to_string(),
-            format!("{:.2e}", row.errors.worst_false),
-            time(&row.times),
-        ]);
-    }
-    table
+    let columns: &[Column<&Point<RegionErrors>>] = &[
+        ("", |row| mark(row.on_front, row.is_tie).to_owned()),
+        ("numbers", |row| row.errors.numbers.to_owned()),
+        ("structure", |row| row.structure.clone()),
+        (">points", |row| row.errors.points.to_string()),
+        (">wrong %", |row| percent(row.errors.wrong)),
+        (">false", |row| row.errors.false_region_count.to_string()),
+        (">missed", |row| row.errors.missed_region_count.to_string()),
+        (">farthest", |row| format!("{:.2e}", row.errors.worst_false)),
+        (">per point", |row| time(&row.times)),
+    ];
+    Table::with(rows, columns)
 }
 
 fn stability_table(p: &Precision) -> Table {
-    let mut table = Table::of(">cameras | >pairs in final order | >CPU time");
-    for row in &p.stability {
-        table.add_row([
-            row.cameras.to_string(),
-            text::percent(row.pairs_in_order),
-            text::time(row.seconds * 1e9),
-        ]);
-    }
-    table
+    let columns: &[Column<&StableAfter>] = &[
+        (">cameras", |row| row.cameras.to_string()),
+        (">pairs in final order", |row| {
+            text::percent(row.pairs_in_order)
+        }),
+        (">CPU time", |row| text::time(row.seconds * 1e9)),
+    ];
+    Table::with(&p.stability, columns)
 }
 
 /// Percent, with how far another seed may come out.
 pub fn elsewhere(rate: Option<Rate>) -> String {
-    let rate = rate.map(|rate| rate.per(100.0));
-    rate.map_or_else(String::new, |rate| {
+    some(rate.map(|rate| rate.per(100.0)), |rate| {
         text::plus_minus(rate.value, rate.elsewhere)
     })
 }
 
 /// Tests by ratios.
 fn sizes_table(rows: &[SizeRow]) -> Table {
-    let mut header = vec!["s/D".to_owned()];
-    header.extend(rows.iter().map(|row| row.size_over_depth.to_string()));
-    let mut table = Table::of_numbers(header);
+    let ratios = rows.iter().map(|row| row.size_over_depth.to_string());
+    let mut table = Table::of_numbers(["s/D".to_owned()].into_iter().chain(ratios));
     let visible = rows.iter().map(|row| text::count(row.visible as usize));
     table.add_row(["visible".to_owned()].into_iter().chain(visible));
     for (i, test) in rows[0].tests.iter().enumerate() {
@@ -292,13 +273,14 @@ fn sizes_table(rows: &[SizeRow]) -> Table {
     table
 }
 
-/// What the table rests on, and what each test costs.
+/// Basis of the table, and the cost of each test.
 fn sizes_note(rows: &[SizeRow]) -> String {
     let first = &rows[0];
-    let middle = rows
+    let mut middle = rows
         .iter()
-        .find(|row| row.size_over_depth == SIZE_RATIOS[2]);
-    let costs = middle.unwrap_or(first).tests.iter().filter_map(|t| {
+        .filter(|row| row.size_over_depth == SIZE_RATIOS[2]);
+    let tests = middle.next().unwrap_or(first).tests.iter();
+    let costs = tests.filter_map(|t| {
         let ns = text::significant(t.ns_per_box?);
         Some(format!("{} {ns}", t.test))
     });
@@ -324,14 +306,10 @@ pub fn swept(value: f64) -> String {
 fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
     let mut values: Vec<f64> = rows.iter().map(|row| row.value).collect();
     values.dedup();
-    let mut header = vec!["six-plane".to_owned()];
-    header.extend(
-        values
-            .iter()
-            .map(|value| format!("{value:.4e}").replace(".0000", "")),
-    );
-    let mut table = Table::of_numbers(header);
-    let (mut losers, mut sound) = (0, Vec::new());
+    let head = |value: &f64| format!("{value:.4e}").replace(".0000", "");
+    let header = ["six-plane".to_owned()].into_iter();
+    let mut table = Table::of_numbers(header.chain(values.iter().map(head)));
+    let mut sound = Vec::new();
     for kind in rows.iter().filter(|row| row.value == values[0]) {
         let own: Vec<&&SweepRow> = rows.iter().filter(|row| row.names == kind.names).collect();
         let is_sound = |row: &&&SweepRow| row.errors.is_some_and(|e| e.false_negatives == 0);
@@ -339,7 +317,6 @@ fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
             sound.push(numbers(&kind.names));
             continue;
         }
-        losers += 1;
         let ppm = own.iter().map(|row| match &row.refused {
             Some(_) => "refused".to_owned(),
             None => text::rate(row.false_negative_ppm, 1.0),
@@ -360,9 +337,9 @@ fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
             sound.join(", ")
         ),
     };
-    let table = match losers {
-        0 => String::new(),
-        _ => format!("{table}\n"),
+    let table = match table.rows.is_empty() {
+        true => String::new(),
+        false => format!("{table}\n"),
     };
     format!("\nMissed visible items (ppm) by {name} ({what}), nothing rebased:\n{table}{sound}")
 }

@@ -1,13 +1,22 @@
-//! `cullbench query`: one row per camera and structure.
+//! `cullbench query` and `cullbench locate`: one row per camera, point or box, and
+//! structure.
 
-use serde_json::json;
+use std::fs::File;
+use std::path::Path;
 
-use super::args::QueryArgs;
+use anyhow::Context;
+use serde_json::{Value, json};
+
+use super::args::{LocateArgs, QueryArgs};
 use super::compare_structures::{Row, ask_all, write};
 use super::{Ending, load_scene, tell};
-use crate::index::Registry;
+use crate::index::{DynIndex, Registry};
 use crate::measure::Workload;
-use crate::path;
+use crate::path::{self, read_points_csv};
+use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
+
+/// A column of the answers: its name and its value of a row.
+type Column<'c> = (&'c str, &'c dyn Fn(&Row) -> Value);
 
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
@@ -18,41 +27,98 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     if let Some(doubt) = culling.unproven() {
         tell(&format!("note: {doubt}"));
     }
-    let ask = |index: &dyn crate::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
+    let ask = |index: &dyn DynIndex, camera: usize, out: &mut _, cost: &mut _| {
         let view = workload.views[camera].as_any();
         index.query_counted(view, out, cost);
         out.clear();
         index.query(view, out);
     };
-    let mut columns = vec![
-        "camera",
-        "structure",
-        "test",
-        "total_count",
-        "visible_count",
-        "visible_id_sum",
-        "nodes_tested",
-        "items_tested",
+    let columns: [Column; 9] = [
+        ("camera", &|row| json!(row.question)),
+        ("structure", &|row| json!(row.structure)),
+        ("test", &|_| json!(culling.test.name())),
+        ("total_count", &|_| json!(scene.items.len())),
+        ("visible_count", &|row| json!(row.answer.count)),
+        ("visible_id_sum", &|row| json!(row.id_sum)),
+        ("nodes_tested", &|row| json!(row.cost.nodes_tested)),
+        ("items_tested", &|row| json!(row.cost.items_tested)),
+        ("visible_ids", &|row| json!(row.ids)),
     ];
-    columns.extend(args.ids.then_some("visible_ids"));
-    let (test, total) = (culling.test.name(), scene.items.len());
-    let row = |a: &Row| {
-        let mut row = vec![
-            json!(a.question),
-            json!(a.structure),
-            json!(test),
-            json!(total),
-            json!(a.answer.count),
-            json!(a.id_sum),
-            json!(a.cost.nodes_tested),
-            json!(a.cost.items_tested),
-        ];
-        row.extend(a.ids.as_ref().map(|ids| json!(ids)));
-        row
+    let columns = if args.ids {
+        &columns[..]
+    } else {
+        &columns[..8]
     };
     let (items, questions) = (&workload.items, ("camera", workload.views.len()));
-    let agree = write(args.format, &columns, row, |each| {
+    let agree = write(args.format, columns, |each| {
         ask_all(&structures, &scene, items, questions, args.ids, ask, each)
     })?;
     Ok(Ending::of(agree))
+}
+
+pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
+    let structures = args.kernel.structures(registry, &args.structure)?;
+    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
+    let what = match args.sought.points {
+        Some(_) => "point",
+        None => "box",
+    };
+    let columns: [Column; 6] = [
+        (what, &|row| json!(row.question)),
+        ("structure", &|row| json!(row.structure)),
+        ("region_count", &|row| json!(row.answer.count)),
+        ("region_id_sum", &|row| json!(row.id_sum)),
+        ("region_ids", &|row| json!(row.ids)),
+        ("nodes_tested", &|row| json!(row.cost.nodes_tested)),
+    ];
+    let agree = match (&args.sought.points, &args.sought.boxes) {
+        (Some(file), _) => {
+            let points = points(&scene, file)?;
+            let boxes = scene.regions.boxes(&scene.items);
+            let ask = |index: &dyn DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
+                let p = &points[point];
+                scene.search(p, out, |p, out| index.query_counted(p.into(), out, cost));
+                out.clear();
+                scene.search(p, out, |p, out| index.locate(p, out));
+            };
+            let questions = (what, points.len());
+            write(args.format, &columns, |each| {
+                ask_all(&structures, &scene, boxes, questions, true, ask, each)
+            })?
+        }
+        (_, Some(file)) => {
+            let boxes = boxes(&scene, file)?;
+            let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
+                index.query_counted((&boxes[n].volume).into(), out, cost);
+                out.clear();
+                index.visible(&boxes[n].volume, out);
+                scene.refine_overlapping(&boxes[n], out);
+            };
+            let (items, questions) = (&scene.items, (what, boxes.len()));
+            write(args.format, &columns, |each| {
+                ask_all(&structures, &scene, items, questions, true, ask, each)
+            })?
+        }
+        // The argument parser refuses that.
+        (None, None) => true,
+    };
+    Ok(Ending::of(agree))
+}
+
+fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
+    let (input, name) = open(file)?;
+    let points = read_points_csv(input, &name)?.into_iter();
+    Ok(points.map(|p| scene.sought(p)).collect())
+}
+
+fn boxes(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SoughtBox>> {
+    let (input, name) = open(file)?;
+    let boxes = read_sought_boxes_csv(input, &name)?.into_iter();
+    Ok(boxes.map(|b| scene.sought_box(b)).collect())
+}
+
+fn open(file: &Path) -> anyhow::Result<(File, String)> {
+    let name = file.display().to_string();
+    let input = File::open(file).with_context(|| name.clone())?;
+    Ok((input, name))
 }

@@ -1,5 +1,5 @@
-//! `cullbench report`: what a run found, as Markdown, as pictures, as one HTML
-//! page. Reads report.json and measures nothing.
+//! `cullbench report`: the results of a run as Markdown, pictures or one HTML page, from
+//! its report.json.
 
 use std::fs;
 use std::io::{self, Write};
@@ -125,7 +125,7 @@ fn known(text: &Option<String>) -> &str {
     text.as_deref().unwrap_or("unknown")
 }
 
-/// Where the figures come from, a line for each thing to know.
+/// Origin of the figures, in lines.
 fn about(report: &Report) -> Vec<String> {
     let (run, machine) = (&report.run, &report.machine);
     let suite = run.suite.as_deref().unwrap_or("chosen by hand");
@@ -178,19 +178,17 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
         share("cull_rate", "culled").unwrap_or_default()
     );
     let peer = comparison.fastest_peer();
-    let mut header = vec![
+    let header = [
         "structure",
         "rank",
         "query [95 %]",
         "p95",
         "speed-up vs linear [95 %]",
     ];
-    if peer.is_some() {
-        header.push("speed-up vs fastest peer");
-    }
-    header.extend(["/ read", "/ copy", "/ build", "bytes per item"]);
-    header.extend(["break-even queries", "locate", "status"]);
-    let mut table = Table::of_numbers(header);
+    let of_peer = peer.map(|_| "speed-up vs fastest peer");
+    let figures = FIGURES.map(|(head, ..)| head);
+    let header = header.into_iter().chain(of_peer).chain(figures);
+    let mut table = Table::of_numbers(header.chain(["status"]));
     for Ranked { rank, cell } in &comparison.ranked {
         let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
         table.rows.push(row(cell, rank, peer));
@@ -206,19 +204,16 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
         let meaning = "/ read, / copy, / build: time / time of that lower bound.";
         blocks.push(Block::Line(meaning.to_owned()));
     }
-    let told = comparison.ranked.iter().map(|r| r.cell);
-    for cell in told.filter(|c| c.reason.is_some()) {
-        let reason = cell.reason.as_deref().unwrap_or_default();
-        blocks.push(Block::Line(format!(
-            "{}: {}: {reason}",
-            cell.structure,
-            cell.status.name()
-        )));
+    for cell in comparison.ranked.iter().map(|ranked| ranked.cell) {
+        if let Some(reason) = &cell.reason {
+            let (structure, status) = (&cell.structure, cell.status.name());
+            blocks.push(Block::Line(format!("{structure}: {status}: {reason}")));
+        }
     }
     blocks
 }
 
-/// How many there are, and whose they are if not all are the culling test's.
+/// Share of false positives, and their sources if not all are the culling test's.
 fn false_positives(comparison: &Comparison) -> Option<String> {
     let share = text::false_positives(comparison);
     let sources = text::by_source(comparison);
@@ -232,29 +227,34 @@ fn false_positives(comparison: &Comparison) -> Option<String> {
     Some(format!("False positives: {told}."))
 }
 
+/// Columns of single figures: head, metric and form.
+const FIGURES: [(&str, &str, fn(f64) -> String); 6] = [
+    ("/ read", "times_read", text::significant),
+    ("/ copy", "times_memcpy", text::significant),
+    ("/ build", "build_ms", |ms| text::time(ms * 1e6)),
+    ("bytes per item", "memory_bytes_per_item", |b| {
+        format!("{b:.1}")
+    }),
+    ("break-even queries", "break_even_queries", |n| {
+        text::count(n as usize)
+    }),
+    ("locate", "locate_ns", text::time),
+];
+
 fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String> {
-    let value =
-        |name: &str, show: fn(f64) -> String| cell.value(name).map(show).unwrap_or_default();
     let mut row = vec![
         cell.structure.clone(),
         rank,
         text::time_estimate(cell.metrics.get("query_ns")),
-        value("query_ns_p95", text::time),
+        text::some(cell.value("query_ns_p95"), text::time),
         text::estimate(cell.metrics.get("speedup")),
     ];
-    if let Some(peer) = peer {
-        let sound = cell.status == Status::Ok;
-        let ratio = times_as_fast(peer, cell).filter(|_| sound);
-        row.push(ratio.map(text::significant).unwrap_or_default());
-    }
-    row.extend([
-        value("times_read", text::significant),
-        value("times_memcpy", text::significant),
-        value("build_ms", |ms| text::time(ms * 1e6)),
-        value("memory_bytes_per_item", |b| format!("{b:.1}")),
-        value("break_even_queries", |n| text::count(n as usize)),
-        value("locate_ns", text::time),
-        cell.status.name().to_owned(),
-    ]);
+    row.extend(peer.map(|peer| {
+        let is_sound = cell.status == Status::Ok;
+        let ratio = times_as_fast(peer, cell).filter(|_| is_sound);
+        text::some(ratio, text::significant)
+    }));
+    row.extend(FIGURES.map(|(_, metric, show)| text::some(cell.value(metric), show)));
+    row.push(cell.status.name().to_owned());
     row
 }

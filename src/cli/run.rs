@@ -138,11 +138,9 @@ impl Run {
         if stopped {
             tell("interrupted: finished cells were saved; continue with --resume");
         }
-        let failed = report.has_failed();
-        Ok(match (stopped, failed) {
-            (true, _) => Ending::Interrupted,
-            (false, true) => Ending::WrongAnswer,
-            (false, false) => Ending::Ok,
+        Ok(match stopped {
+            true => Ending::Interrupted,
+            false => Ending::of(!report.has_failed()),
         })
     }
 
@@ -161,10 +159,9 @@ impl Run {
     fn scene(&mut self, scene: usize) -> anyhow::Result<()> {
         let planned = self.plan.plan.scenes[scene].clone();
         let questions = self.plan.plan.questions(&planned);
-        let keys: Vec<GroupKey> = questions
-            .iter()
-            .map(|question| self.plan.plan.key(&planned, question))
-            .collect();
+        let keys = questions.iter();
+        let keys = keys.map(|question| self.plan.plan.key(&planned, question));
+        let keys: Vec<GroupKey> = keys.collect();
         let mut failed = self.failed_before(&planned.source);
         for process in 0..self.plan.plan.effort.processes {
             loop {
@@ -204,19 +201,15 @@ impl Run {
     fn share(&self, keys: &[GroupKey], process: u32, failed: &BTreeMap<String, Verdict>) -> Share {
         let known = |key: &GroupKey| {
             let first = self.stream.of_group(key);
-            first.first().and_then(|kept| kept.part.known.clone())
+            let known = first.first().and_then(|kept| kept.part.known.clone());
+            known.filter(|_| process > 0)
         };
+        let wanted = keys.iter().map(|key| !self.stream.has(key, process));
         Share {
             plan_only: false,
             process,
-            known: keys
-                .iter()
-                .map(|key| known(key).filter(|_| process > 0))
-                .collect(),
-            wanted: keys
-                .iter()
-                .map(|key| !self.stream.has(key, process))
-                .collect(),
+            known: keys.iter().map(known).collect(),
+            wanted: wanted.collect(),
             failed: failed.clone(),
         }
     }
@@ -264,26 +257,20 @@ impl Run {
             if self.stream.has(key, process) {
                 continue;
             }
-            let before = self
-                .stream
-                .of_group(key)
-                .first()
-                .map(|kept| kept.part.clone());
-            let structures = &self.plan.plan.structures;
-            let subject = |spec| SubjectPart::unknown(spec, verdict.clone());
+            let before = self.stream.of_group(key);
+            let before = before.first().map(|kept| &kept.part);
+            let structures = self.plan.plan.structures.iter();
+            let unknown = || SceneInfo::unknown(&planned.source);
             let part = Part {
                 key: key.clone(),
                 process,
-                scene: before.as_ref().map_or_else(
-                    || SceneInfo::unknown(&planned.source),
-                    |part| part.scene.clone(),
-                ),
-                path: before
-                    .as_ref()
-                    .map_or_else(|| PathInfo::unknown(key), |part| part.path.clone()),
+                scene: before.map_or_else(unknown, |part| part.scene.clone()),
+                path: before.map_or_else(|| PathInfo::unknown(key), |part| part.path.clone()),
                 known: None,
                 judged: None,
-                subjects: structures.iter().map(subject).collect(),
+                subjects: structures
+                    .map(|spec| SubjectPart::unknown(spec, verdict.clone()))
+                    .collect(),
                 failed: failed.clone(),
                 bounds: Vec::new(),
                 tasks: Vec::new(),
@@ -295,11 +282,8 @@ impl Run {
     }
 
     fn close(&self, report: &Report) -> io::Result<()> {
-        let failed = report
-            .cells
-            .iter()
-            .filter(|c| c.status.is_failure())
-            .count();
+        let cells = report.cells.iter();
+        let failed = cells.filter(|cell| cell.status.is_failure()).count();
         let mut out = io::stdout().lock();
         writeln!(
             out,

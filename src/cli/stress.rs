@@ -10,12 +10,12 @@ use indicatif::ProgressBar;
 
 use super::args::StressArgs;
 use super::shared_args::TableFormat;
-use super::table::Table;
+use super::table::{Column, Table};
 use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
-use crate::stress::{Row, Section, Status, Vector, built_in, read_vectors_file, replay};
+use crate::stress::{Section, Status, Vector, built_in, read_vectors_file, replay};
 
 pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
@@ -106,17 +106,13 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let failed = sections
         .iter()
         .any(|section| section.count(Status::Fail) > 0);
-    Ok(match (failed, interrupted) {
-        (true, _) => Ending::WrongAnswer,
-        (false, true) => Ending::Interrupted,
-        (false, false) => Ending::Ok,
-    })
+    Ok(Ending::of_checks(!failed, interrupted))
 }
 
 /// Cases of each extreme by another instruction set than the chosen one.
 const OF_OTHERS: u64 = 2;
 
-/// What failed by another instruction set, under its name.
+/// The failures by another instruction set, under its name.
 fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
     for section in &mut sections {
         section.rows.retain(|row| row.status == Status::Fail);
@@ -177,34 +173,33 @@ fn json(sections: &[Section]) -> io::Result<()> {
 
 fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     let mut out = text::terminal();
-    let mut table = Table::of("category | >cases | >boxes | >rows | >passed | >refused | >failed");
-    for section in sections {
-        table.add_row([
-            section.name.clone(),
-            text::count(section.cases as usize),
-            text::count(section.boxes as usize),
-            text::count(section.rows.len()),
-            text::count(section.count(Status::Pass)),
-            text::count(section.count(Status::Refused)),
-            text::count(section.count(Status::Fail)),
-        ]);
-    }
-    writeln!(out, "{table}")?;
+    let columns: &[Column<&Section>] = &[
+        ("category", |section| section.name.clone()),
+        (">cases", |section| text::count(section.cases as usize)),
+        (">boxes", |section| text::count(section.boxes as usize)),
+        (">rows", |section| text::count(section.rows.len())),
+        (">passed", |section| {
+            text::count(section.count(Status::Pass))
+        }),
+        (">refused", |section| {
+            text::count(section.count(Status::Refused))
+        }),
+        (">failed", |section| {
+            text::count(section.count(Status::Fail))
+        }),
+    ];
+    writeln!(out, "{}", Table::with(sections, columns))?;
     let rows = || sections.iter().flat_map(|section| &section.rows);
     for row in rows().filter(|row| row.status == Status::Fail) {
-        let Row {
-            id,
-            structure,
-            test,
-            expected,
-            got,
-            ..
-        } = row;
-        let level = row.level.name();
         writeln!(
             out,
-            "{}, {level} level, {structure}, {test}:\n  expected {expected}\n  got {got}",
-            text::plain(id)
+            "{}, {} level, {}, {}:\n  expected {}\n  got {}",
+            text::plain(&row.id),
+            row.level.name(),
+            row.structure,
+            row.test,
+            row.expected,
+            row.got
         )?;
     }
     let mut tally = Tally::default();

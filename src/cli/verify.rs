@@ -12,19 +12,19 @@ use serde::Serialize;
 
 use super::args::VerifyArgs;
 use super::shared_args::TableFormat;
-use super::table::Table;
+use super::table::{Column, Table};
 use super::{Ending, interrupt, load_scene, print_json, tell, text, unread_is_fine};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
-use crate::measure::{Status, Subject, Workload, count_pass, guarded, judge};
+use crate::measure::{Status, Subject, Verdict, Workload, count_pass, guarded, judge};
 use crate::path::{self, CameraPath};
 use crate::query::Located;
-use crate::scene::{self, FAMILIES, SAMPLES};
+use crate::scene::{FAMILIES, Regions, SAMPLES, Scene};
 use crate::verify::{
-    ErrorCount, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment, explain_visibility,
-    points_on_faces, variants,
+    ErrorCount, Fault, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment,
+    explain_visibility, points_on_faces, variants,
 };
 
 /// One structure on one scene and path (or on all random cases).
@@ -45,7 +45,7 @@ struct Outcome {
     ok: bool,
     verdicts: u64,
     mismatches: usize,
-    /// Whether answers were held against the cameras as written, beside each other.
+    /// True if answers were compared with the cameras as written too.
     against_cameras: bool,
     seconds: f64,
     seed: u64,
@@ -71,7 +71,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     let culling = args.culling.culling(CullingTest::SixPlane.name())?;
     let by_hand = !args.scene.is_empty() || !args.path.is_empty();
     let cases = args.cases.unwrap_or(if by_hand { 0 } else { CASES });
-    // Random cases alone, if only they are asked for.
+    // Random cases alone, if only they are named.
     let scenes = match (&args.scene[..], args.cases) {
         ([], Some(_)) if !by_hand => Vec::new(),
         ([], _) => default_scenes(),
@@ -85,46 +85,23 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     let bar = ProgressBar::new(scenes.len() as u64 + 1);
     let mut checks = Vec::new();
     let mut interrupted = false;
-    for source in &scenes {
-        if interrupted {
-            break;
-        }
+    'scenes: for source in &scenes {
         bar.set_message(text::plain(source));
         let scene = load_scene(source, &args.scene_args, 2 * structures.len())?;
-        let subjects = |test: CullingTest| -> Vec<Subject> {
+        let subjects = [CullingTest::SixPlane, CullingTest::Sphere].map(|test| {
             let specs = structures.iter().cloned();
             specs
-                .map(|s| Subject::build(s, false, &scene, test))
+                .map(|spec| Subject::build(spec, false, &scene, test))
                 .collect()
-        };
-        let over_boxes = subjects(CullingTest::SixPlane);
-        let over_cubes = subjects(CullingTest::Sphere);
+        });
         for path in paths(args, &scene) {
-            if interrupt::asked() {
-                interrupted = true;
-                break;
+            interrupted = interrupt::asked();
+            if interrupted {
+                break 'scenes;
             }
             let cameras = path::load(&path, &scene, &defaults)?;
             let again = reproduce(source, &path, args);
-            let mut rows: Vec<Check> = Vec::new();
-            for (kind, workload) in workloads(&scene, &cameras, &culling)? {
-                let subjects = match workload.culling.test {
-                    CullingTest::Sphere => &over_cubes,
-                    _ => &over_boxes,
-                };
-                let mut checked = check(&workload, subjects, &kind, &again);
-                if rows.is_empty() && is_safe(&culling) {
-                    judge_camera_level(&workload, &mut checked, &again);
-                }
-                if rows.is_empty() {
-                    rows = checked;
-                } else {
-                    rows.iter_mut()
-                        .zip(checked)
-                        .for_each(|(row, more)| row.add(more));
-                }
-            }
-            checks.extend(rows);
+            checks.extend(check_path(&scene, &cameras, &culling, &subjects, &again)?);
         }
         bar.inc(1);
     }
@@ -149,21 +126,47 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     if interrupted {
         tell("interrupted: only what is shown was checked");
     }
-    Ok(match (outcome.ok, interrupted) {
-        (false, _) => Ending::WrongAnswer,
-        (true, true) => Ending::Interrupted,
-        (true, false) => Ending::Ok,
-    })
+    Ok(Ending::of_checks(outcome.ok, interrupted))
+}
+
+/// Checks all structures, over boxes and over spheres, on the cameras of one path, with
+/// every kind of volume; one row per structure.
+fn check_path(
+    scene: &Scene,
+    cameras: &CameraPath,
+    culling: &Culling,
+    [over_boxes, over_spheres]: &[Vec<Subject>; 2],
+    again: &str,
+) -> anyhow::Result<Vec<Check>> {
+    let mut rows: Vec<Check> = Vec::new();
+    for (kind, workload) in workloads(scene, cameras, culling)? {
+        let subjects = match workload.culling.test {
+            CullingTest::Sphere => over_spheres,
+            _ => over_boxes,
+        };
+        let mut checked = check(&workload, subjects, &kind, again);
+        if rows.is_empty() {
+            if is_safe(culling) {
+                judge_camera_level(&workload, &mut checked, again);
+            }
+            rows = checked;
+            continue;
+        }
+        for (row, more) in rows.iter_mut().zip(checked) {
+            row.add(more);
+        }
+    }
+    Ok(rows)
 }
 
 fn default_scenes() -> Vec<String> {
     let generated = FAMILIES.iter().map(|f| format!("{}:n={ITEMS}", f.name));
-    let far = ["city:n=5000,offset=1e7".to_owned()];
     let real = SAMPLES.iter().map(|s| s.name.to_owned());
-    generated.chain(far).chain(real).collect()
+    let far = "city:n=5000,offset=1e7".to_owned();
+    generated.chain([far]).chain(real).collect()
 }
 
-fn paths(args: &VerifyArgs, scene: &scene::Scene) -> Vec<String> {
+fn paths(args: &VerifyArgs, scene: &Scene) -> Vec<String> {
     if !args.path.is_empty() {
         return args.path.clone();
     }
@@ -183,19 +186,16 @@ fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
         lens.fovy,
         lens.aspect
     );
-    if let Some(near) = lens.near {
-        command += &format!(" --near {near}");
-    }
-    if let Some(far) = lens.far {
-        command += &format!(" --far {far}");
+    for (option, plane) in [("near", lens.near), ("far", lens.far)] {
+        command += &text::some(plane, |plane| format!(" --{option} {plane}"));
     }
     command
 }
 
-/// The queries of a path once for each kind of volume, and once for each other
-/// culling test and arithmetic; the points to locate are asked once.
+/// The queries of a path for each kind of volume, and for each other culling test and
+/// arithmetic; only the first has the points to locate.
 fn workloads<'a>(
-    scene: &'a scene::Scene,
+    scene: &'a Scene,
     cameras: &CameraPath,
     culling: &Culling,
 ) -> anyhow::Result<Vec<(String, Workload<'a>)>> {
@@ -238,19 +238,19 @@ fn workloads<'a>(
 
 /// Every test and arithmetic but the given one, as far as they go together.
 fn other_cullings(culling: &Culling) -> Vec<Culling> {
-    let tests = TESTS.iter().map(|row| row.0);
-    let all = tests.flat_map(|test| {
-        ARITHMETICS.iter().map(move |row| Culling {
-            test,
-            arithmetic: row.0,
-            ..*culling
-        })
+    let pairs = TESTS
+        .iter()
+        .flat_map(|test| ARITHMETICS.iter().map(|row| (test.0, row.0)));
+    let all = pairs.map(|(test, arithmetic)| Culling {
+        test,
+        arithmetic,
+        ..*culling
     });
     all.filter(|other| other != culling && other.check().is_ok())
         .collect()
 }
 
-/// Whether nothing that a camera sees may be missed.
+/// Returns true if the culling must not miss anything that a camera sees.
 fn is_safe(culling: &Culling) -> bool {
     culling.planes.method == PlaneMethod::Frame
         && culling.planes.epsilon >= DEFAULT_EPSILON
@@ -356,7 +356,7 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
         let mut seen = Trial::new(case.items.len());
         seen.see(&case.items, &case.volume);
         let mut holding = Trial::new(case.items.len());
-        holding.expect(scene::Regions::Items.holding(case.point, &case.items));
+        holding.expect(Regions::Items.holding(case.point, &case.items));
         let mut overlapping = Trial::new(case.items.len());
         overlapping.expect(case.overlapping());
         let mut trials = [seen, holding, overlapping];
@@ -366,24 +366,21 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             if check.difference.is_some() {
                 continue;
             }
-            let (status, difference) = match spec.build(&case.items) {
-                Ok(index) => match guarded(|| differ(&case, index.as_ref(), &mut trials)) {
-                    Ok(Ok(())) => (Status::Ok, None),
-                    Ok(Err((status, difference))) => (status, Some(difference)),
-                    Err(verdict) => (verdict.status, verdict.reason),
-                },
-                Err(BuildError::Refused { .. }) => (Status::Ok, None),
+            let found = match spec.build(&case.items) {
+                Ok(index) => guarded(|| differ(&case, index.as_ref(), &mut trials)).flatten(),
+                Err(BuildError::Refused { .. }) => Ok(()),
                 Err(error @ BuildError::Panicked { .. }) => {
-                    (Status::Panicked, Some(error.to_string()))
+                    Err(Verdict::new(Status::Panicked, error.to_string()))
                 }
-                Err(error) => (Status::Wrong, Some(error.to_string())),
+                Err(error) => Err(Verdict::new(Status::Wrong, error.to_string())),
             };
-            if let Some(difference) = difference {
+            if let Err(Verdict { status, reason }) = found {
                 check.status = status.name();
-                let kind = VOLUME_KINDS[case.kind];
                 check.difference = Some(format!(
-                    "{kind} volume, {}: {difference}\n  again: cullbench verify --cases 1 --seed {case_seed}",
-                    text::counted(case.items.len(), "item")
+                    "{} volume, {}: {}\n  again: cullbench verify --cases 1 --seed {case_seed}",
+                    VOLUME_KINDS[case.kind],
+                    text::counted(case.items.len(), "item"),
+                    reason.unwrap_or_default()
                 ));
             }
         }
@@ -391,22 +388,26 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
     checks
 }
 
+/// Compares the answers of one structure to a random case with those of the reference.
 fn differ(
     case: &RandomCase,
     index: &dyn DynIndex,
     [seen, holding, overlapping]: &mut [Trial; 3],
-) -> Result<(), (Status, String)> {
+) -> Result<(), Verdict> {
     let item = |id: usize| case.items.get(id);
+    let verdict = |what: &str, fault: &Fault, explain: &dyn Fn(usize) -> Option<String>| {
+        Verdict::new(
+            Status::of(fault),
+            format!("{what}{}", fault.explained(explain)),
+        )
+    };
+    let visible = |id| Some(explain_visibility(item(id)?, &case.volume));
     seen.ask(|out| index.visible(&case.volume, out))
-        .map_err(|fault| {
-            let why = fault.explained(|id| Some(explain_visibility(item(id)?, &case.volume)));
-            (Status::of(&fault), why)
-        })?;
-    let asked = holding.ask(|out| index.locate(case.point, out));
-    let out = asked.map_err(|fault| {
-        let why = fault.explained(|id| Some(explain_containment(item(id)?, case.point)));
-        (Status::of(&fault), format!("region search: {why}"))
-    })?;
+        .map_err(|fault| verdict("", &fault, &visible))?;
+    let holds = |id| Some(explain_containment(item(id)?, case.point));
+    let out = holding
+        .ask(|out| index.locate(case.point, out))
+        .map_err(|fault| verdict("region search: ", &fault, &holds))?;
     let nowhere = Vec3::new(case.point.x, f32::NAN, case.point.z);
     let mut many = Located::default();
     index.query_many(&[case.point, nowhere, case.point], &mut many);
@@ -414,44 +415,34 @@ fn differ(
         let why = format!(
             "region search: a batch of points is answered otherwise than one by one: {many:?}"
         );
-        return Err((Status::Wrong, why));
+        return Err(Verdict::new(Status::Wrong, why));
     }
     let volume = ConvexVolume::of_box(&case.region);
+    let overlaps = |id| Some(format!("{:?} by {:?}", item(id)?, case.region));
     let asked = overlapping.ask(|out| index.visible(&volume, out));
-    asked.map(|_| ()).map_err(|fault| {
-        let why = fault.explained(|id| Some(format!("{:?} by {:?}", item(id)?, case.region)));
-        (Status::of(&fault), format!("search by a box: {why}"))
-    })
+    asked.map_err(|fault| verdict("search by a box: ", &fault, &overlaps))?;
+    Ok(())
 }
 
 fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
     if format == TableFormat::Json {
         return print_json(outcome);
     }
-    let mut out = io::stdout().lock();
-    let mut table = Table::of("scene | path | structure | >volumes | >verdicts | status");
-    for check in &outcome.checks {
-        table.add_row([
-            check.scene.clone(),
-            check.path.clone(),
-            check.structure.clone(),
-            text::count(check.volumes),
-            text::count(check.verdicts as usize),
-            check.status.to_owned(),
-        ]);
-    }
-    writeln!(out, "{table}")?;
+    let columns: &[Column<&Check>] = &[
+        ("scene", |check| check.scene.clone()),
+        ("path", |check| check.path.clone()),
+        ("structure", |check| check.structure.clone()),
+        (">volumes", |check| text::count(check.volumes)),
+        (">verdicts", |check| text::count(check.verdicts as usize)),
+        ("status", |check| check.status.to_owned()),
+    ];
+    let mut out = text::terminal();
+    writeln!(out, "{}", Table::with(&outcome.checks, columns))?;
     for check in &outcome.checks {
         if let Some(difference) = &check.difference {
-            writeln!(
-                out,
-                "{}:\n  {}",
-                text::plain(&format!(
-                    "{} on {}, {}",
-                    check.structure, check.scene, check.path
-                )),
-                text::lines(difference)
-            )?;
+            let (structure, scene, path) = (&check.structure, &check.scene, &check.path);
+            let about = text::plain(&format!("{structure} on {scene}, {path}"));
+            writeln!(out, "{about}:\n  {difference}")?;
         }
     }
     writeln!(
@@ -465,8 +456,8 @@ fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
     if !outcome.against_cameras {
         writeln!(
             out,
-            "Planes without the whole margin may lose what is visible: structures were held \
-             against each other, not against the cameras."
+            "Planes without the whole margin may lose what is visible: structures were compared \
+             with each other, not with the cameras."
         )?;
     }
     Ok(())
