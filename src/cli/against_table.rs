@@ -15,7 +15,7 @@ use super::compare_table::{Basis, CompareTable, Side};
 use super::study::progress;
 use super::{Ending, interrupt, run_plan, text, unread_is_fine};
 use crate::index::Registry;
-use crate::measure::{CellKey, Machine, Status, Verdict};
+use crate::measure::{CellKey, Machine, Status};
 use crate::report::{Changes, JudgedRow, Lone, work_changes};
 use crate::scene;
 
@@ -134,18 +134,15 @@ fn changes(found: &Against, threshold: f64) -> Changes {
             structure: cell.structure.clone(),
         };
         let [old, new] = &cell.verdicts;
-        let lone = |verdict: &Verdict| Lone {
-            cell: key.clone(),
-            status: verdict.status,
-            reason: verdict.reason.clone(),
-        };
-        match (old.status, new.status) {
-            (Status::LeftOut, Status::LeftOut) => continue,
-            (Status::LeftOut, _) => {
-                changes.only_in_new.push(lone(new));
-                continue;
-            }
-            _ => {}
+        if old.status == Status::LeftOut {
+            let lone = Lone {
+                cell: key,
+                status: new.status,
+                reason: new.reason.clone(),
+            };
+            let is_new = new.status != Status::LeftOut;
+            changes.only_in_new.extend(Some(lone).filter(|_| is_new));
+            continue;
         }
         changes.cells_in_common += 1;
         changes
@@ -206,13 +203,13 @@ fn arguments() -> anyhow::Result<Vec<String>> {
 
 /// Refuses options of a measurement where nothing is measured.
 pub fn expect_none_of_a_run() -> anyhow::Result<()> {
-    match typed()?.first().and_then(|typed| typed.split('=').next()) {
-        Some(option) => bail!(
+    if let Some(option) = typed()?.first().and_then(|typed| typed.split('=').next()) {
+        bail!(
             "{option} says what --against BINARY measures, and two reports are measured already; \
              expected no {option}"
-        ),
-        None => Ok(()),
+        );
     }
+    Ok(())
 }
 
 #[cfg(test)]

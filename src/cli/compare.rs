@@ -3,7 +3,7 @@
 //! from `compare_table`.
 
 use anyhow::bail;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::args::CompareArgs;
 use super::compare_table::{Basis, CompareTable, Side, name, reason};
@@ -79,17 +79,13 @@ fn metrics(lists: &[String]) -> Result<Vec<&'static str>, SpecError> {
 }
 
 fn nothing_in_common(changes: &Changes) -> String {
-    let side = |cells: &[Lone]| match cells.first() {
-        Some(first) => format!(
-            "{} ({}{})",
-            text::counted(cells.len(), "cell"),
-            text::plain(&name(&first.cell)),
-            match cells.len() {
-                1 => "",
-                _ => ", ...",
-            }
-        ),
-        None => "no cells".to_owned(),
+    let side = |cells: &[Lone]| {
+        let Some(first) = cells.first() else {
+            return "no cells".to_owned();
+        };
+        let more = if cells.len() == 1 { "" } else { ", ..." };
+        let name = text::plain(&name(&first.cell));
+        format!("{} ({name}{more})", text::counted(cells.len(), "cell"))
     };
     format!(
         "no cell in common: OLD has {}, NEW has {}; expected runs of the same scenes, paths, \
@@ -99,7 +95,7 @@ fn nothing_in_common(changes: &Changes) -> String {
     )
 }
 
-/// What to know before the figures, a line each.
+/// Lines before the figures.
 fn notes(old: &Report, new: &Report, settings: &[Setting]) -> Vec<String> {
     let mut notes = Vec::new();
     for setting in settings {
@@ -135,37 +131,24 @@ fn processes(report: &Report) -> String {
 }
 
 fn side(report: &Report) -> Side {
-    Side {
-        line: head_line(report),
-        json: head(report),
-    }
-}
-
-fn head(report: &Report) -> Value {
     let (run, source) = (&report.run, &report.source);
-    json!({
-        "id": run.id,
-        "started_at": run.started_at,
-        "command": run.command,
-        "version": source.version,
-        "commit": source.commit,
-        "dirty": source.dirty,
-        "cells": report.cells.len(),
-    })
-}
-
-fn head_line(report: &Report) -> String {
-    let source = &report.source;
-    let commit = match source.commit.as_deref() {
+    let commit = match &source.commit {
         Some(commit) => format!("commit {}", commit.chars().take(12).collect::<String>()),
         None => "commit unknown".to_owned(),
     };
-    format!(
-        "{}, version {}, {commit}, {}",
-        report.run.id,
-        source.version,
-        text::counted(report.cells.len(), "cell")
-    )
+    let cells = text::counted(report.cells.len(), "cell");
+    Side {
+        line: format!("{}, version {}, {commit}, {cells}", run.id, source.version),
+        json: json!({
+            "id": run.id,
+            "started_at": run.started_at,
+            "command": run.command,
+            "version": source.version,
+            "commit": source.commit,
+            "dirty": source.dirty,
+            "cells": report.cells.len(),
+        }),
+    }
 }
 
 #[cfg(test)]

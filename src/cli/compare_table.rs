@@ -1,6 +1,5 @@
-//! How a comparison is shown, of two reports and of two programs alike: one
-//! table of verdicts, as a terminal table, as Markdown or as JSON. What the
-//! verdicts are is decided in `report` and `statistics`.
+//! The table of verdicts of a comparison, of two reports or of two programs, for a
+//! terminal, as Markdown or as JSON. The verdicts come from `report` and `statistics`.
 
 use std::io::{self, Write};
 
@@ -8,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::args::CompareArgs;
-use super::document::{Block, to_markdown};
+use super::document::{Block, to_markdown, to_terminal};
 use super::shared_args::TableFormat;
 use super::table::Table;
 use super::{Ending, print_json, text};
@@ -16,16 +15,16 @@ use crate::measure::{CellKey, METRICS};
 use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};
 use crate::shown::number;
 
-/// So many counters are listed; `--all` lists every one.
+/// Counters in the list; `--all` shows every one.
 const LISTED: usize = 20;
 
-/// What OLD or NEW is.
+/// OLD or NEW.
 pub struct Side {
     pub line: String,
     pub json: Value,
 }
 
-/// What the times of both sides come from.
+/// Source of the times of both sides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Basis {
     /// Two stored reports: times relative to the other structures.
@@ -34,14 +33,14 @@ pub enum Basis {
     Pairs,
 }
 
-/// A comparison with everything that is said about it.
+/// A comparison with its notes.
 pub struct CompareTable {
     pub old: Side,
     pub new: Side,
     pub basis: Basis,
     /// "14 pairs × 100 rounds × 128 cameras", "10 vs 10 processes".
     pub head: String,
-    /// What to know before the figures, a line each.
+    /// Lines before the figures.
     pub notes: Vec<String>,
     pub settings: Vec<Setting>,
     pub changes: Changes,
@@ -57,16 +56,14 @@ impl CompareTable {
         }
     }
 
-    /// On standard output, in the format that was asked for.
+    /// Prints the comparison in the chosen format.
     pub fn show(&self, args: &CompareArgs) -> io::Result<()> {
-        if args.markdown {
-            let markdown = to_markdown(&self.blocks(args.all));
-            return io::stdout().lock().write_all(markdown.as_bytes());
-        }
-        match args.format {
-            TableFormat::Json => self.json(),
-            TableFormat::Table => self.terminal(args.all),
-        }
+        let text = match (args.markdown, args.format) {
+            (true, _) => to_markdown(&self.blocks(args.all)),
+            (false, TableFormat::Table) => to_terminal(&self.blocks(args.all), usize::MAX),
+            (false, TableFormat::Json) => return self.json(),
+        };
+        io::stdout().lock().write_all(text.as_bytes())
     }
 
     fn json(&self) -> io::Result<()> {
@@ -103,21 +100,7 @@ impl CompareTable {
         print_json(&document)
     }
 
-    fn terminal(&self, all: bool) -> io::Result<()> {
-        let mut out = text::terminal();
-        for block in self.blocks(all) {
-            match block {
-                Block::Line(line) | Block::Heading(_, line) => {
-                    writeln!(out, "{}", text::plain(&line))?;
-                }
-                Block::Table(table) => writeln!(out, "{table}")?,
-                Block::Picture(_) => {}
-            }
-        }
-        Ok(())
-    }
-
-    /// The whole, in the order in which it is read.
+    /// The document, for every format.
     fn blocks(&self, all: bool) -> Vec<Block> {
         let changes = &self.changes;
         let mut lines = vec![
@@ -161,20 +144,21 @@ impl CompareTable {
             "scene | path, test | structure | metric | >old | >new | >{change} | >resolves \
              | >{processes} | verdict | why"
         ));
-        table.rows.extend(rows.iter().map(|row| {
+        for row in rows {
             let metric = row.metric.unwrap_or_default();
-            let figure = |value: Option<f64>| value.map_or(String::new(), |v| shown(metric, v));
             let judged = row.judgement.as_ref();
             let resolution = judged.and_then(|found| found.resolution);
-            vec![
+            table.add_row([
                 row.cell.group.scene.clone(),
                 question(&row.cell),
                 row.cell.structure.clone(),
                 metric.to_owned(),
-                figure(row.old),
-                figure(row.new),
-                judged.map_or(String::new(), |j| change_of(j.ratio, j.lower.zip(j.upper))),
-                resolution.map_or(String::new(), |r| format!("{:.1} %", r * 100.0)),
+                text::some(row.old, |value| shown(metric, value)),
+                text::some(row.new, |value| shown(metric, value)),
+                text::some(judged, |found| {
+                    change_of(found.ratio, found.lower.zip(found.upper))
+                }),
+                text::some(resolution, |share| format!("{:.1} %", share * 100.0)),
                 match (self.basis, row.processes) {
                     (_, [0, 0]) => String::new(),
                     (Basis::Pairs, [pairs, _]) => pairs.to_string(),
@@ -182,12 +166,12 @@ impl CompareTable {
                 },
                 row.outcome.name().replace('_', " "),
                 reason(row),
-            ]
-        }));
+            ]);
+        }
         table
     }
 
-    /// What would decide the cells that are inconclusive, if there are any.
+    /// Advice on inconclusive cells, if there are any.
     fn advice(&self) -> Option<String> {
         let undecided = self.changes.count(Outcome::Inconclusive);
         if undecided == 0 {
@@ -250,7 +234,7 @@ pub fn change_of(ratio: f64, interval: Option<(f64, f64)>) -> String {
     }
 }
 
-/// What moved everything, which no cell's verdict says.
+/// Line on the change that all cells share.
 fn shift_line(shift: CommonShift) -> String {
     let percent = |ratio: f64| format!("{:.1}", ratio * 100.0);
     let interval = match shift.lower.zip(shift.upper) {
@@ -286,15 +270,13 @@ fn work_line(work: &WorkChange) -> String {
 
 /// Why a row is what it is, where the figures do not say it.
 pub fn reason(row: &JudgedRow) -> String {
-    let statuses = (row.old_status, row.new_status);
-    let became = match statuses.0 == statuses.1 {
-        true if row.outcome == Outcome::FailedInBoth => statuses.1.name().to_owned(),
-        true => String::new(),
-        false => format!("{} to {}", statuses.0.name(), statuses.1.name()),
+    let (old, new) = (row.old_status, row.new_status);
+    let became = match row.outcome == Outcome::FailedInBoth {
+        true if old == new => Some(new.name().to_owned()),
+        _ => (old != new).then(|| format!("{} to {}", old.name(), new.name())),
     };
-    let why = row.reason.as_deref().unwrap_or_default();
-    let parts = [became.as_str(), why];
-    let told: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    let parts = became.into_iter().chain(row.reason.clone());
+    let told: Vec<String> = parts.filter(|part| !part.is_empty()).collect();
     told.join(", ")
 }
 
@@ -314,36 +296,28 @@ fn lone_lines(side: &str, cells: &[Lone]) -> Vec<String> {
         return Vec::new();
     };
     let more = if cells.len() == 1 { "" } else { ", ..." };
-    let mut lines = vec![format!(
+    let first = format!(
         "only in {side}: {} ({}{more})",
         text::counted(cells.len(), "cell"),
         name(&first.cell)
-    )];
-    for cell in cells.iter().filter(|cell| cell.status.is_failure()) {
-        let why = cell.reason.as_ref().map(|reason| format!(": {reason}"));
-        lines.push(format!(
-            "only in {side}: {}: {}{}",
-            name(&cell.cell),
-            cell.status.name(),
-            why.unwrap_or_default()
-        ));
-    }
-    lines
+    );
+    let wrong = cells.iter().filter(|cell| cell.status.is_failure());
+    let wrong = wrong.map(|cell| {
+        let (name, status) = (name(&cell.cell), cell.status.name());
+        let why = text::some(cell.reason.as_ref(), |reason| format!(": {reason}"));
+        format!("only in {side}: {name}: {status}{why}")
+    });
+    [first].into_iter().chain(wrong).collect()
 }
 
 /// "2 slower, 3 inconclusive, 1 faster, 92 same of 98 cells".
 fn counts_line(changes: &Changes) -> String {
-    let counts = Outcome::ALL.into_iter().filter_map(|outcome| {
-        let count = changes.count(outcome);
-        // The four verdicts are said in any case.
-        let is_said = count > 0 || outcome.is_judged();
-        is_said.then(|| {
-            format!(
-                "{} {}",
-                text::count(count),
-                outcome.name().replace('_', " ")
-            )
-        })
+    // The four verdicts are shown in any case.
+    let outcomes = Outcome::ALL.into_iter();
+    let shown = outcomes.filter(|outcome| outcome.is_judged() || changes.count(*outcome) > 0);
+    let counts = shown.map(|outcome| {
+        let count = text::count(changes.count(outcome));
+        format!("{count} {}", outcome.name().replace('_', " "))
     });
     let counts: Vec<String> = counts.collect();
     let rows = match (changes.rows.len(), changes.cells_in_common) {

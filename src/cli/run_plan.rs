@@ -1,5 +1,5 @@
-//! What `cullbench run` is to do: scenes, ways through them, structures and
-//! culling tests, checked as far as possible before anything runs.
+//! The plan of `cullbench run`: scenes, paths, structures and culling tests, checked as
+//! far as possible before anything runs.
 
 use anyhow::bail;
 
@@ -17,9 +17,9 @@ use crate::suite::{DEFAULT_PATH, SUITES, Suite};
 pub struct RunPlan {
     pub plan: Plan,
     pub suite: &'static Suite,
-    /// Whether scenes and paths are the suite's own.
+    /// True if scenes and paths are the suite's own.
     pub from_suite: bool,
-    /// Of a shard: the groups of the whole plan.
+    /// Groups of the whole plan, if this is a shard.
     pub whole: Vec<GroupKey>,
 }
 
@@ -37,8 +37,8 @@ pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
     Ok(planned)
 }
 
-/// The same of what `run` and `compare --against` have in common, with the suite
-/// that is meant where none is named, and structures other than the suite's.
+/// The plan of the arguments that `run` and `compare --against` share, with the default
+/// suite, and default structures in place of the suite's.
 pub fn plan_of(
     registry: &Registry,
     args: &WhatArgs,
@@ -119,8 +119,8 @@ impl RunPlan {
         self.check_scenes(&|_, _| Ok(()))
     }
 
-    /// Whether the plan of a run that was begun is still the same, and asks the
-    /// same: files may have changed since.
+    /// Checks that the plan of a run that was begun is still the same, and so are its
+    /// files.
     pub fn check_goes_on(&self, begun: &Stream) -> anyhow::Result<()> {
         let structures = self.plan.structures.iter().map(|s| &s.label);
         if self.plan.groups() != begun.header.groups || !structures.eq(&begun.header.structures) {
@@ -146,14 +146,16 @@ impl RunPlan {
 
     /// Loads every scene and then every path of it, with a look at each.
     fn check_scenes(&self, look: Look) -> anyhow::Result<()> {
-        let as_it_comes = self.plan.lens == LensDefaults::default()
-            && self.plan.cullings.iter().all(|c| {
-                let test = c.test;
-                *c == Culling {
+        let is_plain = |culling: &Culling| {
+            let test = culling.test;
+            *culling
+                == Culling {
                     test,
                     ..Culling::default()
                 }
-            });
+        };
+        let as_it_comes =
+            self.plan.lens == LensDefaults::default() && self.plan.cullings.iter().all(is_plain);
         if self.from_suite && as_it_comes {
             return Ok(());
         }
@@ -182,15 +184,18 @@ fn same_digest(
     now: impl Fn() -> String,
 ) -> anyhow::Result<()> {
     let short = |digest: &str| digest.chars().take(12).collect::<String>();
-    match before.map(|before| (before, now())) {
-        Some((before, now)) if before != now => bail!(
-            "{what} '{name}' has changed since the run was begun: its digest was {} and is {}; \
-             expected the same: begin a new run",
-            short(&before),
-            short(&now)
-        ),
-        _ => Ok(()),
-    }
+    let Some(before) = before else {
+        return Ok(());
+    };
+    let now = now();
+    anyhow::ensure!(
+        before == now,
+        "{what} '{name}' has changed since the run was begun: its digest was {} and is {}; \
+         expected the same: begin a new run",
+        short(&before),
+        short(&now)
+    );
+    Ok(())
 }
 
 fn scenes(args: &WhatArgs, suite: &Suite) -> Vec<PlannedScene> {
@@ -202,14 +207,12 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Vec<PlannedScene> {
         },
         caches: if cold { vec![false, true] } else { vec![false] },
     };
-    if args.scene.is_empty() {
-        let rows = suite.plan.iter();
-        return rows
-            .map(|row| scene(row.scene, row.paths, row.cold || args.cold))
-            .collect();
+    let rows = suite.plan.iter();
+    let rows = rows.map(|row| scene(row.scene, row.paths, row.cold || args.cold));
+    let named = args.scene.iter();
+    let named = named.map(|source| scene(source, &[DEFAULT_PATH], args.cold));
+    match args.scene.is_empty() {
+        true => rows.collect(),
+        false => named.collect(),
     }
-    let chosen = args.scene.iter();
-    chosen
-        .map(|source| scene(source, &[DEFAULT_PATH], args.cold))
-        .collect()
 }

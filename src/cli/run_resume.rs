@@ -1,12 +1,12 @@
-//! Where a run is kept: a new folder, or an unfinished one to continue, with the
-//! options and the plan it was begun with, on the same machine by the same program.
+//! The folder of a run: a new one, or an unfinished one to continue with the options and
+//! the plan it was begun with, on the same machine by the same program.
 
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, Parser};
 
@@ -85,7 +85,7 @@ pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
     Ok((folder, stream, begun))
 }
 
-/// Goes on with a run that may.
+/// Continues a run.
 pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> {
     if stopped.lost() > 0 {
         tell(&format!(
@@ -97,7 +97,7 @@ pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> 
     Ok(stopped.go_on(stream)?)
 }
 
-/// Options that say how to continue, and not what is measured.
+/// Options that do not change the measurement.
 const NOT_OF_THE_PLAN: [&str; 3] = ["resume", "out", "timeout"];
 
 /// The recorded options, if those typed now say nothing else.
@@ -106,11 +106,9 @@ fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
     let now = RunOptions::of(std::env::args_os())?;
     for (id, name) in RunOptions::all() {
         let typed = now.0.value_source(&id) == Some(ValueSource::CommandLine);
-        if !typed || NOT_OF_THE_PLAN.contains(&id.as_str()) || before.values(&id) == now.values(&id)
-        {
-            continue;
-        }
-        bail!(
+        let is_free = !typed || NOT_OF_THE_PLAN.contains(&id.as_str());
+        ensure!(
+            is_free || before.values(&id) == now.values(&id),
             "--{name} is '{}', and the run was begun {}; expected the same or none: \
              --resume continues with the recorded options",
             now.values(&id).join(" "),
@@ -120,12 +118,14 @@ fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
     let recorded = Cli::try_parse_from(program().chain(recorded.to_vec()));
     match recorded.map_err(one_line)?.command {
         Command::Run(args) => Ok(args),
-        _ => bail!("no run was recorded there; expected the folder of a run"),
+        _ => bail!(NO_RUN),
     }
 }
 
-/// Whether two runs were begun with the same options, but for those that say
-/// where to and which share.
+/// Message where there is no run.
+const NO_RUN: &str = "no run was recorded there; expected the folder of a run";
+
+/// Checks that two runs were begun with the same options, apart from folder and shard.
 pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
     let (one, other) = (RunOptions::recorded(one)?, RunOptions::recorded(other)?);
     for (id, name) in RunOptions::all() {
@@ -145,7 +145,7 @@ pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
 fn one_line(error: clap::Error) -> anyhow::Error {
     match usage::one_line(&error) {
         Some(line) => anyhow::anyhow!("recorded options: {line}"),
-        None => anyhow::anyhow!("no run was recorded there; expected the folder of a run"),
+        None => anyhow::anyhow!(NO_RUN),
     }
 }
 
@@ -168,17 +168,16 @@ impl RunOptions {
             .try_get_matches_from(line)
             .map_err(one_line)?;
         let run = matches.subcommand_matches("run").cloned();
-        let run = run.context("no run was recorded there; expected the folder of a run")?;
+        let run = run.context(NO_RUN)?;
         Ok(RunOptions(run))
     }
 
-    /// Every option, with the name that is typed.
+    /// Ids and names of all options.
     fn all() -> Vec<(String, String)> {
         let command = Cli::command();
-        let arguments = command
-            .find_subcommand("run")
-            .map(clap::Command::get_arguments);
-        let named = arguments.into_iter().flatten().map(|arg| {
+        let run = command.find_subcommand("run").into_iter();
+        let arguments = run.flat_map(|run| run.get_arguments());
+        let named = arguments.map(|arg| {
             let id = arg.get_id().as_str();
             (id.to_owned(), arg.get_long().unwrap_or(id).to_owned())
         });
@@ -209,12 +208,10 @@ fn same_place(header: &Header, begun: &RunArgs) -> anyhow::Result<()> {
         binary: binary_digest(),
         ..header.clone()
     };
-    match header.differs_in_place(&here) {
-        Some(Difference { what, before, here }) => {
-            bail!("the {what} was '{before}' and is '{here}'; expected the same: begin a new run")
-        }
-        None => Ok(()),
+    if let Some(Difference { what, before, here }) = header.differs_in_place(&here) {
+        bail!("the {what} was '{before}' and is '{here}'; expected the same: begin a new run");
     }
+    Ok(())
 }
 
 /// RFC 3339 in UTC, to the second.
@@ -222,7 +219,7 @@ pub fn utc_now() -> String {
     utc(SystemTime::now())
 }
 
-/// What tells two runs of the same second apart.
+/// Nanoseconds of a clock, which distinguish runs of the same second.
 fn nanos(clock: SystemTime) -> u32 {
     let since = clock.duration_since(UNIX_EPOCH);
     since
@@ -233,9 +230,7 @@ fn nanos(clock: SystemTime) -> u32 {
 fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
     // No folder of results holds no run.
     let listing = fs::read_dir(results).into_iter().flatten();
-    let mut folders: Vec<PathBuf> = listing
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .collect();
+    let mut folders: Vec<PathBuf> = listing.flatten().map(|entry| entry.path()).collect();
     folders.sort();
     // Killed at the very end, a run lacks nothing but its report.
     let unfinished = |path: &PathBuf| {
