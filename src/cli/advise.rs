@@ -328,11 +328,10 @@ fn check_cells(check: &Check) -> [String; 6] {
         check.on.clone(),
         text::time(check.kept_ns),
         text::time(check.left_out_ns),
-        text::within(&Estimate {
-            value: check.ratio,
-            lower: check.ratio_lower,
-            upper: check.ratio_upper,
-        }),
+        text::within(&Estimate::within(
+            check.ratio,
+            [check.ratio_lower, check.ratio_upper],
+        )),
         some(both, |(kept, left_out)| format!("{kept} / {left_out}")),
         match (check.same_answers, check.is_wrong(), missed) {
             (_, true, _) => "WRONG: not the same",
