@@ -3,8 +3,6 @@
 
 use cullbench::camera::{Camera, Lens, PlaneOptions, look_at};
 use cullbench::index::{Bvh, FrustumQuery, Input, RegionIndex};
-use cullbench::kernel::BASELINE;
-use cullbench::query::{Count, QueryContext, QueryCost};
 use cullbench::scene;
 use glam::DVec3;
 
@@ -19,9 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Fly ahead and bank, as the lectures do.
     for step in 0..4 {
         let volume = camera.volume(&PlaneOptions::default(), &city.surroundings())?;
-        let (mut visible, mut cost) = (Vec::new(), QueryCost::default());
-        let mut context = QueryContext::new(BASELINE, &mut visible, &mut cost);
-        let _ = bvh.query(&volume, &mut context);
+        let (visible, cost) = bvh.counted(&volume);
         println!(
             "step {step}: {} of {} visible; {} nodes and {} items looked at, {} accepted unseen",
             visible.len(),
@@ -35,10 +31,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         camera.frame.pitch(-3.0);
     }
 
-    // Region search, with a sink that only counts: walk into the first house.
+    // Region search: walk into the first house.
     let inside = city.items[0].centre();
-    let mut houses = Count::default();
-    let _ = bvh.locate(inside, &mut houses);
-    println!("{} item(s) hold the point {inside}", houses.0);
+    let houses = bvh.locate(inside).len();
+    println!("{houses} item(s) hold the point {inside}");
     Ok(())
 }

@@ -1,6 +1,5 @@
-//! The contract of a structure: what it is built over, what it tells about
-//! itself, and the one query that it answers. What users call besides follows
-//! from that query and is provided.
+//! The contract of a structure: its input, its declaration, and the one query that it
+//! answers. The forms of the query that callers use are provided.
 
 use std::ops::{ControlFlow, Range};
 
@@ -10,13 +9,14 @@ use serde::{Deserialize, Serialize};
 
 use super::Info;
 use crate::geometry::{Aabb, PlaneTree};
-use crate::kernel::{Isa, Kernel, Work};
+use crate::kernel::{BASELINE, Isa, Kernel, Work};
 use crate::query::{
-    Context, ItemId, ManySink, NoRecorder, QueryContext, QueryVolume, Ranges, Recorder, Sink,
+    Context, ItemId, ManySink, NoRecorder, QueryContext, QueryCost, QueryVolume, Ranges, Recorder,
+    Sink,
 };
 use crate::threads::Pool;
 
-/// Why an index could not be built.
+/// The failure of a build.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BuildError {
@@ -36,12 +36,12 @@ pub enum BuildError {
         /// Number of ids there are.
         most: usize,
     },
-    /// The structure could, but not in reasonable time or memory.
+    /// The build would take unreasonable time or memory.
     #[error("'{structure}' refuses these items: {reason}")]
     Refused {
         /// Name of the structure.
         structure: &'static str,
-        /// What about the items, and what is expected.
+        /// The offending property of the items, and the expected one.
         reason: String,
     },
     /// More memory than the process can have.
@@ -58,10 +58,10 @@ pub enum BuildError {
         /// Bytes that are needed, the build included.
         needed: usize,
     },
-    /// The structure's own code did.
+    /// The structure's own code panicked.
     #[error("panicked: {message}")]
     Panicked {
-        /// What the panic says.
+        /// Message of the panic.
         message: String,
     },
     /// A parameter is unknown, unreadable or out of range.
@@ -84,13 +84,13 @@ pub struct MemoryUsage {
 }
 
 impl MemoryUsage {
-    /// Of nodes and items together.
+    /// Sum of nodes and items.
     pub fn total(&self) -> usize {
         self.node_bytes + self.item_bytes
     }
 }
 
-/// What a structure is built over.
+/// Input of a build.
 ///
 /// Items are numbered by their index in the slice. An empty box (min > max) is
 /// an item that no query ever returns.
@@ -99,14 +99,14 @@ impl MemoryUsage {
 pub struct Input<'a> {
     /// The bounds of all items.
     pub items: &'a [Aabb],
-    /// A partition that the scene itself brings, such as a map's own planes.
+    /// The scene's own partition, such as a map's planes.
     pub own_tree: Option<&'a PlaneTree>,
-    /// The threads that the build may use; `None` is this one alone.
+    /// The threads that the build may use; `None` for the current one.
     pub pool: Option<&'a Pool>,
 }
 
 impl<'a> Input<'a> {
-    /// Items without a partition of their own, built over on one thread.
+    /// Items without a partition, for a build on one thread.
     pub fn new(items: &'a [Aabb]) -> Input<'a> {
         Input {
             items,
@@ -115,12 +115,12 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// The same with the scene's own partition, if it has one.
+    /// Sets the scene's own partition, if it has one.
     pub fn own_tree(self, own_tree: Option<&'a PlaneTree>) -> Input<'a> {
         Input { own_tree, ..self }
     }
 
-    /// The same with the threads of a pool.
+    /// Sets the threads of a pool.
     pub fn pool(self, pool: &'a Pool) -> Input<'a> {
         Input {
             pool: Some(pool),
@@ -128,7 +128,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// How many threads the build may use: 1 or more. A structure that reads it
+    /// Number of threads that the build may use, at least 1. A structure that reads it
     /// declares [`Capabilities::threaded_build`](super::Capabilities).
     pub fn threads(&self) -> usize {
         self.pool.map_or(1, Pool::threads)
@@ -141,15 +141,14 @@ impl<'a, Items: AsRef<[Aabb]> + ?Sized> From<&'a Items> for Input<'a> {
     }
 }
 
-/// Parameters of a structure that has nothing to choose.
+/// Parameters of a structure without any.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoParams {}
 
 /// A structure built over item bounds.
 pub trait RegionIndex: Sized + Send + Sync {
-    /// Its name and what it declares of itself. The conformance suite checks
-    /// what can be checked.
+    /// Name and declaration; the conformance suite checks it as far as possible.
     const INFO: Info;
     /// Build parameters, `name:key=value` on the command line.
     type Params: Default + Serialize + DeserializeOwned;
@@ -165,7 +164,7 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// Heap bytes.
     fn memory(&self) -> MemoryUsage;
 
-    /// Hands every item that the volume sees to the sink of the context: exactly
+    /// Passes every item that the volume sees to the sink of the context: exactly
     /// the set `{ i : volume.sees(items[i]) }`, bit for bit, each id once, in the
     /// structure's own order. `Break` if the sink ended the query.
     ///
@@ -176,12 +175,12 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// that stays a call runs portable code.
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, context: &mut C) -> ControlFlow<()>;
 
-    /// Region search for many points: for every point, in ascending order, what
-    /// [`RegionIndex::query`] hands over, in the same order, in one slice.
-    /// `Break` if the sink ended the batch.
+    /// Region search for many points: the sink gets the ids of each point in one slice,
+    /// in the order of [`RegionIndex::query`], point after point. `Break` if the sink
+    /// ended the batch.
     ///
-    /// By default one point after the other; a structure that overlaps the waits
-    /// of several descents overrides it.
+    /// By default one point after the other; a structure that interleaves several
+    /// descents overrides it.
     #[inline(always)]
     fn query_many<I: Isa, S: ManySink>(
         &self,
@@ -200,7 +199,7 @@ pub trait RegionIndex: Sized + Send + Sync {
     }
 
     /// Takes over the new bounds of `moved` items (`items` holds all bounds,
-    /// the new ones included; they are finite) without building anew. False,
+    /// the new ones included; they are finite) without a new build. False,
     /// with the structure unchanged, if it cannot; the caller then rebuilds.
     /// A structure that declares [`Capabilities::refits`](super::Capabilities)
     /// declines only where an item becomes or ceases to be empty; one that does
@@ -210,19 +209,66 @@ pub trait RegionIndex: Sized + Send + Sync {
     }
 
     /// Item ids in the structure's own order, if its answers can be ranges of it
-    /// (it hands them over by [`Sink::accept_places`]):
+    /// (it passes them to [`Sink::accept_places`]):
     /// [`Capabilities::ranges`](super::Capabilities).
     fn tree_order(&self) -> Option<&[ItemId]> {
         None
     }
 }
 
-/// What users call, provided for every structure: frustum culling and region
-/// search by the best [`Kernel`] of this machine, nothing counted.
+/// Queries as callers write them, provided for every structure. They use the best
+/// [`Kernel`] of this machine. A volume is a frustum in any form, a point or a box.
+///
+/// ```
+/// use cullbench::geometry::Aabb;
+/// use cullbench::index::{Bvh, FrustumQuery, Input, RegionIndex};
+/// use glam::Vec3;
+///
+/// let cube = |x: f32| Aabb::around(Vec3::X * x, Vec3::ONE);
+/// let bvh = Bvh::build(&Input::new(&[cube(0.0), cube(9.0)]), &Default::default())?;
+/// let region = Aabb::around(Vec3::ZERO, Vec3::splat(2.0));
+/// assert_eq!(bvh.visible(&region), [0]);
+/// bvh.each_visible(&region, |id| assert_eq!(id, 0));
+/// let (ids, cost) = bvh.counted(&region);
+/// assert!(ids == [0] && cost.comparisons() > 0);
+/// assert_eq!(bvh.locate(Vec3::X * 9.5), [1]);
+/// # Ok::<(), cullbench::index::BuildError>(())
+/// ```
 pub trait FrustumQuery: RegionIndex {
-    /// Hands every item that a camera's volume sees to the sink. `Break` if the
-    /// sink ended the query.
-    fn visible<Q: QueryVolume, S: Sink>(&self, volume: &Q, sink: &mut S) -> ControlFlow<()> {
+    /// Ids of the items that the volume sees, in the structure's own order.
+    fn visible<Q: QueryVolume>(&self, volume: &Q) -> Vec<ItemId> {
+        let mut ids = Vec::new();
+        let _ = self.query_into(volume, &mut ids);
+        ids
+    }
+
+    /// Calls `each` with the id of every item that the volume sees.
+    fn each_visible<Q: QueryVolume>(&self, volume: &Q, mut each: impl FnMut(ItemId)) {
+        let _ = self.query_into(volume, &mut |ids: &[ItemId]| {
+            ids.iter().copied().for_each(&mut each);
+            ControlFlow::Continue(())
+        });
+    }
+
+    /// [`FrustumQuery::visible`] with the cost of the query. By the portable kernel; ids
+    /// and cost are the same by all kernels.
+    fn counted<Q: QueryVolume>(&self, volume: &Q) -> (Vec<ItemId>, QueryCost) {
+        let (mut ids, mut cost) = Default::default();
+        let _ = self.query(
+            volume,
+            &mut QueryContext::new(BASELINE, &mut ids, &mut cost),
+        );
+        (ids, cost)
+    }
+
+    /// Region search: ids of the items whose closed box holds `p`.
+    fn locate(&self, p: Vec3) -> Vec<ItemId> {
+        self.visible(&p)
+    }
+
+    /// Passes every item that the volume sees to the sink. `Break` if the sink ended the
+    /// query.
+    fn query_into<Q: QueryVolume, S: Sink>(&self, volume: &Q, sink: &mut S) -> ControlFlow<()> {
         Kernel::best().run(Query {
             index: self,
             volume,
@@ -231,7 +277,7 @@ pub trait FrustumQuery: RegionIndex {
         })
     }
 
-    /// [`FrustumQuery::visible`] as ranges of the order that is returned
+    /// [`FrustumQuery::visible`] as ranges of the returned order
     /// ([`RegionIndex::tree_order`]), appended to `ranges`; together they hold
     /// each visible item once. Adjoining ranges that follow each other are one.
     /// `None` from a structure without such an order.
@@ -241,30 +287,22 @@ pub trait FrustumQuery: RegionIndex {
         ranges: &mut Vec<Range<u32>>,
     ) -> Option<&[ItemId]> {
         let order = self.tree_order()?;
-        // This sink never breaks off.
-        let _ = self.visible(volume, &mut Ranges::onto(ranges));
+        let _ = self.query_into(volume, &mut Ranges::onto(ranges));
         Some(order)
-    }
-
-    /// Region search: hands every item whose closed box holds `p` to the sink.
-    /// `Break` if the sink ended the query.
-    fn locate<S: Sink>(&self, p: Vec3, sink: &mut S) -> ControlFlow<()> {
-        self.visible(&p, sink)
     }
 }
 
 impl<T: RegionIndex> FrustumQuery for T {}
 
-/// A query as a [`Kernel`] of one's choice does it:
-/// `kernel.run(Query { index, volume, sink, recorder })`.
+/// A query for [`Kernel::run`]: `kernel.run(Query { index, volume, sink, recorder })`.
 pub struct Query<'a, T, Q, S, R> {
     /// The structure.
     pub index: &'a T,
-    /// What is asked.
+    /// The volume that sees items.
     pub volume: &'a Q,
-    /// Where answers go.
+    /// The destination of the answers.
     pub sink: &'a mut S,
-    /// What is counted.
+    /// The counters.
     pub recorder: &'a mut R,
 }
 
@@ -278,7 +316,7 @@ impl<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder> Work for Query<'_, T,
     }
 }
 
-/// A parameter in its range, or the error that names both.
+/// Checks that a parameter is in its range; the error names both.
 pub(crate) fn check_range(
     structure: &'static str,
     name: &str,

@@ -1,44 +1,51 @@
 //! One object type for all structures. Dispatch happens once per query, never
-//! per node: behind each method stands a traversal compiled for that structure,
+//! per node: behind each method is a traversal compiled for that structure,
 //! volume, recorder and instruction set.
 
 use glam::Vec3;
 
-use super::{By, MemoryUsage, Query, RegionIndex};
+use super::{MemoryUsage, Query, RegionIndex};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::kernel::{BASELINE, Isa, Kernel, Work};
 use crate::query::{
-    AnyVolume, Dispatched, ItemId, Located, ManySink, NoRecorder, QueryContext, QueryCost,
-    each_volume,
+    AnyVolume, Dispatched, ItemId, Located, NoRecorder, QueryContext, QueryCost, each_volume,
 };
 
-/// A built structure of any kind. Answers are appended to `out`.
+/// Kernel of queries and threads of builds: a value that a
+/// [`StructureSpec`](super::StructureSpec) carries. Answers do not depend on it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Execution {
+    /// Instruction set of queries.
+    pub kernel: Kernel,
+    /// Threads of builds, at least 1.
+    pub threads: usize,
+}
+
+/// The best kernel of this machine, and one thread.
+impl Default for Execution {
+    fn default() -> Self {
+        Execution {
+            kernel: Kernel::best(),
+            threads: 1,
+        }
+    }
+}
+
+/// A built structure of any kind. Queries append ids to `out`.
 pub trait DynIndex: Send + Sync {
     /// See [`RegionIndex::memory`].
     fn memory(&self) -> MemoryUsage;
-    /// See [`RegionIndex::query`]. The timed path: nothing is counted.
+    /// See [`RegionIndex::query`]. Nothing is counted.
     fn query(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>);
-    /// The same query with its cost added up, by the portable instruction set
-    /// whatever the kernel is: cost and answer are the same by all of them, and
-    /// what is timed is to be asked for its answer itself. All volumes of planes
-    /// share one compiled traversal.
+    /// The same query, its cost added to `cost`. By the portable instruction set: cost
+    /// and answer are the same by all. All volumes of planes share one compiled traversal.
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
-    /// Region search for many points at once; `out` is cleared first. The timed
-    /// path.
-    fn query_many(&self, points: &[Vec3], out: &mut Located) {
-        out.clear();
-        let mut ids = Vec::new();
-        for (&p, point) in points.iter().zip(0..) {
-            ids.clear();
-            self.locate(p, &mut ids);
-            // The collector never breaks off.
-            let _ = out.accept(point, &ids);
-        }
-    }
+    /// See [`RegionIndex::query_many`]; clears `out` first.
+    fn query_many(&self, points: &[Vec3], out: &mut Located);
     /// See [`RegionIndex::refit`].
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool;
 
-    /// [`DynIndex::query`] for what a frustum of f32 planes sees.
+    /// [`DynIndex::query`] for the items that a frustum of f32 planes sees.
     fn visible(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
         self.query(volume.into(), out);
     }
@@ -48,103 +55,73 @@ pub trait DynIndex: Send + Sync {
     }
 }
 
-/// A structure by itself is asked by the best kernel of this machine.
-impl<T: RegionIndex> DynIndex for T {
+/// A structure with the kernel of its queries.
+pub struct By<T> {
+    /// The structure.
+    pub index: T,
+    /// The kernel.
+    pub kernel: Kernel,
+}
+
+// Sinks that collect never end a query.
+impl<T: RegionIndex> DynIndex for By<T> {
     fn memory(&self) -> MemoryUsage {
-        RegionIndex::memory(self)
+        self.index.memory()
     }
 
     fn query(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>) {
-        query(Kernel::best(), self, volume, out);
+        let (index, recorder) = (&self.index, &mut NoRecorder);
+        let _ = each_volume!(volume, volume => {
+            self.kernel.run(Query { index, volume, sink: out, recorder })
+        });
     }
 
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
         let mut context = QueryContext::new(BASELINE, out, cost);
-        // A Vec never breaks off.
         let _ = match Dispatched::of(volume) {
-            Ok(planes) => RegionIndex::query(self, &planes, &mut context),
-            Err(p) => RegionIndex::query(self, &p, &mut context),
+            Ok(planes) => self.index.query(&planes, &mut context),
+            Err(p) => self.index.query(&p, &mut context),
         };
     }
 
     fn query_many(&self, points: &[Vec3], out: &mut Located) {
-        query_many(Kernel::best(), self, points, out);
+        struct QueryMany<'a, T> {
+            index: &'a T,
+            points: &'a [Vec3],
+            out: &'a mut Located,
+        }
+
+        impl<T: RegionIndex> Work for QueryMany<'_, T> {
+            type Output = ();
+
+            #[inline(always)]
+            fn run<I: Isa>(self, isa: I) {
+                let _ = self.index.query_many(isa, self.points, self.out);
+            }
+        }
+
+        out.clear();
+        let index = &self.index;
+        self.kernel.run(QueryMany { index, points, out });
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        RegionIndex::refit(self, items, moved)
+        self.index.refit(items, moved)
     }
-}
-
-impl<T: RegionIndex> DynIndex for By<T> {
-    fn memory(&self) -> MemoryUsage {
-        RegionIndex::memory(&self.index)
-    }
-
-    fn query(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>) {
-        query(self.kernel, &self.index, volume, out);
-    }
-
-    fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
-        DynIndex::query_counted(&self.index, volume, out, cost);
-    }
-
-    fn query_many(&self, points: &[Vec3], out: &mut Located) {
-        query_many(self.kernel, &self.index, points, out);
-    }
-
-    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        RegionIndex::refit(&mut self.index, items, moved)
-    }
-}
-
-/// A traversal of its own for each volume and kernel.
-fn query<T: RegionIndex>(kernel: Kernel, index: &T, volume: AnyVolume<'_>, out: &mut Vec<ItemId>) {
-    let recorder = &mut NoRecorder;
-    // A Vec never breaks off.
-    let _ =
-        each_volume!(volume, volume => kernel.run(Query { index, volume, sink: out, recorder }));
-}
-
-/// A batch of region searches as a kernel does it.
-struct QueryMany<'a, T> {
-    index: &'a T,
-    points: &'a [Vec3],
-    out: &'a mut Located,
-}
-
-impl<T: RegionIndex> Work for QueryMany<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) {
-        // The collector never breaks off.
-        let _ = self.index.query_many(isa, self.points, self.out);
-    }
-}
-
-pub(super) fn query_many<T: RegionIndex>(
-    kernel: Kernel,
-    index: &T,
-    points: &[Vec3],
-    out: &mut Located,
-) {
-    out.clear();
-    kernel.run(QueryMany { index, points, out });
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::{ConvexVolumeF64, Plane, RelativeVolume, Spheres};
-    use crate::index::{Input, Linear, OctreeTextbook, Trace, Wide};
+    use crate::index::{FrustumQuery, Input, Linear, OctreeTextbook, Trace, Wide};
 
-    /// Answer and cost of the structure compiled for the volume, and counted.
-    fn both<T: RegionIndex>(index: &T, volume: AnyVolume<'_>) -> [(Vec<ItemId>, QueryCost); 2] {
-        let [mut own, mut counted] = <[(Vec<ItemId>, QueryCost); 2]>::default();
-        let mut context = QueryContext::new(BASELINE, &mut own.0, &mut own.1);
-        let _ = each_volume!(volume, v => RegionIndex::query(index, v, &mut context));
-        index.query_counted(volume, &mut counted.0, &mut counted.1);
+    /// Answer and cost of the structure compiled for the volume, and dispatched.
+    fn both<T: RegionIndex>(index: T, volume: AnyVolume<'_>) -> [(Vec<ItemId>, QueryCost); 2] {
+        let own = each_volume!(volume, v => index.counted(v));
+        let mut counted = <(Vec<ItemId>, QueryCost)>::default();
+        let kernel = Kernel::best();
+        By { index, kernel }.query_counted(volume, &mut counted.0, &mut counted.1);
         [own, counted]
     }
 
@@ -169,7 +146,7 @@ mod tests {
         ];
         fn check<T: RegionIndex>(input: &Input<'_>, volume: AnyVolume<'_>) {
             let index = T::build(input, &Default::default()).unwrap();
-            let [own, counted] = both(&index, volume);
+            let [own, counted] = both(index, volume);
             assert!(!own.0.is_empty() && own.0.len() < input.items.len());
             assert_eq!(own, counted, "{} {volume:?}", T::INFO.name);
         }

@@ -218,8 +218,7 @@ impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for AllOf<'_, P, R> {
 mod tests {
     use super::*;
     use crate::geometry::{ConvexVolume, Plane};
-    use crate::index::DynIndex;
-    use crate::query::QueryCost;
+    use crate::index::FrustumQuery;
     use glam::Vec3;
 
     #[test]
@@ -240,8 +239,7 @@ mod tests {
             let items: Vec<Aabb> = low.map(|low| Aabb::new(low, low + Vec3::ONE)).collect();
             let scan = Linear::build(&Input::new(&items), &NoParams::default()).unwrap();
             for volume in &volumes {
-                let (mut found, mut cost) = (Vec::new(), QueryCost::default());
-                DynIndex::query_counted(&scan, volume.into(), &mut found, &mut cost);
+                let (found, cost) = scan.counted(volume);
                 let seen = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));
                 let seen: Vec<ItemId> = seen.map(|(_, id)| id).collect();
                 assert!(found == seen, "{count}: {} of {}", found.len(), seen.len());

@@ -18,7 +18,7 @@ pub use many::{Located, ManySink};
 pub use planes::Planes;
 pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
-pub use sink::{Count, First, Ranges, Sink, Tests, runs};
+pub use sink::{Count, Ranges, Sink, Tests, runs};
 pub(crate) use volume::each_volume;
 pub use volume::{AnyVolume, QueryVolume, UnpreparedPlanes};
 

@@ -253,32 +253,10 @@ impl Sink for Count {
     }
 }
 
-/// Stops at the first answer.
-#[derive(Clone, Copy, Default, Debug)]
-pub struct First(pub Option<ItemId>);
-
-impl Sink for First {
+/// A closure that gets ids of answers, slice by slice; `Break` ends the query.
+impl<F: FnMut(&[ItemId]) -> ControlFlow<()>> Sink for F {
     #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
-        match ids.first() {
-            Some(&id) => {
-                self.0 = Some(id);
-                ControlFlow::Break(())
-            }
-            None => ControlFlow::Continue(()),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_first_answer_ends_the_query_and_an_empty_slice_is_none() {
-        let mut first = First::default();
-        assert!(first.accept(&[]).is_continue());
-        assert_eq!(first.accept(&[7, 8]), ControlFlow::Break(()));
-        assert_eq!(first.0, Some(7));
+        self(ids)
     }
 }

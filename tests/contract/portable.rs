@@ -37,7 +37,7 @@ fn sorted_rest(mut ids: Vec<ItemId>, before: usize) -> Vec<ItemId> {
 fn sees<T: RegionIndex, V: QueryVolume>(index: &T, view: &V, before: usize, wanted: &[ItemId]) {
     // No spare room, and a start at any place of a cache line.
     let mut ids = vec![ItemId::MAX; before];
-    let _ = index.visible(view, &mut ids);
+    let _ = index.query_into(view, &mut ids);
     assert_eq!(sorted_rest(ids, before), wanted, "{}", T::INFO.name);
 }
 
@@ -55,9 +55,7 @@ fn queries<T: RegionIndex>(items: &[Aabb], volumes: &[ConvexVolume], points: &[V
     let mut from = 0;
     for (&p, &end) in points.iter().zip(all.ends()) {
         let wanted = those(items, |b| b.contains_point(p));
-        let mut ids = Vec::new();
-        let _ = index.locate(p, &mut ids);
-        assert_eq!(sorted_rest(ids, 0), wanted, "{}", T::INFO.name);
+        assert_eq!(sorted_rest(index.locate(p), 0), wanted, "{}", T::INFO.name);
         let batched = all.ids()[from..end].to_vec();
         assert_eq!(sorted_rest(batched, 0), wanted, "{}", T::INFO.name);
         from = end;

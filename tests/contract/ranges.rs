@@ -15,8 +15,7 @@ fn check<T: RegionIndex>(kernel: Kernel, scene: &Scene, volumes: &[ConvexVolume]
     let index = T::build(&Input::new(items), &T::Params::default()).expect(T::INFO.name);
     for volume in volumes {
         let what = format!("{} on {}", T::INFO.name, scene.name);
-        let mut ids = Vec::new();
-        let _ = index.visible(volume, &mut ids);
+        let mut ids = index.visible(volume);
         // Somebody else's range, which ends where tree order begins.
         let theirs = Range {
             start: u32::MAX,

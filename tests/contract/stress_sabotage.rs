@@ -9,7 +9,7 @@ use cullbench::index::{
     BuildError, DynIndex, Info, Kind, MemoryUsage, Origin, Row as Structure, StructureSpec,
     indexable,
 };
-use cullbench::query::{AnyVolume, ItemId, QueryCost};
+use cullbench::query::{AnyVolume, ItemId, Located, ManySink, QueryCost};
 use cullbench::stress::extremes::{CAMERA_FAMILIES, Case, Findings, PLANES_FAMILIES, camera_case};
 use cullbench::stress::{Replay, Row, Status, built_in, replay};
 use glam::Vec3;
@@ -46,6 +46,15 @@ impl DynIndex for Scan {
 
     fn query_counted(&self, view: AnyVolume<'_>, out: &mut Vec<ItemId>, _: &mut QueryCost) {
         self.query(view, out);
+    }
+
+    fn query_many(&self, points: &[Vec3], out: &mut Located) {
+        out.clear();
+        for (&p, point) in points.iter().zip(0..) {
+            let mut ids = Vec::new();
+            self.locate(p, &mut ids);
+            let _ = out.accept(point, &ids);
+        }
     }
 
     fn refit(&mut self, _: &[Aabb], _: &[ItemId]) -> bool {

@@ -8,9 +8,9 @@ use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
 use super::super::rule::{Rule, Unfit};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
-use crate::index::{DynIndex, Input, Query, RegionIndex, Wide};
-use crate::kernel::{BASELINE, Isa, Kernel};
-use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryContext, QueryCost, QueryVolume};
+use crate::index::{FrustumQuery, Input, Query, RegionIndex, Wide};
+use crate::kernel::{Isa, Kernel};
+use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume};
 
 pub(super) const RULE: Rule = Rule {
     name: "plane-masks",
@@ -39,12 +39,9 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
     let volumes: Rc<Vec<ConvexVolume>> = Rc::new(case.volumes().cloned().collect());
     let step = volumes.len().div_ceil(COUNTED).max(1);
     let (mut with, mut without) = (QueryCost::default(), QueryCost::default());
-    let mut out = Vec::new();
     for volume in volumes.iter().step_by(step) {
-        out.clear();
-        DynIndex::query_counted(&*tree, volume.into(), &mut out, &mut with);
-        out.clear();
-        count_unmasked(&tree, volume, &mut out, &mut without);
+        with += tree.counted(volume).1;
+        without += tree.counted(&Unmasked(volume)).1;
     }
     let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
     let omission = match all {
@@ -77,13 +74,6 @@ fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<
         sink,
         recorder,
     });
-}
-
-/// [`DynIndex::query_counted`] with every plane open.
-fn count_unmasked(tree: &Wide, volume: &ConvexVolume, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
-    let mut context = QueryContext::new(BASELINE, out, cost);
-    // A Vec never breaks off.
-    let _ = RegionIndex::query(tree, &Unmasked(volume), &mut context);
 }
 
 /// The six-plane view with every plane open wherever one is.
@@ -174,11 +164,10 @@ mod tests {
         let volume = ConvexVolume::from_planes(&planes).unwrap();
         let tree = Wide::build(&Input::new(&items), &Default::default()).unwrap();
         let ask = |masked: bool| {
-            let (mut out, mut cost) = (Vec::new(), QueryCost::default());
-            match masked {
-                true => DynIndex::query_counted(&tree, (&volume).into(), &mut out, &mut cost),
-                false => count_unmasked(&tree, &volume, &mut out, &mut cost),
-            }
+            let (mut out, cost) = match masked {
+                true => tree.counted(&volume),
+                false => tree.counted(&Unmasked(&volume)),
+            };
             out.sort_unstable();
             let mut timed = Vec::new();
             match masked {

@@ -351,8 +351,7 @@ fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_
             let cursor = [rng.between(60.0, 260.0), rng.between(60.0, 120.0)];
             let rectangle = CursorRectangle::around(cursor, half, [320.0, 180.0]);
             let volume = rectangle.volume(&rays, &around).unwrap();
-            let mut items = Vec::new();
-            let _ = index.visible(&volume, &mut items);
+            let mut items = index.visible(&volume);
             items.sort_unstable();
             let seen = scene.items.iter().map(|b| volume.sees(b));
             let seen = seen.zip(0..).filter(|(sees, _)| *sees).map(|(_, id)| id);
@@ -373,8 +372,7 @@ fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_
                 min: [0.0; 2],
                 max: [1.0; 2],
             };
-            let mut all = Vec::new();
-            let _ = index.visible(&whole.volume(&rays, &around).unwrap(), &mut all);
+            let all = index.visible(&whole.volume(&rays, &around).unwrap());
             assert!(items.len() < all.len() || all.is_empty());
         }
     }
