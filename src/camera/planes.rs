@@ -218,16 +218,35 @@ impl Camera {
     }
 
     fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes, CameraError> {
-        match self.lens.kind() {
-            LensKind::Matrix(matrix) if method == PlaneMethod::Frame => {
-                Ok(narrow(matrix.planes_about(zero)))
+        use ClipSpace::{D3d, OpenGl, ReversedZ};
+        let (frame, lens) = (&self.frame_about(zero), &self.lens);
+        let is_matrix = matches!(lens.kind(), LensKind::Matrix(_));
+        let rows = match method {
+            PlaneMethod::Frame => {
+                let planes = self.planes_f64(zero).into_iter();
+                return Ok(planes.map(|(name, plane)| (name, plane.narrow())).collect());
             }
-            LensKind::Matrix(_) => Err(CameraError::invalid(
-                "the camera is a matrix, which has planes of its own",
-                "--planes frame",
-            )),
-            _ => Ok(derive(&self.frame_about(zero), &self.lens, method)),
-        }
+            _ if is_matrix => {
+                return Err(CameraError::invalid(
+                    "the camera is a matrix, which has planes of its own",
+                    "--planes frame",
+                ));
+            }
+            PlaneMethod::FrameF32 => return Ok(from_frame_f32(frame, lens)),
+            PlaneMethod::GhGlF32 => single::planes(frame, lens, OpenGl),
+            PlaneMethod::GhGlF64 => double::planes(frame, lens, OpenGl),
+            PlaneMethod::GhD3dF32 => single::planes(frame, lens, D3d),
+            PlaneMethod::GhD3dF64 => double::planes(frame, lens, D3d),
+            PlaneMethod::GhRevzF32 => single::planes(frame, lens, ReversedZ),
+            PlaneMethod::GhRevzF64 => double::planes(frame, lens, ReversedZ),
+        };
+        // An infinite far plane is the absence of `far`, whatever its row holds.
+        let count = if lens.far().is_some() { 6 } else { 5 };
+        Ok(FrustumPlane::ALL
+            .into_iter()
+            .zip(rows)
+            .take(count)
+            .collect())
     }
 }
 
@@ -251,24 +270,6 @@ fn gathered(
 }
 
 type NamedPlanes = Vec<(FrustumPlane, Plane)>;
-
-fn derive(frame: &Frame, lens: &Lens, method: PlaneMethod) -> NamedPlanes {
-    use ClipSpace::{D3d, OpenGl, ReversedZ};
-    let rows = match method {
-        PlaneMethod::Frame => return narrow(from_frame_f64(frame, lens)),
-        PlaneMethod::FrameF32 => return from_frame_f32(frame, lens),
-        PlaneMethod::GhGlF32 => single::planes(frame, lens, OpenGl),
-        PlaneMethod::GhGlF64 => double::planes(frame, lens, OpenGl),
-        PlaneMethod::GhD3dF32 => single::planes(frame, lens, D3d),
-        PlaneMethod::GhD3dF64 => double::planes(frame, lens, D3d),
-        PlaneMethod::GhRevzF32 => single::planes(frame, lens, ReversedZ),
-        PlaneMethod::GhRevzF64 => double::planes(frame, lens, ReversedZ),
-    };
-    // An infinite far plane is the absence of `far`, whatever its row holds.
-    let count = if lens.far().is_some() { 6 } else { 5 };
-    let named = FrustumPlane::ALL.into_iter().zip(rows);
-    named.take(count).collect()
-}
 
 /// The side planes pass through the eye along the window's edges (or, for an
 /// orthographic lens, stand beside it); near and far face each other.
@@ -309,8 +310,3 @@ macro_rules! planes_from_frame {
 
 planes_from_frame!(from_frame_f64, f64, DVec3, |v| v, PlaneF64);
 planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane);
-
-fn narrow(wide: Vec<(FrustumPlane, PlaneF64)>) -> NamedPlanes {
-    let wide = wide.into_iter();
-    wide.map(|(name, plane)| (name, plane.narrow())).collect()
-}

@@ -5,8 +5,7 @@
 use glam::DVec3;
 
 use super::Oracle;
-use super::half_space::HalfSpace;
-use super::number::{Number, Precision};
+use super::number::{HalfSpace, Number, Precision};
 use crate::arithmetic::Expansion;
 use crate::arithmetic::exact::{self, ExactVector};
 use crate::camera::{Lens, LensKind, Pose, ViewProjection};
@@ -47,7 +46,7 @@ impl Oracle {
             let constraints = planes_of_matrix(matrix, origin);
             return origin
                 .is_finite()
-                .then(|| Oracle::new(&constraints, PRECISION));
+                .then(|| Oracle::new(constraints, PRECISION));
         }
         let (eye, towards, up) = match *pose {
             Pose::LookAt { eye, look, up } => (eye, look, up),
@@ -65,7 +64,7 @@ impl Oracle {
         let v = cross(&back, &u);
         let eye = exact::difference(eye, origin);
         let constraints = planes(&View { u, v, back, eye }, lens);
-        Some(Oracle::new(&constraints, PRECISION))
+        Some(Oracle::new(constraints, PRECISION))
     }
 }
 

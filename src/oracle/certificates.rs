@@ -17,8 +17,7 @@
 //! of open half-spaces with "not positive" in place of "negative": a least
 //! value of zero is a touch.)
 
-use super::half_space::HalfSpace;
-use super::number::{Number, Precision};
+use super::number::{HalfSpace, Number, Precision};
 use super::rough::{RoughSpaces, may_agree};
 
 /// What a volume is before any box is looked at.
@@ -43,7 +42,7 @@ pub(super) struct Certificates {
 /// All certificates of the half-spaces that can be the tightest for some box.
 /// O(m^4) steps in f64 for m of them; exact sums only for what is kept and
 /// where rounding could matter.
-pub(super) fn certificates(given: &[HalfSpace], precision: Precision) -> Certificates {
+pub(super) fn certificates(given: Vec<HalfSpace>, precision: Precision) -> Certificates {
     let empty = || Certificates {
         extent: Extent::Empty,
         faces: 0,
@@ -56,13 +55,12 @@ pub(super) fn certificates(given: &[HalfSpace], precision: Precision) -> Certifi
         match (is_zero, precision.sign(&constraint.d)) {
             (true, -1) => return empty(),
             (true, _) => {}
-            (false, _) => constraints.push(constraint.clone()),
+            (false, _) => constraints.push(constraint),
         }
     }
     let mut search = Search {
         precision,
         rough: RoughSpaces::new(&constraints),
-        minors: vec![[None, None, None]; constraints.len() * constraints.len()],
         constraints,
         extent: Extent::Solid,
         found: Vec::new(),
@@ -97,30 +95,22 @@ struct Search {
     precision: Precision,
     constraints: Vec<HalfSpace>,
     rough: RoughSpaces,
-    /// Those that were asked for, by both constraints and the axis left out.
-    minors: Vec<[Option<Number>; 3]>,
     extent: Extent,
     found: Vec<HalfSpace>,
 }
 
 impl Search {
     /// The 2 x 2 minor `n_i[a] n_j[b] - n_i[b] n_j[a]` without `axis`.
-    fn minor(&mut self, i: usize, j: usize, axis: usize) -> Number {
-        let known = &mut self.minors[i * self.constraints.len() + j][axis];
-        let minor = known.get_or_insert_with(|| {
-            let [a, b] = OTHERS[axis];
-            let [n, m] = [i, j].map(|c| &self.constraints[c].normal);
-            self.precision.determinant([&n[a], &n[b], &m[a], &m[b]])
-        });
-        minor.clone()
+    fn minor(&self, i: usize, j: usize, axis: usize) -> Number {
+        let [a, b] = OTHERS[axis];
+        let [n, m] = [i, j].map(|c| &self.constraints[c].normal);
+        self.precision.determinant([&n[a], &n[b], &m[a], &m[b]])
     }
 
-    fn determinant(&mut self, i: usize, j: usize, l: usize) -> Number {
-        let p = self.precision;
-        let minors = [0, 1, 2].map(|k| self.minor(j, l, k));
+    fn determinant(&self, i: usize, j: usize, l: usize) -> Number {
         let first = &self.constraints[i].normal;
-        let products = (0..3).map(|k| p.multiply(&first[k], &minors[k]));
-        products.reduce(|a, b| p.add(&a, &b)).unwrap_or_default()
+        self.precision
+            .combined((0..3).map(|k| (&first[k], self.minor(j, l, k))))
     }
 
     /// A combination of constraints: a certificate, or, if nothing is left of
@@ -134,16 +124,12 @@ impl Search {
         let p = self.precision;
         let parts = parts.map(|c| &self.constraints[c]);
         let sum = |of: &dyn Fn(&HalfSpace) -> Number| {
-            let products = (0..N).map(|k| p.multiply(&weights[k], &of(parts[k])));
-            let total = products.reduce(|a, b| p.add(&a, &b)).unwrap_or_default();
-            p.cleaned(total)
+            let products = weights.iter().zip(parts.map(of));
+            p.cleaned(p.combined(products))
         };
-        let normal = [0, 1, 2].map(|k| {
-            if zero_axes[k] {
-                Number::default()
-            } else {
-                sum(&|c| c.normal[k].clone())
-            }
+        let normal = [0, 1, 2].map(|k| match zero_axes[k] {
+            true => Number::default(),
+            false => sum(&|c| c.normal[k].clone()),
         });
         let d = sum(&|c| c.d.clone());
         if normal.iter().any(|n| p.sign(n) != 0) {

@@ -2,10 +2,10 @@
 //! error, and exactly. Which certificates there are, and what their signs mean
 //! together, is not known here.
 
-use super::half_space::HalfSpace;
-use super::number::Precision;
+use super::number::{HalfSpace, Precision};
 use crate::arithmetic::{Expansion, two_product, two_sum, upper_half};
 use crate::geometry::Aabb;
+use glam::DVec3;
 
 /// A certificate in f64, each coefficient rounded once.
 pub(super) struct Filter {
@@ -41,6 +41,15 @@ impl Corners {
             low: b.min.as_dvec3().to_array(),
             high: b.max.as_dvec3().to_array(),
             is_narrow: true,
+        }
+    }
+
+    /// Corners in f64, whose products with a coefficient are rounded.
+    pub fn between(min: DVec3, max: DVec3) -> Corners {
+        Corners {
+            low: min.to_array(),
+            high: max.to_array(),
+            is_narrow: false,
         }
     }
 
@@ -173,7 +182,7 @@ pub(super) fn inner_point(faces: &[Filter]) -> Option<[f64; 3]> {
 
 /// Where three planes meet, by Cramer's rule.
 fn meeting_point(planes: [&Filter; 3]) -> Option<[f64; 3]> {
-    let [a, b, c] = planes.map(|plane| glam::DVec3::from_array(plane.normal));
+    let [a, b, c] = planes.map(|plane| DVec3::from_array(plane.normal));
     let determinant = a.dot(b.cross(c));
     let sum = b.cross(c) * planes[0].d + c.cross(a) * planes[1].d + a.cross(b) * planes[2].d;
     let point = -sum / determinant;

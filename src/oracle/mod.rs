@@ -7,7 +7,6 @@
 mod camera;
 mod certificates;
 mod evaluate;
-mod half_space;
 mod number;
 mod rough;
 
@@ -15,8 +14,7 @@ use crate::geometry::{Aabb, ConvexVolume};
 use certificates::{Certificates, Extent, certificates};
 use evaluate::{Corners, Exact, Filter, inner_point};
 use glam::DVec3;
-use half_space::HalfSpace;
-use number::Precision;
+use number::{HalfSpace, Precision};
 
 pub use crate::camera::Pose;
 
@@ -80,18 +78,14 @@ impl Oracle {
     /// Planes level: the planes as they are, with no error whatever. Nothing
     /// overflows or underflows: all products have at most four factors of f32.
     pub fn of_volume(volume: &ConvexVolume) -> Oracle {
-        let constraints: Vec<HalfSpace> = volume
-            .planes()
-            .iter()
-            .map(|plane| HalfSpace {
-                normal: plane.normal.to_array().map(Into::into),
-                d: plane.d.into(),
-            })
-            .collect();
-        Oracle::new(&constraints, Precision::EXACT)
+        let planes = volume.planes().iter().map(|plane| HalfSpace {
+            normal: plane.normal.to_array().map(Into::into),
+            d: plane.d.into(),
+        });
+        Oracle::new(planes.collect(), Precision::EXACT)
     }
 
-    fn new(constraints: &[HalfSpace], precision: Precision) -> Oracle {
+    fn new(constraints: Vec<HalfSpace>, precision: Precision) -> Oracle {
         let Certificates { extent, faces, all } = certificates(constraints, precision);
         let filter: Vec<Filter> = all.iter().map(Filter::new).collect();
         Oracle {
@@ -117,33 +111,27 @@ impl Oracle {
 
     /// The same about a box in f64, between finite corners of at most 1e60.
     pub fn judge_wide(&self, min: DVec3, max: DVec3) -> Judgement {
-        self.judge_corners(&wide(min, max))
+        self.judge_corners(&Corners::between(min, max))
     }
 
     fn judge_corners(&self, corners: &Corners) -> Judgement {
-        let proved = |verdict| Judgement {
-            verdict,
-            undecided: false,
-        };
+        let judged = |verdict, undecided| Judgement { verdict, undecided };
         if corners.is_empty() || self.extent == Extent::Empty {
-            return proved(Verdict::Out);
+            return judged(Verdict::Out, false);
         }
         let mut least = if self.extent == Extent::Flat { 0 } else { 1 };
         for i in 0..self.filter.len() {
             if i == self.faces && least > 0 && self.witnessed(corners) {
-                return proved(Verdict::In);
+                return judged(Verdict::In, false);
             }
             match self.sign(i, corners) {
-                -1 => return proved(Verdict::Out),
+                -1 => return judged(Verdict::Out, false),
                 sign => least = least.min(sign),
             }
         }
-        if least > 0 {
-            return proved(Verdict::In);
-        }
-        Judgement {
-            verdict: Verdict::Touch,
-            undecided: !self.precision.is_exact(),
+        match least > 0 {
+            true => judged(Verdict::In, false),
+            false => judged(Verdict::Touch, !self.precision.is_exact()),
         }
     }
 
@@ -179,7 +167,7 @@ impl Oracle {
 
     /// The same of a box in f64.
     pub fn depth_wide(&self, min: DVec3, max: DVec3) -> f64 {
-        self.depth_of_corners(&wide(min, max))
+        self.depth_of_corners(&Corners::between(min, max))
     }
 
     /// Whether one of the volume's own planes has the whole box on its outer
@@ -224,18 +212,9 @@ impl Oracle {
                 value > error
             })
         };
-        let centre = |k: usize| (b.high[k] + b.low[k]) * 0.5;
-        let near = |inner: &[f64; 3], k: usize| inner[k].clamp(b.low[k], b.high[k]);
-        let nearest = self.inner.as_ref();
-        nearest.is_some_and(|p| is_inside([near(p, 0), near(p, 1), near(p, 2)]))
-            || is_inside([centre(0), centre(1), centre(2)])
-    }
-}
-
-fn wide(min: DVec3, max: DVec3) -> Corners {
-    Corners {
-        low: min.to_array(),
-        high: max.to_array(),
-        is_narrow: false,
+        let axes = [0, 1, 2];
+        let nearest = |inner: [f64; 3]| axes.map(|k| inner[k].clamp(b.low[k], b.high[k]));
+        self.inner.is_some_and(|inner| is_inside(nearest(inner)))
+            || is_inside(axes.map(|k| (b.high[k] + b.low[k]) * 0.5))
     }
 }

@@ -55,6 +55,12 @@ impl Precision {
         Number::new(self.cut(&a.value * &b.value), a.size * b.size)
     }
 
+    /// The sum of products.
+    pub fn combined<'a>(self, products: impl Iterator<Item = (&'a Number, Number)>) -> Number {
+        let products = products.map(|(a, b)| self.multiply(a, &b));
+        products.reduce(|a, b| self.add(&a, &b)).unwrap_or_default()
+    }
+
     /// `a*d - b*c`.
     pub fn determinant(self, [a, b, c, d]: [&Number; 4]) -> Number {
         self.subtract(&self.multiply(a, d), &self.multiply(b, c))
@@ -80,6 +86,13 @@ impl Precision {
             _ => a,
         }
     }
+}
+
+/// One constraint `normal . x + d >= 0`.
+#[derive(Clone, Debug)]
+pub(super) struct HalfSpace {
+    pub normal: [Number; 3],
+    pub d: Number,
 }
 
 /// A value with its size: the sum of the magnitudes it came from.

@@ -2,7 +2,7 @@
 //! with a bound of their error, so that exact sums are only formed where
 //! rounding could matter. It defines what can be told for certain without them.
 
-use super::half_space::HalfSpace;
+use super::number::HalfSpace;
 
 /// A result in f64 errs by less than this part of its size. No sum below has
 /// a longer history than coefficients rounded twice, five products and six

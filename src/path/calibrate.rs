@@ -41,16 +41,19 @@ pub(super) fn for_visible_share(
         }
         Ok(seen as f64 / (items.len() * sample.len()).max(1) as f64)
     };
+    let unreached = |found: &str, wanted: &str| {
+        let scene = &scene.name;
+        let reason = format!(
+            "visible={share} cannot be reached: {found} of '{scene}' is visible along it; \
+             expected a {wanted} share"
+        );
+        PathError::unfit(path, reason)
+    };
     let (mut low, mut high) = (1e-4, 4.0);
     let most = visible(high)?;
     if most < share {
-        let (percent, scene) = (most * 100.0, &scene.name);
-        return Err(PathError::unfit(
-            path,
-            format_args!(
-                "visible={share} cannot be reached: at most {percent:.2}% of '{scene}' is visible along it; expected a smaller share"
-            ),
-        ));
+        let found = format!("at most {:.2}%", most * 100.0);
+        return Err(unreached(&found, "smaller"));
     }
     let mut reached = [visible(low)?, most];
     for _ in 0..16 {
@@ -64,18 +67,11 @@ pub(super) fn for_visible_share(
     }
     if reached[1] > share * MOST_ABOVE {
         let [below, above] = reached.map(|share| share * 100.0);
-        let scene = &scene.name;
         let found = match below < share * 100.0 {
             true => format!("{below:.2}% or {above:.2}%, and no share between,"),
             false => format!("at least {above:.2}%"),
         };
-        return Err(PathError::unfit(
-            path,
-            format_args!(
-                "visible={share} cannot be reached: {found} of '{scene}' is visible along it; \
-                 expected a larger share"
-            ),
-        ));
+        return Err(unreached(&found, "larger"));
     }
     Ok(high)
 }
@@ -111,8 +107,6 @@ fn rescaled(camera: &Camera, scale: f64) -> Result<Camera, CameraError> {
 
 /// At most `most` elements, evenly spaced.
 fn every_nth<T: Copy>(all: &[T], most: usize) -> Vec<T> {
-    all.iter()
-        .copied()
-        .step_by(all.len().div_ceil(most).max(1))
-        .collect()
+    let step = all.len().div_ceil(most).max(1);
+    all.iter().copied().step_by(step).collect()
 }

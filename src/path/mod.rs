@@ -134,30 +134,22 @@ pub enum PathError {
     /// The name or a parameter is wrong.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// A row that is no camera.
-    #[error("path '{path}', camera {index}: {error}")]
-    Camera {
-        /// Name of the path.
-        path: String,
-        /// Index of the camera.
-        index: usize,
-        /// What is wrong with it.
-        error: CameraError,
-    },
-    /// The scene lacks what this kind of path needs.
-    #[error("path '{path}': {reason}")]
+    /// A path that this scene cannot have, or one of its cameras that is none.
+    #[error("{place}: {reason}")]
     Unfit {
-        /// Name of the path.
-        path: String,
-        /// What is missing.
+        /// The path, and the camera if it is one of them.
+        place: String,
+        /// What was found and expected.
         reason: String,
     },
 }
 
 impl PathError {
     fn unfit(path: &str, reason: impl ToString) -> PathError {
-        let (path, reason) = (path.to_owned(), reason.to_string());
-        PathError::Unfit { path, reason }
+        PathError::Unfit {
+            place: format!("path '{path}'"),
+            reason: reason.to_string(),
+        }
     }
 }
 
@@ -278,22 +270,19 @@ pub fn load_scaled(
         let reason = "no camera in it; expected at least one";
         return Err(PathError::unfit(source, reason));
     }
-    let lens_scale = match (optics.visible, scale) {
-        (Some(_), Some(scale)) => Some(scale),
-        (Some(share), None) => Some(calibrate::for_visible_share(
-            source, scene, &cameras, share,
-        )?),
-        (None, _) => None,
-    };
-    Ok(CameraPath {
+    let mut path = CameraPath {
         name: source.to_owned(),
-        cameras: match lens_scale {
-            Some(scale) => calibrate::scaled(source, &cameras, scale)?,
-            None => cameras,
-        },
+        cameras,
         lines: Vec::new(),
-        lens_scale,
-    })
+        lens_scale: None,
+    };
+    if let Some(share) = optics.visible {
+        let find = || calibrate::for_visible_share(source, scene, &path.cameras, share);
+        let scale = scale.map_or_else(find, Ok)?;
+        path.cameras = calibrate::scaled(source, &path.cameras, scale)?;
+        path.lens_scale = Some(scale);
+    }
+    Ok(path)
 }
 
 /// Refuses more cameras than there is memory for.
@@ -306,16 +295,15 @@ fn fits(source: &str, cameras: u64) -> Result<(), PathError> {
     if cameras <= ANYWHERE {
         return Ok(());
     }
-    match scene::available_bytes().filter(|available| needed > *available) {
-        Some(available) => Err(PathError::unfit(
-            source,
-            format!(
-                "{cameras} cameras need about {}, {} are free; expected fewer",
-                gigabytes(needed),
-                gigabytes(available)
-            ),
-        )),
-        None => Ok(()),
+    match scene::available_bytes() {
+        Some(available) if needed > available => {
+            let (needed, available) = (gigabytes(needed), gigabytes(available));
+            let reason = format!(
+                "{cameras} cameras need about {needed}, {available} are free; expected fewer"
+            );
+            Err(PathError::unfit(source, reason))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -323,7 +311,7 @@ fn fits(source: &str, cameras: u64) -> Result<(), PathError> {
 struct Optics {
     fovy_deg: f64,
     aspect: f64,
-    near: Option<f64>,
+    near: f64,
     far: Option<f64>,
     visible: Option<f64>,
 }
@@ -357,44 +345,34 @@ impl Optics {
                 spec.name()
             )));
         }
-        let visible = match spec.text("visible") {
-            Some(text) => Some(visible_share(spec, &text, stage.scene.items.len())?),
-            None => None,
-        };
+        let visible = spec.text("visible");
+        let visible = visible.map(|text| visible_share(spec, &text, stage.scene.items.len()));
         Ok(Optics {
             fovy_deg: spec.number("fovy", defaults.fovy_deg)?,
             aspect: spec.number("aspect", defaults.aspect)?,
-            near: near.or_else(|| far.is_none().then_some(natural / 1000.0)),
+            near: near.unwrap_or(far.unwrap_or(natural) / 1000.0),
             far,
-            visible,
+            visible: visible.transpose()?,
         })
     }
 
     fn cameras(&self, path: &str, poses: &[Pose]) -> Result<Vec<Camera>, PathError> {
-        let near = self
-            .near
-            .or(self.far.map(|far| far / 1000.0))
-            .unwrap_or(1.0);
         let camera = |pose: &Pose| -> Result<Camera, CameraError> {
             let frame = Frame::looking_along(pose.eye, pose.forward, up_for(pose.forward))?;
-            let lens = Lens::perspective(self.fovy_deg, self.aspect, near, self.far)?;
+            let lens = Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far)?;
             let mut camera = Camera { frame, lens };
             if pose.magnification != 1.0 {
                 camera.zoom(pose.magnification)?;
             }
             Ok(camera)
         };
-        poses
-            .iter()
-            .enumerate()
-            .map(|(index, pose)| {
-                camera(pose).map_err(|error| PathError::Camera {
-                    path: path.to_owned(),
-                    index,
-                    error,
-                })
+        let numbered = poses.iter().enumerate().map(|(index, pose)| {
+            camera(pose).map_err(|error| PathError::Unfit {
+                place: format!("path '{path}', camera {index}"),
+                reason: error.to_string(),
             })
-            .collect()
+        });
+        numbered.collect()
     }
 }
 

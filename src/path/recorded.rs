@@ -7,7 +7,8 @@ use glam::DVec3;
 
 use super::{CameraPath, PathError};
 use crate::camera::{
-    Camera, CameraError, Frame, Lens, MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, look_at,
+    Camera, CameraError, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
+    MatrixConvention, look_at,
 };
 use crate::input::{InputError, Row, TableReader};
 
@@ -62,17 +63,22 @@ pub fn read_cameras_csv(
     file: &str,
     defaults: &LensDefaults,
 ) -> Result<CameraPath, PathError> {
-    let table = TableReader::open(input, file)?;
+    let mut table = TableReader::open(input, file)?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
-    let (lines, cameras): (Vec<u64>, Vec<Camera>) = if is_matrix {
-        matrices(table, defaults.matrix)?
+    let read: CameraReader = if is_matrix {
+        matrices(&table, defaults.matrix)?
     } else {
-        eyes(table, defaults)?
-    }
+        eyes(&table, defaults)?
+    };
+    let (lines, cameras): (Vec<u64>, Vec<Camera>) = rows(&mut table, file, "no camera", |row| {
+        let camera = read(row)?.map_err(|error| refused(row, &error))?;
+        Ok((row.line(), camera))
+    })?
     .into_iter()
     .unzip();
-    if cameras.is_empty() {
-        return Err(without_rows(file, "no camera").into());
+    match is_matrix {
+        true => table.note_unread(&MATRIX_ENTRIES, &[]),
+        false => table.note_unread(&OF_EYES, &SYNONYMS),
     }
     Ok(CameraPath {
         lens_scale: None,
@@ -82,22 +88,39 @@ pub fn read_cameras_csv(
     })
 }
 
-fn without_rows(file: &str, found: &str) -> InputError {
-    InputError::Line {
-        file: file.to_owned(),
-        line: 2,
-        found: found.to_owned(),
-        expected: "at least one row after the header".to_owned(),
+/// Makes the camera of a row, from the columns of one kind of file.
+type CameraReader<'a> = Box<dyn Fn(&Row) -> Result<Result<Camera, CameraError>, InputError> + 'a>;
+
+/// All rows of a table, of which there must be one.
+fn rows<T>(
+    table: &mut TableReader<impl Read>,
+    file: &str,
+    none: &str,
+    read: impl Fn(&Row) -> Result<T, InputError>,
+) -> Result<Vec<T>, InputError> {
+    let mut found = Vec::new();
+    while let Some(row) = table.next_row()? {
+        found.push(read(&row?)?);
     }
+    if found.is_empty() {
+        return Err(InputError::Line {
+            file: file.to_owned(),
+            line: 2,
+            found: none.to_owned(),
+            expected: "at least one row after the header".to_owned(),
+        });
+    }
+    Ok(found)
 }
 
-/// The camera's own message says what was expected.
+/// The error of a row whose numbers make no camera.
 fn refused(row: &Row, error: &CameraError) -> InputError {
-    let message = error.to_string();
-    let (found, expected) = message
-        .split_once("; expected ")
-        .unwrap_or((&message, "a camera"));
-    row.error(found.to_owned(), expected.to_owned())
+    match error {
+        CameraError::Invalid { found, expected } => {
+            row.error(found.clone(), (*expected).to_owned())
+        }
+        other => row.error(other.to_string(), "a camera".to_owned()),
+    }
 }
 
 /// Columns that say what a matrix says already.
@@ -114,10 +137,10 @@ const SYNONYMS: [(&str, &str); 3] = [
     ("yaw", "forward_x,forward_y,forward_z"),
 ];
 
-fn matrices(
-    mut table: TableReader<impl Read>,
+fn matrices<'a>(
+    table: &TableReader<impl Read>,
     convention: Option<MatrixConvention>,
-) -> Result<Vec<(u64, Camera)>, InputError> {
+) -> Result<CameraReader<'a>, InputError> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
     if let Some(other) = OF_EYES.iter().find(|name| table.column(name).is_some()) {
         return Err(table.error(
@@ -132,93 +155,76 @@ fn matrices(
             format!("--matrix-convention with one of {known}"),
         )
     })?;
-    let mut cameras = Vec::new();
-    while let Some(row) = table.next_row()? {
-        let row = row?;
+    Ok(Box::new(move |row| {
         let mut entries = [[0.0; 4]; 4];
         for (entry, &column) in entries.as_flattened_mut().iter_mut().zip(&columns) {
             *entry = row.finite_number(column)?;
         }
-        let camera = Camera::of_matrix(entries, convention);
-        let camera = camera.map_err(|error| refused(&row, &error))?;
-        cameras.push((row.line(), camera));
-    }
-    table.note_unread(&MATRIX_ENTRIES, &[]);
-    Ok(cameras)
+        Ok(Camera::of_matrix(entries, convention))
+    }))
 }
 
-fn eyes(
-    mut table: TableReader<impl Read>,
-    defaults: &LensDefaults,
-) -> Result<Vec<(u64, Camera)>, InputError> {
-    let eye = table.columns(&["eye_x", "eye_y", "eye_z"])?;
-    let has = |name: &str| ["_x", "_y", "_z"].map(|axis| table.column(&format!("{name}{axis}")));
-    let [looks, forwards] = ["look", "forward"].map(|name| has(name).iter().any(Option::is_some));
-    if looks && forwards {
+fn eyes<'a>(
+    table: &TableReader<impl Read>,
+    defaults: &'a LensDefaults,
+) -> Result<CameraReader<'a>, InputError> {
+    let vector = |name: &str| {
+        let names = ["x", "y", "z"].map(|axis| format!("{name}_{axis}"));
+        let has_any = names.iter().any(|name| table.column(name).is_some());
+        (
+            has_any,
+            table.columns(&names.each_ref().map(String::as_str)),
+        )
+    };
+    let eye = vector("eye").1?;
+    let [(has_look, look), (by_forward, forward), (has_up, up)] =
+        ["look", "forward", "up"].map(vector);
+    if has_look && by_forward {
         return Err(table.error(
             "columns look_* and forward_*".to_owned(),
             "a place to look at or a direction, not both".to_owned(),
         ));
     }
-    let by_forward = forwards;
-    let target = if by_forward {
-        table.columns(&["forward_x", "forward_y", "forward_z"])?
-    } else {
-        table.columns(&["look_x", "look_y", "look_z"])?
-    };
-    let up = ["up_x", "up_y", "up_z"];
-    let has_up = up.iter().any(|name| table.column(name).is_some());
-    let up = has_up.then(|| table.columns(&up)).transpose()?;
+    let target = if by_forward { forward? } else { look? };
+    let up = has_up.then_some(up).transpose()?;
     let lens = ["fovy_deg", "ortho_height", "aspect", "near", "far"];
     let [fovy, height, aspect, near, far] = lens.map(|name| table.column(name));
-    let mut cameras = Vec::new();
-    while let Some(row) = table.next_row()? {
-        let row = row?;
-        let number = |column: Option<usize>, default: f64| match column {
-            Some(column) => row.finite_number(column),
-            None => Ok(default),
+    Ok(Box::new(move |row| {
+        let number = |column: Option<usize>, default: f64| {
+            column.map_or(Ok(default), |column| row.finite_number(column))
         };
-        let eye = vector(&row, eye)?;
-        let target = vector(&row, target)?;
-        let up = match up {
-            Some(columns) => vector(&row, columns)?,
-            None => defaults.up,
-        };
-        let infinite = |column| {
+        let eye = point(row, eye)?;
+        let target = point(row, target)?;
+        let up = up.map_or(Ok(defaults.up), |columns| point(row, columns))?;
+        let is_infinite = |column| {
             let text = row.text(column).to_lowercase();
             ["", "inf", "+inf", "infinity"].contains(&text.as_str())
         };
         let far = match far {
-            Some(column) if infinite(column) => None,
+            Some(column) if is_infinite(column) => None,
             Some(column) => Some(row.finite_number(column)?),
             None => defaults.far.unwrap_or(Some(FAR)),
         };
         let height = height.filter(|column| !row.text(*column).is_empty());
         let height = height.map(|column| row.finite_number(column)).transpose()?;
         // Not read where the lens is orthographic.
-        let fovy = fovy.filter(|_| height.is_none());
-        let fovy = number(fovy, defaults.fovy_deg)?;
+        let fovy_deg = number(fovy.filter(|_| height.is_none()), defaults.fovy_deg)?;
         let aspect = number(aspect, defaults.aspect)?;
         let near = number(near, defaults.near.unwrap_or(NEAR))?;
-        let camera = || -> Result<Camera, CameraError> {
-            let frame = if by_forward {
-                Frame::looking_along(eye, target, up)?
-            } else {
-                look_at(eye, target, up)?
-            };
-            let lens = match height {
-                Some(height) => {
-                    Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY))?
-                }
-                None => Lens::perspective(fovy, aspect, near, far)?,
-            };
-            Ok(Camera { frame, lens })
+        let frame = if by_forward {
+            Frame::looking_along(eye, target, up)
+        } else {
+            look_at(eye, target, up)
         };
-        let camera = camera().map_err(|error| refused(&row, &error))?;
-        cameras.push((row.line(), camera));
-    }
-    table.note_unread(&OF_EYES, &SYNONYMS);
-    Ok(cameras)
+        Ok(frame.and_then(|frame| {
+            let kind = match height {
+                Some(height) => LensKind::Orthographic { height, aspect },
+                None => LensKind::Perspective { fovy_deg, aspect },
+            };
+            let lens = Lens::new(kind, near, far)?;
+            Ok(Camera { frame, lens })
+        }))
+    }))
 }
 
 /// Reads a points CSV with the columns `x,y,z`.
@@ -229,24 +235,14 @@ fn eyes(
 pub fn read_points_csv(input: impl Read, file: &str) -> Result<Vec<DVec3>, InputError> {
     let mut table = TableReader::open(input, file)?;
     let columns = table.columns(&["x", "y", "z"])?;
-    let mut points = Vec::new();
-    while let Some(row) = table.next_row()? {
-        points.push(vector(&row?, columns)?);
-    }
-    if points.is_empty() {
-        return Err(without_rows(file, "no point"));
-    }
+    let points = rows(&mut table, file, "no point", |row| point(row, columns))?;
     table.note_unread(&["x", "y", "z"], &[]);
     Ok(points)
 }
 
-fn vector(row: &Row, columns: [usize; 3]) -> Result<DVec3, InputError> {
-    let [x, y, z] = columns;
-    Ok(DVec3::new(
-        row.finite_number(x)?,
-        row.finite_number(y)?,
-        row.finite_number(z)?,
-    ))
+fn point(row: &Row, [x, y, z]: [usize; 3]) -> Result<DVec3, InputError> {
+    let of = |column| row.finite_number(column);
+    Ok(DVec3::new(of(x)?, of(y)?, of(z)?))
 }
 
 #[cfg(test)]

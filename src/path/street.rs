@@ -78,10 +78,6 @@ struct Stand {
     rise: f64,
     /// Whether on what stands on that.
     is_on_top: bool,
-    /// Whether not on the ground of a mesh.
-    is_off: bool,
-    /// Whether on nothing, where nearly all places are on something.
-    is_bare: bool,
 }
 
 /// For each of so many eyes the lowest of the places that are drawn for it.
@@ -93,19 +89,18 @@ fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<
         let stands = columns.iter_mut().map(|column| {
             let ground = column.ground(height + CLEARANCE);
             let first = column.spans.first();
-            Stand {
+            let is_off_mesh = !first.is_some_and(|span| span.is_ground);
+            // Where there is ground, a place without any is beyond its edge.
+            let is_beyond = has_ground && first.is_none();
+            let stand = Stand {
                 eye: DVec3::new(column.x, column.y, ground + height),
-                is_off: !first.is_some_and(|span| span.is_ground),
-                is_bare: has_ground && first.is_none(),
                 rise: ground - column.foot(),
                 is_on_top: ground > first.map_or(column.low, |span| span.top),
-            }
+            };
+            ((is_off_mesh, is_beyond), stand)
         });
-        // Where there is ground, a place without any is beyond its edge.
-        stands.min_by(|a, b| {
-            let rise = a.rise.total_cmp(&b.rise);
-            (a.is_off, a.is_bare).cmp(&(b.is_off, b.is_bare)).then(rise)
-        })
+        let best = stands.min_by(|(a, s), (b, t)| a.cmp(b).then(s.rise.total_cmp(&t.rise)));
+        best.map(|(_, stand)| stand)
     });
     stands.collect()
 }
