@@ -38,15 +38,18 @@ pub fn exponent(v: &ExactVector) -> Option<i32> {
     (largest > 0.0).then(|| libm::ilogb(largest))
 }
 
-/// The vector times a power of two that brings its largest component near 1, so that
-/// no product overflows; `None` for the zero vector.
+/// The vector times the power of two that brings its largest component near 1.
+///
+/// Products of such vectors do not overflow. `None` for the zero vector.
 pub fn near_unit(v: ExactVector) -> Option<ExactVector> {
     let exponent = exponent(&v)?;
     Some(v.map(|component| component.scaled(-exponent)))
 }
 
-/// Pi, true to 2^-330 (Hida, Li and Bailey 2001, "Algorithms for quad-double precision
-/// floating point arithmetic", and two more terms).
+/// Pi, true to 2^-330.
+///
+/// The first four terms are those of Hida, Li and Bailey 2001, "Algorithms for quad-double
+/// precision floating point arithmetic".
 pub fn pi() -> Expansion {
     const TERMS: [f64; 6] = [
         1.7449862161352486e-83,
@@ -61,7 +64,9 @@ pub fn pi() -> Expansion {
     pi
 }
 
-/// `first` plus `first factor^n / (d(1) d(2) ... d(n))` for all n, to `count` terms.
+/// Sum of `first factor^n / (d(1) d(2) ... d(n))` over all n from 0 on.
+///
+/// The result has `count` terms.
 pub fn series(
     first: Expansion,
     factor: &Expansion,

@@ -1,5 +1,7 @@
-//! Arithmetic with a known error: directed rounding, error-free sums and products, cross
-//! products without cancellation, and expansions (exact sums of doubles).
+//! Arithmetic with a known error, or none.
+//!
+//! Directed rounding, error-free sums and products, cross products without cancellation,
+//! and expansions (exact sums of doubles).
 
 mod cross;
 pub mod exact;

@@ -1,5 +1,4 @@
-//! Directed rounding from f64 to f32: the two functions that keep a bound a
-//! bound. They own no policy; who rounds which way is decided by the caller.
+//! Directed rounding: differences and sums that stay bounds.
 
 use super::two_sum;
 

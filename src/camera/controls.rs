@@ -1,6 +1,7 @@
-//! Flexible camera control: slide, move, zoom, orbit, yaw, pitch and roll of
-//! the lectures. All angles are degrees and turn counter-clockwise about the
-//! axis they name (right-hand rule). It defines the drift correction as well.
+//! Camera controls: slide, advance, zoom, orbit, yaw, pitch and roll.
+//!
+//! Angles are degrees, counter-clockwise about their axis (right-hand rule). Rotations
+//! correct their drift.
 
 use glam::{DQuat, DVec3};
 

@@ -1,5 +1,4 @@
-//! The camera's orthonormal frame in f64 and the world-to-eye matrix. How the
-//! frame moves is in `controls`; what the lens sees is in `lens`.
+//! The camera's orthonormal frame in f64.
 
 use glam::{DMat3, DVec3};
 
@@ -19,7 +18,7 @@ pub struct Frame {
     pub(super) n: DVec3,
     /// Rotations since the last correction, see `controls`.
     pub(super) rotations: u32,
-    /// What the frame was made of, until it is turned.
+    /// Pose that the frame was made of, until it is turned.
     pub(super) written: Option<Pose>,
 }
 
@@ -89,8 +88,9 @@ impl Frame {
         frame
     }
 
-    /// This frame with the axes of another, as if they had been made of what is
-    /// written here: wrong on purpose, so that tests can see who notices.
+    /// This frame with the axes of another but its own pose as written.
+    ///
+    /// Wrong on purpose, for tests of what notices it.
     #[doc(hidden)]
     pub fn with_axes_of(self, other: &Frame) -> Frame {
         let (u, v, n) = (other.u, other.v, other.n);

@@ -1,5 +1,6 @@
-//! Lenses: perspective, orthographic, off-axis and matrices, each with a near plane and a
-//! finite or (but for orthographic) infinite far plane; their checks and their corners.
+//! Lenses: perspective, orthographic, off-axis and matrices.
+//!
+//! Each has a near plane and a finite or (but for orthographic) infinite far plane.
 
 use glam::DVec3;
 
@@ -36,8 +37,9 @@ pub enum LensKind {
         /// `[left, right, bottom, top]` about the axis of view.
         window: [f64; 4],
     },
-    /// The whole camera as a matrix, see [`Camera::of_matrix`]; the frame does not affect
-    /// what is visible.
+    /// The whole camera as a matrix, see [`Camera::of_matrix`].
+    ///
+    /// The frame does not affect what is visible.
     ///
     /// [`Camera::of_matrix`]: super::Camera::of_matrix
     Matrix(ViewProjection),
@@ -169,7 +171,7 @@ impl Lens {
         Some((top - bottom) * reach).filter(|height| height.is_finite())
     }
 
-    /// Whether all lines of sight are parallel.
+    /// Returns whether all lines of sight are parallel.
     pub fn is_orthographic(&self) -> bool {
         matches!(self.kind, LensKind::Orthographic { .. })
     }
@@ -223,9 +225,10 @@ fn check_window(name: &str, low: f64, high: f64) -> Result<(), CameraError> {
 }
 
 impl Camera {
-    /// The camera that a matrix is. Its lens is the matrix; its frame only says
-    /// where the eye is and which way it looks, and turning or moving it changes
-    /// nothing that is visible.
+    /// The camera of a view-projection matrix.
+    ///
+    /// The matrix is its lens. The frame has the position of the eye and the direction of
+    /// view; turning or moving it does not change what is visible.
     ///
     /// # Errors
     /// As [`ViewProjection::new`].

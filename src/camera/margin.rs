@@ -1,6 +1,6 @@
-//! The conservative epsilon: how far a plane must be moved outward so that no
-//! visible box is lost, and how large its sums may grow. Where planes come from
-//! is in `planes`; the proof is in docs/NUMERICS.md.
+//! The conservative epsilon, and the range of the sums of the plane test.
+//!
+//! Planes move outward so far that no visible box is lost: docs/NUMERICS.md has the proof.
 
 use glam::DVec3;
 
@@ -23,7 +23,7 @@ const DERIVED: f64 = 1.0 / (1u64 << 49) as f64;
 /// a node's bounds may be wider than its items'.
 pub(super) const LARGEST_SUM: f64 = (f32::MAX / 2.0) as f64;
 
-/// What the margins of one volume's planes depend on.
+/// Points and bounds that the margins of one volume's planes depend on.
 pub(super) struct Margin {
     c: f64,
     /// Largest absolute coordinates of the points that can be visible: those of
@@ -39,7 +39,7 @@ pub(super) struct Margin {
     /// The share of the derivation in f64: of the named planes, and of those that are
     /// made about the rounded eye.
     derived: [f64; 2],
-    /// Whether the near and the far plane are known as exactly as from a frame.
+    /// True if the near and the far plane are known as exactly as from a frame.
     of_frame: bool,
 }
 
@@ -151,7 +151,7 @@ fn reach(near: &[DVec3; 4], far: Option<&[DVec3; 4]>, of_scene: DVec3) -> DVec3 
     }
 }
 
-/// Whether no sum of the plane test can overflow for boxes within `reach`.
+/// Returns whether no sum of the plane test can overflow for boxes within `reach`.
 ///
 /// # Errors
 /// The largest sum there may be, if not.
@@ -164,8 +164,9 @@ pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<(), Came
     }
 }
 
-/// What the parts of a plane's sum can add up to within `reach`; no number for a plane
-/// that holds one.
+/// Largest sum of the magnitudes in a plane test within `reach`.
+///
+/// NaN for a plane that holds one.
 pub(super) fn largest_sum(plane: &Plane, reach: DVec3) -> f64 {
     plane.normal.as_dvec3().abs().dot(reach) + f64::from(plane.d).abs()
 }

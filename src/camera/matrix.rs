@@ -1,6 +1,6 @@
-//! A camera as an engine gives it: a view-projection matrix and its convention.
-//! The numbers of the matrix are the truth; planes, corners and the eye follow
-//! from them in exact arithmetic and are rounded once.
+//! View-projection matrices in four conventions, as engines write them.
+//!
+//! Planes, corners and the eye are computed exactly from the entries and rounded once.
 
 use glam::DVec3;
 
@@ -45,7 +45,7 @@ pub struct ViewProjection {
     pub(super) rows: [[f64; 4]; 4],
     /// Depth from 0 to w instead of from -w.
     from_zero: bool,
-    /// Whether depth is larger at the near plane.
+    /// True if depth is larger at the near plane.
     is_reversed: bool,
     /// Rounded.
     pub(super) eye: DVec3,
@@ -115,7 +115,7 @@ impl ViewProjection {
         &self.rows
     }
 
-    /// Whether depth begins at 0, and not at -w.
+    /// Returns whether depth begins at 0, and not at -w.
     pub fn is_from_zero(&self) -> bool {
         self.from_zero
     }

@@ -1,6 +1,4 @@
-//! The camera of the lectures: a frame (eye, u, v, n), a lens, and what
-//! follows from the two: matrices and the planes of the view volume. It knows
-//! nothing of scenes, files or indexes.
+//! Cameras: a frame (eye, u, v, n), a lens, and the matrices and planes of both.
 
 mod controls;
 mod frame;
@@ -21,7 +19,7 @@ pub use projection::ClipSpace;
 
 use crate::geometry::VolumeError;
 
-/// Where the camera stands and what its lens takes in.
+/// A frame (position and orientation) and a lens.
 ///
 /// World coordinates are f64; the planes that a query needs come from
 /// [`Camera::volume`] in scene-local f32.
@@ -43,9 +41,9 @@ use crate::geometry::VolumeError;
 /// ```
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Camera {
-    /// Where it is and how it is turned.
+    /// Position and orientation.
     pub frame: Frame,
-    /// What it takes in.
+    /// Window, near and far plane.
     pub lens: Lens,
 }
 

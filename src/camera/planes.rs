@@ -13,7 +13,7 @@ use crate::geometry::{
 };
 
 named! {
-    /// Where the planes come from.
+    /// Derivation of the planes.
     #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum PlaneMethod, PLANE_METHODS {
@@ -53,16 +53,17 @@ impl Default for PlaneOptions {
     }
 }
 
-/// What the planes must know of the scene: prepared once per scene, so that
-/// every structure is asked with the very same planes.
+/// Origin and extent of a scene, which planes are rounded and moved for.
+///
+/// Computed once per scene, so that all structures are queried with the same planes.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct Surroundings {
     /// World position of the scene's local zero.
     pub origin: DVec3,
     /// Largest absolute local coordinate of any item, per axis. It bounds the
-    /// epsilon and the sums of the plane test: items beyond it are promised
-    /// nothing. Zero is "not known": the epsilon is then the volume's own (and
-    /// too small without a far plane), and no sum is watched for items.
+    /// epsilon and the sums of the plane test; no guarantee holds for items beyond it.
+    /// Zero is unknown: the epsilon is then the volume's own (and too small without a
+    /// far plane), and sums are not checked for items.
     pub reach: Vec3,
 }
 
@@ -122,8 +123,7 @@ impl Camera {
         Ok(volume)
     }
 
-    /// The same planes in f64, from the frame and without a margin: what the
-    /// test can tell at best.
+    /// The same planes in f64, from the frame and without a margin.
     ///
     /// # Errors
     /// [`CameraError::Volume`] if a plane does not even fit f64.

@@ -1,5 +1,4 @@
-//! Position and direction of a camera as written, and the exact arithmetic from them to
-//! the axes of its frame.
+//! Position and direction of a camera as written, and the exact way to its axes.
 
 use glam::DVec3;
 

@@ -8,7 +8,7 @@ use glam::{DMat4, DVec3, Vec3};
 use super::{Frame, Lens, LensKind};
 use crate::geometry::Plane;
 
-/// What a projection maps near and far to.
+/// Depths that a projection maps near and far to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ClipSpace {
     /// near -> -1, far -> 1.

@@ -1,5 +1,4 @@
-//! The axis-aligned box. It defines containment, union and outward rounding;
-//! which side of a plane a box lies on is left to the plane.
+//! Axis-aligned boxes in f32: containment, union and outward rounding.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -70,12 +69,12 @@ impl Aabb {
         Aabb::new(kept(low), kept(high))
     }
 
-    /// Whether the box holds no point at all (`min > max` somewhere).
+    /// Returns whether the box holds no point at all (`min > max` somewhere).
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
-    /// Whether all six bounds are finite.
+    /// Returns whether all six bounds are finite.
     pub fn is_finite(&self) -> bool {
         self.min.is_finite() && self.max.is_finite()
     }
@@ -93,19 +92,19 @@ impl Aabb {
             .fold(Aabb::EMPTY, |all, b| all.union(b))
     }
 
-    /// Whether the point lies in the closed box.
+    /// Returns whether the point lies in the closed box.
     #[inline(always)]
     pub fn contains_point(&self, p: Vec3) -> bool {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
-    /// Whether `other` lies wholly in the closed box.
+    /// Returns whether `other` lies wholly in the closed box.
     #[inline(always)]
     pub fn contains(&self, other: &Aabb) -> bool {
         other.min.cmpge(self.min).all() && other.max.cmple(self.max).all()
     }
 
-    /// Whether the two closed boxes share a point (touching counts).
+    /// Returns whether the two closed boxes share a point (touching counts).
     #[inline(always)]
     pub fn intersects(&self, other: &Aabb) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()

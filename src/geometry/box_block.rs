@@ -74,13 +74,13 @@ impl BoxBlock {
         )
     }
 
-    /// Asks for the whole block's memory ahead of its use.
+    /// Prefetches the whole block.
     #[inline(always)]
     pub fn prefetch(&self) {
         self.rows.iter().for_each(prefetch);
     }
 
-    /// Asks for the rows of one corner.
+    /// Prefetches the rows of one corner.
     #[inline(always)]
     pub fn prefetch_corner(&self, corner: BoxCorner) {
         for row in corner.rows() {
@@ -88,7 +88,7 @@ impl BoxBlock {
         }
     }
 
-    /// Asks for one row; for none if there is no such row.
+    /// Prefetches one row, if there is such a row.
     #[inline(always)]
     pub fn prefetch_row(&self, row: usize) {
         if let Some(row) = self.rows.get(row) {
@@ -244,8 +244,9 @@ fn joined(bits: &[u32; LANES]) -> LaneMask {
     bits.iter().fold(0, |all, bit| all | bit) as LaneMask
 }
 
-/// Exclusive or over the bits of all bounds of some blocks: reads each whole and decides
-/// nothing, as fast as the memory allows. O(n).
+/// Exclusive or over the bits of all bounds of some blocks. O(n).
+///
+/// Reads every byte and decides nothing: a bound for any program that reads them all.
 #[inline(always)]
 pub fn xor_of_bits(blocks: &[BoxBlock]) -> u32 {
     let mut lanes = [0; LANES];
@@ -271,7 +272,7 @@ pub struct BoxBlocks {
 }
 
 impl BoxBlocks {
-    /// No boxes yet, and memory for so many.
+    /// No boxes yet, and memory for `boxes` of them.
     pub fn with_capacity(boxes: usize) -> Self {
         BoxBlocks {
             blocks: Vec::with_capacity(boxes.div_ceil(LANES)),
@@ -296,7 +297,7 @@ impl BoxBlocks {
         self.count
     }
 
-    /// Whether there are no boxes.
+    /// Returns whether there are no boxes.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
@@ -321,7 +322,7 @@ impl BoxBlocks {
         size_of_val(&self.blocks[..])
     }
 
-    /// As [`xor_of_bits`], of all blocks.
+    /// [`xor_of_bits`] of all blocks.
     #[inline(always)]
     pub fn xor_of_bits(&self) -> u32 {
         xor_of_bits(&self.blocks)
@@ -345,8 +346,9 @@ impl BoxBlocks {
     }
 }
 
-/// The blocks that the places `first..end` are in: the place of lane 0 of each, and the
-/// lanes that belong to the range.
+/// Blocks that hold the boxes `first..end`.
+///
+/// Yields the index of the box in lane 0 and the lanes that belong to the range.
 #[inline(always)]
 pub fn blocks_of(first: usize, end: usize) -> impl Iterator<Item = (usize, LaneMask)> {
     let mut start = first - first % LANES;

@@ -45,7 +45,7 @@ impl<I: Isa> BroadcastPlane<I> {
         isa.kept(self.keep(isa, isa.keep_all(), block))
     }
 
-    /// Asks for the rows that [`BroadcastPlane::admitted`] reads.
+    /// Prefetches the rows that [`BroadcastPlane::admitted`] reads.
     #[inline(always)]
     pub fn prefetch(&self, block: &BoxBlock) {
         block.prefetch_corner(self.p_vertex);
@@ -55,7 +55,7 @@ impl<I: Isa> BroadcastPlane<I> {
 /// Planes of [`BroadcastPlanes`]: those of a frustum.
 pub const MOST_PLANES: usize = 6;
 
-/// The planes of a volume, all of them made ready for many blocks.
+/// The planes of a volume in vectors, for many blocks.
 #[derive(Clone, Copy)]
 pub struct BroadcastPlanes<I: Isa>([BroadcastPlane<I>; MOST_PLANES]);
 
@@ -104,8 +104,8 @@ impl BoxBlock {
         isa.kept(kept)
     }
 
-    /// [`BoxBlock::admitted_by`] for four blocks: each plane's numbers are made
-    /// ready once for all of them, which pays where all planes are open and
+    /// [`BoxBlock::admitted_by`] for four blocks: each plane's numbers are
+    /// broadcast once for all of them, which pays where all planes are open and
     /// registers are too few to keep them ([`BroadcastPlanes`](super::BroadcastPlanes)).
     #[inline(always)]
     pub fn four_admitted_by<I: Isa>(

@@ -1,6 +1,5 @@
 //! The query volume: an intersection of at most 32 half-spaces, with the six
-//! planes of a frustum named. It defines the plane mask logic (inside, straddle,
-//! outside); where the planes come from is left to the camera.
+//! planes of a frustum named.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -13,7 +12,7 @@ pub const MAX_PLANES: usize = 32;
 
 /// The planes that are not yet decided: bit i stands for plane i.
 ///
-/// A node that lies wholly inside plane i hands its children a mask without
+/// A node that lies wholly inside plane i has children with a mask without
 /// bit i (Assarsson and Moeller 2000, "Optimized view frustum culling
 /// algorithms for bounding boxes", Journal of Graphics Tools 5(1), p. 15).
 pub type PlaneMask = u32;
@@ -101,7 +100,7 @@ pub struct ConvexVolume {
     count: usize,
     mask: PlaneMask,
     p_vertices: [BoxCorner; MAX_PLANES],
-    /// What `n * p` must not be below: `-d`.
+    /// `-d`, which `n * p` must not be below.
     minus_d: [f32; MAX_PLANES],
 }
 
@@ -184,13 +183,13 @@ impl ConvexVolume {
         &self.planes[index as usize % MAX_PLANES]
     }
 
-    /// The p-vertex of plane `index`, likewise.
+    /// The p-vertex of plane `index`, without a check.
     #[inline(always)]
     pub fn p_vertex_of_bit(&self, index: u32) -> BoxCorner {
         self.p_vertices[index as usize % MAX_PLANES]
     }
 
-    /// `-d` of plane `index`, likewise.
+    /// `-d` of plane `index`, without a check.
     #[inline(always)]
     pub fn minus_d_of_bit(&self, index: u32) -> f32 {
         self.minus_d[index as usize % MAX_PLANES]
@@ -225,7 +224,7 @@ impl ConvexVolume {
         !b.is_empty() && !self.planes().iter().any(|plane| plane.excludes(b))
     }
 
-    /// Whether the point lies in the closed volume (the lecture's
+    /// Returns whether the point lies in the closed volume (the lecture's
     /// `CullPointAgainstFrustum`, with inward normals). O(planes).
     pub fn contains_point(&self, p: Vec3) -> bool {
         self.planes().iter().all(|plane| plane.contains_point(p))

@@ -1,5 +1,6 @@
-//! Convex volumes with planes in f64, tested against f32 boxes that are promoted exactly.
-//! Corners and order of operations are those of the f32 test, so it is as monotone.
+//! Convex volumes with planes in f64, tested against f32 boxes.
+//!
+//! Boxes are promoted exactly. Corners and order of operations are those of the f32 test, so it is as monotone.
 
 use glam::DVec3;
 
@@ -57,7 +58,7 @@ impl ConvexVolumeF64 {
         &self.planes[index as usize % MAX_PLANES]
     }
 
-    /// The p-vertex of plane `index`, likewise.
+    /// The p-vertex of plane `index`, without a check.
     #[inline(always)]
     pub fn p_vertex_of_bit(&self, index: u32) -> BoxCorner {
         self.p_vertices[index as usize % MAX_PLANES]

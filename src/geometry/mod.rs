@@ -1,4 +1,4 @@
-//! Boxes, planes and convex volumes, and the one plane test that all structures share.
+//! Boxes, planes, convex volumes and the plane test that all structures share.
 
 mod aabb;
 #[cfg(test)]

@@ -67,27 +67,27 @@ impl Plane {
         self.p_vertex(&Aabb::new(b.max, b.min))
     }
 
-    /// Whether the whole box lies strictly outside: its p-vertex evaluates
+    /// Returns whether the whole box lies strictly outside: its p-vertex evaluates
     /// below zero. Touching is not outside.
     #[inline(always)]
     pub fn excludes(&self, b: &Aabb) -> bool {
         self.value_at(self.p_vertex(b)) < 0.0
     }
 
-    /// Whether the whole box lies inside: its n-vertex evaluates to at least
+    /// Returns whether the whole box lies inside: its n-vertex evaluates to at least
     /// zero.
     #[inline(always)]
     pub fn contains(&self, b: &Aabb) -> bool {
         self.value_at(self.n_vertex(b)) >= 0.0
     }
 
-    /// Whether the point lies in the closed half-space.
+    /// Returns whether the point lies in the closed half-space.
     #[inline(always)]
     pub fn contains_point(&self, x: Vec3) -> bool {
         self.value_at(x) >= 0.0
     }
 
-    /// Whether all four numbers are finite.
+    /// Returns whether all four numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.normal.is_finite() && self.d.is_finite()
     }

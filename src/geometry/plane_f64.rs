@@ -37,13 +37,13 @@ impl PlaneF64 {
         )
     }
 
-    /// Whether the whole box lies strictly outside. Touching is not outside.
+    /// Returns whether the whole box lies strictly outside. Touching is not outside.
     #[inline(always)]
     pub fn excludes(&self, b: &Aabb) -> bool {
         self.value_at(self.p_vertex(b)) < 0.0
     }
 
-    /// Whether the whole box lies inside.
+    /// Returns whether the whole box lies inside.
     #[inline(always)]
     pub fn contains(&self, b: &Aabb) -> bool {
         self.value_at(self.p_vertex(&Aabb::new(b.max, b.min))) >= 0.0

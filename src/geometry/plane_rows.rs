@@ -1,7 +1,6 @@
-//! Up to eight planes side by side: the layout in which one box is tested
-//! against all of them at once. Each lane computes what [`Plane::excludes`]
-//! and [`Plane::contains`] compute; which planes there are is left to the
-//! volume, and many boxes against one plane are the block kernels'.
+//! Up to eight planes side by side, tested against one box at once.
+//!
+//! Each lane computes [`Plane::excludes`] or [`Plane::contains`].
 
 use super::{Aabb, Plane};
 
@@ -90,14 +89,14 @@ impl PlaneRows {
         (excluded, contained)
     }
 
-    /// Whether any plane excludes the (finite) box.
+    /// Returns whether any plane excludes the (finite) box.
     #[inline(always)]
     pub fn exclude(&self, b: &Aabb) -> bool {
         let values = self.values::<true>(b);
         values.iter().fold(false, |any, value| any | (*value < 0.0))
     }
 
-    /// Whether every plane contains the (finite) box.
+    /// Returns whether every plane contains the (finite) box.
     #[inline(always)]
     pub fn contain(&self, b: &Aabb) -> bool {
         let values = self.values::<false>(b);

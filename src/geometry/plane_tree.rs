@@ -1,5 +1,4 @@
-//! A binary partition of space that comes from elsewhere, such as a map file:
-//! planes with their children. It holds no items and decides nothing.
+//! Binary partition of space from another program, such as the BSP tree of a map.
 
 use super::Plane;
 

@@ -70,8 +70,8 @@ mod tests {
 
     #[test]
     fn digits_that_a_far_zero_cancels_are_kept() {
-        // A plane through the eye, slanting: what lies a unit before it must
-        // be told from what lies a unit behind, at ten million.
+        // A slanting plane through the eye, at ten million: one unit before and one
+        // behind it must differ.
         let eye = Vec3::new(1e7, -1e7, 0.0);
         let plane = Plane::new(Vec3::new(0.6, 0.8, 0.0), 0.0);
         let about = ConvexVolume::from_planes(&[plane]).unwrap();

@@ -1,6 +1,7 @@
-//! Culling by bounding spheres: the sphere of a box, the cube that stands for
-//! it in an index, and the planes with what the sphere test needs of them. It
-//! owns the margin that keeps the sphere test on the safe side of the box test.
+//! Culling by bounding spheres.
+//!
+//! An index holds the cube about each sphere. A margin keeps the sphere test on the safe
+//! side of the box test.
 
 use glam::Vec3;
 
@@ -15,7 +16,7 @@ use crate::kernel::each;
 /// The centre is the box's own, rounded; the radius reaches the farthest
 /// corner from there, rounded up; the cube's bounds are rounded outward. So the
 /// box lies in the sphere and the sphere in the cube, exactly. Bounds beyond
-/// f32 are cut off at its largest number, and [`Ball::in_cube`] then knows no
+/// f32 are cut off at its largest number, and [`Ball::in_cube`] then has no
 /// radius. An empty box stays as it is, and so does one that is not finite,
 /// for the build to name.
 pub fn sphere_cube(b: &Aabb) -> Aabb {
@@ -69,7 +70,7 @@ impl Ball {
     }
 }
 
-/// What the sphere test knows of a plane besides its normal.
+/// Numbers of a plane that the sphere test needs besides its normal.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct SphereMargin {
     /// The normal's length, rounded up.
@@ -168,7 +169,7 @@ impl Spheres {
         (self.planes.plane_of_bit(index), margin)
     }
 
-    /// Whether plane `index` has the item's sphere on its outer side.
+    /// Returns whether plane `index` has the item's sphere on its outer side.
     #[inline(always)]
     pub fn drops(&self, index: u32, cube: &Aabb) -> bool {
         let (plane, margin) = self.plane_of_bit(index);

@@ -1,6 +1,8 @@
-//! The planes of a camera to 250 bits: camera parameters are exact reals here,
-//! and roots and tangents are carried far beyond what any tie could need.
-//! Nothing is shared with the derivations that are put to the test.
+//! The planes of a camera to 250 bits.
+//!
+//! Pose and lens count as exact real numbers; roots, sines and cosines are carried far
+//! beyond what any tie could need. Of the code under test only the exact direction of view
+//! is shared.
 
 use glam::DVec3;
 
@@ -33,7 +35,7 @@ impl Oracle {
     /// `origin`, as real numbers.
     ///
     /// Every verdict is that about the real volume, or a touch marked as
-    /// undecided, where the two cannot be told apart: pose and lens count as
+    /// undecided, where the two cannot be distinguished: pose and lens count as
     /// exact, lengths from 1e-60 to 1e60 and angles from 1e-12 degrees are
     /// carried without loss. A matrix is the volume alone, and its planes are
     /// carried without any error. Some ten times the cost of

@@ -12,15 +12,15 @@
 //! planes themselves; two with one zero component the shadows of P along an
 //! axis (the cross products of an edge with an axis, in other words); three
 //! with two the bounds of P along an axis; four with N = 0 say that P itself
-//! is empty. Only products and sums occur: no division, no vertices, nothing
-//! that asks P to be bounded. (Motzkin's transposition theorem says the same
+//! is empty. Only products and sums occur: no division, no vertices, and P need
+//! not be bounded. (Motzkin's transposition theorem says the same
 //! of open half-spaces with "not positive" in place of "negative": a least
 //! value of zero is a touch.)
 
 use super::number::{HalfSpace, Number, Precision};
 use super::rough::{RoughSpaces, may_agree};
 
-/// What a volume is before any box is looked at.
+/// Extent of a volume, whatever the box.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Extent {
     /// No point satisfies all constraints.
@@ -253,8 +253,9 @@ impl Search {
     }
 }
 
-/// Of the bounds along each direction of an axis keeps the tightest, and
-/// whatever rounding cannot tell from it.
+/// Keeps the tightest bound along each direction of an axis.
+///
+/// Also those that rounding cannot distinguish from it.
 fn keep_tightest(bounds: &mut Vec<HalfSpace>) {
     /// Far above the rounding of the two estimates that make a ratio.
     const DOUBT: f64 = 1e-12;

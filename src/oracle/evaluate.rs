@@ -1,6 +1,4 @@
-//! The value of a certificate at a box: in f64 with a proven bound of its
-//! error, and exactly. Which certificates there are, and what their signs mean
-//! together, is not known here.
+//! Value of a certificate at a box: in f64 with a bound of its error, or exactly.
 
 use super::number::{HalfSpace, Precision};
 use crate::arithmetic::{Expansion, two_product, two_sum, upper_half};
@@ -30,7 +28,7 @@ const FILTER_ERROR: f64 = 16.0 * f64::EPSILON;
 pub(super) struct Corners {
     pub low: [f64; 3],
     pub high: [f64; 3],
-    /// Whether all of them are numbers of f32, whose products are short.
+    /// True if all of them are numbers of f32, whose products are short.
     pub is_narrow: bool,
 }
 
@@ -180,7 +178,7 @@ pub(super) fn inner_point(faces: &[Filter]) -> Option<[f64; 3]> {
     (count >= 4.0).then(|| sum.map(|s| s / count))
 }
 
-/// Where three planes meet, by Cramer's rule.
+/// The point that three planes share, by Cramer's rule.
 fn meeting_point(planes: [&Filter; 3]) -> Option<[f64; 3]> {
     let [a, b, c] = planes.map(|plane| DVec3::from_array(plane.normal));
     let determinant = a.dot(b.cross(c));

@@ -1,8 +1,7 @@
-//! The oracle: whether a box and a convex volume have a point in common,
-//! decided exactly. It defines the verdicts OUT, TOUCH and IN at planes level
-//! (f32 planes and boxes are exact objects) and at camera level (the camera's
-//! parameters are); how culling tests come out against it is measured
-//! elsewhere.
+//! The oracle: decides exactly whether a box and a convex volume share a point.
+//!
+//! Its verdicts are OUT, TOUCH and IN, at planes level (f32 planes and boxes count as exact)
+//! or at camera level (the camera's parameters do).
 
 mod camera;
 mod certificates;
@@ -33,7 +32,7 @@ pub enum Verdict {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct Judgement {
-    /// What is true, as far as it could be proved.
+    /// The verdict, as far as it could be proved.
     pub verdict: Verdict,
     /// At camera level: closer to a tie than the precision of the camera's
     /// planes (2^-150 of the magnitudes involved), and so called a touch.
@@ -135,16 +134,15 @@ impl Oracle {
         }
     }
 
-    /// How deep the box reaches into the volume (positive), or how far it
-    /// stays away at the least (negative), in world units.
+    /// Depth of the box in the volume (positive) or a lower bound of its distance
+    /// (negative), world units.
     ///
     /// The least value of any certificate of unit length, to f64 rounding
     /// (some 1e-15 of the coordinates and offsets). For a box that is IN this
     /// is the length of the shortest move that makes it touch; for one that is
     /// OUT the widest gap that an axis of the separating axis test shows, never
     /// more than the true distance (less where two corners are nearest). Zero
-    /// but for rounding for a touch, whose exact verdict the sign does not
-    /// tell. Infinite for a volume without constraints, minus infinity for an
+    /// but for rounding for a touch, of which the sign is arbitrary. Infinite for a volume without constraints, minus infinity for an
     /// empty box or volume. O(certificates).
     ///
     /// ```
@@ -170,8 +168,8 @@ impl Oracle {
         self.depth_of_corners(&Corners::between(min, max))
     }
 
-    /// Whether one of the volume's own planes has the whole box on its outer
-    /// side: what a six-plane test without any error tells.
+    /// Returns whether one plane has the whole box on its outer side, exactly: a
+    /// six-plane test without any error.
     pub fn faces_exclude(&self, b: &Aabb) -> bool {
         let corners = Corners::of(b);
         self.extent == Extent::Empty || (0..self.faces).any(|face| self.sign(face, &corners) < 0)
@@ -203,7 +201,7 @@ impl Oracle {
         depths.fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a point of the box lies strictly inside all planes for certain:
+    /// Returns whether a point of the box lies strictly inside all planes for certain:
     /// the one nearest to the volume's inner point, or the box's centre.
     fn witnessed(&self, b: &Corners) -> bool {
         let is_inside = |point: [f64; 3]| {

@@ -1,6 +1,6 @@
-//! Numbers of the oracle: exact, or precise to a stated number of terms with
-//! the size they had before anything cancelled, which tells a sign from noise.
-//! What the numbers mean is not known here.
+//! Numbers of the oracle: exact, or precise to a stated number of terms.
+//!
+//! Each has the sum of the magnitudes it came from, which separates a sign from noise.
 
 use crate::arithmetic::Expansion;
 
@@ -66,7 +66,7 @@ impl Precision {
         self.subtract(&self.multiply(a, d), &self.multiply(b, c))
     }
 
-    /// Whether a value cannot be told from zero, given its size.
+    /// Returns whether a value may be zero, given its size.
     pub fn is_noise(self, value: f64, size: f64) -> bool {
         value.abs() <= self.tolerance * size
     }

@@ -1,6 +1,7 @@
-//! The preparation's filter: minors and determinants of half-spaces in f64
-//! with a bound of their error, so that exact sums are only formed where
-//! rounding could matter. It defines what can be told for certain without them.
+//! Filter of the oracle's preparation: minors and determinants in f64.
+//!
+//! Each has a bound of its error, so exact sums are only formed where rounding could
+//! matter.
 
 use super::number::HalfSpace;
 
@@ -9,7 +10,7 @@ use super::number::HalfSpace;
 /// sums: some 12 units of epsilon.
 const ERROR: f64 = 32.0 * f64::EPSILON;
 
-/// What underflow may add; never near a product of at most eight f32 numbers
+/// Most that underflow may add; never near a product of at most eight f32 numbers
 /// that matters here (those of five are above 2^-745).
 const UNDERFLOW: f64 = 1e-290;
 
@@ -72,7 +73,7 @@ fn cross(a: &Vector, b: &Vector) -> Vector {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i].times(b[j]).plus(a[j].times(b[i]).negated()))
 }
 
-/// Whether weights could all be strictly of one sign.
+/// Returns whether weights could all be strictly of one sign.
 pub(super) fn may_agree<const N: usize>(weights: [Rough; N]) -> bool {
     let signs = weights.map(Rough::sign);
     let certain = |sign: i32| signs.contains(&Some(sign));
@@ -80,13 +81,13 @@ pub(super) fn may_agree<const N: usize>(weights: [Rough; N]) -> bool {
     !hopeless
 }
 
-/// Whether weights are certainly all strictly of one sign.
+/// Returns whether weights are certainly all strictly of one sign.
 fn agree<const N: usize>(weights: [Rough; N]) -> bool {
     let sign = weights[0].sign();
     sign.is_some_and(|s| s != 0) && weights.iter().all(|w| w.sign() == sign)
 }
 
-/// What is known of a bound of the volume along an axis.
+/// A bound of the volume along an axis, between two numbers.
 pub(super) struct RoughBound {
     /// Twice the axis, plus one if it looks down.
     pub direction: usize,
@@ -140,7 +141,7 @@ impl RoughSpaces {
         &self.crosses[i * self.count() + j]
     }
 
-    /// Of three normals in ascending order.
+    /// Determinant of three normals in ascending order.
     fn determinant(&self, i: usize, j: usize, l: usize) -> Rough {
         self.determinants[(i * self.count() + j) * self.count() + l]
     }
@@ -172,7 +173,7 @@ impl RoughSpaces {
         [(j, l), (l, i), (i, j)].map(|(a, b)| self.cross(a, b)[axis])
     }
 
-    /// Where a combination of three bounds the volume along an axis; `None` if
+    /// The bound of a combination of three along an axis; `None` if
     /// rounding hides too much of it.
     pub fn bound(&self, triple: [usize; 3], axis: usize) -> Option<RoughBound> {
         let weights = self.weights_of_triple(triple, axis);
@@ -198,7 +199,7 @@ impl RoughSpaces {
         })
     }
 
-    /// Whether the line in which two boundaries meet certainly misses the
+    /// Returns whether the line in which two boundaries meet certainly misses the
     /// volume. On the line, in homogeneous coordinates, every other constraint
     /// is `a + t*b >= 0`.
     pub fn edge_misses(&self, i: usize, j: usize) -> bool {

@@ -1,6 +1,4 @@
-//! Finding the far plane that makes a given share of a scene visible: the
-//! axis "visible fraction" of every comparison. It works on a sample and
-//! knows no index.
+//! Search for the far plane at which a given share of a sample is visible.
 
 use super::PathError;
 use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions, Surroundings};
@@ -14,8 +12,9 @@ const MOST_CAMERAS: usize = 128;
 /// more items than that: a share of 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;
 
-/// Largest ratio of the share that is reached to the one that was asked for: one item
-/// more than two.
+/// Largest ratio of the share that is reached to the one requested.
+///
+/// Three items instead of two.
 const MOST_ABOVE: f64 = 1.5;
 
 /// The scale of far (and near, a thousandth of it) at which on average `share`

@@ -1,6 +1,6 @@
-//! Ways through a scene: sequences of cameras, generated, recorded, or taken
-//! from the scene's own places. It defines the table of path families and what
-//! they share; each family has a file of its own.
+//! Camera paths: generated, recorded, or taken from the places of a scene.
+//!
+//! Each generated family has a file of its own.
 
 mod calibrate;
 mod flythrough;
@@ -28,7 +28,7 @@ pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
 /// A named sequence of cameras.
 #[derive(Clone, Debug)]
 pub struct CameraPath {
-    /// As it was asked for: a file or a spec such as `orbit:frames=512`.
+    /// The file or the spec, such as `orbit:frames=512`.
     pub name: String,
     /// In the order of the path.
     pub cameras: Vec<Camera>,
@@ -39,7 +39,7 @@ pub struct CameraPath {
 }
 
 impl CameraPath {
-    /// At most so many of the cameras, evenly spread from the first on.
+    /// At most `most` of the cameras, evenly spread from the first on.
     pub fn at_most(mut self, most: usize) -> CameraPath {
         let count = self.cameras.len();
         if count > most {
@@ -52,7 +52,7 @@ impl CameraPath {
         self
     }
 
-    /// Where a camera stands, for messages: by its line, or its index where it has none.
+    /// Label of a camera in messages: its line in the file, or its index.
     pub fn place(&self, index: usize) -> String {
         match self.lines.get(index) {
             Some(line) => format!("{}, line {line}", self.name),
@@ -61,8 +61,9 @@ impl CameraPath {
     }
 }
 
-/// SHA-256 over frames and lenses: two paths with the same digest ask the same
-/// questions about a scene. O(n).
+/// SHA-256 over frames and lenses. O(n).
+///
+/// Paths with the same digest have the same answers in a scene.
 pub fn digest(cameras: &[Camera]) -> String {
     let mut hash = hmac_sha256::Hash::new();
     let mut add = |value: f64| hash.update(value.to_bits().to_le_bytes());
@@ -94,7 +95,7 @@ pub fn digest(cameras: &[Camera]) -> String {
 /// A kind of path.
 #[non_exhaustive]
 pub struct PathFamily {
-    /// What is typed.
+    /// Name on the command line.
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
@@ -139,7 +140,7 @@ pub enum PathError {
     Unfit {
         /// The path, and the camera if it is one of them.
         place: String,
-        /// What was found and expected.
+        /// The value found and the one expected.
         reason: String,
     },
 }
@@ -153,7 +154,7 @@ impl PathError {
     }
 }
 
-/// What a path is made for.
+/// Scene, length and seed of a path.
 pub(crate) struct Stage<'a> {
     scene: &'a Scene,
     bounds: WorldBox,
@@ -212,7 +213,7 @@ impl Stage<'_> {
 }
 
 impl Scene {
-    /// What camera planes must know of this scene.
+    /// Origin and extent of this scene, for camera planes.
     pub fn surroundings(&self) -> Surroundings {
         Surroundings {
             origin: self.origin,

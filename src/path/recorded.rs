@@ -1,5 +1,4 @@
-//! Recorded cameras and points: the CSV formats that other tools write. It
-//! owns their columns; missing lens columns come from the caller's defaults.
+//! Recorded cameras and points: the CSV formats that other tools write.
 
 use std::io::Read;
 

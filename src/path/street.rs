@@ -1,5 +1,6 @@
-//! Where people are: eyes above the ground and outside of every item, looking level.
-//! Most of such a view is hidden by what stands nearest.
+//! Views from eye height above the ground, outside of all items.
+//!
+//! The nearest items hide most of such a view.
 
 use glam::DVec3;
 
@@ -8,9 +9,10 @@ use crate::geometry::Aabb;
 use crate::scene::{Regions, SeededRng};
 use crate::spec::Spec;
 
-/// Places drawn for each eye, of which it takes the one that rises least above the foot
-/// of what it stands on: in a city the street and not a roof, in a forest the ground
-/// and not the top of a tree.
+/// Places drawn for each eye.
+///
+/// The eye takes the one that rises least above the foot of what it stands on: in a city
+/// the street and not a roof, in a forest the ground and not the top of a tree.
 const DRAWN: usize = 8;
 /// How often more places are drawn for an eye that is not on the ground.
 const MORE: usize = 4;
@@ -33,7 +35,7 @@ struct Span {
     item: usize,
     bottom: f64,
     top: f64,
-    /// Whether it is triangles that all face up.
+    /// True if it is triangles that all face up.
     is_ground: bool,
 }
 
@@ -42,7 +44,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathEr
     let mut rng = stage.rng();
     let places = &stage.scene.places;
     if !places.is_empty() {
-        // The scene's author knows where one stands.
+        // Places of the scene's author need no search.
         let poses = (0..stage.count).map(|_| {
             let eye = places[rng.below(places.len())].eye;
             Pose::new(eye, level(&mut rng))
@@ -70,17 +72,17 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathEr
         .collect())
 }
 
-/// Where an eye may be.
+/// A position that an eye may take.
 #[derive(Clone, Copy)]
 struct Stand {
     eye: DVec3,
     /// How far above the foot of the lowest item there, or of the floor.
     rise: f64,
-    /// Whether on what stands on that.
+    /// True if on what stands on that.
     is_on_top: bool,
 }
 
-/// For each of so many eyes the lowest of the places that are drawn for it.
+/// For each of `count` eyes the lowest of the places that are drawn for it.
 fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<Stand> {
     let mut columns: Vec<Column> = (0..count).flat_map(|_| drawn(stage, rng)).collect();
     fill(stage, &mut columns);
@@ -105,8 +107,9 @@ fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<
     stands.collect()
 }
 
-/// Whether there is something below nearly all places, so that the others are beyond the
-/// edge of the ground.
+/// Returns whether nearly all places have an item below them.
+///
+/// The others are then beyond the edge of the ground.
 fn have_ground(columns: &[Column]) -> bool {
     let bare = columns.iter().filter(|column| column.spans.is_empty());
     bare.count() * 10 < columns.len()
