@@ -11,8 +11,7 @@ use glam::DVec3;
 use crate::arithmetic::cross;
 use crate::geometry::{MAX_PLANES, PlaneF64};
 
-/// What is left of a sum of unit normals where it should be nothing: some units of
-/// 2^-53 for each of up to three.
+/// Rounding error of a sum of unit normals that is zero: some units of 2^-53 each.
 const RESIDUE: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// The volume's bounds along the axes: up to six planes, fewer where it has no
@@ -22,12 +21,12 @@ const RESIDUE: f64 = 1.0 / (1u64 << 49) as f64;
 /// of the normal, moved outward by what making it can cost at points within
 /// `reach` of the zero. O(m^3) for m faces.
 pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
-    /// Of a product of unit vectors.
+    /// Rounding error of a product of unit vectors.
     const ROUNDING: f64 = 1e-14;
-    /// What may be taken for rounding of a sum of length 1.
+    /// Largest rounding error of a sum of length 1.
     const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
-    /// Of a shorter sum nothing is left. Views of up to 179.99 degrees keep their
-    /// bounds with that.
+    /// Least length of a sum that still has digits. Views of up to 179.99 degrees keep
+    /// their bounds with it.
     const CANCELLED: f64 = 2e-9;
     let mut tightest: [Option<f64>; 6] = [None; 6];
     for [a, b, c] in triples(faces) {
@@ -76,8 +75,8 @@ pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
 /// `room`, each moved outward by what making it can cost within `reach`. O(m^3) for
 /// the m faces' corners and O(m^2) sums.
 pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64> {
-    /// Of faces of unit length: a sum shorter than this has lost too many digits
-    /// to be a plane (1e-9 of it would be noise). Doing without is always safe.
+    /// Least length of a sum of unit normals: a shorter one has lost too many digits
+    /// to be a plane (1e-9 of it would be noise). Omitting it is always safe.
     const CANCELLED: f64 = 1e-7;
     /// How near to a corner a sum must pass, as a share of the magnitudes
     /// there: far above rounding, far below the gap of a sum that is idle.
@@ -115,7 +114,7 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64>
     found.into_iter().map(|(_, plane)| plane).collect()
 }
 
-/// What the exact test needs beside the faces: bounds and silhouettes.
+/// Planes of the exact test beside the faces: bounds and silhouettes.
 pub fn extended(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
     let bounds = bounds(faces, reach);
     let room = MAX_PLANES.saturating_sub(faces.len() + bounds.len());
@@ -152,7 +151,7 @@ fn triples(faces: &[PlaneF64]) -> impl Iterator<Item = [&PlaneF64; 3]> {
     pairs.flat_map(move |(i, j)| (j + 1..count).map(move |l| [&faces[i], &faces[j], &faces[l]]))
 }
 
-/// Where three planes meet, by Cramer's rule.
+/// Intersection of three planes, by Cramer's rule.
 fn meeting_point([a, b, c]: [&PlaneF64; 3]) -> Option<DVec3> {
     let crossed = b.normal.cross(c.normal);
     let sum = crossed * a.d + c.normal.cross(a.normal) * b.d + a.normal.cross(b.normal) * c.d;

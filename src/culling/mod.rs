@@ -1,6 +1,4 @@
-//! Which culling test is asked, and how: from a camera to the view that every
-//! structure is asked with. It defines the table of tests and of arithmetics;
-//! traversal and kernels belong to `query` and `index`.
+//! Culling tests and arithmetics: from a camera to the volume of all queries.
 
 mod extended;
 
@@ -20,7 +18,7 @@ use crate::query::AnyVolume;
 pub use extended::{bounds, extended, farthest_corner, silhouettes};
 
 named! {
-    /// How a box is tested against the volume.
+    /// The test of a box against the volume.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     #[non_exhaustive]
@@ -45,7 +43,7 @@ impl CullingTest {
 }
 
 named! {
-    /// In which numbers the test is carried out.
+    /// The numbers of the test.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     #[non_exhaustive]
@@ -70,7 +68,7 @@ pub struct Culling {
     pub planes: PlaneOptions,
 }
 
-/// Why there is no such view.
+/// The failure to derive a volume.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CullingError {
@@ -144,7 +142,7 @@ impl Culling {
         }
     }
 
-    /// Whether the choices go together.
+    /// Checks that the choices go together.
     ///
     /// # Errors
     /// Which of them do not.
@@ -163,7 +161,7 @@ impl Culling {
         Ok(())
     }
 
-    /// Why a margin that was asked for may still lose visible items; `None` where it is
+    /// The reason why a requested margin may still lose visible items; `None` if it is
     /// proven to keep them, or there is none.
     pub fn unproven(&self) -> Option<String> {
         let PlaneOptions { method, epsilon } = self.planes;
@@ -198,9 +196,9 @@ impl Culling {
         })
     }
 
-    /// What the test asks for beyond the faces, about the eye. It is made of the
-    /// frame's planes in f64 whatever the derivation: sums of rounded ones cut off
-    /// what rounding turned them by, and no margin covers that.
+    /// Planes of the test beyond the faces, about the eye. Derived from the frame's
+    /// planes in f64, whatever the derivation: sums of rounded planes can be turned by
+    /// more than a margin covers.
     fn more(
         &self,
         camera: &Camera,

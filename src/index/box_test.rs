@@ -14,7 +14,7 @@ use crate::query::{Context, NoRecorder, QueryVolume, Recorder, Sink};
 
 /// A query as a test of one box at a time. Boxes are finite and not empty.
 pub trait BoxTest {
-    /// Whether `admits` is `!rejects`.
+    /// True if `admits` is `!rejects`.
     const NODES_AS_ITEMS: bool;
     /// No item within this box belongs to the answer.
     fn rejects(&self, node: &Aabb) -> bool;

@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::geometry::{Aabb, Plane, PlaneRows, ROW_LANES};
+use crate::geometry::{Aabb, Plane, PlaneF64, PlaneRows, ROW_LANES};
 
 /// Share of the scene's size by which results are widened: far more than the
 /// rounding of the corners, far less than an item.
@@ -45,21 +45,11 @@ pub fn of_planes(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Aabb {
 /// The planes of a view and the faces of the scene.
 const MOST_HALVES: usize = ROW_LANES + 6;
 
-/// A half-space in f64 with a unit normal.
-#[derive(Clone, Copy)]
-struct Half {
-    normal: DVec3,
-    d: f64,
-}
-
 /// `None` where the corners cannot be computed with confidence.
 fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
     let reach = scene.reach().as_dvec3();
     let size = reach.max_element();
-    let mut halves = [Half {
-        normal: DVec3::ZERO,
-        d: 0.0,
-    }; MOST_HALVES];
+    let mut halves = [PlaneF64::new(DVec3::ZERO, 0.0); MOST_HALVES];
     let mut count = 0;
     for plane in rows.planes() {
         if let Some(moved) = moved_outward(&plane, half.as_dvec3(), reach)? {
@@ -68,14 +58,8 @@ fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
         }
     }
     for axis in DVec3::AXES {
-        halves[count] = Half {
-            normal: axis,
-            d: -axis.dot(scene.min.as_dvec3()),
-        };
-        halves[count + 1] = Half {
-            normal: -axis,
-            d: axis.dot(scene.max.as_dvec3()),
-        };
+        halves[count] = PlaneF64::new(axis, -axis.dot(scene.min.as_dvec3()));
+        halves[count + 1] = PlaneF64::new(-axis, axis.dot(scene.max.as_dvec3()));
         count += 2;
     }
     let halves = &halves[..count];
@@ -104,7 +88,7 @@ fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
                     return None;
                 }
                 let corner = scaled / determinant;
-                let lies_in = |h: &Half| h.normal.dot(corner) + h.d >= -SLACK * size;
+                let lies_in = |h: &PlaneF64| h.normal.dot(corner) + h.d >= -SLACK * size;
                 if halves.iter().all(lies_in) {
                     (min, max) = (min.min(corner), max.max(corner));
                 }
@@ -116,7 +100,7 @@ fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
 
 /// The plane that the centres obey, normalised; `None` within if it constrains
 /// nothing, `None` if it may overflow or can never be met.
-fn moved_outward(plane: &Plane, half: DVec3, reach: DVec3) -> Option<Option<Half>> {
+fn moved_outward(plane: &Plane, half: DVec3, reach: DVec3) -> Option<Option<PlaneF64>> {
     let (normal, d) = (plane.normal.as_dvec3(), f64::from(plane.d));
     let largest = normal.abs().dot(reach) + d.abs();
     // All finite, so never a NaN.
@@ -130,10 +114,7 @@ fn moved_outward(plane: &Plane, half: DVec3, reach: DVec3) -> Option<Option<Half
     // Three products and three sums of f32 err by less than this.
     let error = 1e-6 * largest + 1e-30;
     let d = d + normal.abs().dot(half) + error;
-    Some(Some(Half {
-        normal: normal / length,
-        d: d / length,
-    }))
+    Some(Some(PlaneF64::new(normal / length, d / length)))
 }
 
 /// In f32 and wider by the slack.

@@ -1,5 +1,5 @@
-//! The contract of a structure: its input, its declaration, and the one query that it
-//! answers. The forms of the query that callers use are provided.
+//! The contract of a structure: its input, its declaration, and its one query. The
+//! forms of the query that callers use are provided.
 
 use std::ops::{ControlFlow, Range};
 
@@ -250,8 +250,8 @@ pub trait FrustumQuery: RegionIndex {
         });
     }
 
-    /// [`FrustumQuery::visible`] with the cost of the query. By the portable kernel; ids
-    /// and cost are the same by all kernels.
+    /// [`FrustumQuery::visible`] with the cost of the query, by the portable kernel.
+    /// Ids and cost are the same by all kernels.
     fn counted<Q: QueryVolume>(&self, volume: &Q) -> (Vec<ItemId>, QueryCost) {
         let (mut ids, mut cost) = Default::default();
         let _ = self.query(
@@ -266,8 +266,8 @@ pub trait FrustumQuery: RegionIndex {
         self.visible(&p)
     }
 
-    /// Passes every item that the volume sees to the sink. `Break` if the sink ended the
-    /// query.
+    /// Passes every item that the volume sees to the sink.
+    /// `Break` if the sink ended the query.
     fn query_into<Q: QueryVolume, S: Sink>(&self, volume: &Q, sink: &mut S) -> ControlFlow<()> {
         Kernel::best().run(Query {
             index: self,
@@ -294,7 +294,7 @@ pub trait FrustumQuery: RegionIndex {
 
 impl<T: RegionIndex> FrustumQuery for T {}
 
-/// A query for [`Kernel::run`]: `kernel.run(Query { index, volume, sink, recorder })`.
+/// A query as work: `kernel.run(Query { index, volume, sink, recorder })`.
 pub struct Query<'a, T, Q, S, R> {
     /// The structure.
     pub index: &'a T,

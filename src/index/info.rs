@@ -1,6 +1,5 @@
-//! What a structure says of itself: its name, what kind it is, whose it is and
-//! what it can do. Declared, never guessed from a name; the conformance suite
-//! holds a structure to what it has declared.
+//! The declaration of a structure: name, kind, origin, capabilities. Each structure
+//! is checked against it by the conformance suite.
 
 use std::fmt;
 
@@ -17,56 +16,57 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct Info {
-    /// As typed on the command line; no registry has it twice.
+    /// Name on the command line; unique in a registry.
     pub name: &'static str,
-    /// One line for `cullbench list`; says so if the layout is special.
+    /// One line for `cullbench list`, with special properties of the layout.
     pub summary: &'static str,
     /// Scan, tree or grid.
     pub kind: Kind,
-    /// Whose code it is.
+    /// Author of the code.
     pub origin: Origin<&'static str>,
-    /// What it can do beyond the contract.
+    /// Capabilities beyond the contract.
     pub capabilities: Capabilities,
-    /// The form that lectures show, kept to be read beside the others: timed where
-    /// it is named, or all are, and no part of the list `default`.
+    /// The form that lectures show, for comparison: timed if named, or with `all`, and
+    /// not part of the list `default`.
     pub textbook: bool,
 }
 
-/// How a structure goes about a query.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
-pub enum Kind {
-    /// Looks at every item.
-    Scan,
-    /// Nodes within nodes.
-    Tree,
-    /// Cells side by side, none within another.
-    Grid,
+named! {
+    /// The kind of a structure's search.
+    #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    #[cfg_attr(test, derive(schemars::JsonSchema))]
+    #[non_exhaustive]
+    pub enum Kind {
+        /// Tests every item.
+        Scan = "scan",
+        /// Nodes within nodes.
+        Tree = "tree",
+        /// Cells side by side, none within another.
+        Grid = "grid",
+    }
 }
 
-/// Whose code answers.
+/// Author of the code that answers queries.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum Origin<Name = String> {
-    /// This crate's, even where another crate built the tree.
+    /// This crate, even where another crate builds the tree.
     Ours,
     /// The crate of that name.
     Crate(Name),
-    /// Written here after somebody's code that cannot be asked itself.
+    /// This crate, after code that cannot be called itself.
     StandIn(Name),
 }
 
-/// What a structure can do beyond the contract. Everything is off unless
-/// declared; region search is in the contract.
+/// Capabilities of a structure beyond the contract, off unless declared.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 #[non_exhaustive]
 pub struct Capabilities {
     /// [`RegionIndex::refit`](super::RegionIndex::refit) takes over items that
-    /// have moved; without, it always declines.
+    /// have moved; otherwise it always declines.
     pub refits: bool,
     /// [`RegionIndex::tree_order`](super::RegionIndex::tree_order): answers
     /// may be ranges of the structure's own order.
@@ -87,7 +87,7 @@ impl Info {
         }
     }
 
-    /// A structure that can do what the contract asks, and no more.
+    /// A structure without capabilities beyond the contract.
     pub const fn new(
         name: &'static str,
         summary: &'static str,
@@ -132,7 +132,7 @@ impl Info {
         self
     }
 
-    /// The same under another name: for a variant with parameters of its own.
+    /// The declaration under another name, for a variant with parameters of its own.
     pub const fn named(mut self, name: &'static str) -> Info {
         self.name = name;
         self
@@ -140,7 +140,7 @@ impl Info {
 }
 
 impl Capabilities {
-    /// The names of those it has.
+    /// Names of the declared capabilities.
     pub fn names(&self) -> Vec<&'static str> {
         let all = [
             (self.refits, "refits"),
@@ -153,31 +153,20 @@ impl Capabilities {
     }
 }
 
-impl Kind {
-    /// As JSON and lists have it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Scan => "scan",
-            Kind::Tree => "tree",
-            Kind::Grid => "grid",
-        }
-    }
-}
-
 impl<Name> Origin<Name> {
-    /// Whether the code that answers is this crate's own.
+    /// Returns whether this crate's code answers, not a stand-in.
     pub fn is_ours(&self) -> bool {
         matches!(self, Origin::Ours)
     }
 
-    /// Whether it is the code of another crate itself, no stand-in for it.
+    /// Returns whether another crate's own code answers, not a stand-in.
     pub fn is_crate(&self) -> bool {
         matches!(self, Origin::Crate(_))
     }
 }
 
 impl Origin<&str> {
-    /// The same with a name of its own, for what outlives the structure.
+    /// Converts to an owned name.
     pub fn owned(self) -> Origin {
         match self {
             Origin::Ours => Origin::Ours,

@@ -166,7 +166,7 @@ impl RegionIndex for Linear {
     }
 }
 
-/// Blocks that are passed to the sink together, which reserves 64 KiB for their ids.
+/// Blocks that are passed to the sink together: 64 KiB of ids.
 const TOGETHER: usize = 1024;
 
 /// Consecutive blocks, all planes open.

@@ -28,10 +28,9 @@ type Build = fn(Execution, &Input<'_>, &Value) -> Result<Box<dyn DynIndex>, Buil
 /// A row of a registry: a structure without its type.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// What the structure declares.
+    /// The structure's declaration.
     pub info: Info,
-    /// Builds from parameters as JSON (missing ones take their defaults) what
-    /// is asked by that kernel.
+    /// Builds the structure from parameters as JSON (missing ones take their defaults).
     pub build: Build,
     /// All parameters of a request, defaults filled in.
     pub params: fn(&Value) -> Result<Value, BuildError>,
@@ -264,7 +263,7 @@ impl Registry {
 /// A structure as asked for: its row with parameters.
 #[derive(Clone, Debug)]
 pub struct StructureSpec {
-    /// As typed: `bvh` or `bvh:leaf=4`.
+    /// The typed text: `bvh` or `bvh:leaf=4`.
     pub label: String,
     /// The structure.
     pub row: Row,
@@ -290,7 +289,7 @@ impl StructureSpec {
         StructureSpec { execution, ..self }
     }
 
-    /// What the structure declares.
+    /// The structure's declaration.
     pub fn info(&self) -> &Info {
         &self.row.info
     }
@@ -320,7 +319,7 @@ impl StructureSpec {
     }
 
     /// Brings an index up to date after items have moved: by refitting where
-    /// the structure can, else by building it anew. True for a refit.
+    /// the structure can, else by a new build. True for a refit.
     ///
     /// # Errors
     /// A moved item with a NaN or infinite bound; the index is unchanged.

@@ -1,17 +1,16 @@
-//! What any machine has: the portable kernel alone, its vectors plain arrays.
+//! The portable kernel alone, its vectors plain arrays, for any machine.
 
 use std::ops::Range;
 
 use super::plain::Plain;
 use super::{Kernel, Work};
 
-/// The instruction set that the program was compiled for, with no need to ask
-/// the processor.
+/// The instruction set that the program was compiled for.
 pub type Baseline = Plain;
 /// The value of [`Baseline`].
 pub const BASELINE: Baseline = Plain;
 
-/// Whether this processor runs the kernel.
+/// Returns whether this processor runs the kernel.
 pub fn detect(kernel: Kernel) -> bool {
     kernel == Kernel::Portable
 }
@@ -22,18 +21,18 @@ pub fn run<W: Work>(_: Kernel, work: W) -> W::Output {
     work.run(BASELINE)
 }
 
-/// As [`extend`](crate::kernel::extend).
+/// See [`extend`](crate::kernel::extend).
 #[inline(always)]
 pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
     out.extend_from_slice(words);
 }
 
-/// As [`extend_by_places`](crate::kernel::extend_by_places).
+/// See [`extend_by_places`](crate::kernel::extend_by_places).
 #[inline(always)]
 pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
     out.extend_from_slice(&words[places]);
 }
 
-/// There is no instruction to ask with.
+/// Does nothing: there is no instruction for it.
 #[inline(always)]
 pub fn prefetch<T>(_: &T) {}

@@ -1,4 +1,4 @@
-//! What std has too, of parts that are inlined whatever the compiler thinks.
+//! Functions of std again, always inlined.
 //!
 //! `Zip::new`, `<[T; N]>::map` and `array::from_fn` are not `#[inline]`: where they
 //! end up in another unit of code generation than the kernel that uses them, they are
@@ -7,7 +7,7 @@
 //! other inner loop pays for the call: rays of the sample truth took twice as long, verdicts
 //! of the oracle up to fourteen times. (A closure that is called where it stands is inlined.)
 
-/// As `a.iter().zip(b)`.
+/// Equivalent of `a.iter().zip(b)`.
 #[inline(always)]
 pub fn pairs<'a, A, B>(
     a: &'a [A],
@@ -18,7 +18,7 @@ pub fn pairs<'a, A, B>(
     (0..both).map(move |i| (&a[i], &b[i]))
 }
 
-/// As `array.map(f)`.
+/// Equivalent of `array.map(f)`.
 #[inline(always)]
 pub fn each<A: Copy, B: Copy + Default, const N: usize>(
     array: [A; N],

@@ -1,6 +1,4 @@
-//! Sixteen lanes at a time: the few vector operations that the block kernels
-//! are written in. Who has them and which one runs is chosen next door; what the
-//! lanes mean is up to the callers.
+//! Sixteen lanes at a time: the vector operations of the block kernels.
 
 /// Lanes of a vector: the boxes of one block.
 pub const LANES: usize = 16;
@@ -20,7 +18,7 @@ pub fn first_lanes(count: usize) -> LaneMask {
 /// written in them comes out bit for bit the same on every instruction set. A
 /// value of such a type is the proof that the processor has it.
 pub trait Isa: Copy {
-    /// Whether there are registers for the numbers of six planes and a block.
+    /// True if the registers hold the coefficients of six planes and a block.
     const MANY_REGISTERS: bool = false;
 
     /// Sixteen f32.
@@ -53,9 +51,6 @@ pub trait Isa: Copy {
     fn whole(self, floats: Self::Floats) -> [i32; LANES];
     /// The same number in every lane.
     fn splat(self, x: f32) -> Self::Floats;
-    /// Of four numbers, for each lane the one that its two bits of `picks` say,
-    /// lane 0 the lowest bits.
-    fn permute(self, from: &[f32; 4], picks: u32) -> Self::Floats;
     /// `a + b`, rounded once.
     fn add(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// `a * b`, rounded once; never fused with a sum.
@@ -104,7 +99,7 @@ pub trait Isa: Copy {
 
 /// A piece of a larger work: what [`Isa::apart`] does.
 pub trait Piece<I: Isa> {
-    /// What the piece returns.
+    /// Result of the piece.
     type Output;
 
     /// `#[inline(always)]`, as all that is hot in it.
@@ -112,10 +107,10 @@ pub trait Piece<I: Isa> {
 }
 
 /// Appends rows and some lanes of rows to a list that has room for all of them
-/// from the start, so that nothing is asked in between. The list is as long as
-/// it should be once the packer is dropped.
+/// from the start, without checks in between. The length of the list is set when the
+/// packer is dropped.
 pub trait Pack<'a, I: Isa> {
-    /// Room for so many words, and for the rest of a row behind them.
+    /// Reserves room for `words` words, and for the rest of a row behind them.
     fn onto(out: &'a mut Vec<u32>, words: usize) -> Self;
 
     /// Appends the words of `lanes`, lowest first.
@@ -154,7 +149,6 @@ mod tests {
                 isa.max(a, b),
                 at,
                 behind,
-                isa.permute(&std::array::from_fn(|i| self.a[i]), self.b[5].to_bits()),
             ];
             let bits = floats.map(|x| isa.to_array(x).map(canonical));
             let mut out: Vec<u32> = bits.as_flattened().to_vec();
@@ -191,7 +185,7 @@ mod tests {
         }
     }
 
-    /// Room for so many words, and then these rows and lanes of rows.
+    /// Room for a number of words, and then these rows and lanes of rows.
     struct Packed<'a>(&'a mut Vec<u32>, usize, &'a [([u32; LANES], LaneMask)]);
 
     impl Work for Packed<'_> {
@@ -206,7 +200,7 @@ mod tests {
         }
     }
 
-    /// What each instruction set packs behind a 1, and whether it panicked.
+    /// Words that each instruction set packs behind a 1, and whether it panicked.
     fn packed(words: usize, rows: &[([u32; LANES], LaneMask)]) -> Vec<(Vec<u32>, bool)> {
         let pack = |run: &dyn Fn(Packed)| {
             // Memory enough, so that it is the packer that refuses.

@@ -34,7 +34,7 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
     #[non_exhaustive]
     pub enum Kernel {
-        /// What the program was compiled for: SSE2 on x86-64, NEON on AArch64.
+        /// The compilation target: SSE2 on x86-64, NEON on AArch64.
         Portable = "portable",
         /// 256-bit vectors and the bit instructions of the same generation.
         Avx2 = "avx2",
@@ -49,23 +49,23 @@ named! {
 /// `run` and all that is hot in it must be `#[inline(always)]`: what stays a
 /// call of its own was compiled for the portable set.
 pub trait Work {
-    /// What the work returns.
+    /// Result of the work.
     type Output;
 
     /// Does the work with these instructions.
     fn run<I: Isa>(self, isa: I) -> Self::Output;
 }
 
-/// Why a kernel cannot be had.
+/// The processor lacks a kernel's instructions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("kernel '{kernel}' needs instructions that this processor does not have")]
 pub struct Unavailable {
-    /// The kernel that was asked for.
+    /// The requested kernel.
     pub kernel: Kernel,
 }
 
 impl Kernel {
-    /// Whether this processor (and operating system) runs it. Asked once.
+    /// Returns whether this processor (and operating system) runs it. Detected once.
     #[inline]
     pub fn is_available(self) -> bool {
         static AVAILABLE: OnceLock<[bool; 3]> = OnceLock::new();
@@ -109,15 +109,17 @@ impl fmt::Display for Kernel {
     }
 }
 
-/// Asks for the cache line at the start of `place` ahead of its use. A hint:
-/// it changes no value, and where there is no such instruction nothing is done.
+/// Prefetches the cache line at the start of `place`.
+///
+/// A hint without effect on values; does nothing on machines without such an instruction.
 #[inline(always)]
 pub fn prefetch<T>(place: &T) {
     machine::prefetch(place);
 }
 
-/// `out.extend_from_slice(words)`, inlined: what std has is two calls, and what a
-/// structure hands over is often a few ids.
+/// `out.extend_from_slice(words)`, inlined.
+///
+/// std makes two calls, and structures often pass a few ids.
 #[inline(always)]
 pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
     machine::extend(out, words);

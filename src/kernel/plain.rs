@@ -55,10 +55,6 @@ impl Isa for Plain {
         [x; LANES]
     }
     #[inline(always)]
-    fn permute(self, from: &[f32; 4], picks: u32) -> [f32; LANES] {
-        lanes(|lane| from[(picks >> (2 * lane) & 3) as usize])
-    }
-    #[inline(always)]
     fn add(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
         lanes(|lane| a[lane] + b[lane])
     }

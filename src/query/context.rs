@@ -1,19 +1,17 @@
-//! What a query carries beside its question: one value, so that a structure has
-//! one query for every instruction set, sink and recorder.
+//! Instruction set, sink and recorder of a query as one value.
 
 use std::ops::ControlFlow;
 
 use super::{ItemId, Recorder, Sink};
 use crate::kernel::Isa;
 
-/// The instruction set of a query, the sink of its answers, the recorder of its
-/// cost.
+/// The instruction set, the sink and the recorder of a query.
 pub trait Context {
-    /// The vectors to use; a structure that has no use for vectors never asks.
+    /// The instruction set.
     type Isa: Isa;
-    /// Where answers go.
+    /// The destination of answers.
     type Sink: Sink;
-    /// What is counted.
+    /// The counters.
     type Recorder: Recorder;
 
     /// The instruction set.
@@ -34,7 +32,7 @@ pub trait Context {
         self.parts().1
     }
 
-    /// Hands ids to the sink; `Break` if it ends the query.
+    /// Passes ids to the sink; `Break` if it ends the query.
     #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
         self.sink().accept(ids)
@@ -54,7 +52,7 @@ pub trait Context {
 /// let bvh = Bvh::build(&Input::new(&items), &Default::default())?;
 /// let (mut count, mut cost) = (Count::default(), QueryCost::default());
 /// let mut context = QueryContext::new(BASELINE, &mut count, &mut cost);
-/// // The question may be a point, a box or a frustum.
+/// // The volume may be a point, a box or a frustum.
 /// let _ = bvh.query(&Vec3::ONE, &mut context);
 /// assert_eq!(count.0, 3);
 /// assert!(cost.comparisons() > 0);
@@ -68,7 +66,7 @@ pub struct QueryContext<'q, I, S, R> {
 }
 
 impl<'q, I: Isa, S: Sink, R: Recorder> QueryContext<'q, I, S, R> {
-    /// Of its parts.
+    /// A context of its parts.
     #[inline(always)]
     pub fn new(isa: I, sink: &'q mut S, recorder: &'q mut R) -> Self {
         QueryContext {

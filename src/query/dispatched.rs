@@ -1,5 +1,6 @@
-//! A volume dispatched at run time, test by test, for queries that are not timed: a
-//! structure is compiled for it once instead of once per volume.
+//! A volume dispatched per test, for queries that are not timed.
+//!
+//! A structure is compiled for it once instead of once per volume.
 
 use glam::Vec3;
 

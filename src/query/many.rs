@@ -1,22 +1,21 @@
-//! Answers to many region searches at once: the sink that takes them point by
-//! point, and the collector that keeps them in two flat lists. How a structure
-//! overlaps the searches is its own business.
+//! Answers to many region searches at once: their sink, and a collector.
 
 use std::ops::ControlFlow;
 
 use super::ItemId;
 use crate::kernel::extend;
 
-/// Where the answers to a batch of points go: one call for every point, in
-/// ascending order of the points, with all its ids in one slice (empty where
-/// nothing holds the point). `Break` ends the batch.
+/// Destination of the answers to a batch of points.
+///
+/// One call for every point, in ascending order of the points, with all its ids in one
+/// slice (empty if no item contains the point). `Break` ends the batch.
 pub trait ManySink {
     /// Takes the answer of the point with this index in the batch.
     fn accept(&mut self, point: u32, ids: &[ItemId]) -> ControlFlow<()>;
 
-    /// The answers to several points at once, the first of them `first`: all
-    /// their ids, and for each point where its own end. By default, one call of
-    /// [`ManySink::accept`] a point.
+    /// Takes the answers of several points at once, from the point `first` on: all ids,
+    /// and the end of each point's ids. By default, one call of [`ManySink::accept`] per
+    /// point.
     #[inline(always)]
     fn accept_rows(&mut self, first: u32, ids: &[ItemId], ends: &[u32]) -> ControlFlow<()> {
         let mut from = 0;
@@ -28,28 +27,27 @@ pub trait ManySink {
     }
 }
 
-/// Collects the answers as compressed rows: all ids in one list, point after
-/// point, and where each point's ids end.
+/// Collects answers as compressed rows: all ids, and the end of each point's ids.
 #[derive(Clone, Default, PartialEq, Eq, Debug)]
 pub struct Located {
     ids: Vec<ItemId>,
-    /// Per point; a point's ids begin where those of the one before it end.
+    /// End of each point's ids; they begin at the end of the point before.
     ends: Vec<usize>,
 }
 
 impl Located {
-    /// Forgets the answers and keeps the memory.
+    /// Removes the answers and keeps the memory.
     pub fn clear(&mut self) {
         self.ids.clear();
         self.ends.clear();
     }
 
-    /// Number of points that were answered.
+    /// Number of answered points.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// Whether no point was answered.
+    /// Returns whether there is no answered point.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
@@ -59,7 +57,7 @@ impl Located {
         &self.ids
     }
 
-    /// For each point where its ids end in [`Located::ids`].
+    /// The end of each point's ids in [`Located::ids`].
     pub fn ends(&self) -> &[usize] {
         &self.ends
     }
@@ -85,7 +83,7 @@ impl ManySink for Located {
     fn accept(&mut self, point: u32, ids: &[ItemId]) -> ControlFlow<()> {
         debug_assert_eq!(point as usize, self.ends.len(), "every point, in order");
         match ids {
-            // On a tiling nearly all: no call to copy four bytes.
+            // The usual case on a tiling, without a call to copy four bytes.
             [id] => self.ids.push(*id),
             _ => extend(&mut self.ids, ids),
         }

@@ -1,7 +1,5 @@
-//! What a query is made of: the volume it asks about, the ids it answers with,
-//! and its context: where answers go (sinks), what is counted on the way
-//! (recorders), the instruction set. No structure and no geometry of its own is
-//! here.
+//! Parts of a query: its volume, the ids of its answer, and its context of sink,
+//! recorder and instruction set.
 
 mod context;
 mod dispatched;
@@ -22,5 +20,5 @@ pub use sink::{Count, Ranges, Sink, Tests, runs};
 pub(crate) use volume::each_volume;
 pub use volume::{AnyVolume, QueryVolume, UnpreparedPlanes};
 
-/// An item's number: its zero-based place in the scene.
+/// An item's number: its zero-based index in the scene.
 pub type ItemId = u32;

@@ -1,16 +1,14 @@
-//! Planes of a view made ready for many blocks: by numbers that stay in
-//! registers, or, where a view has none to keep, by asking it as ever.
+//! Planes of a volume prepared for many blocks: coefficients in registers.
 
 use crate::geometry::{BoxBlock, BroadcastPlane, BroadcastPlanes, LaneMask};
 use crate::kernel::Isa;
 
-/// Planes of a view, made ready for many blocks that no other plane is open
-/// for.
+/// Planes of a volume, prepared for many blocks without other open planes.
 pub trait Planes<I: Isa>: Copy {
     /// [`QueryVolume::kept_lanes`](super::QueryVolume::kept_lanes).
     fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask;
 
-    /// Whether four blocks at once are quicker than each by itself.
+    /// True if four blocks at once are faster than one after another.
     const IN_FOURS: bool;
 
     /// [`QueryVolume::kept_of_four`](super::QueryVolume::kept_of_four).
@@ -24,7 +22,7 @@ pub trait Planes<I: Isa>: Copy {
         ]
     }
 
-    /// Asks for the memory that this reads ahead of it.
+    /// Prefetches the rows of a block that the test reads.
     fn prefetch(&self, block: &BoxBlock);
 }
 

@@ -1,29 +1,28 @@
-//! The question about a box that every query comes down to, plane by plane, and
-//! the verdict about a node. How sixteen boxes are asked at once is
-//! [`QueryVolume`](super::QueryVolume)'s; traversal belongs to the structures.
+//! The test of one box against a query volume, plane by plane.
+//!
+//! [`QueryVolume`](super::QueryVolume) tests sixteen boxes at once.
 
 use glam::Vec3;
 
 use super::Recorder;
 use crate::geometry::{Aabb, ConvexVolume, ConvexVolumeF64, PlaneMask, RelativeVolume, Spheres};
 
-/// How a box lies to a query volume.
+/// Position of a box relative to a query volume.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Containment {
-    /// No point of the box can be in the volume: skip the subtree.
+    /// No point of the box can be in the volume: the subtree is skipped.
     Outside,
-    /// Not decided: look at the children.
+    /// Undecided: the children are tested.
     Straddles,
-    /// Everything in the box passes: report the subtree as one slice.
+    /// Every item in the box passes: the subtree is reported as one slice.
     Inside,
 }
 
 /// Up to 32 planes with a test of their own: a camera's frustum in any form, or
 /// a box or a point, which have a single "plane" of another shape.
 ///
-/// A mask of planes is what a parent hands to its children: those that it does
-/// not lie wholly inside of are still open. An implementation must be monotone,
-/// for each plane by itself:
+/// A parent passes a mask of open planes to its children: the planes that it does not
+/// lie wholly inside of. An implementation must be monotone, for each plane by itself:
 ///
 /// - if it [excludes](Predicate::excludes) a box it drops every item within;
 /// - if it [contains](Predicate::contains) a box it drops no item within.
@@ -32,23 +31,23 @@ pub enum Containment {
 /// decided planes out, and still returns exactly `{ i : volume.sees(items[i]) }`,
 /// bit for bit, as a scan does.
 pub trait Predicate: Sized {
-    /// Bits of the planes that constrain anything: what a query starts with.
+    /// Bits of the planes that constrain anything: the initial mask of a query.
     fn mask(&self) -> PlaneMask;
 
-    /// Whether the plane of that bit has the whole box on its outer side.
+    /// Returns whether the whole box is on the outer side of the plane of that bit.
     fn excludes(&self, plane: u32, bounds: &Aabb) -> bool;
 
-    /// Whether the plane of that bit has the whole box on its inner side.
+    /// Returns whether the whole box is on the inner side of the plane of that bit.
     fn contains(&self, plane: u32, bounds: &Aabb) -> bool;
 
-    /// Whether an item is dropped by the plane of that bit; by default, where
-    /// its bounds are excluded.
+    /// Returns whether the plane of that bit drops an item; by default, if it excludes
+    /// the item's bounds.
     #[inline(always)]
     fn drops(&self, plane: u32, item: &Aabb) -> bool {
         self.excludes(plane, item)
     }
 
-    /// How many planes a test with this mask counts as.
+    /// Number of planes that a test with this mask counts as.
     #[inline(always)]
     fn planes_open(mask: PlaneMask) -> u32 {
         mask.count_ones()
@@ -81,9 +80,9 @@ pub trait Predicate: Sized {
         (verdict, undecided)
     }
 
-    /// Whether an item below a node with this mask belongs to the answer. Half
-    /// the work of [`Predicate::classify`]: an item has no children to hand a
-    /// mask to, so nothing needs to be contained.
+    /// Returns whether an item below a node with this mask belongs to the answer. Half
+    /// the work of [`Predicate::classify`]: an item has no children, so containment is
+    /// not tested.
     #[inline(always)]
     fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {
         for plane in Bits(mask) {
@@ -95,14 +94,14 @@ pub trait Predicate: Sized {
         true
     }
 
-    /// Whether an item belongs to the answer: no plane drops it, and it is not
+    /// Returns whether an item belongs to the answer: no plane drops it, and it is not
     /// empty. O(planes).
     fn sees(&self, item: &Aabb) -> bool {
         !item.is_empty() && self.admits(item, self.mask(), &mut super::NoRecorder)
     }
 }
 
-/// Region search: which boxes hold this point (closed bounds).
+/// Region search: the boxes that contain this point (closed bounds).
 impl Predicate for Vec3 {
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
@@ -123,7 +122,7 @@ impl Predicate for Vec3 {
     }
 }
 
-/// Box search: which boxes share a point with this one (closed bounds).
+/// Box search: the boxes that share a point with this one (closed bounds).
 impl Predicate for Aabb {
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
@@ -161,8 +160,8 @@ impl Predicate for ConvexVolume {
 }
 
 /// The sphere test, on an index over [sphere cubes](crate::geometry::sphere_cube).
-/// Nodes get the plane test, items that and their spheres'; monotone because
-/// the cube's corners have a say in both: see [`Spheres`].
+/// Nodes get the plane test, items the plane test and the sphere test; monotone because
+/// both use the cube's corners: see [`Spheres`].
 impl Predicate for Spheres {
     #[inline(always)]
     fn mask(&self) -> PlaneMask {

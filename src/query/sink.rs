@@ -1,18 +1,19 @@
-//! Where answers go: collect, count, or stop at the first one.
+//! Destinations of answers: lists, ranges, counts, closures.
 
 use std::ops::{ControlFlow, Range};
 
 use super::ItemId;
 use crate::kernel::{Isa, LANES, LaneMask, Pack, Piece, extend, extend_by_places};
 
-/// Where answers go. A structure hands over slices: a subtree that is wholly
-/// inside is one call. Returning `Break` ends the query.
+/// Destination of answers. `Break` ends the query.
+///
+/// A structure passes slices: a subtree that is wholly inside is one call.
 pub trait Sink {
     /// Takes ids of answers, none of them twice in a query.
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()>;
 
-    /// The items at some places of a structure that keeps them in the order
-    /// of `ids`: `accept(&ids[places])`, for sinks that do without the ids.
+    /// Takes items by their positions in a structure that keeps them in the order
+    /// of `ids`: `accept(&ids[places])`, for sinks that do not need the ids.
     #[inline(always)]
     fn accept_places<I: Isa>(
         &mut self,
@@ -23,8 +24,8 @@ pub trait Sink {
         self.accept(&ids[places])
     }
 
-    /// The items at the places `start + lane` of all lanes that are set, lowest
-    /// first: by default, run by run.
+    /// Takes the items at the positions `start + lane` of all lanes that are set.
+    /// Lowest lane first; by default, run by run.
     #[inline(always)]
     fn accept_lanes<I: Isa>(
         &mut self,
@@ -39,8 +40,8 @@ pub trait Sink {
         ControlFlow::Continue(())
     }
 
-    /// What many blocks of items are found to hold, one block after the other;
-    /// `ids` are those of each block.
+    /// Takes the answers of many blocks of items, one block after the other; `ids` are
+    /// those of each block.
     #[inline(always)]
     fn accept_tested<I: Isa, T: Tests<I>>(
         &mut self,
@@ -56,15 +57,14 @@ pub trait Sink {
     }
 }
 
-/// Blocks of items that are tested when their turn comes.
+/// Blocks of items that the sink has tested one by one.
 pub trait Tests<I: Isa> {
-    /// Whether most blocks are expected to hold no answer at all: then the ids
-    /// of those are not read.
+    /// True if most blocks are expected to hold no answer: their ids are not read.
     const SPARSE: bool;
 
     /// Number of blocks.
     fn count(&self) -> usize;
-    /// The number of the i-th block, and its lanes that are answers.
+    /// The index of the i-th block, and its lanes that are answers.
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask);
 }
 
@@ -88,14 +88,14 @@ impl Sink for Vec<ItemId> {
     #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
         match ids {
-            // Often, and a call to copy four bytes would cost more than they.
+            // Frequent; a call to copy four bytes would cost more than the copy.
             [id] => self.push(*id),
             _ => extend(self, ids),
         }
         ControlFlow::Continue(())
     }
 
-    /// Short runs without a call of memcpy, which costs more than they do.
+    /// Copies short runs without a call of memcpy, which would cost more.
     #[inline(always)]
     fn accept_places<I: Isa>(
         &mut self,
@@ -107,7 +107,7 @@ impl Sink for Vec<ItemId> {
         ControlFlow::Continue(())
     }
 
-    /// All sixteen ids are read and the ones that count moved together.
+    /// Reads all sixteen ids and compresses those of the lanes.
     #[inline(always)]
     fn accept_lanes<I: Isa>(
         &mut self,
@@ -126,7 +126,7 @@ impl Sink for Vec<ItemId> {
         ControlFlow::Continue(())
     }
 
-    /// Room is made for all blocks at once.
+    /// Reserves room for all blocks at once.
     #[inline(always)]
     fn accept_tested<I: Isa, T: Tests<I>>(
         &mut self,
@@ -165,8 +165,8 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
             }
             return;
         }
-        // Test first, and go only where there is something: which blocks those
-        // are cannot be foretold, so nothing is asked in between.
+        // All tests first, then the blocks with answers: a branch per block would be
+        // unpredictable.
         let mut held = [0; TESTED_AHEAD];
         let mut blocks = [0; TESTED_AHEAD];
         let mut hits = [0; TESTED_AHEAD + LANES];
@@ -195,24 +195,22 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
     }
 }
 
-/// Blocks that are tested before the first of them is handed over, where most
-/// hold nothing.
+/// Blocks that are tested before the first of them is copied, if most hold nothing.
 const TESTED_AHEAD: usize = 16 * LANES;
 
-/// So few blocks are handed over as they come: making room for what is tested
-/// ahead would cost more than going everywhere.
+/// Most blocks that are copied one by one; below, testing ahead would cost more.
 const FEW: usize = 48;
 
-/// Where the answers lie in the structure's own order, without their ids;
-/// adjoining ranges are one. Only for structures that hand over places.
+/// Positions of the answers in the structure's own order; adjoining ranges are one.
+/// Only for structures that pass positions.
 pub struct Ranges<'a> {
     out: &'a mut Vec<Range<u32>>,
-    /// Ranges before this one are somebody else's.
+    /// Number of ranges in the list before the query.
     first: usize,
 }
 
 impl<'a> Ranges<'a> {
-    /// Appends to what is there.
+    /// A sink that appends to a list.
     #[inline(always)]
     pub fn onto(out: &'a mut Vec<Range<u32>>) -> Self {
         let first = out.len();

@@ -1,6 +1,6 @@
-//! Query volumes as structures ask them: a [`Predicate`] and its kernels, which
-//! test sixteen boxes at once, and one type for any of them. Every kernel has the
-//! scalar test for a default; a volume with vectors of its own overrides it.
+//! Query volumes: a [`Predicate`] and kernels that test sixteen boxes at once.
+//!
+//! The default of every kernel is the scalar test.
 
 use glam::Vec3;
 
@@ -14,12 +14,12 @@ use super::predicate::Bits;
 use super::{Containment, NoRecorder, Predicate};
 use crate::kernel::Isa;
 
-/// What a structure is asked: which items a frustum sees, which hold a point,
-/// which share a point with a box. Bit for bit its [`Predicate`], sixteen boxes
-/// at a time.
+/// A frustum, a point or a box that sees items.
+///
+/// Bit for bit its [`Predicate`], sixteen boxes at a time.
 pub trait QueryVolume: Predicate {
-    /// Whether the volume is a point, so that a structure that goes down to one
-    /// by other means than bounds may: [`QueryVolume::as_point`].
+    /// True if the volume is a point, for structures that search for points by other
+    /// means than bounds: [`QueryVolume::as_point`].
     const IS_POINT: bool = false;
 
     /// The point, if the volume is one.
@@ -39,15 +39,15 @@ pub trait QueryVolume: Predicate {
         })
     }
 
-    /// The plane of that bit, made ready for many blocks:
+    /// The plane of that bit, prepared for many blocks:
     /// [`QueryVolume::kept_lanes`] with this bit for a mask.
     #[inline(always)]
     fn one_plane<I: Isa>(&self, _: I, plane: u32) -> impl Planes<I> {
         UnpreparedPlanes::one(self, plane)
     }
 
-    /// All planes, made ready for many blocks: [`QueryVolume::kept_lanes`] with
-    /// [`Predicate::mask`]. `None` if they are too many.
+    /// All planes, prepared for many blocks: [`QueryVolume::kept_lanes`] with
+    /// [`Predicate::mask`]. `None` if there are too many planes.
     #[inline(always)]
     fn all_planes<I: Isa>(&self, _: I) -> Option<impl Planes<I>> {
         Some(UnpreparedPlanes::all(self))
@@ -75,7 +75,7 @@ pub trait QueryVolume: Predicate {
         ALL_ROWS
     }
 
-    /// Asks for the memory that [`QueryVolume::kept_lanes`] reads ahead of it.
+    /// Prefetches the rows of a block that [`QueryVolume::kept_lanes`] reads.
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock, _mask: PlaneMask) {
         block.prefetch();
@@ -109,7 +109,7 @@ pub trait QueryVolume: Predicate {
     }
 }
 
-/// Planes of a volume that prepares nothing: each block asks the volume itself.
+/// Planes of a volume that prepares nothing: each block is tested by the volume.
 pub struct UnpreparedPlanes<'v, V> {
     view: &'v V,
     mask: PlaneMask,
@@ -270,8 +270,7 @@ impl QueryVolume for Aabb {
     }
 }
 
-/// Any of the volumes that an erased structure is asked. It is looked into once
-/// per query, never per node.
+/// Any volume for an erased structure. Dispatched once per query, never per node.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum AnyVolume<'a> {
@@ -287,7 +286,7 @@ pub enum AnyVolume<'a> {
     Point(Vec3),
 }
 
-/// Does the same with any of the volumes there are, compiled for each of them.
+/// Evaluates an expression for the volume inside, compiled for each type.
 macro_rules! each_volume {
     ($any:expr, $volume:ident => $work:expr) => {
         match $any {
@@ -336,7 +335,7 @@ mod tests {
     use crate::kernel::{BASELINE, Plain};
     use proptest::prelude::*;
 
-    /// What every volume owes: monotone plane by plane, lanes like the scalar
+    /// Checks the contract of a volume: monotone plane by plane, lanes like the scalar
     /// test, and verdicts about a node that fit all of its items.
     fn check<V: QueryVolume>(view: &V, items: &[Aabb]) -> Result<(), TestCaseError> {
         let node = Aabb::union_of(items);

@@ -86,7 +86,7 @@ pub enum PlaneSource {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BspParams {
-    /// Where the dividing planes come from.
+    /// Source of the dividing planes.
     pub builder: PlaneSource,
     /// Most items of a leaf (1 to 4096).
     pub leaf: u32,

@@ -46,11 +46,11 @@ fn by_median(records: &mut [Record], normal: Vec3) -> (Vec3, usize) {
     (normal, half)
 }
 
-/// The median along the widest axis, or beside it where it would part items of
+/// The median along the widest axis, or beside it where it would separate items of
 /// one centre: regions that tile space lie in layers, and a plane between two
 /// layers cuts none of them. Axis after axis, widest first; a side gets at
 /// least a quarter of the items (of few, at least one), or else the layer is
-/// parted after all.
+/// divided after all.
 pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     let centres = centres(records);
     let width = centres.max * 0.5 - centres.min * 0.5;
@@ -58,13 +58,13 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
     let (count, half) = (records.len(), records.len() / 2);
     let quarter = count.div_ceil(4);
-    // Few items may part as they can: their depth has a bound of its own.
+    // Few items may be divided unevenly: their depth has a bound of its own.
     let sizes: &[usize] = match count <= DESCENT_LEAF {
         true => &[quarter, 1],
         false => &[quarter],
     };
     for &least in sizes {
-        // No plane across an axis parts centres that are all at one place of it.
+        // No plane across an axis separates centres with one coordinate on it.
         for axis in axes
             .into_iter()
             .filter(|&k| centres.min[k] < centres.max[k])
@@ -174,12 +174,12 @@ pub fn by_principal_axis(records: &mut [Record]) -> Option<(Vec3, usize)> {
     Some(by_median(records, axis.as_vec3()))
 }
 
-/// Planes that `faces` looks at per node, and items it judges them by.
+/// Candidate planes of `faces` per node, and items by which they are ranked.
 const CANDIDATES: usize = 24;
 const JUDGES: usize = 128;
 
-/// The faces of so many of the boxes, and two diagonals through the centre of
-/// each: eight planes a box.
+/// The faces of `boxes` of the boxes, and two diagonals through the centre of each:
+/// eight planes per box.
 pub fn planes_of(records: &[Record], boxes: usize) -> impl Iterator<Item = Plane> {
     let step = records.len().div_ceil(boxes).max(1);
     records.iter().step_by(step).flat_map(|r| {
@@ -193,8 +193,7 @@ pub fn planes_of(records: &[Record], boxes: usize) -> impl Iterator<Item = Plane
     })
 }
 
-/// Of the [`planes_of`] some of the boxes,
-/// the plane with the least imbalance plus cut items.
+/// The plane of some boxes ([`planes_of`]) with the least imbalance plus cut items.
 pub fn by_own_planes(records: &mut [Record], cut: f32) -> Option<(Vec3, usize)> {
     let candidates = planes_of(records, CANDIDATES / 8);
     let judges = records.len().div_ceil(JUDGES).max(1);

@@ -56,20 +56,21 @@ fn finished(mut tree: Bvh2, params: BvhBuildParams) -> Bvh2 {
     tree
 }
 
-/// Reinserts a share of the nodes, unless they lie in too many others.
+/// Reinserts a share of the nodes, unless too many others contain them.
 fn reinsert(tree: &mut Bvh2, share: f32) {
     if !is_nested(tree, share) {
         ReinsertionOptimizer::default().run(tree, share, None);
     }
 }
 
-/// Nodes that are looked at to see how many others they lie in.
+/// Nodes sampled to count the others that contain them.
 const SAMPLE: usize = 1024;
-/// Most nodes that one may lie in on average. Ten to forty are usual.
+/// Most nodes that contain one on average. Ten to forty are usual.
 const MOST_AROUND: usize = 150;
 
-/// Whether the nodes that would be reinserted lie in so many others that the search
-/// for a better place, which looks into all of them, takes quadratic time.
+/// Decides whether reinsertion would take quadratic time.
+///
+/// The search for a better position visits all nodes that contain the reinserted one.
 fn is_nested(tree: &Bvh2, share: f32) -> bool {
     let nodes = &tree.nodes;
     let candidates = (nodes.len() as f32 * (2.0 * share).min(1.0)) as usize;
@@ -179,7 +180,7 @@ fn find_nearest(clusters: &[Bvh2Node], reach: usize, found: &mut Vec<Nearest>) {
     }
 }
 
-/// Has clusters find each other two by two.
+/// Pairs clusters two by two.
 fn pair(clusters: usize, found: &mut Vec<Nearest>) {
     found.clear();
     let last = clusters as u32 - 1;

@@ -1,5 +1,4 @@
-//! The crate bvh: its tree queried through `Bvh::traverse`, which returns references
-//! to shapes in a list.
+//! The crate bvh: its tree queried through `Bvh::traverse`, which returns shapes.
 
 use std::ops::ControlFlow;
 
@@ -68,7 +67,7 @@ impl<T: BoxTest, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, '_, T, R> {
 /// Boxes of this reach have areas that are still numbers in f32.
 const LARGEST: f32 = 1e18;
 
-/// The crate's tree over shapes scaled down, its nodes then fitted to the true boxes.
+/// The crate's tree over shapes scaled down, its nodes then fitted to the shapes.
 ///
 /// Where areas overflow, the crate's builder finds no cheapest split and
 /// leaves both children with empty boxes; where widths overflow, it panics.
@@ -112,7 +111,7 @@ pub struct PeerBvh {
 impl BoxTested for PeerBvh {
     const ABOUT: Info = Info::new(
         "peer-bvh",
-        "crate bvh, asked through Bvh::traverse",
+        "crate bvh, queried through Bvh::traverse",
         Kind::Tree,
         Origin::Crate("bvh"),
     );

@@ -1,4 +1,6 @@
-//! Structures of other crates, one file per crate, checked like our own. Each gets its test one box at a time (`box_test`). docs/PEERS.md has the calls.
+//! Structures of other crates, one file per crate, checked like our own.
+//!
+//! Each gets its test one box at a time (`box_test`). docs/PEERS.md has the calls.
 //!
 //! A peer's own code was compiled for the portable instruction set, unless the
 //! compiler inlines it into the kernel that calls it.
@@ -18,7 +20,7 @@ pub use obvhs::PeerObvhs;
 pub use parry3d::PeerParry3d;
 pub use rstar::PeerRstar;
 
-/// Most items with the same bounds for a builder that needs quadratic time for them.
+/// Most items with the same bounds for a builder of quadratic time.
 const MOST_ALIKE: usize = 50_000;
 
 /// Refuses more than [`MOST_ALIKE`] items with the same bounds. O(n log n).

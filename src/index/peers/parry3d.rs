@@ -30,7 +30,7 @@ fn bounds_of(node: &BvhNode) -> Aabb {
 impl BoxTested for PeerParry3d {
     const ABOUT: Info = Info::new(
         "peer-parry3d",
-        "crate parry3d, binned build, asked through traverse_indexed, whole subtrees accepted",
+        "crate parry3d, binned build, queried through traverse_indexed, whole subtrees accepted",
         Kind::Tree,
         Origin::Crate("parry3d"),
     );

@@ -168,7 +168,7 @@ pub trait Division: Send + Sync {
     const NAME: &str;
     /// Summary of the structure.
     const SUMMARY: &str;
-    /// Whether region search goes by [`Node::half_space`].
+    /// True if region search goes by the half-spaces of nodes.
     const BY_HALF_SPACES: bool = false;
 
     /// The root over items, of which there is at least one.

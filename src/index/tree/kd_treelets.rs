@@ -32,8 +32,7 @@ struct Treelet {
     high: [f32; CHILDREN],
     /// Nothing on the upper side reaches below this.
     low: [f32; CHILDREN],
-    /// What lies below the last planes: a treelet, or [`LEAF`] and the number
-    /// of a leaf.
+    /// Children of the last planes: a treelet, or [`LEAF`] and the number of a leaf.
     children: [u32; CHILDREN],
 }
 
@@ -94,7 +93,7 @@ impl Treelet {
     }
 }
 
-/// By lane: the bit of its plane, and the bit among the axes that says y or z.
+/// Bit of each lane's plane, and its bits among the axes for y and z.
 const BITS: [u32; CHILDREN] = powers_of_two(1, 1);
 const Y: [u32; CHILDREN] = powers_of_two(1, 2);
 const Z: [u32; CHILDREN] = powers_of_two(2, 2);
@@ -191,9 +190,10 @@ struct Branch {
 }
 
 impl Branch {
-    /// Whether the branch begins a treelet of its own instead of taking this lane:
-    /// where four levels or a multiple of four are left, so that the treelets above
-    /// the leaves are full.
+    /// Returns whether the branch begins a treelet of its own at this lane.
+    ///
+    /// True where four levels or a multiple of four are left, so that the treelets
+    /// above the leaves are full.
     fn begins_treelet(&self, lane: usize) -> bool {
         lane >= AXES || (lane > 0 && (self.height as usize).is_multiple_of(LEVELS))
     }
@@ -364,7 +364,7 @@ impl Treelets {
         self.starts[leaf] as usize..self.starts[leaf + 1] as usize
     }
 
-    /// Hands every item whose closed box holds `p` to the sink, in tree order.
+    /// Passes every item whose closed box holds `p` to the sink, in tree order.
     #[inline(always)]
     pub fn locate<I: Isa, S: Sink, R: Recorder>(
         &self,

@@ -33,7 +33,7 @@ impl TreeNode {
     }
 }
 
-/// Whether the node at this index has no children.
+/// Returns whether the node at this index has no children.
 #[inline(always)]
 pub fn is_leaf(nodes: &[TreeNode], node: usize) -> bool {
     nodes[node].after() == node + 1

@@ -101,7 +101,7 @@ impl PackedTree {
         &self.ids
     }
 
-    /// Whether the node has no children.
+    /// Returns whether the node has no children.
     #[inline(always)]
     pub fn is_leaf(&self, node: usize) -> bool {
         is_leaf(&self.nodes, node)

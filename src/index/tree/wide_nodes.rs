@@ -31,7 +31,7 @@ pub struct WideNodes {
     pub links: Vec<Links>,
     /// The lane of each tree node, counted over all wide nodes; or [`NO_LANE`].
     lane_of: Vec<u32>,
-    /// Whether some lane stands for several siblings.
+    /// True if some lane stands for several siblings.
     has_groups: bool,
 }
 

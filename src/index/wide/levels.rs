@@ -36,7 +36,7 @@ pub struct Layer<'t> {
     pub level: Level,
     /// Items below one lane.
     pub span: usize,
-    /// Whether its memory is prefetched.
+    /// True if its memory is prefetched.
     pub far: bool,
 }
 

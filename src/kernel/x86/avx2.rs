@@ -78,17 +78,6 @@ impl Isa for Avx2 {
         [unsafe { _mm256_set1_ps(x) }; 2]
     }
     #[inline(always)]
-    fn permute(self, from: &[f32; 4], picks: u32) -> [__m256; 2] {
-        each!(2, |i| unsafe {
-            let four = _mm_loadu_ps(from.as_ptr());
-            let four = _mm256_set_m128(four, four);
-            let picks = _mm256_set1_epi32((picks >> (16 * i)) as i32);
-            let shifts = _mm256_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14);
-            // Only the two lowest bits of a lane count.
-            _mm256_permutevar_ps(four, _mm256_srlv_epi32(picks, shifts))
-        })
-    }
-    #[inline(always)]
     fn add(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
         each!(2, |i| unsafe { _mm256_add_ps(a[i], b[i]) })
     }

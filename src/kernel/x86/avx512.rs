@@ -74,17 +74,6 @@ impl Isa for Avx512 {
         unsafe { _mm512_set1_ps(x) }
     }
     #[inline(always)]
-    fn permute(self, from: &[f32; 4], picks: u32) -> __m512 {
-        unsafe {
-            let four = _mm512_broadcast_f32x4(_mm_loadu_ps(from.as_ptr()));
-            let lanes =
-                _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-            // Only the two lowest bits of a lane count.
-            let picks = _mm512_srlv_epi32(_mm512_set1_epi32(picks as i32), lanes);
-            _mm512_permutevar_ps(four, picks)
-        }
-    }
-    #[inline(always)]
     fn add(self, a: __m512, b: __m512) -> __m512 {
         unsafe { _mm512_add_ps(a, b) }
     }

@@ -1,5 +1,6 @@
-//! What x86-64 has: SSE2 everywhere, AVX2 and AVX-512 where the processor says
-//! so. The only folder of the crate with unsafe code. Intrinsics are unsafe; they
+//! Kernels of x86-64: SSE2, and AVX2 and AVX-512 if the processor has them.
+//!
+//! The only folder of the crate with unsafe code. Intrinsics are unsafe; they
 //! are sound because a value of each set's type only exists where its
 //! instructions do.
 #![allow(unsafe_code)]
@@ -13,13 +14,12 @@ pub use packer::{extend, extend_by_places};
 
 use super::{Kernel, Work};
 
-/// The instruction set that the program was compiled for, with no need to ask
-/// the processor.
+/// The instruction set that the program was compiled for.
 pub type Baseline = sse2::Sse2;
 /// The value of [`Baseline`].
 pub const BASELINE: Baseline = sse2::Sse2;
 
-/// Whether this processor (and operating system) runs the kernel.
+/// Returns whether this processor (and operating system) runs the kernel.
 pub fn detect(kernel: Kernel) -> bool {
     macro_rules! all {
         ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
@@ -61,7 +61,7 @@ fn avx512<W: Work>(work: W) -> W::Output {
     work.run(avx512::Avx512::here())
 }
 
-/// Asks for the cache line at the start of `place`.
+/// Prefetches the cache line at the start of `place`.
 #[inline(always)]
 pub fn prefetch<T>(place: &T) {
     use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

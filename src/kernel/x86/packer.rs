@@ -1,5 +1,5 @@
-//! Appending to a list through its spare memory: a row is stored whole, whatever
-//! of it counts, and the list's length is set once.
+//! Appending to a list through its spare memory: a row is stored whole, whichever
+//! lanes count, and the list's length is set once.
 
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ pub fn append<I: PackTo>(isa: I, out: &mut Vec<u32>, row: &[u32; LANES], lanes: 
     // Room first: a register would not outlive the call that makes it.
     make_room(out, LANES);
     let end = out.spare_capacity_mut().as_mut_ptr().cast();
-    // SAFETY: there is room for sixteen words; so many are written.
+    // SAFETY: there is room for sixteen words; at most sixteen are written.
     unsafe {
         isa.pack_to(end, isa.words(row), lanes);
         out.set_len(out.len() + lanes.count_ones() as usize);
@@ -39,12 +39,12 @@ fn make_room(out: &mut Vec<u32>, words: usize) {
     }
 }
 
-/// [`extend`](crate::kernel::extend), without a call but memcpy where there is room.
+/// [`extend`](crate::kernel::extend), calling only memcpy if there is room.
 #[inline(always)]
 pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
     make_room(out, words.len());
     let end = out.spare_capacity_mut().as_mut_ptr().cast();
-    // SAFETY: there is room for so many words behind the end, and a list that is
+    // SAFETY: there is room for `words.len()` words behind the end, and a list that is
     // borrowed mutably does not overlap `words`.
     unsafe {
         std::ptr::copy_nonoverlapping(words.as_ptr(), end, words.len());
@@ -52,7 +52,7 @@ pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
     }
 }
 
-/// Up to so many words are copied row by row; more, as memory.
+/// Most words that are copied row by row.
 const FEW: usize = 16 * LANES;
 
 /// [`extend_by_places`](crate::kernel::extend_by_places).
@@ -65,7 +65,7 @@ pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>)
     }
     make_room(out, rows * LANES);
     let end = out.spare_capacity_mut().as_mut_ptr().cast::<u32>();
-    // SAFETY: so many rows can be read from the first place on and written behind the
+    // SAFETY: `rows` rows can be read from the first place on and written behind the
     // end, and a list that is borrowed mutably does not overlap `words`.
     unsafe {
         for row in 0..rows {
@@ -83,7 +83,7 @@ pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>)
 /// The memory behind a list.
 pub struct Packer<'a> {
     out: &'a mut Vec<u32>,
-    /// Where the next word goes; `room` words fit from there.
+    /// Address of the next word; `room` words fit from there.
     end: *mut u32,
     room: usize,
     added: usize,
@@ -119,8 +119,8 @@ impl<'a, I: PackTo> Pack<'a, I> for Packer<'a> {
 impl Drop for Packer<'_> {
     #[inline(always)]
     fn drop(&mut self) {
-        // SAFETY: so many words have been written behind the old end, and room
-        // for them was made.
+        // SAFETY: `added` words have been written behind the old end, within the
+        // reserved room.
         unsafe { self.out.set_len(self.out.len() + self.added) };
     }
 }

@@ -81,19 +81,6 @@ impl Isa for Sse2 {
         [unsafe { _mm_set1_ps(x) }; 4]
     }
     #[inline(always)]
-    fn permute(self, from: &[f32; 4], picks: u32) -> [__m128; 4] {
-        each!(4, |i| unsafe {
-            // The two bits of a lane, each as a mask.
-            let here = _mm_set1_epi32((picks >> (8 * i)) as i32);
-            let mask = |bits| _mm_castsi128_ps(_mm_cmpeq_epi32(_mm_and_si128(here, bits), bits));
-            let odd = mask(_mm_setr_epi32(1, 4, 16, 64));
-            let late = mask(_mm_setr_epi32(2, 8, 32, 128));
-            let either = |mask, yes, no| _mm_or_ps(_mm_and_ps(mask, yes), _mm_andnot_ps(mask, no));
-            let [a, b, c, d] = each!(4, |i| _mm_set1_ps(from[i]));
-            either(late, either(odd, d, c), either(odd, b, a))
-        })
-    }
-    #[inline(always)]
     fn add(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
         each!(4, |i| unsafe { _mm_add_ps(a[i], b[i]) })
     }
