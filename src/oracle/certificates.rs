@@ -17,6 +17,8 @@
 //! of open half-spaces with "not positive" in place of "negative": a least
 //! value of zero is a touch.)
 
+use std::cell::OnceCell;
+
 use super::number::{HalfSpace, Number, Precision};
 use super::rough::{RoughSpaces, may_agree};
 
@@ -61,6 +63,7 @@ pub(super) fn certificates(given: Vec<HalfSpace>, precision: Precision) -> Certi
     let mut search = Search {
         precision,
         rough: RoughSpaces::new(&constraints),
+        minors: vec![Default::default(); constraints.len() * constraints.len()],
         constraints,
         extent: Extent::Solid,
         found: Vec::new(),
@@ -95,16 +98,20 @@ struct Search {
     precision: Precision,
     constraints: Vec<HalfSpace>,
     rough: RoughSpaces,
+    /// Minors computed so far, by both constraints and the axis left out.
+    minors: Vec<[OnceCell<Number>; 3]>,
     extent: Extent,
     found: Vec<HalfSpace>,
 }
 
 impl Search {
     /// The 2 x 2 minor `n_i[a] n_j[b] - n_i[b] n_j[a]` without `axis`.
-    fn minor(&self, i: usize, j: usize, axis: usize) -> Number {
-        let [a, b] = OTHERS[axis];
-        let [n, m] = [i, j].map(|c| &self.constraints[c].normal);
-        self.precision.determinant([&n[a], &n[b], &m[a], &m[b]])
+    fn minor(&self, i: usize, j: usize, axis: usize) -> &Number {
+        self.minors[i * self.constraints.len() + j][axis].get_or_init(|| {
+            let [a, b] = OTHERS[axis];
+            let [n, m] = [i, j].map(|c| &self.constraints[c].normal);
+            self.precision.determinant([&n[a], &n[b], &m[a], &m[b]])
+        })
     }
 
     fn determinant(&self, i: usize, j: usize, l: usize) -> Number {
@@ -124,8 +131,8 @@ impl Search {
         let p = self.precision;
         let parts = parts.map(|c| &self.constraints[c]);
         let sum = |of: &dyn Fn(&HalfSpace) -> Number| {
-            let products = weights.iter().zip(parts.map(of));
-            p.cleaned(p.combined(products))
+            let values = parts.map(of);
+            p.cleaned(p.combined(weights.iter().zip(&values)))
         };
         let normal = [0, 1, 2].map(|k| match zero_axes[k] {
             true => Number::default(),
@@ -202,7 +209,7 @@ impl Search {
                 continue;
             }
             let [i, j, l] = triple;
-            let weights = [(j, l), (l, i), (i, j)].map(|(a, b)| self.minor(a, b, axis));
+            let weights = [(j, l), (l, i), (i, j)].map(|(a, b)| self.minor(a, b, axis).clone());
             if let Some(weights) = self.of_one_sign(weights) {
                 let mut zero = [true; 3];
                 zero[axis] = false;

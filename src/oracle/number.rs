@@ -56,8 +56,8 @@ impl Precision {
     }
 
     /// The sum of products.
-    pub fn combined<'a>(self, products: impl Iterator<Item = (&'a Number, Number)>) -> Number {
-        let products = products.map(|(a, b)| self.multiply(a, &b));
+    pub fn combined<'a>(self, products: impl Iterator<Item = (&'a Number, &'a Number)>) -> Number {
+        let products = products.map(|(a, b)| self.multiply(a, b));
         products.reduce(|a, b| self.add(&a, &b)).unwrap_or_default()
     }
 
