@@ -1,4 +1,4 @@
-//! Your crate enters the benchmark: the whole contract of a structure.
+//! A structure of your own crate in the benchmark.
 //!
 //! Tiles of items in slabs along x, and `main_with`, which gives it every command of the program:
 //! `cargo run --release --example enter_your_crate -- run --structure linear,bvh,tiles`
@@ -22,7 +22,7 @@ struct Tiles {
 }
 
 impl RegionIndex for Tiles {
-    /// Declared, and held to: a structure that can `refit` adds `.refits()`.
+    /// Checked by the conformance suite: a structure that can `refit` adds `.refits()`.
     const INFO: Info = Info::new(
         "tiles",
         "tiles of 32 items in slabs along x",
@@ -41,7 +41,7 @@ impl RegionIndex for Tiles {
         let slabs = ids.chunks_mut(slab);
         slabs.for_each(|slab| slab.sort_by(|a, b| at(a, 1).total_cmp(&at(b, 1))));
         let boxes: Vec<Aabb> = ids.iter().map(|&id| items[id as usize]).collect();
-        // Exact unions: what is decided for a tile is decided for its items.
+        // Exact unions: a decision about a tile holds for its items.
         let bounds = boxes.chunks(TILE).map(Aabb::union_of).collect();
         Ok(Tiles { ids, boxes, bounds })
     }
@@ -56,13 +56,13 @@ impl RegionIndex for Tiles {
         let tiles = self.ids.chunks(TILE).zip(self.boxes.chunks(TILE));
         for ((ids, boxes), bounds) in tiles.zip(&self.bounds) {
             cx.recorder().nodes_tested(1);
-            // The mask knows which planes are decided for all of the tile.
+            // The mask has the planes that are not decided for all of the tile.
             let (verdict, mask) = q.classify(bounds, q.mask(), cx.recorder());
             if verdict == Containment::Outside {
                 cx.recorder().subtrees_rejected(1);
             } else if verdict == Containment::Inside {
                 cx.recorder().subtree_accepted(ids.len());
-                cx.accept(ids)?; // `?`: a sink may break off
+                cx.accept(ids)?; // `?`: a sink may stop the query
             } else {
                 cx.recorder().items_tested(ids.len() as u32);
                 for (id, item) in ids.iter().zip(boxes) {
@@ -76,7 +76,7 @@ impl RegionIndex for Tiles {
     }
 }
 
-/// Public for the project's own test; a crate of yours needs no `pub`.
+/// Public for the project's own test; your crate needs no `pub`.
 pub fn main() -> ExitCode {
     cullbench::cli::main_with(Registry::builtin().with::<Tiles>())
 }

@@ -1,5 +1,7 @@
-//! Cost of a recorder that is off: the same queries by the library's traversal with
-//! `NoRecorder` (`with`) or by a copy of it without such a parameter (`without`); `scripts/check-recorder.sh` compares the
+//! Cost of a recorder that is off.
+//!
+//! Runs the same queries by the library's traversal with `NoRecorder` (`with`) or by a copy
+//! of it without that parameter (`without`). `scripts/check-recorder.sh` compares the
 //! instruction counts of the two.
 
 use std::hint::black_box;
@@ -11,7 +13,7 @@ use cullbench::kernel::BASELINE;
 use cullbench::query::{ItemId, NoRecorder, Sink};
 use cullbench::{path, scene};
 
-/// The median along the widest axis: the plainest tree there is.
+/// Median tree: splits the widest axis at the median item.
 struct Halves;
 
 impl Splitter for Halves {
@@ -125,7 +127,7 @@ fn without(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
                 for (start, lanes, block) in tree.boxes().range(items.start, items.end) {
                     let admitted = block.admitted_by(BASELINE, volume, mask);
                     if admitted & lanes != 0 {
-                        // A Vec never breaks off.
+                        // A Vec never stops the query.
                         let _ = out.accept_lanes(BASELINE, tree.ids(), start, admitted & lanes);
                     }
                 }

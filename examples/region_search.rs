@@ -1,7 +1,7 @@
-//! The lecture's table: which region holds the camera, by linear search O(n)
-//! and by trees O(log n). Counts the bounds (or planes) each structure compares
-//! a search, for a thousand to a million regions, and fits how the count grows.
-//! Prints Markdown.
+//! Comparisons per region search: a scan, O(n), against trees, O(log n).
+//!
+//! Counts the bounds (or planes) that each structure compares per search, for a thousand to
+//! a million regions, fits the growth of the count, and prints Markdown.
 
 use cullbench::geometry::Aabb;
 use cullbench::index::{Registry, StructureSpec};
