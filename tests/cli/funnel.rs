@@ -3,6 +3,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use serde_json::Value;
 
@@ -44,17 +45,22 @@ pub fn counted(report: &Value, test: &str, count: &str) -> f64 {
 
 pub const LINE: &str = "funnel --scene scene.csv --path cameras.csv --processes 1 --format json";
 
+/// The report of [`LINE`] on [`folder`], from one run for all tests.
+pub fn plain_report() -> &'static Value {
+    static REPORT: LazyLock<Value> = LazyLock::new(|| json(&works(folder().path(), LINE)));
+    &REPORT
+}
+
 #[test]
 fn a_wall_hides_what_is_behind_it_and_nothing_else() {
-    let folder = folder();
-    let report = json(&works(folder.path(), LINE));
+    let report = plain_report();
     assert_eq!((&report["items"], &report["views"]), (&5.into(), &1.into()));
-    let object = rows(&report, "object").find(|row| row["structure"] == "wide");
+    let object = rows(report, "object").find(|row| row["structure"] == "wide");
     let object = object.expect("the structure of the chain");
     // All but the one behind the camera.
     assert_eq!(number(object, "output_count"), 4.0);
     for name in ["masked-inner", "masked", "hierarchical-z"] {
-        let row = row(&report, "occlusion", name);
+        let row = row(report, "occlusion", name);
         // The box around the eye stays, though nothing of it is seen from within.
         assert_eq!(number(row, "output_count"), 3.0, "{name}");
         assert_eq!(number(row, "truth_count"), 2.0, "{name}");
@@ -62,10 +68,10 @@ fn a_wall_hides_what_is_behind_it_and_nothing_else() {
         assert_eq!(number(row, "false_positive_count"), 1.0, "{name}");
     }
     // Of each box at most three sides face an eye outside of it.
-    let triangles = row(&report, "triangle", "per-triangle");
+    let triangles = row(report, "triangle", "per-triangle");
     assert!(number(triangles, "output_count") <= 12.0);
     assert_eq!(number(triangles, "false_positive_count"), 0.0);
-    let gains = array(&report, "gains");
+    let gains = array(report, "gains");
     let occlusion = gains.iter().find(|gain| gain["stage"] == "occlusion");
     let occlusion = occlusion.expect("a stage of the chain");
     assert_eq!(number(occlusion, "with_count"), 3.0);
@@ -76,7 +82,7 @@ fn a_wall_hides_what_is_behind_it_and_nothing_else() {
 fn what_promises_to_lose_nothing_loses_nothing() {
     for scene in ["city:n=1500", "rooms:n=1500", "forest:n=1500"] {
         let line = format!(
-            "funnel --scene {scene} --path street:frames=6 --samples 96x54 --processes 2 \
+            "funnel --scene {scene} --path street:frames=6 --samples 96x54 --processes 1 \
              --format json"
         );
         let report = json(&works(Path::new("."), &line));
@@ -122,7 +128,7 @@ fn assert_fits(text: &str) {
 /// are.
 #[test]
 fn tables_of_many_items_with_intervals_fit() {
-    let more = "--path street:frames=2 --samples 64x36 --processes 3";
+    let more = "--path street:frames=2 --samples 32x18 --processes 3";
     let lines = [
         format!("funnel --scene city:n=10000 {more}"),
         format!(
@@ -160,13 +166,13 @@ fn fields(row: &Value, before: &str, found: &mut Vec<(String, String)>) {
 
 #[test]
 fn csv_has_every_field_of_every_table_of_the_json() {
-    let more = "--path street:frames=2 --samples 32x18 --processes 2";
+    let more = "--path street:frames=2 --samples 32x18 --processes 1";
     let lines = [
         format!("funnel --scene rooms:n=500 {more}"),
         format!("funnel --scene city:n=500 {more} --cut-out fence"),
         format!("funnel --scene city:n=500 {more} --mirror 7"),
         format!("funnel --scene freedm-map12 {more}"),
-        format!("funnel --scene mesh:forest:n=5k {more}"),
+        format!("funnel --scene mesh:forest:n=2k {more}"),
     ];
     let wanted = [
         "level",
@@ -225,15 +231,14 @@ fn csv_has_every_field_of_every_table_of_the_json() {
 
 #[test]
 fn triangles_and_fragments_are_gained_too() {
-    let folder = folder();
-    let report = json(&works(folder.path(), LINE));
+    let (folder, report) = (folder(), plain_report());
     let gain = |stage: &str| {
-        let mut gains = array(&report, "gains").iter();
+        let mut gains = array(report, "gains").iter();
         gains.find(|gain| gain["stage"] == stage).expect("a gain")
     };
     let [triangle, fragment] = ["triangle", "fragment"].map(gain);
     let faces = row(
-        &report,
+        report,
         "triangle",
         triangle["back_end"].as_str().expect("a name"),
     );
@@ -253,12 +258,12 @@ fn triangles_and_fragments_are_gained_too() {
     assert_eq!(fragment["unit"], "fragments");
     assert_eq!(
         number(fragment, "with_count"),
-        counted(&report, "z-test", "shaded_count")
+        counted(report, "z-test", "shaded_count")
     );
-    let every = counted(&report, "z-test", "fragment_count");
+    let every = counted(report, "z-test", "fragment_count");
     assert_eq!(number(fragment, "without_count"), every);
     let spent = number(fragment, "with_ns") - number(fragment, "without_ns");
-    let own = number(row(&report, "fragment", "z-test"), "stage_ns");
+    let own = number(row(report, "fragment", "z-test"), "stage_ns");
     assert!(own > 0.0 && (spent / own - 1.0).abs() < 1e-6, "{fragment}");
     let table = works(folder.path(), &LINE.replace("--format json", ""));
     assert!(table.contains("fragment (z-test)"), "{table}");
@@ -292,7 +297,8 @@ fn tables_fit_and_pictures_are_whole() {
 
 #[test]
 fn lower_bounds_are_of_the_back_ends_beside_them() {
-    let line = "funnel --scene rooms:n=500 --path street:frames=4 --processes 1 --format json";
+    let line = "funnel --scene rooms:n=500 --path street:frames=2 --samples 96x54 --processes 1 \
+                --format json";
     let report = json(&works(Path::new("."), line));
     let bounds = array(&report, "bounds");
     let of: Vec<_> = bounds
@@ -421,7 +427,7 @@ fn what_cannot_be_is_refused_in_a_line() {
 
 #[test]
 fn whole_pixels_lose_nothing_at_any_size_and_pixel_centres_do() {
-    let line = "precision --scene city:n=4000 --stage occlusion --path street:frames=6 --processes 1 \
+    let line = "precision --scene city:n=2000 --stage occlusion --path street:frames=4 --processes 1 \
                 --structure wide --format json";
     let sweep = json(&works(Path::new("."), line));
     let points = array(&sweep, "points");
@@ -450,7 +456,7 @@ fn whole_pixels_lose_nothing_at_any_size_and_pixel_centres_do() {
             .any(|point| point["name"] == "cone-f32-safe")
     );
     let rooms = line
-        .replace("city:n=4000", "rooms:n=2000")
+        .replace("city:n=2000", "rooms:n=1000")
         .replace("occlusion", "region");
     for point in array(&json(&works(Path::new("."), &rooms)), "points") {
         assert_eq!(number(point, "false_negative_count"), 0.0, "{point}");

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::BOXES;
-use super::funnel::{LINE, counted, folder, row, rows};
+use super::funnel::{LINE, counted, folder, plain_report, row, rows};
 use super::process::*;
 
 /// The wall as a mirror: what is behind the camera is seen in it, what is behind the wall
@@ -40,7 +40,7 @@ fn a_mirror_shows_what_is_before_it_on_its_own_samples() {
     // From behind the wall nothing of what is before it: the camera is at the other side.
     let behind = json(&works(folder.path(), &format!("{LINE} --mirror 3")));
     assert_eq!(number(&behind["mirror"], "view_count"), 0.0);
-    assert!(json(&works(folder.path(), LINE))["mirror"].is_null());
+    assert!(plain_report()["mirror"].is_null());
     let table = works(folder.path(), &LINE.replace("--format json", "--mirror 0"));
     assert!(table.contains("What is seen in the mirror"), "{table}");
     assert!(
@@ -106,8 +106,8 @@ fn through_the_holes_of_a_wall_is_seen_what_is_behind_it() {
         assert!(table.contains(words), "{words}: {table}");
     }
     // Without holes there is no such test.
-    let solid = json(&works(folder.path(), LINE));
-    assert!(rows(&solid, "fragment").all(|row| row["name"] != "alpha-test"));
+    let solid = plain_report();
+    assert!(rows(solid, "fragment").all(|row| row["name"] != "alpha-test"));
     assert!(solid["cut_outs"].is_null());
 }
 
@@ -118,7 +118,7 @@ fn what_promises_to_lose_nothing_sees_through_holes() {
         ("rooms:n=1500", "foliage:share=1,tile=0.25"),
     ] {
         let line = format!(
-            "funnel --scene {scene} --cut-out {mask} --path street:frames=8 --samples 96x54 \
+            "funnel --scene {scene} --cut-out {mask} --path street:frames=4 --samples 96x54 \
              --processes 1 --format json"
         );
         let report = json(&works(Path::new("."), &line));
@@ -140,7 +140,7 @@ fn what_promises_to_lose_nothing_sees_through_holes() {
 
 #[test]
 fn a_stencil_of_portals_saves_samples_and_shows_the_same() {
-    let line = "funnel --scene rooms:n=2000 --path street:frames=4 --samples 64x36 --processes 1 \
+    let line = "funnel --scene rooms:n=1000 --path street:frames=4 --samples 64x36 --processes 1 \
                 --region none --occlusion none --format json";
     for more in ["", " --cut-out fence:share=0.5,tile=0.5"] {
         let report = json(&works(Path::new("."), &format!("{line}{more}")));

@@ -2,6 +2,7 @@
 //! every question of picking.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use cullbench::visibility::inscribed::BOXES;
 use serde_json::Value;
@@ -16,10 +17,15 @@ fn report(line: &str) -> Value {
     json(&works(Path::new("."), line))
 }
 
+/// The report of [`CITY`], from one run for all tests.
+fn city_report() -> &'static Value {
+    static REPORT: LazyLock<Value> = LazyLock::new(|| report(CITY));
+    &REPORT
+}
+
 #[test]
 fn every_question_of_picking_is_answered_exactly() {
-    let report = report(CITY);
-    let picks = array(&report, "picks");
+    let picks = array(city_report(), "picks");
     for question in ["first item", "nearest 8", "all within 4 pixels"] {
         let of_question = || picks.iter().filter(|row| row["question"] == question);
         assert!(of_question().count() >= 3, "{question}");
@@ -33,7 +39,7 @@ fn every_question_of_picking_is_answered_exactly() {
 
 #[test]
 fn more_boxes_inside_meshes_hide_more_and_lose_nothing() {
-    let wood = "funnel --scene mesh:forest:n=20k --frames 8 --samples 96x54 --processes 1";
+    let wood = "funnel --scene mesh:forest:n=20k --frames 6 --samples 64x36 --processes 1";
     let removed = |limit: u32| {
         let report = report(&format!("{wood} --format json --inner-boxes {limit}"));
         let inner = &report["inner_boxes"];
@@ -67,16 +73,16 @@ fn more_boxes_inside_meshes_hide_more_and_lose_nothing() {
 
 #[test]
 fn fewer_occluders_hide_less() {
-    let all = report(CITY);
+    let all = city_report();
     assert_eq!(all["occluders"], "all");
     for choice in ["nearest:1", "largest:1"] {
         let few = report(&format!("{CITY} --occluders {choice}"));
         assert_eq!(few["occluders"], choice);
-        let [left, more] = [&all, &few]
+        let [left, more] = [all, &few]
             .map(|report| number(row(report, "occlusion", "hierarchical-z"), "output_count"));
         assert!(more > left, "{choice}: {more}, with all {left}");
         // A walk of a tree draws what it comes upon.
-        let [same, again] = [&all, &few]
+        let [same, again] = [all, &few]
             .map(|report| number(row(report, "occlusion", "masked-inner"), "output_count"));
         assert_eq!(same, again, "{choice}");
     }
