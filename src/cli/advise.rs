@@ -1,5 +1,5 @@
-//! `cullbench advise`: the structure, the culling test and the work to leave out for a
-//! scene and path, with the evidence. The library measures and weighs it.
+//! `cullbench advise`: the structure, the culling test and the work to leave out
+//! for a scene and path, with the evidence. The library measures and weighs it.
 
 use std::io::{self, Write};
 
@@ -92,7 +92,8 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
     })
 }
 
-/// The inputs of the command itself or of a worker, and the cameras of the whole path.
+/// The inputs of the command itself or of a worker, and the cameras of the whole
+/// path.
 fn setting(
     registry: &Registry,
     args: &AdviseArgs,

@@ -30,8 +30,8 @@ const NEW: usize = 1;
 /// Pairs that are added until the answer is clear.
 const MORE: usize = 2;
 
-/// The first and the most pairs of a comparison: ten for a threshold of 5 %, more for
-/// less, as such a change needs on a shared machine.
+/// The first and the most pairs of a comparison: ten for a threshold of 5 %, more
+/// for less, as such a change needs on a shared machine.
 fn pairs(threshold: f64) -> (usize, usize) {
     match threshold {
         t if t >= 0.1 => (6, 32),
@@ -142,8 +142,8 @@ impl Duel<'_> {
         Ok(seen)
     }
 
-    /// One process's share of a scene: the plan of the new side, and the answers of its own
-    /// side to be counted.
+    /// One process's share of a scene: the plan of the new side, and the answers of its
+    /// own side to be counted.
     fn share(&self, scene: usize, process: u32, [new, own]: [&[Part]; 2]) -> Share {
         let planned = &self.plan.scenes[scene];
         let questions = self.plan.questions(planned);

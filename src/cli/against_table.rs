@@ -20,8 +20,8 @@ use crate::report::{Changes, JudgedRow, Lone, work_changes};
 use crate::scene;
 
 const SUITE: &str = "compare";
-/// Default structures, without the plain loop over all items: it takes most of the time
-/// and says least.
+/// Default structures, without the plain loop over all items: it takes most of the
+/// time and says least.
 const STRUCTURES: &str = "linear,bsp,octree,quadtree,bvh,wide";
 
 /// Changes below this are not looked for: two builds of one source differ as much

@@ -1,5 +1,5 @@
-//! What can be typed. A value that can be judged by itself is by its parser
-//! ([`values`]), any other where it is used.
+//! Commands and options. Their parsers ([`values`]) check single values; the
+//! commands check the rest.
 
 use std::path::PathBuf;
 
@@ -67,9 +67,11 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Error against run time: every test, arithmetic and derivation of the planes
     Precision(PrecisionArgs),
-    /// The visibility funnel: what each stage from region to fragment removes, at what cost
+    /// The visibility funnel: what each stage from region to fragment removes, at what
+    /// cost
     Funnel(FunnelArgs),
-    /// Advise: which structure, which test, which work can be skipped, with the evidence
+    /// Advise: which structure, which test, which work can be skipped, with the
+    /// evidence
     Advise(AdviseArgs),
     /// Errors of camera updates (turn, orbit, chase) after up to ten million steps
     Drift(DriftArgs),
@@ -102,16 +104,17 @@ pub enum ListTopic {
 
 #[derive(Args, Debug)]
 pub struct ListArgs {
-    /// What to list [default: everything]
+    /// Topic to list [default: everything]
     pub topic: Option<ListTopic>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
 }
 
-/// What is measured: the same for `run` and `compare --against`.
+/// The measurement: the same for `run` and `compare --against`.
 #[derive(Args, Debug)]
 pub struct WhatArgs {
-    /// The scenes, paths and rounds: quick, standard, full, compare or growth [default: quick; compare --against: compare]
+    /// The scenes, paths and rounds: quick, standard, full, compare or growth [default:
+    /// quick; compare --against: compare]
     #[arg(long, value_name = "SUITE")]
     pub suite: Option<String>,
     /// A scene (file or spec) instead of the suite's; may be repeated
@@ -120,7 +123,9 @@ pub struct WhatArgs {
     /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
     #[arg(long, visible_alias = "cameras", value_name = "PATH")]
     pub path: Vec<String>,
-    /// Structures, e.g. linear,bvh:leaf=4; may be repeated; also all, or default (all but the textbook forms) [default: all for the suites standard and full, else default; compare --against: the trees, linear and wide]
+    /// Structures, e.g. linear,bvh:leaf=4; may be repeated; also all, or default (all
+    /// but the textbook forms) [default: all for the suites standard and full, else
+    /// default; compare --against: the trees, linear and wide]
     #[arg(long, value_name = "LIST")]
     pub structure: Vec<String>,
     /// The culling test: sphere, six-plane, six-box or exact; may be repeated
@@ -163,13 +168,16 @@ Structures share a rank where no test over the processes tells them apart.";
 pub struct RunArgs {
     #[command(flatten)]
     pub what: WhatArgs,
-    /// Folder for report.json, summary.csv, samples.csv and stream.jsonl [default: a new one under results/]
+    /// Folder for report.json, summary.csv, samples.csv and stream.jsonl [default: a
+    /// new one under results/]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Continue the run in --out (or the newest unfinished one under results/) with its own options
+    /// Continue the run in --out (or the newest unfinished one under results/) with its
+    /// own options
     #[arg(long)]
     pub resume: bool,
-    /// Processes to spread the rounds over; ten or more give intervals [default: the suite's]
+    /// Processes to spread the rounds over; ten or more give intervals [default: the
+    /// suite's]
     #[arg(long, value_name = "N", value_parser = values::whole(1..=1000u32))]
     pub processes: Option<u32>,
     /// Print the cells as JSON lines instead of measuring them
@@ -239,7 +247,8 @@ pub struct CompareArgs {
     /// report.json of the newer run, or the folder it is in
     #[arg(value_name = "NEW.json", required_unless_present = "against")]
     pub new: Option<PathBuf>,
-    /// Run another build of this program against this one instead: OLD is that binary (a name without a slash is looked up in PATH), NEW is this
+    /// Run another build of this program against this one instead: OLD is that binary
+    /// (a name without a slash is looked up in PATH), NEW is this
     #[arg(long, value_name = "BINARY", conflicts_with_all = ["old", "new"])]
     pub against: Option<PathBuf>,
     #[command(flatten)]
@@ -253,7 +262,8 @@ pub struct CompareArgs {
         allow_hyphen_values = true
     )]
     pub threshold: f64,
-    /// The metrics to judge by, of query_ns, locate_ns, locate_batched_ns, build_ms; may be repeated
+    /// The metrics to judge by, of query_ns, locate_ns, locate_batched_ns, build_ms;
+    /// may be repeated
     #[arg(
         long,
         value_name = "LIST",
@@ -318,7 +328,7 @@ pub struct LocateArgs {
     pub kernel: KernelArgs,
 }
 
-/// What is searched for: one of the two.
+/// Points or boxes to search for: one of the two.
 #[derive(Args, Debug)]
 #[group(required = true, multiple = false)]
 pub struct SoughtArgs {
@@ -332,7 +342,8 @@ pub struct SoughtArgs {
 
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
-    /// A scene (file or spec); may be repeated [default: small ones of every family and the real ones]
+    /// A scene (file or spec); may be repeated [default: small ones of every family and
+    /// the real ones]
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<String>,
     /// A camera path (spec or cameras CSV); may be repeated [default: several]
@@ -372,7 +383,9 @@ pub struct PrecisionArgs {
     /// Draw false positives against time as an SVG file too
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    /// Another stage of the funnel in place of the frustum: occlusion (over the sizes of its buffer), region (portals) or triangle (cones); the first structure does the object stage, the path is street if none is named
+    /// Another stage of the funnel in place of the frustum: occlusion (over the sizes
+    /// of its buffer), region (portals) or triangle (cones); the first structure does
+    /// the object stage, the path is street if none is named
     #[arg(long, value_name = "STAGE", value_parser = values::stage)]
     pub stage: Option<StageKind>,
     #[arg(long, value_enum, default_value = "table")]
@@ -390,7 +403,8 @@ pub struct AdviseArgs {
     /// Cost of shading a fragment, ns (1 shades an image of 1920 x 1080 in 2 ms)
     #[arg(long, value_name = "NS", default_value_t = 1.0, value_parser = values::at_least_zero)]
     pub shade_ns: f64,
-    /// The largest error to accept: of planes in depths of the view, of a camera frame in radians
+    /// The largest error to accept: of planes in depths of the view, of a camera frame
+    /// in radians
     #[arg(long, value_name = "SHARE", default_value_t = 1e-5, value_parser = values::above_zero)]
     pub tolerance: f64,
     /// Share of the items that move between two updates
@@ -411,7 +425,8 @@ pub struct DriftArgs {
     /// The largest error of a recommended way to turn or orbit after all steps
     #[arg(long, value_name = "RAD", default_value_t = 1e-6, value_parser = values::above_zero)]
     pub tolerance: f64,
-    /// Spring arms to study: linear, collision (stiffens as it is stretched, and has a stop)
+    /// Spring arms to study: linear, collision (stiffens as it is stretched, and has a
+    /// stop)
     #[arg(
         long,
         value_name = "LIST",
@@ -461,7 +476,8 @@ pub struct StressArgs {
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
-    /// Cases of each generated extreme, 0 for none [default: 66, ten million boxes; 0 with --vectors]
+    /// Cases of each generated extreme, 0 for none [default: 66, ten million boxes; 0
+    /// with --vectors]
     #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX))]
     pub cases: Option<u64>,
     /// Seed of the first case; case i has seed N + i

@@ -69,7 +69,8 @@ pub fn legend<'a, 'b: 'a, C: CoordTranslate>(
     Ok(legend.background_style(WHITE.mix(0.8)).draw()?)
 }
 
-/// A picture of `size` pixels on white, as lines of SVG. `what` names it in the error.
+/// A picture of `size` pixels on white, as lines of SVG. `what` names it in the
+/// error.
 pub fn svg(
     what: &str,
     size: (u32, u32),
@@ -87,8 +88,8 @@ pub fn svg(
     Ok(text::lines(&svg))
 }
 
-/// Values with a place on a logarithmic axis, far beyond anything measured. Near the
-/// ends of floating point, steps along an axis would never come to its end.
+/// Values with a place on a logarithmic axis, far beyond anything measured. Near
+/// the ends of floating point, steps along an axis would never come to its end.
 const DRAWN: Range<f64> = 1e-30..1e30;
 
 /// Returns true for a value with a place on a logarithmic axis.

@@ -1,5 +1,5 @@
-//! Answers of one structure after another (a large scene does not fit in memory several
-//! times), as `query` and `locate` compare and write them.
+//! Answers of one structure after another (a large scene does not fit in memory
+//! several times), as `query` and `locate` compare and write them.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};

@@ -1,5 +1,5 @@
-//! A document of headings, lines and tables, written as Markdown, as one HTML page or
-//! for a terminal, and the escaping of each.
+//! A document of headings, lines and tables, written as Markdown, as one HTML page
+//! or for a terminal, and the escaping of each.
 
 use super::table::Table;
 use super::text;
@@ -48,8 +48,8 @@ fn html_table(table: &Table) -> String {
     )
 }
 
-/// Text of a line, with an escape before every mark of Markdown. A line break would end
-/// a table row.
+/// Text of a line, with an escape before every mark of Markdown. A line break would
+/// end a table row.
 fn markdown(text: &str) -> String {
     let marks = ['\\', '|', '`', '*', '_', '<', '[', '&'];
     let text = text::plain(text);

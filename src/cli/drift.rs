@@ -1,5 +1,5 @@
-//! `cullbench drift`: tables of the errors of camera updates (turn, orbit, chase), of the
-//! cost of a step of each, and recommendations.
+//! `cullbench drift`: tables of the errors of camera updates (turn, orbit, chase),
+//! of the cost of a step of each, and recommendations.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};

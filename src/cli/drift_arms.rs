@@ -1,6 +1,7 @@
-//! Spring arms in `cullbench drift`: tables of the steps that each method takes to be
-//! precise enough, its observed order, its limit of stability, and which one to take,
-//! and their diagram. Errors and orders are shown at one frame rate; the JSON has all.
+//! Spring arms in `cullbench drift`: tables of the steps that each method takes to
+//! be precise enough, its observed order, its limit of stability, and which one to
+//! take, and their diagram. Errors and orders are shown at one frame rate; the JSON
+//! has all.
 
 use std::io::{self, Write};
 

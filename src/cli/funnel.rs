@@ -1,5 +1,6 @@
-//! `cullbench funnel`: every stage from region to fragment with every back end on the
-//! views of a path, and what each is worth. How it is shown is in `funnel_table`.
+//! `cullbench funnel`: every stage from region to fragment with every back end on
+//! the views of a path, and what each is worth. How it is shown is in
+//! `funnel_table`.
 
 use std::cell::Cell;
 use std::io::{self, Write};
@@ -102,8 +103,8 @@ fn work(input: &FunnelInput) -> String {
     )
 }
 
-/// Returns true if no back end with a guarantee lost a visible item. Stages behind an
-/// unproven one of the chain miss what that has lost.
+/// Returns true if no back end with a guarantee lost a visible item. Stages behind
+/// an unproven one of the chain miss what that has lost.
 fn keep_their_word(stages: &[StageRow]) -> bool {
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Guarantee::Unproven;
     let chosen = stages.iter().filter(|row| row.is_chosen);

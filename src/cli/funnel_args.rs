@@ -1,5 +1,4 @@
-//! What can be typed behind `cullbench funnel`. Values are checked
-//! where they are used, like those of all [commands](super::args).
+//! Options of `cullbench funnel`.
 
 use std::path::PathBuf;
 
@@ -15,17 +14,17 @@ use crate::visibility::occlusion::OccluderChoice;
 
 const FUNNEL_HELP: &str = "\
 Columns of the table:
-  in, out      items (triangles in the triangle stage) that the stage is given and hands on, per view
+  in, out      items (triangles in the triangle stage) that the stage receives and passes, per view
   truth        of them those that are in front at a sample; of triangles those that face the eye
-  FP, FN       handed on though not visible; visible and not handed on
+  FP, FN       false positives (passed, not visible) and false negatives (visible, not passed)
   time         CPU time of the stage per view, with half of its 95 % interval
   per item     time / what the stage removed
-The rows of a stage are given what the chain hands them; * marks the chain's own, ? a back end that
-promises nothing. NAME is what the column `by` shows; none leaves a stage out. What is true is
+The rows of a stage receive what the chain passes; * marks the chain's own, ? a back end that
+has no guarantee. NAME is what the column `by` shows; none leaves a stage out. What is true is
 decided exactly, along the rays through the samples. Where the occlusion stage walks a tree of its
 own (masked-inner, masked), its time holds the object stage's. Orders: pairs of items that overlap in
 the image, those drawn in the wrong order, and samples that show a wrong item without a z-test.
-A lower bound does what must be done at any rate and decides nothing. With and without each stage
+A lower bound does what must at least be done and decides nothing. With and without each stage
 is counted what is left in the end: items, of the triangle stage triangles, of the fragment stage
 shaded fragments; it pays where drawing or shading one of them takes longer than what stands in the
 last column. A fragment is an item at a sample, of meshes and maps a triangle at a sample, but that
@@ -50,11 +49,12 @@ pub struct FunnelArgs {
     /// Columns and rows of samples
     #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]
     pub samples: SampleGrid,
-    /// Cut holes into a share of the items: fence or foliage, e.g. fence:share=0.2,tile=1,seed=1
+    /// Cut holes into a share of the items: fence or foliage, e.g.
+    /// fence:share=0.2,tile=1,seed=1
     #[arg(long, value_name = "MASK", value_parser = CutOuts::parse)]
     pub cut_out: Option<CutOuts>,
-    /// Take a face of this item for a mirror (across its shortest edge): what is seen in it, with
-    /// and without a stencil of its samples
+    /// Take a face of this item for a mirror (across its shortest edge): what is seen
+    /// in it, with and without a stencil of its samples
     #[arg(long, value_name = "ITEM", value_parser = values::whole(0..=ItemId::MAX))]
     pub mirror: Option<ItemId>,
     /// Back end of the region stage [default: the best that the scene has regions for]
@@ -63,11 +63,11 @@ pub struct FunnelArgs {
     /// Back end of the occlusion stage
     #[arg(long, value_name = "NAME")]
     pub occlusion: Option<String>,
-    /// What hierarchical-z draws: all, nearest:64, largest:64
+    /// Occluders that hierarchical-z draws: all, nearest:64, largest:64
     #[arg(long, value_name = "CHOICE", default_value = "all", value_parser = values::occluders)]
     pub occluders: OccluderChoice,
-    /// Most boxes that are looked for inside each closed item of a mesh, and drawn for it
-    /// [default: 8]
+    /// Most boxes that are looked for inside each closed item of a mesh, and drawn for
+    /// it [default: 8]
     #[arg(long, value_name = "N", value_parser = values::whole(1..=MOST_BOXES as u32))]
     pub inner_boxes: Option<u32>,
     /// Back end of the triangle stage
@@ -76,7 +76,8 @@ pub struct FunnelArgs {
     /// Back end of the fragment stage
     #[arg(long, value_name = "NAME")]
     pub fragment: Option<String>,
-    /// A claim of what is seen from each region, for the row stored-pvs: {"regions": N, "sees": [[0, 1], ..]}
+    /// A claim of what is seen from each region, for the row stored-pvs: {"regions": N,
+    /// "sees": [[0, 1], ..]}
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
     /// Write tables and picture as one HTML page too

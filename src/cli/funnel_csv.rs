@@ -1,5 +1,5 @@
-//! `cullbench funnel --format csv`: every table of the JSON report as rows of one file. A
-//! column says which table a row is of; all others are fields of the JSON.
+//! `cullbench funnel --format csv`: every table of the JSON report as rows of one
+//! file. A column says which table a row is of; all others are fields of the JSON.
 
 use std::io::{self, Write};
 
@@ -24,8 +24,8 @@ const TABLES: [&str; 12] = [
     "gains",
 ];
 
-/// Fields of the rows of all tables, `/` before a field of a field. The columns are the
-/// same for every report.
+/// Fields of the rows of all tables, `/` before a field of a field. The columns are
+/// the same for every report.
 const FIELDS: &str = "
     stage name back_end structure question selected guarantee is_chosen does_object_stage
     unit stage_ns stage_ns_lower stage_ns_upper
@@ -73,7 +73,8 @@ pub fn write(report: &FunnelReport, out: impl Write) -> io::Result<()> {
     out.flush()
 }
 
-/// The name of a field's column: `excess/lower` is `excess_lower`, a value needs no more.
+/// The name of a field's column: `excess/lower` is `excess_lower`, a value needs no
+/// more.
 fn column(path: &str) -> String {
     path.trim_end_matches("/value").replace('/', "_")
 }

@@ -1,5 +1,5 @@
-//! The tables of `cullbench funnel`: a row for each stage and back end, the gain of each
-//! stage of the chain, and conclusions.
+//! The tables of `cullbench funnel`: a row for each stage and back end, the gain of
+//! each stage of the chain, and conclusions.
 
 use super::document::Block;
 use super::table::{Column, Table};
@@ -49,7 +49,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         ("What is left, drawn in every order", orders(report)),
         ("What is under a cursor", picks(report)),
         (
-            "Lower bounds: what must be read or written at any rate",
+            "Lower bounds: what must at least be read or written",
             bounds(report),
         ),
         (

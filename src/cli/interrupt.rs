@@ -17,7 +17,7 @@ pub fn from_now_on_finish() {
 #[error("interrupted")]
 pub struct Interrupted;
 
-/// Whether somebody has asked to stop.
+/// Returns true after a request to stop.
 pub fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
@@ -46,8 +46,10 @@ pub fn install() {
     }
 }
 
-/// Whether `nohup` has started the program. The handler takes all three signals or none,
-/// and a run must outlive its terminal where that was wanted.
+/// Returns true if `nohup` started the program.
+///
+/// The handler takes all three signals or none, and a run under `nohup` must outlive its
+/// terminal.
 fn ignores_hangup() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

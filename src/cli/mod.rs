@@ -332,8 +332,8 @@ fn told_once(error: &anyhow::Error) -> String {
     text
 }
 
-/// Returns true for an error that is or wraps a broken pipe. `io` and `csv` errors wrap one
-/// another without naming each other as the source.
+/// Returns true for an error that is or wraps a broken pipe. `io` and `csv` errors
+/// wrap one another without naming each other as the source.
 fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
     if let Some(io) = error.downcast_ref::<io::Error>() {
         return io.kind() == io::ErrorKind::BrokenPipe

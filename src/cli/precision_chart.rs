@@ -21,7 +21,7 @@ struct Mark {
     /// Time and error, as the axes have them.
     at: [f64; 2],
     on_front: bool,
-    /// Whether it misses something.
+    /// True if the point misses something.
     is_cross: bool,
 }
 
@@ -56,10 +56,10 @@ impl Mark {
 struct Picture {
     caption: String,
     axes: [&'static str; 2],
-    /// What stands for no error at all: a logarithmic axis has no zero.
+    /// Position of no error at all: a logarithmic axis has no zero.
     none: f64,
     marks: Vec<Mark>,
-    /// Whether a series has a place in the legend.
+    /// Returns true for a series with a place in the legend.
     is_named: fn(&[Mark], &str) -> bool,
 }
 
@@ -99,7 +99,7 @@ pub fn draw(precision: &Precision) -> anyhow::Result<String> {
 }
 
 impl Picture {
-    /// Where a mark is drawn, if its axes have such a place.
+    /// Position of a mark, if it is on the axes.
     fn place(&self, mark: &Mark) -> Option<(f64, f64)> {
         let place = (mark.at[0], mark.at[1].max(self.none));
         (is_drawn(place.0) && is_drawn(place.1)).then_some(place)

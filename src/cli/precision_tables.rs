@@ -1,5 +1,5 @@
-//! Tables of `cullbench precision`: errors and times, the Pareto fronts and the sweeps.
-//! Sentences about them are in `precision_conclusions`.
+//! Tables of `cullbench precision`: errors and times, the Pareto fronts and the
+//! sweeps. Sentences about them are in `precision_conclusions`.
 
 use std::io::{self, Write};
 
@@ -52,8 +52,8 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
         errors_table(&fastest)
     ))?;
     say(
-        "± is the 95 % interval over the cameras, < what nothing seen leaves open (3/n). By source: items \
-         too many by storage/planes/test, of all cameras. px: how deep \
+        "± is the 95 % interval over the cameras; <: none observed, 95 % upper bound 3/n. By source: false \
+         positives by storage/planes/test, of all cameras. px: how deep \
          the deepest miss reaches into a view 1080 pixels high. Flicker: items that change from a \
          camera to the next of the path while their truth does not, of the visible. c is the factor \
          of the conservative epsilon. Structures have the same errors.",

@@ -1,5 +1,5 @@
-//! What a command and its workers say to each other: one request, and lines of
-//! JSON in answer. [`processes`](super::processes) is the parent's side of it,
+//! Messages between a command and its workers: one request, and lines of JSON in
+//! answer. [`processes`](super::processes) is the parent's side,
 //! [`worker`](super::worker) the child's.
 
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use crate::precision::PointPlan;
 /// not understand each other.
 pub const PROTOCOL: u32 = 5;
 
-/// What a worker is to do.
+/// Work of one process.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Request {
     pub protocol: u32,
@@ -43,7 +43,7 @@ pub enum Job {
     Scene {
         scene: usize,
         share: Share,
-        /// Whether samples are wanted beside the parts.
+        /// True to receive samples beside the parts.
         samples: bool,
     },
     /// Both sides of every rule (`advise`).
@@ -58,11 +58,11 @@ pub enum Job {
     Sweep(FunnelPlan, Timing),
 }
 
-/// What a process is to know beside its plan.
+/// Parameters of a process beside its plan.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub struct Timing {
     pub process: u32,
-    /// Scale of the lens where the path was asked for by its visible share.
+    /// Scale of the lens of a path with a given visible share.
     pub lens_scale: Option<f64>,
 }
 
@@ -74,7 +74,7 @@ pub enum Message {
     Ready {
         protocol: u32,
     },
-    /// What comes next, and of which structure.
+    /// The next step, and its structure.
     Doing {
         structure: Option<String>,
         step: String,

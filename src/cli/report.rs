@@ -1,5 +1,5 @@
-//! `cullbench report`: the results of a run as Markdown, pictures or one HTML page, from
-//! its report.json.
+//! `cullbench report`: the results of a run as Markdown, pictures or one HTML page,
+//! from its report.json.
 
 use std::fs;
 use std::io::{self, Write};

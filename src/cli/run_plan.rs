@@ -1,5 +1,5 @@
-//! The plan of `cullbench run`: scenes, paths, structures and culling tests, checked as
-//! far as possible before anything runs.
+//! The plan of `cullbench run`: scenes, paths, structures and culling tests,
+//! checked as far as possible before anything runs.
 
 use anyhow::bail;
 
@@ -37,8 +37,8 @@ pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
     Ok(planned)
 }
 
-/// The plan of the arguments that `run` and `compare --against` share, with the default
-/// suite, and default structures in place of the suite's.
+/// The plan of the arguments that `run` and `compare --against` share, with the
+/// default suite, and default structures in place of the suite's.
 pub fn plan_of(
     registry: &Registry,
     args: &WhatArgs,

@@ -1,5 +1,5 @@
-//! The folder of a run: a new one, or an unfinished one to continue with the options and
-//! the plan it was begun with, on the same machine by the same program.
+//! The folder of a run: a new one, or an unfinished one to continue with the
+//! options and the plan it was begun with, on the same machine by the same program.
 
 use std::ffi::OsString;
 use std::fs;
@@ -125,7 +125,8 @@ fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
 /// Message where there is no run.
 const NO_RUN: &str = "no run was recorded there; expected the folder of a run";
 
-/// Checks that two runs were begun with the same options, apart from folder and shard.
+/// Checks that two runs were begun with the same options, apart from folder and
+/// shard.
 pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
     let (one, other) = (RunOptions::recorded(one)?, RunOptions::recorded(other)?);
     for (id, name) in RunOptions::all() {

@@ -1,6 +1,5 @@
-//! The ranked tables of a scene that `cullbench run` shows when it is done with
-//! it, narrow enough for a terminal of a hundred columns. Reads a report; measures
-//! nothing.
+//! The ranked tables of a scene at the end of its part of `cullbench run`, narrow
+//! enough for a terminal of a hundred columns.
 
 use std::io::{self, Write};
 
@@ -8,7 +7,7 @@ use super::table::Table;
 use super::text;
 use crate::report::{Comparison, Ranked, Report, ReportCell, comparisons};
 
-/// What a build costs, then a table for each path, cache state and culling test.
+/// A table for each path, cache state and culling test, then the cost of builds.
 pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
     let mut all = comparisons(report);
     all.retain(|c| c.about().scene.name == scene);
@@ -47,7 +46,7 @@ pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
     out.flush()
 }
 
-/// What is asked, how right the answers are, and what the times rest on.
+/// Lines above a table: the queries, their errors, and the basis of the times.
 fn heads(comparison: &Comparison) -> [String; 2] {
     let about = comparison.about();
     let mut head = format!("{}, {}", about.path.name, about.test);
@@ -78,7 +77,7 @@ fn ranked<'r>(comparison: &Comparison<'r>) -> impl Iterator<Item = (String, &'r 
 /// A column: what is over it, and its figure of a cell.
 type Column = (&'static str, fn(&ReportCell) -> String);
 
-/// Of the queries of a path. What has no time has its status in its place.
+/// Columns of the queries of a path. A status stands in place of a missing time.
 const QUERIES: &[Column] = &[
     ("query [95 %]", |cell| match cell.metrics.get("query_ns") {
         None => cell.status.name().to_owned(),
@@ -92,7 +91,7 @@ const QUERIES: &[Column] = &[
     ("locate", |cell| of(cell, "locate_ns", text::time)),
 ];
 
-/// Of a structure on a scene.
+/// Columns of a structure on a scene.
 const BUILDS: &[Column] = &[
     ("build", |cell| {
         of(cell, "build_ms", |ms| text::time(ms * 1e6))
@@ -114,8 +113,7 @@ fn of(cell: &ReportCell, metric: &str, show: fn(f64) -> String) -> String {
     cell.value(metric).map(show).unwrap_or_default()
 }
 
-/// A row a cell; columns without any figure are left out, and so is a table of
-/// nothing else.
+/// A table of a row per cell, without empty columns; nothing if all are empty.
 fn table<'r>(columns: &[Column], cells: impl Iterator<Item = (String, &'r ReportCell)>) -> String {
     let header = ["structure"].into_iter().chain(columns.iter().map(|c| c.0));
     let mut table = Table::of_numbers(header);

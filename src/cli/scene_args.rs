@@ -1,5 +1,4 @@
-//! What can be typed behind `cullbench scene`. Values are checked where they are
-//! used, like those of all [commands](super::args).
+//! Options of `cullbench scene`.
 
 use std::path::PathBuf;
 
@@ -41,7 +40,7 @@ pub struct SceneGenerateArgs {
     pub scene_args: SceneArgs,
 }
 
-/// What a scene can be converted to.
+/// Formats of a written scene.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
 pub enum SceneFormat {
     Csv,

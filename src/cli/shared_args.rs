@@ -1,5 +1,5 @@
-//! Options that several commands take: how scenes are read, what cameras lack,
-//! how a view is made and tested, how queries are computed.
+//! Options of several commands: scenes, lenses, culling tests, instruction sets,
+//! and the processes of a study.
 
 use super::values;
 use crate::camera::{
@@ -25,7 +25,7 @@ pub struct SceneArgs {
 }
 
 impl SceneArgs {
-    /// How a scene is read that so many structures will be built over.
+    /// Load options of a scene for n `structures`.
     pub fn options(&self, structures: usize) -> LoadOptions {
         LoadOptions {
             skip_bad_items: self.skip_bad_items,
@@ -47,7 +47,7 @@ pub struct KernelArgs {
 }
 
 impl KernelArgs {
-    /// The structures of a list, to be built and asked in this way.
+    /// The structures of a list, with this instruction set and these threads.
     pub fn structures(
         &self,
         registry: &Registry,
@@ -97,7 +97,8 @@ pub struct StudyArgs {
 /// How times are spread over processes, for a study of one scene and path.
 #[derive(Args, Debug)]
 pub struct SpreadArgs {
-    /// Processes to spread the rounds over; ten or more give intervals, one gives values alone
+    /// Processes to spread the rounds over; ten or more give intervals, one gives
+    /// values alone
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::whole(1..=1000u32))]
     pub processes: u32,
     /// Seed of all that is random: scenes of sweeps, order of measurement
@@ -106,7 +107,7 @@ pub struct SpreadArgs {
 }
 
 impl SpreadArgs {
-    /// How much of a study that takes so many rounds by itself is one process's.
+    /// One process's share of a study of `rounds` rounds in a single process.
     pub fn effort(&self, rounds: [usize; 2]) -> Effort {
         let processes = self.processes as usize;
         let [least, most] = rounds;
@@ -153,13 +154,17 @@ pub struct LensArgs {
     /// Width / height for cameras without one
     #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero)]
     pub aspect: f64,
-    /// Near plane for cameras without one [default: 0.1 for recorded cameras, far/1000 for paths]
+    /// Near plane for cameras without one [default: 0.1 for recorded cameras, far/1000
+    /// for paths]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
-    /// Far plane for cameras without one, or inf; beyond 1.7e38 is inf too [default: 1000 for recorded cameras, the scene for paths]
+    /// Far plane for cameras without one, or inf; beyond 1.7e38 is inf too [default:
+    /// 1000 for recorded cameras, the scene for paths]
     #[arg(long, value_parser = values::far)]
     pub far: Option<f64>,
-    /// How cameras that are matrices (columns m00 to m33: row, column) are read: column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d (clip = x M); reversed depth and infinite far are recognised
+    /// How cameras that are matrices (columns m00 to m33: row, column) are read:
+    /// column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d
+    /// (clip = x M); reversed depth and infinite far are recognised
     #[arg(long, value_name = "NAME")]
     pub matrix_convention: Option<String>,
 }
@@ -189,7 +194,8 @@ impl LensArgs {
 /// How a camera's view is made and tested.
 #[derive(Args, Debug)]
 pub struct CullingArgs {
-    /// Where the planes come from: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32, gh-d3d-f64, gh-revz-f32, gh-revz-f64
+    /// Derivation of the planes: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32,
+    /// gh-d3d-f64, gh-revz-f32, gh-revz-f64
     #[arg(long, value_name = "METHOD", default_value = "frame", value_parser = values::choice("plane method", &PLANE_METHODS))]
     pub planes: PlaneMethod,
     /// Factor c of the conservative epsilon; 0 leaves the planes as derived
@@ -215,7 +221,7 @@ impl CullingArgs {
     }
 }
 
-/// How a command prints what it found.
+/// Output formats for people and programs.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
 pub enum TableFormat {
     Table,

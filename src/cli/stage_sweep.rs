@@ -1,4 +1,5 @@
-//! `cullbench precision --stage`: error against run time of one stage of the funnel.
+//! `cullbench precision --stage`: error against run time of one stage of the
+//! funnel.
 
 use std::io::{self, Write};
 

@@ -42,8 +42,8 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// Loads what the arguments name: in a worker for its `timing`, in the command itself
-    /// without one and with `held`, the limits of a scene for n structures.
+    /// Loads what the arguments name: in a worker for its `timing`, in the command
+    /// itself without one and with `held`, the limits of a scene for n structures.
     pub fn load(
         registry: &Registry,
         args: &StudyArgs,

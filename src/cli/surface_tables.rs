@@ -39,7 +39,8 @@ fn winners(surface: &Surface) -> Table {
     table
 }
 
-/// "wide = bvh: 12.3 (at 34.70 %)": those of one rank share the place, the fastest comes first.
+/// "wide = bvh: 12.3 (at 34.70 %)": those of one rank share the place, the fastest
+/// comes first.
 fn winner(place: &Place) -> String {
     let names: Vec<&str> = place
         .comparison

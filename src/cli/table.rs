@@ -7,7 +7,8 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement};
 
 use super::text::plain;
 
-/// A column of rows `R`: its head, with `>` before that of numbers, and its cell of a row.
+/// A column of rows `R`: its head, with `>` before that of numbers, and its cell of
+/// a row.
 pub type Column<R> = (&'static str, fn(&R) -> String);
 
 /// A table whose cells may hold any text. Columns in `right` hold numbers.

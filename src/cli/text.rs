@@ -167,8 +167,8 @@ pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
     }
 }
 
-/// Basis of the times of a study, with the ratio of a thing that was measured twice:
-/// "10 processes (a twin took 1.00 [0.99, 1.01] times as long)".
+/// Basis of the times of a study, with the ratio of a thing that was measured
+/// twice: "10 processes (a twin took 1.00 [0.99, 1.01] times as long)".
 pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     let count = counted(processes, "process");
     match twin.filter(|twin| twin.lower.is_some()) {
@@ -177,8 +177,8 @@ pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     }
 }
 
-/// Basis of the times of a table: "10 processes, 100 rounds each; 64 cameras timed, 128
-/// checked, 8 of them against the oracle".
+/// Basis of the times of a table: "10 processes, 100 rounds each; 64 cameras timed,
+/// 128 checked, 8 of them against the oracle".
 pub fn basis(comparison: &Comparison) -> String {
     if comparison.range(|_| 0).is_none() {
         return "no times".to_owned();
@@ -207,8 +207,8 @@ pub fn false_positives(comparison: &Comparison) -> Option<String> {
     Some(format!("{} %", plus_minus(share.value * 100.0, margin)))
 }
 
-/// Sources of false positives, as items of all judged cameras: "12/0/80". Nothing if all
-/// are the culling test's own.
+/// Sources of false positives, as items of all judged cameras: "12/0/80". Nothing
+/// if all are the culling test's own.
 pub fn by_source(comparison: &Comparison) -> Option<String> {
     let errors = &comparison.judged()?.errors;
     let others = errors.by_storage > 0 || errors.by_planes > 0;

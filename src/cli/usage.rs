@@ -7,7 +7,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::spec::SpecError;
 
-/// What one of our own parsers says of a value.
+/// Message of one of our own parsers about a value.
 fn value(error: &clap::Error) -> Option<String> {
     let said = error.source()?.downcast_ref::<SpecError>()?.to_string();
     let told = |kind| match error.get(kind) {
@@ -25,8 +25,8 @@ fn value(error: &clap::Error) -> Option<String> {
     })
 }
 
-/// The error on one line; `None` for what is no error but text that was asked
-/// for, or the help for want of a command.
+/// The error on one line; `None` for requested help or version, and for the help in
+/// place of a missing command.
 pub fn one_line(error: &clap::Error) -> Option<String> {
     use ErrorKind::{
         DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand as NoCommand, DisplayVersion,

@@ -1,6 +1,5 @@
-//! What the value of an option may be: the parsers that the argument parser
-//! calls. An error says what was expected; the parser says where and what it found
-//! ([`usage`](super::usage)).
+//! Parsers of option values. Their errors state what was expected;
+//! [`usage`](super::usage) adds the option and the value.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -32,7 +31,7 @@ where
     move |text| {
         let sound = text.parse().ok().filter(|n| range.contains(n));
         let (least, most) = (range.start(), range.end().to_string());
-        // Twenty digits bound nothing that anybody types.
+        // Twenty digits are no bound in practice.
         match most == u64::MAX.to_string() {
             true => expected(sound, format_args!("a whole number of at least {least}")),
             false => expected(sound, format_args!("a whole number from {least} to {most}")),

@@ -129,8 +129,8 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     Ok(Ending::of_checks(outcome.ok, interrupted))
 }
 
-/// Checks all structures, over boxes and over spheres, on the cameras of one path, with
-/// every kind of volume; one row per structure.
+/// Checks all structures, over boxes and over spheres, on the cameras of one path,
+/// with every kind of volume; one row per structure.
 fn check_path(
     scene: &Scene,
     cameras: &CameraPath,
@@ -192,8 +192,8 @@ fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
     command
 }
 
-/// The queries of a path for each kind of volume, and for each other culling test and
-/// arithmetic; only the first has the points to locate.
+/// The queries of a path for each kind of volume, and for each other culling test
+/// and arithmetic; only the first has the points to locate.
 fn workloads<'a>(
     scene: &'a Scene,
     cameras: &CameraPath,
@@ -388,7 +388,8 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
     checks
 }
 
-/// Compares the answers of one structure to a random case with those of the reference.
+/// Compares the answers of one structure to a random case with those of the
+/// reference.
 fn differ(
     case: &RandomCase,
     index: &dyn DynIndex,

@@ -1,6 +1,6 @@
-//! The child's side of what is measured over processes: `cullbench worker`, not
-//! shown in the help. It reads one request, does one process's share of a job, and
-//! writes what it does and finds, a JSON line each, to standard output.
+//! The child's side of what is measured over processes: `cullbench worker`, hidden
+//! in the help. It reads one request, does one process's share of a job, and writes
+//! steps and results to standard output, a JSON line each.
 
 use std::cell::RefCell;
 use std::io::{self, BufRead, Write};
@@ -22,7 +22,7 @@ use crate::measure::{Part, Plan, ProcessTimes, TIMING, TaskSamples, measure_scen
 
 /// Exit code of a worker whose parent is gone.
 const ORPHANED: i32 = 130;
-/// How often a worker that is timing says so, and what.
+/// Time between the reports of a worker that is timing.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
@@ -41,7 +41,7 @@ pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
 fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     if request.protocol != PROTOCOL {
         anyhow::bail!(
-            "protocol {} was asked for; expected {PROTOCOL}: the two programs are of different \
+            "protocol {} is requested; expected {PROTOCOL}: the two programs are of different \
              versions",
             request.protocol
         );
@@ -88,10 +88,11 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     }
 }
 
-/// What the process is at. Turns of a timed pass are too short to be told one by
-/// one: a thread of its own tells every second whose turn it is, as long as turns
-/// come and go. Then silence means a turn that does not end, and the parent knows
-/// whose.
+/// Current step of the process.
+///
+/// Turns of a timed pass are too short to report each: a thread reports the current turn
+/// every second, as long as turns come and go. Then silence means a turn that does not
+/// end, and the parent has its structure.
 #[derive(Default)]
 struct At {
     turns: AtomicU64,
@@ -99,7 +100,7 @@ struct At {
 }
 
 impl At {
-    /// Whether this is something else than before.
+    /// Sets the step; true if it changed.
     fn set(&self, structure: Option<&str>, step: &str) -> bool {
         let mut doing = self.doing.lock().unwrap_or_else(PoisonError::into_inner);
         if doing.0.as_deref() == structure && doing.1 == step {
@@ -121,7 +122,7 @@ impl At {
             loop {
                 thread::sleep(HEARTBEAT);
                 let turns = self.turns.load(Ordering::Relaxed);
-                // The main thread sees for itself that nobody listens.
+                // The main thread finds the closed pipe by itself.
                 if turns != told && send(&self.message()).is_err() {
                     return;
                 }
@@ -131,7 +132,7 @@ impl At {
     }
 }
 
-/// What is told to the parent, and whether it listens.
+/// Messages to the parent, and the error of the first that was not received.
 #[derive(Default)]
 struct Here {
     failed: RefCell<Option<io::Error>>,
@@ -151,7 +152,7 @@ impl Here {
         }
     }
 
-    /// Asked before every turn of a timed pass, and now and then elsewhere.
+    /// Returns true to stop; called before every turn of a timed pass, and elsewhere.
     fn stop(&self) -> bool {
         self.at.turns.fetch_add(1, Ordering::Relaxed);
         // The parent is gone.
@@ -189,8 +190,8 @@ impl Here {
 /// Times everything unless it is stopped.
 type TimeAll<'t> = &'t dyn Fn(&dyn Fn() -> bool) -> anyhow::Result<Option<ProcessTimes>>;
 
-/// Nothing more is ever said on standard input: its end is that of the parent,
-/// however it came about, and so of this process, whatever it is at.
+/// Ends this process with its parent: standard input has nothing after the request,
+/// so its end is that of the parent.
 fn end_with_the_parent() {
     thread::spawn(|| {
         let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
