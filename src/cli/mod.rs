@@ -354,6 +354,8 @@ fn print_all(text: &[u8]) -> anyhow::Result<Ending> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::PLANE_METHODS;
+    use crate::culling::{ARITHMETICS, TESTS};
     use anyhow::Context;
 
     fn broken() -> io::Error {
@@ -382,5 +384,24 @@ mod tests {
             .context("a")
             .unwrap_err();
         assert_eq!(told_once(&error), "a: b: is full");
+    }
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_choice_of_a_culling_is_in_the_help() {
+        let help = Cli::command()
+            .find_subcommand_mut("query")
+            .map(|c| c.render_long_help().to_string())
+            .unwrap_or_default();
+        let methods = PLANE_METHODS.iter().map(|row| row.1);
+        let tests = TESTS.iter().map(|row| row.1);
+        let numbers = ARITHMETICS.iter().map(|row| row.1);
+        for name in methods.chain(tests).chain(numbers) {
+            assert!(help.contains(name), "{name}");
+        }
     }
 }
