@@ -17,7 +17,7 @@ const RULES: &str = "needless-planes plane-masks no-index six-planes regions occ
      cones sorting third-dimension rebasing rebuild f64-kernel frame-correction";
 
 /// Of one process: for what is no time.
-fn advice(folder: &Path, line: &str) -> Value {
+pub fn advice(folder: &Path, line: &str) -> Value {
     json(&works(
         folder,
         &format!("{line} --processes 1 --format json"),
@@ -41,7 +41,7 @@ fn assert_ratio(row: &Value, [ratio, time, other]: &[&str; 3]) {
     );
 }
 
-fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
+pub fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
     let mut rules = array(advice, "omissions").iter();
     rules.find(|o| o["rule"] == name).expect(name)
 }
@@ -386,119 +386,4 @@ fn mistakes_are_one_line() {
     let nothing = "advise --scene uniform:n=0 --path cameras.csv";
     all_refused(&folder, &[nothing], "uniform:n=0 | no items");
     all_refused(&folder, &["advise --scene nothing.csv"], "nothing.csv");
-}
-
-#[test]
-fn occlusion_is_left_out_from_the_air_and_kept_on_the_street() {
-    let of = |path: &str| {
-        let line = format!(
-            "advise --scene city:n=4000 --path {path} --structure linear,wide --draw-ns 200"
-        );
-        let advice = advice(Path::new("."), &line);
-        let rule = rule(&advice, "occlusion");
-        (rule["decision"].clone(), number(rule, "statistic"))
-    };
-    let (street, hidden) = of("street:frames=12");
-    assert_eq!(street, "keep");
-    assert!(hidden > 0.5, "{hidden}");
-    let (air, hidden) = of("outside:frames=12");
-    assert_eq!(air, "leave_out");
-    assert!(hidden < 0.5, "{hidden}");
-}
-
-#[test]
-fn what_occlusion_removes_is_predicted_from_what_is_drawn() {
-    let predicted = |line: &str| {
-        let line = format!("advise --structure linear,wide {line}");
-        let advice = advice(Path::new("."), &line);
-        let rule = rule(&advice, "occlusion");
-        let reason = rule["reason"].as_str().expect("a reason").to_owned();
-        let share = reason.split("predicted ").nth(1);
-        let share = share.and_then(|text| text.split(" %").next());
-        let share: f64 = share.expect(&reason).parse().expect("a number");
-        (share, number(rule, "statistic") * 100.0)
-    };
-    let (share, removed) = predicted("--scene city:n=4000 --path street:frames=12");
-    assert!((share - removed).abs() < 10.0, "{share} {removed}");
-    for mesh in ["mesh:spheres:n=100k", "mesh:forest:n=50k"] {
-        let (share, removed) = predicted(&format!("--scene {mesh} --path street:frames=12"));
-        assert!(
-            removed > 1.0 && (share - removed).abs() < 10.0,
-            "{mesh}: {share} {removed}"
-        );
-    }
-    // A lone statue has nothing behind it, of a map nothing hides from an eye outside of it.
-    for nothing in [
-        "--scene mesh:statue:n=5k --path street:frames=12",
-        "--scene freedm-map12 --path outside:frames=12",
-    ] {
-        assert_eq!(predicted(nothing), (0.0, 0.0), "{nothing}");
-    }
-}
-
-/// The decision of a rule with its statistic, for a scene and path.
-fn decided(name: &str, line: &str) -> (String, f64) {
-    let line = format!("advise --structure linear,wide {line}");
-    let advice = advice(Path::new("."), &line);
-    let rule = rule(&advice, name);
-    let decision = rule["decision"].as_str().expect("a decision");
-    (decision.to_owned(), number(rule, "statistic"))
-}
-
-#[test]
-fn regions_are_kept_indoors_and_left_out_from_outside() {
-    let (indoors, hidden) = decided("regions", "--scene rooms:n=4000 --path street:frames=12");
-    assert_eq!(indoors, "keep");
-    assert!(hidden > 0.5, "{hidden}");
-    // Eyes in no room: all rooms may be seen.
-    let (outside, hidden) = decided("regions", "--scene rooms:n=4000 --path outside:frames=12");
-    assert_eq!((outside.as_str(), hidden), ("leave_out", 0.0));
-    let (map, hidden) = decided("regions", "--scene freedm-map12 --path street:frames=12");
-    assert_eq!(map, "keep");
-    assert!(hidden > 0.2, "{hidden}");
-}
-
-#[test]
-fn cones_are_kept_where_triangles_cost_something() {
-    let of = |more: &str| decided("cones", &format!("--scene city:n=2000 {more}"));
-    let (kept, away) = of("--path street:frames=12");
-    assert_eq!(kept, "keep");
-    // Of a box one sees one to three of six faces.
-    assert!((0.5..0.84).contains(&away), "{away}");
-    assert_eq!(of("--path street:frames=12 --draw-ns 0").0, "leave_out");
-}
-
-#[test]
-fn sorting_pays_by_the_layers_and_the_cost_of_a_fragment() {
-    let of = |more: &str| decided("sorting", &format!("--scene city:n=2000 {more}"));
-    let (street, saved) = of("--path street:frames=12 --shade-ns 5");
-    assert_eq!(street, "keep");
-    let (_, from_the_air) = of("--path outside:frames=12");
-    assert!(saved > 1.5 * from_the_air, "{saved} {from_the_air}");
-    assert_eq!(of("--path street:frames=12 --shade-ns 0").0, "leave_out");
-}
-
-#[test]
-fn the_stages_behind_the_frustum_are_weighed_on_maps_and_meshes_too() {
-    let of = |more: &str| {
-        let line = format!("advise --structure linear,wide --path street:frames=8 {more}");
-        let advice = advice(Path::new("."), &line);
-        ["occlusion", "cones", "sorting"].map(|name| {
-            let rule = rule(&advice, name);
-            (rule["decision"].clone(), number(rule, "statistic"))
-        })
-    };
-    // Free drawing is worth no stage, dear drawing is worth one that removes much.
-    let dear = of("--scene freedm-map20 --draw-ns 1e5 --shade-ns 100");
-    let free = of("--scene freedm-map20 --draw-ns 0 --shade-ns 0");
-    for (i, least) in [0.2, 0.2, 0.01].into_iter().enumerate() {
-        assert!(dear[i].0 == "keep" && dear[i].1 > least, "{i} {dear:?}");
-        assert!(
-            free[i].0 == "leave_out" && free[i].1 == dear[i].1,
-            "{i} {free:?}"
-        );
-    }
-    let mesh = of("--scene mesh:spheres:n=40000");
-    let shares = mesh.iter().all(|(_, removed)| (0.0..1.0).contains(removed));
-    assert!(shares, "{mesh:?}");
 }

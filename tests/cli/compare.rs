@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use super::process::*;
 
 /// The run, made once: five structures on two paths.
-fn measured() -> &'static Value {
+pub fn measured() -> &'static Value {
     static REPORT: OnceLock<Value> = OnceLock::new();
     REPORT.get_or_init(|| {
         let folder = folder(&[]);
@@ -35,7 +35,7 @@ fn measured() -> &'static Value {
 
 /// Times of ten processes: a fifth by the machine, for all cells alike, and one
 /// percent of a cell's own.
-fn ten(value: f64, own: usize) -> Vec<f64> {
+pub fn ten(value: f64, own: usize) -> Vec<f64> {
     let time = |process: usize| {
         let machine = 1.0 + 0.2 * ((process * 7 % 5) as f64 / 4.0 - 0.5);
         let noise = 1.0 + 0.01 * (((process + own) * 3 % 7) as f64 / 6.0 - 0.5);
@@ -44,19 +44,19 @@ fn ten(value: f64, own: usize) -> Vec<f64> {
     (0..10).map(time).collect()
 }
 
-fn cells(report: &mut Value) -> &mut Vec<Value> {
+pub fn cells(report: &mut Value) -> &mut Vec<Value> {
     report["cells"].as_array_mut().expect("an array")
 }
 
 /// The cell of the bvh on the orbit.
-fn bvh(report: &mut Value) -> &mut Value {
+pub fn bvh(report: &mut Value) -> &mut Value {
     let is_it =
         |cell: &&mut Value| cell["structure"] == "bvh" && cell["path"]["name"] == "orbit:frames=8";
     cells(report).iter_mut().find(is_it).expect("a cell of bvh")
 }
 
 /// Multiplies a figure, its interval, and the times of its processes.
-fn scale(cell: &mut Value, metric: &str, factor: f64) {
+pub fn scale(cell: &mut Value, metric: &str, factor: f64) {
     let scaled = |value: &Value| value.as_f64().map(|value| json!(value * factor));
     for part in ["value", "lower", "upper"] {
         if let Some(value) = scaled(&cell["metrics"][metric][part]) {
@@ -71,18 +71,18 @@ fn scale(cell: &mut Value, metric: &str, factor: f64) {
 }
 
 /// A folder with the run as old.json, and as new.json what became of it.
-fn with_change(change: impl FnOnce(&mut Value)) -> TempDir {
+pub fn with_change(change: impl FnOnce(&mut Value)) -> TempDir {
     let mut new = measured().clone();
     change(&mut new);
     let (old, new) = (measured().to_string(), new.to_string());
     folder(&[("old.json", old.as_bytes()), ("new.json", new.as_bytes())])
 }
 
-const COMPARE: &str = "compare old.json new.json";
+pub const COMPARE: &str = "compare old.json new.json";
 
 /// Runs a comparison that must end with this exit code, without a word on
 /// stderr; its output.
-fn compare(folder: &Path, options: &str, code: i32) -> String {
+pub fn compare(folder: &Path, options: &str, code: i32) -> String {
     let done = cullbench(folder, &format!("{COMPARE} {options}"));
     assert_eq!(
         (done.code, done.err.as_str()),
@@ -93,18 +93,18 @@ fn compare(folder: &Path, options: &str, code: i32) -> String {
     done.out
 }
 
-fn last_line(text: &str) -> &str {
+pub fn last_line(text: &str) -> &str {
     text.lines().last().unwrap_or_default()
 }
 
 /// Rows of the table with this verdict.
-fn rows(text: &str, verdict: &str) -> usize {
+pub fn rows(text: &str, verdict: &str) -> usize {
     let rows = text.lines().filter(|line| line.starts_with('│'));
     let verdict = format!("   {verdict} ");
     rows.filter(|row| row.contains(&verdict)).count()
 }
 
-fn row_with<'t>(text: &'t str, part: &str) -> &'t str {
+pub fn row_with<'t>(text: &'t str, part: &str) -> &'t str {
     let mut rows = text.lines().filter(|line| line.starts_with('│'));
     let row = rows.find(|line| line.contains(part));
     row.unwrap_or_else(|| panic!("no row with '{part}' in:\n{text}"))
@@ -439,137 +439,4 @@ fn cells_of_one_side_and_other_settings_are_said() {
         cells(new).push(copy);
     });
     assert!(compare(twice.path(), "", 0).contains("only in NEW: 1 cell (bvh on"));
-}
-
-#[test]
-fn json_says_the_same_with_types() {
-    let folder = with_change(|new| {
-        scale(bvh(new), "query_ns", 2.0);
-        bvh(new)["metrics"]["planes_tested"]["value"] = json!(1e6);
-        let last = cells(new).pop().expect("a cell");
-        assert_eq!(last["structure"], "bsp");
-    });
-    let done = json(&compare(folder.path(), "--format json", 3));
-    let fields = "old new verdict counts head notes settings advice threshold cells_in_common rows \
-        work_changed only_in_old only_in_new common_shift";
-    assert_eq!(keys(&done), set(fields));
-    assert_eq!(done["verdict"], "regression");
-    let head = "id started_at command version commit dirty cells";
-    assert_eq!(keys(&done["old"]), set(head));
-    assert_eq!(
-        (&done["old"]["cells"], &done["new"]["cells"]),
-        (&json!(10), &json!(9))
-    );
-    assert_eq!(done["advice"], json!(null));
-    let outcomes = "broken lost slower different unmeasured failed_in_both gained inconclusive \
-        faster same";
-    assert_eq!(keys(&done["counts"]), set(outcomes));
-    assert_eq!(
-        (&done["counts"]["slower"], &done["counts"]["same"]),
-        (&json!(1), &json!(8))
-    );
-    let rows = done["rows"].as_array().expect("an array");
-    assert_eq!(rows.len(), 9);
-    let row = "verdict scene path cache test arithmetic planes epsilon structure metric old new \
-        judgement processes old_status new_status reason";
-    assert!(rows.iter().all(|one| keys(one) == set(row)));
-    let worst = &rows[0];
-    assert_eq!(
-        (&worst["verdict"], &worst["structure"]),
-        (&json!("slower"), &json!("bvh"))
-    );
-    let judged = &worst["judgement"];
-    let figures = "change ratio lower upper resolution more_pairs pairs";
-    assert_eq!(keys(judged), set(figures));
-    let figure = |name: &str| judged[name].as_f64().expect(name);
-    assert!((figure("ratio") - 2.0).abs() < 1e-9, "{judged}");
-    assert!(figure("lower") < 2.0 && 2.0 < figure("upper"), "{judged}");
-    assert_eq!(
-        (&judged["pairs"], &worst["processes"]),
-        (&json!(10), &json!([10, 10]))
-    );
-    let [old, new] = ["old", "new"].map(|side| worst[side].as_f64().expect(side));
-    assert_eq!(new, 2.0 * old);
-    let work = &done["work_changed"][0];
-    assert_eq!(
-        (&work["structure"], &work["counter"], &work["new"]),
-        (&json!("bvh"), &json!("planes_tested"), &json!(1e6))
-    );
-    let lone = &done["only_in_old"][0];
-    assert_eq!(
-        (&lone["structure"], &lone["status"]),
-        (&json!("bsp"), &json!("ok"))
-    );
-    assert_eq!(done["only_in_new"], json!([]));
-    let shift = &done["common_shift"];
-    assert_eq!(keys(shift), set("ratio lower upper cells"));
-    assert_eq!(shift["cells"], json!(9));
-    let same = json(&works(
-        folder.path(),
-        "compare old.json old.json --format json",
-    ));
-    assert_eq!(
-        (&same["verdict"], &same["counts"]["same"]),
-        (&json!("ok"), &json!(10))
-    );
-}
-
-#[test]
-fn what_cannot_be_compared_is_refused_in_one_line() {
-    let folder = with_change(|new| cells(new).truncate(3));
-    let mut other = measured().clone();
-    for cell in cells(&mut other) {
-        cell["scene"]["name"] = json!("another");
-    }
-    let half = &measured().to_string()[..3000];
-    for (file, text) in [
-        ("half.json", half),
-        ("other.json", &other.to_string()),
-        ("noise.json", "\u{1}{"),
-    ] {
-        fs::write(folder.path().join(file), text).expect("writable");
-    }
-    for (file, wanted) in [
-        ("missing.json", "missing.json: No such file"),
-        ("half.json", "half.json | expected the report of a run"),
-        ("noise.json", "noise.json | expected the report of a run"),
-        (
-            "other.json",
-            "no cell in common | OLD has | NEW has | another | expected runs of the same scenes",
-        ),
-    ] {
-        let lines = [
-            format!("compare {file} new.json"),
-            format!("compare new.json {file}"),
-            format!("compare new.json {file} --format json"),
-        ];
-        all_refused(&folder, &lines, wanted);
-    }
-    let empty = with_change(|new| cells(new).clear());
-    all_refused(&empty, &[COMPARE], "no cell in common | NEW has no cells");
-    for (options, wanted) in [
-        (
-            "--metric qery_ns",
-            "unknown metric 'qery_ns' | did you mean 'query_ns'? | build_ms",
-        ),
-        (
-            "--metric query_ns,visible_count",
-            "unknown metric 'visible_count' | known: query_ns",
-        ),
-        (
-            "--metric build_ms --metric build_ms",
-            "'build_ms' is named twice",
-        ),
-        ("--metric ,", "no metric to compare by | expected"),
-        ("--threshold nan", "--threshold is 'nan' | expected | 5%"),
-        ("--threshold -5%", "--threshold is '-5%'"),
-        ("--threshold -0.05", "--threshold is '-0.05'"),
-        ("--threshold inf", "--threshold is 'inf'"),
-        ("--threshold 1e999%", "--threshold is '1e999%'"),
-        ("--threshold 5", "--threshold is '5' | 5% | 0.05"),
-        ("--threshold ''", "--threshold is ''"),
-        ("--threshold %", "--threshold is '%'"),
-    ] {
-        all_refused(&folder, &[format!("{COMPARE} {options}")], wanted);
-    }
 }

@@ -5,9 +5,12 @@
 #![cfg(feature = "cli")]
 
 mod advise;
+mod advise_stages;
 mod bad_input;
+mod bad_usage;
 mod cases;
 mod compare;
+mod compare_output;
 mod converting;
 mod cullings;
 mod drift;
@@ -25,6 +28,7 @@ mod memory;
 mod meshes;
 mod pipes;
 mod precision;
+mod precision_options;
 mod process;
 mod queries;
 mod readers;
