@@ -241,9 +241,13 @@ pub fn prepare(
         chain: input.chain.clone(),
         gains: study.gains(&rows),
         stages: rows,
-        inner_boxes: world.hiders.inner_row().cloned(),
-        ground: world.hiders.ground().map(|ground| ground.row.clone()),
-        solid_blocks: world.hiders.blocks_row().cloned(),
+        inner_boxes: world.hiders.inner.clone(),
+        ground: world
+            .hiders
+            .ground
+            .as_ref()
+            .map(|ground| ground.row.clone()),
+        solid_blocks: world.hiders.blocks.clone(),
         mirror,
         orders: orders.unwrap_or_default(),
         picks,

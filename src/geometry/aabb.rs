@@ -92,6 +92,12 @@ impl Aabb {
             .fold(Aabb::EMPTY, |all, b| all.union(b))
     }
 
+    /// The smallest box around points; empty without any.
+    pub fn of_points(points: impl IntoIterator<Item = Vec3>) -> Aabb {
+        let around = |b: Aabb, p: Vec3| Aabb::new(b.min.min(p), b.max.max(p));
+        points.into_iter().fold(Aabb::EMPTY, around)
+    }
+
     /// Returns whether the point lies in the closed box.
     #[inline(always)]
     pub fn contains_point(&self, p: Vec3) -> bool {

@@ -68,7 +68,7 @@ impl Occlusion {
             inscribed::BOXES,
             case.spec.execution.threads,
         );
-        if hiders.blocks_row().is_some_and(|row| row.box_count == 0) {
+        if hiders.blocks.as_ref().is_some_and(|row| row.box_count == 0) {
             return Err(not_applicable(
                 "no boxes are known in the solid between the map's rooms",
             ));

@@ -1,5 +1,4 @@
-//! The boxes in the solid of a map, made once before any view: how many there are, and
-//! what making them took.
+//! The boxes in the solid of a map, made once before any view.
 
 use std::time::Instant;
 
@@ -10,11 +9,11 @@ use crate::geometry::Aabb;
 use crate::scene::Scene;
 use crate::visibility::region::doom::DoomMap;
 
-/// What is known of the boxes in the solid of a map.
+/// The boxes in the solid of a map.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[non_exhaustive]
 pub struct BlocksRow {
-    /// How many there are; none if a sector does not close.
+    /// Number of boxes; none if a sector does not close.
     pub box_count: usize,
     /// Sectors whose linedefs do not close: rays leave the map there.
     pub unclosed_sector_count: usize,
@@ -22,33 +21,20 @@ pub struct BlocksRow {
     pub build_ns: f64,
 }
 
-/// The boxes themselves.
-pub struct Blocks {
-    /// Over the heights of the map's items, scene-local.
-    pub boxes: Vec<Aabb>,
-    /// What they are.
-    pub row: BlocksRow,
-}
-
-impl Blocks {
-    /// `None` for a scene that is no map.
-    pub fn of(scene: &Scene) -> Option<Blocks> {
-        let map = DoomMap::of_scene(scene)?;
-        let begun = Instant::now();
-        let all = scene.written().map(|b| [b.min.z, b.max.z]);
-        let heights = all.reduce(|[low, high], [min, max]| [low.min(min), high.max(max)]);
-        let boxes = heights.map_or(Vec::new(), |heights| map.solid_boxes(heights));
-        // Whole numbers, so nothing is rounded.
-        let about = |corner: DVec3| (corner - scene.origin).as_vec3();
-        let local = boxes.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
-        let build_ns = begun.elapsed().as_nanos() as f64;
-        Some(Blocks {
-            row: BlocksRow {
-                box_count: boxes.len(),
-                unclosed_sector_count: map.unclosed().len(),
-                build_ns,
-            },
-            boxes: local.collect(),
-        })
-    }
+/// Boxes over the heights of a map's items, scene-local; `None` for other scenes.
+pub fn blocks(scene: &Scene) -> Option<(Vec<Aabb>, BlocksRow)> {
+    let map = DoomMap::of_scene(scene)?;
+    let begun = Instant::now();
+    let all = scene.written().map(|b| [b.min.z, b.max.z]);
+    let heights = all.reduce(|[low, high], [min, max]| [low.min(min), high.max(max)]);
+    let boxes = heights.map_or(Vec::new(), |heights| map.solid_boxes(heights));
+    let row = BlocksRow {
+        box_count: boxes.len(),
+        unclosed_sector_count: map.unclosed().len(),
+        build_ns: begun.elapsed().as_nanos() as f64,
+    };
+    // Whole numbers, so nothing is rounded.
+    let about = |corner: DVec3| (corner - scene.origin).as_vec3();
+    let local = boxes.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
+    Some((local.collect(), row))
 }

@@ -1,5 +1,4 @@
-//! The ground of a mesh: boxes below it, made once before any view, hide what is behind
-//! hills.
+//! The ground of a mesh: boxes below it hide what is behind hills.
 //!
 //! Ground are the items of which every triangle faces up, if all of them together are
 //! a height over a rectangle: each edge is gone along once each way, but for those on
@@ -20,16 +19,16 @@ use serde::Serialize;
 use crate::geometry::Aabb;
 use crate::scene::{Scene, SurfaceKind, Surfaces};
 use crate::visibility::Rays;
-use crate::visibility::inscribed::{rectangles, turn};
+use crate::visibility::inscribed::{Cells, turn};
 
 /// Cells along each side of the rectangle, and steps of height.
 const CELLS: usize = 64;
 /// Boxes at most: each costs time in every view.
 const MOST_BOXES: usize = 512;
-/// Of the volume between the lowest and the highest place that a box must add.
+/// Least share of the volume between lowest and highest place that a box adds.
 const LEAST_GAIN: f64 = 1.0 / 16384.0;
 
-/// What is known of the boxes below the ground of a mesh.
+/// The boxes below the ground of a mesh.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[non_exhaustive]
 pub struct GroundRow {
@@ -37,8 +36,9 @@ pub struct GroundRow {
     pub item_count: usize,
     /// How many boxes there are below it.
     pub box_count: usize,
-    /// Volume of the boxes / volume below the ground, both above its lowest place; null for
-    /// flat ground, which hides nothing.
+    /// Volume of the boxes / volume below the ground; null for flat ground.
+    ///
+    /// Both are above its lowest place. Flat ground hides nothing.
     pub volume_share: Option<f64>,
     /// Wall time of finding them all.
     pub build_ns: f64,
@@ -48,10 +48,10 @@ pub struct GroundRow {
 pub struct Ground {
     /// Overlapping; all of them reach below whatever else there is.
     pub boxes: Vec<Aabb>,
-    /// What they are.
+    /// Their number and share.
     pub row: GroundRow,
     triangles: Vec<[Vec3; 3]>,
-    /// Of all triangles.
+    /// Bounds of all triangles.
     bounds: Aabb,
     origin: DVec3,
 }
@@ -66,24 +66,28 @@ impl Ground {
         let triangles = items.iter().flat_map(|&item| surfaces.of(item));
         let triangles: Vec<[Vec3; 3]> = triangles.map(|t| t.map(|p| p + 0.0)).collect();
         let bounds = height_over(&triangles)?;
-        let mut heights = Heights::of(&triangles, &bounds);
+        let heights = Heights::of(&triangles, &bounds);
+        let filled = heights.filled();
+        let share = |cells: u32| f64::from(cells) / (CELLS as f64).powi(3);
+        let below = share(filled.iter().map(|row| row.count_ones()).sum());
         let (mut boxes, mut held) = (Vec::new(), 0.0);
         let bottom = scene.bounds.min.z - scene.bounds.extent().z - 1.0;
+        let mut cells = Cells::new(CELLS, filled);
         while boxes.len() < MOST_BOXES {
-            let Some((gain, cells)) = heights.next_box() else {
+            // All columns of cells begin at the lowest place.
+            let found = cells.next_box(0..1);
+            let Some((count, found)) = found.filter(|(count, _)| share(*count) >= LEAST_GAIN)
+            else {
                 break;
             };
-            if gain < LEAST_GAIN {
-                break;
-            }
-            held += gain;
-            boxes.push(heights.close(cells, bottom));
+            held += share(count);
+            boxes.push(heights.to_box(found, bottom));
         }
         Some(Ground {
             row: GroundRow {
                 item_count: items.len(),
                 box_count: boxes.len(),
-                volume_share: (held > 0.0).then(|| held / heights.filled()),
+                volume_share: (held > 0.0).then(|| held / below),
                 build_ns: begun.elapsed().as_nanos() as f64,
             },
             boxes,
@@ -93,15 +97,16 @@ impl Ground {
         })
     }
 
-    /// Whether some of the ground is higher than an eye. From above all of it hills hide
-    /// little, and boxes all over the image take the place of what else hides there.
+    /// Returns `true` if some of the ground is higher than the eye.
+    ///
+    /// From above all of it hills hide little, and boxes all over the image displace other
+    /// occluders.
     pub fn rises_above(&self, rays: &Rays) -> bool {
         let eye = rays.camera().frame.eye.z - self.origin.z;
         eye < f64::from(self.bounds.max.z)
     }
 
-    /// Whether all rays of a view begin above the ground: where they are at the near
-    /// plane. O(t).
+    /// Returns `true` if all rays are above the ground at the near plane. O(t).
     pub fn is_below(&self, rays: &Rays) -> bool {
         let camera = rays.camera();
         let near = match camera.lens.is_orthographic() {
@@ -110,11 +115,8 @@ impl Ground {
         };
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
         let corners = corners.map(|[x, y]| rays.through(x, y).at(near) - self.origin);
-        let (low, high) = corners
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-                (low.min(*p), high.max(*p))
-            });
+        let low = corners.into_iter().reduce(DVec3::min).unwrap_or_default();
+        let high = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
         // More than rounding of the corners, and of what begins at them, can be.
         let size = low
             .abs()
@@ -125,15 +127,16 @@ impl Ground {
         let (low, high) = (low - slack, high + slack);
         let [least, most] = [self.bounds.min, self.bounds.max].map(Vec3::as_dvec3);
         let is_over = low.x >= least.x && high.x <= most.x && low.y >= least.y && high.y <= most.y;
-        let mut below = self.triangles.iter().filter(|[a, b, c]| {
-            let [least, most] = [a.min(*b).min(*c), a.max(*b).max(*c)].map(Vec3::as_dvec3);
+        let mut below = self.triangles.iter().filter(|corners| {
+            let Aabb { min, max } = Aabb::of_points(**corners);
+            let [least, most] = [min, max].map(Vec3::as_dvec3);
             most.x >= low.x && least.x <= high.x && most.y >= low.y && least.y <= high.y
         });
         is_over && below.all(|t| t.iter().all(|p| f64::from(p.z) < low.z))
     }
 }
 
-/// Whether an item hides and every triangle of it faces up.
+/// Returns `true` if an item hides and every triangle of it faces up.
 fn faces_up(surfaces: &Surfaces, item: usize) -> bool {
     let flat = |p: Vec3| [p.x, p.y];
     surfaces.kinds[item] == SurfaceKind::Opaque
@@ -145,9 +148,11 @@ fn faces_up(surfaces: &Surfaces, item: usize) -> bool {
 
 /// The bounds of triangles that all face up, if they are a height over a rectangle.
 fn height_over(triangles: &[[Vec3; 3]]) -> Option<Aabb> {
-    let points = triangles.iter().flatten();
-    let low = points.clone().fold(Vec3::INFINITY, |low, p| low.min(*p));
-    let high = points.fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
+    let bounds = Aabb::of_points(triangles.iter().flatten().copied());
+    let Aabb {
+        min: low,
+        max: high,
+    } = bounds;
     let bits = |p: Vec3| p.to_array().map(f32::to_bits);
     let mut rim: HashMap<[[u32; 3]; 2], [Vec3; 2]> = HashMap::new();
     for corners in triangles {
@@ -180,48 +185,36 @@ fn height_over(triangles: &[[Vec3; 3]]) -> Option<Aabb> {
             return None;
         }
     }
-    Some(Aabb::new(low, high))
+    Some(bounds)
 }
 
-/// Columns of cells of a rectangle, as high as the ground is at the least there.
+/// Columns of cells over a rectangle, filled up to the ground.
 struct Heights {
     bounds: Aabb,
-    /// By row and column, exactly.
+    /// Exact height of the lowest point over each column, by row and column.
     least: Vec<f32>,
-    /// The same in whole steps, and how many of these are in a box already.
-    steps: Vec<u32>,
-    closed: Vec<u32>,
 }
-
-/// First row and column, the ones behind the last, and a number of steps.
-type Cells = ([usize; 2], [usize; 2], u32);
 
 impl Heights {
     fn of(triangles: &[[Vec3; 3]], bounds: &Aabb) -> Heights {
         let mut heights = Heights {
             bounds: *bounds,
             least: vec![f32::INFINITY; CELLS * CELLS],
-            steps: Vec::new(),
-            closed: vec![0; CELLS * CELLS],
         };
-        for [a, b, c] in triangles {
-            let (low, high) = (a.min(*b).min(*c), a.max(*b).max(*c));
-            let [rows, columns] = [1, 0].map(|axis| heights.cells(axis, low[axis], high[axis]));
+        for &corners in triangles {
+            let Aabb { min, max } = Aabb::of_points(corners);
+            let [rows, columns] = [1, 0].map(|axis| heights.cells(axis, min[axis], max[axis]));
             for row in rows {
                 for column in columns.clone() {
                     let least = &mut heights.least[row * CELLS + column];
-                    *least = least.min(low.z);
+                    *least = least.min(min.z);
                 }
             }
         }
-        let (low, high) = (bounds.min.z, bounds.max.z);
-        let step = (high - low) / CELLS as f32;
-        let whole = |z: &f32| ((z - low) / step).clamp(0.0, CELLS as f32) as u32;
-        heights.steps = heights.least.iter().map(whole).collect();
         heights
     }
 
-    /// Where a cell begins along an axis; at the end of the last one the bound itself.
+    /// Lower end of a cell along an axis; behind the last cell the bound itself.
     fn edge(&self, axis: usize, cell: usize) -> f32 {
         let (low, high) = (self.bounds.min[axis], self.bounds.max[axis]);
         match cell {
@@ -230,7 +223,7 @@ impl Heights {
         }
     }
 
-    /// The cells that have a point between two places.
+    /// The cells that have a point between two positions.
     fn cells(&self, axis: usize, low: f32, high: f32) -> std::ops::Range<usize> {
         let cells = 0..CELLS;
         let first = cells
@@ -240,69 +233,29 @@ impl Heights {
         first.unwrap_or(0)..CELLS - end.unwrap_or(0)
     }
 
-    /// All that is below the ground, as a share of the bounds.
-    fn filled(&self) -> f64 {
-        self.steps
-            .iter()
-            .map(|&steps| f64::from(steps))
-            .sum::<f64>()
-            / (CELLS as f64).powi(3)
-    }
-
-    /// The box that holds the most that none before it does, as a share of the bounds; of
-    /// as many the largest, so that boxes overlap and leave no seam to look through.
-    fn next_box(&self) -> Option<(f64, Cells)> {
-        let mut best = ((0, 0), ([0; 2], [0; 2], 0));
-        for steps in 1..=CELLS as u32 {
-            let rows = self.steps.chunks(CELLS).map(|row| {
-                let high = row.iter().enumerate().filter(|(_, own)| **own >= steps);
-                high.fold(0u64, |bits, (column, _)| bits | 1 << column)
-            });
-            let rows: Vec<u64> = rows.collect();
-            let open = self.open_below(steps);
-            let sum = |row: usize, column: usize| open[row * (CELLS + 1) + column];
-            rectangles(&rows, |columns, rows| {
-                let all = (columns.len() * rows.len()) as u32 * steps;
-                let count = sum(rows.end, columns.end) + sum(rows.start, columns.start)
-                    - sum(rows.end, columns.start)
-                    - sum(rows.start, columns.end);
-                if (count, all) > best.0 {
-                    let [first, end] = [[rows.start, columns.start], [rows.end, columns.end]];
-                    best = ((count, all), (first, end, steps));
-                }
-            });
-        }
-        let ((count, _), cells) = best;
-        (count > 0).then(|| (f64::from(count) / (CELLS as f64).powi(3), cells))
-    }
-
-    /// Sums over all cells below each corner of what is not in a box up to a height.
-    fn open_below(&self, steps: u32) -> Vec<u32> {
-        let side = CELLS + 1;
-        let mut sums = vec![0; side * side];
-        for row in 0..CELLS {
-            let mut own = 0;
-            for column in 0..CELLS {
-                own += steps.saturating_sub(self.closed[row * CELLS + column]);
-                sums[(row + 1) * side + column + 1] = own + sums[row * side + column + 1];
+    /// Rows of the cells wholly below the ground, by z and y, a bit per cell along x.
+    fn filled(&self) -> Vec<u64> {
+        let (low, high) = (self.bounds.min.z, self.bounds.max.z);
+        let step = (high - low) / CELLS as f32;
+        let mut filled = vec![0; CELLS * CELLS];
+        for (at, least) in self.least.iter().enumerate() {
+            let (row, column) = (at / CELLS, at % CELLS);
+            let steps = ((least - low) / step).clamp(0.0, CELLS as f32) as usize;
+            for z in 0..steps {
+                filled[z * CELLS + row] |= 1 << column;
             }
         }
-        sums
+        filled
     }
 
-    /// The box of some cells: from `bottom` up to where the ground is lowest over them.
-    fn close(&mut self, (first, end, steps): Cells, bottom: f32) -> Aabb {
-        let mut top = f32::INFINITY;
-        for row in first[0]..end[0] {
-            for column in first[1]..end[1] {
-                let at = row * CELLS + column;
-                self.closed[at] = self.closed[at].max(steps);
-                top = top.min(self.least[at]);
-            }
-        }
+    /// The box over some columns, from `bottom` up to the lowest point over them.
+    fn to_box(&self, [low, high]: [[usize; 3]; 2], bottom: f32) -> Aabb {
+        let rows = (low[1]..high[1]).map(|row| &self.least[row * CELLS..]);
+        let least = rows.flat_map(|row| &row[low[0]..high[0]]);
+        let top = least.copied().fold(f32::INFINITY, f32::min);
         let corner =
-            |at: [usize; 2], z: f32| Vec3::new(self.edge(0, at[1]), self.edge(1, at[0]), z);
-        Aabb::new(corner(first, bottom), corner(end, top))
+            |at: [usize; 3], z: f32| Vec3::new(self.edge(0, at[0]), self.edge(1, at[1]), z);
+        Aabb::new(corner(low, bottom), corner(high, top))
     }
 }
 

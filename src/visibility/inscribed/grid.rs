@@ -1,42 +1,31 @@
-//! A grid of cells over a closed surface, and the search for boxes of inside cells: it
-//! only proposes; what is used of them is proven (`proof`).
+//! A grid of cells over a closed surface.
+//!
+//! Its cells only propose boxes; `proof` proves those that are used.
 
 use glam::{DVec3, Vec3};
 
-use super::rectangles::rectangles;
+use super::cells::{CellBox, Cells};
 use crate::geometry::Aabb;
 
-/// Cells of the bounds of a piece: inside or not. Boxes of inside cells come one after
-/// the other, each the one that adds most to those before it.
+/// A grid over the bounds of a closed piece of a surface.
 pub struct Grid {
     cells: usize,
     low: DVec3,
     step: DVec3,
-    /// A word per row along x, bit by bit.
-    inside: Vec<u64>,
-    /// Those inside that are in no box yet.
-    open: Vec<u64>,
 }
 
 impl Grid {
-    /// Of a closed piece: O(t + cells³) and more where triangles are long.
+    /// A grid of `cells` along each axis.
     pub fn of(part: &[[Vec3; 3]], cells: usize) -> Grid {
-        let points = part.iter().flatten();
-        let low = points.clone().fold(Vec3::INFINITY, |low, p| low.min(*p));
-        let high = points.fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
-        let low = low.as_dvec3();
-        let step = (high.as_dvec3() - low) / cells as f64;
-        let mut grid = Grid {
-            cells,
-            low,
-            step,
-            inside: vec![0; cells * cells],
-            open: Vec::new(),
-        };
-        let touched = grid.touched(part);
-        grid.fill(&touched);
-        grid.open = grid.inside.clone();
-        grid
+        let bounds = Aabb::of_points(part.iter().flatten().copied());
+        let low = bounds.min.as_dvec3();
+        let step = (bounds.max.as_dvec3() - low) / cells as f64;
+        Grid { cells, low, step }
+    }
+
+    /// The cells inside the surface. O(t + cells³), and more where triangles are long.
+    pub fn cells(&self, part: &[[Vec3; 3]]) -> Cells {
+        Cells::new(self.cells, self.inside(&self.touched(part)))
     }
 
     /// Lower corner of a cell.
@@ -75,8 +64,8 @@ impl Grid {
         touched
     }
 
-    /// What cannot be reached from the sides without a touched cell on the way.
-    fn fill(&mut self, touched: &[u64]) {
+    /// Cells that no path from the sides reaches without a touched cell.
+    fn inside(&self, touched: &[u64]) -> Vec<u64> {
         let n = self.cells;
         let row = if n == 64 { u64::MAX } else { (1 << n) - 1 };
         let mut outside = vec![0u64; n * n];
@@ -113,91 +102,11 @@ impl Grid {
             }
         }
         let rest = touched.iter().zip(&outside).map(|(t, o)| row & !t & !o);
-        self.inside = rest.collect();
+        rest.collect()
     }
 
-    /// The box of inside cells that holds the most of those that no box before did; of
-    /// as many the largest, so that boxes overlap and leave no seam to look through.
-    /// All slabs of z, and of each all runs of rows. `None` if none is left.
-    fn next_box(&mut self) -> Option<Cells> {
-        let n = self.cells;
-        let open = self.open_below();
-        // Up to a corner of cells, how many are open below it.
-        let below = |x: usize, y: usize, z: usize| open[(z * (n + 1) + y) * (n + 1) + x];
-        let mut best = ((0, 0), [[0; 3]; 2]);
-        for low in 0..n {
-            let mut rows = self.inside[low * n..(low + 1) * n].to_vec();
-            for high in low + 1..=n {
-                if high > low + 1 {
-                    let next = &self.inside[(high - 1) * n..high * n];
-                    rows.iter_mut()
-                        .zip(next)
-                        .for_each(|(row, next)| *row &= next);
-                }
-                if rows.iter().all(|&row| row == 0) {
-                    break;
-                }
-                rectangles(&rows, |x, y| {
-                    let all = (x.len() * y.len() * (high - low)) as u32;
-                    if all < best.0.0 {
-                        return;
-                    }
-                    let flat = |z: usize| {
-                        below(x.end, y.end, z) + below(x.start, y.start, z)
-                            - below(x.start, y.end, z)
-                            - below(x.end, y.start, z)
-                    };
-                    let count = (flat(high) - flat(low), all);
-                    if count > best.0 {
-                        best = (count, [[x.start, y.start, low], [x.end, y.end, high]]);
-                    }
-                });
-            }
-        }
-        let ((count, _), found) = best;
-        (count > 0).then_some(found)
-    }
-
-    /// Sums over all open cells below each corner, x fastest.
-    fn open_below(&self) -> Vec<u32> {
-        let n = self.cells;
-        let side = n + 1;
-        let mut sums = vec![0; side * side * side];
-        for z in 0..n {
-            for y in 0..n {
-                let mut row = 0;
-                for x in 0..n {
-                    row += (self.open[z * n + y] >> x & 1) as u32;
-                    let at = |x: usize, y: usize, z: usize| (z * side + y) * side + x;
-                    sums[at(x + 1, y + 1, z + 1)] =
-                        row + sums[at(x + 1, y, z + 1)] + sums[at(x + 1, y + 1, z)]
-                            - sums[at(x + 1, y, z)];
-                }
-            }
-        }
-        sums
-    }
-
-    fn close(&mut self, [low, high]: Cells) {
-        let row = (u64::MAX >> (64 - (high[0] - low[0]))) << low[0];
-        for z in low[2]..high[2] {
-            for y in low[1]..high[1] {
-                self.open[z * self.cells + y] &= !row;
-            }
-        }
-    }
-}
-
-/// First cell and the one behind the last.
-type Cells = [[usize; 3]; 2];
-
-impl Iterator for Grid {
-    type Item = Aabb;
-
-    /// The next box to try.
-    fn next(&mut self) -> Option<Aabb> {
-        let found = self.next_box()?;
-        self.close(found);
-        Some(Aabb::new(self.corner(found[0]), self.corner(found[1])))
+    /// A box of cells, scene-local.
+    pub fn to_box(&self, [low, high]: CellBox) -> Aabb {
+        Aabb::new(self.corner(low), self.corner(high))
     }
 }

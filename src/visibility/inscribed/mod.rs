@@ -5,18 +5,18 @@
 //! (Inscribed boxes as occluders: Silvennoinen, Saransaari, Laine and Lehtinen 2014,
 //! "Occluder simplification using planar sections", name the voxel approach.)
 
+mod cells;
 mod grid;
 mod proof;
-mod rectangles;
 
 use std::collections::BTreeMap;
 
 use glam::Vec3;
 
+pub(crate) use self::cells::Cells;
 use self::grid::Grid;
 use self::proof::is_in;
 pub(crate) use self::proof::turn;
-pub(crate) use self::rectangles::rectangles;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::{SurfaceKind, Surfaces, volume_within};
@@ -43,7 +43,7 @@ pub const MOST_BOXES: usize = 16;
 /// Boxes of an item by default.
 pub const BOXES: usize = 8;
 
-/// Of the item's volume that a box must add.
+/// Least share of the item's volume that a box adds.
 const LEAST_GAIN: f64 = 1.0 / 64.0;
 
 /// How often a box shrinks when its proof fails.
@@ -80,12 +80,16 @@ pub fn inscribed_boxes(
     (!boxes.is_empty()).then_some(Inscribed { boxes, share })
 }
 
-/// Boxes in a closed surface in one piece, up to `most`, each with the volume that it
-/// adds: at least so much.
+/// Boxes in a closed surface in one piece, each with the volume it adds.
+///
+/// Up to `most`, each of which adds at least `least`.
 fn boxes_in(part: &[[Vec3; 3]], cells: usize, most: usize, least: f64) -> Vec<(f64, Aabb)> {
     let mut found: Vec<(f64, Aabb)> = Vec::new();
-    for tried in Grid::of(part, cells).take(most) {
-        let Some(proven) = proven(part, tried) else {
+    let grid = Grid::of(part, cells);
+    let mut inside = grid.cells(part);
+    let tried = std::iter::from_fn(|| inside.next_box(0..cells));
+    for (_, tried) in tried.take(most) {
+        let Some(proven) = proven(part, grid.to_box(tried)) else {
             continue;
         };
         let mut rest = vec![proven];
@@ -113,7 +117,7 @@ fn proven(part: &[[Vec3; 3]], mut tried: Aabb) -> Option<Aabb> {
     None
 }
 
-/// What of a box is outside another: up to six boxes.
+/// The part of a box outside another: up to six boxes.
 fn without(b: &Aabb, other: &Aabb) -> Vec<Aabb> {
     if !b.intersects(other) {
         return vec![*b];
@@ -185,8 +189,9 @@ pub struct InnerBoxes {
 }
 
 impl InnerBoxes {
-    /// Boxes for each item, as [`inscribed_boxes`] finds them: up to `most` on a grid of
-    /// so many cells. The same on any number of threads.
+    /// Boxes for each item, as [`inscribed_boxes`] finds them.
+    ///
+    /// The same on any number of threads.
     pub fn of(surfaces: &Surfaces, cells: usize, most: usize, threads: usize) -> InnerBoxes {
         const CHUNK: usize = 16;
         let mut found = vec![None; surfaces.items()];
@@ -222,7 +227,7 @@ mod tests {
     use super::*;
     use crate::scene::{Family, SeededRng, load};
 
-    /// Whether the open box is in the inside of one piece of a closed item: exactly.
+    /// Returns `true` if the open box is inside one piece of a closed item, exactly.
     fn is_inside(surfaces: &Surfaces, item: usize, inner: &Aabb) -> bool {
         parts(surfaces, item).iter().any(|part| is_in(part, inner))
     }

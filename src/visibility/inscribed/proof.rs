@@ -1,5 +1,6 @@
-//! That a box is inside a closed piece of a surface, exactly: no triangle enters it, and
-//! the surface winds round it.
+//! Exact proof that a box is inside a closed piece of a surface.
+//!
+//! No triangle enters the box, and the surface winds round it.
 
 use glam::{DVec3, Vec3};
 
@@ -7,15 +8,16 @@ use crate::arithmetic::Expansion;
 use crate::geometry::Aabb;
 use crate::visibility::triangle::{Eye, faces, normal};
 
-/// Whether the open box is in the inside of a closed piece.
+/// Returns `true` if the open box is inside a closed piece.
 pub fn is_in(part: &[[Vec3; 3]], inner: &Aabb) -> bool {
     let is_apart = part.iter().all(|corners| is_outside(*corners, inner));
     // All of an open box without a surface in it is inside, or none is.
     is_apart && winding(part, inner).is_some_and(|turns| turns > 0)
 }
 
-/// Whether a triangle and an open box have no point in common: exactly, by the
-/// thirteen separating axes (Akenine-Möller 2001) as comparisons and orientations.
+/// Returns `true` if a triangle and an open box have no point in common, exactly.
+///
+/// By the thirteen separating axes (Akenine-Möller 2001) as comparisons and orientations.
 fn is_outside(corners: [Vec3; 3], b: &Aabb) -> bool {
     let [p, q, r] = corners;
     let (low, high) = (p.min(q).min(r), p.max(q).max(r));

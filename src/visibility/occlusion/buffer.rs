@@ -1,42 +1,43 @@
-//! What all depth buffers of this stage have in common: occluders are drawn into
-//! them, and rectangles are asked whether they are hidden.
+//! The depth buffers of this stage as a contract: occluders are drawn into them, and
+//! rectangles are tested.
 
 use super::outline::{Coverage, Outline};
-use super::rect::{Rect, Rects};
+use super::rect::{Candidate, Rect, Rects};
+use super::scene::OccluderScene;
+use super::view::View;
 use crate::kernel::{Isa, LaneMask};
 use crate::visibility::{Guarantee, SampleGrid};
 
-/// A buffer that says what lies behind what was drawn.
+/// A depth buffer of occluders.
 pub trait OcclusionBuffer {
-    /// Its name in tables.
-    const NAME: &'static str;
-    /// What it is, one line; of code written after a description, which one.
+    /// One line for tables; names the source of code written after a description.
     const SUMMARY: &'static str;
-    /// What it promises of the items that it does not hide.
+    /// Guarantee of the items that it does not hide.
     const GUARANTEE: Guarantee;
-    /// Which pixels of an occluder are drawn.
+    /// The pixels of an occluder that are drawn.
     const COVERAGE: Coverage;
-    /// Whether drawing and asking may alternate. If not, [`OcclusionBuffer::finish`]
-    /// has to be called in between.
+    /// `true` if draws and tests may alternate; else [`OcclusionBuffer::finish`] separates
+    /// them.
     const ALTERNATES: bool;
 
-    /// A buffer of so many pixels, nothing drawn.
+    /// An empty buffer.
     fn new(grid: SampleGrid) -> Self;
 
-    /// Forgets what was drawn.
+    /// Empties the buffer.
     fn clear(&mut self);
 
     /// Draws an occluder.
     fn draw<I: Isa>(&mut self, isa: I, outline: &Outline);
 
-    /// Everything has been drawn.
+    /// Prepares the buffer for tests, after all draws.
     fn finish(&mut self) {}
 
-    /// Whether something that was drawn is nearer than the rectangle in all its
-    /// pixels. As near is not nearer.
+    /// Returns `true` if something drawn is nearer than the rectangle in all its pixels.
+    ///
+    /// As near is not nearer.
     fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool;
 
-    /// The same for some boxes of a block at once.
+    /// Tests some boxes of a block; returns the lanes of the hidden ones.
     #[inline(always)]
     fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask {
         let mut hidden = 0;
@@ -48,4 +49,44 @@ pub trait OcclusionBuffer {
         }
         hidden
     }
+}
+
+/// Draws what hides at a candidate's position, unless a ray enters its box before the near
+/// plane; returns the number of occluders that cover any pixel.
+#[inline(always)]
+pub fn draw<I: Isa, B: OcclusionBuffer>(
+    isa: I,
+    buffer: &mut B,
+    scene: &OccluderScene,
+    view: &View,
+    candidate: &Candidate,
+) -> usize {
+    let position = candidate.position as usize;
+    if view.entered_before_near(&scene.outer(position)) {
+        return 0;
+    }
+    let mut drawn = 0;
+    for occluder in scene.occluders(position) {
+        let open = view.open & occluder.faces;
+        let Some(mut outline) = Outline::of(&occluder.inner, open, view, B::COVERAGE) else {
+            continue;
+        };
+        if !candidate.near {
+            outline.within(&candidate.rect);
+        }
+        buffer.draw(isa, &outline);
+        drawn += 1;
+    }
+    drawn
+}
+
+/// Counts of one view.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct CullStats {
+    /// Boxes of nodes and items that were projected.
+    pub boxes: usize,
+    /// Occluders drawn.
+    pub drawn: usize,
+    /// Items that were not removed.
+    pub kept: usize,
 }

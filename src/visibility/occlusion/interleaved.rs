@@ -9,11 +9,10 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::buffer::OcclusionBuffer;
-use super::outline::{Coverage, Outline};
-use super::rect::{Rect, Rects};
+use super::buffer::{CullStats, OcclusionBuffer, draw};
+use super::outline::Coverage;
+use super::rect::{Candidate, Rect, Rects};
 use super::scene::OccluderScene;
-use super::stats::CullStats;
 use super::view::View;
 use crate::geometry::PlaneMask;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
@@ -21,7 +20,7 @@ use crate::query::ItemId;
 
 /// Survivors are drawn that may cover at least this part of the image: a pixel of
 /// 320 x 180.
-pub const DEFAULT_DRAWN_PART: u32 = 65_536;
+const DEFAULT_DRAWN_PART: u32 = 65_536;
 
 /// The interleaved coupling, with memory that is kept from view to view.
 #[derive(Clone, Debug)]
@@ -32,7 +31,7 @@ pub struct Interleaved<B> {
     /// The [`key`]s of blocks and their places among the entries.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     entries: Vec<Entry>,
-    survivors: Vec<Survivor>,
+    survivors: Vec<Candidate>,
 }
 
 /// A block that is still to be opened.
@@ -58,14 +57,6 @@ fn key(depth: u32, level: u16, block: u32) -> u64 {
     u64::from(depth) << 32 | u64::from(level) << 28 | u64::from(block)
 }
 
-/// An item that was not hidden when it was met.
-#[derive(Clone, Copy, Debug)]
-struct Survivor {
-    rect: Rect,
-    position: u32,
-    near: bool,
-}
-
 impl<B: OcclusionBuffer> Interleaved<B> {
     /// With a buffer that may be drawn into and asked in turn, on an instruction
     /// set.
@@ -73,7 +64,7 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     /// # Panics
     /// If the buffer may not.
     pub fn new(buffer: B, kernel: Kernel) -> Interleaved<B> {
-        assert!(B::ALTERNATES, "{} is drawn first and asked then", B::NAME);
+        assert!(B::ALTERNATES, "draws and tests alternate");
         Interleaved {
             buffer,
             kernel,
@@ -85,6 +76,7 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     }
 
     /// Draws survivors that may cover at least the image's pixels divided by `part`.
+    #[cfg(test)]
     pub fn drawing_from(mut self, part: u32) -> Self {
         self.drawn_part = part.max(1);
         self
@@ -200,11 +192,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             let large = lanes & (!flat | coverable_from(isa, &rects, B::COVERAGE, least_area));
             let mut order = [0; LANES];
             let count = by_depth(&rects.depth, large, &mut order);
-            let survivor = |lane: usize| Survivor {
-                rect: rects.get(lane),
-                position: (index * LANES + lane) as u32,
-                near: flat >> lane & 1 == 0,
-            };
+            let survivor = |lane: usize| rects.candidate(lane, index * LANES + lane);
             let mut drawn = 0;
             for &key in &order[..count] {
                 let item = survivor((key & 15) as usize);
@@ -250,35 +238,6 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         stats.kept = self.out.len() - before;
         stats
     }
-}
-
-/// Draws what hides at an item's position, if it may be drawn: as much of it as covers
-/// anything.
-#[inline(always)]
-fn draw<I: Isa, B: OcclusionBuffer>(
-    isa: I,
-    buffer: &mut B,
-    scene: &OccluderScene,
-    view: &View,
-    item: &Survivor,
-) -> usize {
-    let position = item.position as usize;
-    if view.entered_before_near(&scene.outer(position)) {
-        return 0;
-    }
-    let mut drawn = 0;
-    for occluder in scene.occluders(position) {
-        let open = view.open & occluder.faces;
-        let Some(mut outline) = Outline::of(&occluder.inner, open, view, B::COVERAGE) else {
-            continue;
-        };
-        if !item.near {
-            outline.within(&item.rect);
-        }
-        buffer.draw(isa, &outline);
-        drawn += 1;
-    }
-    drawn
 }
 
 /// The lanes by their depths, each with its depth's upper bits in front of its number;

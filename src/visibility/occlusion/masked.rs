@@ -7,7 +7,7 @@
 //! tell the two back ends apart.
 
 use super::buffer::OcclusionBuffer;
-use super::outline::{Coverage, Outline, TileNearness};
+use super::outline::{Coverage, Nearness, Outline};
 use super::rect::{Rect, Rects};
 use super::view::{TILE_HEIGHT, TILE_WIDTH};
 use crate::kernel::{Isa, LANES, LaneMask, each, first_lanes, pairs};
@@ -37,7 +37,6 @@ pub type MaskedInner = Masked<true>;
 pub type MaskedCentre = Masked<false>;
 
 impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
-    const NAME: &'static str = if WHOLE { "masked-inner" } else { "masked" };
     const SUMMARY: &'static str = if WHOLE {
         "masked tiles of 8 x 4 pixels; only wholly covered pixels hide"
     } else {
@@ -189,28 +188,23 @@ impl<const WHOLE: bool> Masked<WHOLE> {
     }
 
     /// The tiles that a rectangle meets, each with the part of it that lies there.
-    pub(super) fn tiles_of(&self, rect: &Rect) -> impl Iterator<Item = (usize, Rect)> {
-        let (rect, columns) = (*rect, self.columns);
-        let of = |first: u16, last: u16, size: usize| {
-            let tiles = usize::from(first) / size..usize::from(last) / size + 1;
-            tiles.map(move |tile| {
-                let low = (tile * size) as u16;
-                (tile, first.max(low), last.min(low + (size - 1) as u16))
-            })
-        };
-        of(rect.y0, rect.y1, TILE_HEIGHT).flat_map(move |(row, y0, y1)| {
-            of(rect.x0, rect.x1, TILE_WIDTH).map(move |(column, x0, x1)| {
-                let nearness = rect.nearness;
+    pub(super) fn tiles_of(&self, rect: &Rect) -> Vec<(usize, Rect)> {
+        let tiles = |first: u16, last: u16, size: u16| first / size..last / size + 1;
+        let (width, height) = (TILE_WIDTH as u16, TILE_HEIGHT as u16);
+        let mut parts = Vec::new();
+        for row in tiles(rect.y0, rect.y1, height) {
+            for column in tiles(rect.x0, rect.x1, width) {
                 let part = Rect {
-                    x0,
-                    x1,
-                    y0,
-                    y1,
-                    nearness,
+                    x0: rect.x0.max(column * width),
+                    x1: rect.x1.min(column * width + width - 1),
+                    y0: rect.y0.max(row * height),
+                    y1: rect.y1.min(row * height + height - 1),
+                    ..*rect
                 };
-                (row * columns + column, part)
-            })
-        })
+                parts.push((usize::from(row) * self.columns + usize::from(column), part));
+            }
+        }
+        parts
     }
 
     /// Those of the lanes that are hidden as far as one row of tiles goes: the one that
@@ -284,7 +278,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         row: usize,
         start: &[i32; TILE_HEIGHT],
         end: &[i32; TILE_HEIGHT],
-        nearness: &TileNearness,
+        nearness: &Nearness,
     ) {
         let (mut least, mut greatest) = (i32::MAX, 0);
         let (mut top, mut bottom) = (TILE_HEIGHT, 0);

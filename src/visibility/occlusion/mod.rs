@@ -18,7 +18,6 @@ mod masked;
 mod outline;
 mod rect;
 mod scene;
-mod stats;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -26,14 +25,13 @@ mod two_pass;
 mod view;
 mod zbuffer;
 
-pub use buffer::OcclusionBuffer;
+pub use buffer::{CullStats, OcclusionBuffer};
 pub use hierarchical_z::HierarchicalZ;
-pub use interleaved::{DEFAULT_DRAWN_PART, Interleaved};
+pub use interleaved::Interleaved;
 pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use outline::{Coverage, Outline};
-pub use rect::{Rect, Rects};
+pub use rect::{Candidate, Rect, Rects};
 pub use scene::{Faces, Occluder, OccluderScene};
-pub use stats::CullStats;
 #[cfg(test)]
 pub use tests::NoOcclusion;
 pub use trace::FrameTrace;

@@ -100,8 +100,7 @@ impl Outline {
                 high[axis] = f64::INFINITY;
             }
         }
-        let size = [view.grid.width as usize, view.grid.height as usize];
-        let padded = |size: usize, tile: usize| (size.div_ceil(tile) * tile) as f64;
+        let [columns, height] = view.padded;
         let none = Bound {
             at: 0.0,
             slope: 0.0,
@@ -111,13 +110,13 @@ impl Outline {
             lower_count: 0,
             upper: [none; 8],
             upper_count: 0,
-            height: padded(size[1], TILE_HEIGHT),
-            rows: [0.0, padded(size[1], TILE_HEIGHT)],
-            columns_within: [0.0, padded(size[0], TILE_WIDTH)],
+            height,
+            rows: [0.0, height],
+            columns_within: [0.0, columns],
             faces: [Linear::constant(f64::INFINITY); 3],
             face_count: 0,
             floor: 0.0,
-            columns: padded(size[0], TILE_WIDTH),
+            columns,
             coverage,
         };
         match view.parallel {
@@ -129,21 +128,13 @@ impl Outline {
     }
 
     fn add_perspective(&mut self, low: DVec3, high: DVec3, view: &View) {
-        // Axes of which a face is turned to the eye, mirrored.
-        let mut toward = [false; 3];
-        let mut near = [0.0; 3];
-        let mut far = [0.0; 3];
-        let mut along = view.rays;
-        for axis in 0..3 {
-            if low[axis] > 0.0 {
-                (near[axis], far[axis]) = (low[axis], high[axis]);
-                toward[axis] = true;
-            } else if high[axis] < 0.0 {
-                (near[axis], far[axis]) = (-high[axis], -low[axis]);
-                along[axis] = along[axis].times(-1.0);
-                toward[axis] = true;
-            }
-        }
+        let side = |axis: usize| low[axis].max(0.0) + high[axis].min(0.0);
+        let Mirrored {
+            toward,
+            near,
+            far,
+            along,
+        } = Mirrored::of(low, high, view, side);
         let zero = view.far_from_zero;
         for i in (0..3).filter(|&i| toward[i]) {
             let (n, g) = (near[i], &along[i]);
@@ -151,20 +142,15 @@ impl Outline {
                 let d = &along[j];
                 let margin = |f: f64| MARGIN * (f.abs() + n + zero) * view.reach;
                 let ahead = MARGIN * view.reach;
+                let mut edge = |bound: f64, a: f64, b: f64| match bound.is_finite() {
+                    true => self.keep(g.blend(a, d, b), margin(bound)),
+                    false => self.keep(*g, ahead),
+                };
                 if toward[j] {
-                    match far[j].is_finite() {
-                        true => self.keep(g.blend(far[j], d, -n), margin(far[j])),
-                        false => self.keep(*g, ahead),
-                    }
+                    edge(far[j], far[j], -n);
                 } else {
-                    match high[j].is_finite() {
-                        true => self.keep(g.blend(high[j], d, -n), margin(high[j])),
-                        false => self.keep(*g, ahead),
-                    }
-                    match low[j].is_finite() {
-                        true => self.keep(d.blend(n, g, -low[j]), margin(low[j])),
-                        false => self.keep(*g, ahead),
-                    }
+                    edge(high[j], high[j], -n);
+                    edge(low[j], -low[j], n);
                 }
             }
             // A little farther than it is: n may be wrong by its error, and so may
@@ -181,20 +167,12 @@ impl Outline {
 
     fn add_parallel(&mut self, low: DVec3, high: DVec3, view: &View) {
         let f = view.forward.abs();
-        let mut toward = [false; 3];
-        let mut near = [0.0; 3];
-        let mut far = [0.0; 3];
-        let mut beside = view.rays;
-        for axis in 0..3 {
-            if view.forward[axis] > 0.0 {
-                (near[axis], far[axis]) = (low[axis], high[axis]);
-                toward[axis] = true;
-            } else if view.forward[axis] < 0.0 {
-                (near[axis], far[axis]) = (-high[axis], -low[axis]);
-                beside[axis] = beside[axis].times(-1.0);
-                toward[axis] = true;
-            }
-        }
+        let Mirrored {
+            toward,
+            near,
+            far,
+            along: beside,
+        } = Mirrored::of(low, high, view, |axis| view.forward[axis]);
         let zero = view.far_from_zero + view.reach;
         // Rays that run along a slab are in it all the way or not at all.
         for j in (0..3).filter(|&j| !toward[j]) {
@@ -339,55 +317,82 @@ impl Outline {
 
     /// The nearness of parts of tiles, never above that of any covered pixel in them.
     #[inline(always)]
-    pub fn per_tile(&self) -> TileNearness {
-        let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
-        for (i, face) in self.faces[..self.face_count].iter().enumerate() {
-            // Six u of the greatest terms: one for rounding each coefficient, one for
-            // each product, two sums.
+    pub fn per_tile(&self) -> Nearness {
+        // Six u of the greatest terms: one for rounding each coefficient, one for each
+        // product, two sums.
+        self.nearness(|face| {
             let size = face.c.abs() + face.x.abs() * self.columns + face.y.abs() * self.height;
-            let c = face.c - 6.0 * f64::from(U) * size;
-            faces[i] = [c as f32, face.x as f32, face.y as f32];
-        }
-        TileNearness {
-            faces,
-            floor: (self.floor as f32).next_down(),
-        }
+            face.c - 6.0 * f64::from(U) * size
+        })
     }
 
     /// The nearness at the centres of pixels, rounded.
     #[inline(always)]
-    pub fn per_pixel(&self) -> PixelNearness {
+    pub fn per_pixel(&self) -> Nearness {
+        self.nearness(|face| face.c + 0.5 * (face.x + face.y))
+    }
+
+    #[inline(always)]
+    fn nearness(&self, constant: impl Fn(&Linear) -> f64) -> Nearness {
         let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
         for (i, face) in self.faces[..self.face_count].iter().enumerate() {
-            let c = face.c + 0.5 * (face.x + face.y);
-            faces[i] = [c as f32, face.x as f32, face.y as f32];
+            faces[i] = [constant(face) as f32, face.x as f32, face.y as f32];
         }
-        PixelNearness { faces }
+        Nearness {
+            faces,
+            floor: (self.floor as f32).next_down(),
+        }
     }
 }
 
-/// The nearness of an outline pixel by pixel, in f32.
-#[derive(Clone, Copy, Debug)]
-pub struct PixelNearness {
-    faces: [[f32; 3]; 3],
+/// A box with axes mirrored so that its near bounds are those that rays enter by.
+struct Mirrored {
+    /// `true` for axes of which a face is turned to the eye.
+    toward: [bool; 3],
+    near: [f64; 3],
+    far: [f64; 3],
+    along: [Linear; 3],
 }
 
-impl PixelNearness {
+impl Mirrored {
+    /// Mirrors the axes of which `side` is below zero; no face of those of zero is turned to
+    /// the eye.
+    #[inline(always)]
+    fn of(low: DVec3, high: DVec3, view: &View, side: impl Fn(usize) -> f64) -> Mirrored {
+        let mut mirrored = Mirrored {
+            toward: [false; 3],
+            near: [0.0; 3],
+            far: [0.0; 3],
+            along: view.rays,
+        };
+        for axis in 0..3 {
+            let side = side(axis);
+            if side > 0.0 {
+                (mirrored.near[axis], mirrored.far[axis]) = (low[axis], high[axis]);
+            } else if side < 0.0 {
+                (mirrored.near[axis], mirrored.far[axis]) = (-high[axis], -low[axis]);
+                mirrored.along[axis] = mirrored.along[axis].times(-1.0);
+            }
+            mirrored.toward[axis] = side != 0.0;
+        }
+        mirrored
+    }
+}
+
+/// The nearness of an outline in f32.
+#[derive(Clone, Copy, Debug)]
+pub struct Nearness {
+    faces: [[f32; 3]; 3],
+    floor: f32,
+}
+
+impl Nearness {
     /// At the centre of a pixel, by its column and row.
     #[inline(always)]
     pub fn of(&self, column: f32, row: f32) -> f32 {
         least(each(self.faces, |f| (f[0] + f[1] * column) + f[2] * row))
     }
-}
 
-/// The nearness of an outline tile by tile, in f32, rounded down.
-#[derive(Clone, Copy, Debug)]
-pub struct TileNearness {
-    faces: [[f32; 3]; 3],
-    floor: f32,
-}
-
-impl TileNearness {
     /// From the column `left` to the column `right` and from the row `top` to the row
     /// `bottom`, edges of pixels.
     #[inline(always)]

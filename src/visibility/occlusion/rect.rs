@@ -65,6 +65,19 @@ impl Rect {
     }
 }
 
+/// A box that may be hidden.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate {
+    /// The rectangle, if there is one.
+    pub rect: Rect,
+    /// Position in tree order.
+    pub position: u32,
+    /// Lower bound of the least depth.
+    pub depth: f32,
+    /// `true` if there is no rectangle, as the box is too near.
+    pub near: bool,
+}
+
 /// The rectangles of a block's boxes.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
@@ -109,6 +122,17 @@ impl Rects {
             y0: self.y0[lane] as u16,
             y1: self.y1[lane] as u16,
             nearness: self.nearness[lane],
+        }
+    }
+
+    /// The box of a lane, which is at a position of the tree.
+    #[inline(always)]
+    pub fn candidate(&self, lane: usize, position: usize) -> Candidate {
+        Candidate {
+            rect: self.get(lane),
+            position: position as u32,
+            depth: self.depth[lane],
+            near: self.flat >> lane & 1 == 0,
         }
     }
 

@@ -4,13 +4,12 @@
 
 use std::cell::RefCell;
 
-use super::buffer::OcclusionBuffer;
+use super::buffer::{CullStats, OcclusionBuffer};
 use super::interleaved::Interleaved;
 use super::masked::{MaskedInner, Tile};
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
 use super::scene::OccluderScene;
-use super::stats::CullStats;
 use super::view::View;
 use crate::geometry::xor_of_bits;
 use crate::kernel::{Isa, Kernel, LANES};
@@ -81,7 +80,6 @@ struct Traced {
 }
 
 impl OcclusionBuffer for Traced {
-    const NAME: &'static str = MaskedInner::NAME;
     const SUMMARY: &'static str = MaskedInner::SUMMARY;
     const GUARANTEE: Guarantee = MaskedInner::GUARANTEE;
     const COVERAGE: Coverage = MaskedInner::COVERAGE;
@@ -111,7 +109,7 @@ impl OcclusionBuffer for Traced {
 
     fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool {
         let hidden = self.buffer.hides(isa, rect);
-        let parts = self.buffer.tiles_of(rect);
+        let parts = self.buffer.tiles_of(rect).into_iter();
         let reads = &mut self.reads.borrow_mut();
         match hidden {
             true => reads.extend(parts.map(|(at, _)| at as u32)),

@@ -2,11 +2,9 @@
 
 use std::fmt;
 
-use super::buffer::OcclusionBuffer;
-use super::outline::Outline;
-use super::rect::{Rect, Rects};
+use super::buffer::{CullStats, OcclusionBuffer, draw};
+use super::rect::{Candidate, Rects};
 use super::scene::OccluderScene;
-use super::stats::CullStats;
 use super::view::View;
 use crate::geometry::BoxBlock;
 use crate::kernel::{Isa, Kernel, LANES, Work};
@@ -47,25 +45,13 @@ impl fmt::Display for OccluderChoice {
     }
 }
 
-/// A candidate and what is known of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Candidate {
-    /// In tree order.
-    pub position: u32,
-    /// The rectangle, if there is one.
-    pub rect: Rect,
-    /// Whether there is none, as the box is too near.
-    pub near: bool,
-    /// Not above the least depth.
-    pub depth: f32,
-}
-
 /// Two passes over candidates, with memory that is kept from view to view.
 #[derive(Clone, Debug)]
 pub struct TwoPass<B> {
     buffer: B,
     choice: OccluderChoice,
     kernel: Kernel,
+    ids: Vec<ItemId>,
     candidates: Vec<Candidate>,
     order: Vec<u32>,
 }
@@ -77,6 +63,7 @@ impl<B: OcclusionBuffer> TwoPass<B> {
             buffer,
             choice,
             kernel,
+            ids: Vec::new(),
             candidates: Vec::new(),
             order: Vec::new(),
         }
@@ -116,17 +103,10 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
     fn run<I: Isa>(self, isa: I) -> CullStats {
         let (state, scene, view) = (self.state, self.scene, self.view);
         let mut stats = CullStats::default();
-        state.candidates.clear();
-        project_all(isa, scene, view, self.ids, &mut state.candidates);
-        for first in scene.blocks().step_by(LANES) {
-            let (mut ids, end) = ([0; LANES], scene.blocks().end);
-            let chunk = first..end.min(first + LANES as ItemId);
-            let count = chunk.len();
-            ids.iter_mut()
-                .zip(chunk)
-                .for_each(|(id, block)| *id = block);
-            project_all(isa, scene, view, &ids[..count], &mut state.candidates);
-        }
+        state.ids.clear();
+        state.ids.extend_from_slice(self.ids);
+        state.ids.extend(scene.blocks());
+        project_all(isa, scene, view, &state.ids, &mut state.candidates);
         stats.boxes = self.ids.len();
         choose(
             scene,
@@ -138,19 +118,7 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
         state.buffer.clear();
         for &index in &state.order {
             let candidate = &state.candidates[index as usize];
-            let position = candidate.position as usize;
-            for occluder in scene.occluders(position) {
-                let open = view.open & occluder.faces;
-                let outline = Outline::of(&occluder.inner, open, view, B::COVERAGE);
-                let Some(mut outline) = outline else {
-                    continue;
-                };
-                if !candidate.near {
-                    outline.within(&candidate.rect);
-                }
-                state.buffer.draw(isa, &outline);
-                stats.drawn += 1;
-            }
+            stats.drawn += draw(isa, &mut state.buffer, scene, view, candidate);
         }
         state.buffer.finish();
         let before = self.out.len();
@@ -177,6 +145,7 @@ fn project_all<I: Isa>(
     ids: &[ItemId],
     candidates: &mut Vec<Candidate>,
 ) {
+    candidates.clear();
     let mut rects = Rects::NONE;
     for chunk in ids.chunks(LANES) {
         let mut block = BoxBlock::EMPTY;
@@ -184,15 +153,10 @@ fn project_all<I: Isa>(
             block.set(lane, &scene.outer(scene.position(id)));
         }
         rects.project(isa, &block, view);
-        let (seen, flat) = (rects.seen, rects.flat);
+        let seen = rects.seen;
         for (lane, &id) in chunk.iter().enumerate() {
             if seen >> lane & 1 == 1 {
-                candidates.push(Candidate {
-                    position: scene.position(id) as u32,
-                    rect: rects.get(lane),
-                    near: flat >> lane & 1 == 0,
-                    depth: rects.depth[lane],
-                });
+                candidates.push(rects.candidate(lane, scene.position(id)));
             }
         }
     }

@@ -91,6 +91,8 @@ pub struct View<'v> {
     pub volume: &'v ConvexVolume,
     /// Pixels.
     pub grid: SampleGrid,
+    /// Width and height of the image in pixels, rounded up to whole tiles.
+    pub padded: [f64; 2],
     /// Whether all rays are parallel.
     pub parallel: bool,
     /// The eye in scene coordinates.
@@ -163,6 +165,7 @@ impl<'v> View<'v> {
         View {
             volume,
             grid,
+            padded,
             parallel,
             eye,
             forward,

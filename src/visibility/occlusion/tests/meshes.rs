@@ -75,7 +75,7 @@ fn boxes_below_the_ground_hide_nothing_that_is_visible() {
     for name in ["mesh:terrain:n=20k", "mesh:forest:n=20k"] {
         let scene = load(name, &Default::default()).unwrap();
         let hiders = Hiders::of(&scene, None, 2, 1);
-        assert!(hiders.ground().unwrap().row.box_count > 20);
+        assert!(hiders.ground.as_ref().unwrap().row.box_count > 20);
         let index = SurfaceIndex::build(scene.surfaces.as_ref().unwrap());
         let [open, bare] = [true, false].map(|is_open| Ready {
             solids: Solids::of(&scene),

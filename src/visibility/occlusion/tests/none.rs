@@ -12,7 +12,6 @@ use crate::visibility::{Guarantee, SampleGrid};
 pub struct NoOcclusion;
 
 impl OcclusionBuffer for NoOcclusion {
-    const NAME: &'static str = "none";
     const SUMMARY: &'static str = "hides nothing";
     const GUARANTEE: Guarantee = Guarantee::Conservative;
     const COVERAGE: Coverage = Coverage::Whole;

@@ -41,7 +41,7 @@ fn a_rectangle_is_cut_into_the_tiles_that_it_meets() {
         y1: 4,
         nearness,
     };
-    let parts: Vec<_> = buffer.tiles_of(&rect).collect();
+    let parts = buffer.tiles_of(&rect);
     assert_eq!(
         parts.iter().map(|(at, _)| *at).collect::<Vec<_>>(),
         [0, 1, 2, 8, 9, 10]

@@ -104,7 +104,10 @@ fn losses<B: OcclusionBuffer>(
                 );
                 let lost_here = missing(&seen, &kept);
                 if !lost_here.is_empty() && B::GUARANTEE.is_safe() {
-                    println!("{} seed {seed}: lost {lost_here:?} of {seen:?}", B::NAME);
+                    println!(
+                        "{} seed {seed}: lost {lost_here:?} of {seen:?}",
+                        std::any::type_name::<B>()
+                    );
                 }
                 lost += lost_here.len();
                 removed += in_view.len() - kept.len();

@@ -1,0 +1,151 @@
+//! Cells of a grid, and the search for boxes of them.
+
+use std::ops::Range;
+
+/// Cells of a cube of `n` along each axis, up to 64: those that boxes may fill.
+#[derive(Clone)]
+pub struct Cells {
+    n: usize,
+    /// A word per row along x, y fastest: bit `x` is a cell.
+    inside: Vec<u64>,
+    /// Those inside that are in no box yet.
+    open: Vec<u64>,
+}
+
+/// First cell of a box and the one behind its last, on each axis.
+pub type CellBox = [[usize; 3]; 2];
+
+impl Cells {
+    /// Cells of rows along x, by z and y; no box yet.
+    pub fn new(n: usize, inside: Vec<u64>) -> Cells {
+        let open = inside.clone();
+        Cells { n, inside, open }
+    }
+
+    /// Finds the box of inside cells that holds the most that are in no box yet.
+    ///
+    /// Returns it with their number. Of several the largest, so that boxes overlap and leave no seam to look through. Its
+    /// lowest slab of z is one of `lows`. `None` if no cell is left. O(n⁴) in common cases.
+    pub fn next_box(&mut self, lows: Range<usize>) -> Option<(u32, CellBox)> {
+        let n = self.n;
+        let open = self.open_below();
+        let below = |x: usize, y: usize, z: usize| open[(z * (n + 1) + y) * (n + 1) + x];
+        let mut best = ((0, 0), [[0; 3]; 2]);
+        for low in lows {
+            let mut rows = vec![u64::MAX; n];
+            for high in low + 1..=n {
+                let slab = &self.inside[(high - 1) * n..high * n];
+                rows.iter_mut()
+                    .zip(slab)
+                    .for_each(|(row, next)| *row &= next);
+                if rows.iter().all(|&row| row == 0) {
+                    break;
+                }
+                rectangles(&rows, |x, y| {
+                    let all = (x.len() * y.len() * (high - low)) as u32;
+                    if all < best.0.0 {
+                        return;
+                    }
+                    let flat = |z: usize| {
+                        below(x.end, y.end, z) + below(x.start, y.start, z)
+                            - below(x.start, y.end, z)
+                            - below(x.end, y.start, z)
+                    };
+                    let count = (flat(high) - flat(low), all);
+                    if count > best.0 {
+                        best = (count, [[x.start, y.start, low], [x.end, y.end, high]]);
+                    }
+                });
+            }
+        }
+        let ((count, _), found) = best;
+        if count == 0 {
+            return None;
+        }
+        self.close(found);
+        Some((count, found))
+    }
+
+    /// Sums over all open cells below each corner, x fastest.
+    fn open_below(&self) -> Vec<u32> {
+        let n = self.n;
+        let side = n + 1;
+        let mut sums = vec![0; side * side * side];
+        for z in 0..n {
+            for y in 0..n {
+                let mut row = 0;
+                for x in 0..n {
+                    row += (self.open[z * n + y] >> x & 1) as u32;
+                    let at = |x: usize, y: usize, z: usize| (z * side + y) * side + x;
+                    sums[at(x + 1, y + 1, z + 1)] =
+                        row + sums[at(x + 1, y, z + 1)] + sums[at(x + 1, y + 1, z)]
+                            - sums[at(x + 1, y, z)];
+                }
+            }
+        }
+        sums
+    }
+
+    fn close(&mut self, [low, high]: CellBox) {
+        let row = (u64::MAX >> (64 - (high[0] - low[0]))) << low[0];
+        for z in low[2]..high[2] {
+            for y in low[1]..high[1] {
+                self.open[z * self.n + y] &= !row;
+            }
+        }
+    }
+}
+
+/// Calls `each` with columns and rows of every rectangle of set bits of full width.
+///
+/// For all runs of rows, the runs of columns that are set in all of them; column `k` is bit
+/// `k`. O(rows² x runs).
+fn rectangles(rows: &[u64], mut each: impl FnMut(Range<usize>, Range<usize>)) {
+    for first in 0..rows.len() {
+        let mut common = u64::MAX;
+        for (last, row) in rows.iter().enumerate().skip(first) {
+            common &= row;
+            if common == 0 {
+                break;
+            }
+            let mut left = common;
+            while left != 0 {
+                let at = left.trailing_zeros();
+                let end = at + (left >> at).trailing_ones();
+                left &= u64::MAX.checked_shl(end).unwrap_or(0);
+                each(at as usize..end as usize, first..last + 1);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SeededRng;
+
+    #[test]
+    fn they_are_those_of_a_plain_search() {
+        let mut rng = SeededRng::new(6);
+        for _ in 0..200 {
+            let word =
+                |rng: &mut SeededRng| (0..64).fold(0, |w, _| w << 1 | u64::from(rng.below(4) > 0));
+            let rows = [0; 5].map(|_| word(&mut rng));
+            let mut found = Vec::new();
+            rectangles(&rows, |columns, rows| found.push((rows, columns)));
+            let mut wanted = Vec::new();
+            for first in 0..5 {
+                for end in first + 1..=5 {
+                    let is_set = |k: usize| rows[first..end].iter().all(|row| row >> k & 1 == 1);
+                    let starts = (0..64).filter(|&k| is_set(k) && (k == 0 || !is_set(k - 1)));
+                    let run = |k: usize| k..(k..64).find(|&k| !is_set(k)).unwrap_or(64);
+                    wanted.extend(starts.map(|k| (first..end, run(k))));
+                }
+            }
+            assert_eq!(found, wanted);
+        }
+        let mut found = Vec::new();
+        rectangles(&[u64::MAX], |columns, rows| found.push((columns, rows)));
+        assert_eq!(found, [(0..64, 0..1)]);
+    }
+}
