@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::items::Record;
 use super::{BuildError, Info, Input, MemoryUsage, NoParams, RegionIndex, centre_bounds};
 use crate::geometry::{Aabb, PlaneRows};
-use crate::query::{Context, NoRecorder, QueryVolume, Recorder, Sink};
+use crate::query::{Bits, Context, NoRecorder, QueryVolume, Recorder, Sink};
 
 /// A query as a test of one box at a time. Boxes are finite and not empty.
 pub trait BoxTest {
@@ -83,24 +83,10 @@ pub trait Planes {
 
 impl<Q: QueryVolume> Planes for Q {
     fn exclude(&self, node: &Aabb) -> bool {
-        let mut mask = self.mask();
-        while mask != 0 {
-            if self.excludes(mask.trailing_zeros(), node) {
-                return true;
-            }
-            mask &= mask - 1;
-        }
-        false
+        Bits(self.mask()).any(|plane| self.excludes(plane, node))
     }
     fn contain(&self, node: &Aabb) -> bool {
-        let mut mask = self.mask();
-        while mask != 0 {
-            if !self.contains(mask.trailing_zeros(), node) {
-                return false;
-            }
-            mask &= mask - 1;
-        }
-        true
+        Bits(self.mask()).all(|plane| self.contains(plane, node))
     }
     fn keep(&self, item: &Aabb) -> bool {
         self.admits(item, self.mask(), &mut NoRecorder)

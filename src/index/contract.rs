@@ -209,7 +209,7 @@ pub trait RegionIndex: Sized + Send + Sync {
     }
 
     /// Item ids in the structure's own order, if its answers can be ranges of it
-    /// (it passes them to [`Sink::accept_places`]):
+    /// (it passes them to [`Sink::accept_range`]):
     /// [`Capabilities::ranges`](super::Capabilities).
     fn tree_order(&self) -> Option<&[ItemId]> {
         None

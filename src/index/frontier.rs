@@ -196,5 +196,5 @@ pub fn pass_run<I: Isa, S: Sink, R: Recorder>(
         return ControlFlow::Continue(());
     }
     recorder.subtree_accepted(places.len());
-    sink.accept_places(isa, ids, places)
+    sink.accept_range(isa, ids, places)
 }

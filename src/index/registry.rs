@@ -1,6 +1,6 @@
-//! The structures there are: a registry of rows, one per structure, each made
-//! from what the structure declares. It is a value: another crate adds its
-//! own with [`Registry::with`] and hands it on, to `cli::main_with` for example.
+//! The registry: a row per structure, made from its declaration. It is a value: another
+//! crate adds its own structure with [`Registry::with`] and passes the registry to
+//! `cli::main_with`.
 
 use std::hint::black_box;
 
@@ -37,7 +37,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// The row of a structure, from what it declares.
+    /// The row of a structure, from its declaration.
     pub const fn of<T: RegionIndex + 'static>() -> Row {
         fn typed<T: RegionIndex>(params: &Value) -> Result<T::Params, BuildError> {
             // Nothing given is no object for parameters that are `()`.
@@ -45,11 +45,12 @@ impl Row {
             if nothing && let Ok(none) = serde_json::from_value(Value::Null) {
                 return Ok(none);
             }
-            serde_json::from_value(params.clone()).map_err(|error| {
-                let (found, expected) = told(&error);
-                let is_value = !found.starts_with("a field");
-                let found = match culprit::<T>(params) {
-                    Some(pair) if is_value => pair,
+            serde_path_to_error::deserialize(params).map_err(|error| {
+                // serde's message about a value lacks its name.
+                let key = error.path().to_string();
+                let (found, expected) = told(error.inner());
+                let found = match params.get(&key) {
+                    Some(value) if !found.starts_with("a field") => format!("{key}={value}"),
                     _ => found,
                 };
                 BuildError::Params {
@@ -60,14 +61,6 @@ impl Row {
                     },
                 }
             })
-        }
-        /// The one pair that cannot be read; serde's message lacks its name.
-        fn culprit<T: RegionIndex>(params: &Value) -> Option<String> {
-            let bad = params.as_object()?.iter().find(|(key, value)| {
-                let alone = Map::from_iter([((*key).clone(), (*value).clone())]);
-                serde_json::from_value::<T::Params>(Value::Object(alone)).is_err()
-            });
-            bad.map(|(key, value)| format!("{key}={value}"))
         }
         Row {
             info: T::INFO,
@@ -108,7 +101,7 @@ const PEERS: [&str; 5] = [
 ];
 
 impl Registry {
-    /// No structure yet.
+    /// A registry without structures.
     pub const fn empty() -> Registry {
         Registry { rows: Vec::new() }
     }
@@ -139,7 +132,7 @@ impl Registry {
         own
     }
 
-    /// The same with one structure more.
+    /// Adds a structure.
     ///
     /// # Panics
     /// If there is one of that name already, or the name cannot be typed: that
@@ -148,7 +141,7 @@ impl Registry {
         self.with_row(Row::of::<T>())
     }
 
-    /// The same with a row made by hand.
+    /// Adds a row.
     ///
     /// # Panics
     /// As [`Registry::with`].
@@ -210,7 +203,7 @@ impl Registry {
             })
             .collect();
         let params = (row.params)(&Value::Object(given)).map_err(SpecError::new)?;
-        // Ranges are the build's to check: let it see no items.
+        // The build checks ranges: a build over no items.
         let (execution, no_planes) = (Execution::default(), PlaneTree::default());
         let nothing = Input::new(&[]).own_tree(Some(&no_planes));
         (row.build)(execution, &nothing, &params).map_err(SpecError::new)?;
@@ -222,7 +215,7 @@ impl Registry {
         })
     }
 
-    /// Those with their default parameters whose declaration is meant.
+    /// The structures with certain declarations, with their default parameters.
     fn specs(&self, is_meant: fn(&Info) -> bool) -> Result<Vec<StructureSpec>, SpecError> {
         let meant = self.rows.iter().filter(|row| is_meant(&row.info));
         meant.map(|row| self.structure(row.info.name)).collect()
@@ -260,7 +253,7 @@ impl Registry {
     }
 }
 
-/// A structure as asked for: its row with parameters.
+/// A requested structure: its row with parameters.
 #[derive(Clone, Debug)]
 pub struct StructureSpec {
     /// The typed text: `bvh` or `bvh:leaf=4`.
@@ -269,8 +262,8 @@ pub struct StructureSpec {
     pub row: Row,
     /// Complete, defaults filled in.
     pub params: Value,
-    /// How it is built and asked: the best kernel and one thread unless
-    /// [`StructureSpec::by`] says otherwise.
+    /// Kernel and threads: the best kernel and one thread unless changed by
+    /// [`StructureSpec::by`].
     pub execution: Execution,
 }
 
@@ -284,7 +277,7 @@ impl StructureSpec {
         Registry::builtin().structure(text)
     }
 
-    /// The same structure, built and asked in another way.
+    /// Sets kernel and threads.
     pub fn by(self, execution: Execution) -> StructureSpec {
         StructureSpec { execution, ..self }
     }
@@ -302,7 +295,7 @@ impl StructureSpec {
         let input = input.into();
         let count = input.items.len();
         let needed = count.saturating_mul(self.info().build_bytes());
-        // Taken and given back untouched: an allocation that fails later would end the
+        // Reserved and released unused: an allocation that fails later would end the
         // program.
         let mut room = Vec::<u8>::new();
         if room.try_reserve_exact(needed).is_err() {
@@ -318,8 +311,8 @@ impl StructureSpec {
         caught(build).unwrap_or_else(|message| Err(BuildError::Panicked { message }))
     }
 
-    /// Brings an index up to date after items have moved: by refitting where
-    /// the structure can, else by a new build. True for a refit.
+    /// Updates an index after items have moved: by refitting if the structure can, else
+    /// by a new build. True for a refit.
     ///
     /// # Errors
     /// A moved item with a NaN or infinite bound; the index is unchanged.

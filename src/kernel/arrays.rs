@@ -27,9 +27,9 @@ pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
     out.extend_from_slice(words);
 }
 
-/// See [`extend_by_places`](crate::kernel::extend_by_places).
+/// See [`extend_from_range`](crate::kernel::extend_from_range).
 #[inline(always)]
-pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
+pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
     out.extend_from_slice(&words[places]);
 }
 

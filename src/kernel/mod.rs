@@ -128,8 +128,8 @@ pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
 /// `extend(out, &words[places])`, row by row where there are few: a call of memcpy
 /// costs more than they do. What lies behind them in `words` is read too.
 #[inline(always)]
-pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
-    machine::extend_by_places(out, words, places);
+pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
+    machine::extend_from_range(out, words, places);
 }
 
 #[cfg(test)]
@@ -154,7 +154,7 @@ mod tests {
                     extend(&mut out, &words[places.clone()]);
                     assert_eq!(out, std, "{places:?}");
                     out.truncate(held as usize);
-                    extend_by_places(&mut out, &words, places.clone());
+                    extend_from_range(&mut out, &words, places.clone());
                     assert_eq!(out, std, "{places:?}");
                 }
             }
@@ -165,7 +165,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "out of range")]
     fn places_that_are_not_there_panic() {
-        extend_by_places(&mut Vec::new(), &[1, 2, 3], 2..4);
+        extend_from_range(&mut Vec::new(), &[1, 2, 3], 2..4);
     }
 
     /// Sixteen products and sums, which a fused multiply-add would round once.

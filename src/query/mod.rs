@@ -14,6 +14,7 @@ pub use context::{Context, QueryContext};
 pub(crate) use dispatched::Dispatched;
 pub use many::{Located, ManySink};
 pub use planes::Planes;
+pub(crate) use predicate::Bits;
 pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use sink::{Count, Ranges, Sink, Tests, runs};

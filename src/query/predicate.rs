@@ -219,7 +219,7 @@ impl Predicate for RelativeVolume {
 }
 
 /// The bits that are set, lowest first.
-pub(super) struct Bits(pub PlaneMask);
+pub(crate) struct Bits(pub PlaneMask);
 
 impl Iterator for Bits {
     type Item = u32;

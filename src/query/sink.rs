@@ -3,7 +3,7 @@
 use std::ops::{ControlFlow, Range};
 
 use super::ItemId;
-use crate::kernel::{Isa, LANES, LaneMask, Pack, Piece, extend, extend_by_places};
+use crate::kernel::{Isa, LANES, LaneMask, Pack, Piece, extend, extend_from_range};
 
 /// Destination of answers. `Break` ends the query.
 ///
@@ -15,7 +15,7 @@ pub trait Sink {
     /// Takes items by their positions in a structure that keeps them in the order
     /// of `ids`: `accept(&ids[places])`, for sinks that do not need the ids.
     #[inline(always)]
-    fn accept_places<I: Isa>(
+    fn accept_range<I: Isa>(
         &mut self,
         _: I,
         ids: &[ItemId],
@@ -35,7 +35,7 @@ pub trait Sink {
         lanes: LaneMask,
     ) -> ControlFlow<()> {
         for run in runs(lanes) {
-            self.accept_places(isa, ids, start + run.start..start + run.end)?;
+            self.accept_range(isa, ids, start + run.start..start + run.end)?;
         }
         ControlFlow::Continue(())
     }
@@ -97,13 +97,13 @@ impl Sink for Vec<ItemId> {
 
     /// Copies short runs without a call of memcpy, which would cost more.
     #[inline(always)]
-    fn accept_places<I: Isa>(
+    fn accept_range<I: Isa>(
         &mut self,
         _: I,
         ids: &[ItemId],
         places: Range<usize>,
     ) -> ControlFlow<()> {
-        extend_by_places(self, ids, places);
+        extend_from_range(self, ids, places);
         ControlFlow::Continue(())
     }
 
@@ -224,7 +224,7 @@ impl Sink for Ranges<'_> {
     }
 
     #[inline(always)]
-    fn accept_places<I: Isa>(
+    fn accept_range<I: Isa>(
         &mut self,
         _: I,
         _: &[ItemId],

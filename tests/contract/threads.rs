@@ -2,15 +2,18 @@
 //! same order, on every edge scene.
 
 use cullbench::geometry::{Aabb, ConvexVolume};
-use cullbench::index::{BlockOrder, FrustumQuery, Wide, WideParams};
+use cullbench::index::{BlockOrder, FrustumQuery, Input, RegionIndex, Wide, WideParams};
 use cullbench::scene;
+use cullbench::threads::Pool;
 use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
 
 const THREADS: std::ops::RangeInclusive<usize> = 1..=5;
 
 fn built(threads: usize, items: &[Aabb], order: BlockOrder) -> Wide {
-    Wide::build_on(threads, items, &WideParams { order }).expect("finite items")
+    let pool = Pool::new(threads);
+    let input = Input::new(items).pool(&pool);
+    Wide::build(&input, &WideParams { order }).expect("finite items")
 }
 
 /// Scenes with the volumes to ask them: all edge scenes, random cases, and

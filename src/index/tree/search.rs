@@ -69,7 +69,7 @@ impl PackedTree {
             }
             Containment::Inside => {
                 recorder.subtree_accepted(ids.len());
-                return sink.accept_places(isa, ids, 0..ids.len());
+                return sink.accept_range(isa, ids, 0..ids.len());
             }
             Containment::Straddles => {}
         }
@@ -227,7 +227,7 @@ impl PackedTree {
                 }
                 Containment::Inside => {
                     recorder.subtree_accepted(node.count as usize);
-                    sink.accept_places(isa, ids, node.items())?;
+                    sink.accept_range(isa, ids, node.items())?;
                     at = node.after;
                 }
                 Containment::Straddles => {

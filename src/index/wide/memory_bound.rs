@@ -48,7 +48,7 @@ impl Sink for TraceSink<'_> {
     fn accept(&mut self, _: &[ItemId]) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
-    fn accept_places<I: Isa>(
+    fn accept_range<I: Isa>(
         &mut self,
         _: I,
         _: &[ItemId],
@@ -141,7 +141,7 @@ impl Work for Replay<'_> {
         for run in runs {
             let items = run.start as usize..run.end as usize;
             let ids = self.id_rows.as_flattened();
-            let _ = self.out.accept_places(isa, ids, items);
+            let _ = self.out.accept_range(isa, ids, items);
         }
         for (reads, leaves) in [(&[][..], whole), (below, tested)] {
             let tests = TracedLeaves {

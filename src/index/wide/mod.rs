@@ -144,19 +144,6 @@ impl Wide {
         tree
     }
 
-    /// [`RegionIndex::build`] on several threads: the very same structure.
-    ///
-    /// # Errors
-    /// As [`RegionIndex::build`].
-    pub fn build_on(
-        threads: usize,
-        items: &[Aabb],
-        params: &WideParams,
-    ) -> Result<Wide, BuildError> {
-        let ids = block_ordered(items, indexable(items)?, params.order, threads);
-        Ok(Wide::over(items, &ids, threads))
-    }
-
     /// Compares two trees bit for bit: ids, blocks, levels.
     pub fn same_as(&self, other: &Wide) -> bool {
         self.depth() == other.depth() && self.ids == other.ids && self.blocks == other.blocks
@@ -211,7 +198,7 @@ impl Wide {
         let (sink, recorder) = cx.parts();
         if volume.mask() == 0 {
             recorder.subtree_accepted(self.ids.len());
-            return sink.accept_places(isa, &self.ids, 0..self.ids.len());
+            return sink.accept_range(isa, &self.ids, 0..self.ids.len());
         }
         let Scratch {
             here,
@@ -308,7 +295,9 @@ impl RegionIndex for Wide {
 
     /// O(n log n) by medians, O(n) but for the sort by Morton codes.
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
-        Wide::build_on(input.threads(), input.items, params)
+        let threads = input.threads();
+        let ids = block_ordered(input.items, indexable(input.items)?, params.order, threads);
+        Ok(Wide::over(input.items, &ids, threads))
     }
 
     fn memory(&self) -> MemoryUsage {

@@ -10,7 +10,7 @@ mod avx512;
 mod packer;
 mod sse2;
 
-pub use packer::{extend, extend_by_places};
+pub use packer::{extend, extend_from_range};
 
 use super::{Kernel, Work};
 

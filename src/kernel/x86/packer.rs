@@ -55,9 +55,9 @@ pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
 /// Most words that are copied row by row.
 const FEW: usize = 16 * LANES;
 
-/// [`extend_by_places`](crate::kernel::extend_by_places).
+/// [`extend_from_range`](crate::kernel::extend_from_range).
 #[inline(always)]
-pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
+pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
     let few = &words[places.clone()];
     let rows = few.len().div_ceil(LANES);
     if few.len() > FEW || words.len() - places.start < rows * LANES {
