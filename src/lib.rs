@@ -1,60 +1,61 @@
-//! Which spatial index finds what a camera sees, and where the camera is: how
-//! fast, and is the answer right?
+//! Spatial indexes for visibility, compared: which finds what a camera sees, and where
+//! the camera is, how fast, and is the answer right?
 //!
-//! cullbench puts interchangeable structures behind one trait pair, builds
-//! scenes and drives cameras through them, checks every answer, and measures.
-//! The story of the crate in the order of its modules:
-//!
-//! - [`kernel`]: instruction sets, chosen at run time
-//! - [`threads`]: how many may work at once, and how they share work out
-//! - [`arithmetic`]: directed rounding, exact sums and products
-//! - [`geometry`]: boxes, planes, convex volumes, and THE plane test
-//! - [`query`]: what is asked ([`query::QueryVolume`]), where answers go
-//!   ([`query::Sink`]) and what is counted ([`query::Recorder`])
-//! - [`camera`]: eye, u, v, n; lenses; matrices; the planes of the view
-//! - [`culling`]: culling tests and arithmetics: from a camera to a view
-//! - [`oracle`]: the exact verdict about a box and a volume or camera
-//! - [`index`]: the contract [`index::RegionIndex`], what follows from it
-//!   ([`index::FrustumQuery`]), the structures, and the [`index::Registry`] that
-//!   yours joins
-//! - [`scene`]: generated and real worlds, and the regions in them
-//! - [`path`]: ways through a scene
-//! - [`visibility`]: what hides what: the stages after and before the object stage
-//! - [`verify`]: the reference answer and how others differ from it
-//! - [`stress`]: test vectors and extremes with their declared outcome
-//! - [`measure`]: count, verify, time; [`statistics`] makes figures of it
-//! - [`precision`]: error against run time, and the sweeps behind it
-//! - [`drift`]: how methods of turning and chasing drift from the truth
-//! - [`funnel`]: what each stage from region to fragment removes, and at what cost
-//! - [`report`]: the files that other tools read; [`suite`]: what to run
-//! - [`spec`] and [`input`]: what users type and the files they bring
-//! - `cli` (feature `cli`): the command line over any registry
+//! cullbench puts interchangeable structures behind one trait pair, builds scenes and
+//! moves cameras through them, checks every answer, and measures. A structure by itself:
 //!
 //! ```
-//! use cullbench::camera::PlaneOptions;
-//! use cullbench::index::StructureSpec;
-//! use cullbench::{path, scene};
+//! use cullbench::prelude::*;
 //!
 //! let city = scene::load("city:n=2000,seed=7", &Default::default())?;
 //! let orbit = path::load("orbit:frames=8", &city, &Default::default())?;
-//! let linear = StructureSpec::parse("linear")?.build(&city.items)?;
-//! let bvh = StructureSpec::parse("bvh:leaf=4")?.build(&city.items)?;
+//! let bvh = Bvh::build(&Input::new(&city.items), &Default::default())?;
+//! let frustum = orbit.cameras[0].volume(&PlaneOptions::default(), &city.surroundings())?;
 //!
-//! for camera in &orbit.cameras {
-//!     let volume = camera.volume(&PlaneOptions::default(), &city.surroundings())?;
-//!     let (mut slow, mut fast) = (Vec::new(), Vec::new());
-//!     linear.visible(&volume, &mut slow);
-//!     bvh.visible(&volume, &mut fast);
-//!     fast.sort_unstable();
-//!     assert_eq!(slow, fast, "every structure returns the very same set");
-//! }
+//! // Three forms of one query: a new list, a function per item, a list with the cost.
+//! let ids = bvh.visible(&frustum);
+//! let mut count = 0;
+//! bvh.each_visible(&frustum, |_| count += 1);
+//! let (again, cost) = bvh.counted(&frustum);
+//! assert!(ids == again && ids.len() == count && cost.nodes_tested > 0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Features: `cli` (default) is the `cullbench` program and `cli::main_with`, with
-//! everything from clap downwards; without it the structures, scenes, oracle and
-//! measurements are left. `peers` adds structures of other crates behind the same
-//! traits.
+//! Structures side by side, with every answer checked:
+//!
+//! ```
+//! use cullbench::prelude::*;
+//!
+//! let report = Experiment::new("city:n=500")
+//!     .path("orbit:frames=8")
+//!     .structures(Registry::builtin().structures("linear,bvh,octree")?)
+//!     .run()?;
+//! assert!(report.cells.iter().all(|cell| cell.status == Status::Ok));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Modules, each of which may use those before it:
+//!
+//! - [`kernel`]: instruction sets, chosen at run time; [`threads`]: thread pools
+//! - [`arithmetic`]: directed rounding, exact sums and products
+//! - [`geometry`]: boxes, planes, convex volumes, and THE plane test
+//! - [`query`]: query volumes ([`query::QueryVolume`]), sinks ([`query::Sink`]) and
+//!   counters ([`query::Recorder`])
+//! - [`camera`]: eye, u, v, n; lenses; matrices; the planes of the view
+//! - [`culling`]: culling tests and arithmetics: from a camera to a view
+//! - [`oracle`]: the exact verdict about a box and a volume or camera
+//! - [`index`]: the contract [`index::RegionIndex`], queries ([`index::FrustumQuery`]),
+//!   the structures, and the [`index::Registry`] that yours joins
+//! - [`scene`]: generated and real worlds, and the regions in them; [`path`]: camera paths
+//! - [`verify`]: the reference answer, and how others differ from it
+//! - [`measure`]: count, verify, time; [`statistics`] turns times into figures
+//! - [`report`]: the files that other tools read; [`suite`]: named sets of scenes and paths
+//! - [`spec`], [`input`], [`json`], [`shown`]: texts and files of users, read and shown
+//!
+//! Features: `cli` (default) is the `cullbench` program (`cli::main_with`) with the
+//! studies behind it: `visibility` (the stages before and after the object stage),
+//! `funnel`, `advise`, `precision`, `drift` and `stress`. `peers` adds structures of
+//! other crates behind the same traits.
 //!
 //! Conventions: everything is right-handed; z is up in scenes; bounds are
 //! closed, so touching counts as visible; plane normals point inward; angles
@@ -108,3 +109,19 @@ pub mod threads;
 pub mod verify;
 #[cfg(feature = "cli")]
 pub mod visibility;
+
+/// The names that a program with a structure or an experiment of its own needs.
+pub mod prelude {
+    pub use crate::camera::{Camera, Lens, PlaneOptions, look_at};
+    pub use crate::culling::{Culling, CullingTest};
+    pub use crate::geometry::{Aabb, ConvexVolume, Plane};
+    pub use crate::index::{
+        Bsp, Bvh, FrustumQuery, Input, Linear, Octree, Quadtree, RegionIndex, Registry,
+        StructureSpec, UniformGrid, Wide,
+    };
+    pub use crate::measure::Status;
+    pub use crate::path::{self, CameraPath};
+    pub use crate::query::{ItemId, QueryCost, QueryVolume};
+    pub use crate::report::{Experiment, Report};
+    pub use crate::scene::{self, Scene};
+}

@@ -13,6 +13,7 @@ macro_rules! named {
             $($(#[$of])* $value,)+
         }
 
+        #[allow(dead_code, reason = "not every table is listed and shown")]
         impl $Enum {
             /// Every value, in the order of the declaration.
             $vis const ALL: [$Enum; [$($name),+].len()] = [$($Enum::$value),+];

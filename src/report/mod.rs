@@ -3,6 +3,7 @@
 //! read off a report. It defines the formats; the figures come from `measure`.
 
 mod changes;
+mod experiment;
 mod files;
 mod folder;
 mod growth;
@@ -19,6 +20,7 @@ mod writing;
 
 pub use crate::measure::{ReportCell, SamplesRef};
 pub use changes::changes;
+pub use experiment::Experiment;
 pub use files::{FolderError, bare};
 pub use folder::{RunFolder, StoppedRun, save_report};
 pub use growth::{Growth, growths};
@@ -31,6 +33,6 @@ pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
 pub use ranking::{Comparison, Ranked, comparisons, times_as_fast};
 pub use reading::{read_report, read_stream};
 pub use setting::{Setting, settings};
-pub use stream::{Difference, Header, KeptPart, Line, Stream, dated, run_here, utc};
+pub use stream::{Difference, Header, KeptPart, Line, Stream, dated, utc};
 pub use surface::{Crossing, Place, Surface, surfaces};
 pub use writing::{temporary_in, try_folder, try_place, write_atomically};

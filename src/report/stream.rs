@@ -8,9 +8,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use super::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef};
-use crate::measure::{
-    ExperimentError, Group, GroupKey, Machine, Part, Plan, Share, Source, Toolchain, measure_scene,
-};
+use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
 use crate::statistics::two_speeds;
 
@@ -294,59 +292,6 @@ impl Stream {
         report.noise.warnings = warnings(&report, speeds);
         report
     }
-}
-
-/// Runs a whole plan in this process and reports it: times without intervals, for
-/// those need several processes. `None` if stopped.
-///
-/// # Errors
-/// As [`measure_scene`].
-///
-/// ```
-/// use cullbench::index::Registry;
-/// use cullbench::measure::{Beside, Effort, Plan, PlannedScene};
-/// use cullbench::report::run_here;
-///
-/// let plan = Plan {
-///     scenes: vec![PlannedScene {
-///         source: "city:n=500".to_owned(),
-///         paths: vec!["orbit:frames=8".to_owned()],
-///         caches: vec![false],
-///     }],
-///     structures: Registry::builtin().structures("linear,bvh")?,
-///     cullings: vec![Default::default()],
-///     lens: Default::default(),
-///     load: Default::default(),
-///     most_cameras: usize::MAX,
-///     effort: Effort { processes: 1, rounds: [3, 3], task_ns: 1e5, pass_ns: 1e6, beside: Beside::All },
-///     bounds: false,
-///     seed: 1,
-/// };
-/// let report = run_here(&plan, &|| false)?.expect("not stopped");
-/// assert_eq!(report.cells[1].structure, "bvh");
-/// assert!(report.cells[1].value("query_ns") > Some(0.0));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn run_here(plan: &Plan, stop: &dyn Fn() -> bool) -> Result<Option<Report>, ExperimentError> {
-    let started_at = utc(SystemTime::now());
-    let mut header = Header::of(plan, Machine::capture(), started_at.clone(), started_at);
-    header.run.processes = 1;
-    let mut stream = Stream::of(header);
-    for planned in &plan.scenes {
-        let share = Share::first(plan.questions(planned).len());
-        let mut keep = |part: Part, _| {
-            stream.parts.push(KeptPart {
-                part,
-                rows: BTreeMap::new(),
-                samples_end: 0,
-            });
-        };
-        if !measure_scene(plan, planned, &share, &mut keep, &|_, _| (), stop)? {
-            return Ok(None);
-        }
-    }
-    stream.finished_at = Some(utc(SystemTime::now()));
-    Ok(Some(stream.report()))
 }
 
 /// RFC 3339 in UTC, to the second. A clock out of range gives the nearest time
