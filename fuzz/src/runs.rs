@@ -5,7 +5,7 @@ use std::path::Path;
 
 use cullbench::json::from_json;
 use cullbench::report::{
-    JUDGED_METRICS, Line, Report, StoppedRun, Stream, changes, comparisons, growths, merge,
+    JUDGED_METRICS, Report, StoppedRun, Stream, changes, comparisons, growths, merge,
     read_report, read_stream, save_report, settings, surfaces,
 };
 use tempfile::TempDir;
@@ -56,16 +56,8 @@ pub fn stream(bytes: &[u8]) {
 }
 
 fn written(stream: &Stream) -> Vec<u8> {
-    let mut lines = vec![Line::Run(Box::new(stream.header.clone()))];
-    let parts = stream.parts.iter().cloned();
-    lines.extend(parts.map(|part| Line::Part(Box::new(part))));
-    let at = stream.finished_at.clone();
-    lines.extend(at.map(|at| Line::Finished { at }));
-    let text = lines.iter().flat_map(|line| {
-        let mut text = serde_json::to_vec(line).expect("a line is JSON");
-        text.push(b'\n');
-        text
-    });
+    let text = stream.lines();
+    let text = text.flat_map(|line| line.to_json().expect("a line is JSON"));
     text.collect()
 }
 

@@ -21,6 +21,18 @@ pub struct GroupKey {
     pub epsilon: f64,
 }
 
+impl GroupKey {
+    /// Text of the key, equal for equal keys: a key of maps, which its number cannot be.
+    pub fn id(&self) -> String {
+        let key = GroupKey {
+            // Zero has two signs and one meaning.
+            epsilon: self.epsilon + 0.0,
+            ..self.clone()
+        };
+        serde_json::to_string(&key).unwrap_or_default()
+    }
+}
+
 /// A cell: a structure in a group.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CellKey {

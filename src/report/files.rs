@@ -1,7 +1,8 @@
-//! The files of a run's folder, and what can be wrong with them.
+//! Names of the files in a run's folder, and errors of reading and writing them.
 
+use std::fmt::Display;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::SCHEMA_VERSION;
 use crate::json::JsonError;
@@ -15,75 +16,67 @@ pub(super) const STREAM: &str = "stream.jsonl";
 pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
                                          queries,cpu_ns,wall_ns,returned\n";
 
-/// Why the folder of a run cannot be read or written.
+/// Error of reading, writing or joining folders of runs: one line that names the place.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum FolderError {
-    /// The system refused to read or write it.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// Not the report or the stream of a run.
-    #[error("{}, {}: {}; expected {}", path.display(), error.place(), error.found, error.expected_of(whole))]
-    Json {
-        /// File that was read.
-        path: PathBuf,
-        /// Where, and what is there.
-        error: Box<JsonError>,
-        /// What the file should be.
-        whole: &'static str,
-    },
-    /// A report of another schema.
-    #[error("{}: schema version {found}; expected {SCHEMA_VERSION}", path.display())]
-    Version {
-        /// File that was read.
-        path: PathBuf,
-        /// Its schema version.
-        found: u32,
-    },
-    /// There is a run already.
-    #[error("{} already holds a run; expected an empty or new folder (continue it with --resume)", path.display())]
-    Taken {
-        /// Folder of the run.
-        path: PathBuf,
-    },
-    /// A run is being written there.
-    #[error("{}: another run is writing here; expected a folder of its own for each run", path.display())]
-    Locked {
-        /// Folder of the run.
-        path: PathBuf,
-    },
-    /// A line of the stream that does not belong there.
-    #[error("{}, line {line}: {found}; expected {expected}", path.display())]
-    Line {
-        /// File of the stream.
-        path: PathBuf,
-        /// From 1.
-        line: usize,
-        /// What is there.
-        found: String,
-        /// The rule.
-        expected: &'static str,
-    },
+#[error("{text}")]
+pub struct FolderError {
+    text: String,
+    source: Option<io::Error>,
 }
 
 impl FolderError {
-    /// What the file system says of a path.
+    pub(super) fn new(text: String) -> FolderError {
+        FolderError { text, source: None }
+    }
+
+    /// An error in a file or folder: the text says what was found and expected.
+    pub(super) fn at(path: &Path, text: impl Display) -> FolderError {
+        FolderError::new(format!("{}: {text}", path.display()))
+    }
+
+    /// An error of the file system about a path.
     pub(super) fn io(path: &Path) -> impl Fn(io::Error) -> FolderError + Copy {
-        move |source| FolderError::Io {
-            path: path.to_owned(),
-            source: bare(source),
+        move |source| {
+            let source = bare(source);
+            let text = format!("{}: {source}", path.display());
+            FolderError {
+                text,
+                source: Some(source),
+            }
         }
+    }
+
+    /// Text that is not the JSON of `whole`, such as "the report of a run".
+    pub(super) fn json(path: &Path, error: &JsonError, whole: &str) -> FolderError {
+        let (place, expected) = (error.place(), error.expected_of(whole));
+        let (path, found) = (path.display(), &error.found);
+        FolderError::new(format!("{path}, {place}: {found}; expected {expected}"))
+    }
+
+    /// A line that does not belong into a stream; `line` counts from 1.
+    pub(super) fn line(path: &Path, line: usize, found: &str, expected: &str) -> FolderError {
+        let path = path.display();
+        FolderError::new(format!("{path}, line {line}: {found}; expected {expected}"))
+    }
+
+    /// A file of another schema version.
+    pub(super) fn version(path: &Path, found: u32) -> FolderError {
+        let text = format!("schema version {found}; expected {SCHEMA_VERSION}");
+        FolderError::at(path, text)
+    }
+
+    /// A folder that holds a run already.
+    pub(super) fn taken(path: &Path) -> FolderError {
+        FolderError::new(format!(
+            "{} already holds a run; expected an empty or new folder (continue it with --resume)",
+            path.display()
+        ))
     }
 }
 
-/// What the system says, without the name of a temporary file that was wrapped around it.
+/// The error of the system, without the temporary file's name that was wrapped around it.
 pub fn bare(error: io::Error) -> io::Error {
-    // `tempfile` wraps it so, and hands on no more of it than its kind and text.
+    // `tempfile` wraps it so, and passes no more of it than its kind and text.
     match error.to_string().split_once(" at path \"") {
         Some((said, _)) if error.get_ref().is_some() => io::Error::new(error.kind(), said),
         _ => error,

@@ -33,7 +33,7 @@ impl RunFolder {
     /// Makes the folder of a new run.
     ///
     /// # Errors
-    /// [`FolderError::Taken`] if it holds a file of a run already.
+    /// An error if it holds a file of a run already.
     pub fn create(path: &Path, header: &Header) -> Result<RunFolder, FolderError> {
         let io = FolderError::io(path);
         let is_new = !path.exists();
@@ -42,9 +42,7 @@ impl RunFolder {
         // There is no stream without its first line: it gets its name with it.
         let begin = || -> io::Result<NamedTempFile> {
             let (mut stream, is_locked) = locked_temporary_in(path)?;
-            let mut text = serde_json::to_vec(&Line::Run(Box::new(header.clone())))?;
-            text.push(b'\n');
-            stream.write_all(&text)?;
+            stream.write_all(&Line::Run(Box::new(header.clone())).to_json()?)?;
             is_locked?;
             Ok(stream)
         };
@@ -58,9 +56,7 @@ impl RunFolder {
         let stream = match begun.persist_noclobber(&file) {
             Ok(stream) => stream,
             Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
-                return Err(FolderError::Taken {
-                    path: path.to_owned(),
-                });
+                return Err(FolderError::taken(path));
             }
             Err(error) => return Err(io(error.error)),
         };
@@ -98,12 +94,8 @@ impl RunFolder {
     /// # Errors
     /// What the file system says.
     pub fn append(&mut self, line: &Line) -> Result<(), FolderError> {
-        let write = || -> io::Result<()> {
-            let mut text = serde_json::to_vec(line)?;
-            text.push(b'\n');
-            (&self.stream).write_all(&text)
-        };
-        write().map_err(FolderError::io(&self.path.join(STREAM)))
+        let written = line.to_json().and_then(|text| self.stream.write_all(&text));
+        written.map_err(FolderError::io(&self.path.join(STREAM)))
     }
 
     /// Appends a part: its samples first, then the line that refers to them.
@@ -192,29 +184,28 @@ impl StoppedRun {
                     thread::sleep(PATIENCE / 50);
                 }
                 Err(fs::TryLockError::WouldBlock) => {
-                    return Err(FolderError::Locked {
-                        path: path.to_owned(),
-                    });
+                    let found = "another run is writing here; expected a folder of its own for \
+                                 each run";
+                    return Err(FolderError::at(path, found));
                 }
                 Err(fs::TryLockError::Error(source)) => return Err(io(source)),
             }
         }
-        let (mut stream, length) = read_stream(&file)?;
-        let mut stopped = StoppedRun {
-            path: path.to_owned(),
-            stream: lock,
-            length,
-            lost: 0,
-        };
+        let (mut stream, ends) = read_stream(&file)?;
         let samples = length_of_samples(&path.join(SAMPLES)).unwrap_or(0);
+        let all = stream.parts.len();
         let mut parts = stream.parts.iter();
-        if let Some(kept) = parts.position(|kept| kept.samples_end > samples) {
-            stopped.lost = stream.parts.len() - kept;
+        let kept = parts.position(|kept| kept.samples_end > samples);
+        if let Some(kept) = kept {
             stream.parts.truncate(kept);
             stream.finished_at = None;
-            // The header and as many lines as there are parts.
-            stopped.length = length_of_lines(&file, 1 + kept).map_err(io)?;
         }
+        let stopped = StoppedRun {
+            path: path.to_owned(),
+            stream: lock,
+            length: ends[kept.unwrap_or(ends.len() - 1)],
+            lost: all - stream.parts.len(),
+        };
         Ok((stopped, stream))
     }
 
@@ -258,15 +249,13 @@ impl StoppedRun {
 /// Refuses a folder that holds a file of a run.
 ///
 /// # Errors
-/// [`FolderError::Taken`].
+/// An error that names the folder.
 pub(super) fn refuse_taken(path: &Path) -> Result<(), FolderError> {
     let files = [REPORT, SUMMARY, SAMPLES, STREAM];
     // A link that leads nowhere is one too.
     let is_there = |file| fs::symlink_metadata(path.join(file)).is_ok();
     match files.into_iter().any(is_there) {
-        true => Err(FolderError::Taken {
-            path: path.to_owned(),
-        }),
+        true => Err(FolderError::taken(path)),
         false => Ok(()),
     }
 }
@@ -305,21 +294,6 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
         }
         reader.consume(read);
     }
-}
-
-/// Bytes of the first lines of a file that are not empty.
-fn length_of_lines(file: &Path, lines: usize) -> io::Result<u64> {
-    let bytes = fs::read(file)?;
-    let all = bytes.split_inclusive(|b| *b == b'\n');
-    let (mut found, mut length) = (0, 0);
-    for line in all {
-        if found == lines {
-            break;
-        }
-        found += usize::from(line != b"\n");
-        length += line.len() as u64;
-    }
-    Ok(length)
 }
 
 /// Writes report.json and summary.csv into a folder; a link of that name is replaced.

@@ -17,28 +17,17 @@ pub(super) fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> V
     groups
 }
 
-/// The name in an order, and how many cells of that name come before it: a
-/// report that holds a cell twice loses none of them.
-type Key<'r> = ([&'r str; 7], u64, usize);
+/// Group, structure, and number of cells before it that have both: a report that holds a
+/// cell twice loses none of them.
+type Key<'r> = (String, &'r str, usize);
 
 fn keyed(cells: &[ReportCell]) -> Vec<(Key<'_>, &ReportCell)> {
     let mut seen = BTreeMap::new();
     let keys = cells.iter().map(|cell| {
-        let path = &cell.path;
-        let texts = [
-            cell.scene.name.as_str(),
-            &path.name,
-            &path.cache,
-            &cell.test,
-            &path.arithmetic,
-            &path.planes,
-            &cell.structure,
-        ];
-        // Zero has two signs and one meaning.
-        let epsilon = (path.epsilon + 0.0).to_bits();
-        let before = seen.entry((texts, epsilon)).or_insert(0);
+        let key = (cell.key().group.id(), cell.structure.as_str());
+        let before = seen.entry(key.clone()).or_insert(0);
         *before += 1;
-        ((texts, epsilon, *before), cell)
+        ((key.0, key.1, *before), cell)
     });
     keys.collect()
 }
@@ -55,8 +44,8 @@ pub(super) struct Matched<'r> {
 
 pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Matched<'r> {
     let (old, new) = (keyed(old), keyed(new));
-    let known: BTreeSet<Key> = old.iter().map(|(key, _)| *key).collect();
-    let partners: BTreeMap<Key, &ReportCell> = new.iter().copied().collect();
+    let known: BTreeSet<Key> = old.iter().map(|(key, _)| key.clone()).collect();
+    let partners: BTreeMap<Key, &ReportCell> = new.iter().cloned().collect();
     let (mut pairs, mut only_old) = (Vec::new(), Vec::new());
     for (key, cell) in old {
         match partners.get(&key) {

@@ -9,49 +9,10 @@ use std::path::{Path, PathBuf};
 use super::files::{FolderError, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::folder::{self, save_report};
 use super::reading::read_stream;
-use super::stream::{Difference, Header, KeptPart, Line, Stream};
+use super::stream::{Difference, Header, KeptPart, Stream};
 use super::writing::temporary_folder_in;
 use crate::measure::GroupKey;
 use crate::shown::first_of;
-
-/// Why runs are not shards of one plan.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MergeError {
-    /// A folder cannot be read.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// A shard was stopped.
-    #[error("{}: the run is not finished; expected a finished one (run --resume --out {})", path.display(), path.display())]
-    Unfinished {
-        /// Folder of the shard.
-        path: PathBuf,
-    },
-    /// `reason` names another folder as well.
-    #[error("{}: {reason}", path.display())]
-    Apart {
-        /// Folder of one of them.
-        path: PathBuf,
-        /// What they do not have in common.
-        reason: String,
-    },
-    /// samples.csv of a shard holds less than its stream says.
-    #[error("{}: {found} sound bytes; expected {wanted} that stream.jsonl refers to", path.display())]
-    Samples {
-        /// That file.
-        path: PathBuf,
-        /// Its length in bytes, up to the first NUL.
-        found: u64,
-        /// The length that the stream needs, in bytes.
-        wanted: u64,
-    },
-    /// A group of the plan is in no shard.
-    #[error("no shard has {missing}; expected all of the plan (--partial joins what is there)")]
-    Missing {
-        /// Scenes and paths of the missing groups.
-        missing: String,
-    },
-}
 
 /// Shards that belong together, joined but not written.
 pub struct Merged {
@@ -69,36 +30,38 @@ pub struct Merged {
 /// # Errors
 /// An unfinished shard; another seed, suite, structure, machine, build or
 /// source; a cell in two shards; without `partial` a group in none.
-pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merged, MergeError> {
+pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merged, FolderError> {
     let mut shards = Vec::new();
     for path in folders {
         let (stream, _) = read_stream(&path.join(STREAM))?;
         if !stream.is_finished() {
-            return Err(MergeError::Unfinished { path: path.clone() });
+            let path = path.display();
+            return Err(FolderError::new(format!(
+                "{path}: the run is not finished; expected a finished one (run --resume --out {path})"
+            )));
         }
         shards.push((path, stream));
     }
     let (first, begin) = &shards[0];
     for (n, (path, stream)) in shards.iter().enumerate() {
-        if stream.header.run.shard.is_none() {
-            let reason = "a whole run; expected a shard (run --shard i/n)".to_owned();
-            let path = path.to_path_buf();
-            return Err(MergeError::Apart { path, reason });
-        }
+        let is_whole = stream.header.run.shard.is_none();
         let mut before = shards[..n].iter();
-        let reason = another_plan(&begin.header, &stream.header, first)
+        let reason = is_whole
+            .then(|| "a whole run; expected a shard (run --shard i/n)".to_owned())
+            .or_else(|| another_plan(&begin.header, &stream.header, first))
             .or_else(|| before.find_map(|(before, other)| overlap(stream, other, before)));
         if let Some(reason) = reason {
-            let path = path.to_path_buf();
-            return Err(MergeError::Apart { path, reason });
+            return Err(FolderError::at(path, reason));
         }
     }
     let whole = begin.header.whole().to_vec();
     let has = |key: &&GroupKey| shards.iter().any(|(_, s)| s.header.groups.contains(key));
     let missing: Vec<GroupKey> = whole.iter().filter(|key| !has(key)).cloned().collect();
     if !missing.is_empty() && !partial {
-        let missing = pairs(&missing);
-        return Err(MergeError::Missing { missing });
+        return Err(FolderError::new(format!(
+            "no shard has {}; expected all of the plan (--partial joins what is there)",
+            pairs(&missing)
+        )));
     }
     let mut parts = Vec::new();
     for (path, stream) in &shards {
@@ -110,11 +73,10 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
         }
         let found = folder::length_of_samples(&file).map_err(FolderError::io(&file))?;
         if found < from {
-            return Err(MergeError::Samples {
-                path: file,
-                found,
-                wanted: from,
-            });
+            return Err(FolderError::at(
+                &file,
+                format!("{found} sound bytes; expected {from} that stream.jsonl refers to"),
+            ));
         }
     }
     // As one run would have measured them: scene by scene, process by process.
@@ -157,7 +119,7 @@ impl Merged {
     /// False if stopped.
     ///
     /// # Errors
-    /// [`FolderError::Taken`]; what the file system says.
+    /// A folder that holds a run or other files; errors of the file system.
     pub fn write(&self, out: &Path, stop: &dyn Fn() -> bool) -> Result<bool, FolderError> {
         let io = FolderError::io(out);
         folder::refuse_taken(out)?;
@@ -209,16 +171,8 @@ impl Merged {
 
     fn write_stream(&self, path: &Path) -> io::Result<()> {
         let mut out = BufWriter::new(File::create_new(path)?);
-        let mut line = |line: &Line| -> io::Result<()> {
-            serde_json::to_writer(&mut out, line)?;
-            out.write_all(b"\n")
-        };
-        line(&Line::Run(Box::new(self.stream.header.clone())))?;
-        for kept in &self.stream.parts {
-            line(&Line::Part(Box::new(kept.clone())))?;
-        }
-        if let Some(at) = self.stream.finished_at.clone() {
-            line(&Line::Finished { at })?;
+        for line in self.stream.lines() {
+            out.write_all(&line.to_json()?)?;
         }
         out.flush()
     }

@@ -28,7 +28,7 @@ pub use judging::{
     COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WorkChange,
     work_changes,
 };
-pub use merge::{MergeError, Merged, merge};
+pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
 pub use ranking::{Comparison, Ranked, comparisons, times_as_fast};
 pub use reading::{read_report, read_stream};

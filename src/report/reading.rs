@@ -42,135 +42,104 @@ fn read_json(path: PathBuf) -> Result<Report, FolderError> {
         schema_version: u32,
     }
     let bytes = fs::read(&path).map_err(FolderError::io(&path))?;
-    let bad = |error| FolderError::Json {
-        path: path.clone(),
-        error: Box::new(error),
-        whole: "the report of a run",
-    };
+    let bad = |error| FolderError::json(&path, &error, "the report of a run");
     let Versioned { schema_version } = from_json(&bytes).map_err(bad)?;
-    if schema_version != SCHEMA_VERSION {
-        return Err(FolderError::Version {
-            path,
-            found: schema_version,
-        });
+    match schema_version == SCHEMA_VERSION {
+        true => from_json(&bytes).map_err(bad),
+        false => Err(FolderError::version(&path, schema_version)),
     }
-    from_json(&bytes).map_err(bad)
 }
 
-/// Reads the stream of a run, and how long it is without half a line at its end.
+/// Reads the stream of a run. Also the ends of its lines in bytes: of the header, of each
+/// part, and last of the whole without half a line at its end.
 ///
 /// # Errors
-/// What the file system says; a line that is none or does not belong there (by its
+/// Errors of the file system; a line that is none or does not belong there (by its
 /// number); another schema version.
-pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
-    /// Read first: what the rest of the line is.
+pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), FolderError> {
+    /// Read first: the kind of the rest of the line.
     #[derive(Deserialize)]
     struct Tag {
         line: String,
         schema_version: Option<u32>,
     }
+    #[derive(Deserialize)]
+    struct Finished {
+        at: String,
+    }
     let bytes = fs::read(path).map_err(FolderError::io(path))?;
-    let whole = bytes
-        .iter()
-        .rposition(|b| *b == b'\n')
-        .map_or(0, |at| at + 1);
-    let mut header: Option<Header> = None;
-    let (mut parts, mut finished_at) = (Vec::new(), None);
-    let mut seen = BTreeSet::new();
-    let mut samples_end = SAMPLE_COLUMNS.len() as u64;
-    // By their JSON: a key has a number that is no key of a map.
-    let mut groups = BTreeMap::new();
-    let name_of = |key: &GroupKey| serde_json::to_string(key).unwrap_or_default();
-    for (n, text) in bytes[..whole].split(|b| *b == b'\n').enumerate() {
-        if text.is_empty() {
+    let mut stream: Option<Stream> = None;
+    let (mut seen, mut groups) = (BTreeSet::new(), BTreeMap::new());
+    let (mut ends, mut end) = (Vec::new(), 0);
+    let lines = bytes.split_inclusive(|b| *b == b'\n');
+    for (n, text) in lines
+        .enumerate()
+        .take_while(|(_, text)| text.ends_with(b"\n"))
+    {
+        end += text.len() as u64;
+        if text == b"\n" {
             continue;
         }
-        let no_json = |error| FolderError::Json {
-            path: path.to_owned(),
-            error: Box::new(JsonError {
+        let text = &text[..text.len() - 1];
+        let no_json = |error| {
+            let error = JsonError {
                 line: n + 1,
                 ..error
-            }),
-            whole: "the stream of a run",
+            };
+            FolderError::json(path, &error, "the stream of a run")
         };
-        let bad = |found: String, expected| FolderError::Line {
-            path: path.to_owned(),
-            line: n + 1,
-            found,
-            expected,
-        };
+        let bad = |found: &str, expected| Err(FolderError::line(path, n + 1, found, expected));
         let tag: Tag = from_json(text).map_err(no_json)?;
-        match (tag.line.as_str(), &header) {
+        match (tag.line.as_str(), &mut stream) {
             ("run", None) => {
                 let version = tag.schema_version.unwrap_or(SCHEMA_VERSION);
                 if version != SCHEMA_VERSION {
-                    return Err(FolderError::Version {
-                        path: path.to_owned(),
-                        found: version,
-                    });
+                    return Err(FolderError::version(path, version));
                 }
-                let found: Header = from_json(text).map_err(no_json)?;
-                groups.extend(found.groups.iter().map(name_of).zip(0..));
-                header = Some(found);
+                let header: Header = from_json(text).map_err(no_json)?;
+                groups.extend(header.groups.iter().map(GroupKey::id).zip(0_usize..));
+                stream = Some(Stream::of(header));
+                ends.push(end);
             }
-            ("run", Some(_)) => {
-                return Err(bad("a second header".to_owned(), "one, in the first line"));
-            }
-            ("part", Some(header)) => {
+            ("run", Some(_)) => return bad("a second header", "one, in the first line"),
+            ("part", Some(stream)) => {
                 let kept: KeptPart = from_json(text).map_err(no_json)?;
                 let Part { key, process, .. } = &kept.part;
-                let group: Option<usize> = groups.get(&name_of(key)).copied();
-                let found = || {
-                    let GroupKey {
-                        scene, path, test, ..
-                    } = key;
-                    let process = u64::from(*process) + 1;
-                    format!("process {process} of {scene}, {path}, {test}")
-                };
-                let Some(group) = group.filter(|_| *process < header.run.processes) else {
-                    return Err(bad(found(), "a part of the plan in the first line"));
+                let (scene, way, test) = (&key.scene, &key.path, &key.test);
+                let number = u64::from(*process) + 1;
+                let found = format!("process {number} of {scene}, {way}, {test}");
+                let group = groups.get(&key.id());
+                let group = group.filter(|_| *process < stream.header.run.processes);
+                let Some(group) = group else {
+                    return bad(&found, "a part of the plan in the first line");
                 };
                 // Counted twice, it would be a process more than there was.
-                if !seen.insert((group, *process)) {
-                    return Err(bad(found() + " a second time", "each part once"));
+                if !seen.insert((*group, *process)) {
+                    return bad(&format!("{found} a second time"), "each part once");
                 }
-                if kept.samples_end < samples_end {
+                let before = stream.parts.last().map(|kept| kept.samples_end);
+                if kept.samples_end < before.unwrap_or(SAMPLE_COLUMNS.len() as u64) {
                     let found = format!("samples that end at byte {}", kept.samples_end);
-                    return Err(bad(found, "an end behind that of the part before"));
+                    return bad(&found, "an end behind that of the part before");
                 }
-                samples_end = kept.samples_end;
-                finished_at = None;
-                parts.push(kept);
+                stream.finished_at = None;
+                stream.parts.push(kept);
+                ends.push(end);
             }
-            ("finished", Some(_)) => {
+            ("finished", Some(stream)) => {
                 let Finished { at } = from_json(text).map_err(no_json)?;
-                finished_at = Some(at);
+                stream.finished_at = Some(at);
             }
             (_, None) => break,
             (other, _) => {
                 let found = format!("a line '{}'", plain(other));
-                return Err(bad(found, "'part' or 'finished'"));
+                return bad(&found, "'part' or 'finished'");
             }
         }
     }
-    let header = header.ok_or_else(|| FolderError::Line {
-        path: path.to_owned(),
-        line: 1,
-        found: "no run begins here".to_owned(),
-        expected: "the stream of a run",
-    })?;
-    let stream = Stream {
-        header,
-        parts,
-        finished_at,
-    };
-    Ok((stream, whole as u64))
-}
-
-/// The last line, as it is read.
-#[derive(Deserialize)]
-struct Finished {
-    at: String,
+    ends.push(end);
+    let none = || FolderError::line(path, 1, "no run begins here", "the stream of a run");
+    Ok((stream.ok_or_else(none)?, ends))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! ends a run, the lines that are there are whole but for the last.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
@@ -70,6 +71,18 @@ pub struct Difference {
 
 /// What it is called, and what a run has of it.
 type Fact = (&'static str, fn(&Header) -> Option<String>);
+
+impl Line {
+    /// The line as JSON, with its end.
+    ///
+    /// # Errors
+    /// None are expected: all of it is text, numbers and maps with names.
+    pub fn to_json(&self) -> io::Result<Vec<u8>> {
+        let mut text = serde_json::to_vec(self)?;
+        text.push(b'\n');
+        Ok(text)
+    }
+}
 
 impl Header {
     /// Of a plan that is begun here and now, by nobody who typed anything.
@@ -215,6 +228,15 @@ impl Stream {
             parts: Vec::new(),
             finished_at: None,
         }
+    }
+
+    /// The lines of the file, in order.
+    pub fn lines(&self) -> impl Iterator<Item = Line> {
+        let header = Line::Run(Box::new(self.header.clone()));
+        let parts = self.parts.iter().cloned();
+        let parts = parts.map(|kept| Line::Part(Box::new(kept)));
+        let finished = self.finished_at.clone().map(|at| Line::Finished { at });
+        std::iter::once(header).chain(parts).chain(finished)
     }
 
     /// Whether every process has measured every group.
