@@ -1,5 +1,5 @@
-//! Reading JSON: where it is not what was asked for, what is there, and what was
-//! expected, in other words than those of the reader's program.
+//! Reading JSON, with errors that name place, text found and text expected, in
+//! other words than those of the reader's program.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use serde_json::error::Category;
 
 use crate::shown::plain;
 
-/// Why a text is not the JSON that was asked for.
+/// Difference of a text from the JSON that was expected.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct JsonError {
@@ -18,9 +18,9 @@ pub struct JsonError {
     pub column: usize,
     /// Path of the value, `cells[3].rank`; empty for the whole.
     pub path: String,
-    /// What is there.
+    /// Text that was found.
     pub found: String,
-    /// What was expected in that place, where the text is JSON at all.
+    /// Value expected in that place, where the text is JSON at all.
     pub expected: Option<String>,
 }
 
@@ -36,7 +36,7 @@ impl JsonError {
         }
     }
 
-    /// What was expected of the whole, and here.
+    /// Description of the whole, and of the value expected here.
     pub fn expected_of(&self, whole: &str) -> String {
         match &self.expected {
             Some(here) => format!("{whole}, here {here}"),
@@ -92,7 +92,7 @@ pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
     })
 }
 
-/// What a reader says was found and expected.
+/// Text found and text expected, from the reader's message.
 pub fn told(error: &serde_json::Error) -> (String, Option<String>) {
     let said = error.to_string();
     let said = said.split(" at line ").next().unwrap_or_default();

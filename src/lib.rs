@@ -1,5 +1,7 @@
-//! Spatial indexes for visibility, compared: which finds what a camera sees, and where
-//! the camera is, how fast, and is the answer right?
+//! Spatial indexes for visibility, compared.
+//!
+//! The question: which index finds what a camera sees, and where the camera is, how fast,
+//! and is the answer right?
 //!
 //! cullbench puts interchangeable structures behind one trait pair, builds scenes and
 //! moves cameras through them, checks every answer, and measures. A structure by itself:

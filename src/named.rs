@@ -1,9 +1,9 @@
 //! Tables in the source: enums whose values have names for people and files, and
 //! rows of structs. It defines how such a table is written down.
 
-/// Declares an enum with its names: `ALL` in this order, and `name`. With the name of
-/// a table behind the enum's, each name is followed by what it stands for, which is
-/// its doc comment, and the table holds all three as rows.
+/// Declares an enum with its names: `ALL` in this order, and `name`.
+/// With the name of a table behind the enum's, each name is followed by its description,
+/// which is its doc comment, and the table holds all three as rows.
 macro_rules! named {
     ($(#[$about:meta])* $vis:vis enum $Enum:ident {
         $($(#[$of:meta])* $value:ident = $name:literal,)+
@@ -18,7 +18,7 @@ macro_rules! named {
             /// Every value, in the order of the declaration.
             $vis const ALL: [$Enum; [$($name),+].len()] = [$($Enum::$value),+];
 
-            /// As it is typed, shown and written.
+            /// Name as it is typed, shown and written.
             $vis const fn name(self) -> &'static str {
                 match self {
                     $($Enum::$value => $name,)+

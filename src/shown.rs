@@ -37,8 +37,8 @@ pub fn shortened(text: &str, most: usize) -> String {
     without_middle(&plain(text), [most, 0])
 }
 
-/// [`plain`] text of a message. Very long words lose their middle, and so does the whole:
-/// a name of any length leaves where and what was expected.
+/// [`plain`] text of a message. Very long words lose their middle, and so does
+/// the whole: a name of any length leaves place and expectation.
 ///
 /// ```
 /// use cullbench::shown::message;
@@ -87,8 +87,8 @@ pub fn field(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// The same of a text that is shown: without what a terminal would obey. Line breaks
-/// stay, for CSV has them within quotes.
+/// The same of a text that is shown: without anything that a terminal would obey.
+/// Line breaks stay, for CSV has them within quotes.
 pub fn shown_field(text: &str) -> String {
     field(&lines(text)).into_owned()
 }
@@ -123,7 +123,7 @@ pub fn count(value: usize) -> String {
     grouped
 }
 
-/// All digits of a number, with an exponent where it has more than a count can have.
+/// All digits of a number, with an exponent if it is longer than any count.
 pub fn number(value: f64) -> String {
     match value.abs() < 1e15 {
         true => value.to_string(),

@@ -27,7 +27,7 @@ pub struct Spec {
     known: Vec<&'static str>,
 }
 
-/// What is wrong with a spec, in one line.
+/// Error in a spec, in one line.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error("{}", plain(.0))]
 pub struct SpecError(String);
@@ -96,8 +96,8 @@ impl Spec {
         Spec::parse_behind("", text)
     }
 
-    /// The same of a name that begins with `prefix`, if the text does, and may hold a `:`
-    /// there: `mesh:statue:n=1M`.
+    /// The same of a name that begins with `prefix`, if the text does, and may hold a
+    /// `:` there: `mesh:statue:n=1M`.
     pub fn parse_behind(prefix: &str, text: &str) -> Result<Spec, SpecError> {
         let begun = if text.starts_with(prefix) {
             prefix.len()

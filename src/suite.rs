@@ -6,7 +6,7 @@ use crate::measure::{Beside, Effort};
 /// A named set of scenes and paths with the time to spend on them.
 #[non_exhaustive]
 pub struct Suite {
-    /// What `--suite` takes.
+    /// Value of `--suite`.
     pub name: &'static str,
     /// One line for `cullbench list scenes`.
     pub summary: &'static str,

@@ -1,12 +1,11 @@
 //! How many threads may share a piece of work, and how they share it out. What is
-//! measured is asked on one thread. What a job is
-//! and in which order results are put together is left to the callers.
+//! measured runs on one thread. Jobs and the order of their results belong to the callers.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, scope};
 
-/// Most threads that can be asked for: beyond it the system may give none.
+/// Most threads of a pool: beyond it the system may give none.
 pub const MOST_THREADS: usize = 256;
 
 /// The threads that a build may use, and whether a build has asked for them.
@@ -17,7 +16,7 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// So many: at least 1, at most [`MOST_THREADS`].
+    /// A pool of at least 1, at most [`MOST_THREADS`] threads.
     pub fn new(threads: usize) -> Pool {
         Pool {
             threads: threads.clamp(1, MOST_THREADS),
@@ -31,13 +30,13 @@ impl Pool {
         self.threads
     }
 
-    /// Whether [`Pool::threads`] was called: a build that never does is on one.
+    /// Returns true if [`Pool::threads`] was called: otherwise a build is on one.
     pub fn was_asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }
 }
 
-/// Does every job, on so many threads of which this is one: a free thread
+/// Does every job on `threads` threads, of which this is one: a free thread
 /// takes the next. With one thread the jobs are done in order, here.
 ///
 /// Where the system gives fewer threads, those do the work. A thread costs some
@@ -87,7 +86,7 @@ mod tests {
 
     #[test]
     fn jobs_run_at_the_same_time() {
-        // Nobody passes the barrier alone.
+        // No thread passes the barrier alone.
         let (barrier, seen) = (Barrier::new(3), Mutex::new(HashSet::new()));
         share(3, 0..3, |_| {
             barrier.wait();

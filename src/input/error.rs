@@ -1,5 +1,4 @@
-//! What can be wrong with a scene or a camera file, each as one line that
-//! says where, what was found and what was expected.
+//! Errors in files and texts of users, each one line: where, found, expected.
 
 use std::path::PathBuf;
 
@@ -14,10 +13,10 @@ pub enum InputError {
     Io {
         /// File that was to be read.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// A file that is no longer what was read before ([`hold_files`](super::hold_files)).
+    /// A file that has changed since it was read ([`hold_files`](super::hold_files)).
     #[error("{}: has changed since it was first read; expected the same file until the end", path.display())]
     Changed {
         /// Name of the file.
@@ -30,7 +29,7 @@ pub enum InputError {
         file: String,
         /// From 1, the header included.
         line: u64,
-        /// What is there.
+        /// Text that was found.
         found: String,
         /// The rule.
         expected: String,
@@ -42,7 +41,7 @@ pub enum InputError {
         file: String,
         /// Path of the value, `cases[3].near`.
         place: String,
-        /// What is there.
+        /// Text that was found.
         found: String,
         /// The rule.
         expected: String,
@@ -54,7 +53,7 @@ pub enum InputError {
         file: String,
         /// Bytes before it.
         offset: u64,
-        /// What is there.
+        /// Bytes that were found.
         found: String,
         /// The rule.
         expected: String,
@@ -64,7 +63,7 @@ pub enum InputError {
         "{first} ({count} bad items in all; --skip-bad-items leaves them out and reports the count)"
     )]
     BadItems {
-        /// Where and what.
+        /// The first of them.
         first: Box<InputError>,
         /// How many there are, the first included.
         count: usize,
@@ -98,7 +97,7 @@ pub enum InputError {
         scene: String,
         /// Index of the item.
         item: usize,
-        /// What was found and what is expected.
+        /// Text found and text expected.
         reason: String,
     },
     /// The name or a parameter is wrong.

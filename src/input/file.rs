@@ -1,5 +1,6 @@
-//! The bytes of a file or a pipe. A pipe can be read only once: its bytes are kept, so
-//! that it may be read again like a file.
+//! Bytes of a file or a pipe.
+//!
+//! A pipe can be read only once, so its bytes are kept and read again like a file.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,13 +9,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::InputError;
 
-/// What came out of pipes, by their names.
+/// Bytes of pipes, by their names.
 static PIPES: Mutex<BTreeMap<PathBuf, Arc<[u8]>>> = Mutex::new(BTreeMap::new());
 
 /// SHA-256 of files, by their names, if they are held.
 static HELD: Mutex<Option<BTreeMap<String, String>>> = Mutex::new(None);
 
-/// Whether there is a file, a pipe or a device of that name.
+/// Returns true if there is a file, a pipe or a device of that name.
 pub fn is_readable(path: &Path) -> bool {
     let pipes = PIPES.lock().unwrap_or_else(PoisonError::into_inner);
     pipes.contains_key(path) || fs::metadata(path).is_ok_and(|found| !found.is_dir())

@@ -60,7 +60,7 @@ impl<R> LineCounter<R> {
     }
 
     /// The line of the first record that begins at or after a byte. Records
-    /// must be asked for in the order of the file.
+    /// must come in the order of the file.
     pub fn line_of_record_at(&mut self, byte: u64) -> u64 {
         while self.starts.front().is_some_and(|start| start.0 < byte) {
             self.starts.pop_front();

@@ -1,4 +1,4 @@
-//! Notes: what a reader ignores or guesses, told once by the program, if it listens.
+//! Notes on ignored or guessed input, shown once each by the program.
 
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
@@ -7,7 +7,7 @@ type Told = (fn(&str), BTreeSet<String>);
 
 static LISTENER: Mutex<Option<Told>> = Mutex::new(None);
 
-/// From now on `tell` gets each different note once. Without it nothing is told.
+/// From now on `tell` gets each different note once. Without it notes are dropped.
 pub fn tell_notes(tell: fn(&str)) {
     let mut listener = LISTENER.lock().unwrap_or_else(PoisonError::into_inner);
     *listener = Some((tell, BTreeSet::new()));

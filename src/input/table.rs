@@ -131,7 +131,7 @@ impl<R: Read> TableReader<R> {
         Ok(places)
     }
 
-    /// What is wrong with the header.
+    /// An error in the header.
     pub fn error(&self, found: String, expected: String) -> InputError {
         InputError::Line {
             file: self.file.clone(),
@@ -236,7 +236,7 @@ fn joined(header: &[String]) -> String {
     shortened(&header.join(","), 60)
 }
 
-/// Numbers where the names of columns should be: no table here has fewer than three.
+/// Numbers in place of the names of columns: all tables have three or more.
 fn is_data(header: &[String]) -> bool {
     let numbers = header.iter().filter(|name| name.parse::<f64>().is_ok());
     numbers.count() >= 3

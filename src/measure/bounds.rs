@@ -12,9 +12,9 @@ use crate::query::{Dispatched, ItemId};
 /// A row of the table of bounds.
 #[non_exhaustive]
 pub struct Bound {
-    /// As `list metrics` and reports have it: `bound-read`.
+    /// Name in `list metrics` and in reports: `bound-read`.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// Its work, in one line.
     pub summary: &'static str,
     /// The metric that holds time of a structure / time of this bound.
     pub ratio: &'static str,
@@ -23,18 +23,18 @@ pub struct Bound {
     pub make: for<'a> fn(&Material<'a>) -> Option<TimedTask<'a>>,
 }
 
-/// What a bound is made from.
+/// Material that a bound is made from.
 pub struct Material<'a> {
     /// The queries that it bounds.
     pub workload: &'a Workload<'a>,
-    /// What was built on the scene, under the names they were asked for by.
+    /// Structures built on the scene, under the names on the command line.
     pub subjects: &'a [Subject],
     /// Items visible to each camera of the path, as everyone counted them.
     pub visible: Vec<u64>,
 }
 
 impl Material<'_> {
-    /// The kernel that the subjects are asked by.
+    /// The kernel that the subjects are queried with.
     fn kernel(&self) -> Kernel {
         let first = self.subjects.first();
         first.map_or_else(Kernel::best, |c| c.spec.execution.kernel)
@@ -185,7 +185,7 @@ mod tests {
         assert_ne!(ids(1).first(), ids(5).first());
     }
 
-    /// What the bound computes is thrown away; here it is looked at.
+    /// The result of the bound, which is dropped elsewhere, is compared here.
     #[test]
     fn the_read_bound_reads_the_bounds_of_every_item() {
         // Whole blocks only: the lanes behind the last item are no item's.

@@ -1,4 +1,4 @@
-//! What a report says of one structure on one scene, path and test.
+//! A cell of a report: one structure on one scene, path and culling test.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub struct ReportCell {
     pub path: PathInfo,
     /// Label of the structure or name of the bound.
     pub structure: String,
-    /// As the structure declares; null for a bound and in older reports.
+    /// Kind that the structure declares; null for a bound and in older reports.
     #[serde(default)]
     pub kind: Option<Kind>,
     /// Likewise.
@@ -37,17 +37,17 @@ pub struct ReportCell {
     /// there is no time.
     #[serde(default)]
     pub rank: Option<usize>,
-    /// What the metrics of time were made from.
+    /// Basis of the metrics of time.
     #[serde(default)]
     pub times: CellTimes,
-    /// By name; a metric that was not measured is not there.
+    /// Metrics by name; one that was not measured is absent.
     pub metrics: BTreeMap<String, Metric>,
     /// How the answers differ from the exact truth; null where nothing was
     /// answered.
     pub error: Option<Judged>,
-    /// What was not measured of an ok cell, each with its reason.
+    /// Metrics that were not measured of an ok cell, each with its reason.
     pub left_out: Vec<String>,
-    /// Where the samples of this cell are; null without samples.
+    /// Location of the samples of this cell; null without samples.
     pub samples_ref: Option<SamplesRef>,
 }
 
@@ -62,7 +62,7 @@ pub struct SamplesRef {
     pub rows: u64,
 }
 
-/// What the times of a cell rest on.
+/// Basis of the times of a cell.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
@@ -77,12 +77,12 @@ pub struct CellTimes {
     pub cameras_checked: usize,
     /// Queries per clock reading.
     pub batch: usize,
-    /// By metric: the time in each process, ns.
+    /// Time in each process, ns, by metric.
     pub by_process: BTreeMap<String, Vec<f64>>,
 }
 
 impl ReportCell {
-    /// What the cell is found by in another report.
+    /// The key by which another report is searched for the same cell.
     pub fn key(&self) -> CellKey {
         CellKey {
             group: GroupKey::new(&self.scene.name, &self.path, &self.test),
@@ -90,7 +90,7 @@ impl ReportCell {
         }
     }
 
-    /// Whether the structure looks at every item, as far as it is known.
+    /// Returns true if the structure is known to test every item.
     pub fn is_scan(&self) -> bool {
         self.kind == Some(Kind::Scan)
     }

@@ -1,6 +1,5 @@
-//! What cold queries need: something to stream over the caches with, and
-//! outputs that do not grow while they are timed. The timed pass decides
-//! when to sweep.
+//! Cold queries: a sweep over the caches, and outputs that do not grow while
+//! they are timed. The timed pass decides when to sweep.
 
 use super::schedule::Protocol;
 use super::task::TimedTask;
@@ -9,15 +8,16 @@ use crate::query::ItemId;
 /// Room behind the answer that a structure may ask for while it writes it.
 const SLACK: usize = 64;
 
-/// What cold queries need. One sweep serves one query of every task: each
-/// has data of its own, which no other's query brings back, and its own output.
+/// Sweep and outputs of cold queries. One sweep serves one query of every task:
+/// each has data of its own, which no other query brings back, and its own
+/// output.
 pub(super) struct Cold {
     pub(super) sweep: Sweep,
     pub(super) outs: Vec<Vec<ItemId>>,
 }
 
 impl Cold {
-    /// The outputs have their final size: a query that is asked once a sweep
+    /// The outputs have their final size: a query that runs once per sweep
     /// must not pay for their growth.
     pub(super) fn new(protocol: &Protocol, tasks: &[TimedTask]) -> Cold {
         let most = |c: &TimedTask| c.expected.iter().copied().max().unwrap_or(0) as usize;

@@ -43,8 +43,8 @@ impl Counted {
 /// Longest a subject may take for its whole count pass.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Counts and verifies. One reference serves all subjects of a camera; a subject that
-/// fails once, or was not built, is skipped.
+/// Counts and verifies. One reference serves all subjects of a camera.
+/// A subject that fails once, or was not built, is skipped.
 pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> Vec<Counted> {
     let fresh = |subject: &Subject| Counted {
         verdict: subject.built.as_ref().err().cloned().unwrap_or_default(),
@@ -196,8 +196,8 @@ fn verdict(
     }
 }
 
-/// Adds a note to a structure that declares itself no scan, but tests (almost) every
-/// item for a sliver of the scene.
+/// Notes a structure that declares itself no scan, but works like one:
+/// it tests (almost) every item for a sliver of the scene.
 fn note_scan(counted: &mut Counted, items: usize) {
     let answers = &counted.answers[Pass::Queries as usize];
     let queries = answers.len().max(1) as u64;

@@ -1,5 +1,5 @@
-//! Where a figure was measured and what measured it: machine, toolchain and
-//! source. A fact that cannot be found out is null, never a guess.
+//! Origin of a figure: machine, toolchain and source. A fact that cannot be
+//! found out is null, never a guess.
 
 use std::fs;
 use std::path::Path;
@@ -46,7 +46,7 @@ pub struct Cache {
     pub bytes: u64,
 }
 
-/// What the program was built with; what the build script could not find is `None`.
+/// Compiler and settings of the build; a fact that is not known is `None`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
@@ -67,7 +67,7 @@ pub struct Toolchain {
     pub lock_digest: String,
 }
 
-/// What the program was built from.
+/// Source of the build.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
@@ -76,7 +76,7 @@ pub struct Source {
     pub version: String,
     /// Git commit; `None` for a build from a package.
     pub commit: Option<String>,
-    /// Whether files differed from the commit when the program was built.
+    /// True if files differed from the commit when the program was built.
     pub dirty: Option<bool>,
 }
 
@@ -186,7 +186,7 @@ fn caches(folder: &Path) -> Vec<Cache> {
         .collect()
 }
 
-/// What build.rs left in the environment; empty means unknown.
+/// A value that build.rs left in the environment; empty means unknown.
 fn built_with(value: &str) -> Option<String> {
     Some(value.to_owned()).filter(|v| !v.is_empty())
 }

@@ -38,11 +38,11 @@ pub struct Effort {
     /// The timed cameras are as many as a plain loop over all items answers in
     /// this time, ns.
     pub pass_ns: f64,
-    /// What is measured beside frustum queries.
+    /// Measurements beside frustum queries.
     pub beside: Beside,
 }
 
-/// What is measured beside frustum queries.
+/// Measurements beside frustum queries.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Beside {
@@ -61,11 +61,11 @@ pub struct PlannedScene {
     pub source: String,
     /// Files or specs, as [`crate::path::load`] takes them.
     pub paths: Vec<String>,
-    /// Whether caches are cold: the states to measure.
+    /// Cache states to measure: true is cold.
     pub caches: Vec<bool>,
 }
 
-/// What is to be measured: data, complete before anything runs.
+/// Plan of a run: data, complete before anything runs.
 #[derive(Clone)]
 pub struct Plan {
     /// Measured one after the other.
@@ -74,7 +74,7 @@ pub struct Plan {
     pub structures: Vec<StructureSpec>,
     /// Culling tests with their arithmetic and planes, each a group of its own.
     pub cullings: Vec<Culling>,
-    /// What cameras have where their path does not say.
+    /// Lens of cameras whose path has none.
     pub lens: LensDefaults,
     /// How scenes are read.
     pub load: LoadOptions,
@@ -82,7 +82,7 @@ pub struct Plan {
     pub most_cameras: usize,
     /// How many processes, rounds and tasks.
     pub effort: Effort,
-    /// Whether lower bounds are measured beside the structures.
+    /// Measure lower bounds beside the structures.
     pub bounds: bool,
     /// Seed of the order in which structures are measured.
     pub seed: u64,
@@ -93,15 +93,15 @@ pub struct Plan {
 pub struct Question {
     /// File or spec of the path.
     pub path: String,
-    /// Whether caches are emptied before each query.
+    /// Empty the caches before each query.
     pub cold: bool,
     /// Test, arithmetic and planes.
     pub culling: Culling,
 }
 
 impl Plan {
-    /// Everything that is asked on a scene: tests over boxes before those over
-    /// spheres, so that structures are built twice at most.
+    /// All queries of a scene. Tests over boxes come before those over spheres, so that
+    /// structures are built twice at most.
     pub fn questions(&self, scene: &PlannedScene) -> Vec<Question> {
         let of_spheres = |c: &&Culling| c.test == CullingTest::Sphere;
         let (spheres, boxes): (Vec<&Culling>, Vec<&Culling>) =
@@ -233,19 +233,18 @@ pub enum ExperimentError {
 pub struct Share {
     /// Its number; the first, 0, counts and plans for the others.
     pub process: u32,
-    /// By question: what the first process found; `None` where this is the
-    /// first process.
+    /// Per question: results of the first process; `None` in the first process.
     pub known: Vec<Option<Known>>,
-    /// By question: whether it is to be measured.
+    /// Per question: true if it is to be measured.
     pub wanted: Vec<bool>,
-    /// Whether to count, check and plan only.
+    /// Count, check and plan only.
     pub plan_only: bool,
     /// Structures that have ended a process before, with what became of them.
     pub failed: BTreeMap<String, Verdict>,
 }
 
 impl Share {
-    /// The whole of a scene with so many questions, in the first process.
+    /// The whole of a scene with `questions` questions, in the first process.
     pub fn first(questions: usize) -> Share {
         Share {
             known: vec![None; questions],
@@ -255,8 +254,8 @@ impl Share {
     }
 }
 
-/// Measures one process's share of one scene; each part is handed over as soon
-/// as it is there. False if stopped.
+/// Measures one process's share of one scene. `keep` gets each part as soon as
+/// it is there. False if stopped.
 ///
 /// # Errors
 /// A scene or a path that cannot be read or made, a camera without a view.
@@ -279,7 +278,7 @@ pub fn measure_scene(
             continue;
         }
         let known = share.known[n].as_ref();
-        // Built once for all tests over boxes, and anew for spheres.
+        // Built once for all tests over boxes, and again for spheres.
         let of_spheres = question.culling.test == CullingTest::Sphere;
         if built.as_ref().is_none_or(|(kind, _)| *kind != of_spheres) {
             // The old ones go first: memory for one set is enough.

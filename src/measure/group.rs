@@ -24,9 +24,9 @@ pub(super) const LEAST_TAIL: usize = 20;
 
 /// Settings that a group is measured with.
 pub struct GroupPlan<'a> {
-    /// What reports say of the scene.
+    /// The scene, as reports have it.
     pub scene: &'a SceneInfo,
-    /// What reports say of the path.
+    /// The path, as reports have it.
     pub path: PathInfo,
     /// Number of this process; 0 counts and plans.
     pub process: u32,
@@ -36,9 +36,9 @@ pub struct GroupPlan<'a> {
     pub bounds: &'a [Bound],
     /// From the first process; `None` in the first process itself.
     pub known: Option<&'a Known>,
-    /// Whether to count, check and plan only.
+    /// Count, check and plan only.
     pub plan_only: bool,
-    /// Whether region search is timed as well.
+    /// Time region search as well.
     pub locate: bool,
 }
 
@@ -224,7 +224,7 @@ fn tail(timed: &Timed, largest: usize, schedule: &Schedule) -> Vec<f64> {
     groups.values().filter_map(middle).collect()
 }
 
-/// Counts, compares every answer with the reference, and the reference with the oracle.
+/// Counts, and compares all answers with the reference, and it with the oracle.
 fn count<'a>(
     workload: &Workload,
     subjects: &'a [Subject],

@@ -1,8 +1,8 @@
-//! What a cell is called by: everything that a result is of.
+//! Keys of cells: everything that identifies a result.
 
 use serde::{Deserialize, Serialize};
 
-/// What is common to the cells that are compared with each other.
+/// Key of a group: the part in common to cells that are compared.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct GroupKey {
     /// Name of the scene, parameters included.
@@ -22,7 +22,7 @@ pub struct GroupKey {
 }
 
 impl GroupKey {
-    /// Text of the key, equal for equal keys: a key of maps, which its number cannot be.
+    /// Text that is equal for equal keys, as a key of maps.
     pub fn id(&self) -> String {
         let key = GroupKey {
             // Zero has two signs and one meaning.
@@ -36,7 +36,7 @@ impl GroupKey {
 /// A cell: a structure in a group.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CellKey {
-    /// What the cell is compared within.
+    /// Group that the cell is compared within.
     #[serde(flatten)]
     pub group: GroupKey,
     /// Label of the structure, `bvh:leaf=4`.

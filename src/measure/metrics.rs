@@ -9,11 +9,11 @@ use crate::statistics::Estimate;
 /// One metric of the list; the unit is part of its name where it has one.
 #[non_exhaustive]
 pub struct MetricInfo {
-    /// As in reports and `--metric`.
+    /// Name in reports and for `--metric`.
     pub name: &'static str,
     /// Unit of its values; empty for counts and ratios.
     pub unit: &'static str,
-    /// What it is, in one line.
+    /// Meaning, in one line.
     pub summary: &'static str,
 }
 
@@ -68,7 +68,7 @@ pub struct Metric {
     pub lower: Option<f64>,
     /// Upper end of the interval; `None` without one.
     pub upper: Option<f64>,
-    /// As `cullbench list metrics` has it.
+    /// Unit, as in `cullbench list metrics`.
     pub unit: String,
 }
 

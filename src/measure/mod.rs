@@ -64,7 +64,7 @@ pub use update::{UPDATE_SHARES, move_share};
 pub use workload::{Workload, WorkloadError, input_of};
 
 named! {
-    /// What became of a cell. A gap is never silent.
+    /// Ending of a cell. A gap is never silent.
     #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
     #[cfg_attr(test, derive(schemars::JsonSchema))]
     #[serde(rename_all = "snake_case")]
@@ -91,7 +91,7 @@ named! {
 }
 
 impl Status {
-    /// What a wrong answer makes of a structure: a false negative is worse than
+    /// Status of a structure with a wrong answer: a false negative is worse than
     /// anything that is returned too much.
     pub fn of(fault: &Fault) -> Status {
         match fault {
@@ -101,7 +101,7 @@ impl Status {
         }
     }
 
-    /// Whether this means a wrong answer (exit code 1).
+    /// Returns true for a wrong answer (exit code 1).
     pub fn is_failure(self) -> bool {
         matches!(self, Status::Wrong | Status::Unsafe | Status::Panicked)
     }

@@ -1,8 +1,8 @@
-//! What a process says it is doing, for progress and for those who wait.
+//! Notices of a process about its current step, for progress and time limits.
 
-/// The step that is told at every turn of a timed pass.
+/// The step that is noticed at every turn of a timed pass.
 pub const TIMING: &str = "timing";
 
-/// Who is told what the process is about to do: the structure (none for the
-/// harness's own work) and the step.
+/// Gets each next step of a process: the structure (none for the harness's own
+/// work) and the step.
 pub type Notice<'n> = &'n dyn Fn(Option<&str>, &str);

@@ -7,7 +7,7 @@ use crate::scene::SeededRng;
 /// once in as many rounds as there are tasks (twice in twice as many for
 /// odd numbers): a Williams square (E. J. Williams 1949, "Experimental designs
 /// balanced for the estimation of residual effects of treatments"), its names
-/// dealt anew for each block. Who comes after a task that streams through
+/// drawn again for each block. A task behind one that streams through
 /// the caches starts worse than others; a fixed neighbour would be a bias.
 pub struct Orders {
     names: Vec<usize>,
@@ -60,7 +60,7 @@ mod tests {
     fn everyone_takes_every_place_and_follows_everyone_equally_often() {
         for (count, rounds, often) in [(2, 2, 1), (6, 6, 1), (8, 8, 1), (5, 10, 2), (9, 18, 2)] {
             let mut orders = Orders::new(count, 7);
-            // A second block, dealt anew.
+            // A second block, drawn again.
             for _ in 0..2 {
                 let mut taken = vec![vec![0; count]; count];
                 let mut follows = vec![vec![0; count]; count];

@@ -1,6 +1,6 @@
-//! What one process found out about one group of cells: plain data that goes
-//! from process to process and into the stream of a run. What is made of the
-//! parts of all processes is `results`' to say.
+//! Results of one process for one group of cells: plain data that goes from
+//! process to process and into the stream of a run. `results` turns the parts
+//! of all processes into cells.
 
 use std::collections::BTreeMap;
 
@@ -14,21 +14,19 @@ use super::{
     Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, TaskKind, Verdict,
 };
 
-/// What the first process counted and planned; the others keep to it.
+/// Counts and plan of the first process; the others keep to it.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Known {
-    /// Of every camera: what every structure that is right answers. Empty if
-    /// the process is to count for itself.
+    /// Right answer of every camera. Empty if the process should count for itself.
     pub visible: Vec<Answer>,
-    /// Of every eye.
+    /// Right answer of every eye.
     pub located: Vec<Answer>,
-    /// Of frustum queries, bounds last, and of region searches. `None` where
-    /// nothing is timed.
+    /// Schedule of frustum queries, bounds last. `None` where nothing is timed.
     pub query: Option<KeyedSchedule<TaskKey>>,
-    /// As `query`, of region searches.
+    /// Schedule of region searches.
     pub locate: Option<KeyedSchedule<TaskKey>>,
-    /// Scale of the lens where the path was asked for by its visible share.
+    /// Scale of the lens where the path names a visible share.
     pub lens_scale: Option<f64>,
 }
 
@@ -50,20 +48,20 @@ impl Known {
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SubjectPart {
-    /// As asked for, `bvh:leaf=4`; the twin of one ends in `#twin`.
+    /// Label on the command line, `bvh:leaf=4`; the twin of one ends in `#twin`.
     pub label: String,
     /// Parameters of the structure, defaults included.
     pub params: Value,
-    /// As the structure declares.
+    /// Kind that the structure declares.
     pub kind: Kind,
-    /// As the structure declares.
+    /// Origin that the structure declares.
     pub origin: Origin,
     /// How building, counting and timing ended.
     #[serde(flatten)]
     pub verdict: Verdict,
-    /// Whether builds share threads: wall time then, else CPU time.
+    /// CPU time of one build; wall time if builds share threads.
     pub build_ms: Option<f64>,
-    /// Of nodes and items; `None` where nothing was built.
+    /// Bytes of nodes and items; `None` where nothing was built.
     pub memory_bytes: Option<u64>,
     /// In the order of [`super::UPDATE_SHARES`].
     pub update_ms: Vec<f64>,
@@ -73,13 +71,13 @@ pub struct SubjectPart {
     pub counts: BTreeMap<String, f64>,
 }
 
-/// What was timed of one task in one process.
+/// Times of one task in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TaskPart {
-    /// Of a structure or of a lower bound.
+    /// Label of a structure or a lower bound.
     pub label: String,
-    /// What it was timed at.
+    /// Kind of query.
     pub task: TaskKind,
     /// How timing it ended.
     #[serde(flatten)]
@@ -103,11 +101,11 @@ pub struct Part {
     pub key: GroupKey,
     /// 0 is the first, which counts and plans.
     pub process: u32,
-    /// What reports say of the scene.
+    /// The scene, as reports have it.
     pub scene: SceneInfo,
-    /// What reports say of the path.
+    /// The path, as reports have it.
     pub path: PathInfo,
-    /// What the other processes are to keep to; from the first process only.
+    /// Counts and plan for the other processes; from the first process only.
     pub known: Option<Known>,
     /// How the answers differ from the exact truth; the first process only.
     pub judged: Option<Judged>,
@@ -124,7 +122,7 @@ pub struct Part {
 }
 
 impl SubjectPart {
-    /// Of a structure that was not looked at.
+    /// A structure that was not tried.
     pub fn unknown(spec: &StructureSpec, verdict: Verdict) -> SubjectPart {
         SubjectPart {
             label: spec.label.clone(),
@@ -142,9 +140,9 @@ impl SubjectPart {
 }
 
 impl Part {
-    /// What in the timed pass is not what the plan asks for, by label: a task
-    /// that is not planned or not in its place, rounds too many, samples missing
-    /// or counted twice. Answers are known, so the ids of a whole pass are too.
+    /// Differences of the timed pass from the plan, by label: a task that is not
+    /// planned or not in its place, rounds too many, samples missing or counted
+    /// twice. Answers are known, so the ids of a whole pass are too.
     pub fn contradictions(&self, known: &Known) -> Vec<(&str, Verdict)> {
         let mut found = Vec::new();
         for pass in Pass::ALL {

@@ -1,5 +1,5 @@
-//! What a cell was asked: its scene and the queries along its path, each with a
-//! digest, so that two reports can tell whether they asked the same.
+//! Scene and queries of a cell, each with a digest, so that two reports can be
+//! compared for the same question.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ pub struct SceneInfo {
 }
 
 impl SceneInfo {
-    /// Of a scene that could not be looked at.
+    /// A scene that could not be loaded.
     pub fn unknown(name: &str) -> SceneInfo {
         SceneInfo {
             name: name.to_owned(),
@@ -67,7 +67,7 @@ pub struct PathInfo {
     pub camera_count: usize,
     /// "warm" or "cold".
     pub cache: String,
-    /// Where the planes come from, and the factor c of their epsilon.
+    /// Name of the method that planes are derived by.
     pub planes: String,
     /// Factor c of the planes' epsilon.
     pub epsilon: f64,
@@ -79,7 +79,7 @@ pub struct PathInfo {
 }
 
 impl PathInfo {
-    /// Of a path that could not be looked at.
+    /// A path that could not be loaded.
     pub fn unknown(key: &GroupKey) -> PathInfo {
         PathInfo {
             name: key.path.clone(),
@@ -104,7 +104,7 @@ impl PathInfo {
 }
 
 impl GroupKey {
-    /// The key of what is asked of a scene along a path.
+    /// The key of a scene's queries along a path.
     pub fn of(scene: &str, path: &str, cold: bool, culling: &Culling) -> GroupKey {
         GroupKey {
             scene: scene.to_owned(),

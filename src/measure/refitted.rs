@@ -1,4 +1,4 @@
-//! What many updates do to the queries of a structure that refits.
+//! Effect of many updates on the queries of a structure that refits.
 
 use super::input_of;
 use super::update::{MOST_UPDATED, USUAL_SHARE, move_share};

@@ -1,6 +1,6 @@
-//! What the timed pass does, fixed before it begins: which cameras are timed, how
-//! many queries share a clock reading, how often each task takes part. The same
-//! for all processes of a run and for both sides of a comparison.
+//! Schedule of a timed pass, fixed before it begins: timed cameras, queries per
+//! clock reading, and rounds of each task. The same for all processes of a run
+//! and for both sides of a comparison.
 
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +49,7 @@ pub struct Schedule {
     pub cameras: Vec<u32>,
     /// Rounds of the pass.
     pub rounds: u32,
-    /// Whether caches are emptied before each query.
+    /// True if caches are emptied before each query.
     pub cold: bool,
     /// In the order of the tasks.
     pub tasks: Vec<TaskPlan>,
@@ -67,7 +67,7 @@ pub struct TaskPlan {
 }
 
 impl Protocol {
-    /// The cameras that are timed, of so many.
+    /// The cameras that are timed, of `count`.
     pub fn cameras_of(&self, count: usize) -> Vec<u32> {
         let most = match self.cold {
             true => self.cameras.min(COLD_CAMERAS),
@@ -78,9 +78,9 @@ impl Protocol {
     }
 }
 
-/// Most cameras of which a plain loop over so many items takes no longer than
-/// `pass_ns`. It depends on the question alone, so that every run of one
-/// command times the same cameras.
+/// Most cameras that a plain loop over `items` items answers within `pass_ns`.
+/// It depends on the question alone, so that every run of one command times the
+/// same cameras.
 pub fn cameras_within(pass_ns: f64, items: usize) -> usize {
     /// Time of a box in the plain loop, ns.
     const BOX_NS: f64 = 5.0;

@@ -32,7 +32,7 @@ pub struct Built {
     /// CPU time of one build over the items, ms; wall time
     /// where builds have several threads.
     pub build_ms: f64,
-    /// Of the index over the items.
+    /// Memory of the index over the items.
     pub memory: MemoryUsage,
     /// CPU time of an update, ms, for each of [`super::UPDATE_SHARES`]; empty for
     /// scenes too large to be moved in passing.
@@ -134,7 +134,7 @@ fn build(
     let (mut index, mut build_ms) = build()?;
     // A twin's build is shown nowhere.
     if build_ms < AGAIN_BELOW_MS && !is_twin {
-        // The first one has paid for memory that nobody had touched. Never two
+        // The first one has paid for memory that was never touched. Never two
         // at once: a large scene would not fit twice.
         drop(index);
         (index, build_ms) = build()?;

@@ -9,16 +9,16 @@ use super::{Answer, Built, Workload};
 use crate::query::{ItemId, Located};
 
 named! {
-    /// Which of the two questions is asked.
+    /// Kind of query.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     #[non_exhaustive]
     pub enum TaskKind {
-        /// What does the camera see?
+        /// Frustum query: the items that the camera sees.
         Query = "query",
-        /// Where is the camera?
+        /// Region search: the regions that hold the camera.
         Locate = "locate",
-        /// Where are all the cameras of the path? Asked at once.
+        /// Region search of all cameras of the path in one batch.
         LocateBatched = "locate_batched",
     }
 }
@@ -42,8 +42,8 @@ impl Pass {
         }
     }
 
-    /// CPU time of a task of this pass / time of a frustum query's: region search is not
-    /// what structures are ranked by.
+    /// CPU time of a task of this pass / time of a frustum query's.
+    /// Region search is not what structures are ranked by.
     pub(super) fn share(self) -> f64 {
         match self {
             Pass::Queries => 1.0,
@@ -75,13 +75,13 @@ pub struct TimedTask<'a> {
     pub ask_many: Option<AskMany<'a>>,
     /// Number of ids of every query.
     pub expected: Vec<u64>,
-    /// What a query surely takes, ns, from what was counted: the same in every
-    /// run. `None` where nothing was counted.
+    /// Lower bound of the time of a query, ns, from counters: the same in every run.
+    /// `None` where nothing was counted.
     pub least_ns: Option<f64>,
 }
 
 impl<'a> TimedTask<'a> {
-    /// One that is asked query by query, and of which nothing was counted.
+    /// A task of single queries, without counters.
     pub fn new(expected: Vec<u64>, ask: impl Fn(usize, &mut Vec<ItemId>) + 'a) -> Self {
         TimedTask {
             ask: Box::new(ask),

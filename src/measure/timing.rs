@@ -96,16 +96,15 @@ pub fn timed_rounds(
     )
 }
 
-/// Times the tasks as the schedule has it. `turn` is told before each turn of a
-/// task which one it is
-/// and ends the pass early if it says so: its samples are then worthless and the
-/// result is `None`.
+/// Times the tasks by a schedule. `turn` gets the number of the task before
+/// each of its turns, and ends the pass by returning true: its samples are then
+/// worthless and the result is `None`.
 ///
 /// A sample whose number of ids differs from what was expected makes its task
 /// `wrong`; a panic on the way is the result of its task alone.
 ///
 /// # Panics
-/// If the schedule is not one of so many tasks.
+/// If the schedule is of another number of tasks.
 pub fn timed(
     tasks: &[TimedTask],
     schedule: &Schedule,
@@ -130,14 +129,14 @@ pub fn timed(
         if let Some(cold) = &mut cold {
             for first in 0..schedule.cameras.len() {
                 cold.sweep.over_caches();
-                // Whoever is first after the sweep finds the view cold as well:
+                // The first task after the sweep finds the view cold as well:
                 // a new order for each camera.
                 for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
                     if turn(task) {
                         return None;
                     }
                     let out = &mut cold.outs[task];
-                    // Points that are asked at once come once a round.
+                    // Batched points come once a round.
                     if first % batch(task) == 0 {
                         pass.guarded(task, |pass| pass.time(task, round, first, batch(task), out));
                     }
@@ -163,7 +162,7 @@ pub fn timed(
     Some(pass.results)
 }
 
-/// What the rounds of a pass fill in.
+/// Results of a pass, filled in by its rounds.
 struct Pass<'p, 'a> {
     cameras: &'p [u32],
     tasks: &'p [TimedTask<'a>],

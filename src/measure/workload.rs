@@ -1,5 +1,5 @@
-//! What is asked of every subject: the views of a camera path and the points
-//! to locate, made before the first clock starts and the same for all.
+//! Queries for every subject: the views of a camera path and the points to
+//! locate, made before the first clock starts and the same for all.
 
 use std::borrow::Cow;
 
@@ -13,8 +13,8 @@ use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{Scene, Sought};
 
-/// What a structure is built over: items of a scene, as they are or as a culling
-/// test has them indexed, with the scene's own partition.
+/// Input of a structure: items of a scene, as they are or as a culling test has
+/// them indexed, with the scene's own partition.
 pub fn input_of<'a>(scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
     Input::new(items).own_tree(scene.own_tree.as_ref())
 }
@@ -31,12 +31,12 @@ pub struct Workload<'a> {
     pub items: Cow<'a, [Aabb]>,
     /// The cameras of the path; the truth is theirs.
     pub cameras: Vec<Camera>,
-    /// What structures are queried with: one view per camera.
+    /// Views that structures are queried with, one per camera.
     pub views: Vec<CameraView>,
-    /// Scale of the lens where the path was asked for by its visible share.
+    /// Scale of the lens where the path names a visible share.
     pub lens_scale: Option<f64>,
     /// The eyes of the path, to be located among the scene's regions: as
-    /// structures are asked for them, and as they are.
+    /// structures get them, and as they are.
     pub points: Vec<Vec3>,
     /// The same eyes as they were written.
     pub sought: Vec<Sought>,
@@ -47,9 +47,9 @@ pub struct Workload<'a> {
 #[error("{place}: {error}")]
 #[non_exhaustive]
 pub struct WorkloadError {
-    /// Where it stands: [`CameraPath::place`].
+    /// Place in the path: [`CameraPath::place`].
     pub place: String,
-    /// What is wrong with it.
+    /// Reason.
     pub error: CullingError,
 }
 
@@ -86,8 +86,8 @@ impl<'a> Workload<'a> {
         })
     }
 
-    /// Region search as every subject is asked to do it: what its index finds for
-    /// the point of a place, made exact ([`Scene::search`]).
+    /// Region search: the answer of an index for the point of a place, made exact
+    /// ([`Scene::search`]).
     #[inline]
     pub fn search(
         &self,

@@ -67,8 +67,7 @@ fn lone(cell: &ReportCell) -> Lone {
     }
 }
 
-/// What became of a pair by its statuses and questions alone; `None` if times
-/// are to decide.
+/// Outcome of a pair by its statuses and questions alone; `None` if times decide.
 fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
     let (old, new) = pair;
     let verdict = |cell: &ReportCell| Verdict {

@@ -1,5 +1,4 @@
-//! An experiment in the process of its caller: scene, paths and structures in, a report
-//! out.
+//! An experiment in the process of its caller: from names to a report.
 
 use std::collections::BTreeMap;
 use std::time::SystemTime;
@@ -11,7 +10,7 @@ use crate::measure::{
     Beside, Effort, ExperimentError, Machine, Part, Plan, PlannedScene, Share, measure_scene,
 };
 
-/// A plan that is measured by the calling process alone: times without intervals, for
+/// A plan that the calling process measures alone. Times have no intervals:
 /// those need several processes.
 ///
 /// ```
@@ -62,7 +61,7 @@ impl Experiment {
         }
     }
 
-    /// Adds a camera path: a file or a spec, as [`path::load`](crate::path::load) takes it.
+    /// Adds a camera path: file or spec ([`path::load`](crate::path::load)).
     pub fn path(mut self, path: &str) -> Experiment {
         for scene in &mut self.plan.scenes {
             scene.paths.push(path.to_owned());

@@ -16,7 +16,7 @@ pub(super) const STREAM: &str = "stream.jsonl";
 pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
                                          queries,cpu_ns,wall_ns,returned\n";
 
-/// Error of reading, writing or joining folders of runs: one line that names the place.
+/// Error of reading, writing or joining runs: one line that names the place.
 #[derive(Debug, thiserror::Error)]
 #[error("{text}")]
 pub struct FolderError {
@@ -74,7 +74,7 @@ impl FolderError {
     }
 }
 
-/// The error of the system, without the temporary file's name that was wrapped around it.
+/// The error of the system, without the name of a temporary file.
 pub fn bare(error: io::Error) -> io::Error {
     // `tempfile` wraps it so, and passes no more of it than its kind and text.
     match error.to_string().split_once(" at path \"") {

@@ -1,5 +1,5 @@
 //! The folder of a run: stream.jsonl and samples.csv, appended to as the run
-//! goes on, and report.json and summary.csv, made of them at its end. Those are
+//! continues, and report.json and summary.csv, made of them at its end. Those are
 //! written beside their place and renamed into it, so that a reader or a crash
 //! never meets half a file.
 
@@ -151,15 +151,15 @@ impl RunFolder {
     }
 }
 
-/// Longest to wait for the lock of a run: a worker that a killed run had just begun to start
-/// holds it until it is a program of its own.
+/// Longest wait for the lock of a run: a worker that was just started by a
+/// killed run holds it until it is a program of its own.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The folder of a run that was stopped: locked, and as it was left.
 pub struct StoppedRun {
     path: PathBuf,
     stream: File,
-    /// Of the stream, as far as it is whole and has its samples.
+    /// Length of the stream, as far as it is whole and has its samples.
     length: u64,
     lost: usize,
 }
@@ -275,8 +275,8 @@ fn open(file: &Path) -> Result<File, FolderError> {
     opened.map_err(FolderError::io(file))
 }
 
-/// Bytes of samples.csv up to the first NUL, which a power cut leaves where data never
-/// reached the disk.
+/// Bytes of samples.csv up to the first NUL. A power cut leaves NULs where data
+/// never reached the disk.
 pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
     // A pipe would wait for its writer.
     if !fs::metadata(file)?.is_file() {
@@ -296,7 +296,7 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
     }
 }
 
-/// Writes report.json and summary.csv into a folder; a link of that name is replaced.
+/// Writes report.json and summary.csv into a folder; replaces links.
 ///
 /// # Errors
 /// What the file system says.
@@ -346,7 +346,7 @@ const WITH_INTERVALS: &[&str] = &[
     "build_ms",
 ];
 
-/// What there is; an empty field for what there is not.
+/// Text of a value; empty without one.
 fn text(value: Option<impl ToString>) -> String {
     value.map_or(String::new(), |value| value.to_string())
 }

@@ -1,6 +1,6 @@
-//! What became of one cell from an old measurement to a new one: two reports,
-//! or two programs that ran in turns. The one row type of both, the metrics
-//! that may be judged, and the counters that are compared exactly.
+//! Outcome of one cell between an old measurement and a new one: two reports,
+//! or two programs that ran in turns. One row type for both, the metrics that
+//! may be judged, and the counters that are compared exactly.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ pub static COUNTERS: &[&str] = &[
 ];
 
 named! {
-    /// What became of a cell, worst first.
+    /// Outcome of a cell, worst first.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
     #[serde(rename_all = "snake_case")]
     #[non_exhaustive]
@@ -57,7 +57,7 @@ named! {
 }
 
 impl Outcome {
-    /// By statuses alone; `None` where both are ok and times decide.
+    /// Outcome from statuses alone; `None` where both are ok and times decide.
     pub fn of_statuses(old: Status, new: Status) -> Option<Outcome> {
         match (old == Status::Ok, new == Status::Ok) {
             (true, true) => None,
@@ -70,7 +70,7 @@ impl Outcome {
         }
     }
 
-    /// Whether the statistics decided.
+    /// Returns true if the statistics decided.
     pub fn is_judged(self) -> bool {
         matches!(
             self,
@@ -116,8 +116,7 @@ pub struct JudgedRow {
     pub new_status: Status,
     /// Why the verdict is what it is, where the figures do not say it.
     pub reason: Option<String>,
-    /// What was judged, where pairs of processes were: ln ns per query of each,
-    /// old and new.
+    /// Judged samples of pairs of processes: ln ns per query, old and new.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pairs_ln_ns: Option<[Vec<f64>; 2]>,
 }
@@ -173,8 +172,8 @@ impl JudgedRow {
         }
     }
 
-    /// Whether the row is worth reading: not the same as before, not a metric
-    /// that neither side ever had, not a failure as before.
+    /// Returns true if the row is worth reading: not the same as before, not a
+    /// metric that neither side ever had, not a failure as before.
     pub fn is_news(&self) -> bool {
         match self.outcome {
             Outcome::Same => false,
@@ -243,7 +242,7 @@ pub struct Lone {
     pub reason: Option<String>,
 }
 
-/// What moved all structures at once: the machine, or the program as a whole.
+/// Shift of all structures at once: the machine, or the program as a whole.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[non_exhaustive]
 pub struct CommonShift {
@@ -273,7 +272,7 @@ pub struct Changes {
     pub only_in_old: Vec<Lone>,
     /// Cells that only the new report has.
     pub only_in_new: Vec<Lone>,
-    /// Of two reports; `None` for programs that ran in turns, which share it.
+    /// Shift between two reports; `None` for programs that ran in turns.
     pub common_shift: Option<CommonShift>,
 }
 
@@ -284,14 +283,14 @@ impl Changes {
         rows.filter(|row| row.outcome == outcome).count()
     }
 
-    /// Whether NEW holds a wrong answer, with or without a partner in OLD.
+    /// Returns true if NEW holds a wrong answer, with or without a partner in OLD.
     pub fn is_wrong(&self) -> bool {
         let paired = self.rows.iter().map(|row| row.new_status);
         let alone = self.only_in_new.iter().map(|cell| cell.status);
         paired.chain(alone).any(Status::is_failure)
     }
 
-    /// Whether a right answer takes longer or is not given any more.
+    /// Returns true if a right answer takes longer or is no longer given.
     pub fn is_regression(&self) -> bool {
         self.count(Outcome::Slower) + self.count(Outcome::Lost) > 0
     }

@@ -17,8 +17,8 @@ pub(super) fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> V
     groups
 }
 
-/// Group, structure, and number of cells before it that have both: a report that holds a
-/// cell twice loses none of them.
+/// Group, structure, and number of cells before it that have both.
+/// A report that holds a cell twice loses none of them.
 type Key<'r> = (String, &'r str, usize);
 
 fn keyed(cells: &[ReportCell]) -> Vec<(Key<'_>, &ReportCell)> {

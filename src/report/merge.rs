@@ -20,7 +20,7 @@ pub struct Merged {
     pub stream: Stream,
     /// The groups of the plan that no shard has.
     pub missing: Vec<GroupKey>,
-    /// By part: the file its samples are in, and where.
+    /// Per part: the file of its samples, and their range in bytes.
     samples: Vec<(PathBuf, [u64; 2])>,
 }
 

@@ -53,7 +53,7 @@ pub struct RunInfo {
     pub id: String,
     /// RFC 3339, UTC.
     pub started_at: String,
-    /// Null while the run goes on, and for a run that was stopped.
+    /// Null while the run continues, and for a run that was stopped.
     pub finished_at: Option<String>,
     /// The command line, blanks between arguments.
     pub command: String,
@@ -85,7 +85,7 @@ pub struct Noise {
     /// The twin ratio of each scene and path: a check that its interval holds 1.
     /// Nothing is derived from it.
     pub twins: Vec<TwinEntry>,
-    /// What made the times noisy, as far as the run noticed, with advice.
+    /// Causes of noisy times, as far as the run noticed them, with advice.
     #[serde(default)]
     pub warnings: Vec<String>,
 }
@@ -116,7 +116,7 @@ pub struct TwinEntry {
 }
 
 impl TwinEntry {
-    /// Whether the interval holds 1; `None` without one.
+    /// True if the interval contains 1; `None` without one.
     pub fn holds_one(&self) -> Option<bool> {
         Some(self.lower? <= 1.0 && 1.0 <= self.upper?)
     }
@@ -145,7 +145,7 @@ impl Noise {
 mod tests {
     use super::*;
 
-    /// `UPDATE_SCHEMA=1 cargo test schema` writes the file anew.
+    /// `UPDATE_SCHEMA=1 cargo test schema` writes the file again.
     #[test]
     fn the_committed_schema_is_the_one_of_the_code() {
         let schema = schemars::schema_for!(Report);

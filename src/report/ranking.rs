@@ -1,5 +1,5 @@
-//! Reading a report: which cells were asked the same, and in which order they
-//! come. Ranks are the run's own; nothing here decides a tie.
+//! Reading a report: groups of cells with the same question, in the order of
+//! their ranks. Ranks are the run's own; nothing here decides a tie.
 
 use super::matching::grouped;
 use super::{Report, ReportCell};
@@ -21,7 +21,7 @@ pub struct Ranked<'r> {
     pub cell: &'r ReportCell,
 }
 
-/// What a comparison is found by.
+/// Key of a comparison.
 type Key<'r> = (&'r str, &'r str, &'r str, &'r str);
 
 fn key(cell: &ReportCell) -> Key<'_> {
@@ -46,8 +46,8 @@ fn time(cell: &ReportCell) -> Option<f64> {
     time.filter(|_| cell.status == Status::Ok)
 }
 
-/// By the rank the run has given them, the faster first within a rank; what has
-/// none comes last.
+/// Cells in the order of the ranks from the run, the faster first within a
+/// rank; those without a rank come last.
 fn ranked(cells: Vec<&ReportCell>) -> Vec<Ranked<'_>> {
     let cells = cells.into_iter().map(|cell| Ranked {
         rank: cell.rank.filter(|_| time(cell).is_some()),

@@ -50,8 +50,8 @@ fn read_json(path: PathBuf) -> Result<Report, FolderError> {
     }
 }
 
-/// Reads the stream of a run. Also the ends of its lines in bytes: of the header, of each
-/// part, and last of the whole without half a line at its end.
+/// Reads the stream of a run, and the ends of its lines in bytes: of the header,
+/// of each part, and last of the whole without half a line at its end.
 ///
 /// # Errors
 /// Errors of the file system; a line that is none or does not belong there (by its

@@ -16,7 +16,7 @@ pub struct Setting {
     pub old: String,
     /// In the new report.
     pub new: String,
-    /// Whether it is another machine: absolute times do not compare.
+    /// True if it is another machine: absolute times do not compare.
     pub is_machine: bool,
 }
 
@@ -47,7 +47,7 @@ fn facts(report: &Report) -> Vec<Fact> {
     ]
 }
 
-/// What differs, in the order of the report.
+/// Differing facts, in the order of the report.
 pub fn settings(old: &Report, new: &Report) -> Vec<Setting> {
     let pairs = facts(old).into_iter().zip(facts(new));
     let differing = pairs.filter(|(old, new)| old.3 != new.3);

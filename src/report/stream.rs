@@ -20,7 +20,7 @@ use crate::statistics::two_speeds;
 pub enum Line {
     /// The first line: everything about the run but its cells.
     Run(Box<Header>),
-    /// What one process found out about one group of cells.
+    /// Results of one process for one group of cells.
     Part(Box<KeptPart>),
     /// All parts of the plan are there.
     Finished {
@@ -29,7 +29,7 @@ pub enum Line {
     },
 }
 
-/// Where, by what and with which options a run was begun.
+/// Place, program and options of a run.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Header {
@@ -37,7 +37,7 @@ pub struct Header {
     pub schema_version: u32,
     /// The command and when it was begun.
     pub run: RunInfo,
-    /// The arguments of `run`, to go on with.
+    /// The arguments of `run`, to continue with.
     pub args: Vec<String>,
     /// The machine.
     pub machine: Machine,
@@ -47,7 +47,7 @@ pub struct Header {
     pub source: Source,
     /// The groups of the plan, in order; of a shard its own.
     pub groups: Vec<GroupKey>,
-    /// Of a shard: the groups of the whole plan, in order.
+    /// Groups of the whole plan, in order, if this run is a shard.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub whole: Vec<GroupKey>,
     /// The structures of the plan, as asked for.
@@ -56,8 +56,8 @@ pub struct Header {
     pub binary: Option<String>,
 }
 
-/// What two runs must have in common for their times to belong together, and
-/// what one and the other have.
+/// A fact that two runs must have in common for their times to belong together, and
+/// its two values.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct Difference {
@@ -69,7 +69,7 @@ pub struct Difference {
     pub here: String,
 }
 
-/// What it is called, and what a run has of it.
+/// Name of a fact, and its value in a run.
 type Fact = (&'static str, fn(&Header) -> Option<String>);
 
 impl Line {
@@ -85,7 +85,7 @@ impl Line {
 }
 
 impl Header {
-    /// Of a plan that is begun here and now, by nobody who typed anything.
+    /// Header of a plan that begins here and now, without a command line.
     pub fn of(plan: &Plan, machine: Machine, id: String, started_at: String) -> Header {
         Header {
             schema_version: SCHEMA_VERSION,
@@ -191,7 +191,7 @@ impl Header {
     }
 }
 
-/// As much of a digest as tells two of them apart for a reader.
+/// Beginning of a digest, enough for a reader.
 fn short(digest: &str) -> String {
     digest.chars().take(12).collect()
 }
@@ -200,7 +200,7 @@ fn short(digest: &str) -> String {
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct KeptPart {
-    /// What the process measured.
+    /// Results of the process.
     pub part: Part,
     /// Rows of each structure or bound.
     pub rows: BTreeMap<String, u64>,
@@ -216,12 +216,12 @@ pub struct Stream {
     pub header: Header,
     /// In the order in which they were measured.
     pub parts: Vec<KeptPart>,
-    /// RFC 3339, UTC; `None` for a run that goes on or was stopped.
+    /// RFC 3339, UTC; `None` for a run that continues or was stopped.
     pub finished_at: Option<String>,
 }
 
 impl Stream {
-    /// Of a run that was just begun.
+    /// The stream of a run that has just begun.
     pub fn of(header: Header) -> Stream {
         Stream {
             header,
@@ -239,14 +239,14 @@ impl Stream {
         std::iter::once(header).chain(parts).chain(finished)
     }
 
-    /// Whether every process has measured every group.
+    /// Returns true if every process has measured every group.
     pub fn is_finished(&self) -> bool {
         let processes = self.header.run.processes;
         let mut all = self.header.groups.iter();
         self.finished_at.is_some() && all.all(|key| (0..processes).all(|p| self.has(key, p)))
     }
 
-    /// Whether that process has measured that group.
+    /// Returns true if that process has measured that group.
     pub fn has(&self, key: &GroupKey, process: u32) -> bool {
         let mut parts = self.parts.iter().map(|kept| &kept.part);
         parts.any(|part| part.key == *key && part.process == process)
@@ -329,7 +329,7 @@ pub fn dated(clock: SystemTime) -> SystemTime {
     clock.clamp(UNIX_EPOCH, last)
 }
 
-/// What made times noisy, with what to do about it.
+/// Causes of noisy times, with advice.
 fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String> {
     /// Processes that already run on a core, from which on it is called busy.
     const BUSY: f64 = 0.5;
@@ -355,7 +355,7 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
     let (missed, all) = twins.fold((0, 0), |(missed, all), holds| {
         (missed + usize::from(!holds), all + 1)
     });
-    // One in twenty misses by chance; of so many, this many are no chance.
+    // One in twenty misses by chance; this many of `all` are no chance.
     if missed > 1 + all / 8 {
         warnings.push(format!(
             "of {all} structures that were entered twice, {missed} differ from themselves: the \

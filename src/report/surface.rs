@@ -14,7 +14,7 @@ pub struct Surface<'r> {
     pub cache: &'r str,
     /// Name of the culling test.
     pub test: &'r str,
-    /// By number of items, then by share.
+    /// Places by number of items, then by share.
     pub places: Vec<Place<'r>>,
 }
 
@@ -36,13 +36,13 @@ pub struct Place<'r> {
 pub enum Crossing {
     /// At every size that was measured, this being the smallest.
     Below(usize),
-    /// By interpolation of the logarithms between two sizes.
+    /// Between two sizes, by interpolation of the logarithms.
     At(f64),
     /// Not at the largest size that was measured.
     Above(usize),
 }
 
-/// `uniform:n=1000,seed=7` is `uniform:seed=7`, `mesh:forest:n=1000` is `mesh:forest`.
+/// Name of a scene without its size: `uniform:n=1000,seed=7` is `uniform:seed=7`.
 pub fn world_of(scene: &str) -> String {
     let Some((name, parameters)) = scene.rsplit_once(':') else {
         return scene.to_owned();
@@ -103,13 +103,12 @@ pub fn surfaces(comparisons: Vec<Comparison<'_>>) -> Vec<Surface<'_>> {
 }
 
 impl<'r> Place<'r> {
-    /// Whether the class alone would say something else than was measured: more
-    /// than a tenth off.
+    /// Returns true if the class is more than a tenth off the measured share.
     pub fn is_off_class(&self) -> bool {
         !(0.9..=1.1).contains(&(self.share / self.class))
     }
 
-    /// Whether a scan is the fastest, or ties with it.
+    /// Returns true if a scan is the fastest, or ties with it.
     pub fn scan_wins(&self) -> bool {
         self.comparison.winners().any(ReportCell::is_scan)
     }
@@ -137,7 +136,7 @@ impl Surface<'_> {
         classes
     }
 
-    /// Whether there is anything to cross: more than one size or share.
+    /// Returns true if there is more than one size or share.
     pub fn spans(&self) -> bool {
         self.sizes().len() > 1 || self.classes().len() > 1
     }
@@ -178,8 +177,8 @@ impl Surface<'_> {
         curve
     }
 
-    /// Where a structure becomes faster than the linear scan for good; `None` if
-    /// it is known at one size only. It is faster where it ranks before linear;
+    /// Number of items from which a structure is faster than the linear scan for good;
+    /// `None` if it is known at one size only. It is faster where it ranks before linear;
     /// in between, the logarithms of the speed-ups are interpolated.
     pub fn crossing(&self, structure: &str, class: f64) -> Option<Crossing> {
         let curve = self.curve(structure, class, "speedup");
@@ -207,7 +206,7 @@ impl Surface<'_> {
         Some(Crossing::At((n0 + along * (n1 - n0)).exp()))
     }
 
-    /// Whether it ranks before linear in the first path of that size and class.
+    /// Returns true if it ranks before linear in the first path of size and class.
     fn is_faster(&self, structure: &str, class: f64, items: usize) -> bool {
         let here = |place: &&Place| place.class == class && place.items == items;
         let mut places = self.places.iter().filter(here);
@@ -227,7 +226,7 @@ mod tests {
     use crate::index::Kind;
     use crate::report::ranking::Ranked;
 
-    /// Structures with their times where so many items are visible of `items`.
+    /// Structures with their times where `visible` of `items` items are visible.
     fn comparison(items: usize, share: f64, times: &[(&str, f64)]) -> Comparison<'static> {
         let scene = format!("uniform:n={items},seed=3");
         let cells = times.iter().zip(1..).map(|(&(name, ns), rank)| {

@@ -1,7 +1,8 @@
-//! Files and folders that appear whole or not at all: written beside their place under
-//! a temporary name, then renamed into it. A process locks its temporary names while it
-//! runs; an unlocked one is the leftover of a killed process, and the next write into
-//! the same folder removes it.
+//! Files and folders that appear whole or not at all.
+//!
+//! They are written beside their place under a temporary name, then renamed into it. A
+//! process locks its temporary names while it runs; an unlocked one is the leftover of a
+//! killed process, and the next write into the same folder removes it.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
@@ -39,8 +40,8 @@ pub fn write_atomically(
     attempt().map_err(FolderError::io(path))
 }
 
-/// The same of a file in a folder of the program's own: whatever has its name, a link
-/// too, is replaced.
+/// The same of a file in a folder of the program's own. Anything of its name, a
+/// link too, is replaced.
 pub(super) fn replace_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -78,8 +79,8 @@ fn is_stream(found: &fs::Metadata) -> bool {
     !found.is_file() && !found.is_dir()
 }
 
-/// Tries to write into the folder where a file is to appear, and leaves nothing there: a
-/// folder that is read-only or full is found before the work.
+/// Tries to write into the folder of a future file, and leaves nothing there:
+/// a folder that is read-only or full is found before the work.
 ///
 /// # Errors
 /// What the file system says, with the path.
@@ -110,7 +111,7 @@ fn try_writing(folder: &Path) -> io::Result<()> {
     temporary_in(folder)?.write_all(&[0; 4096])
 }
 
-/// Makes a file that goes with this process, or with the next write into the folder.
+/// Makes a file that ends with this process, or with the next write beside it.
 ///
 /// # Errors
 /// What the file system says.
@@ -134,8 +135,8 @@ pub(super) fn locked_temporary_in(
     }
 }
 
-/// Makes a folder that goes with this process, or with the next write beside it; locked
-/// for as long as the file is open.
+/// Makes a folder that ends with this process, or with the next write beside it.
+/// Locked for as long as the file is open.
 pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<(TempDir, Option<File>)> {
     sweep(folder);
     loop {
@@ -152,8 +153,8 @@ pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<(TempDir, Option<
     }
 }
 
-/// Names of temporary files. Private by themselves; results are meant to be read, as far
-/// as the user's umask lets them.
+/// Builder of temporary names. Those are private by themselves; results are meant
+/// to be read, as far as the user's umask lets them.
 fn named(mode: u32) -> Builder<'static, 'static> {
     let mut builder = Builder::new();
     builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);

@@ -14,7 +14,7 @@ pub struct Standing {
 /// front is what nothing is shown to dominate: which of two equals came out ahead is luck.
 ///
 /// `is_less(a, b, k)` says whether the samples show `a` to be better than `b` in
-/// dimension `k`; it is asked only where the values say so. That a point is
+/// dimension `k`; it is called only where the values say so. That a point is
 /// dominated is shown if a point that is no worse than it (itself, or one that is
 /// as good or better by all values) is shown to be worse in some dimension than a
 /// point that is no worse than that one. So dominance is transitive, as it is by

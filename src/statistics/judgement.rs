@@ -23,7 +23,7 @@ const EQUIVALENCE: f64 = 0.95;
 /// 95 % quantile of the normal distribution: the power that a resolution has.
 const POWER: f64 = 1.645;
 
-/// Beyond so many pairs the answer to "how many more?" is: none would do.
+/// With more than this many pairs, "how many more?" is answered: none would do.
 const MOST_PAIRS: usize = 10_000;
 
 named! {
@@ -103,7 +103,7 @@ pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>>
     judge_estimates(estimates.collect(), [threshold, FLOOR], |_| ())
 }
 
-/// Whether every judged cell is known finely enough: the rule by which a
+/// Returns true if every judged cell is known finely enough: the rule by which a
 /// comparison stops. On precision, never on significance: stopping at the first
 /// significant difference would find one where there is none.
 pub fn resolved(judged: &[Option<Judgement>], threshold: f64) -> bool {

@@ -5,8 +5,8 @@ use super::trimmed::{centre, paired_difference};
 /// Level at which two are told apart.
 pub const ALPHA: f64 = 0.05;
 
-/// Ranks structures by their trimmed means: 1 is the smallest; two that share rank 1
-/// are followed by rank 3. Per structure: one value per process, all from the same
+/// Ranks structures by their trimmed means, 1 for the smallest. Two that share rank
+/// 1 are followed by rank 3. Per structure: one value per process, all from the same
 /// processes, paired by index.
 ///
 /// A structure shares the rank of the fastest of that rank unless Yuen's paired
@@ -31,8 +31,9 @@ pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<usize> {
     ranks
 }
 
-/// Whether a paired test over the processes finds `a` less than `b` (Yuen's,
-/// two-sided, `alpha`); under three processes, whether it is by the trimmed mean.
+/// Returns true if a paired test over the processes finds `a` less than `b`
+/// (Yuen's, two-sided, `alpha`); under three processes, if its trimmed mean is
+/// less.
 pub fn is_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
     let means = centre(a).zip(centre(b));
     means.is_some_and(|(a, b)| a < b) && told_apart(a, b, alpha)

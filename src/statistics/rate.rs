@@ -91,9 +91,10 @@ pub fn rate(clusters: &[[f64; 2]]) -> Option<Rate> {
     })
 }
 
-/// Whether the clusters, paired by index, show the mean of `a` to be below that
-/// of `b`: Student's paired t, two-sided at `alpha`. From one cluster, or where
-/// all differences are the same, the order of the means decides.
+/// Returns true if the clusters, paired by index, show the mean of `a` to be
+/// below that of `b`: Student's paired t, two-sided at `alpha`. From one
+/// cluster, or where all differences are the same, the order of the means
+/// decides.
 ///
 /// The plain mean and no trimmed one: what is rare lies in few clusters, and
 /// those a trimmed mean leaves out.
@@ -101,8 +102,8 @@ pub fn shows_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
     is_above_zero(&[plain_difference(a, b)], alpha)
 }
 
-/// Whether two independent samples, each paired by index, show the sum of their
-/// means to be less for `a` than for `b`: `times` over processes by Yuen's paired
+/// Compares the sums of the means of two independent samples, each paired by index:
+/// true if they show less for `a` than for `b`. `times` over processes by Yuen's paired
 /// difference of trimmed means, `counts` over clusters as in [`shows_less`], with
 /// the degrees of freedom of Welch. Under three processes the order of the sums
 /// decides.

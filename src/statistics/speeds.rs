@@ -1,4 +1,4 @@
-//! Whether a machine has two speeds.
+//! Detection of a machine with two speeds.
 
 use super::sorted;
 

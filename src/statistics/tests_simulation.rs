@@ -103,7 +103,7 @@ fn deviation(values: &[f64]) -> f64 {
     (squares / (values.len() - 1) as f64).sqrt()
 }
 
-/// Whether `share` of `count` lies in `low..=high`.
+/// Returns true if `share` of `count` lies in `low..=high`.
 fn within(share: usize, count: usize, low: f64, high: f64) -> bool {
     (low..=high).contains(&(share as f64 / count as f64))
 }

@@ -6,8 +6,8 @@ use super::judgement::judge_estimates;
 use super::trimmed::{centre, difference};
 use super::{Judgement, Trimmed, median, trimmed_mean};
 
-/// Single cells of one program moved by 9 % from one quiet run to the next: a change of
-/// up to 5 % of two runs is not called one.
+/// Changes of up to 5 % between two runs are not called one: single cells of
+/// one program moved by 9 % from one quiet run to the next.
 const FLOOR_OF_RUNS: f64 = 0.05;
 
 /// Fewer cells do not tell how far two runs scatter: of all cells, and of those of
@@ -78,8 +78,8 @@ fn add_scatter_of_runs(cells: &mut [Trimmed], structures: &[&str]) {
     }
 }
 
-/// Variance of the means about `middle`, by the median absolute deviation, beyond what
-/// their standard errors explain.
+/// Variance of the means about `middle` beyond their standard errors, by the median
+/// absolute deviation.
 fn excess_variance(cells: &[Trimmed], middle: f64) -> f64 {
     let of = |what: &dyn Fn(&Trimmed) -> f64| {
         median(&cells.iter().map(what).collect::<Vec<_>>()).unwrap_or(0.0)
@@ -140,7 +140,7 @@ mod tests {
             _ => -0.12,
         });
         assert_eq!(slower(&wild), 0);
-        // One structure alone that scatters is told by its own cells.
+        // One structure alone that scatters is found by its own cells.
         let one = judged(|structure, scene| match (structure, scene) {
             (3, 0 | 2) => 0.12,
             (3, _) => -0.12,

@@ -328,7 +328,7 @@ fn a_pass_that_is_not_the_plan_s_makes_its_structure_wrong() {
         part.tasks[2].label = "linear".to_owned();
     });
     assert!(swapped.contains(&wrong), "{swapped:?}");
-    // A bound's answer is its own business; its name and rounds are not.
+    // The answer of a bound is free; its name and rounds are not.
     let bound = statuses(&|part| {
         part.bounds.push("fast".to_owned());
         part.tasks[2].returned = 1;

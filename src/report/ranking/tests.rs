@@ -2,7 +2,7 @@ use super::*;
 use crate::index::Origin;
 use serde_json::json;
 
-/// A cell of a tree of our own with a time, and a ratio to a linear scan of 1000 ns.
+/// A cell of our own tree with a time, and a ratio to a scan of 1000 ns.
 pub fn cell(scene: &str, items: usize, path: &str, structure: &str, ns: f64) -> ReportCell {
     let metric = |value: f64| json!({ "value": value, "unit": "" });
     let cell = json!({
