@@ -105,6 +105,23 @@ pub enum InputError {
     Spec(#[from] SpecError),
 }
 
+impl InputError {
+    /// An error in a line of a text file; `line` counts from 1.
+    pub fn line(
+        file: &str,
+        line: u64,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> InputError {
+        InputError::Line {
+            file: file.to_owned(),
+            line,
+            found: found.into(),
+            expected: expected.into(),
+        }
+    }
+}
+
 pub(crate) fn gigabytes(bytes: u64) -> String {
     match bytes {
         0..1_000_000_000 => format!("{:.0} MB", bytes as f64 / 1e6),

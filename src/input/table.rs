@@ -56,12 +56,8 @@ impl<R: Read> TableReader<R> {
             })
             .collect();
         let header_line = csv.get_mut().line_of_record_at(0);
-        let complain = |found: String, expected: &str| InputError::Line {
-            file: file.to_owned(),
-            line: header_line,
-            found,
-            expected: expected.to_owned(),
-        };
+        let complain =
+            |found: String, expected: &str| InputError::line(file, header_line, found, expected);
         if fields.as_slice().contains(&0) {
             let found = "zero bytes, as in UTF-16 text".to_owned();
             return Err(complain(found, "UTF-8 text"));
@@ -133,12 +129,7 @@ impl<R: Read> TableReader<R> {
 
     /// An error in the header.
     pub fn error(&self, found: String, expected: String) -> InputError {
-        InputError::Line {
-            file: self.file.clone(),
-            line: self.header_line,
-            found,
-            expected,
-        }
+        InputError::line(&self.file, self.header_line, found, expected)
     }
 
     /// Tells of columns that nothing is read from, with the nearest name that would be,
@@ -222,12 +213,7 @@ impl Row<'_> {
 
     /// An error at this row.
     pub fn error(&self, found: String, expected: String) -> InputError {
-        InputError::Line {
-            file: self.file.to_owned(),
-            line: self.line,
-            found,
-            expected,
-        }
+        InputError::line(self.file, self.line, found, expected)
     }
 }
 
@@ -243,15 +229,12 @@ fn is_data(header: &[String]) -> bool {
 }
 
 fn quote_error(file: &str, fault: QuoteFault) -> InputError {
-    InputError::Line {
-        file: file.to_owned(),
-        line: fault.line,
-        found: match fault.end {
-            None => "a quote that is never closed".to_owned(),
-            Some(end) => format!("a quote that is not closed before line {end}"),
-        },
-        expected: "'\"' at both ends of a field, and doubled within it".to_owned(),
-    }
+    let found = match fault.end {
+        None => "a quote that is never closed".to_owned(),
+        Some(end) => format!("a quote that is not closed before line {end}"),
+    };
+    let expected = "'\"' at both ends of a field, and doubled within it";
+    InputError::line(file, fault.line, found, expected)
 }
 
 fn csv_error(file: &str, error: csv::Error) -> InputError {
@@ -261,12 +244,7 @@ fn csv_error(file: &str, error: csv::Error) -> InputError {
             path: file.into(),
             source,
         },
-        other => InputError::Line {
-            file: file.to_owned(),
-            line,
-            found: format!("{other:?}"),
-            expected: "comma-separated values".into(),
-        },
+        other => InputError::line(file, line, format!("{other:?}"), "comma-separated values"),
     }
 }
 

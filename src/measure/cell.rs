@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{CellKey, GroupKey, Judged, Metric, PathInfo, SceneInfo, Status};
+use super::{CellKey, GroupKey, Judged, Metric, PathInfo, SceneInfo, Status, Verdict};
 use crate::index::{Kind, Origin};
 
 /// A structure, or a lower bound, on one scene, path and test.
@@ -87,6 +87,14 @@ impl ReportCell {
         CellKey {
             group: GroupKey::new(&self.scene.name, &self.path, &self.test),
             structure: self.structure.clone(),
+        }
+    }
+
+    /// Status with its reason.
+    pub fn verdict(&self) -> Verdict {
+        Verdict {
+            status: self.status,
+            reason: self.reason.clone(),
         }
     }
 

@@ -44,16 +44,18 @@ pub struct Sample {
 pub struct Timed {
     /// All clock readings of the task.
     pub samples: Vec<Sample>,
-    /// Rounds in which the task took part.
-    pub rounds: usize,
 }
 
 impl Timed {
+    /// The samples of each round that the task took part in.
+    pub fn rounds(&self) -> impl Iterator<Item = &[Sample]> {
+        self.samples.chunk_by(|a, b| a.round == b.round)
+    }
+
     /// Mean time per query of each round the task took part in, over all timed
     /// cameras, by one of the clocks; ns.
     pub fn round_means(&self, clock: impl Fn(&Sample) -> f64) -> Vec<f64> {
-        let rounds = self.samples.chunk_by(|a, b| a.round == b.round);
-        rounds
+        self.rounds()
             .map(|round| {
                 let queries: f64 = round.iter().map(|s| f64::from(s.queries)).sum();
                 let spent: f64 = round.iter().map(|s| clock(s) * f64::from(s.queries)).sum();
@@ -155,9 +157,6 @@ pub fn timed(
                 });
             }
         }
-    }
-    for timed in pass.results.iter_mut().flatten() {
-        timed.rounds = timed.samples.chunk_by(|a, b| a.round == b.round).count();
     }
     Some(pass.results)
 }
@@ -261,7 +260,7 @@ mod tests {
             let protocol = Protocol { cold, ..protocol() };
             for timed in timed_rounds(40, &all, &protocol, &|| false).unwrap() {
                 let timed = timed.unwrap();
-                assert_eq!(timed.rounds, 3);
+                assert_eq!(timed.rounds().count(), 3);
                 for round in 0..3 {
                     let samples = timed.samples.iter().filter(|s| s.round == round);
                     let asked: u32 = samples.map(|s| s.queries).sum();
@@ -290,7 +289,7 @@ mod tests {
         schedule.rounds = 6;
         schedule.tasks[1].every = 3;
         let found = timed(&all, &schedule, &protocol(), &|_| false).unwrap();
-        let rounds = |i: usize| found[i].as_ref().unwrap().rounds;
+        let rounds = |i: usize| found[i].as_ref().unwrap().rounds().count();
         assert_eq!((rounds(0), rounds(1)), (6, 2));
     }
 
@@ -315,7 +314,7 @@ mod tests {
         for at in [39, 0] {
             let all = [panics(40), panics(at)];
             let found = timed_rounds(40, &all, &protocol(), &|| false).unwrap();
-            assert_eq!(found[0].as_ref().unwrap().rounds, 3);
+            assert_eq!(found[0].as_ref().unwrap().rounds().count(), 3);
             let verdict = found[1].as_ref().unwrap_err();
             assert_eq!(verdict.status, Status::Panicked);
             let reason = verdict.reason.as_deref().unwrap_or_default();
@@ -341,7 +340,7 @@ mod tests {
             sample(4, 4, 100.0),
             sample(6, 4, 1e9),
         ];
-        let timed = Timed { samples, rounds: 4 };
+        let timed = Timed { samples };
         assert_eq!(timed.round_means(|s| s.cpu_ns)[0], 100.0);
         let ns = timed.ns().unwrap();
         assert!((ns - 100.0).abs() < 1e-9, "{ns}");

@@ -87,7 +87,6 @@ mod tests {
         let all = (0..2).flat_map(|round| (0..batches.len()).map(move |i| sample(round, i)));
         Timed {
             samples: all.collect(),
-            rounds: 2,
         }
     }
 

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, work_changes};
 use super::matching::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
 use super::{Report, ReportCell};
-use crate::measure::{CellKey, GroupKey, Status, Verdict};
+use crate::measure::{CellKey, GroupKey, Status};
 use crate::shown::number;
 use crate::statistics::{Judgement, judge_unpaired, median, trimmed_mean};
 
@@ -70,11 +70,7 @@ fn lone(cell: &ReportCell) -> Lone {
 /// Outcome of a pair by its statuses and questions alone; `None` if times decide.
 fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
     let (old, new) = pair;
-    let verdict = |cell: &ReportCell| Verdict {
-        status: cell.status,
-        reason: cell.reason.clone(),
-    };
-    let by_status = JudgedRow::of_statuses(new.key(), &verdict(old), &verdict(new));
+    let by_status = JudgedRow::of_statuses(new.key(), &old.verdict(), &new.verdict());
     // Wrong is wrong, whatever the question was.
     let is_broken = by_status.as_ref().map(|row| row.outcome) == Some(Outcome::Broken);
     let different = |reason: String| JudgedRow {

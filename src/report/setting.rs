@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use super::Report;
+use super::stream::caches;
 
 /// A fact that differs.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
@@ -26,15 +27,11 @@ type Fact = (&'static str, &'static str, bool, String);
 fn facts(report: &Report) -> Vec<Fact> {
     let (machine, tools) = (&report.machine, &report.toolchain);
     let known = |text: &Option<String>| text.clone().unwrap_or_else(|| "unknown".to_owned());
-    let caches = machine.caches.iter();
-    let caches: Vec<String> = caches
-        .map(|cache| format!("L{} {} KiB", cache.level, cache.bytes >> 10))
-        .collect();
     let (vectors, locked) = (machine.instruction_set.clone(), tools.lock_digest.clone());
     vec![
         ("machine", "cpu", true, known(&machine.cpu)),
         ("machine", "cores", true, machine.cores.to_string()),
-        ("machine", "caches", true, caches.join(" ")),
+        ("machine", "caches", true, caches(machine).join(" ")),
         ("machine", "instruction set", true, vectors),
         ("machine", "os kernel", false, known(&machine.kernel)),
         ("toolchain", "rustc", false, known(&tools.rustc)),

@@ -69,9 +69,6 @@ pub struct Difference {
     pub here: String,
 }
 
-/// Name of a fact, and its value in a run.
-type Fact = (&'static str, fn(&Header) -> Option<String>);
-
 impl Line {
     /// The line as JSON, with its end.
     ///
@@ -111,75 +108,60 @@ impl Header {
         }
     }
 
-    /// The first thing that tells machine, build or program of two runs apart.
+    /// The first fact of machine, build or program in which two runs differ.
     pub fn differs_in_place(&self, other: &Header) -> Option<Difference> {
-        const FACTS: [Fact; 19] = [
-            ("schema version", |h| Some(h.schema_version.to_string())),
-            ("processor", |h| h.machine.cpu.clone()),
-            ("number of cores", |h| Some(h.machine.cores.to_string())),
-            ("instruction set", |h| {
-                Some(h.machine.instruction_set.clone())
-            }),
-            ("list of processor features", |h| {
-                Some(h.machine.features.join(","))
-            }),
-            ("list of caches", |h| {
-                let caches = h.machine.caches.iter();
-                let told = caches.map(|c| format!("L{} {} KiB", c.level, c.bytes >> 10));
-                Some(told.collect::<Vec<_>>().join(", "))
-            }),
-            // A system keeps some of it for itself, now more, now less.
-            ("memory", |h| {
-                let bytes = h.machine.memory_bytes? as f64;
-                Some(format!("{:.0} GiB", bytes / f64::from(1 << 30)))
-            }),
-            ("system", |h| h.machine.os.clone()),
-            ("kernel of the system", |h| h.machine.kernel.clone()),
-            ("version", |h| Some(h.source.version.clone())),
-            ("commit", |h| h.source.commit.clone()),
-            ("state of the source (dirty)", |h| {
-                h.source.dirty.map(|dirty| dirty.to_string())
-            }),
-            ("compiler", |h| h.toolchain.rustc.clone()),
-            ("target", |h| h.toolchain.target.clone()),
-            ("compiler flags", |h| Some(h.toolchain.flags.clone())),
-            ("profile", |h| {
-                let profile = h.toolchain.profile.clone()?;
-                let level = h.toolchain.opt_level.clone().unwrap_or_default();
-                Some(format!("{profile}, level {level}"))
-            }),
-            ("list of features", |h| Some(h.toolchain.features.join(","))),
-            ("digest of Cargo.lock", |h| {
-                Some(short(&h.toolchain.lock_digest))
-            }),
-            ("digest of the program", |h| h.binary.as_deref().map(short)),
-        ];
-        self.differs_in(other, &FACTS)
+        first_difference(self.place(), other.place())
     }
 
-    /// The first thing that tells the plans of two runs apart, but for which
-    /// shard each of them is.
+    /// The first fact in which the plans of two runs differ, the shard apart.
     pub fn differs_in_plan(&self, other: &Header) -> Option<Difference> {
-        const FACTS: [Fact; 5] = [
-            ("seed", |h| Some(h.run.seed.to_string())),
-            ("suite", |h| h.run.suite.clone()),
-            ("generator", |h| Some(h.run.generator.clone())),
-            ("number of processes", |h| Some(h.run.processes.to_string())),
-            ("list of structures", |h| Some(h.structures.join(","))),
-        ];
-        self.differs_in(other, &FACTS)
+        first_difference(self.plan(), other.plan())
     }
 
-    fn differs_in(&self, other: &Header, facts: &[Fact]) -> Option<Difference> {
-        let shown = |value: Option<String>| value.unwrap_or_else(|| "unknown".to_owned());
-        facts.iter().find_map(|(what, of)| {
-            let (before, here) = (of(self), of(other));
-            (before != here).then(|| Difference {
-                what,
-                before: shown(before),
-                here: shown(here),
-            })
-        })
+    fn place(&self) -> Vec<Fact> {
+        let (machine, tools, source) = (&self.machine, &self.toolchain, &self.source);
+        let gib = |bytes: u64| format!("{:.0} GiB", bytes as f64 / f64::from(1 << 30));
+        let level = tools.opt_level.as_deref().unwrap_or_default();
+        let profile = tools.profile.as_ref();
+        let profile = profile.map(|profile| format!("{profile}, level {level}"));
+        let dirty = source.dirty.map(|dirty| dirty.to_string());
+        let program = self.binary.as_deref().map(short);
+        vec![
+            ("schema version", Some(self.schema_version.to_string())),
+            ("processor", machine.cpu.clone()),
+            ("number of cores", Some(machine.cores.to_string())),
+            ("instruction set", Some(machine.instruction_set.clone())),
+            (
+                "list of processor features",
+                Some(machine.features.join(",")),
+            ),
+            ("list of caches", Some(caches(machine).join(", "))),
+            // A system keeps some of it for itself, now more, now less.
+            ("memory", machine.memory_bytes.map(gib)),
+            ("system", machine.os.clone()),
+            ("kernel of the system", machine.kernel.clone()),
+            ("version", Some(source.version.clone())),
+            ("commit", source.commit.clone()),
+            ("state of the source (dirty)", dirty),
+            ("compiler", tools.rustc.clone()),
+            ("target", tools.target.clone()),
+            ("compiler flags", Some(tools.flags.clone())),
+            ("profile", profile),
+            ("list of features", Some(tools.features.join(","))),
+            ("digest of Cargo.lock", Some(short(&tools.lock_digest))),
+            ("digest of the program", program),
+        ]
+    }
+
+    fn plan(&self) -> Vec<Fact> {
+        let run = &self.run;
+        vec![
+            ("seed", Some(run.seed.to_string())),
+            ("suite", run.suite.clone()),
+            ("generator", Some(run.generator.clone())),
+            ("number of processes", Some(run.processes.to_string())),
+            ("list of structures", Some(self.structures.join(","))),
+        ]
     }
 
     /// The groups of the whole plan, in order.
@@ -189,6 +171,27 @@ impl Header {
             false => &self.whole,
         }
     }
+}
+
+/// A named fact of a run; `None` if it is unknown.
+type Fact = (&'static str, Option<String>);
+
+fn first_difference(before: Vec<Fact>, here: Vec<Fact>) -> Option<Difference> {
+    let shown = |value: Option<String>| value.unwrap_or_else(|| "unknown".to_owned());
+    let mut pairs = before.into_iter().zip(here);
+    let ((what, before), (_, here)) = pairs.find(|(before, here)| before != here)?;
+    Some(Difference {
+        what,
+        before: shown(before),
+        here: shown(here),
+    })
+}
+
+/// Levels and sizes of the caches, "L1 32 KiB".
+pub(super) fn caches(machine: &Machine) -> Vec<String> {
+    let caches = machine.caches.iter();
+    let shown = caches.map(|cache| format!("L{} {} KiB", cache.level, cache.bytes >> 10));
+    shown.collect()
 }
 
 /// Beginning of a digest, enough for a reader.
