@@ -78,16 +78,16 @@
 mod named;
 
 #[cfg(feature = "cli")]
-pub mod advise;
+mod advise;
 pub mod arithmetic;
 pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod culling;
 #[cfg(feature = "cli")]
-pub mod drift;
+mod drift;
 #[cfg(feature = "cli")]
-pub mod funnel;
+mod funnel;
 pub mod geometry;
 pub mod index;
 pub mod input;
@@ -97,7 +97,7 @@ pub mod measure;
 pub mod oracle;
 pub mod path;
 #[cfg(feature = "cli")]
-pub mod precision;
+mod precision;
 pub mod query;
 pub mod report;
 pub mod scene;

@@ -14,7 +14,7 @@ mod trials;
 use serde::{Deserialize, Serialize};
 
 pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
-pub use omission::{Check, Decision, LeftOutIf, Omission};
+pub use omission::{Check, LeftOutIf, Omission};
 pub use options::{AdviseError, AdviseOptions};
 
 use crate::culling::Culling;

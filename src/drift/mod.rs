@@ -16,7 +16,7 @@ use serde::Serialize;
 
 pub use arm::Method as ArmMethod;
 pub use arm::{ARMS, ArmKind};
-pub use arm_study::{ArmChoice, ArmOptions, ArmPoint, Setting};
+pub use arm_study::{ArmChoice, ArmOptions, ArmPoint};
 pub use frames::Turn;
 pub use orbit::{OrbitDrift, SWING_DEG};
 pub use rated::{Rated, Recommendation};

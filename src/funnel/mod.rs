@@ -29,17 +29,18 @@ mod world;
 
 pub use back_ends::{back_ends, left_out_of};
 pub use bounds::BoundRow;
-pub use counts::Errors;
-pub use error::{FunnelError, LeftOutRow};
+#[cfg(test)]
+pub(crate) use counts::Errors;
 pub use fragment_stage::FragmentCounts;
-pub use mirror::MirrorRow;
 pub use orders::OrderRow;
-pub use picks::{PickQuestion, PickRow};
+pub use picks::PickRow;
 pub use plan_view::{Fate, PlanView};
-pub use report::{CutOutRow, FunnelReport, Gain, LevelRow, StageRow};
-pub use stage::{BackEnd, Chain, NONE, StageKind};
-pub use study::{Prepared, failure, prepare, time};
-pub use sweep::{PreparedSweep, StageSweep, SweepPoint, prepare_sweep, time_sweep};
-pub use task::{FunnelKey, FunnelPlan, Times};
+pub use report::{FunnelReport, Gain, LevelRow, StageRow};
+#[cfg(test)]
+pub(crate) use stage::BackEnd;
+pub use stage::{Chain, NONE, StageKind};
+pub use study::{failure, prepare, time};
+pub use sweep::{StageSweep, SweepPoint, prepare_sweep, time_sweep};
+pub use task::{FunnelPlan, Times};
 pub use triangle_stage::BYTES_PER_TRIANGLE;
 pub use world::FunnelInput;

@@ -13,8 +13,8 @@ mod sweeps;
 
 pub use judged::{CullingErrors, Names};
 pub use point::{Point, Times};
-pub use points::{PointPlan, Precision, PrecisionInput, Prepared, prepare, time};
-pub use region_search::{POINTS_PER_CAMERA, RegionErrors};
-pub use size_sweep::{SIZE_RATIOS, SizeError, SizeRow, size_sweep};
+pub use points::{PointPlan, Precision, PrecisionInput, prepare, time};
+pub use region_search::RegionErrors;
+pub use size_sweep::{SIZE_RATIOS, SizeRow, size_sweep};
 pub use stability::StableAfter;
-pub use sweeps::{SWEEPS, Sweep, SweepRow, sweep};
+pub use sweeps::{SWEEPS, SweepRow, sweep};
