@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::key::Pass;
 use super::notice::Notice;
-use super::task::Pass;
 use super::{Answer, Built, Status, Subject, Verdict, Workload, guarded};
 use crate::culling::CullingTest;
 use crate::index::Kind;

@@ -6,11 +6,10 @@ use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
 use super::count::{Counted, count_pass, judge};
-use super::key::GroupKey;
+use super::key::{GroupKey, Pass, TaskKey};
 use super::notice::{Notice, TIMING};
-use super::part::{Known, Part, SubjectPart, TaskKey, TaskPart, TaskSamples};
+use super::part::{Known, Part, SubjectPart, TaskPart, TaskSamples};
 use super::subject::TWIN;
-use super::task::Pass;
 use super::{
     Answer, Judged, KeyedSchedule, PathInfo, Protocol, SceneInfo, Schedule, Status, Subject,
     TaskKind, Tasks, Timed, TimedTask, Verdict, Workload, guarded, timed,

@@ -42,3 +42,59 @@ pub struct CellKey {
     /// Label of the structure, `bvh:leaf=4`.
     pub structure: String,
 }
+
+named! {
+    /// Kind of query.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
+    pub enum TaskKind {
+        /// Frustum query: the items that the camera sees.
+        Query = "query",
+        /// Region search: the regions that hold the camera.
+        Locate = "locate",
+        /// Region search of all cameras of the path in one batch.
+        LocateBatched = "locate_batched",
+    }
+}
+
+/// Passes of a group, each timed by itself.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Pass {
+    /// Frustum queries, one per camera; lower bounds take part.
+    Queries,
+    /// Region searches, one per eye.
+    Searches,
+}
+
+impl Pass {
+    pub(super) const ALL: [Pass; 2] = [Pass::Queries, Pass::Searches];
+
+    pub(super) fn of(task: TaskKind) -> Pass {
+        match task {
+            TaskKind::Query => Pass::Queries,
+            TaskKind::Locate | TaskKind::LocateBatched => Pass::Searches,
+        }
+    }
+
+    /// CPU time of a task of this pass / time of a frustum query's.
+    /// Region search is not what structures are ranked by.
+    pub(super) fn share(self) -> f64 {
+        match self {
+            Pass::Queries => 1.0,
+            Pass::Searches => 1.0 / 3.0,
+        }
+    }
+
+    /// Object of one query, for messages.
+    pub(super) fn question(self) -> &'static str {
+        match self {
+            Pass::Queries => "camera",
+            Pass::Searches => "point",
+        }
+    }
+}
+
+/// Key of a task of a group: label of a structure or a lower bound, and what it is
+/// timed at.
+pub type TaskKey = (String, TaskKind);

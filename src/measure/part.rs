@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::index::{Kind, Origin, StructureSpec};
 
-use super::task::Pass;
+use super::key::{Pass, TaskKey};
 use super::{
     Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, TaskKind, Verdict,
 };
@@ -29,10 +29,6 @@ pub struct Known {
     /// Scale of the lens where the path names a visible share.
     pub lens_scale: Option<f64>,
 }
-
-/// Key of a task of a group: label of a structure or a lower bound, and what it is
-/// timed at.
-pub type TaskKey = (String, TaskKind);
 
 impl Known {
     /// Schedule of a pass, if it is timed, and the right answers.

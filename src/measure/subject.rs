@@ -4,7 +4,7 @@
 
 use super::clock::Stopwatch;
 use super::guarded::guarded;
-use super::task::Pass;
+use super::key::Pass;
 use super::update::measure_updates;
 use super::{Status, Verdict, Workload, input_of};
 use crate::culling::CullingTest;
