@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::key::Pass;
-use super::notice::Notice;
+use super::progress::Notice;
 use super::{Answer, Built, Status, Subject, Verdict, Workload, guarded};
 use crate::culling::CullingTest;
 use crate::index::Kind;

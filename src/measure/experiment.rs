@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::bounds::BOUNDS;
 use super::group::{GroupPlan, measure_part};
 use super::key::{CellKey, GroupKey};
-use super::notice::Notice;
-use super::part::{Known, Part, TaskSamples};
+use super::process_result::{Known, Part, TaskSamples};
+use super::progress::Notice;
 use super::refitted::refitted_ln;
 use super::schedule::cameras_within;
 use super::{

@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
 use super::count::{Counted, count_pass, judge};
+use super::index_under_test::TWIN;
 use super::key::{GroupKey, Pass, TaskKey};
-use super::notice::{Notice, TIMING};
-use super::part::{Known, Part, SubjectPart, TaskPart, TaskSamples};
-use super::subject::TWIN;
+use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
+use super::progress::{Notice, TIMING};
 use super::{
     Answer, Judged, KeyedSchedule, PathInfo, Protocol, SceneInfo, Schedule, Status, Subject,
     TaskKind, Tasks, Timed, TimedTask, Verdict, Workload, guarded, timed,

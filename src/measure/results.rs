@@ -10,9 +10,9 @@ use serde_json::Value;
 
 use super::bounds::{BOUNDS, Bound};
 use super::group::{GroupPlan, LEAST_TAIL, measure_part};
+use super::index_under_test::TWIN;
 use super::metrics::{METRICS, Metrics};
-use super::part::{Known, Part, SubjectPart, TaskPart};
-use super::subject::TWIN;
+use super::process_result::{Known, Part, SubjectPart, TaskPart};
 use super::update::MOST_UPDATED;
 use super::{
     CellTimes, Judged, PathInfo, Protocol, ReportCell, SceneInfo, Status, Subject, TaskKind,

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::cache_flush::Cold;
 use super::clock::Stopwatch;
-use super::cold::Cold;
 use super::guarded::guarded;
 use super::orders::Orders;
 use super::schedule::{Protocol, Schedule};
