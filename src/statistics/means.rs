@@ -1,6 +1,17 @@
-//! Means: geometric, interquartile.
+//! Means: plain, geometric, interquartile.
 
 use super::sorted;
+
+/// The plain mean.
+pub(super) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Sum of the squared distances from the mean.
+pub(super) fn squares(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    values.iter().map(|value| (value - mean).powi(2)).sum()
+}
 
 /// exp of the mean logarithm; `None` for no data or a value that is not
 /// positive. The right mean for ratios (Fleming and Wallace 1986).

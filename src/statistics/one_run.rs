@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::means::squares;
 use super::trimmed::centre;
 use super::{Trimmed, trimmed_mean};
 
@@ -107,9 +108,7 @@ fn margin(values: &[f64]) -> f64 {
 fn estimate(values: &[f64]) -> Option<Trimmed> {
     let trimmed = trimmed_mean(values)?;
     let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let plain = (squares / (count * (count - 1.0))).sqrt();
+    let plain = (squares(values) / (count * (count - 1.0))).sqrt();
     Some(Trimmed {
         standard_error: trimmed.standard_error.max(plain),
         df: (trimmed.df - 1.0).max(1.0),

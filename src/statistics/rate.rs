@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::means::{mean, squares};
 use super::student;
 use super::trimmed::{Trimmed, paired_difference};
 
@@ -119,11 +120,9 @@ pub fn shows_less_in_sum(times: [&[f64]; 2], counts: [&[f64]; 2], alpha: f64) ->
 fn plain_difference(a: &[f64], b: &[f64]) -> Trimmed {
     let differences: Vec<f64> = b.iter().zip(a).map(|(b, a)| b - a).collect();
     let count = differences.len() as f64;
-    let mean = differences.iter().sum::<f64>() / count;
-    let squares: f64 = differences.iter().map(|d| (d - mean).powi(2)).sum();
-    let error = (squares / (count * (count - 1.0))).sqrt();
+    let error = (squares(&differences) / (count * (count - 1.0))).sqrt();
     Trimmed {
-        mean,
+        mean: mean(&differences),
         standard_error: if error > 0.0 { error } else { 0.0 },
         df: (count - 1.0).max(1.0),
         count: differences.len(),

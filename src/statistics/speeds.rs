@@ -1,5 +1,6 @@
 //! Detection of a machine with two speeds.
 
+use super::means::{mean, squares};
 use super::sorted;
 
 /// Fewer values show clusters by chance.
@@ -35,16 +36,8 @@ pub fn two_speeds(times: &[f64]) -> Option<(f64, f64)> {
     (high - low > SEPARATION * deviation).then(|| (low.exp(), high.exp()))
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 /// Sum of squares within both parts.
 fn within((low, high): (&[f64], &[f64])) -> f64 {
-    let squares = |values: &[f64]| {
-        let mean = mean(values);
-        values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
-    };
     squares(low) + squares(high)
 }
 

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::means::{mean, squares};
 use super::{median, sorted, student};
 
 /// Share of the values that is cut off at each end.
@@ -98,9 +99,8 @@ pub(super) fn centre(values: &[f64]) -> Option<f64> {
     }
     let (cut, sorted) = (cut(values.len()), sorted(values.to_vec()));
     let inner = &sorted[cut..sorted.len() - cut];
-    let mean = inner.iter().sum::<f64>() / inner.len() as f64;
     // Rounding can carry the mean of equal values past them.
-    Some(mean.clamp(inner[0], inner[inner.len() - 1]))
+    Some(mean(inner).clamp(inner[0], inner[inner.len() - 1]))
 }
 
 /// The difference of two independent trimmed means, `new` - `old`, with the
@@ -177,12 +177,6 @@ fn winsorised(values: &[f64]) -> Vec<f64> {
     let (cut, sorted) = (cut(values.len()), sorted(values.to_vec()));
     let (low, high) = (sorted[cut], sorted[sorted.len() - 1 - cut]);
     values.iter().map(|value| value.clamp(low, high)).collect()
-}
-
-/// Sum of the squared distances from the mean.
-fn squares(values: &[f64]) -> f64 {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter().map(|value| (value - mean).powi(2)).sum()
 }
 
 #[cfg(test)]
