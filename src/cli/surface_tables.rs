@@ -48,12 +48,13 @@ fn winner(place: &Place) -> String {
         .map(|c| c.structure.as_str())
         .collect();
     let mut told = names.join(" = ");
-    let ratio = place.comparison.winners().next();
-    if let Some(ratio) = ratio.and_then(|c| c.value("speedup"))
-        && !place.scan_wins()
-    {
-        told += &format!(": {}", text::significant(ratio));
-    }
+    let ratio = place
+        .comparison
+        .winners()
+        .next()
+        .and_then(|cell| cell.value("speedup"));
+    let ratio = ratio.filter(|_| !place.scan_wins());
+    told += &text::some(ratio, |ratio| format!(": {}", text::significant(ratio)));
     if place.is_off_class() {
         told += &format!(" (at {})", text::percent(place.share));
     }
@@ -66,15 +67,14 @@ fn crossings(surface: &Surface) -> Option<Table> {
     let header = ["faster than linear from".to_owned()].into_iter();
     let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| class(*c))));
     for structure in surface.no_scans() {
-        let told = classes.iter().map(|class| {
-            let crossing = surface.crossing(structure, *class);
-            match crossing {
+        let told = classes
+            .iter()
+            .map(|class| match surface.crossing(structure, *class) {
                 None => String::new(),
                 Some(Crossing::Below(items)) => format!("<= {}", text::count(items)),
                 Some(Crossing::At(items)) => format!("~ {}", text::count(two_digits(items))),
                 Some(Crossing::Above(items)) => format!("> {}", text::count(items)),
-            }
-        });
+            });
         let told: Vec<String> = told.collect();
         if told.iter().any(|cell| !cell.is_empty()) {
             let name = [structure.to_owned()].into_iter();

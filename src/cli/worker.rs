@@ -18,8 +18,10 @@ use super::args::{Cli, Command};
 use super::protocol::{Job, Message, PROTOCOL, Request};
 use super::{advise, drift, funnel, precision, run_plan, stage_sweep};
 use crate::index::Registry;
-use crate::measure::{Part, Plan, ProcessTimes, TIMING, TaskSamples, measure_scene};
+use crate::measure::{Part, Plan, ProcessTimes, Share, TIMING, TaskSamples, measure_scene};
 
+/// Error of a request whose job and arguments do not match.
+const OTHER: &str = "a job of another command";
 /// Exit code of a worker whose parent is gone.
 const ORPHANED: i32 = 130;
 /// Time between the reports of a worker that is timing.
@@ -39,13 +41,11 @@ pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
 }
 
 fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
-    if request.protocol != PROTOCOL {
-        anyhow::bail!(
-            "protocol {} is requested; expected {PROTOCOL}: the two programs are of different \
-             versions",
-            request.protocol
-        );
-    }
+    anyhow::ensure!(
+        request.protocol == PROTOCOL,
+        "protocol {} is requested; expected {PROTOCOL}: the two programs are of different versions",
+        request.protocol
+    );
     let here = Here::default();
     // Before the processor is chosen: it may wake up on another one.
     here.at.clone().tell_of_turns();
@@ -59,11 +59,20 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
         .into_iter()
         .chain(request.args.clone());
     match (&request.job, Cli::try_parse_from(typed)?.command) {
-        (Job::Scene { .. }, Command::Run(args)) => {
-            here.scene(&run_plan::plan(registry, &args)?.plan, &request.job)?;
-        }
-        (Job::Scene { .. }, Command::Advise(args)) => {
-            here.scene(&advise::plan(registry, &args)?, &request.job)?;
+        (
+            Job::Scene {
+                scene,
+                share,
+                samples,
+            },
+            command,
+        ) => {
+            let plan = match command {
+                Command::Run(args) => run_plan::plan(registry, &args)?.plan,
+                Command::Advise(args) => advise::plan(registry, &args)?,
+                _ => anyhow::bail!(OTHER),
+            };
+            here.scene(&plan, *scene, share, *samples)?;
         }
         (Job::Trials(plan, timing), Command::Advise(args)) => {
             here.times(&|stop| advise::time(registry, &args, plan, timing, stop))?;
@@ -80,7 +89,7 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
         (Job::Drift(plan, timing), Command::Drift(args)) => {
             here.times(&|stop| Ok(drift::time(&args, plan, timing, stop)))?;
         }
-        _ => anyhow::bail!("a job of another command"),
+        _ => anyhow::bail!(OTHER),
     }
     match here.failed.into_inner() {
         Some(error) => Err(error.into()),
@@ -159,21 +168,14 @@ impl Here {
         self.failed.borrow().is_some()
     }
 
-    fn scene(&self, plan: &Plan, job: &Job) -> anyhow::Result<()> {
-        let Job::Scene {
-            scene,
-            share,
-            samples: wanted,
-        } = job
-        else {
-            return Ok(());
-        };
+    /// Measures one scene of a plan; sends samples only if they are `wanted`.
+    fn scene(&self, plan: &Plan, scene: usize, share: &Share, wanted: bool) -> anyhow::Result<()> {
         let mut keep = |part: Part, samples: Vec<TaskSamples>| {
-            let samples = if *wanted { samples } else { Vec::new() };
+            let samples = if wanted { samples } else { Vec::new() };
             self.tell(&Message::Part(Box::new(part), samples));
         };
         let notice = |structure: Option<&str>, step: &str| self.notice(structure, step);
-        let planned = &plan.scenes[*scene];
+        let planned = &plan.scenes[scene];
         measure_scene(plan, planned, share, &mut keep, &notice, &|| self.stop())?;
         Ok(())
     }

@@ -10,12 +10,12 @@ use super::process::*;
 fn the_funnel_of_a_mesh_is_judged_by_its_triangles() {
     for (scene, path) in [
         ("mesh:spheres:n=40k", "flythrough:frames=4"),
-        ("mesh:forest:n=20k", "street:frames=4"),
-        ("mesh:terrain:n=10k", "street:frames=2"),
-        ("mesh:statue:n=5k", "orbit:frames=2"),
+        ("mesh:forest:n=10k", "street:frames=2"),
+        ("mesh:terrain:n=5k", "street:frames=1"),
+        ("mesh:statue:n=5k", "orbit:frames=1"),
     ] {
         let line = format!(
-            "funnel --scene {scene} --path {path} --samples 96x54 --processes 1 --format json"
+            "funnel --scene {scene} --path {path} --samples 64x36 --processes 1 --format json"
         );
         let report = json(&works(Path::new("."), &line));
         for row in array(&report, "stages") {
