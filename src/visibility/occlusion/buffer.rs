@@ -1,5 +1,6 @@
-//! The depth buffers of this stage as a contract: occluders are drawn into them, and
-//! rectangles are tested.
+//! The depth buffers of this stage as a contract.
+//!
+//! Occluders are drawn into them, and rectangles are tested.
 
 use super::outline::{Coverage, Outline};
 use super::rect::{Candidate, Rect, Rects};
@@ -16,8 +17,9 @@ pub trait OcclusionBuffer {
     const GUARANTEE: Guarantee;
     /// The pixels of an occluder that are drawn.
     const COVERAGE: Coverage;
-    /// `true` if draws and tests may alternate; else [`OcclusionBuffer::finish`] separates
-    /// them.
+    /// `true` if draws and tests may alternate.
+    ///
+    /// If not, [`OcclusionBuffer::finish`] separates them.
     const ALTERNATES: bool;
 
     /// An empty buffer.
@@ -32,7 +34,7 @@ pub trait OcclusionBuffer {
     /// Prepares the buffer for tests, after all draws.
     fn finish(&mut self) {}
 
-    /// Returns `true` if something drawn is nearer than the rectangle in all its pixels.
+    /// Returns `true` if what was drawn is nearer than the rectangle in all its pixels.
     ///
     /// As near is not nearer.
     fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool;
@@ -51,8 +53,9 @@ pub trait OcclusionBuffer {
     }
 }
 
-/// Draws what hides at a candidate's position, unless a ray enters its box before the near
-/// plane; returns the number of occluders that cover any pixel.
+/// Draws the occluders of a candidate; returns the number that cover any pixel.
+///
+/// Draws none if a ray may enter the candidate's box before the near plane.
 #[inline(always)]
 pub fn draw<I: Isa, B: OcclusionBuffer>(
     isa: I,

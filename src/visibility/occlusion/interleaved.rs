@@ -40,7 +40,7 @@ struct Entry {
     rect: Rect,
     block: u32,
     level: u16,
-    /// Whether there is no rectangle.
+    /// `true` if there is no rectangle.
     near: bool,
     open: PlaneMask,
     /// How many occluders had been drawn when the rectangle was looked at.
@@ -141,7 +141,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         });
         let mut rects = Rects::NONE;
         let mut open = [0; LANES];
-        // Survivors that something was drawn after; the others have been asked by all of it.
+        // Survivors that something was drawn after; the others were tested against all of it.
         let mut early = 0;
         while let Some(Reverse((_, place))) = queue.pop() {
             let entry = entries[place as usize];
@@ -240,8 +240,9 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
     }
 }
 
-/// The lanes by their depths, each with its depth's upper bits in front of its number;
-/// returns how many there are.
+/// Sorts lanes by depth; returns their number.
+///
+/// Each entry is the upper bits of the depth, then the lane.
 #[inline(always)]
 fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> usize {
     let mut count = 0;
@@ -261,8 +262,9 @@ fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> 
     count
 }
 
-/// The lanes whose boxes may cover at least so many pixels, about: a rectangle is rounded
-/// outward, so that the pixels at its rim are covered in part.
+/// The lanes whose boxes may cover at least `pixels` pixels, about.
+///
+/// A rectangle is rounded outward, so the pixels at its rim are covered in part.
 #[inline(always)]
 fn coverable_from<I: Isa>(isa: I, rects: &Rects, coverage: Coverage, pixels: u32) -> LaneMask {
     let rim = match coverage {

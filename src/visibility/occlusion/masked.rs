@@ -157,7 +157,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     }
 }
 
-/// What is known of a tile's pixels.
+/// The two layers of a tile.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Tile {
     pub reference: f32,
@@ -350,7 +350,7 @@ const STEPS: [f32; LANES] = [
     0.0, 8.0, 16.0, 24.0, 32.0, 40.0, 48.0, 56.0, 64.0, 72.0, 80.0, 88.0, 96.0, 104.0, 112.0, 120.0,
 ];
 
-/// What an occluder adds to some tiles side by side.
+/// The part of an occluder in some tiles side by side.
 struct Layer {
     mask: [Mask; CHUNK],
     near: [f32; CHUNK],

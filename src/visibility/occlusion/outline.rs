@@ -1,5 +1,7 @@
-//! What a box covers in the image, without clipping: one convex outline of at most
-//! six half-planes, and its nearness, the least of at most three linear functions.
+//! The outline of a box in the image, without clipping.
+//!
+//! It is convex, of at most six half-planes; its nearness is the least of at most three linear
+//! functions.
 //!
 //! # Half-planes
 //!
@@ -74,9 +76,9 @@ pub struct Outline {
     /// The least of these is the nearness, rounded down already.
     faces: [Linear; 3],
     face_count: usize,
-    /// What the nearness is not below.
+    /// Lower bound of the nearness.
     floor: f64,
-    /// Of the padded image.
+    /// Columns of the padded image.
     columns: f64,
     height: f64,
     coverage: Coverage,
@@ -273,7 +275,7 @@ impl Outline {
         self.rows = [top.max(y0), bottom.min(y1)];
     }
 
-    /// First row and the one behind the last that columns have to be asked for.
+    /// First row and the one behind the last that may have columns.
     pub fn rows(&self) -> (usize, usize) {
         (self.rows[0] as usize, self.rows[1] as usize)
     }
@@ -355,8 +357,9 @@ struct Mirrored {
 }
 
 impl Mirrored {
-    /// Mirrors the axes of which `side` is below zero; no face of those of zero is turned to
-    /// the eye.
+    /// Mirrors the axes of which `side` is below zero.
+    ///
+    /// No face of an axis whose `side` is zero is turned to the eye.
     #[inline(always)]
     fn of(low: DVec3, high: DVec3, view: &View, side: impl Fn(usize) -> f64) -> Mirrored {
         let mut mirrored = Mirrored {

@@ -1,5 +1,6 @@
-//! Where sixteen boxes are in the image, and how near: rectangles of pixels,
-//! rounded outward, and depths, rounded towards the eye.
+//! Projections of sixteen boxes: rectangles of pixels and depths.
+//!
+//! Rectangles are rounded outward, depths towards the eye.
 //!
 //! # Error analysis
 //!
@@ -90,7 +91,7 @@ pub struct Rects {
     pub y0: [i32; LANES],
     /// Last rows.
     pub y1: [i32; LANES],
-    /// As [`Rect::nearness`].
+    /// [`Rect::nearness`] of each box.
     pub nearness: [f32; LANES],
     /// Not above the least depth: what boxes are sorted by.
     pub depth: [f32; LANES],
@@ -256,7 +257,7 @@ impl Rects {
 struct AboutEye<I: Isa> {
     /// Axis by axis the lower and the upper bounds.
     bounds: [[I::Floats; 2]; 3],
-    /// What all errors are relative to, negated: -r.
+    /// The size that all errors are relative to, negated: -r.
     minus_size: I::Floats,
 }
 

@@ -1,5 +1,6 @@
-//! The items of a scene, prepared once for occlusion: a packed tree of blocks of
-//! sixteen, and for each item what the drawing of occluders must know of it.
+//! The items of a scene, prepared once for occlusion.
+//!
+//! They are in a packed tree of blocks of sixteen, each with its occluders.
 
 use glam::DVec3;
 
@@ -31,11 +32,11 @@ pub struct OccluderScene {
     levels: Vec<Vec<BoxBlock>>,
     /// In tree order, as what hides.
     ids: Vec<ItemId>,
-    /// What hides, and which faces of the scene's bounds it reaches.
+    /// All occluders, in tree order.
     occluders: Vec<Occluder>,
-    /// Where those of a position begin; at the end their number.
+    /// First occluder of each position; at the end their number.
     first_occluders: Vec<u32>,
-    /// Where in the tree an item is.
+    /// Position of each item in tree order.
     positions: Vec<u32>,
     /// How many of the boxes are items; those behind them only hide.
     items: usize,
@@ -55,9 +56,10 @@ impl OccluderScene {
         OccluderScene::sorted(solids.origin, &solids.outer, &occluders, bounds)
     }
 
-    /// Items that hide what is behind boxes inside them (each with its item, by ascending
-    /// item), among boxes that hide and are no items: below ground, the rock between the
-    /// rooms of a map. All scene-local. O(n log n).
+    /// Items with boxes inside that hide, among boxes that hide and are no items.
+    ///
+    /// O(n log n). Each of `inner` has its item, by ascending item. `blocks` are below ground or in the
+    /// rock between the rooms of a map. All are scene-local.
     pub fn among(scene: &Scene, inner: &[(ItemId, Aabb)], blocks: &[Aabb]) -> OccluderScene {
         let bounds = WorldBox::union_of(scene.written());
         let numbered = (scene.items.len() as ItemId..).zip(blocks.iter().copied());
@@ -126,7 +128,7 @@ impl OccluderScene {
         self.ids.len()
     }
 
-    /// Whether there are no boxes.
+    /// Returns `true` if there are no boxes.
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
     }
@@ -143,7 +145,7 @@ impl OccluderScene {
         self.items as ItemId..self.ids.len() as ItemId
     }
 
-    /// Where the zero of the boxes is in the world.
+    /// World position of the zero of the boxes.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
@@ -153,7 +155,7 @@ impl OccluderScene {
         &self.bounds
     }
 
-    /// Where in tree order an item is.
+    /// Position of an item in tree order.
     #[inline(always)]
     pub fn position(&self, item: ItemId) -> usize {
         self.positions[item as usize] as usize
@@ -186,7 +188,7 @@ impl OccluderScene {
         self.levels[0][position / LANES].get(position % LANES)
     }
 
-    /// What hides at a position; nothing where the item is not solid.
+    /// Occluders at a position; none where the item is not solid.
     #[inline(always)]
     pub fn occluders(&self, position: usize) -> &[Occluder] {
         let [first, end] = [position, position + 1].map(|at| self.first_occluders[at] as usize);

@@ -1,6 +1,6 @@
-//! What a masked buffer is asked to do in one view, written down: the tiles that are
-//! drawn into and those that decide. Doing that again, and nothing else, is the least
-//! that the stage can take with such a buffer.
+//! A trace of a masked buffer in a view: tiles drawn into and tiles that decide.
+//!
+//! Replaying it, and nothing else, is the least that the stage can take with such a buffer.
 
 use std::cell::RefCell;
 
@@ -29,7 +29,7 @@ pub struct FrameTrace {
 }
 
 impl FrameTrace {
-    /// Of the interleaved coupling with [`MaskedInner`].
+    /// Traces the interleaved coupling with [`MaskedInner`].
     pub fn of(scene: &OccluderScene, view: &View, kernel: Kernel) -> FrameTrace {
         let traced = Traced::new(view.grid);
         let mut culling = Interleaved::new(traced, kernel);
@@ -42,8 +42,7 @@ impl FrameTrace {
         }
     }
 
-    /// Reads the boxes of the occluders that were drawn, 24 bytes each: as many, side by
-    /// side.
+    /// Reads as many boxes of occluders as were drawn, side by side, 24 bytes each.
     pub fn read_occluders(&self, scene: &OccluderScene) -> u32 {
         let drawn = &scene.all_occluders()[..self.stats.drawn];
         drawn.iter().fold(0, |all, occluder| {

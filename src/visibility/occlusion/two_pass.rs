@@ -16,14 +16,14 @@ use crate::query::ItemId;
 pub enum OccluderChoice {
     /// All of them.
     All,
-    /// So many of least depth.
+    /// Those of least depth, up to a number.
     Nearest(usize),
-    /// So many that cover the most pixels by their rectangles.
+    /// Those whose rectangles cover the most pixels, up to a number.
     Largest(usize),
 }
 
 impl OccluderChoice {
-    /// As it is typed: `all`, `nearest:64`, `largest:64`.
+    /// Parses `all`, `nearest:64`, `largest:64`.
     pub fn parse(text: &str) -> Option<OccluderChoice> {
         let count = |text: &str| text.parse().ok().filter(|count| *count > 0);
         match text.split_once(':') {

@@ -67,24 +67,24 @@ pub struct Projection {
     /// Rows for x, y and depth: of a perspective lens x and y are still to be
     /// divided by the depth.
     pub rows: [[f32; 3]; 3],
-    /// What is added to x and y; zero for a perspective lens.
+    /// Added to x and y; zero for a perspective lens.
     pub shift: [f32; 2],
     /// Width and height of the image.
     pub size: [f32; 2],
-    /// What a coordinate's error is, apart from the box's own size, in units of
+    /// Error of a coordinate, apart from the box's own size, in units of
     /// two u: see `rect`.
     pub far_from_zero: f32,
     /// Factors of the slack in x and y: see `rect`.
     pub slack: [f32; 2],
     /// The part of it that no size of a box changes.
     pub slack_added: [f32; 2],
-    /// What depths are subtracted from for an orthographic lens.
+    /// Depth that depths are subtracted from for an orthographic lens.
     pub base: f32,
     /// Boxes farther away than this are near: see `rect`. Below 0 all of them are.
     pub most_size: f32,
 }
 
-/// A camera's rays over a buffer of so many pixels, in a scene's coordinates.
+/// A camera's rays over the pixels of a buffer, in a scene's coordinates.
 #[derive(Clone, Debug)]
 pub struct View<'v> {
     /// The volume whose planes say what is in the view at all.
@@ -93,7 +93,7 @@ pub struct View<'v> {
     pub grid: SampleGrid,
     /// Width and height of the image in pixels, rounded up to whole tiles.
     pub padded: [f64; 2],
-    /// Whether all rays are parallel.
+    /// `true` if all rays are parallel.
     pub parallel: bool,
     /// The eye in scene coordinates.
     pub eye: DVec3,
@@ -102,17 +102,16 @@ pub struct View<'v> {
     /// Perspective: a ray's direction for unit depth, axis by axis. Parallel rays:
     /// where the ray leaves the plane of the eye, about the eye.
     pub rays: [Linear; 3],
-    /// What a coordinate of `rays` can reach within the padded image, all axes
+    /// Largest coordinate of `rays` within the padded image, all axes
     /// together.
     pub reach: f64,
-    /// What the eye's coordinates may be wrong by, in units of 2^-52.
+    /// Error of the eye's coordinates, in units of 2^-52.
     pub far_from_zero: f64,
     /// Least visible depth.
     pub near: f64,
     /// Largest visible depth, or infinity.
     pub far: f64,
-    /// What no ray has passed through before the near plane lies outside of this
-    /// box (perspective lenses).
+    /// A box that holds all points of rays before the near plane (perspective lenses).
     pub before_near: [DVec3; 2],
     /// The faces of the scene's bounds beyond which no ray comes back: see
     /// `outline`.
@@ -122,8 +121,9 @@ pub struct View<'v> {
 }
 
 impl<'v> View<'v> {
-    /// A camera's rays in a scene. The volume is asked which items are in the view;
-    /// it should hold all that the rays can meet.
+    /// A camera's rays in a scene.
+    ///
+    /// The volume decides which items are in the view; it should hold all that the rays meet.
     pub fn new(
         rays: &Rays,
         volume: &'v ConvexVolume,
@@ -180,7 +180,7 @@ impl<'v> View<'v> {
         }
     }
 
-    /// Whether some ray may enter the box before the near plane (or begin in it).
+    /// Returns `true` if some ray may enter the box, or begin in it, before near.
     /// Such a box may not be drawn: that ray does not meet it.
     #[inline(always)]
     pub fn entered_before_near(&self, outer: &Aabb) -> bool {
@@ -197,8 +197,9 @@ impl<'v> View<'v> {
     }
 }
 
-/// What f64 sums of a few products of coordinates are moved by, relative to the
-/// sum of their sizes: 2^-44. Each coordinate about the eye is wrong by at most
+/// Margin of f64 sums of a few products, relative to the sum of their sizes: 2^-44.
+///
+/// Each coordinate about the eye is wrong by at most
 /// 2^-52 of itself and of the eye's (the eye in scene coordinates was rounded
 /// once, the difference once), each coefficient of a ray by less than 2^-50 of the
 /// ray's reach, the truth's own rays by as much, and a sum of three products adds

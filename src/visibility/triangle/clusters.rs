@@ -1,4 +1,4 @@
-//! Clusters: at most 64 neighbouring triangles of an item, a bit of a word for each.
+//! Clusters: at most 64 neighbouring triangles of an item, a bit of a word each.
 //!
 //! Grown greedily over common edges, along the Morton curve (as Kapoulkine's meshoptimizer
 //! grows meshlets). Deterministic.

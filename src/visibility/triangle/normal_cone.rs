@@ -27,6 +27,7 @@ use glam::{DVec3, Vec3};
 use super::exact::{faces, normal};
 use super::eye::Eye;
 use crate::arithmetic::rounding::round_up;
+use crate::geometry::Aabb;
 
 /// Slack of the sine for the rounding of the test: see above.
 const SLACK: f64 = 10.0 / (1u64 << 24) as f64;
@@ -115,9 +116,8 @@ fn axis_of(normals: impl Iterator<Item = DVec3> + Clone) -> Option<DVec3> {
 
 /// A point of f32 that is in front of no triangle: proven by the exact test.
 fn apex_of(planes: &[([Vec3; 3], DVec3)], axis: DVec3) -> Option<Vec3> {
-    let points = || planes.iter().flat_map(|(corners, _)| *corners);
-    let low = points().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
-    let high = points().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
+    let bounds = Aabb::of_points(planes.iter().flat_map(|(corners, _)| *corners));
+    let [low, high] = [bounds.min, bounds.max].map(Vec3::as_dvec3);
     let centre = (low + high) * 0.5;
     let distances = planes
         .iter()

@@ -172,12 +172,11 @@ impl Facets {
             })
         };
         let all: Vec<Facet> = (0..surfaces.items()).flat_map(of_item).collect();
-        let bounds =
-            |&Facet {
-                 corners: [a, b, c], ..
-             }: &Facet| { Aabb::new(a.min(b).min(c), a.max(b).max(c)) };
         Bodies {
-            bounds: all.iter().map(bounds).collect(),
+            bounds: all
+                .iter()
+                .map(|facet| Aabb::of_points(facet.corners))
+                .collect(),
             all,
             origin: surfaces.origin,
             items: surfaces.items(),
