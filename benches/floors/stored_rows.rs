@@ -7,9 +7,7 @@ use std::sync::Arc;
 
 use cullbench::measure::Stopwatch;
 use cullbench::visibility::Rays;
-use cullbench::visibility::region::{
-    EXACT, Pvs, RegionGraph, RegionId, RegionRow, Scratch, StoredPvs,
-};
+use cullbench::visibility::region::{Pvs, RegionGraph, RegionId, RegionRow, Scratch, Source};
 
 use super::{loaded, over_builds, ratio, verdict};
 
@@ -27,7 +25,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
     let (typed, scene, cameras) = loaded(SCENE, PATH, only_test);
     let graph = Arc::new(RegionGraph::of_scene(&scene).expect("rooms"));
     let pvs = Arc::new(Pvs::of_rooms(&graph).expect("flat openings"));
-    let stored = StoredPvs::of(graph.clone(), pvs, EXACT).expect("as many regions");
+    let stored = RegionRow::stored(Source::Exact, graph.clone(), pvs).expect("as many regions");
     let eyes = cameras.cameras.iter().map(|c| Rays::of(c).expect("rays"));
     let eyes: Vec<Rays> = eyes.collect();
     let mut homes: Vec<RegionId> = Vec::new();
@@ -38,7 +36,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
         }
     }
     // What is stored of the rows, one after the other.
-    let rows = homes.iter().map(|home| stored.stored(*home).to_vec());
+    let rows = homes.iter().map(|home| stored.stored_from(*home).to_vec());
     let rows: Vec<Vec<RegionId>> = rows.collect();
 
     let passes = if only_test { 1 } else { PASSES };
@@ -54,14 +52,14 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
     };
     let mut answer_ns = 0.0;
     // Kept, so that the next ones lie elsewhere.
-    let mut earlier: Vec<(StoredPvs, Vec<Vec<RegionId>>)> = Vec::new();
+    let mut earlier: Vec<(RegionRow, Vec<Vec<RegionId>>)> = Vec::new();
     let [times, low, high] = over_builds(if only_test { 3 } else { BUILDS }, |_| {
         let (stored, rows) = (stored.clone(), rows.clone());
-        let row: &dyn RegionRow = black_box(&stored);
+        let row: &RegionRow = black_box(&stored);
         let answer = || {
             answer_ns = time(&mut || {
                 for home in &homes {
-                    read_all(row.stored(*home));
+                    read_all(row.stored_from(*home));
                 }
             });
             answer_ns
@@ -77,7 +75,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
         earlier.push((stored, rows));
         times
     });
-    let row: &dyn RegionRow = black_box(&stored);
+    let row: &RegionRow = black_box(&stored);
     let (mut scratch, mut out) = (Scratch::default(), Vec::new());
     let from_eye = time(&mut || {
         for rays in &eyes {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cullbench::scene::{Scene, WadMap, map_names};
 use cullbench::visibility::Ray;
-use cullbench::visibility::region::Marks;
+use cullbench::visibility::region::IdSet;
 use cullbench::visibility::region::doom::DoomMap;
 
 use crate::read;
@@ -38,7 +38,7 @@ fn see_through(map: Arc<DoomMap>, scene: &Scene) {
     let Ok(graph) = map.graph() else {
         return;
     };
-    let mut seen = Marks::default();
+    let mut seen = IdSet::default();
     for place in &scene.places {
         let ray = Ray {
             origin: place.eye,

@@ -9,7 +9,7 @@ use crate::visibility::occlusion::{
     HierarchicalZ, Interleaved, MaskedCentre, MaskedInner, OccluderChoice, OccluderScene,
     OcclusionBuffer, TwoPass, View, ZBuffer,
 };
-use crate::visibility::region::{self, About};
+use crate::visibility::region;
 use crate::visibility::triangle::TRIANGLE_ROWS;
 use crate::visibility::{Guarantee, SampleGrid};
 
@@ -20,14 +20,6 @@ pub const Z: &str = "z-test";
 const ALPHA: &str = "alpha-test";
 /// The test that is restricted to the samples of portals.
 pub const STENCIL: &str = "stencil-test";
-
-/// Most rooms for which the exact potentially visible sets are computed.
-const MOST_EXACT_ROOMS: usize = 4_096;
-
-/// Whether the exact potentially visible sets of a scene's rooms are computed.
-pub fn has_exact(scene: &Scene) -> bool {
-    matches!(&scene.regions, Regions::Tiling(rooms) if rooms.boxes.len() <= MOST_EXACT_ROOMS)
-}
 
 /// The region stage of a map whose sectors do not divide the plane, with the reason.
 pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
@@ -46,7 +38,7 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
     let mut rows = vec![BackEnd::new(stage, declared, Guarantee::Conservative)];
     match stage {
         StageKind::Region => {
-            let known = region::ROWS.iter().filter(|row| searches(row, scene));
+            let known = region::BACK_ENDS.iter().filter(|row| row.is_for(scene));
             rows.extend(
                 known.map(|row| BackEnd::new(stage, [row.name, row.summary], row.guarantee)),
             );
@@ -62,16 +54,6 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
         StageKind::Fragment => rows.extend(fragment_tests(scene, has_cut_outs)),
     }
     rows
-}
-
-/// Whether a back end of the region stage finds a way through a scene's regions.
-fn searches(row: &About, scene: &Scene) -> bool {
-    let is = |other: About| row.name == other.name;
-    match &scene.regions {
-        Regions::Tiling(_) => !is(region::REJECT) && (!is(region::EXACT) || has_exact(scene)),
-        Regions::Bsp(map) => !is(region::EXACT) && map.disputes().is_empty(),
-        _ => false,
-    }
 }
 
 fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> impl Iterator<Item = BackEnd> {

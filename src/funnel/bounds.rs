@@ -112,10 +112,10 @@ pub fn bounds<'w>(
     bounds
 }
 
-fn of_table<'w>(world: &'w World, row: &'w dyn RegionRow) -> Bound<'w> {
+fn of_table<'w>(world: &'w World, row: &'w RegionRow) -> Bound<'w> {
     let homes = world.views().map(|view| {
         let mut homes = Vec::new();
-        match row.graph().homes(world.rays(view), &mut homes) {
+        match row.graph.homes(world.rays(view), &mut homes) {
             true => homes,
             false => Vec::new(),
         }
@@ -124,17 +124,21 @@ fn of_table<'w>(world: &'w World, row: &'w dyn RegionRow) -> Bound<'w> {
     let name = "read the rows of the eye's regions";
     Bound::new(StageKind::Region, ["exact-pvs", name], move |view, _| {
         for &home in &homes[view] {
-            black_box(row.stored(home).iter().fold(0, |all, region| all ^ region));
+            black_box(
+                row.stored_from(home)
+                    .iter()
+                    .fold(0, |all, region| all ^ region),
+            );
         }
     })
 }
 
-fn of_portals<'w>(world: &World, row: &dyn RegionRow) -> Bound<'w> {
+fn of_portals<'w>(world: &World, row: &RegionRow) -> Bound<'w> {
     let seen_openings = |view| -> Vec<Opening> {
         let mut seen = Vec::new();
         row.from_eye(world.rays(view), &mut Scratch::default(), &mut seen);
         let is_seen = |region: &RegionId| seen.binary_search(region).is_ok();
-        let openings = row.graph().openings().iter();
+        let openings = row.graph.openings().iter();
         let inner = openings.filter(|opening| opening.sides.iter().all(is_seen));
         inner.copied().collect()
     };

@@ -4,6 +4,7 @@
 use std::cell::RefCell;
 use std::collections::HashSet;
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::back_ends::{STENCIL, Z};
@@ -17,10 +18,8 @@ use super::truth::Truth;
 use super::world::{Shape, World};
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
-use crate::visibility::fragment::{
-    Canvas, Drawn, DrawnTriangles, Piece, Screen, Stencil, Surfaces, Tally, Tests,
-};
-use crate::visibility::truth::TriangleProbe;
+use crate::visibility::fragment::{Canvas, Drawn, Holes, Piece, Screen, Stencil, Tally, Tests};
+use crate::visibility::truth::Facet;
 use crate::visibility::{Rays, Solids};
 
 /// Samples and fragments of a test, means per view.
@@ -91,7 +90,7 @@ enum Left<'w> {
     Triangles(&'w scene::Surfaces, Vec<Vec<u32>>, TriangleImage),
 }
 
-type TriangleImage = RefCell<Option<(Canvas<TriangleProbe>, DrawnTriangles)>>;
+type TriangleImage = RefCell<Option<(Canvas<Facet>, Drawn<Facet>)>>;
 
 impl Left<'_> {
     /// Refuses a view that covers too many samples.
@@ -152,7 +151,7 @@ impl<'w> FragmentStage<'w> {
                 let new = || (Canvas::of(rays, grid), Drawn::new(grid.samples()));
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
-                canvas.turn_to(rays);
+                canvas.turn_to(rays, DVec3::ZERO);
                 let left = &views[view];
                 left.draw(test, canvas, drawn);
                 let visible = drawn.depth.visible(canvas).into_iter();
@@ -162,13 +161,13 @@ impl<'w> FragmentStage<'w> {
             Left::Triangles(surfaces, views, image) => {
                 let origin = surfaces.origin;
                 let new = || {
-                    let canvas = Canvas::for_triangles(rays, grid, origin);
-                    (canvas, DrawnTriangles::new(grid.samples()))
+                    let canvas = Canvas::about(rays, grid, origin);
+                    (canvas, Drawn::new(grid.samples()))
                 };
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
                 canvas.turn_to(rays, origin);
-                drawn.draw(canvas, surfaces, &views[view]);
+                drawn.draw_triangles(canvas, surfaces, &views[view]);
                 // Floors and ceilings of a map come behind its items.
                 let items = self.world.items() as ItemId;
                 let visible = drawn.visible(canvas).into_iter();
@@ -231,7 +230,7 @@ impl<'w> FragmentStage<'w> {
 struct Boxes {
     items: Vec<ItemId>,
     solids: Solids,
-    cut_outs: Option<Surfaces>,
+    cut_outs: Option<Holes>,
     room: Option<Room>,
 }
 
@@ -270,7 +269,7 @@ impl Boxes {
             Some(room) => {
                 drawn.draw(canvas, solids, &room.near, &tests);
                 let stencil = room.stencil(canvas, drawn);
-                drawn.tally.asked += stencil.asked();
+                drawn.tally.asked += stencil.tested;
                 let stencil = Some(&stencil);
                 drawn.draw(canvas, solids, &room.beyond, &Tests { stencil, ..tests });
             }
@@ -306,10 +305,6 @@ impl Room {
 
     /// Samples that see a portal before everything that is drawn already.
     fn stencil(&self, canvas: &Canvas, drawn: &Drawn) -> Stencil {
-        let mut stencil = Stencil::of(vec![false; canvas.grid().samples()]);
-        for portal in &self.portals {
-            stencil.add(&Stencil::of_rectangle(canvas, portal, &drawn.depth));
-        }
-        stencil
+        Stencil::of_rectangles(canvas, &self.portals, &drawn.depth)
     }
 }

@@ -12,7 +12,7 @@ use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::occlusion;
-use crate::visibility::region::{EyePlace, Marks, Scratch};
+use crate::visibility::region::{EyePlace, IdSet, Scratch};
 
 /// Appends the items of a view that a stage leaves of those given (`None`: all items).
 pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
@@ -37,7 +37,7 @@ impl World<'_> {
     fn run_region(&self, name: &str) -> Run<'_> {
         let regions = self.regions.as_ref().expect("a scene with regions");
         let row = regions.row(name).expect("a row of the region stage");
-        let state = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
+        let state = RefCell::new((Scratch::default(), IdSet::default(), Vec::new()));
         Box::new(move |view, _, out| {
             let (scratch, marks, seen) = &mut *state.borrow_mut();
             match row.from_eye(&self.views[view].rays, scratch, seen) {
@@ -50,7 +50,7 @@ impl World<'_> {
     fn run_object(&self, name: &str) -> Run<'_> {
         let found = self.structures.iter().find(|(label, _)| label == name);
         let (_, index) = found.expect("a structure that was built");
-        let state = RefCell::new((Marks::default(), Vec::new()));
+        let state = RefCell::new((IdSet::default(), Vec::new()));
         Box::new(move |view, input, out| {
             let volume = &self.views[view].volume;
             let Some(items) = input else {

@@ -69,7 +69,7 @@ pub fn mirrored(
         let left = world.listed(stages.items(steps, view));
         let left: Vec<Piece> = left.iter().copied().map(Piece::whole).collect();
         let direct = draw(&canvas, solids, &left, &Tests::default());
-        let stencil = Stencil::of_rectangle(&canvas, &face, &direct.depth);
+        let stencil = Stencil::of_rectangles(&canvas, &[face], &direct.depth);
         let reflected = canvas.mirrored(axis, face.min[axis]);
         let screen = reflected.screen();
         let rectangles = solids.boxes.iter().filter_map(|b| screen.rectangle(b));
@@ -80,7 +80,7 @@ pub fn mirrored(
         };
         let mut seen = draw(&reflected, solids, &others, &tests);
         let all = draw(&reflected, solids, &others, &Tests::default());
-        seen.tally.asked += stencil.asked();
+        seen.tally.asked += stencil.tested;
         let [own, other] = [&seen, &all].map(|drawn| drawn.depth.ids());
         let marks = (0..own.len()).filter(|&sample| stencil.holds(sample));
         wrong += marks.filter(|&sample| own[sample] != other[sample]).count() as u64;

@@ -60,7 +60,7 @@ struct Left {
     items: Vec<ItemId>,
     /// Solid boxes, or the boxes about the items.
     boxes: Solids,
-    cut_outs: Option<fragment::Surfaces>,
+    cut_outs: Option<fragment::Holes>,
     rays: Rays,
     orders: Vec<Box<dyn DepthOrder>>,
 }
@@ -85,9 +85,10 @@ impl Left {
     ) -> (Vec<&'static order::OrderRow>, Left) {
         let boxes = all.some(items);
         let triangles = world.shape.triangles().map(|surfaces| surfaces.some(items));
-        let to_order = match &triangles {
-            None => ToOrder::boxes(&boxes),
-            Some(own) => ToOrder::surfaces(&boxes, own, world.scene.own_tree.as_ref()),
+        let to_order = ToOrder {
+            boxes: &boxes,
+            planes: triangles.as_ref().and(world.scene.own_tree.as_ref()),
+            surfaces: triangles.as_ref(),
         };
         let built = ORDERS
             .iter()

@@ -3,12 +3,9 @@
 use std::cell::OnceCell;
 use std::sync::Arc;
 
-use super::back_ends::has_exact;
 use crate::scene::{Dispute, Scene};
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::region::{
-    About, EXACT, Pvs, REJECT, RegionGraph, RegionItems, RegionRow, STORED, Searched, StoredPvs,
-};
+use crate::visibility::region::{BACK_ENDS, Pvs, RegionGraph, RegionItems, RegionRow, Source};
 
 /// Rooms of a scene or sectors of its map.
 pub struct Regions {
@@ -16,10 +13,10 @@ pub struct Regions {
     pub graph: Arc<RegionGraph>,
     /// Items of each region.
     pub items: RegionItems,
-    rows: Vec<Box<dyn RegionRow>>,
+    rows: Vec<RegionRow>,
     has_exact: bool,
     /// The exact table, computed when it is first used.
-    exact: OnceCell<Option<StoredPvs>>,
+    exact: OnceCell<Option<RegionRow>>,
 }
 
 impl Regions {
@@ -32,46 +29,44 @@ impl Regions {
             None => RegionGraph::of_scene(scene).map_err(|_| None)?,
         });
         let mut regions = Regions {
-            rows: vec![
-                Box::new(Searched::flood(graph.clone())),
-                Box::new(Searched::portal_rect(graph.clone())),
-                Box::new(Searched::portal_clip(graph.clone())),
-            ],
+            rows: [Source::Flood, Source::PortalRect, Source::PortalClip]
+                .map(|source| RegionRow::search(source, graph.clone()))
+                .into(),
             items: RegionItems::of(&graph, scene),
             graph,
-            has_exact: has_exact(scene),
+            has_exact: BACK_ENDS
+                .iter()
+                .any(|row| row.source == Source::Exact && row.is_for(scene)),
             exact: OnceCell::new(),
         };
         if let Some(reject) = map.and_then(|map| map.reject()) {
-            regions.store(Arc::new(reject), REJECT);
+            regions.store(Arc::new(reject), Source::Reject);
         }
         Ok(regions)
     }
 
     /// Adds a claimed table; false if it has another number of regions.
     pub fn claim(&mut self, claim: &Arc<Pvs>) -> bool {
-        self.store(claim.clone(), STORED)
+        self.store(claim.clone(), Source::Claim)
     }
 
-    fn store(&mut self, pvs: Arc<Pvs>, about: About) -> bool {
-        let row = StoredPvs::of(self.graph.clone(), pvs, about);
+    fn store(&mut self, pvs: Arc<Pvs>, source: Source) -> bool {
+        let row = RegionRow::stored(source, self.graph.clone(), pvs);
         let fits = row.is_some();
-        self.rows
-            .extend(row.map(|row| Box::new(row) as Box<dyn RegionRow>));
+        self.rows.extend(row);
         fits
     }
 
     /// The back end of a name.
-    pub fn row(&self, name: &str) -> Option<&dyn RegionRow> {
-        if name == EXACT.name {
+    pub fn row(&self, name: &str) -> Option<&RegionRow> {
+        let source = BACK_ENDS.iter().find(|row| row.name == name)?.source;
+        if source == Source::Exact {
             let exact = self.exact.get_or_init(|| {
                 let exact = self.has_exact.then(|| Pvs::of_rooms(&self.graph).ok());
-                let pvs = exact.flatten()?;
-                StoredPvs::of(self.graph.clone(), Arc::new(pvs), EXACT)
+                RegionRow::stored(source, self.graph.clone(), Arc::new(exact.flatten()?))
             });
-            return exact.as_ref().map(|row| row as &dyn RegionRow);
+            return exact.as_ref();
         }
-        let found = self.rows.iter().find(|row| row.about().name == name);
-        found.map(|row| &**row)
+        self.rows.iter().find(|row| row.back_end.source == source)
     }
 }

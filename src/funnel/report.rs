@@ -14,7 +14,7 @@ use super::stage::{BackEnd, Chain, StageKind};
 use super::task::{FunnelKey, KeyedTimes, Times};
 use crate::statistics::{ALPHA, trimmed_mean};
 use crate::visibility::Level;
-use crate::visibility::fragment::{CutOuts, Surfaces};
+use crate::visibility::fragment::{CutOuts, Holes};
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 
 /// The funnel of a scene and a path.
@@ -119,7 +119,7 @@ pub struct CutOutRow {
 
 impl CutOutRow {
     /// Options, and the surfaces made from them.
-    pub(super) fn new(cut_outs: &CutOuts, made: &Surfaces) -> CutOutRow {
+    pub(super) fn new(cut_outs: &CutOuts, made: &Holes) -> CutOutRow {
         CutOutRow {
             mask: cut_outs.mask.name(),
             share: cut_outs.share,

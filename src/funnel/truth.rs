@@ -64,7 +64,7 @@ pub fn visible(
 
 /// Surfaces at which rays end: solid boxes, or triangles with the floors of a map.
 enum RaysEnd<'w> {
-    Boxes(RayIndex, Option<&'w fragment::Surfaces>),
+    Boxes(RayIndex, Option<&'w fragment::Holes>),
     Triangles(SurfaceIndex),
 }
 

@@ -96,7 +96,7 @@ pub struct World<'a> {
     pub views: Vec<View>,
     pub shape: Shape,
     /// Items that have holes, if any have.
-    pub cut_outs: Option<fragment::Surfaces>,
+    pub cut_outs: Option<fragment::Holes>,
     /// Occluders.
     pub hiders: Hiders,
     /// Occluders that two passes draw.

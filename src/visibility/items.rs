@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::fragment::{self, CutOuts};
+use super::fragment::{CutOuts, Holes};
 use super::region::RegionGraph;
 use super::region::doom::DoomMap;
 use crate::query::ItemId;
@@ -19,8 +19,8 @@ pub fn surfaces_of(scene: &Scene) -> Option<Arc<Surfaces>> {
 /// The items of a scene that are cut out: all but the walls of its rooms.
 ///
 /// The regions of the rooms are `graph`; a view into the next room leads through portals only.
-pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> fragment::Surfaces {
+pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> Holes {
     let walls = graph.map(|graph| graph.borders(scene));
     let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
-    typed.surfaces(scene.items.len(), is_free)
+    typed.holes(scene.items.len(), is_free)
 }

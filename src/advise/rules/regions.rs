@@ -16,7 +16,7 @@ use crate::scene::Scene;
 use crate::visibility::Rays;
 use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{
-    EyePlace, Marks, RegionGraph, RegionItems, RegionRow, Scratch, Searched, seen_by_samples,
+    EyePlace, IdSet, RegionGraph, RegionItems, RegionRow, Scratch, Source, seen_by_samples,
 };
 
 pub(super) const RULE: Rule = Rule {
@@ -34,7 +34,7 @@ pub(super) const RULE: Rule = Rule {
 
 /// The regions of the scene with their items, and what is asked of them.
 struct Regions {
-    row: Searched,
+    row: RegionRow,
     items: RegionItems,
     views: Vec<(Rays, ConvexVolume)>,
 }
@@ -58,7 +58,7 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
     let views = hidden::sights(case).map_err(not_applicable)?;
     let regions = Rc::new(Regions {
         items: RegionItems::of(&graph, case.scene()),
-        row: Searched::portal_clip(graph),
+        row: RegionRow::search(Source::PortalClip, graph),
         views,
     });
     let predicted = predicted(case, &regions);
@@ -77,7 +77,7 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
 /// The items of the regions that are seen, each tested against the six planes; all
 /// items by the tree where the eye is in no region.
 fn asked<'c>(case: &'c Case<'c>, regions: Rc<Regions>) -> Ask<'c> {
-    let memory = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
+    let memory = RefCell::new((Scratch::default(), IdSet::default(), Vec::new()));
     let items = &case.scene().items;
     Box::new(move |n, out| {
         let (rays, volume) = &regions.views[n];
@@ -94,10 +94,10 @@ fn asked<'c>(case: &'c Case<'c>, regions: Rc<Regions>) -> Ask<'c> {
 
 /// Of the items that a few cameras meet, those in no region that a few rays pass.
 fn predicted(case: &Case, regions: &Regions) -> f64 {
-    let graph = regions.row.graph();
+    let graph = &*regions.row.graph;
     let (mut met, mut gone) = (0, 0);
     let (mut found, mut listed) = (Vec::new(), Vec::new());
-    let (mut homes, mut seen, mut marks) = (Vec::new(), Vec::new(), Marks::default());
+    let (mut homes, mut seen, mut marks) = (Vec::new(), Vec::new(), IdSet::default());
     for frame in hidden::frames(regions.views.len(), PROBED) {
         found.clear();
         case.query(frame, &mut found);

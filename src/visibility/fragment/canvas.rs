@@ -1,61 +1,64 @@
-//! The samples of an image, ready to be drawn on: it finds the fragments of a box.
+//! The samples of an image, ready to be drawn on: rasterisation of boxes and triangles.
 
 use glam::DVec3;
 
 use super::order::{Part, Piece};
-use super::screen::Screen;
+use super::screen::{Rectangle, Screen};
 use super::stencil::Stencil;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
-use crate::visibility::truth::{Crossing, Probe, TriangleProbe};
-use crate::visibility::{Ray, Rays, SampleGrid, Solids};
+use crate::visibility::truth::{Body, Crossing, Probe, SolidBox};
+use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// An item at a sample.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Fragment<At = Crossing> {
-    /// Row by row from the top left.
+    /// Index of the sample, row by row from the top left.
     pub sample: usize,
     /// The item.
     pub item: ItemId,
-    /// Where the ray meets it.
+    /// Point where the ray meets the item.
     pub at: At,
 }
 
-/// What it took to find the fragments of a piece.
+/// Samples that were visited for a piece.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub(super) struct Asked {
-    /// Samples whose rays were asked.
-    pub samples: u64,
-    /// Samples that the stencil kept out.
+pub(super) struct Visited {
+    /// Samples whose rays were tested.
+    pub tested: u64,
+    /// Samples that the stencil kept from a test.
     pub kept_out: u64,
 }
 
 /// The samples of an image with their rays, for boxes (88 bytes a sample) or for triangles
 /// (128).
 #[derive(Clone, Debug)]
-pub struct Canvas<P = Probe> {
+pub struct Canvas<B: Body = SolidBox> {
     screen: Screen,
-    probes: Vec<P>,
+    probes: Vec<B::Probe>,
 }
 
-impl<P> Canvas<P> {
-    fn by(rays: &Rays, grid: SampleGrid, probe: impl Fn(Ray) -> P) -> Canvas<P> {
+impl<B: Body> Canvas<B> {
+    /// The rays of a camera through the samples of a grid, for bodies relative to an
+    /// origin.
+    pub fn about(rays: &Rays, grid: SampleGrid, origin: DVec3) -> Canvas<B> {
         let mut canvas = Canvas {
             screen: Screen::of(rays, grid),
             probes: Vec::with_capacity(grid.samples()),
         };
-        canvas.fill(rays, probe);
+        canvas.turn_to(rays, origin);
         canvas
     }
 
-    fn fill(&mut self, rays: &Rays, probe: impl Fn(Ray) -> P) {
+    /// Takes the samples of another camera, in the same memory.
+    pub fn turn_to(&mut self, rays: &Rays, origin: DVec3) {
         let grid = self.grid();
         self.screen = Screen::of(rays, grid);
         self.probes.clear();
         for row in 0..grid.height {
-            for column in 0..grid.width {
-                self.probes.push(probe(rays.sample(grid, column, row)));
-            }
+            let ray = |column| rays.sample(grid, column, row);
+            let probes = (0..grid.width).map(|column| B::probe(&ray(column), origin));
+            self.probes.extend(probes);
         }
     }
 
@@ -64,39 +67,47 @@ impl<P> Canvas<P> {
         self.screen.grid()
     }
 
-    /// Where boxes and triangles come to lie in the image.
+    /// The image, in which boxes and triangles can be placed.
     pub fn screen(&self) -> &Screen {
         &self.screen
     }
 
     /// The ray of a sample.
     #[inline]
-    pub fn probe(&self, sample: usize) -> &P {
+    pub fn probe(&self, sample: usize) -> &B::Probe {
         &self.probes[sample]
     }
-}
 
-impl Canvas<TriangleProbe> {
-    /// The rays of a camera through the samples of a grid, for triangles about an origin.
-    pub fn for_triangles(rays: &Rays, grid: SampleGrid, origin: DVec3) -> Self {
-        Canvas::by(rays, grid, |ray| TriangleProbe::new(ray, origin))
-    }
-
-    /// Takes the samples of another camera, in the same memory.
-    pub fn turn_to(&mut self, rays: &Rays, origin: DVec3) {
-        self.fill(rays, |ray| TriangleProbe::new(ray, origin));
+    /// Calls `visit` with each sample of a rectangle that the stencil lets through.
+    pub(super) fn scan(
+        &self,
+        rectangle: Option<Rectangle>,
+        stencil: Option<&Stencil>,
+        mut visit: impl FnMut(usize, &B::Probe),
+    ) -> Visited {
+        let mut visited = Visited::default();
+        let Some(Rectangle { columns, rows }) = rectangle else {
+            return visited;
+        };
+        for row in rows {
+            for column in columns.clone() {
+                let sample = (row * self.grid().width + column) as usize;
+                if stencil.is_some_and(|stencil| !stencil.holds(sample)) {
+                    visited.kept_out += 1;
+                    continue;
+                }
+                visited.tested += 1;
+                visit(sample, &self.probes[sample]);
+            }
+        }
+        visited
     }
 }
 
 impl Canvas {
     /// The rays of a camera through the samples of a grid, for boxes.
     pub fn of(rays: &Rays, grid: SampleGrid) -> Canvas {
-        Canvas::by(rays, grid, Probe::new)
-    }
-
-    /// Takes the samples of another camera, in the same memory.
-    pub fn turn_to(&mut self, rays: &Rays) {
-        self.fill(rays, Probe::new);
+        Canvas::about(rays, grid, DVec3::ZERO)
     }
 
     /// The same samples seen in a mirror that is a plane across an axis: the rays
@@ -106,11 +117,9 @@ impl Canvas {
         let reflected = |probe: &Probe| {
             let mut ray = *probe.ray();
             let depth = (at - ray.origin[axis]) / ray.direction[axis];
-            let reached = depth >= 0.0 && depth.is_finite();
-            ray.near = if reached {
-                depth.max(ray.near)
-            } else {
-                f64::INFINITY
+            ray.near = match depth >= 0.0 && depth.is_finite() {
+                true => depth.max(ray.near),
+                false => f64::INFINITY,
             };
             ray.origin[axis] = 2.0 * at - ray.origin[axis];
             ray.direction[axis] = -ray.direction[axis];
@@ -122,35 +131,21 @@ impl Canvas {
         }
     }
 
-    /// Hands over each sample that meets the box, with where.
+    /// Calls `found` with each sample that meets the box.
     pub(super) fn meet(
         &self,
         b: &WorldBox,
         stencil: Option<&Stencil>,
         mut found: impl FnMut(usize, Crossing),
-    ) -> Asked {
-        let mut asked = Asked::default();
-        let Some(rectangle) = self.screen.rectangle(b) else {
-            return asked;
-        };
-        for row in rectangle.rows {
-            for column in rectangle.columns.clone() {
-                let sample = (row * self.grid().width + column) as usize;
-                if stencil.is_some_and(|stencil| !stencil.holds(sample)) {
-                    asked.kept_out += 1;
-                    continue;
-                }
-                asked.samples += 1;
-                let probe = &self.probes[sample];
-                if let Some(at) = probe.enter(b, probe.ray().far) {
-                    found(sample, at);
-                }
+    ) -> Visited {
+        self.scan(self.screen.rectangle(b), stencil, |sample, probe| {
+            if let Some(at) = probe.enter(b, probe.ray().far) {
+                found(sample, at);
             }
-        }
-        asked
+        })
     }
 
-    /// Hands over the fragments of a piece: of a part of an item, those where the
+    /// Calls `found` with the fragments of a piece: for a part of an item, those where the
     /// item is entered through that part.
     pub(super) fn fragments(
         &self,
@@ -158,17 +153,14 @@ impl Canvas {
         piece: &Piece,
         stencil: Option<&Stencil>,
         mut found: impl FnMut(Fragment),
-    ) -> Asked {
+    ) -> Visited {
         let item = piece.item;
         let whole = &solids.boxes[item as usize];
-        let part = match &piece.part {
-            Some(Part::Within(part)) => part,
+        let Some(Part::Within(part)) = &piece.part else {
             // Leaves are of triangles.
-            Some(Part::InLeaf(_)) | None => {
-                return self.meet(whole, stencil, |sample, at| {
-                    found(Fragment { sample, item, at });
-                });
-            }
+            return self.meet(whole, stencil, |sample, at| {
+                found(Fragment { sample, item, at });
+            });
         };
         self.meet(part, stencil, |sample, of_part| {
             let probe = &self.probes[sample];

@@ -1,9 +1,8 @@
-//! Cut-outs of a scene as they are typed: which share of its items has holes, and of
-//! which mask.
+//! Cut-outs of a scene as typed: the share of its items that has holes, and their mask.
 
 use std::fmt::{self, Display, Formatter};
 
-use super::mask::{MASKS, Mask, Surface, Surfaces};
+use super::mask::{Holes, MASKS, Mask, Surface};
 use crate::query::ItemId;
 use crate::scene::SeededRng;
 use crate::spec::{Spec, SpecError};
@@ -12,17 +11,17 @@ use crate::spec::{Spec, SpecError};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct CutOuts {
-    /// Where they are opaque; not [`Mask::Solid`].
+    /// Pattern of their opaque parts.
     pub mask: Mask,
-    /// Of the items that may be cut out, in (0, 1].
+    /// Share of the items that may be cut out, in (0, 1].
     pub share: f64,
     /// Edge length of a tile of the mask, world units; above 0.
     pub tile: f64,
-    /// Which items they are.
+    /// Seed of the choice of items.
     pub seed: u64,
 }
 
-/// As it is typed.
+/// The text as typed.
 impl Display for CutOuts {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let CutOuts {
@@ -36,16 +35,14 @@ impl Display for CutOuts {
 }
 
 impl CutOuts {
-    /// From `fence`, `foliage:share=0.5,tile=2,seed=7`.
+    /// Parses `fence`, `foliage:share=0.5,tile=2,seed=7`.
     ///
     /// # Errors
     /// A mask or a parameter that is not known, a value out of range.
     pub fn parse(text: &str) -> Result<CutOuts, SpecError> {
         let mut spec = Spec::parse(text)?;
-        let holed = MASKS.iter().filter(|(mask, ..)| *mask != Mask::Solid);
-        let found = holed.clone().find(|(_, name, _)| *name == spec.name());
-        let Some(&(mask, ..)) = found else {
-            let names = holed.map(|(_, name, _)| *name);
+        let Some(&(mask, ..)) = MASKS.iter().find(|(_, name, _)| *name == spec.name()) else {
+            let names = MASKS.iter().map(|(_, name, _)| *name);
             return Err(SpecError::unknown("mask", spec.name(), names));
         };
         let share = spec.number("share", 0.2)?;
@@ -64,18 +61,17 @@ impl CutOuts {
         Ok(cut_outs)
     }
 
-    /// The surfaces of so many items, of which some may be cut out: the same items,
+    /// The cut-outs among `items`, of which those that `may_be` are drawn: the same items,
     /// whatever the mask.
-    pub fn surfaces(&self, items: usize, may_be: impl Fn(ItemId) -> bool) -> Surfaces {
-        let mut rng = SeededRng::new(self.seed);
-        let mut surfaces = Surfaces::default();
+    pub fn holes(&self, items: usize, may_be: impl Fn(ItemId) -> bool) -> Holes {
+        let (mut rng, mut holes) = (SeededRng::new(self.seed), Holes::default());
+        let CutOuts { mask, tile, .. } = *self;
         for item in 0..items as ItemId {
             if rng.unit() < self.share && may_be(item) {
-                let CutOuts { mask, tile, .. } = *self;
-                surfaces.set(item, Surface { mask, tile });
+                holes.set(item, Surface { mask, tile });
             }
         }
-        surfaces
+        holes
     }
 }
 
@@ -87,7 +83,7 @@ mod tests {
     fn what_is_typed_is_what_is_cut_out() {
         let typed = CutOuts::parse("foliage:share=50%,tile=2,seed=7").unwrap();
         assert_eq!((typed.mask, typed.share), (Mask::Foliage, 0.5));
-        let surfaces = typed.surfaces(1000, |item| item % 2 == 0);
+        let surfaces = typed.holes(1000, |item| item % 2 == 0);
         let cut: Vec<ItemId> = (0..1000).filter(|i| surfaces.of(*i).is_some()).collect();
         assert!(cut.iter().all(|item| item % 2 == 0));
         assert!((200..300).contains(&cut.len()), "{}", cut.len());
@@ -96,9 +92,9 @@ mod tests {
         let fence = CutOuts::parse("fence").unwrap();
         assert_eq!((fence.share, fence.tile, fence.seed), (0.2, 1.0, 1));
         let whole = CutOuts::parse("fence:share=1").unwrap();
-        let all = whole.surfaces(50, |_| true);
+        let all = whole.holes(50, |_| true);
         assert!((0..50).all(|item| all.of(item).is_some()));
-        let other = CutOuts { seed: 8, ..typed }.surfaces(1000, |item| item % 2 == 0);
+        let other = CutOuts { seed: 8, ..typed }.holes(1000, |item| item % 2 == 0);
         assert!((0..1000).any(|item| other.of(item).is_some() != surfaces.of(item).is_some()));
     }
 

@@ -1,66 +1,52 @@
 //! Items that overlap in a cycle: A before B before C before A. No order of such
 //! items is right; one of them would have to be cut.
 
-use std::collections::HashMap;
-
 use crate::query::ItemId;
 
-/// How many items lie on a cycle of `before` pairs: the strongly connected
-/// components of more than one item (Tarjan 1972). O(pairs).
+/// Number of items on cycles of `before` pairs: those of strongly connected components
+/// of more than one item (Kosaraju; Sharir 1981). O(pairs log pairs).
 pub(super) fn items_in_cycles(before: &[(ItemId, ItemId)]) -> usize {
-    let mut number: HashMap<ItemId, usize> = HashMap::new();
-    let mut next: Vec<Vec<usize>> = Vec::new();
+    let mut items: Vec<ItemId> = before.iter().flat_map(|&(a, b)| [a, b]).collect();
+    items.sort_unstable();
+    items.dedup();
+    let node = |item| items.binary_search(&item).expect("an item of a pair");
+    let (mut next, mut previous) = (vec![Vec::new(); items.len()], vec![Vec::new(); items.len()]);
     for &(a, b) in before {
-        let [a, b] = [a, b].map(|item| {
-            *number.entry(item).or_insert_with(|| {
-                next.push(Vec::new());
-                next.len() - 1
-            })
-        });
+        let (a, b) = (node(a), node(b));
         next[a].push(b);
+        previous[b].push(a);
     }
-    const UNSEEN: usize = usize::MAX;
-    let (mut index, mut low) = (vec![UNSEEN; next.len()], vec![0; next.len()]);
-    let mut on_stack = vec![false; next.len()];
-    let (mut stack, mut counter, mut cyclic) = (Vec::new(), 0, 0);
-    for root in 0..next.len() {
-        if index[root] != UNSEEN {
-            continue;
-        }
-        // A node and how many of its successors are done.
-        let mut calls = vec![(root, 0)];
-        while let Some((at, done)) = calls.last_mut() {
-            let at = *at;
-            if *done == 0 && index[at] == UNSEEN {
-                (index[at], low[at]) = (counter, counter);
-                counter += 1;
-                stack.push(at);
-                on_stack[at] = true;
-            }
-            if let Some(&to) = next[at].get(*done) {
+    let (mut seen, mut finished) = (vec![false; items.len()], Vec::new());
+    for root in 0..items.len() {
+        finish(&next, root, &mut seen, &mut finished);
+    }
+    seen.fill(false);
+    let components = finished.iter().rev().map(|&root| {
+        let mut component = Vec::new();
+        finish(&previous, root, &mut seen, &mut component);
+        component.len()
+    });
+    components.filter(|&nodes| nodes > 1).sum()
+}
+
+/// Appends the nodes that are reached from a root and not yet seen, successors first.
+fn finish(next: &[Vec<usize>], root: usize, seen: &mut [bool], finished: &mut Vec<usize>) {
+    if std::mem::replace(&mut seen[root], true) {
+        return;
+    }
+    // Nodes, each with the number of its successors that are done.
+    let mut calls = vec![(root, 0)];
+    while let Some((at, done)) = calls.last_mut() {
+        match next[*at].get(*done) {
+            Some(&to) => {
                 *done += 1;
-                if index[to] == UNSEEN {
+                if !std::mem::replace(&mut seen[to], true) {
                     calls.push((to, 0));
-                } else if on_stack[to] {
-                    low[at] = low[at].min(index[to]);
-                }
-                continue;
-            }
-            if low[at] == index[at] {
-                let from = stack.iter().rposition(|&node| node == at).unwrap_or(0);
-                let component = stack.split_off(from);
-                component.iter().for_each(|&node| on_stack[node] = false);
-                if component.len() > 1 {
-                    cyclic += component.len();
                 }
             }
-            calls.pop();
-            if let Some(&(above, _)) = calls.last() {
-                low[above] = low[above].min(low[at]);
-            }
+            None => finished.extend(calls.pop().map(|(node, _)| node)),
         }
     }
-    cyclic
 }
 
 #[cfg(test)]

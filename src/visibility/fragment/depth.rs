@@ -2,19 +2,19 @@
 
 use super::canvas::{Canvas, Fragment};
 use crate::query::ItemId;
-use crate::visibility::truth::{Along, NO_ITEM, Probe};
+use crate::visibility::truth::{Along, Body, NO_ITEM, SolidBox};
 
-/// What is in front at each sample so far; of a tie the lowest id.
+/// The front item of each sample so far; of a tie the lowest id.
 #[derive(Clone, Debug)]
-pub struct DepthBuffer<P: Along = Probe> {
-    front: Vec<Option<(P::At, ItemId)>>,
+pub struct DepthBuffer<B: Body = SolidBox> {
+    front: Vec<Option<(B::At, ItemId)>>,
     /// Fragments that were as near as the one in front, and lost by their id.
-    ties: Vec<Fragment<P::At>>,
+    ties: Vec<Fragment<B::At>>,
 }
 
-impl<P: Along> DepthBuffer<P> {
+impl<B: Body> DepthBuffer<B> {
     /// A buffer in which nothing is drawn yet.
-    pub fn new(samples: usize) -> DepthBuffer<P> {
+    pub fn new(samples: usize) -> DepthBuffer<B> {
         DepthBuffer {
             front: vec![None; samples],
             ties: Vec::new(),
@@ -27,10 +27,10 @@ impl<P: Along> DepthBuffer<P> {
         self.ties.clear();
     }
 
-    /// Whether the fragment is drawn: there is nothing at its sample, or what is
-    /// there is deeper, or as deep with a higher id. If so it is there from now on.
+    /// Draws the fragment, if it passes: its sample is empty, or holds an item that is
+    /// deeper, or as deep with a higher id. Returns whether it passed.
     #[inline]
-    pub fn test(&mut self, canvas: &Canvas<P>, fragment: &Fragment<P::At>) -> bool {
+    pub fn test(&mut self, canvas: &Canvas<B>, fragment: &Fragment<B::At>) -> bool {
         let Fragment { sample, item, at } = *fragment;
         let front = &mut self.front[sample];
         if let Some((other, other_item)) = *front {
@@ -44,11 +44,11 @@ impl<P: Along> DepthBuffer<P> {
                     return false;
                 }
                 let lost = item.max(other_item);
-                self.ties.push(Fragment {
-                    sample,
+                let tie = Fragment {
                     item: lost,
-                    at,
-                });
+                    ..*fragment
+                };
+                self.ties.push(tie);
                 if lost == item {
                     return false;
                 }
@@ -58,29 +58,29 @@ impl<P: Along> DepthBuffer<P> {
         true
     }
 
-    /// What is in front at a sample.
+    /// The front item of a sample, and where its ray meets it.
     #[inline]
-    pub fn front(&self, sample: usize) -> Option<(P::At, ItemId)> {
+    pub fn front(&self, sample: usize) -> Option<(B::At, ItemId)> {
         self.front[sample]
     }
 
     /// The id buffer: the item in front at each sample, [`NO_ITEM`] for none.
     pub fn ids(&self) -> Vec<ItemId> {
-        let id = |front: &Option<(P::At, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
+        let id = |front: &Option<(B::At, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
         self.front.iter().map(id).collect()
     }
 
-    /// How many samples have been drawn on.
+    /// Number of samples that have been drawn on.
     pub fn covered(&self) -> u64 {
         self.front.iter().filter(|front| front.is_some()).count() as u64
     }
 
     /// The exact visible set of the samples, ascending: all that is in front
     /// anywhere, every item of a tie.
-    pub fn visible(&self, canvas: &Canvas<P>) -> Vec<ItemId> {
-        let in_front = |tie: &&Fragment<P::At>| {
+    pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
+        let in_front = |tie: &&Fragment<B::At>| {
             let front = self.front[tie.sample];
-            let order = |front: (P::At, _)| canvas.probe(tie.sample).order(&tie.at, &front.0);
+            let order = |front: (B::At, _)| canvas.probe(tie.sample).order(&tie.at, &front.0);
             front.is_some_and(|front| order(front).is_eq())
         };
         let ties = self.ties.iter().filter(in_front).map(|tie| tie.item);

@@ -1,26 +1,27 @@
-//! Draws a list of pieces with the tests switched on that are asked for, and counts
-//! what each of them lets through.
+//! Drawing: a list of pieces of boxes with any of the fragment tests, or triangles with
+//! the z-test; counts what each test lets through.
 
-use super::canvas::{Canvas, Fragment};
+use super::canvas::{Canvas, Fragment, Visited};
 use super::depth::DepthBuffer;
-use super::mask::Surfaces;
+use super::mask::Holes;
 use super::order::Piece;
 use super::stencil::Stencil;
 use crate::query::ItemId;
+use crate::scene::{SurfaceKind, Surfaces};
 use crate::visibility::Solids;
-use crate::visibility::truth::NO_ITEM;
+use crate::visibility::truth::{Body, Facet, SolidBox};
 
-/// Which fragment tests there are beside the z-test.
+/// The fragment tests beside the z-test.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Tests<'a> {
     /// The alpha-test, by the surfaces of the items.
-    pub surfaces: Option<&'a Surfaces>,
+    pub surfaces: Option<&'a Holes>,
     /// The stencil-test.
     pub stencil: Option<&'a Stencil>,
 }
 
 impl Tests<'_> {
-    /// Whether the alpha-test keeps a fragment.
+    /// Tests whether the alpha-test keeps a fragment.
     pub(super) fn keep(&self, canvas: &Canvas, solids: &Solids, fragment: &Fragment) -> bool {
         self.surfaces.is_none_or(|surfaces| {
             let b = &solids.boxes[fragment.item as usize];
@@ -30,19 +31,19 @@ impl Tests<'_> {
     }
 }
 
-/// What was counted while a list was drawn.
+/// Counts of a drawn list.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 #[non_exhaustive]
 pub struct Tally {
-    /// Pieces that came to lie in the image.
+    /// Pieces or triangles that came to lie in the image.
     pub drawn: u64,
-    /// Samples whose rays were asked.
+    /// Samples whose rays were tested.
     pub asked: u64,
-    /// Samples that the stencil kept from being asked.
+    /// Samples that the stencil kept from a test.
     pub kept_out: u64,
     /// Fragments: samples that met a piece.
     pub fragments: u64,
-    /// Of these, dropped by the alpha-test.
+    /// Fragments that the alpha-test dropped.
     pub clear: u64,
     /// Of the rest, those that passed the z-test when they came: with early z, the
     /// fragments that are shaded.
@@ -51,17 +52,25 @@ pub struct Tally {
     pub covered: u64,
 }
 
-/// A drawn image.
+impl Tally {
+    fn visited(&mut self, visited: Visited) {
+        self.drawn += u64::from(visited.tested + visited.kept_out > 0);
+        self.asked += visited.tested;
+        self.kept_out += visited.kept_out;
+    }
+}
+
+/// A drawn image, of boxes or of triangles.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub struct Drawn {
-    /// What was counted.
+pub struct Drawn<B: Body = SolidBox> {
+    /// Counts of all that was drawn.
     pub tally: Tally,
-    /// With the z-test: the exact front of each sample.
-    pub depth: DepthBuffer,
-    /// Without it: the item of each sample that was drawn last, [`NO_ITEM`] for
-    /// none.
-    pub last: Vec<ItemId>,
+    /// The exact front of each sample, of opaque items.
+    pub depth: DepthBuffer<B>,
+    /// Items of triangles that hide nothing and are met before the front or with it,
+    /// ascending.
+    pub before: Vec<ItemId>,
 }
 
 /// Draws the pieces in this order. Θ(samples of the screen rectangles).
@@ -76,23 +85,35 @@ pub fn draw<'a>(
     drawn
 }
 
-impl Drawn {
-    /// An image of so many samples in which nothing is drawn yet.
-    pub fn new(samples: usize) -> Drawn {
+impl<B: Body> Drawn<B> {
+    /// An empty image of this many samples.
+    pub fn new(samples: usize) -> Drawn<B> {
         Drawn {
             tally: Tally::default(),
             depth: DepthBuffer::new(samples),
-            last: vec![NO_ITEM; samples],
+            before: Vec::new(),
         }
     }
 
-    /// Forgets what was drawn.
+    /// Empties the image.
     pub fn clear(&mut self) {
         self.tally = Tally::default();
         self.depth.clear();
-        self.last.fill(NO_ITEM);
+        self.before.clear();
     }
 
+    /// The exact visible set of the samples, ascending: all that is in front anywhere, every
+    /// item of a tie, and the items before it that hide nothing.
+    pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
+        let mut visible = self.depth.visible(canvas);
+        visible.extend_from_slice(&self.before);
+        visible.sort_unstable();
+        visible.dedup();
+        visible
+    }
+}
+
+impl Drawn {
     /// Draws more on the same image.
     pub fn draw<'a>(
         &mut self,
@@ -101,21 +122,140 @@ impl Drawn {
         pieces: impl IntoIterator<Item = &'a Piece>,
         tests: &Tests<'_>,
     ) {
-        let Drawn { tally, depth, last } = self;
+        let Drawn { tally, depth, .. } = self;
         for piece in pieces {
-            let asked = canvas.fragments(solids, piece, tests.stencil, |fragment| {
+            let visited = canvas.fragments(solids, piece, tests.stencil, |fragment| {
                 tally.fragments += 1;
-                if !tests.keep(canvas, solids, &fragment) {
+                if tests.keep(canvas, solids, &fragment) {
+                    tally.passed += u64::from(depth.test(canvas, &fragment));
+                } else {
                     tally.clear += 1;
-                    return;
                 }
-                last[fragment.sample] = fragment.item;
-                tally.passed += u64::from(depth.test(canvas, &fragment));
             });
-            tally.drawn += u64::from(asked.samples + asked.kept_out > 0);
-            tally.asked += asked.samples;
-            tally.kept_out += asked.kept_out;
+            tally.visited(visited);
         }
         tally.covered = depth.covered();
+    }
+}
+
+impl Drawn<Facet> {
+    /// Empties the image and draws triangles, each by itself: the opaque ones with the z-test,
+    /// then those that hide nothing against the front.
+    ///
+    /// A fragment is a triangle at a sample whose ray meets it: a one-sided one from its front.
+    /// Θ(samples of the screen rectangles).
+    pub fn draw_triangles(
+        &mut self,
+        canvas: &Canvas<Facet>,
+        surfaces: &Surfaces,
+        triangles: &[u32],
+    ) {
+        self.clear();
+        for opaque in [true, false] {
+            for &triangle in triangles {
+                let item = surfaces.item_of(triangle);
+                if (surfaces.kinds[item] == SurfaceKind::Opaque) == opaque {
+                    self.add(canvas, surfaces, triangle, item);
+                }
+            }
+        }
+        self.tally.covered = self.depth.covered();
+        self.before.sort_unstable();
+        self.before.dedup();
+    }
+
+    fn add(&mut self, canvas: &Canvas<Facet>, surfaces: &Surfaces, triangle: u32, item: usize) {
+        let Drawn {
+            tally,
+            depth,
+            before,
+        } = self;
+        let facet = Facet {
+            corners: surfaces.corners(triangle),
+            item: item as ItemId,
+            two_sided: surfaces.two_sided[item],
+            hides: surfaces.kinds[item] == SurfaceKind::Opaque,
+        };
+        let Facet { item, hides, .. } = facet;
+        let rectangle = canvas.screen().triangle(facet.corners, surfaces.origin);
+        let visited = canvas.scan(rectangle, None, |sample, probe| {
+            let Some(at) = facet.meet(probe, probe.ray().far) else {
+                return;
+            };
+            tally.fragments += 1;
+            let is_before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
+            let passes = match hides {
+                true => depth.test(canvas, &Fragment { sample, item, at }),
+                false => depth.front(sample).is_none_or(is_before),
+            };
+            tally.passed += u64::from(passes);
+            if passes && !hides && before.last() != Some(&item) {
+                before.push(item);
+            }
+        });
+        tally.visited(visited);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{self, SeededRng};
+    use crate::visibility::fragment::tests::cameras;
+    use crate::visibility::truth::{SampleTruth, SurfaceIndex, judge};
+    use crate::visibility::{Rays, SampleGrid, Solids, surfaces_of};
+
+    /// What is drawn of all triangles is what rays see; how many items.
+    fn drawn_as_seen(
+        surfaces: &Surfaces,
+        index: &SurfaceIndex,
+        rays: &Rays,
+        grid: SampleGrid,
+    ) -> usize {
+        let truth = SampleTruth::of(index, rays, grid, 1);
+        let canvas = Canvas::about(rays, grid, surfaces.origin);
+        let mut triangles: Vec<u32> = (0..surfaces.triangles.len() as u32).collect();
+        let mut drawn = Drawn::new(grid.samples());
+        for turn in 0..2 {
+            drawn.draw_triangles(&canvas, surfaces, &triangles);
+            assert_eq!(drawn.depth.ids(), truth.front, "{turn} {surfaces:?}");
+            assert_eq!(drawn.visible(&canvas), truth.visible, "{turn} {surfaces:?}");
+            assert!(drawn.tally.passed >= drawn.tally.covered);
+            triangles.reverse();
+        }
+        truth.visible.len()
+    }
+
+    #[test]
+    fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
+        let (mut rng, mut seen) = (SeededRng::new(19), 0);
+        for _ in 0..400 {
+            let surfaces = judge::triangles(&mut rng);
+            let mut camera = judge::camera(&mut rng);
+            camera.frame.eye += surfaces.origin;
+            let rays = Rays::of(&camera).unwrap();
+            let index = SurfaceIndex::build(&surfaces);
+            seen += drawn_as_seen(&surfaces, &index, &rays, SampleGrid::new(8, 6));
+        }
+        assert!(seen > 800, "the premise: {seen}");
+    }
+
+    #[test]
+    fn meshes_and_maps_are_drawn_as_they_are_seen() {
+        for name in [
+            "mesh:forest:n=4000",
+            "mesh:spheres:n=40000,offset=1e6",
+            "freedm-map12",
+        ] {
+            let scene = scene::load(name, &Default::default()).unwrap();
+            let surfaces = surfaces_of(&scene).unwrap();
+            let index = SurfaceIndex::build(&surfaces);
+            let mut seen = 0;
+            for camera in &cameras(&Solids::of(&scene), 4) {
+                let rays = Rays::of(camera).unwrap();
+                seen += drawn_as_seen(&surfaces, &index, &rays, SampleGrid::new(64, 40));
+            }
+            assert!(seen > 20, "{name}: {seen}");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What an order gets wrong, by the exact order of depths at each sample.
+//! Errors of an order, by the exact order of depths at each sample.
 
 use std::cmp::Ordering;
 
@@ -17,7 +17,7 @@ pub struct OrderErrors {
     /// Pairs of items that overlap in the image: both met by a sample's ray, at
     /// different depths.
     pub pairs: u64,
-    /// Of these, drawn the wrong way round at a sample.
+    /// Pairs that are drawn the wrong way round at a sample.
     pub wrong: u64,
     /// Samples that show a wrong item if the list is drawn back to front without a
     /// z-test (painter's algorithm).
@@ -30,17 +30,13 @@ pub struct OrderErrors {
 /// layers of the one before.
 const MOST_PAIRS: u64 = 1 << 25;
 
-/// Items of which more lie behind each other than are compared.
+/// More items behind each other than are compared.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error(
-    "more than {most} pairs of layers at the samples of a view; \
+    "more than {MOST_PAIRS} pairs of layers at the samples of a view; \
      expected fewer --samples or fewer items behind each other"
 )]
-#[non_exhaustive]
-pub struct TooManyPairs {
-    /// Most pairs.
-    pub most: u64,
-}
+pub struct TooManyPairs;
 
 /// A fragment, where its ray meets the item and when it was drawn.
 #[derive(Clone, Copy, Debug)]
@@ -135,35 +131,31 @@ impl ErrorCount {
                 }
             }
         }
-        self.pairs.settle(false);
+        self.pairs.settle();
     }
 
-    /// Of all samples.
+    /// The errors of all samples.
     pub fn all(self) -> Result<OrderErrors, TooManyPairs> {
         if self.looked_at > MOST_PAIRS {
-            return Err(TooManyPairs { most: MOST_PAIRS });
+            return Err(TooManyPairs);
         }
-        let ErrorCount {
-            wrong_samples,
-            mut pairs,
+        let Pairs {
+            mut right,
+            mut wrong,
             ..
-        } = self;
-        pairs.settle(true);
-        let wrong = pairs.wrong.len() as u64;
-        pairs.right.append(&mut pairs.wrong);
-        pairs.right.sort_unstable();
-        pairs.right.dedup();
-        let cyclic = items_in_cycles(&pairs.right);
-        let mut overlapping = pairs.right;
-        for pair in &mut overlapping {
-            *pair = (pair.0.min(pair.1), pair.0.max(pair.1));
-        }
-        overlapping.sort_unstable();
-        overlapping.dedup();
+        } = self.pairs;
+        sort_and_dedup(&mut wrong);
+        let wrong_pairs = wrong.len() as u64;
+        right.append(&mut wrong);
+        sort_and_dedup(&mut right);
+        let cyclic = items_in_cycles(&right);
+        let unordered = right.iter().map(|&(a, b)| (a.min(b), a.max(b)));
+        let mut overlapping: Vec<(ItemId, ItemId)> = unordered.collect();
+        sort_and_dedup(&mut overlapping);
         Ok(OrderErrors {
             pairs: overlapping.len() as u64,
-            wrong,
-            wrong_samples,
+            wrong: wrong_pairs,
+            wrong_samples: self.wrong_samples,
             cyclic,
         })
     }
@@ -174,21 +166,24 @@ impl ErrorCount {
 struct Pairs {
     right: Vec<(ItemId, ItemId)>,
     wrong: Vec<(ItemId, ItemId)>,
-    /// How many there were when they were sorted last.
+    /// Number of pairs after the last sort.
     sorted: usize,
 }
 
 impl Pairs {
-    /// Sorts and drops what is there twice, where there is much that is new.
-    fn settle(&mut self, now: bool) {
-        if now || self.right.len() + self.wrong.len() > 2 * self.sorted + 1_000_000 {
-            for list in [&mut self.right, &mut self.wrong] {
-                list.sort_unstable();
-                list.dedup();
-            }
+    /// Drops duplicates, where there is much that is new.
+    fn settle(&mut self) {
+        if self.right.len() + self.wrong.len() > 2 * self.sorted + 1_000_000 {
+            sort_and_dedup(&mut self.right);
+            sort_and_dedup(&mut self.wrong);
             self.sorted = self.right.len() + self.wrong.len();
         }
     }
+}
+
+fn sort_and_dedup(pairs: &mut Vec<(ItemId, ItemId)>) {
+    pairs.sort_unstable();
+    pairs.dedup();
 }
 
 #[cfg(test)]
@@ -254,6 +249,6 @@ mod tests {
         }
         assert_eq!(count.looked_at, 499_500);
         count.sample(&mut (0..9000).map(|i| layer(i, i, i)).collect(), u32::cmp);
-        assert_eq!(count.all(), Err(TooManyPairs { most: MOST_PAIRS }));
+        assert_eq!(count.all(), Err(TooManyPairs));
     }
 }

@@ -8,23 +8,20 @@ use crate::scene::WorldBox;
 use crate::visibility::truth::{Crossing, Probe};
 
 named! {
-    /// Where a surface is opaque.
-    #[derive(Clone, Copy, PartialEq, Eq, Default, Hash, Debug)]
+    /// Pattern of the opaque parts of a surface.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
     #[non_exhaustive]
     pub enum Mask, MASKS {
-        #[default]
-        Solid = "solid", "everywhere";
         Fence = "fence", "four pickets in ten of a tile, and two rails";
         Foliage = "foliage", "six in ten of the cells of a grid of 8 x 8, at random";
     }
 }
 
 impl Mask {
-    /// Whether the surface is opaque at a place, in tiles: the pattern of a fence
+    /// Tests whether the surface is opaque at a place, in tiles: the pattern of a fence
     /// repeats with each, that of foliage never.
     pub fn opaque(self, u: f64, v: f64) -> bool {
         match self {
-            Mask::Solid => true,
             Mask::Fence => {
                 let (u, v) = (u - u.floor(), v - v.floor());
                 let picket = u * 5.0 - (u * 5.0).floor() < 0.4;
@@ -45,38 +42,38 @@ impl Mask {
 /// A mask and the size of its tiles.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Surface {
-    /// Where it is opaque.
+    /// Its opaque parts.
     pub mask: Mask,
     /// Edge length of a tile, world units; above 0.
     pub tile: f64,
 }
 
-/// The surfaces of the items of a scene: solid but for those that are named.
+/// The cut-outs among the items of a scene; all other items are solid.
 #[derive(Clone, Default, Debug)]
-pub struct Surfaces {
+pub struct Holes {
     /// By item id; the items beyond its end are solid.
     of_item: Vec<Option<Surface>>,
 }
 
-impl Surfaces {
-    /// Gives an item a surface.
+impl Holes {
+    /// Cuts an item out.
     pub fn set(&mut self, item: ItemId, surface: Surface) {
         let item = item as usize;
         if self.of_item.len() <= item {
             self.of_item.resize(item + 1, None);
         }
-        self.of_item[item] = (surface.mask != Mask::Solid).then_some(surface);
+        self.of_item[item] = Some(surface);
     }
 
-    /// Those of some of the items, numbered anew in this order.
-    pub fn some(&self, items: &[ItemId]) -> Surfaces {
+    /// The cut-outs among some of the items, numbered anew in this order.
+    pub fn some(&self, items: &[ItemId]) -> Holes {
         let of_item = items.iter().map(|&item| self.of(item).copied());
-        Surfaces {
+        Holes {
             of_item: of_item.collect(),
         }
     }
 
-    /// How many items are not solid.
+    /// Number of cut-outs.
     pub fn count(&self) -> usize {
         self.of_item.iter().flatten().count()
     }
@@ -87,7 +84,7 @@ impl Surfaces {
         self.of_item.get(item as usize)?.as_ref()
     }
 
-    /// Whether an item is opaque where a ray enters it. The place on the face is
+    /// Tests whether an item is opaque where a ray enters it. The place on the face is
     /// that of the rounded depth, counted from the box's lower corner along the
     /// two axes of the face, in the order x, y, z.
     pub fn opaque(&self, item: ItemId, b: &WorldBox, probe: &Probe, at: &Crossing) -> bool {
@@ -132,7 +129,6 @@ mod tests {
             let opaque = places.filter(|&(u, v)| mask.opaque(u, v)).count();
             opaque as f64 / 160_000.0
         };
-        assert_eq!(share(Mask::Solid), 1.0);
         // Pickets, and the rails between them.
         assert!((share(Mask::Fence) - (0.4 + 0.6 * 0.2)).abs() < 0.01);
         assert!((share(Mask::Foliage) - 0.6).abs() < 0.03);
@@ -155,7 +151,7 @@ mod tests {
         });
         let at = probe.enter(&b, f64::INFINITY).unwrap();
         assert_eq!(face_axis(&b, &probe, &at), 0);
-        let mut surfaces = Surfaces::default();
+        let mut surfaces = Holes::default();
         let mut opaque = |tile: f64| {
             let mask = Mask::Fence;
             surfaces.set(3, Surface { mask, tile });

@@ -1,7 +1,9 @@
-//! The fragment stage: which samples' fragments survive. Solids are drawn sample by
-//! sample with the rays of a camera, in the order of a list; the z-test keeps the
-//! nearest, the alpha-test drops what a mask says is clear, the stencil-test
-//! restricts the samples. What an order costs (overdraw) and gets wrong is counted.
+//! The fragment stage: the fragments that survive at each sample.
+//!
+//! Solids are drawn sample by sample with the rays of a camera, in the order of a list; the
+//! z-test keeps the nearest, the alpha-test drops the clear parts of a mask, the
+//! stencil-test restricts the samples. The cost of an order (overdraw) and its errors are
+//! counted.
 //!
 //! A fragment is an item at a sample whose ray meets the item: where it enters it,
 //! so front faces only, as it is said where [`Solids`](super::Solids) are.
@@ -13,12 +15,10 @@ mod depth;
 mod draw;
 mod errors;
 mod layers;
-mod marking;
 mod mask;
 pub mod order;
 mod screen;
 mod stencil;
-mod triangles;
 
 #[cfg(test)]
 mod tests;
@@ -29,8 +29,7 @@ pub use depth::DepthBuffer;
 pub use draw::{Drawn, Tally, Tests, draw};
 pub use errors::{OrderErrors, TooManyPairs, order_errors};
 pub use layers::draw_surfaces;
-pub use mask::{MASKS, Mask, Surface, Surfaces};
+pub use mask::{Holes, MASKS, Mask, Surface};
 pub use order::{DepthOrder, Part, Piece, ToOrder};
 pub use screen::{Rectangle, Screen};
 pub use stencil::Stencil;
-pub use triangles::DrawnTriangles;

@@ -16,10 +16,18 @@ fn all(solids: &Solids) -> Vec<Piece> {
     items.map(Piece::whole).collect()
 }
 
+fn to_order(boxes: &Solids) -> ToOrder<'_> {
+    ToOrder {
+        boxes,
+        surfaces: None,
+        planes: None,
+    }
+}
+
 /// The orders of boxes, ready for them.
 fn orders(solids: &Solids) -> Vec<(&'static OrderRow, Box<dyn DepthOrder>)> {
     let built = ORDERS.iter().filter_map(|row| {
-        let order = (row.build)(&ToOrder::boxes(solids))?;
+        let order = (row.build)(&to_order(solids))?;
         Some((row, order))
     });
     built.collect()
@@ -169,16 +177,20 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
                 // The painter's picture, drawn, is wrong where it was said to be.
                 let drawn = draw(&canvas, &solids, pieces.iter().rev(), &Tests::default());
                 let ids = drawn.depth.ids();
-                let differing = drawn.last.iter().zip(&ids).filter(|(last, id)| last != id);
+                let mut last = vec![NO_ITEM; ids.len()];
+                for piece in pieces.iter().rev() {
+                    canvas.fragments(&solids, piece, None, |f| last[f.sample] = f.item);
+                }
+                let differing = last.iter().zip(&ids).filter(|(last, id)| last != id);
                 let tied = |sample: usize| {
                     let probe = canvas.probe(sample);
                     let at =
                         |item: ItemId| probe.enter(&solids.boxes[item as usize], f64::INFINITY);
-                    let (a, b) = (at(drawn.last[sample]).unwrap(), at(ids[sample]).unwrap());
+                    let (a, b) = (at(last[sample]).unwrap(), at(ids[sample]).unwrap());
                     probe.compare(&a, &b).is_eq()
                 };
                 let ties = (0..ids.len())
-                    .filter(|&s| drawn.last[s] != ids[s] && tied(s))
+                    .filter(|&s| last[s] != ids[s] && tied(s))
                     .count();
                 assert_eq!((differing.count() - ties) as u64, errors.wrong_samples);
                 if row.guarantee == Guarantee::Exact {
@@ -285,7 +297,7 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
 }
 
 fn of_boxes(name: &str, solids: &Solids) -> Box<dyn DepthOrder> {
-    (row(name).build)(&ToOrder::boxes(solids)).unwrap()
+    (row(name).build)(&to_order(solids)).unwrap()
 }
 
 fn row(name: &str) -> &'static order::OrderRow {
@@ -297,10 +309,11 @@ fn row(name: &str) -> &'static order::OrderRow {
 fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
     let solids = Solids::of(&load("city:n=400", &Default::default()).unwrap());
     let index = RayIndex::build(&solids);
-    let mut surfaces = Surfaces::default();
+    let mut surfaces = Holes::default();
     for item in 0..solids.boxes.len() as ItemId {
-        let mask = [Mask::Solid, Mask::Fence, Mask::Foliage][item as usize % 3];
-        surfaces.set(item, Surface { mask, tile: 4.0 });
+        if let Some(&mask) = [Mask::Fence, Mask::Foliage].get(item as usize % 3) {
+            surfaces.set(item, Surface { mask, tile: 4.0 });
+        }
     }
     let (mut through, mut clear) = (0, 0);
     for camera in cameras(&solids, 6) {
@@ -366,7 +379,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     let walls = draw(&canvas, &solids, room, &Tests::default());
     let portal = wall([-1.0, 1.0], [0.0, 2.0]);
     let portal = WorldBox::new(portal.min, DVec3::new(10.0, portal.max.y, portal.max.z));
-    let stencil = Stencil::of_rectangle(&canvas, &portal, &walls.depth);
+    let stencil = Stencil::of_rectangles(&canvas, &[portal], &walls.depth);
     assert!((5..400).contains(&stencil.count()), "{}", stencil.count());
     let tests = Tests {
         stencil: Some(&stencil),
@@ -424,7 +437,7 @@ fn a_mirror_shows_reflected_boxes_behind_its_plane() {
         let mut mirror = WorldBox::new(DVec3::splat(-9.0), DVec3::splat(9.0));
         (mirror.min[axis], mirror.max[axis]) = (at, at);
         let nothing = DepthBuffer::new(GRID.samples());
-        let stencil = Stencil::of_rectangle(&canvas, &mirror, &nothing);
+        let stencil = Stencil::of_rectangles(&canvas, &[mirror], &nothing);
         let tests = Tests {
             stencil: Some(&stencil),
             surfaces: None,
@@ -490,7 +503,11 @@ fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
         let surfaces = map.surfaces(&scene);
         let (index, own) = (SurfaceIndex::build(&surfaces), surfaces.some(&items));
         let boxes = Solids::of(&scene).some(&items);
-        let of = ToOrder::surfaces(&boxes, &own, scene.own_tree.as_ref());
+        let of = ToOrder {
+            boxes: &boxes,
+            surfaces: Some(&own),
+            planes: scene.own_tree.as_ref(),
+        };
         let orders =
             ["map-bsp", "box-distance", "map-bsp"].map(|name| (row(name).build)(&of).unwrap());
         let mut rng = SeededRng::new(7);

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::graph::{Ground, RegionGraph};
+use super::id_set::{IdSet, RegionId};
 use super::locate::{BoxGrid, covers};
-use super::number::{Marks, RegionId};
 use super::opening::{Opening, OpeningPlane, rectangle};
 use super::walk::follow_boxes;
 use crate::geometry::Aabb;
@@ -27,15 +27,6 @@ struct Boxes {
     borders: BoxGrid,
 }
 
-impl Boxes {
-    fn alone(regions: Vec<WorldBox>) -> Boxes {
-        Boxes {
-            regions: BoxGrid::new(regions),
-            borders: BoxGrid::new(Vec::new()),
-        }
-    }
-}
-
 impl Ground for Boxes {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let first = out.len();
@@ -50,7 +41,7 @@ impl Ground for Boxes {
         inside
     }
 
-    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks) {
+    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
         let start = ray.at(ray.near);
         let mut homes = Vec::new();
         self.regions
@@ -75,89 +66,92 @@ impl RegionGraph {
     /// Regions that are boxes themselves.
     pub fn of_boxes(boxes: Vec<WorldBox>, openings: Vec<Opening>) -> RegionGraph {
         let regions: Vec<Vec<WorldBox>> = boxes.iter().map(|b| vec![*b]).collect();
-        RegionGraph::new(&regions, openings, Arc::new(Boxes::alone(boxes)))
+        let ground = Boxes {
+            regions: BoxGrid::new(boxes),
+            borders: BoxGrid::new(Vec::new()),
+        };
+        RegionGraph::new(&regions, openings, Arc::new(ground))
     }
 
     /// The regions of a scene that is a tiling of boxes whose borders, but for the
-    /// openings, lie in solid items. An opening is as the tiling has it, flat: the wall
+    /// openings, lie in solid items. An opening is flat, as the tiling has it: the wall
     /// about it has a thickness, so less is seen through it.
     ///
     /// # Errors
     /// A scene whose regions are not a tiling.
     pub fn of_scene(scene: &Scene) -> Result<RegionGraph, NoRegions> {
-        match &scene.regions {
-            Regions::Tiling(tiling) => {
-                let mut graph = RegionGraph::of_tiling(tiling, scene.origin);
-                let regions = BoxGrid::new(graph.parts.all.clone());
-                let items = scene.items.iter();
-                let world = items.map(|item| WorldBox::of(item, scene.origin));
-                let borders = world.filter(|item| !is_within_one(&regions, item));
-                graph.ground = Arc::new(Boxes {
-                    borders: BoxGrid::new(borders.collect()),
-                    regions,
-                });
-                Ok(graph)
-            }
-            other => Err(NoRegions(other.kind())),
-        }
+        let Regions::Tiling(tiling) = &scene.regions else {
+            return Err(NoRegions(scene.regions.kind()));
+        };
+        let mut graph = RegionGraph::of_tiling(tiling, scene.origin);
+        let borders = graph.borders(scene).into_iter().zip(&scene.items);
+        let borders = borders.filter_map(|(is_border, item)| is_border.then_some(item));
+        let borders = borders.map(|item| WorldBox::of(item, scene.origin));
+        graph.ground = Arc::new(Boxes {
+            borders: BoxGrid::new(borders.collect()),
+            regions: BoxGrid::new(graph.parts.all.clone()),
+        });
+        Ok(graph)
     }
 
-    /// By item: whether it may close a border between regions; furniture does not.
+    /// By item: `true` if it may close a border between regions; furniture does not.
     pub fn borders(&self, scene: &Scene) -> Vec<bool> {
         let boxes = BoxGrid::new(self.parts.all.clone());
         let closes = |item: &Aabb| !is_within_one(&boxes, &WorldBox::of(item, scene.origin));
         scene.items.iter().map(closes).collect()
     }
 
-    /// The same for a tiling about an origin.
+    /// The rooms of a tiling about an origin.
     pub fn of_tiling(tiling: &Tiling, origin: DVec3) -> RegionGraph {
         let world = |b: &Aabb| WorldBox::of(b, origin);
         let boxes: Vec<WorldBox> = tiling.boxes.iter().map(world).collect();
-        let mut openings = Vec::with_capacity(tiling.portals.len());
-        for portal in &tiling.portals {
+        let openings = tiling.portals.iter().flat_map(|portal| {
             let hole = world(&portal.opening);
-            let [a, b] = portal.between;
-            let size = hole.max - hole.min;
-            let flat = (0..3).find(|&axis| size[axis] == 0.0);
-            // The front is the region that goes on to larger coordinates.
-            let front = flat.and_then(|axis| {
-                let (a, b) = (&boxes[a as usize], &boxes[b as usize]);
-                let at = hole.min[axis];
-                if a.min[axis] == at && b.max[axis] == at {
-                    Some((axis, false))
-                } else if b.min[axis] == at && a.max[axis] == at {
-                    Some((axis, true))
-                } else {
-                    None
-                }
-            });
-            if let Some((axis, swap)) = front {
-                openings.push(Opening {
-                    sides: if swap { [b, a] } else { [a, b] },
-                    corners: rectangle(axis, hole.min, hole.max),
-                    plane: OpeningPlane::Axis {
-                        axis,
-                        at: hole.min[axis],
-                    },
-                });
-                continue;
+            match flat(&boxes, portal.between, &hole) {
+                Some(opening) => vec![opening],
+                None => thick(portal.between, &hole),
             }
-            // A line through a box passes one of its faces.
-            for axis in 0..3 {
-                for (from, to) in [(hole.min, hole.max), (hole.max, hole.min)] {
-                    let (mut low, mut high) = (hole.min, hole.max);
-                    (low[axis], high[axis]) = (from[axis], from[axis]);
-                    openings.push(Opening {
-                        sides: [a, b],
-                        corners: rectangle(axis, low, high),
-                        plane: OpeningPlane::Undirected,
-                    });
-                    if from[axis] == to[axis] {
-                        break;
-                    }
-                }
-            }
-        }
+        });
+        let openings = openings.collect();
         RegionGraph::of_boxes(boxes, openings)
     }
+}
+
+/// A hole without thickness in the border of two boxes, if it is one.
+fn flat(boxes: &[WorldBox], [a, b]: [RegionId; 2], hole: &WorldBox) -> Option<Opening> {
+    let axis = (0..3).find(|&axis| hole.min[axis] == hole.max[axis])?;
+    let at = hole.min[axis];
+    // The front is the region that goes on to larger coordinates.
+    let is_front = |front: RegionId, behind: RegionId| {
+        boxes[front as usize].min[axis] == at && boxes[behind as usize].max[axis] == at
+    };
+    let sides = match (is_front(a, b), is_front(b, a)) {
+        (true, _) => [a, b],
+        (_, true) => [b, a],
+        _ => return None,
+    };
+    Some(Opening {
+        sides,
+        corners: rectangle(axis, hole.min, hole.max),
+        plane: OpeningPlane::Axis { axis, at },
+    })
+}
+
+/// The faces of a hole with a thickness: a line through a box passes one of them.
+fn thick(sides: [RegionId; 2], hole: &WorldBox) -> Vec<Opening> {
+    let faces = (0..3).flat_map(|axis| {
+        let mut ends = vec![hole.min[axis], hole.max[axis]];
+        ends.dedup();
+        ends.into_iter().map(move |at| (axis, at))
+    });
+    let opening = |(axis, at): (usize, f64)| {
+        let (mut low, mut high) = (hole.min, hole.max);
+        (low[axis], high[axis]) = (at, at);
+        Opening {
+            sides,
+            corners: rectangle(axis, low, high),
+            plane: OpeningPlane::Undirected,
+        }
+    };
+    faces.map(opening).collect()
 }

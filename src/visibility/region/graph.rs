@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::answer::{Marks, RegionId};
-use super::lists::Lists;
+use super::csr::Csr;
+use super::id_set::{IdSet, RegionId};
 use super::opening::Opening;
 use crate::scene::WorldBox;
 use crate::visibility::{Ray, Rays};
@@ -20,17 +20,16 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
 
     /// Adds the regions that a ray passes before it meets what is opaque, by a
     /// search that shares nothing with the back ends.
-    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks);
+    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet);
 }
 
-/// Regions joined by openings: what one can see from one into another is seen
-/// through openings.
+/// Regions joined by openings: one sees from one into another through openings only.
 #[derive(Clone, Debug)]
 pub struct RegionGraph {
     /// The boxes that each region lies in.
-    pub(super) parts: Lists<WorldBox>,
+    pub(super) parts: Csr<WorldBox>,
     openings: Vec<Opening>,
-    exits: Lists<u32>,
+    exits: Csr<u32>,
     pub(super) ground: Arc<dyn Ground>,
 }
 
@@ -41,16 +40,16 @@ impl RegionGraph {
         openings: Vec<Opening>,
         ground: Arc<dyn Ground>,
     ) -> RegionGraph {
-        let mut lists = vec![Vec::new(); regions.len()];
+        let mut exits = vec![Vec::new(); regions.len()];
         for (i, opening) in (0u32..).zip(&openings) {
             for side in opening.sides {
-                lists[side as usize].push(i);
+                exits[side as usize].push(i);
             }
         }
         RegionGraph {
-            parts: Lists::of(regions),
+            parts: Csr::of(regions),
             openings,
-            exits: Lists::of(&lists),
+            exits: Csr::of(&exits),
             ground,
         }
     }
@@ -60,7 +59,7 @@ impl RegionGraph {
         self.exits.count()
     }
 
-    /// Whether there are no regions.
+    /// Tests whether there are no regions.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -80,7 +79,7 @@ impl RegionGraph {
         self.exits.list(region)
     }
 
-    /// What finds the regions of a place.
+    /// Finder of the regions of a place.
     pub fn ground(&self) -> &dyn Ground {
         &*self.ground
     }

@@ -1,8 +1,8 @@
 //! From regions to items: those whose boxes meet a part of a region.
 
-use super::answer::{Marks, RegionId};
+use super::csr::Csr;
 use super::graph::RegionGraph;
-use super::lists::Lists;
+use super::id_set::{IdSet, RegionId};
 use super::locate::BoxGrid;
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
@@ -10,7 +10,7 @@ use crate::scene::{Scene, WorldBox};
 /// The items of each region.
 #[derive(Clone, Debug)]
 pub struct RegionItems {
-    lists: Lists<ItemId>,
+    lists: Csr<ItemId>,
     items: usize,
 }
 
@@ -20,15 +20,10 @@ impl RegionItems {
     /// Where regions have no height of their own (a map's), boxes of regions are taken
     /// to go on for ever up and down. O(n log n) for items much smaller than regions.
     pub fn of(graph: &RegionGraph, scene: &Scene) -> RegionItems {
-        let mut owners = Vec::new();
-        let mut parts = Vec::new();
-        for region in 0..graph.len() as u32 {
-            for part in graph.parts(region) {
-                owners.push(region);
-                parts.push(*part);
-            }
-        }
-        let grid = BoxGrid::new(parts);
+        let regions = 0..graph.len() as u32;
+        let owners = regions.flat_map(|region| graph.parts(region).iter().map(move |_| region));
+        let owners: Vec<RegionId> = owners.collect();
+        let grid = BoxGrid::new(graph.parts.all.clone());
         let mut lists = vec![Vec::new(); graph.len()];
         let mut met = Vec::new();
         for (id, item) in (0..).zip(&scene.items) {
@@ -41,7 +36,7 @@ impl RegionItems {
             met.iter().for_each(|&owner| lists[owner as usize].push(id));
         }
         RegionItems {
-            lists: Lists::of(&lists),
+            lists: Csr::of(&lists),
             items: scene.items.len(),
         }
     }
@@ -53,7 +48,7 @@ impl RegionItems {
 
     /// Replaces `out` by the items of the regions, ascending. All regions together
     /// are all items. O(items of the regions + n / 64).
-    pub fn of_regions(&self, regions: &[RegionId], marks: &mut Marks, out: &mut Vec<ItemId>) {
+    pub fn of_regions(&self, regions: &[RegionId], marks: &mut IdSet, out: &mut Vec<ItemId>) {
         if regions.len() == self.lists.count() {
             out.clear();
             out.extend(0..self.items as u32);

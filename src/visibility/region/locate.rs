@@ -1,9 +1,9 @@
-//! Which boxes hold a point or meet a box: a uniform grid over them. Used for the
-//! region of an eye and for the items of a region.
+//! A uniform grid over boxes that finds those which meet another box: for the region of
+//! an eye and for the items of a region.
 
 use glam::DVec3;
 
-use super::lists::Lists;
+use super::csr::Csr;
 use crate::scene::WorldBox;
 
 /// A uniform grid of buckets over boxes.
@@ -14,7 +14,7 @@ pub struct BoxGrid {
     per_unit: DVec3,
     count: [usize; 3],
     /// The boxes of each bucket.
-    buckets: Lists<u32>,
+    buckets: Csr<u32>,
 }
 
 impl BoxGrid {
@@ -43,13 +43,13 @@ impl BoxGrid {
             low,
             per_unit: DVec3::new(per(0), per(1), per(2)),
             count,
-            buckets: Lists::of(&[]),
+            buckets: Csr::of(&[]),
         };
         let mut lists = vec![Vec::new(); count[0] * count[1] * count[2]];
         for (id, b) in (0..).zip(&grid.boxes) {
             grid.buckets(b, |bucket| lists[bucket as usize].push(id));
         }
-        grid.buckets = Lists::of(&lists);
+        grid.buckets = Csr::of(&lists);
         grid
     }
 
@@ -89,7 +89,7 @@ impl BoxGrid {
     }
 }
 
-/// Whether closed boxes cover a box wholly. Exact; O(pieces * boxes), meant for few.
+/// Tests whether closed boxes cover a box wholly. Exact; O(pieces * boxes), meant for few.
 pub fn covers(by: &[WorldBox], b: &WorldBox) -> bool {
     let mut open = vec![(*b, 0)];
     while let Some((piece, first)) = open.pop() {

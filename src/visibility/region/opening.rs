@@ -1,12 +1,12 @@
-//! A portal: a flat, upright or level, rectangle that two regions share. It
-//! defines on which side of it a point lies; what is seen through it is left to the
-//! back ends.
+//! A portal: a flat rectangle, upright or level, that two regions share; the sides of
+//! its plane.
 
 use glam::{DVec2, DVec3};
 
-use super::answer::RegionId;
+use super::id_set::RegionId;
+use super::stabbing_line::turn_by_rounding;
 
-/// The plane of an opening and which side is its front.
+/// The plane of an opening and its front side.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum OpeningPlane {
@@ -14,14 +14,14 @@ pub enum OpeningPlane {
     Axis {
         /// 0, 1 or 2.
         axis: usize,
-        /// Where it is on the axis, world units.
+        /// Coordinate on the axis, world units.
         at: f64,
     },
     /// Upright over the line from one point to another: the front is right of it.
     Upright {
-        /// Where the line begins, seen from above.
+        /// Start of the line, seen from above.
         from: DVec2,
-        /// Where it ends.
+        /// End of the line.
         to: DVec2,
     },
     /// One face of an opening that has a thickness: passed in both directions.
@@ -39,27 +39,15 @@ pub struct Opening {
     pub plane: OpeningPlane,
 }
 
-/// What a sum of two products of rounded differences loses at most, relative to the
-/// products' sizes: (3 + 16 u) u with u = 2^-53 (Shewchuk 1997, "Adaptive precision
-/// floating-point arithmetic", section 4.2), rounded up.
-const TURN_BOUND: f64 = 4.0 / (1u64 << 53) as f64;
-
 impl Opening {
-    /// Which side of the plane a point is surely on: 1 in front, -1 behind, 0 on it,
-    /// or where rounding leaves it open.
+    /// Side of the plane that a point is surely on: 1 in front, -1 behind, 0 on it or
+    /// too close to decide.
     pub fn side(&self, p: DVec3) -> i32 {
         match self.plane {
-            OpeningPlane::Axis { axis, at } => sign(p[axis] - at),
+            OpeningPlane::Axis { axis, at } => i32::from(p[axis] > at) - i32::from(p[axis] < at),
             OpeningPlane::Upright { from, to } => {
-                let p = p.truncate();
-                let (left, right) = ((from.x - p.x) * (to.y - p.y), (from.y - p.y) * (to.x - p.x));
                 // Above zero: the point is left of the line.
-                let left_of = left - right;
-                let bound = TURN_BOUND * (left.abs() + right.abs()) + f64::MIN_POSITIVE;
-                if left_of.abs() <= bound {
-                    return 0;
-                }
-                -sign(left_of)
+                -turn_by_rounding(from, to, p.truncate()).unwrap_or(0)
             }
             OpeningPlane::Undirected => 0,
         }
@@ -77,15 +65,21 @@ impl Opening {
         }
     }
 
+    /// Lower and upper corner of the box about it.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let corners = self.corners.into_iter();
+        let [low, high] = [
+            corners.clone().reduce(DVec3::min),
+            corners.reduce(DVec3::max),
+        ];
+        [low, high].map(|corner| corner.expect("four corners"))
+    }
+
     /// The other of its two regions.
     pub fn other(&self, region: RegionId) -> RegionId {
         let [front, behind] = self.sides;
         if region == front { behind } else { front }
     }
-}
-
-fn sign(x: f64) -> i32 {
-    i32::from(x > 0.0) - i32::from(x < 0.0)
 }
 
 /// The corners of a rectangle across an axis, in turn.

@@ -6,75 +6,58 @@
 //! a corner that was computed by cutting, so errors do not build up from opening to
 //! opening (the proof is at the slack, in `view`).
 
-use std::sync::Arc;
+use super::opening::Opening;
+use super::search::Windows;
+use super::view::{HalfSpace, MOST_PLANES, Polygon, View, through_edge};
 
-use super::answer::{About, Scratch};
-use super::graph::RegionGraph;
-use super::searched::Searched;
-use super::view::{MOST_PLANES, View, through_edge};
-use super::windows::Window;
-use crate::visibility::Guarantee;
-
-/// What it declares of itself.
-pub const ABOUT: About = About {
-    name: "portal-clip",
-    summary: "openings clipped as convex polygons by those before them",
-    guarantee: Guarantee::Conservative,
-};
-
-impl Searched {
-    /// Searches with clipped openings.
-    pub fn portal_clip(graph: Arc<RegionGraph>) -> Searched {
-        let about = ABOUT;
-        Searched {
-            about,
-            graph,
-            search,
-        }
-    }
+/// Sets of half-spaces. A window is the range of its half-spaces in `planes`.
+#[derive(Clone, Default, Debug)]
+pub struct PortalClip {
+    /// The half-spaces of all windows, the sides of the image first.
+    planes: Vec<HalfSpace>,
+    /// The current window: the opening as it is seen, and the half-spaces about it.
+    polygon: Polygon,
+    current: Vec<HalfSpace>,
 }
 
-fn search(graph: &RegionGraph, view: &View, scratch: &mut Scratch) {
-    let (seen, search) = (&mut scratch.seen, &mut scratch.windows);
-    search.clear(graph.len());
-    search.polygon.corners.clear();
-    for &home in &scratch.homes {
-        search.kept.clear();
-        search.kept.extend_from_slice(&view.sides);
-        search.enter(seen, home, view);
+impl Windows for PortalClip {
+    type Window = [u32; 2];
+
+    fn begin(&mut self, view: &View) -> [u32; 2] {
+        self.planes.clear();
+        self.planes.extend_from_slice(&view.sides);
+        [0, view.sides.len() as u32]
     }
-    let mut next = 0;
-    while let Some(&Window { region, shape, .. }) = search.entered.windows.get(next) {
-        next += 1;
-        for &exit in graph.exits(region) {
-            let opening = &graph.openings()[exit as usize];
-            let Some(entered) = opening.entered(region, view.eye) else {
-                continue;
-            };
-            let (corners, reach) = view.corners(opening);
-            if view.is_beyond(&corners, reach) {
-                continue;
-            }
-            let mut polygon = std::mem::take(&mut search.polygon);
-            let passes = polygon.begin(view, opening, &corners, reach)
-                && search.range(shape).iter().all(|plane| polygon.cut(plane));
-            search.polygon = polygon;
-            if !passes {
-                continue;
-            }
-            let mut kept = std::mem::take(&mut search.kept);
-            kept.clear();
-            let edges = (0u32..4).filter_map(|edge| {
-                through_edge(&corners, edge as usize, reach, 4 + 4 * exit + edge)
-            });
-            let all = search.range(shape).iter().copied().chain(edges);
-            // A half-space that holds all of the polygon follows from the others.
-            kept.extend(
-                all.filter(|plane| !search.polygon.is_within(plane))
-                    .take(MOST_PLANES),
-            );
-            search.kept = kept;
-            search.enter(seen, entered, view);
-        }
+
+    fn narrow(&mut self, view: &View, (exit, opening): (u32, &Opening), window: [u32; 2]) -> bool {
+        let before = &self.planes[window[0] as usize..window[1] as usize];
+        let Some((corners, reach)) = self.polygon.see(view, opening, before) else {
+            return false;
+        };
+        let edges = (0u32..4)
+            .filter_map(|edge| through_edge(&corners, edge as usize, reach, 4 + 4 * exit + edge));
+        // A half-space that holds all of the polygon follows from the others.
+        let needed = |plane: &HalfSpace| !self.polygon.is_within(plane);
+        let all = before.iter().copied().chain(edges);
+        self.current.clear();
+        self.current.extend(all.filter(needed).take(MOST_PLANES));
+        true
+    }
+
+    /// Each half-space of the earlier window is one of the current or holds its polygon.
+    fn is_within(&self, [first, end]: [u32; 2]) -> bool {
+        let implied = |old: &HalfSpace| {
+            let shared = self.current.iter().any(|plane| plane.number == old.number);
+            shared || self.polygon.is_within(old)
+        };
+        self.planes[first as usize..end as usize]
+            .iter()
+            .all(implied)
+    }
+
+    fn keep(&mut self) -> [u32; 2] {
+        let first = self.planes.len() as u32;
+        self.planes.extend_from_slice(&self.current);
+        [first, self.planes.len() as u32]
     }
 }

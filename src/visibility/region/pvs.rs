@@ -1,24 +1,22 @@
-//! Which region may be seen from which: one row of bits for each region. Made by an
-//! exact search, or read from a file: then it is a claim.
+//! Pairs of regions that may see each other: one set per region. Made by an exact
+//! search, or read from a file: then it is a claim.
 
 use serde::Deserialize;
 
-use super::answer::RegionId;
+use super::id_set::{IdSet, RegionId};
 use crate::json::{JsonError, from_json};
 
 /// A potentially visible set: for each region the set of regions seen from it.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pvs {
-    regions: usize,
-    words: usize,
-    bits: Vec<u64>,
+    rows: Vec<IdSet>,
 }
 
 /// Why bytes are no potentially visible set.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PvsError {
-    /// Not the JSON of one.
+    /// JSON of another form.
     #[error("{}: {}; expected {}", .0.place(), .0.found, .0.expected_of(FORM))]
     Json(JsonError),
     /// A region that is not there.
@@ -28,7 +26,7 @@ pub enum PvsError {
         pair: usize,
         /// The number.
         region: RegionId,
-        /// How many regions there are.
+        /// Number of regions.
         regions: usize,
     },
     /// More regions than pairs of them can be held.
@@ -69,14 +67,15 @@ const MOST_REGIONS: usize = 1 << 16;
 impl Pvs {
     /// Each region sees itself alone. O(n^2) bits.
     pub fn alone(regions: usize) -> Pvs {
-        let words = regions.div_ceil(64);
-        let mut pvs = Pvs {
-            regions,
-            words,
-            bits: vec![0; words * regions],
+        let row = |region| {
+            let mut row = IdSet::default();
+            row.clear(regions);
+            row.insert(region);
+            row
         };
-        (0..regions as u32).for_each(|r| pvs.insert(r, r));
-        pvs
+        Pvs {
+            rows: (0..regions as u32).map(row).collect(),
+        }
     }
 
     /// Reads `{"regions": COUNT, "sees": [[FROM, TO], ...]}`; each region sees
@@ -136,34 +135,27 @@ impl Pvs {
 
     /// Number of regions.
     pub fn len(&self) -> usize {
-        self.regions
+        self.rows.len()
     }
 
-    /// Whether there are no regions.
+    /// Tests whether there are no regions.
     pub fn is_empty(&self) -> bool {
-        self.regions == 0
+        self.rows.is_empty()
     }
 
-    /// The bits of what a region sees, lowest first.
-    pub fn row(&self, from: RegionId) -> &[u64] {
-        let first = from as usize * self.words;
-        &self.bits[first..first + self.words]
-    }
-
-    /// Whether `to` is seen from `from`.
-    pub fn sees(&self, from: RegionId, to: RegionId) -> bool {
-        self.row(from)[to as usize / 64] >> (to % 64) & 1 == 1
+    /// The regions that a region sees.
+    pub fn row(&self, from: RegionId) -> &IdSet {
+        &self.rows[from as usize]
     }
 
     /// Adds a pair, in this direction only.
     pub fn insert(&mut self, from: RegionId, to: RegionId) {
-        self.bits[from as usize * self.words + to as usize / 64] |= 1 << (to % 64);
+        self.rows[from as usize].insert(to);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::answer::decode;
     use super::*;
 
     #[test]
@@ -173,9 +165,9 @@ mod tests {
         wanted.insert(3, 69);
         wanted.insert(69, 4);
         assert_eq!(pvs, wanted);
-        assert!(pvs.sees(3, 69) && !pvs.sees(69, 3));
+        assert!(pvs.row(3).holds(69) && !pvs.row(69).holds(3));
         let mut row = Vec::new();
-        decode(pvs.row(69), &mut row);
+        pvs.row(69).list(&mut row);
         assert_eq!(row, [4, 69]);
     }
 
@@ -192,11 +184,9 @@ mod tests {
     fn a_reject_bit_hides_and_bits_run_on_over_rows() {
         // Bit 1 (0 to 1) and bit 8 (2 to 2, which sees itself all the same).
         let pvs = Pvs::from_reject(&[0b10, 0b1], 3).unwrap();
-        assert!(!pvs.sees(0, 1) && pvs.sees(1, 0) && pvs.sees(2, 2));
-        assert_eq!(
-            [0, 1, 2].map(|from| pvs.row(from)[0]),
-            [0b101, 0b111, 0b111]
-        );
+        assert!(!pvs.row(0).holds(1) && pvs.row(1).holds(0) && pvs.row(2).holds(2));
+        let rows = [0, 1, 2].map(|from| [0, 1, 2].map(|to| pvs.row(from).holds(to)));
+        assert_eq!(rows, [[true, false, true], [true; 3], [true; 3]]);
         let error = Pvs::from_reject(&[0], 3).unwrap_err().to_string();
         assert!(error.contains("1 bytes for 3 sectors"), "{error}");
     }

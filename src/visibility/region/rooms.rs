@@ -1,5 +1,5 @@
-//! Which rooms of a tiling see each other: an exact search by storeys, conservative
-//! between them.
+//! Pairs of rooms of a tiling that see each other: an exact search by storeys,
+//! conservative between them.
 //!
 //! A line of sight passes a sequence of openings, all of them rectangles across axes.
 //! Seen along an axis, each opening has an end on the left of the line and an end on
@@ -11,60 +11,42 @@
 //! necessary, not sufficient (Teller 1992, "Visibility computations in densely occluded
 //! polyhedral environments", chapter 5), and the pair is listed as visible.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
-use super::answer::RegionId;
 use super::graph::RegionGraph;
+use super::id_set::RegionId;
 use super::opening::{Opening, OpeningPlane};
 use super::pvs::Pvs;
-use super::stab::Stabbing;
+use super::stabbing_line::Stabbing;
 
 /// Openings for which there is no exact search.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("opening {0} is not flat across an axis; expected openings of a tiling without thickness")]
 pub struct NotFlat(pub usize);
 
-/// The three looks at a line: the axes that remain when it is seen along the third.
+/// The three projections of a line: the axes that remain when it is seen along the
+/// third.
 const VIEWS: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
-/// One kind of lines: the signs of their direction. Lines of sign 0 along z pass no
-/// opening across z, and may be level.
-#[derive(Clone, Copy, Debug)]
-struct Heading([i32; 3]);
-
-const HEADINGS: [Heading; 12] = {
-    let mut all = [Heading([0; 3]); 12];
-    let mut i = 0;
-    while i < 12 {
-        let z = (i >> 2) as i32 - 1;
-        all[i] = Heading([sign_of(i, 0), sign_of(i, 1), z]);
-        i += 1;
-    }
-    all
-};
-
-const fn sign_of(i: usize, bit: usize) -> i32 {
-    if i >> bit & 1 == 1 { 1 } else { -1 }
-}
+/// The signs of the direction of lines. Lines of sign 0 along z pass no opening across
+/// z, and may be level.
+type Heading = [i32; 3];
 
 /// A search from one region along one heading.
 struct Search<'a> {
     graph: &'a RegionGraph,
     heading: Heading,
-    /// Of a heading that is not level: the regions from which it leads on to an
-    /// opening across z, all if not `layered`.
-    rising: &'a [bool],
-    /// Whether a level line does for all that no opening across z is passed for.
+    /// Regions from which the heading leads on to an opening across z: all if it is
+    /// level or the graph is not `layered`.
+    rising: Vec<bool>,
+    /// A level line does for all that no opening across z is passed for.
     layered: bool,
     stabbing: [Stabbing; 3],
-    path: Vec<u32>,
-    /// How many openings of the path lie across z.
-    risen: usize,
 }
 
 impl Pvs {
-    /// Which rooms of a tiling see each other. Time is proportional to the number of
-    /// sequences of openings that a line passes.
+    /// Pairs of rooms of a tiling that see each other. Time is proportional to the number
+    /// of sequences of openings that a line passes.
     ///
     /// # Errors
     /// An opening with a thickness.
@@ -75,22 +57,29 @@ impl Pvs {
         }
         let mut pvs = Pvs::alone(graph.len());
         let layered = is_layered(graph);
-        for heading in HEADINGS {
-            let rising = match layered {
-                true => rising(graph, heading),
-                false => vec![true; graph.len()],
-            };
+        let plane = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
+        for heading in [-1, 0, 1]
+            .iter()
+            .flat_map(|&z| plane.map(|[x, y]| [x, y, z]))
+        {
             let mut search = Search {
                 graph,
                 heading,
-                rising: &rising,
+                rising: match layered && heading[2] != 0 {
+                    true => rising(graph, heading),
+                    false => vec![true; graph.len()],
+                },
                 layered,
                 stabbing: Default::default(),
-                path: Vec::new(),
-                risen: 0,
             };
             for from in 0..graph.len() as u32 {
-                search.visit(from, &mut |to| pvs.insert(from, to));
+                let mut reached = |to| pvs.insert(from, to);
+                search.visit(
+                    from,
+                    false,
+                    [f64::NEG_INFINITY, f64::INFINITY],
+                    &mut reached,
+                );
             }
         }
         Ok(pvs)
@@ -98,77 +87,73 @@ impl Pvs {
 }
 
 impl Search<'_> {
-    /// Calls `reached` with each region that a line of the heading reaches.
-    fn visit(&mut self, at: RegionId, reached: &mut dyn FnMut(RegionId)) {
-        let is_level = self.heading.0[2] == 0;
-        if !is_level && self.risen == 0 && !self.rising[at as usize] {
+    /// Calls `reached` with each region that a line of the heading reaches through the
+    /// openings so far: one of them across z if `risen`, all about the `heights`.
+    fn visit(
+        &mut self,
+        at: RegionId,
+        risen: bool,
+        heights: [f64; 2],
+        reached: &mut dyn FnMut(RegionId),
+    ) {
+        if !risen && !self.rising[at as usize] {
             return;
         }
-        if is_level || self.risen > 0 || !self.layered {
+        let (graph, is_level) = (self.graph, self.heading[2] == 0);
+        if is_level || risen || !self.layered {
             reached(at);
         }
-        let graph = self.graph;
         for &exit in graph.exits(at) {
             let opening = &graph.openings()[exit as usize];
-            let OpeningPlane::Axis { axis, .. } = opening.plane else {
+            let Some((axis, from, to)) = onward(opening, self.heading) else {
                 continue;
             };
-            // Towards larger coordinates from the region behind.
-            let sign = if opening.sides[1] == at { 1 } else { -1 };
-            if sign == self.heading.0[axis] && self.push(exit) {
-                self.risen += usize::from(axis == 2);
-                self.visit(opening.other(at), reached);
-                self.risen -= usize::from(axis == 2);
-                self.pop();
+            let [min, max] = opening.bounds();
+            let common = [heights[0].max(min.z), heights[1].min(max.z)];
+            let passes_level = !is_level || common[0] < common[1];
+            if from == at && passes_level && self.push(opening) {
+                self.visit(to, risen || axis == 2, common, reached);
+                let views = self.views();
+                self.stabbing[..views].iter_mut().for_each(Stabbing::pop);
             }
         }
     }
 
-    fn push(&mut self, exit: u32) -> bool {
-        let opening = &self.graph.openings()[exit as usize];
-        self.path.push(exit);
-        if self.heading.0[2] == 0 && !self.heights_overlap() {
-            self.path.pop();
-            return false;
-        }
+    /// Adds an opening; `false`, and nothing is added, if no line passes all.
+    fn push(&mut self, opening: &Opening) -> bool {
         for (i, view) in VIEWS.into_iter().enumerate().take(self.views()) {
             let [left, right] = ends(opening, view, self.heading);
             if !self.stabbing[i].push(left, right) {
                 self.stabbing[..i].iter_mut().for_each(Stabbing::pop);
-                self.path.pop();
                 return false;
             }
         }
         true
     }
 
-    fn pop(&mut self) {
-        self.path.pop();
-        let views = self.views();
-        self.stabbing[..views].iter_mut().for_each(Stabbing::pop);
-    }
-
-    /// A level line needs no look from the sides.
+    /// Number of projections: a level line needs none from the sides.
     fn views(&self) -> usize {
-        if self.heading.0[2] == 0 { 1 } else { 3 }
-    }
-
-    /// Whether one height passes all openings.
-    fn heights_overlap(&self) -> bool {
-        let bounds = self.path.iter().map(|&exit| {
-            let (min, max) = bounds(&self.graph.openings()[exit as usize]);
-            (min.z, max.z)
-        });
-        let (low, high) = bounds.fold((f64::NEG_INFINITY, f64::INFINITY), |all, one| {
-            (all.0.max(one.0), all.1.min(one.1))
-        });
-        low < high
+        if self.heading[2] == 0 { 1 } else { 3 }
     }
 }
 
-/// Whether all openings by which one can go about without passing one across z have
-/// a height in common, storey by storey: then a level line does wherever a slanting
-/// one does.
+/// Axis of an opening that lines of a heading pass, and the regions that they leave and
+/// enter.
+fn onward(opening: &Opening, heading: Heading) -> Option<(usize, RegionId, RegionId)> {
+    let OpeningPlane::Axis { axis, .. } = opening.plane else {
+        return None;
+    };
+    let [front, behind] = opening.sides;
+    // From the region behind towards larger coordinates.
+    match heading[axis] {
+        1 => Some((axis, behind, front)),
+        -1 => Some((axis, front, behind)),
+        _ => None,
+    }
+}
+
+/// Tests whether all openings that are joined without one across z have a height in
+/// common, storey by storey: then a level line does wherever a slanting one does.
 fn is_layered(graph: &RegionGraph) -> bool {
     let mut seen = vec![false; graph.len()];
     (0..graph.len() as u32).all(|start| {
@@ -181,7 +166,7 @@ fn is_layered(graph: &RegionGraph) -> bool {
             for &exit in graph.exits(at) {
                 let opening = &graph.openings()[exit as usize];
                 if !matches!(opening.plane, OpeningPlane::Axis { axis: 2, .. }) {
-                    let (min, max) = bounds(opening);
+                    let [min, max] = opening.bounds();
                     (low, high) = (low.max(min.z), high.min(max.z));
                     open.push(opening.other(at));
                 }
@@ -191,55 +176,40 @@ fn is_layered(graph: &RegionGraph) -> bool {
     })
 }
 
-/// The regions from which a line of the heading can come to an opening across z, by
-/// way of openings that are passed in its direction.
+/// The regions from which a line of the heading can come to an opening across z, through
+/// openings that it passes in its direction.
 fn rising(graph: &RegionGraph, heading: Heading) -> Vec<bool> {
     let mut leads = vec![false; graph.len()];
-    let onward = |opening: &Opening| match opening.plane {
-        // From the region behind towards larger coordinates.
-        OpeningPlane::Axis { axis, .. } => match heading.0[axis] {
-            1 => Some((axis, opening.sides[1], opening.sides[0])),
-            -1 => Some((axis, opening.sides[0], opening.sides[1])),
-            _ => None,
-        },
-        _ => None,
-    };
-    let mut open = Vec::new();
-    for opening in graph.openings() {
-        if let Some((2, from, _)) = onward(opening)
-            && !std::mem::replace(&mut leads[from as usize], true)
-        {
-            open.push(from);
-        }
-    }
+    let across_z = graph
+        .openings()
+        .iter()
+        .filter_map(|opening| onward(opening, heading));
+    let mut open: Vec<RegionId> = across_z
+        .filter_map(|(axis, from, _)| (axis == 2).then_some(from))
+        .collect();
     while let Some(at) = open.pop() {
-        for &exit in graph.exits(at) {
-            if let Some((_, from, to)) = onward(&graph.openings()[exit as usize])
-                && to == at
-                && !std::mem::replace(&mut leads[from as usize], true)
-            {
-                open.push(from);
-            }
+        if !std::mem::replace(&mut leads[at as usize], true) {
+            let openings = graph
+                .exits(at)
+                .iter()
+                .map(|&exit| &graph.openings()[exit as usize]);
+            let passed = openings.filter_map(|opening| onward(opening, heading));
+            open.extend(passed.filter_map(|(_, from, to)| (to == at).then_some(from)));
         }
     }
     leads
 }
 
-fn bounds(opening: &Opening) -> (DVec3, DVec3) {
-    let corners = opening.corners.iter();
-    corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), c| {
-        (low.min(*c), high.max(*c))
-    })
-}
-
 /// The ends of an opening on the left and on the right of lines of a heading, seen
-/// against the third axis. Of a rectangle these are two opposite corners.
+/// against the third axis: two opposite corners of a rectangle.
 fn ends(opening: &Opening, [i, j]: [usize; 2], heading: Heading) -> [DVec2; 2] {
-    let (min, max) = bounds(opening);
-    let (di, dj) = (heading.0[i], heading.0[j]);
-    let pick = |axis: usize, high: bool| if high { max[axis] } else { min[axis] };
+    let (bounds, di, dj) = (opening.bounds(), heading[i], heading[j]);
+    let end = |high_i: bool, high_j: bool| {
+        DVec2::new(
+            bounds[usize::from(high_i)][i],
+            bounds[usize::from(high_j)][j],
+        )
+    };
     // Left of (di, dj) is (-dj, di).
-    let left = DVec2::new(pick(i, dj < 0), pick(j, di > 0));
-    let right = DVec2::new(pick(i, dj > 0), pick(j, di < 0));
-    [left, right]
+    [end(dj < 0, di > 0), end(dj > 0, di < 0)]
 }

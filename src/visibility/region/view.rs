@@ -9,10 +9,10 @@ use glam::DVec3;
 use super::opening::Opening;
 use crate::visibility::Rays;
 
-/// How far outside of a half-space `n . x >= 0` a point is still kept, relative to
-/// bounds of |n| and |x| (sums of absolute coordinates).
+/// Distance outside of a half-space `n . x >= 0` within which a point is still kept,
+/// relative to bounds of |n| and |x| (sums of absolute coordinates).
 ///
-/// What has to be covered, with u = 2^-53 and X = |x|:
+/// The errors to cover, with u = 2^-53 and X = |x|:
 /// - A corner minus the eye is rounded by u relative; three products and two sums
 ///   with axes whose coordinates are at most 1 add 3 u X a coordinate: below 2^-49 X.
 /// - A ray of the camera is `u a + v b + forward`, rounded: u relative an operation,
@@ -54,7 +54,8 @@ pub struct View {
     /// World coordinates.
     pub eye: DVec3,
     axes: [DVec3; 3],
-    window: [f64; 4],
+    /// Left, right, bottom, top: slopes per unit of depth.
+    pub window: [f64; 4],
     far: f64,
     /// Left, right, bottom, top; numbers 0 to 3.
     pub sides: [HalfSpace; 4],
@@ -64,52 +65,35 @@ pub struct View {
 #[derive(Clone, Debug, Default)]
 pub struct Polygon {
     /// Corners in turn, camera coordinates.
-    pub corners: Vec<DVec3>,
+    corners: Vec<DVec3>,
     /// Largest |x| of the opening's corners.
-    pub reach: f64,
+    reach: f64,
     spare: Vec<DVec3>,
 }
 
 impl View {
-    /// `None` for an orthographic lens, whose rays share no eye.
-    pub fn of(rays: &Rays) -> Option<View> {
+    /// The half-spaces of a camera whose rays share an eye: any but an orthographic one.
+    pub fn of(rays: &Rays) -> View {
         let camera = rays.camera();
-        if camera.lens.is_orthographic() {
-            return None;
-        }
         let frame = &camera.frame;
         let window @ [left, right, bottom, top] = rays.window();
-        let normals = [
-            DVec3::new(1.0, 0.0, -left),
-            DVec3::new(-1.0, 0.0, right),
-            DVec3::new(0.0, 1.0, -bottom),
-            DVec3::new(0.0, -1.0, top),
-        ];
-        let mut number = 0;
-        Some(View {
+        let side = |number: u32, x: f64, y: f64, z: f64| HalfSpace {
+            normal: DVec3::new(x, y, z),
+            bound: size(DVec3::new(x, y, z)),
+            number,
+        };
+        View {
             eye: frame.eye,
             axes: [frame.u(), frame.v(), frame.forward()],
             window,
             far: camera.lens.far().unwrap_or(f64::INFINITY),
-            sides: normals.map(|normal| {
-                number += 1;
-                HalfSpace {
-                    normal,
-                    bound: size(normal),
-                    number: number - 1,
-                }
-            }),
-        })
-    }
-
-    /// Left, right, bottom, top: slopes per unit of depth.
-    pub fn window(&self) -> [f64; 4] {
-        self.window
-    }
-
-    /// A point in camera coordinates.
-    pub fn camera(&self, p: DVec3) -> DVec3 {
-        self.turned(p - self.eye)
+            sides: [
+                side(0, 1.0, 0.0, -left),
+                side(1, -1.0, 0.0, right),
+                side(2, 0.0, 1.0, -bottom),
+                side(3, 0.0, -1.0, top),
+            ],
+        }
     }
 
     /// A vector in camera coordinates.
@@ -118,15 +102,15 @@ impl View {
         DVec3::new(u.dot(d), v.dot(d), forward.dot(d))
     }
 
-    /// Whether all of an opening lies beyond the far plane, its corners given in
-    /// camera coordinates.
-    pub fn is_beyond(&self, corners: &[DVec3; 4], reach: f64) -> bool {
+    /// Tests whether all of an opening, its corners given in camera coordinates, lies
+    /// beyond the far plane.
+    fn is_beyond(&self, corners: &[DVec3; 4], reach: f64) -> bool {
         corners.iter().all(|c| c.z - reach * SLACK > self.far)
     }
 
     /// The corners of an opening in camera coordinates, and the largest size of one.
-    pub fn corners(&self, opening: &Opening) -> ([DVec3; 4], f64) {
-        let corners = opening.corners.map(|c| self.camera(c));
+    fn corners(&self, opening: &Opening) -> ([DVec3; 4], f64) {
+        let corners = opening.corners.map(|c| self.turned(c - self.eye));
         let reach = corners.iter().fold(0.0, |most: f64, c| most.max(size(*c)));
         (corners, reach)
     }
@@ -150,12 +134,8 @@ impl View {
         if corners.iter().any(|c| c.z <= 4.0 * SLACK * reach) {
             return Some(self.window);
         }
-        let mut rectangle = [
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-        ];
+        let (most, least) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut rectangle = [most, least, most, least];
         for c in &corners {
             let (x, y) = (c.x / c.z, c.y / c.z);
             // Both coordinates of x / z are off by below 2^-48 reach.
@@ -171,20 +151,21 @@ impl View {
 }
 
 impl Polygon {
-    /// Makes it the whole of an opening, grown by the slack. `false` if the opening
-    /// has no area: nothing is seen through it.
-    pub fn begin(
+    /// Makes it the part of an opening within half-spaces, grown by the slack. Returns the
+    /// corners of the opening in camera coordinates and the largest size of one; `None` if
+    /// nothing is seen: the opening has no area, or all of it is outside or too far.
+    pub fn see(
         &mut self,
         view: &View,
         opening: &Opening,
-        corners: &[DVec3; 4],
-        reach: f64,
-    ) -> bool {
-        // Of the opening itself: from far away its corners may come out the same.
+        within: &[HalfSpace],
+    ) -> Option<([DVec3; 4], f64)> {
+        let (corners, reach) = view.corners(opening);
+        // The edges of the opening itself: from far away its corners may come out the same.
         let ring = &opening.corners;
         let (along, across) = (ring[1] - ring[0], ring[3] - ring[0]);
-        if along == DVec3::ZERO || across == DVec3::ZERO {
-            return false;
+        if view.is_beyond(&corners, reach) || along == DVec3::ZERO || across == DVec3::ZERO {
+            return None;
         }
         // More than the slack, as coordinates are off too.
         let grow = |edge: DVec3| view.turned(edge.normalize()) * (4.0 * SLACK * reach);
@@ -197,12 +178,13 @@ impl Polygon {
             corners[3] - along + across,
         ]);
         self.reach = reach * (1.0 + 32.0 * SLACK);
-        true
+        let is_left = within.iter().all(|plane| self.cut(plane));
+        is_left.then_some((corners, reach))
     }
 
-    /// Cuts off what is surely outside of the half-space (Sutherland and Hodgman
+    /// Cuts off the part that is surely outside of the half-space (Sutherland and Hodgman
     /// 1974); `false` if nothing is left.
-    pub fn cut(&mut self, by: &HalfSpace) -> bool {
+    fn cut(&mut self, by: &HalfSpace) -> bool {
         let slack = SLACK * by.bound * self.reach;
         let depth = |x: DVec3| by.normal.dot(x) + slack;
         if self.corners.iter().all(|c| depth(*c) >= 0.0) {
@@ -226,7 +208,7 @@ impl Polygon {
         !self.corners.is_empty()
     }
 
-    /// Whether each point of it surely satisfies the half-space.
+    /// Tests whether each point of it surely satisfies the half-space.
     pub fn is_within(&self, of: &HalfSpace) -> bool {
         let slack = SLACK * of.bound * self.reach;
         self.corners.iter().all(|c| of.normal.dot(*c) >= slack)

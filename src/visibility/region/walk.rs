@@ -1,15 +1,15 @@
-//! Rays followed from region to region in plain f64: what samples see of the regions.
-//! The simplest thing that can be written, as the back ends are tested against it.
+//! Rays followed from region to region in plain f64: the regions that samples see.
+//! As simple as can be, because the back ends are tested against it.
 
-use super::answer::{Marks, RegionId};
 use super::graph::RegionGraph;
+use super::id_set::{IdSet, RegionId};
 use super::opening::OpeningPlane;
 use crate::scene::WorldBox;
 use crate::visibility::{Ray, Rays, SampleGrid};
 
 /// Adds the regions, boxes each, that a ray passes from its near to its far end,
 /// until it meets a border where there is no opening. `home` holds its beginning.
-pub fn follow_boxes(graph: &RegionGraph, home: RegionId, ray: &Ray, seen: &mut Marks) {
+pub fn follow_boxes(graph: &RegionGraph, home: RegionId, ray: &Ray, seen: &mut IdSet) {
     let (mut region, mut depth) = (home, ray.near);
     // A ray passes each region once.
     for _ in 0..graph.len() {
@@ -26,12 +26,8 @@ pub fn follow_boxes(graph: &RegionGraph, home: RegionId, ray: &Ray, seen: &mut M
         let through = |exit: &&u32| {
             let opening = &graph.openings()[**exit as usize];
             let same = OpeningPlane::Axis { axis, at } == opening.plane;
-            same && (0..3).filter(|&k| k != axis).all(|k| {
-                let values = opening.corners.map(|c| c[k]);
-                let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-                let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                low < p[k] && p[k] < high
-            })
+            let [low, high] = opening.bounds();
+            same && (0..3).all(|k| k == axis || low[k] < p[k] && p[k] < high[k])
         };
         match graph.exits(region).iter().find(through) {
             Some(&exit) => region = graph.openings()[exit as usize].other(region),
@@ -62,7 +58,7 @@ pub fn seen_by_samples(
     grid: SampleGrid,
     out: &mut Vec<RegionId>,
 ) {
-    let mut seen = Marks::default();
+    let mut seen = IdSet::default();
     seen.clear(graph.len());
     for row in 0..grid.height {
         for column in 0..grid.width {

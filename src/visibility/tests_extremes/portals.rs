@@ -10,7 +10,7 @@ use crate::camera::Lens;
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::Rays;
 use crate::visibility::region::{
-    Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, Searched, leads_through, rectangle,
+    Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, Source, leads_through, rectangle,
 };
 
 /// A chain of rooms along x, and a line of sight from the first to the last of them.
@@ -82,16 +82,16 @@ impl Chain {
             .map(|opening| narrower(*opening, shrink));
         let told = RegionGraph::of_boxes(self.rooms.clone(), told.collect());
         let rows = rows(&Arc::new(told));
-        let safe = rows.iter().filter(|row| row.about().guarantee.is_safe());
-        Some(safe.map(|row| self.answer(&**row)).collect())
+        let safe = rows.iter().filter(|row| row.back_end.guarantee.is_safe());
+        Some(safe.map(|row| self.answer(row)).collect())
     }
 
-    fn answer(&self, row: &dyn RegionRow) -> Answer {
+    fn answer(&self, row: &RegionRow) -> Answer {
         let mut listed = Vec::new();
         row.from_eye(&self.rays, &mut Scratch::default(), &mut listed);
         let rooms = 0..self.rooms.len() as u32;
         Answer {
-            row: row.about().name,
+            row: row.back_end.name,
             lost: rooms
                 .filter(|room| listed.binary_search(room).is_err())
                 .collect(),
@@ -115,11 +115,7 @@ fn narrower(opening: Opening, by: f64) -> Opening {
     }
 }
 
-fn rows(graph: &Arc<RegionGraph>) -> [Box<dyn RegionRow>; 3] {
-    let graph = || graph.clone();
-    [
-        Box::new(Searched::flood(graph())),
-        Box::new(Searched::portal_rect(graph())),
-        Box::new(Searched::portal_clip(graph())),
-    ]
+fn rows(graph: &Arc<RegionGraph>) -> [RegionRow; 3] {
+    let sources = [Source::Flood, Source::PortalRect, Source::PortalClip];
+    sources.map(|source| RegionRow::search(source, graph.clone()))
 }

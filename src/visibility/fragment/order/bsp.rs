@@ -11,7 +11,8 @@
 //! parts, or too many planes about them; and rays that run within a plane have both of
 //! its sides on the eye's.
 
-use super::contract::{self, DepthOrder, Piece, distance, nearest_point};
+use super::contract::{self, DepthOrder, Piece, ToOrder};
+use super::whole::nearest;
 use crate::camera::Camera;
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
@@ -55,6 +56,12 @@ pub struct BspOrder {
     parts: usize,
     /// Whether cutting ended before everything was parted.
     is_cut_short: bool,
+}
+
+/// Cuts boxes by planes; no order of triangles.
+pub fn order(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    let order = || Box::new(BspOrder::of(of.boxes)) as Box<dyn DepthOrder>;
+    of.surfaces.is_none().then(order)
 }
 
 impl BspOrder {
@@ -115,16 +122,15 @@ impl BspOrder {
 fn sides(parts: Vec<Part>, axis: usize, at: f64) -> [Vec<Part>; 2] {
     let (mut below, mut above) = (Vec::new(), Vec::new());
     for part in parts {
-        if part.b.max[axis] <= at {
-            below.push(part);
-        } else if part.b.min[axis] >= at {
-            above.push(part);
-        } else {
-            let [mut low, mut high] = [Part { cut: true, ..part }; 2];
-            low.b.max[axis] = at;
-            high.b.min[axis] = at;
-            below.push(low);
-            above.push(high);
+        let [mut low, mut high] = [Part { cut: true, ..part }; 2];
+        (low.b.max[axis], high.b.min[axis]) = (at, at);
+        match (part.b.max[axis] <= at, part.b.min[axis] >= at) {
+            (true, _) => below.push(part),
+            (_, true) => above.push(part),
+            _ => {
+                below.push(low);
+                above.push(high);
+            }
         }
     }
     [below, above]
@@ -150,18 +156,15 @@ fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
     }
     let mut best: Option<(usize, usize, f64)> = None;
     for axis in 0..3 {
-        let sorted = |bound: fn(&WorldBox) -> glam::DVec3| {
-            let mut bounds: Vec<f64> = parts.iter().map(|part| bound(&part.b)[axis]).collect();
+        let sorted = |bound: &dyn Fn(&WorldBox) -> Option<f64>| {
+            let bounds = parts.iter().filter_map(|part| bound(&part.b));
+            let mut bounds: Vec<f64> = bounds.collect();
             bounds.sort_unstable_by(f64::total_cmp);
             bounds
         };
-        let (low, high) = (sorted(|b| b.min), sorted(|b| b.max));
-        let mut flat: Vec<f64> = parts
-            .iter()
-            .filter(|part| part.b.min[axis] == part.b.max[axis])
-            .map(|part| part.b.min[axis])
-            .collect();
-        flat.sort_unstable_by(f64::total_cmp);
+        let low = sorted(&|b| Some(b.min[axis]));
+        let high = sorted(&|b| Some(b.max[axis]));
+        let flat = sorted(&|b| (b.min[axis] == b.max[axis]).then_some(b.min[axis]));
         let equal = |list: &[f64], at: f64| {
             list.partition_point(|&x| x <= at) - list.partition_point(|&x| x < at)
         };
@@ -203,7 +206,7 @@ impl DepthOrder for BspOrder {
                     });
                 }
                 Node::Leaf(parts) => {
-                    let far = |part: &Part| distance(camera, nearest_point(camera, &part.b));
+                    let far = |part: &Part| nearest(camera, &part.b);
                     let mut parts: Vec<&Part> = parts.iter().collect();
                     parts.sort_by(|a, b| far(a).total_cmp(&far(b)).then(a.item.cmp(&b.item)));
                     pieces.extend(parts.iter().map(|part| Piece {

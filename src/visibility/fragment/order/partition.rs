@@ -10,7 +10,8 @@
 
 use glam::DVec3;
 
-use super::contract::{DepthOrder, Part, Piece, distance, nearest_point};
+use super::contract::{DepthOrder, Part, Piece, ToOrder};
+use super::whole::nearest;
 use crate::camera::Camera;
 use crate::geometry::PlaneTree;
 use crate::query::ItemId;
@@ -70,11 +71,9 @@ struct Fallen {
     two_sided: bool,
 }
 
-/// Part of a triangle on its way down.
-struct Falling {
-    polygon: Vec<DVec3>,
-    node: Option<u32>,
-    leaf: usize,
+/// Sorts the items of surfaces in a scene with a partition of its own.
+pub fn order(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    Some(Box::new(PartitionOrder::of(of.surfaces?, of.planes?)))
 }
 
 impl PartitionOrder {
@@ -126,44 +125,26 @@ impl PartitionOrder {
         normal: DVec3,
         mut fallen: impl FnMut(usize, Vec<DVec3>),
     ) {
-        let mut open = vec![Falling {
-            polygon: corners.to_vec(),
-            node: self.root,
-            leaf: 0,
-        }];
-        while let Some(Falling {
-            polygon,
-            node,
-            leaf,
-        }) = open.pop()
-        {
+        // Parts of the triangle, each with the node that it is at and the leaf if that is none.
+        let mut open = vec![(corners.to_vec(), self.root, 0)];
+        while let Some((polygon, node, leaf)) = open.pop() {
             let Some(at) = node else {
                 fallen(leaf, polygon);
                 continue;
             };
             let node = &self.nodes[at as usize];
             let heights: Vec<f64> = polygon.iter().map(|&p| node.height(p)).collect();
-            let [above, below] = [
-                heights.iter().any(|&h| h > self.slack),
-                heights.iter().any(|&h| h < -self.slack),
-            ];
-            let sides = match (above, below) {
-                (true, true) => [true, true],
-                (false, false) => [0, 1].map(|side| node.faced(normal) == side),
-                one => [one.0, one.1],
+            let sides = match [1.0, -1.0].map(|sign| heights.iter().any(|h| sign * h > self.slack))
+            {
+                [false, false] => [0, 1].map(|side| node.faced(normal) == side),
+                sides => sides,
             };
-            for side in [0, 1] {
-                if sides[side] {
-                    let polygon = match sides[1 - side] {
-                        true => cut(&polygon, &heights, [1.0, -1.0][side]),
-                        false => polygon.clone(),
-                    };
-                    open.push(Falling {
-                        polygon,
-                        node: node.children[side],
-                        leaf: 2 * at as usize + side,
-                    });
-                }
+            for side in (0..2).filter(|&side| sides[side]) {
+                let polygon = match sides[1 - side] {
+                    true => cut(&polygon, &heights, [1.0, -1.0][side]),
+                    false => polygon.clone(),
+                };
+                open.push((polygon, node.children[side], 2 * at as usize + side));
             }
         }
     }
@@ -229,10 +210,8 @@ impl DepthOrder for PartitionOrder {
                 continue;
             }
             sorted.clear();
-            sorted.extend(self.leaves[leaf].iter().map(|held| {
-                let nearest = nearest_point(camera, &held.bounds);
-                (held.is_behind_all, distance(camera, nearest), held.item)
-            }));
+            let key = |held: &Held| (held.is_behind_all, nearest(camera, &held.bounds), held.item);
+            sorted.extend(self.leaves[leaf].iter().map(key));
             sorted.sort_unstable_by(|a: &(bool, f64, ItemId), b| {
                 a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
             });

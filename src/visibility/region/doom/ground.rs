@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::super::graph::{Ground, RegionGraph};
-use super::super::number::{Marks, RegionId};
+use super::super::id_set::{IdSet, RegionId};
 use super::super::opening::{Opening, OpeningPlane};
 use super::map::{DoomMap, HIGHEST};
 use crate::scene::{Dispute, Linedef, WorldBox};
@@ -162,7 +162,7 @@ impl Ground for SectorGround {
         self.regions_at(b, out);
     }
 
-    fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut Marks) {
+    fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
         let start = ray.at(ray.near);
         let Some(mut sector) = self.sector_at(start.truncate()) else {
             return;

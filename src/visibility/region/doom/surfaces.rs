@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::super::number::RegionId;
+use super::super::id_set::RegionId;
 use super::map::DoomMap;
 use super::plan::{self, Point};
 use crate::scene::{Linedef, Scene, SurfaceKind, Surfaces};

@@ -21,15 +21,13 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
         let (map, graph) = sample(&scene);
         let mut rows = from_eye::rows(&graph);
         let reject = Arc::new(map.reject().unwrap());
-        rows.push(Box::new(
-            StoredPvs::of(graph.clone(), reject, REJECT).unwrap(),
-        ));
+        rows.push(RegionRow::stored(Source::Reject, graph.clone(), reject).unwrap());
         let mut rng = SeededRng::new(8);
         let (mut scratch, mut out) = (Scratch::default(), Vec::new());
         let mut sums = vec![0; rows.len() + 1];
         for place in scene.places.iter().take(30) {
             let rays = looking(place.eye, &mut rng);
-            let mut seen = Marks::default();
+            let mut seen = IdSet::default();
             seen.clear(graph.len());
             for _ in 0..300 {
                 let ray = rays.through(rng.unit(), rng.unit());
@@ -44,7 +42,7 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
                     .iter()
                     .filter(|r| out.binary_search(r).is_err())
                     .count();
-                assert_eq!(lost, 0, "{name} {}", row.about().name);
+                assert_eq!(lost, 0, "{name} {}", row.back_end.name);
                 sums[i] += out.len();
             }
         }
@@ -75,7 +73,7 @@ fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
         for row in from_eye::rows(&graph) {
             let mut out = Vec::new();
             let answer = row.from_eye(&rays, &mut Scratch::default(), &mut out);
-            assert_eq!(answer, place, "{away} {height} {}", row.about().name);
+            assert_eq!(answer, place, "{away} {height} {}", row.back_end.name);
         }
     }
 }

@@ -39,7 +39,7 @@ fn visible_and_lost(world: &World, graph: &Arc<RegionGraph>, eyes: usize) -> (us
     let rows = rows(graph);
     let mut rng = SeededRng::new(12);
     let (mut scratch, mut regions) = (Scratch::default(), Vec::new());
-    let (mut marks, mut list) = (Marks::default(), Vec::new());
+    let (mut marks, mut list) = (IdSet::default(), Vec::new());
     let (mut visible, mut lost) = (0, vec![0; rows.len()]);
     for place in world.scene.places.iter().cycle().take(eyes) {
         let rays = looking(place.eye, &mut rng);
@@ -118,7 +118,7 @@ fn rays_end_where_rays_through_sectors_end() {
         let own = world.scene.items.len() as ItemId;
         let items = RegionItems::of(&world.graph, &world.scene);
         let mut rng = SeededRng::new(13);
-        let (mut whole, mut part) = (Marks::default(), Marks::default());
+        let (mut whole, mut part) = (IdSet::default(), IdSet::default());
         let (mut ended, mut escaped) = (0, 0);
         for place in world.scene.places.iter().take(40) {
             let rays = looking(place.eye, &mut rng);

@@ -7,17 +7,15 @@ use super::worlds::*;
 use crate::scene::SeededRng;
 use crate::visibility::Rays;
 
-pub fn rows(graph: &Arc<RegionGraph>) -> Vec<Box<dyn RegionRow>> {
-    vec![
-        Box::new(Searched::flood(graph.clone())),
-        Box::new(Searched::portal_rect(graph.clone())),
-        Box::new(Searched::portal_clip(graph.clone())),
-    ]
+pub fn rows(graph: &Arc<RegionGraph>) -> Vec<RegionRow> {
+    let sources = [Source::Flood, Source::PortalRect, Source::PortalClip];
+    let rows = sources.map(|source| RegionRow::search(source, graph.clone()));
+    rows.into()
 }
 
 /// Regions that random rays of the camera pass.
 fn sampled(graph: &RegionGraph, rays: &Rays, count: usize, rng: &mut SeededRng) -> Vec<u32> {
-    let mut seen = Marks::default();
+    let mut seen = IdSet::default();
     seen.clear(graph.len());
     for _ in 0..count {
         let ray = rays.through(rng.unit(), rng.unit());
@@ -29,7 +27,7 @@ fn sampled(graph: &RegionGraph, rays: &Rays, count: usize, rng: &mut SeededRng) 
 }
 
 /// How many regions that rays pass are missing in the row's answers.
-pub fn missing(row: &dyn RegionRow, truth: &RegionGraph, eyes: usize, seed: u64) -> usize {
+pub fn missing(row: &RegionRow, truth: &RegionGraph, eyes: usize, seed: u64) -> usize {
     let mut rng = SeededRng::new(seed);
     let (mut scratch, mut out) = (Scratch::default(), Vec::new());
     let mut missing = 0;
@@ -50,7 +48,7 @@ pub fn missing(row: &dyn RegionRow, truth: &RegionGraph, eyes: usize, seed: u64)
 fn a_stored_row_answers_what_is_stored() {
     let (_, graph) = rooms("rooms:n=1600,seed=1");
     let pvs = Arc::new(Pvs::of_rooms(&graph).unwrap());
-    let stored = StoredPvs::of(graph.clone(), pvs.clone(), EXACT).unwrap();
+    let stored = RegionRow::stored(Source::Exact, graph.clone(), pvs.clone()).unwrap();
     let (mut rng, mut scratch, mut homes) = (SeededRng::new(8), Scratch::default(), Vec::new());
     let [mut answer, mut wanted] = [Vec::new(), Vec::new()];
     for _ in 0..200 {
@@ -60,13 +58,13 @@ fn a_stored_row_answers_what_is_stored() {
         let all = 0..graph.len() as u32;
         wanted.clear();
         wanted.extend(all.filter(|&to| {
-            place == EyePlace::Outside || homes.iter().any(|&from| pvs.sees(from, to))
+            place == EyePlace::Outside || homes.iter().any(|&from| pvs.row(from).holds(to))
         }));
         assert_eq!(answer, wanted);
         for &home in &homes {
             let mut row = Vec::new();
-            decode(pvs.row(home), &mut row);
-            assert_eq!(stored.stored(home), row);
+            pvs.row(home).list(&mut row);
+            assert_eq!(stored.stored_from(home), row);
         }
     }
 }
@@ -84,10 +82,10 @@ fn no_row_misses_a_region_that_a_ray_passes() {
         let (_, graph) = rooms(world);
         for row in rows(&graph) {
             assert_eq!(
-                missing(&*row, &graph, 60, 9),
+                missing(&row, &graph, 60, 9),
                 0,
                 "{world} {}",
-                row.about().name
+                row.back_end.name
             );
         }
     }
@@ -100,10 +98,10 @@ fn no_row_misses_a_cube_that_a_ray_passes() {
         let graph = cubes(count, &mut rng);
         for row in rows(&graph) {
             assert_eq!(
-                missing(&*row, &graph, 60, 9),
+                missing(&row, &graph, 60, 9),
                 0,
                 "{count:?} {}",
-                row.about().name
+                row.back_end.name
             );
         }
     }
@@ -116,7 +114,7 @@ fn a_forgotten_opening_is_noticed() {
         let wrong = Arc::new(without_opening(&graph, opening));
         let caught = rows(&wrong)
             .iter()
-            .filter(|row| missing(&***row, &graph, 800, 9) > 0)
+            .filter(|row| missing(row, &graph, 800, 9) > 0)
             .count();
         // Flood may come by another way.
         assert!(caught >= 2, "{opening}: {caught}");
@@ -173,11 +171,11 @@ fn openings_with_a_thickness_are_seen_through() {
         let lens = crate::camera::Lens::perspective(60.0, 1.0, 0.1, None).unwrap();
         let rays = Rays::of(&crate::camera::Camera { frame, lens }).unwrap();
         let mut out = Vec::new();
-        let mut count = |row: &dyn RegionRow| {
+        let mut count = |row: &RegionRow| {
             row.from_eye(&rays, &mut Scratch::default(), &mut out);
             out.len()
         };
-        rows(&graph).iter().map(|row| count(&**row)).collect()
+        rows(&graph).iter().map(|row| count(row)).collect()
     };
     assert_eq!(answers(DVec3::X), [3, 3, 3]);
     assert_eq!(answers(DVec3::NEG_X), [1, 1, 1]);

@@ -18,12 +18,10 @@ fn lost_hits(world: &str, graph_of: fn(&crate::scene::Scene) -> RegionGraph) -> 
     let items = RegionItems::of(&graph, &scene);
     let mut rows = rows(&graph);
     let exact = Arc::new(Pvs::of_rooms(&graph).unwrap());
-    rows.push(Box::new(
-        StoredPvs::of(graph.clone(), exact, EXACT).unwrap(),
-    ));
+    rows.push(RegionRow::stored(Source::Exact, graph.clone(), exact).unwrap());
     let mut rng = SeededRng::new(21);
     let (mut scratch, mut regions) = (Scratch::default(), Vec::new());
-    let (mut marks, mut list) = (Marks::default(), Vec::new());
+    let (mut marks, mut list) = (IdSet::default(), Vec::new());
     let mut lost = vec![0; rows.len()];
     for _ in 0..250 {
         let b = graph.parts(rng.below(graph.len()) as u32)[0];
@@ -68,7 +66,7 @@ fn who_forgets_that_an_eye_can_be_in_a_wall_is_caught() {
 fn items_of_regions_are_those_that_meet_them() {
     let (scene, graph) = rooms("rooms:n=900,seed=2,storeys=5");
     let items = RegionItems::of(&graph, &scene);
-    let (mut marks, mut list) = (Marks::default(), Vec::new());
+    let (mut marks, mut list) = (IdSet::default(), Vec::new());
     for region in 0..graph.len() as u32 {
         let room = graph.parts(region)[0];
         let meets = |b: &crate::geometry::Aabb| {

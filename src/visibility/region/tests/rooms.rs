@@ -16,8 +16,8 @@ fn missing(pvs: &Pvs, rays: &Pvs) -> usize {
     let n = pvs.len() as u32;
     let pairs = (0..n).flat_map(|a| (0..n).map(move |b| [a, b]));
     let lost = pairs.filter(|&[a, b]| {
-        assert_eq!(pvs.sees(a, b), pvs.sees(b, a), "{a} {b}");
-        rays.sees(a, b) && !pvs.sees(a, b)
+        assert_eq!(pvs.row(a).holds(b), pvs.row(b).holds(a), "{a} {b}");
+        rays.row(a).holds(b) && !pvs.row(a).holds(b)
     });
     lost.count()
 }

@@ -119,7 +119,7 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
     let graph = Arc::new(RegionGraph::of_boxes(chain.rooms, chain.openings));
     let [eye, end] = chain.ends;
     let frame = Frame::looking_along(eye, end - eye, DVec3::new(0.3, 0.5, 0.7)).unwrap();
-    let answer = |row: &dyn RegionRow, lens: Lens| {
+    let answer = |row: &RegionRow, lens: Lens| {
         let rays = Rays::of(&Camera { frame, lens }).unwrap();
         let mut out = Vec::new();
         let place = row.from_eye(&rays, &mut Scratch::default(), &mut out);
@@ -127,11 +127,11 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
     };
     for row in &rows(&graph) {
         let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();
-        assert_eq!(answer(&**row, level), (EyePlace::Outside, 40));
+        assert_eq!(answer(row, level), (EyePlace::Outside, 40));
         // The last opening that is not beyond the far plane leads one room on.
         let near = Lens::perspective(60.0, 1.0, 1e-4, Some(9.9)).unwrap();
-        let (place, count) = answer(&**row, near);
+        let (place, count) = answer(row, near);
         assert_eq!(place, EyePlace::Inside);
-        assert!((10..=12).contains(&count), "{} {count}", row.about().name);
+        assert!((10..=12).contains(&count), "{} {count}", row.back_end.name);
     }
 }

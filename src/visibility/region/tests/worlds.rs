@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::{Marks, Opening, OpeningPlane, Pvs, RegionGraph, rectangle};
+use super::super::{IdSet, Opening, OpeningPlane, Pvs, RegionGraph, rectangle};
 use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::visibility::{Ray, Rays};
@@ -40,7 +40,7 @@ pub fn looking(eye: DVec3, rng: &mut SeededRng) -> Rays {
 pub fn joined_by_rays(graph: &RegionGraph, rays: usize, seed: u64) -> Pvs {
     let mut rng = SeededRng::new(seed);
     let mut pvs = Pvs::alone(graph.len());
-    let (mut seen, mut list) = (Marks::default(), Vec::new());
+    let (mut seen, mut list) = (IdSet::default(), Vec::new());
     for i in 0..rays {
         let from = (i % graph.len()) as u32;
         let b = graph.parts(from)[0];
@@ -127,6 +127,10 @@ pub fn without_opening(graph: &RegionGraph, index: usize) -> RegionGraph {
 
 /// Number of ordered pairs, each region with itself included.
 pub fn pairs(pvs: &Pvs) -> u64 {
-    let rows = (0..pvs.len() as u32).flat_map(|from| pvs.row(from));
-    rows.map(|word| u64::from(word.count_ones())).sum()
+    let mut row = Vec::new();
+    let count = |from| {
+        pvs.row(from).list(&mut row);
+        row.len() as u64
+    };
+    (0..pvs.len() as u32).map(count).sum()
 }

@@ -1,27 +1,27 @@
-//! Lists of lists in two tables.
+//! Lists of lists in two tables (compressed sparse rows).
 
 /// Lists that lie one behind the other.
 #[derive(Clone, Debug)]
-pub struct Lists<T> {
-    /// Where each list begins; one more at the end.
+pub struct Csr<T> {
+    /// Start of each list; one more at the end.
     starts: Vec<u32>,
     pub all: Vec<T>,
 }
 
-impl<T: Clone> Lists<T> {
-    /// Puts lists together.
-    pub fn of(lists: &[Vec<T>]) -> Lists<T> {
+impl<T: Clone> Csr<T> {
+    /// Joins lists. O(entries).
+    pub fn of(lists: &[Vec<T>]) -> Csr<T> {
         let ends = lists.iter().scan(0, |end, list| {
             *end += list.len() as u32;
             Some(*end)
         });
-        Lists {
+        Csr {
             starts: std::iter::once(0).chain(ends).collect(),
             all: lists.concat(),
         }
     }
 
-    /// How many lists there are.
+    /// Number of lists.
     pub fn count(&self) -> usize {
         self.starts.len() - 1
     }

@@ -1,27 +1,32 @@
-//! Lines that pass between points: is there a directed line in the plane with all
-//! `lefts` strictly on its left and all `rights` strictly on its right? Decided
-//! exactly, for any f64 coordinates.
+//! Lines that pass between points: whether a directed line in the plane has all
+//! `lefts` strictly on its left and all `rights` strictly on its right. Exact for any
+//! f64 coordinates.
 
 use glam::DVec2;
 
 use crate::arithmetic::Expansion;
 
-/// Of which side of the line from `a` through `b` the point `c` is: above zero for the
-/// left, zero for on it. Exact (Shewchuk 1997, "Adaptive precision floating-point
-/// arithmetic", section 4.2: the bound is the first stage of its orient2d).
-pub fn turn(a: DVec2, b: DVec2, c: DVec2) -> i32 {
+/// Side of the line from `a` through `b` that the point `c` is on, in rounded
+/// arithmetic: 1 for the left, -1 for the right, `None` if rounding hides it (Shewchuk
+/// 1997, "Adaptive precision floating-point arithmetic", section 4.2: the bound is the
+/// first stage of its orient2d).
+pub fn turn_by_rounding(a: DVec2, b: DVec2, c: DVec2) -> Option<i32> {
     const BOUND: f64 = 4.0 / (1u64 << 53) as f64;
     let (left, right) = ((a.x - c.x) * (b.y - c.y), (a.y - c.y) * (b.x - c.x));
     let determinant = left - right;
     let bound = BOUND * (left.abs() + right.abs()) + f64::MIN_POSITIVE;
-    if determinant.abs() > bound {
-        return if determinant > 0.0 { 1 } else { -1 };
-    }
-    let product = Expansion::product;
-    let ab = &product(a.x, b.y) - &product(a.y, b.x);
-    let bc = &product(b.x, c.y) - &product(b.y, c.x);
-    let ca = &product(c.x, a.y) - &product(c.y, a.x);
-    (&(&ab + &bc) + &ca).sign()
+    (determinant.abs() > bound).then_some(if determinant > 0.0 { 1 } else { -1 })
+}
+
+/// The same, exactly: 0 for on the line.
+fn turn(a: DVec2, b: DVec2, c: DVec2) -> i32 {
+    turn_by_rounding(a, b, c).unwrap_or_else(|| {
+        let product = Expansion::product;
+        let ab = &product(a.x, b.y) - &product(a.y, b.x);
+        let bc = &product(b.x, c.y) - &product(b.y, c.x);
+        let ca = &product(c.x, a.y) - &product(c.y, a.x);
+        (&(&ab + &bc) + &ca).sign()
+    })
 }
 
 /// The openings that a line has to pass: the end of each that is on its left and the
@@ -66,7 +71,7 @@ impl Stabbing {
         self.extreme.pop();
     }
 
-    /// Whether the line from right point r through left point l has all lefts on its
+    /// Tests whether the line from right point r through left point l has all lefts on its
     /// left and all rights on its right, or on itself and then all rights before all
     /// lefts. Turned a little to the right about a point between those it has none on
     /// itself: it is a line as wanted. And where there are such lines, one of them

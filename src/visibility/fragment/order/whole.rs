@@ -1,0 +1,97 @@
+//! Orders of whole items: by id, by tree, by distance.
+
+use glam::DVec3;
+
+use super::contract::{DepthOrder, Piece, ToOrder};
+use crate::camera::Camera;
+use crate::index::{Input, RegionIndex, Wide};
+use crate::query::ItemId;
+use crate::scene::WorldBox;
+use crate::visibility::Solids;
+
+/// The same list of items for every camera.
+struct Fixed(Vec<ItemId>);
+
+impl DepthOrder for Fixed {
+    fn order(&self, _: &Solids, _: &Camera, pieces: &mut Vec<Piece>) {
+        pieces.clear();
+        pieces.extend(self.0.iter().map(|&item| Piece::whole(item)));
+    }
+}
+
+/// Items in the order of their ids.
+pub fn by_id(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    let items = 0..of.boxes.boxes.len() as ItemId;
+    Some(Box::new(Fixed(items.collect())))
+}
+
+/// Items in the order of the packed tree: the output of the object stage, unsorted.
+pub fn by_tree(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    let tree = Wide::build(&Input::new(&of.boxes.outer), &Default::default());
+    match tree.ok().and_then(|tree| Some(tree.tree_order()?.to_vec())) {
+        Some(items) => Some(Box::new(Fixed(items))),
+        None => by_id(of),
+    }
+}
+
+/// Items sorted by the least of a box's distance, of the same one by id. O(n log n) per view.
+struct Sorted(fn(&Camera, &WorldBox) -> f64);
+
+impl DepthOrder for Sorted {
+    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
+        let boxes = solids.boxes.iter().zip(0..);
+        let mut keyed: Vec<_> = boxes.map(|(b, item)| (self.0(camera, b), item)).collect();
+        sort(&mut keyed);
+        pieces.clear();
+        pieces.extend(keyed.into_iter().map(|(_, item)| Piece::whole(item)));
+    }
+}
+
+/// Items sorted by the distance of the centre of each box.
+pub fn by_centre(_: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    let key = |camera: &Camera, b: &WorldBox| distance(camera, b.min / 2.0 + b.max / 2.0);
+    Some(Box::new(Sorted(key)))
+}
+
+/// Items sorted by the distance of the nearest point of each box.
+pub fn by_box(_: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    Some(Box::new(Sorted(nearest)))
+}
+
+/// Sorts some of the items by the distance of the nearest point of each box. O(n log n).
+///
+/// # Panics
+/// If there is no such item.
+pub fn front_to_back(solids: &Solids, camera: &Camera, items: &mut [ItemId]) {
+    let key = |&item: &ItemId| (nearest(camera, &solids.boxes[item as usize]), item);
+    let mut keyed: Vec<_> = items.iter().map(key).collect();
+    sort(&mut keyed);
+    let places = items.iter_mut().zip(keyed);
+    places.for_each(|(to, (_, item))| *to = item);
+}
+
+fn sort(keyed: &mut [(f64, ItemId)]) {
+    keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+}
+
+fn distance(camera: &Camera, point: DVec3) -> f64 {
+    let away = point - camera.frame.eye;
+    match camera.lens.is_orthographic() {
+        true => away.dot(camera.frame.forward()),
+        false => away.length_squared(),
+    }
+}
+
+/// Distance of the nearest point of a box: squared from the eye, or the depth for an
+/// orthographic lens.
+pub fn nearest(camera: &Camera, b: &WorldBox) -> f64 {
+    let point = match camera.lens.is_orthographic() {
+        true => {
+            let forward = camera.frame.forward();
+            let pick = |k: usize| if forward[k] > 0.0 { b.min[k] } else { b.max[k] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        }
+        false => camera.frame.eye.max(b.min).min(b.max),
+    };
+    distance(camera, point)
+}
