@@ -55,7 +55,7 @@ pub fn read_sought_boxes_csv(input: impl Read, file: &str) -> Result<Vec<WorldBo
     Ok(rows.boxes)
 }
 
-/// What a file holds, and what is wrong with it.
+/// Content of a file, with its errors.
 struct Rows {
     boxes: Vec<WorldBox>,
     labels: Vec<Labels>,

@@ -37,8 +37,9 @@ fn named(sector: Option<u32>) -> String {
     sector.map_or("none".to_owned(), |sector| sector.to_string())
 }
 
-/// All disputes of a map, the first between each two sectors; none where its sectors
-/// divide the plane. O(linedefs * those that a line across the map meets).
+/// The first dispute of a map between each two sectors.
+///
+/// None where its sectors divide the plane. O(linedefs * those that a line across the map meets).
 pub fn disputes(lines: &[Linedef]) -> Vec<Dispute> {
     let mut found: Vec<Dispute> = Vec::new();
     for axis in [0, 1] {
@@ -51,8 +52,9 @@ pub fn disputes(lines: &[Linedef]) -> Vec<Dispute> {
     found
 }
 
-/// A linedef across a direction: its ends from low to high in that direction, each with
-/// its place across first, and the sectors on its sides of lesser and of greater places.
+/// A linedef across a direction.
+///
+/// Its ends from low to high in that direction, each with its place across first, and the sectors on its sides of lesser and of greater places.
 struct Edge {
     ends: [[i64; 2]; 2],
     sides: [Option<u32>; 2],
@@ -89,8 +91,9 @@ impl Edge {
     }
 }
 
-/// Goes through the strips between the levels of all ends, in which no edge begins or
-/// ends, from edge to edge.
+/// Finds disputes in the strips between the levels of all ends.
+///
+/// No edge begins or ends in a strip, so they are passed from edge to edge.
 fn between_levels(lines: &[Linedef], axis: usize, mut found: impl FnMut(Dispute)) {
     let edges = lines.iter().filter_map(|line| Edge::of(line, axis));
     let mut edges: Vec<Edge> = edges.collect();
@@ -127,8 +130,9 @@ fn between_levels(lines: &[Linedef], axis: usize, mut found: impl FnMut(Dispute)
     }
 }
 
-/// The sectors that two neighbours of a strip, or one and the outside, disagree about:
-/// between them, or where they cross.
+/// The sectors that two neighbours of a strip disagree about.
+///
+/// Between them, or where they cross; one of them may be the outside.
 fn disputed(pair: [Option<&Edge>; 2], strip: [i64; 2]) -> Option<[Option<u32>; 2]> {
     let [before, behind] = pair.map(|edge| edge.map_or([None; 2], |edge| edge.sides));
     let crosses = || {
@@ -210,7 +214,7 @@ mod tests {
         );
     }
 
-    /// The sector on the near side of the nearest line, in four directions from a point.
+    /// The sector before the nearest line, in four directions from a point.
     fn looks(lines: &[Linedef], p: [f64; 2]) -> Vec<Option<u32>> {
         let look = |(axis, sign): (usize, f64)| {
             let mut nearest = (f64::INFINITY, None);

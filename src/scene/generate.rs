@@ -1,4 +1,5 @@
-//! The tables of generated worlds and their common parameters: count, seed and offset.
+//! The tables of generated worlds, and their common parameters.
+//!
 //! Each family has a file of its own; adding one is that file and one row here.
 
 use super::meshes::{forest as mesh_forest, spheres, statue, terrain};

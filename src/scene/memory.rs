@@ -37,8 +37,9 @@ pub fn needed_by_triangles(triangles: u64, beside: u64, structures: u64) -> u64 
     triangles * (MESHED + beside) + needed_by_items(triangles / FEWEST, structures)
 }
 
-/// Refuses a scene that needs more bytes than are available; if that is unknown, any
-/// scene passes.
+/// Refuses a scene that needs more bytes than are available.
+///
+/// If that is unknown, any scene passes.
 ///
 /// # Errors
 /// [`InputError::TooLarge`].
@@ -59,8 +60,9 @@ pub fn check_fits(
     }
 }
 
-/// Bytes that are free for a scene of `count` items or triangles; `None` where that is
-/// unknown or the scene is small.
+/// Bytes that are free for a scene of `count` items or triangles.
+///
+/// `None` where that is unknown or the scene is small.
 pub fn free_for(count: u64) -> Option<u64> {
     (count > ANYWHERE).then(available_bytes).flatten()
 }
@@ -82,7 +84,7 @@ pub(crate) fn available_bytes() -> Option<u64> {
     left.into_iter().flatten().min()
 }
 
-/// Address space that the system's allocator and the stack of another thread may take.
+/// Address space for the allocator and the stack of another thread.
 const THREADS: u64 = 80 << 20;
 
 /// The number behind a name at the beginning of a line; `None` for "unlimited".
@@ -91,8 +93,9 @@ fn figure(text: &str, name: &str) -> Option<u64> {
     rest.split_whitespace().next()?.parse().ok()
 }
 
-/// Bytes that `ulimit -v` and `ulimit -d` leave, from the process's own files of limits
-/// and status.
+/// Bytes that `ulimit -v` and `ulimit -d` leave.
+///
+/// From the process's own files of limits and status.
 fn left_of_limits(limits: &str, status: &str) -> Option<u64> {
     let left = |limit, used| {
         let used = 1024 * figure(status, used)? + THREADS;
@@ -103,8 +106,9 @@ fn left_of_limits(limits: &str, status: &str) -> Option<u64> {
     address_space.into_iter().chain(data).min()
 }
 
-/// Bytes that the control groups of a process and their ancestors leave; pages of files
-/// that can be dropped are free. Version 2, where the line names no controller, or 1.
+/// Bytes that the control groups of a process and their ancestors leave.
+///
+/// Pages of files that can be dropped are free. Version 2, where the line names no controller, or 1.
 fn left_in_groups(root: &Path, groups: &str) -> Option<u64> {
     const V1: [&str; 3] = [
         "memory.limit_in_bytes",

@@ -5,7 +5,7 @@
 /// A real scene that is part of the program.
 #[non_exhaustive]
 pub struct Sample {
-    /// What is typed.
+    /// Name as typed.
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
@@ -13,7 +13,7 @@ pub struct Sample {
     pub licence: &'static str,
     /// The file under `datasets/`.
     pub file: &'static str,
-    /// That file's contents.
+    /// Contents of the file.
     pub bytes: &'static [u8],
 }
 

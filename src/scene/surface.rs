@@ -13,7 +13,7 @@ use crate::input::InputError;
 use crate::query::ItemId;
 
 named! {
-    /// What a ray does that meets a surface.
+    /// Effect of a surface on a ray.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
     #[non_exhaustive]
     pub enum SurfaceKind {
@@ -32,7 +32,7 @@ named! {
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Surfaces {
-    /// Where the zero of `points` is in the world.
+    /// Zero of `points`, in the world.
     pub origin: DVec3,
     /// Corners, scene-local. No two items share one.
     pub points: Vec<Vec3>,
@@ -40,9 +40,9 @@ pub struct Surfaces {
     pub triangles: Vec<[u32; 3]>,
     /// The triangles of each item: one range follows the other, without gaps.
     pub of_item: Vec<Range<u32>>,
-    /// What each item is made of.
+    /// Kind of each item.
     pub kinds: Vec<SurfaceKind>,
-    /// Whether an item's triangles are seen from both sides.
+    /// `true` for each item whose triangles are seen from both sides.
     pub two_sided: Vec<bool>,
 }
 
@@ -103,7 +103,7 @@ impl Surfaces {
         Surfaces::of_boxes(origin, rounded)
     }
 
-    /// Some of the items, numbered anew in this order.
+    /// Some of the items, renumbered in this order.
     ///
     /// # Panics
     /// If there is no such item.

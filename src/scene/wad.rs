@@ -51,8 +51,9 @@ pub struct Thing {
     pub kind: u16,
 }
 
-/// The names of the maps in a WAD file, in file order; of several of one name there is
-/// but the last.
+/// The names of the maps in a WAD file, in file order.
+///
+/// Of several maps of one name only the last counts.
 pub fn map_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
     let wad = Wad::open(bytes, file)?;
     let names = wad.markers().into_iter().map(|(name, _)| name.to_owned());

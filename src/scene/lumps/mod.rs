@@ -1,5 +1,6 @@
-//! The lumps of a WAD file, and which of them are a map's. It defines the WAD format
-//! (the unofficial Doom specs 1.666, Matthew S. Fell 1994) and trusts no byte of it.
+//! The WAD format: the lumps of a file, and those of a map.
+//!
+//! After the unofficial Doom specs 1.666, Matthew S. Fell 1994. No byte is trusted.
 
 use std::collections::HashSet;
 use std::ops::Range;

@@ -74,7 +74,7 @@ pub fn icosphere(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
 
 struct Sphere {
     frequency: u32,
-    /// By the weights of the corners, those that are not zero, in their order.
+    /// Point of each set of corners with their weights, without those of weight zero.
     ids: HashMap<[(usize, u32); 3], u32>,
     points: Vec<DVec3>,
 }

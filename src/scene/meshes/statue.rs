@@ -16,7 +16,7 @@ const TALL: f64 = 1.8;
 /// Radius without bulges, world units.
 const RADIUS: f64 = 1.0;
 
-/// One item of about so many triangles.
+/// One item of about `triangles` triangles.
 pub fn build(triangles: usize, seed: u64) -> Surfaces {
     let frequency = libm::sqrt(triangles as f64 / 20.0) as u32;
     let (directions, faces) = icosphere(frequency);

@@ -26,7 +26,7 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// A square of about so many triangles, one tile at least.
+    /// A square of about `triangles` triangles, one tile at least.
     pub fn of(triangles: usize, seed: u64) -> Ground {
         let tiles = libm::round(libm::sqrt(triangles as f64 / TILE as f64)) as usize;
         Ground {

@@ -1,4 +1,4 @@
-//! The samples of an image, ready to be drawn on: rasterisation of boxes and triangles.
+//! The samples of an image: rasterisation of boxes and triangles.
 
 use glam::DVec3;
 
@@ -30,8 +30,9 @@ pub(super) struct Visited {
     pub kept_out: u64,
 }
 
-/// The samples of an image with their rays, for boxes (88 bytes a sample) or for triangles
-/// (128).
+/// The samples of an image with their rays.
+///
+/// 88 bytes per sample for boxes, 128 for triangles.
 #[derive(Clone, Debug)]
 pub struct Canvas<B: Body = SolidBox> {
     screen: Screen,
@@ -145,8 +146,9 @@ impl Canvas {
         })
     }
 
-    /// Calls `found` with the fragments of a piece: for a part of an item, those where the
-    /// item is entered through that part.
+    /// Calls `found` with the fragments of a piece.
+    ///
+    /// For a part of an item, those where the item is entered through that part.
     pub(super) fn fragments(
         &self,
         solids: &Solids,

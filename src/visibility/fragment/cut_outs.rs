@@ -1,4 +1,4 @@
-//! Cut-outs of a scene as typed: the share of its items that has holes, and their mask.
+//! Cut-outs of a scene as typed: the share of items with holes, and their mask.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -61,8 +61,9 @@ impl CutOuts {
         Ok(cut_outs)
     }
 
-    /// The cut-outs among `items`, of which those that `may_be` are drawn: the same items,
-    /// whatever the mask.
+    /// The cut-outs among `items`, drawn from those that `may_be`.
+    ///
+    /// They are the same items whatever the mask.
     pub fn holes(&self, items: usize, may_be: impl Fn(ItemId) -> bool) -> Holes {
         let (mut rng, mut holes) = (SeededRng::new(self.seed), Holes::default());
         let CutOuts { mask, tile, .. } = *self;

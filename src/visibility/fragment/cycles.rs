@@ -3,8 +3,9 @@
 
 use crate::query::ItemId;
 
-/// Number of items on cycles of `before` pairs: those of strongly connected components
-/// of more than one item (Kosaraju; Sharir 1981). O(pairs log pairs).
+/// Number of items on cycles of `before` pairs.
+///
+/// Those of strongly connected components of more than one item (Kosaraju; Sharir 1981). O(pairs log pairs).
 pub(super) fn items_in_cycles(before: &[(ItemId, ItemId)]) -> usize {
     let mut items: Vec<ItemId> = before.iter().flat_map(|&(a, b)| [a, b]).collect();
     items.sort_unstable();
@@ -29,7 +30,7 @@ pub(super) fn items_in_cycles(before: &[(ItemId, ItemId)]) -> usize {
     components.filter(|&nodes| nodes > 1).sum()
 }
 
-/// Appends the nodes that are reached from a root and not yet seen, successors first.
+/// Appends the unseen nodes that are reached from a root, successors first.
 fn finish(next: &[Vec<usize>], root: usize, seen: &mut [bool], finished: &mut Vec<usize>) {
     if std::mem::replace(&mut seen[root], true) {
         return;

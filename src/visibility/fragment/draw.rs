@@ -1,5 +1,6 @@
-//! Drawing: a list of pieces of boxes with any of the fragment tests, or triangles with
-//! the z-test; counts what each test lets through.
+//! Drawing with fragment tests: lists of pieces of boxes, or triangles.
+//!
+//! Counts the fragments that each test lets through.
 
 use super::canvas::{Canvas, Fragment, Visited};
 use super::depth::DepthBuffer;
@@ -45,8 +46,8 @@ pub struct Tally {
     pub fragments: u64,
     /// Fragments that the alpha-test dropped.
     pub clear: u64,
-    /// Of the rest, those that passed the z-test when they came: with early z, the
-    /// fragments that are shaded.
+    /// Other fragments that passed the z-test when they came: with early z, the shaded
+    /// ones.
     pub passed: u64,
     /// Samples that something opaque covers.
     pub covered: u64,
@@ -102,8 +103,10 @@ impl<B: Body> Drawn<B> {
         self.before.clear();
     }
 
-    /// The exact visible set of the samples, ascending: all that is in front anywhere, every
-    /// item of a tie, and the items before it that hide nothing.
+    /// The exact visible set of the samples, ascending.
+    ///
+    /// All items that are in front anywhere, every item of a tie, and the items before them
+    /// that hide nothing.
     pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
         let mut visible = self.depth.visible(canvas);
         visible.extend_from_slice(&self.before);
@@ -139,9 +142,9 @@ impl Drawn {
 }
 
 impl Drawn<Facet> {
-    /// Empties the image and draws triangles, each by itself: the opaque ones with the z-test,
-    /// then those that hide nothing against the front.
+    /// Empties the image and draws triangles, each by itself.
     ///
+    /// The opaque ones first, with the z-test; then those that hide nothing, against the front.
     /// A fragment is a triangle at a sample whose ray meets it: a one-sided one from its front.
     /// Θ(samples of the screen rectangles).
     pub fn draw_triangles(
@@ -205,7 +208,7 @@ mod tests {
     use crate::visibility::truth::{SampleTruth, SurfaceIndex, judge};
     use crate::visibility::{Rays, SampleGrid, Solids, surfaces_of};
 
-    /// What is drawn of all triangles is what rays see; how many items.
+    /// Number of items that rays see, all of which are drawn.
     fn drawn_as_seen(
         surfaces: &Surfaces,
         index: &SurfaceIndex,

@@ -26,8 +26,9 @@ pub struct OrderErrors {
     pub cyclic: usize,
 }
 
-/// Pairs of layers that are looked at in an image, where a sample does not show the very
-/// layers of the one before.
+/// Most pairs of layers that are compared in an image.
+///
+/// A sample with the layers of the one before adds none.
 const MOST_PAIRS: u64 = 1 << 25;
 
 /// More items behind each other than are compared.
@@ -90,8 +91,9 @@ pub(super) struct ErrorCount {
 }
 
 impl ErrorCount {
-    /// One more sample: all its layers, and the exact order of two of them. They are left in
-    /// the order in which they were drawn, one for each item.
+    /// Adds a sample: all its layers, and the exact order of two of them.
+    ///
+    /// Leaves the layers in the order in which they were drawn, one for each item.
     pub fn sample<A>(&mut self, layers: &mut Vec<Layer<A>>, compare: impl Fn(&A, &A) -> Ordering) {
         // A ray along a cut meets both parts: the first counts.
         layers.sort_by_key(|layer| (layer.item, layer.when));

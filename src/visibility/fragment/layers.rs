@@ -1,5 +1,6 @@
-//! Items of triangles drawn in several orders at once, ray by ray: what [`draw`] and
-//! [`order_errors`] count of boxes.
+//! Items of triangles drawn in several orders at once, ray by ray.
+//!
+//! The counts are those of [`draw`] and [`order_errors`] for boxes.
 //!
 //! An item at a sample is one fragment, where the ray meets it first. Every item is taken
 //! for solid; a one-sided triangle is met from its front only.
@@ -19,7 +20,7 @@ use crate::visibility::{Rays, SampleGrid};
 
 /// When each part of each item is drawn.
 struct Ranks {
-    /// By item: leaf or none, and the place in the list.
+    /// Leaf (or none) and place in the list of each part, by item.
     of: Vec<Vec<(Option<u32>, u32)>>,
 }
 
@@ -36,8 +37,9 @@ impl Ranks {
         Ranks { of: ranks }
     }
 
-    /// When an item is drawn at a point; a point that rounding has put into a leaf where
-    /// nothing of it is counts with what is drawn first.
+    /// Place in the list at which an item is drawn at a point.
+    ///
+    /// A point that rounding has put into a leaf without a part of it counts with its first part.
     fn when(&self, item: ItemId, leaf: impl FnOnce() -> Option<u32>) -> Option<u32> {
         let parts = &self.of[item as usize];
         let first = parts.first()?;
@@ -50,7 +52,7 @@ impl Ranks {
     }
 }
 
-/// What each of several orders takes and gets wrong, of the items that are left.
+/// Cost and errors of several orders of the items that are left.
 ///
 /// `left` has their ids among those of `index`, ascending; pieces are numbered by the place
 /// there. O(fragments log layers) and the pairs that are looked at.

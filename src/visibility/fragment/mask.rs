@@ -51,7 +51,7 @@ pub struct Surface {
 /// The cut-outs among the items of a scene; all other items are solid.
 #[derive(Clone, Default, Debug)]
 pub struct Holes {
-    /// By item id; the items beyond its end are solid.
+    /// Surface of each item; the items beyond its end are solid.
     of_item: Vec<Option<Surface>>,
 }
 
@@ -65,7 +65,7 @@ impl Holes {
         self.of_item[item] = Some(surface);
     }
 
-    /// The cut-outs among some of the items, numbered anew in this order.
+    /// The cut-outs among some of the items, renumbered in this order.
     pub fn some(&self, items: &[ItemId]) -> Holes {
         let of_item = items.iter().map(|&item| self.of(item).copied());
         Holes {

@@ -38,7 +38,7 @@ const CUT: f64 = 1.0 / (1u64 << 28) as f64;
 /// not cut: its box is taken to cover everything.
 const LEVEL: f64 = 1.0 / (1u64 << 20) as f64;
 
-/// What rays and axes of a camera may be off, in slopes, and more.
+/// Upper bound of the errors of rays and axes of a camera, in slopes.
 const AXES: f64 = 1e-12;
 
 /// A camera's image, ready to place boxes in it.
@@ -48,11 +48,11 @@ pub struct Screen {
     window: [f64; 4],
     eye: DVec3,
     axes: [DVec3; 3],
-    /// What lies before this depth is not drawn; just before the near plane.
+    /// Least depth that is drawn; just before the near plane.
     near: f64,
     far: f64,
     parallel: bool,
-    /// What the eye may be off, world units.
+    /// Error of the eye, world units.
     eye_off: f64,
 }
 
@@ -134,13 +134,14 @@ impl Screen {
     #[inline]
     fn place(&self, at: DVec3, off: f64) -> [f64; 4] {
         let [x, y, w] = each(self.axes, |axis| at.dot(axis));
-        // Of a point beyond what can be told from another, the depth is off too.
+        // Of a point too far to be resolved, the depth is off too.
         let size = at.abs().element_sum() + (self.eye_off + off) / ROUNDED;
         [x, y, w, size]
     }
 
-    /// A rectangle that holds the convex hull of some corners, of which any two that the
-    /// hull has an edge between are said to be so.
+    /// A rectangle that holds the convex hull of some corners.
+    ///
+    /// `is_edge` is true for any two corners between which the hull has an edge.
     fn hull<const N: usize>(
         &self,
         corners: &[[f64; 4]; N],

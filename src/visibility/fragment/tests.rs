@@ -411,7 +411,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     assert!(with.fragments > 0 && with.fragments * 4 < without.fragments);
 }
 
-/// What a mirror shows is what reflected boxes would show behind it.
+/// A mirror shows the same as reflected boxes behind it.
 #[test]
 fn a_mirror_shows_reflected_boxes_behind_its_plane() {
     let mut rng = SeededRng::new(14);
@@ -544,7 +544,7 @@ fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
     counted
 }
 
-/// Of the walls of a map its own BSP gets no pair wrong; distances do, and back to front it
+/// The own BSP of a map gets no pair of walls wrong; distances do, and back to front it
 /// gets all wrong. Of things in one leaf it gets few wrong.
 #[test]
 fn a_maps_own_bsp_orders_its_walls_exactly() {

@@ -1,4 +1,4 @@
-//! Graphs of regions that are boxes: any boxes with openings, and the rooms of a scene.
+//! Graphs of regions that are boxes, such as the rooms of a scene.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub struct NoRegions(pub &'static str);
 struct Boxes {
     regions: BoxGrid,
     /// Solids that close their borders. A ray that begins in such a solid is not hidden
-    /// by it, and may go on in every region that the solid meets.
+    /// by it, and may continue in every region that the solid meets.
     borders: BoxGrid,
 }
 
@@ -52,7 +52,7 @@ impl Ground for Boxes {
     }
 }
 
-/// What is strictly within one box closes no border.
+/// Tests for an item strictly within one box: it closes no border.
 fn is_within_one(boxes: &BoxGrid, item: &WorldBox) -> bool {
     let mut within = false;
     boxes.meeting(item, |id| {
@@ -94,7 +94,7 @@ impl RegionGraph {
         Ok(graph)
     }
 
-    /// By item: `true` if it may close a border between regions; furniture does not.
+    /// Tests, by item, for a possible border between regions; furniture is none.
     pub fn borders(&self, scene: &Scene) -> Vec<bool> {
         let boxes = BoxGrid::new(self.parts.all.clone());
         let closes = |item: &Aabb| !is_within_one(&boxes, &WorldBox::of(item, scene.origin));
@@ -121,7 +121,7 @@ impl RegionGraph {
 fn flat(boxes: &[WorldBox], [a, b]: [RegionId; 2], hole: &WorldBox) -> Option<Opening> {
     let axis = (0..3).find(|&axis| hole.min[axis] == hole.max[axis])?;
     let at = hole.min[axis];
-    // The front is the region that goes on to larger coordinates.
+    // The front is the region that extends to larger coordinates.
     let is_front = |front: RegionId, behind: RegionId| {
         boxes[front as usize].min[axis] == at && boxes[behind as usize].max[axis] == at
     };

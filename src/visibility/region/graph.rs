@@ -14,8 +14,9 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
     /// part of it may be in none.
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool;
 
-    /// Appends regions that a closed box meets where none of their parts is, if regions are
-    /// not the same as their parts.
+    /// Appends regions that a closed box meets outside of their parts.
+    ///
+    /// None unless regions differ from their parts.
     fn more_at(&self, _: &WorldBox, _: &mut Vec<RegionId>) {}
 
     /// Adds the regions that a ray passes before it meets what is opaque, by a
@@ -23,7 +24,7 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
     fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet);
 }
 
-/// Regions joined by openings: one sees from one into another through openings only.
+/// Regions joined by openings: sight leads from one to another through these only.
 #[derive(Clone, Debug)]
 pub struct RegionGraph {
     /// The boxes that each region lies in.

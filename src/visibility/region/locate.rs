@@ -1,5 +1,6 @@
-//! A uniform grid over boxes that finds those which meet another box: for the region of
-//! an eye and for the items of a region.
+//! A uniform grid over boxes that finds those which meet another box.
+//!
+//! For the region of an eye and for the items of a region.
 
 use glam::DVec3;
 
@@ -89,7 +90,7 @@ impl BoxGrid {
     }
 }
 
-/// Tests whether closed boxes cover a box wholly. Exact; O(pieces * boxes), meant for few.
+/// Tests whether closed boxes cover a box, exactly. O(pieces * boxes): for few.
 pub fn covers(by: &[WorldBox], b: &WorldBox) -> bool {
     let mut open = vec![(*b, 0)];
     while let Some((piece, first)) = open.pop() {

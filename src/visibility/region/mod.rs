@@ -1,5 +1,6 @@
-//! The region stage: the rooms, sectors or cells of a scene that can be seen at all,
-//! and so the items.
+//! The region stage: the rooms or sectors of a scene that can be seen at all.
+//!
+//! Their items are what remains.
 //!
 //! A back end ([`RegionRow`]) searches a [`RegionGraph`]: regions and the openings
 //! between them, made from a tiling of rooms or a Doom map.

@@ -1,5 +1,4 @@
-//! A portal: a flat rectangle, upright or level, that two regions share; the sides of
-//! its plane.
+//! A portal: a flat rectangle, upright or level, that two regions share.
 
 use glam::{DVec2, DVec3};
 

@@ -1,5 +1,6 @@
-//! Exact clipped portals: an opening is cut, as a convex polygon, by the half-spaces
-//! through the eye and the edges of all openings before it. Exact up to a slack of
+//! Exact clipped portals.
+//!
+//! An opening is cut, as a convex polygon, by the half-spaces through the eye and the edges of all openings before it. Exact up to a slack of
 //! some 1e-11 of the distance, which is given away so that rounding loses nothing.
 //!
 //! A window keeps half-spaces of the openings' own edges only; none is ever made from
@@ -44,7 +45,7 @@ impl Windows for PortalClip {
         true
     }
 
-    /// Each half-space of the earlier window is one of the current or holds its polygon.
+    /// Each half-space of an earlier window is one of the current or holds its polygon.
     fn is_within(&self, [first, end]: [u32; 2]) -> bool {
         let implied = |old: &HalfSpace| {
             let shared = self.current.iter().any(|plane| plane.number == old.number);

@@ -1,5 +1,6 @@
-//! Portal rectangles: a window is the rectangle of the image that an opening covers,
-//! intersected with the window before it (Luebke and Georges 1995, "Portals and
+//! Portal rectangles.
+//!
+//! A window is the rectangle of the image that an opening covers, intersected with the window before it (Luebke and Georges 1995, "Portals and
 //! mirrors: simple, fast evaluation of potentially visible sets").
 
 use super::opening::Opening;

@@ -44,7 +44,7 @@ pub enum PvsError {
     },
 }
 
-// Its words are in those of the error already: it is no cause to be told as well.
+// The message of the error has its words already: it is no source.
 impl From<JsonError> for PvsError {
     fn from(error: JsonError) -> Self {
         PvsError::Json(error)

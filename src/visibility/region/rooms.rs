@@ -28,8 +28,9 @@ pub struct NotFlat(pub usize);
 /// third.
 const VIEWS: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
-/// The signs of the direction of lines. Lines of sign 0 along z pass no opening across
-/// z, and may be level.
+/// The signs of the direction of lines.
+///
+/// Lines of sign 0 along z pass no opening across z, and may be level.
 type Heading = [i32; 3];
 
 /// A search from one region along one heading.
@@ -45,8 +46,9 @@ struct Search<'a> {
 }
 
 impl Pvs {
-    /// Pairs of rooms of a tiling that see each other. Time is proportional to the number
-    /// of sequences of openings that a line passes.
+    /// Pairs of rooms of a tiling that see each other.
+    ///
+    /// Time is proportional to the number of sequences of openings that a line passes.
     ///
     /// # Errors
     /// An opening with a thickness.
@@ -137,8 +139,7 @@ impl Search<'_> {
     }
 }
 
-/// Axis of an opening that lines of a heading pass, and the regions that they leave and
-/// enter.
+/// Axis of an opening that a heading passes, and the regions it leaves and enters.
 fn onward(opening: &Opening, heading: Heading) -> Option<(usize, RegionId, RegionId)> {
     let OpeningPlane::Axis { axis, .. } = opening.plane else {
         return None;
@@ -176,8 +177,9 @@ fn is_layered(graph: &RegionGraph) -> bool {
     })
 }
 
-/// The regions from which a line of the heading can come to an opening across z, through
-/// openings that it passes in its direction.
+/// The regions from which a line of the heading can come to an opening across z.
+///
+/// It passes all openings in its direction.
 fn rising(graph: &RegionGraph, heading: Heading) -> Vec<bool> {
     let mut leads = vec![false; graph.len()];
     let across_z = graph

@@ -1,4 +1,4 @@
-//! The back ends of the region stage: their table, and one over the graph of a scene.
+//! The back ends of the region stage: their table, and each over a graph.
 
 use std::sync::Arc;
 
@@ -102,8 +102,9 @@ pub struct RegionRow {
 #[derive(Clone, Debug)]
 struct Stored {
     pvs: Arc<Pvs>,
-    /// By region. One allocation each, not one table with offsets: reading a row takes
-    /// two thirds of the time.
+    /// List of each region.
+    ///
+    /// One allocation each: reading a row of one table with offsets takes half again as long.
     lists: Box<[Box<[RegionId]>]>,
 }
 

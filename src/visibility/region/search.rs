@@ -7,8 +7,9 @@ use super::opening::Opening;
 use super::view::View;
 use crate::visibility::Rays;
 
-/// Most different windows of a region; further ones are the whole image, which bounds
-/// the time where many ways lead to one region.
+/// Most different windows of a region; further ones are the whole image.
+///
+/// Bounds the time where many ways lead to one region.
 const MOST_WINDOWS: u32 = 32;
 
 /// A form of windows, and how an opening narrows them.
@@ -41,7 +42,7 @@ pub struct Search<W, S> {
     windows: W,
     /// All entries of regions, in the order of the search.
     entries: Vec<Entry<S>>,
-    /// By region: its last entry plus one, and how many it has; valid where seen.
+    /// Last entry plus one, and number of entries, of each region that is seen.
     last: Vec<(u32, u32)>,
 }
 

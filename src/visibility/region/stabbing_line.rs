@@ -29,8 +29,9 @@ fn turn(a: DVec2, b: DVec2, c: DVec2) -> i32 {
     })
 }
 
-/// The openings that a line has to pass: the end of each that is on its left and the
-/// end that is on its right.
+/// The openings that a line has to pass.
+///
+/// Each has an end on the line's left and an end on its right.
 #[derive(Clone, Default, Debug)]
 pub struct Stabbing {
     lefts: Vec<DVec2>,
@@ -71,8 +72,9 @@ impl Stabbing {
         self.extreme.pop();
     }
 
-    /// Tests whether the line from right point r through left point l has all lefts on its
-    /// left and all rights on its right, or on itself and then all rights before all
+    /// Tests for an extreme line, from right point r through left point l.
+    ///
+    /// It has all lefts on its left and all rights on its right, or on itself and then all rights before all
     /// lefts. Turned a little to the right about a point between those it has none on
     /// itself: it is a line as wanted. And where there are such lines, one of them
     /// can be turned to the left until it goes through a right point behind and a

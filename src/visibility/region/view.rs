@@ -9,8 +9,9 @@ use glam::DVec3;
 use super::opening::Opening;
 use crate::visibility::Rays;
 
-/// Distance outside of a half-space `n . x >= 0` within which a point is still kept,
-/// relative to bounds of |n| and |x| (sums of absolute coordinates).
+/// Distance within which a point outside of a half-space `n . x >= 0` is kept.
+///
+/// Relative to bounds of |n| and |x| (sums of absolute coordinates).
 ///
 /// The errors to cover, with u = 2^-53 and X = |x|:
 /// - A corner minus the eye is rounded by u relative; three products and two sums
@@ -72,7 +73,7 @@ pub struct Polygon {
 }
 
 impl View {
-    /// The half-spaces of a camera whose rays share an eye: any but an orthographic one.
+    /// The half-spaces of a camera whose rays share an eye: not orthographic.
     pub fn of(rays: &Rays) -> View {
         let camera = rays.camera();
         let frame = &camera.frame;
@@ -151,8 +152,9 @@ impl View {
 }
 
 impl Polygon {
-    /// Makes it the part of an opening within half-spaces, grown by the slack. Returns the
-    /// corners of the opening in camera coordinates and the largest size of one; `None` if
+    /// Makes it the part of an opening within half-spaces, grown by the slack.
+    ///
+    /// Returns the corners of the opening in camera coordinates and the largest size of one; `None` if
     /// nothing is seen: the opening has no area, or all of it is outside or too far.
     pub fn see(
         &mut self,
@@ -182,8 +184,9 @@ impl Polygon {
         is_left.then_some((corners, reach))
     }
 
-    /// Cuts off the part that is surely outside of the half-space (Sutherland and Hodgman
-    /// 1974); `false` if nothing is left.
+    /// Cuts off the part that is surely outside of the half-space.
+    ///
+    /// After Sutherland and Hodgman (1974); `false` if nothing is left.
     fn cut(&mut self, by: &HalfSpace) -> bool {
         let slack = SLACK * by.bound * self.reach;
         let depth = |x: DVec3| by.normal.dot(x) + slack;

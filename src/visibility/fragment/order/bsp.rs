@@ -19,19 +19,20 @@ use crate::visibility::Solids;
 
 /// Parts that there may be for each item before cutting ends.
 const MOST_PARTS: usize = 16;
-/// Parts that there may be at any rate: few boxes, each within the next, are cut into
-/// hundreds.
+/// Least bound of the number of parts.
+///
+/// Few boxes, each within the next, are cut into hundreds.
 const ROOM: usize = 1 << 14;
 /// Cuts per part, on average, before cutting ends.
 // Boxes nested within each other are split off one at a time.
 const MOST_PLANES: usize = 64;
-/// A cut costs as much as so many boxes of imbalance.
+/// Cost of a cut, in boxes of imbalance.
 const COST_OF_CUT: usize = 8;
 
 /// A node, or the parts of a leaf.
 #[derive(Clone, Debug)]
 enum Node {
-    /// What is not above the plane, and what is.
+    /// A plane, with the nodes not above it and above it.
     Plane {
         axis: usize,
         at: f64,
@@ -54,7 +55,7 @@ struct Part {
 pub struct BspOrder {
     nodes: Vec<Node>,
     parts: usize,
-    /// Whether cutting ended before everything was parted.
+    /// `true` if cutting ended early.
     is_cut_short: bool,
 }
 
@@ -70,7 +71,7 @@ impl BspOrder {
         BspOrder::within(solids, (solids.boxes.len() * MOST_PARTS).max(ROOM))
     }
 
-    /// The same, of so many parts at most.
+    /// The same, of at most `most` parts.
     pub fn within(solids: &Solids, most: usize) -> BspOrder {
         let part = |(b, item): (&WorldBox, u32)| Part {
             item,
@@ -136,7 +137,7 @@ fn sides(parts: Vec<Part>, axis: usize, at: f64) -> [Vec<Part>; 2] {
     [below, above]
 }
 
-/// The parts through which a ray can enter their items: those within are never drawn.
+/// The parts through which a ray can enter their items; others are never drawn.
 fn entered(mut parts: Vec<Part>, boxes: &[WorldBox]) -> Vec<Part> {
     parts.retain(|Part { item, b, cut }| {
         let whole = &boxes[*item as usize];

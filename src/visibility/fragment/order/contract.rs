@@ -50,13 +50,14 @@ pub trait DepthOrder: Send + Sync {
     /// Deterministic.
     fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>);
 
-    /// Leaf of a point of a triangle, relative to the zero of the surfaces; `None` if parts
-    /// are no leaves.
+    /// Leaf of a point of a triangle; `None` if parts are no leaves.
+    ///
+    /// The point is relative to the zero of the surfaces.
     fn leaf(&self, _at: DVec3, _normal: DVec3) -> Option<u32> {
         None
     }
 
-    /// Reason why an order that is declared exact may be wrong for a camera all the same.
+    /// Reason why an order that is declared exact may be wrong for a camera.
     fn exception(&self, _: &Camera) -> Option<&'static str> {
         None
     }

@@ -15,7 +15,7 @@ use crate::visibility::Guarantee;
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct OrderRow {
-    /// As typed on the command line.
+    /// Name as typed.
     pub name: &'static str,
     /// One line for tables and help.
     pub summary: &'static str,

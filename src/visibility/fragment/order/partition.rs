@@ -1,5 +1,6 @@
-//! A partition that the scene brings with it, such as the BSP of a Doom map: leaves from
-//! front to back, and in each what of the items is in it.
+//! A partition of the scene's own, such as the BSP of a Doom map.
+//!
+//! Leaves from front to back, and in each the parts of the items in it.
 //!
 //! Whatever the planes are, on a ray from the eye all of a leaf comes before all of one
 //! behind it, so between leaves the order is exact, but for what rounding does within
@@ -18,10 +19,11 @@ use crate::query::ItemId;
 use crate::scene::{Surfaces, WorldBox};
 use crate::visibility::Solids;
 
-/// What is nearer to a plane than this, per unit of the largest coordinate, lies in it: some
-/// times what the rounding of a plane to f32 moves it.
+/// Distance within which points lie in a plane, per unit of the largest coordinate.
+///
+/// A multiple of the error of a plane that is rounded to f32.
 const SLACK: f64 = 1.0 / (1u64 << 21) as f64;
-/// Triangles in a leaf of which each is held against each, at most.
+/// Most triangles of a leaf that are compared, each with each.
 const MOST_COMPARED: usize = 1000;
 
 /// A plane: unit normal towards the front, offset, and what is in front and behind.
@@ -43,12 +45,12 @@ impl Node {
     }
 }
 
-/// What of an item is in a leaf.
+/// Part of an item in a leaf.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     item: ItemId,
     bounds: WorldBox,
-    /// Whether all the rest of the leaf is before it, and it is seen from there only.
+    /// `true` if all the rest of the leaf is before it, and it is seen from there only.
     is_behind_all: bool,
 }
 
@@ -58,15 +60,15 @@ pub struct PartitionOrder {
     root: Option<u32>,
     origin: DVec3,
     slack: f64,
-    /// By twice the node above and its side; a space that is not divided is the only one.
+    /// Index: twice the node above, plus its side. An undivided space is leaf 0.
     leaves: Vec<Vec<Held>>,
 }
 
-/// What of a triangle is in a leaf.
+/// Part of a triangle in a leaf.
 struct Fallen {
     item: ItemId,
     polygon: Vec<DVec3>,
-    /// Of unit length.
+    /// Unit normal.
     normal: DVec3,
     two_sided: bool,
 }
@@ -77,8 +79,9 @@ pub fn order(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
 }
 
 impl PartitionOrder {
-    /// Cuts every triangle by the planes that it meets. O(triangles * depth) where few are
-    /// cut.
+    /// Cuts every triangle by the planes that it meets.
+    ///
+    /// O(triangles * depth) where few are cut.
     pub fn of(surfaces: &Surfaces, planes: &PlaneTree) -> PartitionOrder {
         let nodes = planes.nodes.iter().map(|node| {
             let normal = node.plane.normal.as_dvec3();
@@ -172,8 +175,7 @@ impl PartitionOrder {
     }
 }
 
-/// What of a polygon is on the side of a plane where `sign` times the height is not below
-/// zero.
+/// Part of a polygon on one side of a plane: `sign` times the height is at least 0.
 fn cut(polygon: &[DVec3], heights: &[f64], sign: f64) -> Vec<DVec3> {
     let mut left = Vec::with_capacity(polygon.len() + 1);
     for (i, &p) in polygon.iter().enumerate() {
@@ -246,8 +248,7 @@ mod tests {
     use crate::geometry::Aabb;
     use crate::scene::SurfaceKind;
 
-    /// A wall that is nearer to the eye than a thing far along it hides nothing of it, seen
-    /// from its one side.
+    /// A wall hides nothing of a thing before it, however near the wall is to the eye.
     #[test]
     fn what_stands_before_a_wall_comes_first_however_near_the_wall_is() {
         let wall = [(-100.0, -9.0), (100.0, -9.0), (100.0, 9.0), (-100.0, 9.0)];

@@ -34,7 +34,7 @@ pub fn by_tree(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
     }
 }
 
-/// Items sorted by the least of a box's distance, of the same one by id. O(n log n) per view.
+/// Items sorted by a key of their boxes, then by id. O(n log n) per view.
 struct Sorted(fn(&Camera, &WorldBox) -> f64);
 
 impl DepthOrder for Sorted {
@@ -58,7 +58,7 @@ pub fn by_box(_: &ToOrder) -> Option<Box<dyn DepthOrder>> {
     Some(Box::new(Sorted(nearest)))
 }
 
-/// Sorts some of the items by the distance of the nearest point of each box. O(n log n).
+/// Sorts items by the distance of the nearest point of each box. O(n log n).
 ///
 /// # Panics
 /// If there is no such item.
@@ -82,8 +82,9 @@ fn distance(camera: &Camera, point: DVec3) -> f64 {
     }
 }
 
-/// Distance of the nearest point of a box: squared from the eye, or the depth for an
-/// orthographic lens.
+/// Distance of the nearest point of a box.
+///
+/// Squared from the eye; the depth for an orthographic lens.
 pub fn nearest(camera: &Camera, b: &WorldBox) -> f64 {
     let point = match camera.lens.is_orthographic() {
         true => {

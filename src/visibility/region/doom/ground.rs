@@ -1,5 +1,4 @@
-//! Places and rays in a map: the sector of a point, and rays followed from linedef to
-//! linedef.
+//! The sector of a point of a map, and rays followed from linedef to linedef.
 
 use std::sync::Arc;
 
@@ -73,7 +72,7 @@ impl SectorGround {
     }
 }
 
-/// Whether a linedef may meet a closed box, seen from above.
+/// Tests whether a linedef may meet a closed box, seen from above.
 fn meets(line: &Linedef, b: &WorldBox) -> bool {
     let [from, to] = line.ends.map(plan);
     let (low, high) = (b.min.truncate(), b.max.truncate());

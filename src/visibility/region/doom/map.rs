@@ -20,14 +20,16 @@ pub struct DoomMap {
     pub sectors: Vec<[f64; 2]>,
 }
 
-/// Tests for an action that opens or moves the sector behind its own line (linuxdoom
-/// 1.10, p_doors.c, EV_VerticalDoor).
+/// Tests for an action that opens or moves the sector behind its own line.
+///
+/// After linuxdoom 1.10, p_doors.c, EV_VerticalDoor.
 fn is_door(action: u16) -> bool {
     matches!(action, 1 | 26 | 27 | 28 | 31..=34 | 117 | 118)
 }
 
-/// Tests for an action that moves no sector with its tag: exits, teleporters, lights,
-/// scrolling walls (linuxdoom 1.10, p_spec.c, p_switch.c).
+/// Tests for an action that moves no sector with its tag.
+///
+/// Exits, teleporters, lights, scrolling walls (linuxdoom 1.10, p_spec.c, p_switch.c).
 fn is_still(action: u16) -> bool {
     matches!(
         action,
@@ -47,7 +49,7 @@ impl DoomMap {
         }
     }
 
-    /// O(linedefs * sectors).
+    /// Finds the sectors that move. O(linedefs * sectors).
     pub fn of(file: Arc<WadMap>) -> DoomMap {
         let is_moved = |tag: u16, sector: u32| {
             let moves = |line: &Linedef| {

@@ -1,5 +1,6 @@
-//! Polygons of a map, seen from above, cut into triangles between their own corners:
-//! whole numbers throughout, so that floors meet each other and the walls exactly.
+//! Triangulation of the polygons of a map, seen from above.
+//!
+//! Whole numbers throughout, so that floors meet each other and the walls exactly.
 
 /// Map coordinates.
 pub type Point = [i32; 2];
@@ -12,13 +13,12 @@ pub fn turn(a: Point, b: Point, c: Point) -> i64 {
     x * v - y * u
 }
 
-/// Whether a point other than the corners lies in a closed triangle that turns to the
-/// right.
+/// Tests for a point in a closed triangle that turns right, other than its corners.
 fn holds([a, b, c]: [Point; 3], p: Point) -> bool {
     p != a && p != b && p != c && turn(a, b, p) <= 0 && turn(b, c, p) <= 0 && turn(c, a, p) <= 0
 }
 
-/// Whether two segments cross in a point that is the end of neither.
+/// Tests whether two segments cross in a point that is the end of neither.
 fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
     turn(a, b, c).signum() * turn(a, b, d).signum() < 0
         && turn(c, d, a).signum() * turn(c, d, b).signum() < 0
@@ -39,8 +39,9 @@ pub fn parted([from, to]: [Point; 2], points: &[Point]) -> Vec<[Point; 2]> {
     stops.windows(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
-/// Cuts the polygons that lie on the right of all edges together, holes and all, into
-/// triangles that turn to the right. `None` where the edges do not close, cross, or one
+/// Cuts the polygons on the right of all edges into triangles that turn right.
+///
+/// Polygons may have holes. `None` where the edges do not close, cross, or one
 /// has a corner of another between its ends.
 ///
 /// A front advances from edge to edge: each triangle takes an edge and a corner that

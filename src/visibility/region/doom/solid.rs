@@ -131,8 +131,10 @@ impl Plan {
         }
     }
 
-    /// Whether the inside of a triangle that turns to the right and an open cell within
-    /// its bounds have a point in common: unless a side of the triangle parts them.
+    /// Tests whether the inside of a triangle and an open cell have a point in common.
+    ///
+    /// The triangle turns right, the cell is within its bounds: they do unless a side of the
+    /// triangle separates them.
     fn meets(&self, [a, b, c]: [Point; 3], column: usize, row: usize) -> bool {
         let [x, y] = [
             [self.lines[0][column], self.lines[0][column + 1]],
@@ -204,8 +206,9 @@ impl Plan {
     }
 }
 
-/// Calls `found` with each rectangle of true cells that is part of no larger one. O(cells)
-/// by a stack of what is as deep as each row (the largest rectangle in a histogram).
+/// Calls `found` with each rectangle of true cells that is part of no larger one.
+///
+/// O(cells) by a stack of what is as deep as each row (the largest rectangle in a histogram).
 fn for_each_maximal(cells: &[bool], columns: usize, mut found: impl FnMut(Cells)) {
     let mut deep = vec![0; columns];
     let mut open: Vec<(usize, usize)> = Vec::new();
@@ -252,8 +255,9 @@ mod tests {
         }
     }
 
-    /// A map of sectors that are rectangles one in the other, each with its heights; what
-    /// has none is rock. The first one is the outline.
+    /// A map of sectors that are rectangles one in the other, with their heights.
+    ///
+    /// A rectangle without heights is rock. The first one is the outline.
     fn nested(sectors: &[([i32; 4], Option<[f64; 2]>)]) -> DoomMap {
         let numbers: Vec<Option<u32>> = sectors
             .iter()

@@ -1,5 +1,6 @@
-//! A map as triangles: its walls and things as the items that its scene has, its floors
-//! and ceilings as what else hides.
+//! A map as triangles: walls and things as the items of its scene.
+//!
+//! Floors and ceilings follow the items; they hide too.
 
 use glam::Vec3;
 
@@ -8,8 +9,7 @@ use super::map::DoomMap;
 use super::plan::{self, Point};
 use crate::scene::{Linedef, Scene, SurfaceKind, Surfaces};
 
-/// A part of a linedef's wall: which of its two sides is faced, from which height to
-/// which.
+/// A part of a linedef's wall: the side that it faces, lower and upper height.
 type Part = (usize, [f64; 2]);
 
 impl DoomMap {
@@ -83,8 +83,9 @@ impl DoomMap {
         sectors.filter(|&s| self.triangles(s).is_none()).collect()
     }
 
-    /// The triangles of a sector, seen from above; `None` if its linedefs do not close or
-    /// disagree with others about a part of it.
+    /// The triangles of a sector, seen from above.
+    ///
+    /// `None` if its linedefs do not close or disagree with others about a part of it.
     pub(super) fn triangles(&self, sector: RegionId) -> Option<Vec<[Point; 3]>> {
         let mut disputed = self.disputes().iter().flat_map(|dispute| dispute.sectors);
         match disputed.any(|of| of == Some(sector)) {
@@ -93,14 +94,15 @@ impl DoomMap {
         }
     }
 
-    /// Tests for a sector whose floor or ceiling may leave the height that the file has.
+    /// Tests for a sector whose floor or ceiling may move.
     fn moves(&self, sector: RegionId) -> bool {
         let sector = sector as usize;
         self.sectors[sector] != self.file.sectors[sector].heights
     }
 
-    /// The linedefs about a sector, which lies on the right of each, in parts between all of
-    /// their ends.
+    /// The linedefs about a sector, which lies on the right of each.
+    ///
+    /// They are split at all of their ends.
     fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
         let mut edges = Vec::new();
         for Linedef { ends, sectors, .. } in &self.lines {
@@ -151,8 +153,9 @@ fn parts(line: &Linedef, heights: impl Fn(RegionId) -> [f64; 2]) -> impl Iterato
     parts.filter(|(_, [low, high])| low < high)
 }
 
-/// The triangles of an item in the making, map coordinates: whole numbers of 17 bits,
-/// exact in f32.
+/// The triangles of an item in the making, map coordinates.
+///
+/// Whole numbers of 17 bits, exact in f32.
 #[derive(Default)]
 struct Shape {
     points: Vec<Vec3>,

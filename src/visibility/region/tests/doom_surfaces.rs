@@ -1,4 +1,4 @@
-//! A map as surfaces against the same map as sectors: two ways to what is visible that
+//! A map as surfaces against the same map as sectors: two ways to visibility that
 //! share only the lumps.
 
 use std::sync::Arc;
@@ -32,7 +32,7 @@ fn world(name: &str) -> World {
     }
 }
 
-/// How many items are visible, and how many of them are missing in each row's answer.
+/// Number of visible items, and of those missing in the answer of each row.
 fn visible_and_lost(world: &World, graph: &Arc<RegionGraph>, eyes: usize) -> (usize, Vec<usize>) {
     let index = SurfaceIndex::build(&world.surfaces);
     let items = RegionItems::of(graph, &world.scene);
@@ -107,7 +107,7 @@ fn a_graph_that_lacks_openings_is_caught() {
     assert!(caught > 0);
 }
 
-/// A ray ends at a wall, floor or ceiling of the last sector that it passes, neither
+/// A ray ends at a wall, floor or ceiling of the last sector it passes, neither
 /// earlier nor later. Rays that pass a corner of the map to rounding are not counted
 /// on: there is none among these.
 #[test]

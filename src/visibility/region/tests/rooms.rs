@@ -11,7 +11,7 @@ const WORLDS: [&str; 4] = [
     "rooms:n=64,seed=5,storeys=4",
 ];
 
-/// Pairs that rays find and a set lacks; both directions of a pair are in a set or neither.
+/// Pairs that rays find and a set lacks; sets hold both directions or neither.
 fn missing(pvs: &Pvs, rays: &Pvs) -> usize {
     let n = pvs.len() as u32;
     let pairs = (0..n).flat_map(|a| (0..n).map(move |b| [a, b]));

@@ -1,11 +1,11 @@
-//! Lines of sight through boxes and openings, followed from box to box in exact arithmetic.
+//! Lines of sight through boxes and openings, followed in exact arithmetic.
 
 use glam::DVec3;
 
 use super::super::{OpeningPlane, RegionGraph, RegionId};
 use crate::arithmetic::Expansion;
 
-/// Whether a segment from strictly within one region to strictly within another leads
+/// Tests whether a segment from within one region to within another leads
 /// through openings only, touching no edge. Of a graph of boxes; O(regions passed * exits).
 pub fn leads_through(graph: &RegionGraph, regions: [RegionId; 2], [a, b]: [DVec3; 2]) -> bool {
     for (region, p) in regions.into_iter().zip([a, b]) {
@@ -38,7 +38,7 @@ pub fn leads_through(graph: &RegionGraph, regions: [RegionId; 2], [a, b]: [DVec3
     false
 }
 
-/// Whether the line from a to b meets the plane at `at` strictly within the corners.
+/// Tests for a line from a to b that meets the plane at `at` within the corners.
 fn passes(axis: usize, at: f64, corners: &[DVec3; 4], a: DVec3, b: DVec3) -> bool {
     let exact = Expansion::from;
     let minus = |x: f64, y: f64| &exact(x) - &exact(y);

@@ -1,5 +1,6 @@
-//! Chains of slits around one line of sight, near and far from the origin, with eyes
-//! on and next to openings.
+//! Chains of slits around one line of sight, near and far from the origin.
+//!
+//! Eyes are on and next to openings.
 
 use std::sync::Arc;
 
@@ -11,8 +12,8 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::Rays;
 
-/// Rooms in a row along an axis with slits around one line, how far they go on each
-/// side of it by `margin`; an eye in the first room, and a point in the last, on it.
+/// Rooms in a row along an axis with slits around one line, which extend on each side
+/// of it by `margin`; an eye in the first room, and a point in the last, on it.
 struct Chain {
     rooms: Vec<WorldBox>,
     openings: Vec<Opening>,
@@ -62,8 +63,9 @@ fn chain(rng: &mut SeededRng, base: DVec3, length: usize, shrink: f64, margins: 
     }
 }
 
-/// How often a row loses the last room though the line of sight is accepted, and how
-/// often it was accepted.
+/// Number of times that a row loses the last room of an accepted line of sight.
+///
+/// And the number of times that the line was accepted.
 fn lost(row: usize, shrink: f64) -> (usize, usize) {
     let (mut lost, mut accepted) = (0, 0);
     for round in 0..400u64 {
@@ -72,7 +74,7 @@ fn lost(row: usize, shrink: f64) -> (usize, usize) {
         // The finest are some units in the last place.
         let last_place = f64::EPSILON * (1.0 + base.abs().max_element());
         let margins = [1e-3, 1e-7, 8.0 * last_place, 2.0 * last_place];
-        // The same numbers for the truth and for what the row is told.
+        // The same numbers for the truth and for the input of the row.
         let truth = chain(&mut SeededRng::new(round), base, length, 0.0, &margins);
         let told = chain(&mut SeededRng::new(round), base, length, shrink, &margins);
         let graph = RegionGraph::of_boxes(truth.rooms, truth.openings);
