@@ -1,3 +1,5 @@
+//! Specs: numbers, lists, suggestions; and the parameters that `list` shows.
+
 use super::*;
 use std::collections::BTreeSet;
 /// Parameters with their defaults, without the remarks in parentheses.

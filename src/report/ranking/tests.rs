@@ -1,3 +1,5 @@
+//! Ranks as a report has them, on cells made by hand.
+
 use super::*;
 use crate::index::Origin;
 use serde_json::json;
