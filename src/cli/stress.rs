@@ -14,7 +14,7 @@ use super::table::{Column, Table};
 use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
-use crate::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
+use crate::stress::extremes::{DEFAULT_CASES, Extremes, Tally};
 use crate::stress::{Section, Status, Vector, built_in, read_vectors_file, replay};
 
 pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
@@ -76,7 +76,13 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
                 cases,
                 ..extremes
             };
-            found.extend(extremes.run(&Shown(&bar)));
+            found.extend(extremes.run(&|family| {
+                if bar.message() != family {
+                    bar.set_message(family.to_owned());
+                }
+                bar.inc(1);
+                interrupt::asked()
+            }));
         }
         if kernel != chosen {
             by_others += found
@@ -124,22 +130,6 @@ fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
     }
     sections.retain(|section| !section.rows.is_empty());
     sections
-}
-
-/// Tells the progress bar; a Ctrl-C ends the run after the case at hand.
-struct Shown<'a>(&'a ProgressBar);
-
-impl Progress for Shown<'_> {
-    fn case_done(&self, family: &str) {
-        if self.0.message() != family {
-            self.0.set_message(family.to_owned());
-        }
-        self.0.inc(1);
-    }
-
-    fn stop(&self) -> bool {
-        interrupt::asked()
-    }
 }
 
 /// The rows of a vector, under its category.

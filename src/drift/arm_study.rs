@@ -180,7 +180,8 @@ pub fn errors(setting: Setting, seconds: f64) -> Vec<ArmPoint> {
 /// Steps of one query, about: a round is some tens of microseconds.
 const STEPS: usize = 750;
 
-/// The tasks of all points of a setting, each with the simulated seconds of one query.
+/// Tasks of all points of a setting, each with the simulated seconds of a query.
+///
 /// They time the arm on its way in.
 pub fn tasks(setting: Setting) -> impl Iterator<Item = (TimedTask<'static>, f64)> {
     setting.efforts().map(move |(method, substeps)| {
@@ -198,8 +199,9 @@ pub fn tasks(setting: Setting) -> impl Iterator<Item = (TimedTask<'static>, f64)
     })
 }
 
-/// Fills in the times of the points of one setting, whose tasks begin at `first`, and
-/// chooses a method.
+/// Fills in the times of the points of one setting and chooses a method.
+///
+/// The tasks of the setting begin at `first`.
 pub fn conclude(
     points: &mut [ArmPoint],
     times: &OverProcesses,

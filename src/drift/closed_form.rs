@@ -1,5 +1,5 @@
-//! The spring arm in closed form, for every damping. A stiffening spring is frozen as
-//! it is when the step begins.
+//! The spring arm in closed form, for every damping. A stiffening spring is frozen
+//! as it is when the step begins.
 
 /// Position and velocity.
 pub type State = [f64; 2];

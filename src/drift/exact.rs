@@ -22,9 +22,9 @@ fn sin_cos_degrees(degrees: &Expansion) -> (Expansion, Expansion) {
     exact::sin_cos(&radians.leading(TERMS), TERMS)
 }
 
-/// Position and velocity of the linear arm `x'' = omega^2 (sin t - x) - 2 omega x'` at
-/// the ends of `frames` frames, from rest at one.
+/// Position and velocity of the linear arm at the ends of frames.
 ///
+/// The arm is `x'' = omega^2 (sin t - x) - 2 omega x'`, from rest at one.
 /// Position, velocity, sine and cosine of the time are one linear system: each frame
 /// multiplies them by the exponential of its matrix.
 pub fn linear_way(omega: f64, frame_s: f64, frames: usize) -> Vec<[f64; 2]> {
@@ -43,7 +43,7 @@ pub fn linear_way(omega: f64, frame_s: f64, frames: usize) -> Vec<[f64; 2]> {
     (0..frames).map(frame).collect()
 }
 
-/// A square matrix of numbers of 200 bits; that of a camera basis has the columns u, v
+/// A square matrix of numbers of 200 bits. The columns of a camera basis are u, v
 /// and n.
 #[derive(Clone, Debug)]
 pub struct Matrix<const N: usize = 3>([[Expansion; N]; N]);

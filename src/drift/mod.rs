@@ -1,5 +1,5 @@
-//! Small errors that add up, in bases, orbits and spring arms of cameras: the methods
-//! that are compared, their references, and which method to take.
+//! Small errors that add up, in bases, orbits and spring arms of cameras: the
+//! methods that are compared, their references, and which method to take.
 
 mod arm;
 mod arm_study;
@@ -205,8 +205,10 @@ impl DriftReport {
     }
 }
 
-/// Errors of ways to turn after a number of steps and their ns per step, timed in this
-/// process alone. `None` for a basis that is lost; names without a method are left out.
+/// Errors of ways to turn after a number of steps, and their ns per step.
+///
+/// Times are those of this process alone. The error of a basis that is lost is `None`;
+/// names without a method are left out.
 pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
     let protocol = Protocol {
         rounds: [5, 5],

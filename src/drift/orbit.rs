@@ -33,7 +33,7 @@ pub const CARRIERS: &[Method] = rows! { Method { name, summary, sum, walk }
         Sum::Turns, toolkit_orbit;
     "f64-carried-radius", "the f64 eye alone, put back to its distance each step",
         Sum::Turns, double::carried::<true>;
-    "f64-angle", "the eye made anew from an f64 angle in degrees, whole turns taken off",
+    "f64-angle", "the eye recomputed from an f64 angle in degrees, whole turns taken off",
         Sum::Angles, summed_orbit;
 };
 

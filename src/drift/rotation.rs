@@ -1,5 +1,5 @@
-//! Drift of camera bases from the exact rotation: one row of [`METHODS`] for each way
-//! to keep one.
+//! Drift of camera bases from the exact rotation: one row of [`METHODS`] for each
+//! way to keep one.
 
 use std::collections::BTreeMap;
 
@@ -64,7 +64,7 @@ pub const METHODS: &[Method] = rows! { Method { name, summary, sum, walk }
     "f32-polar-100", "f32 axes, a Newton step to the polar factor after 100 rotations",
         Sum::Turns, single::frame::<POLAR>;
     "f32-quaternion", "f32 quaternion, normalised after each step", Sum::Turns, single::quaternion;
-    "f32-radians", "f32 angles summed in radians, axes made anew by sine and cosine",
+    "f32-radians", "f32 angles summed in radians, axes recomputed by sine and cosine",
         Sum::Angles, single::angles::<RADIANS>;
     "f32-degrees", "the same in degrees", Sum::Angles, single::angles::<DEGREES>;
     "f32-degrees-wrapped", "the same in degrees, whole turns taken off",

@@ -1,5 +1,5 @@
-//! Limits of stability of the spring arm's methods in `omega h`, and the share of an
-//! error that one step leaves beyond: found by trying the very step that runs.
+//! Limits of stability of the spring arm's methods in `omega h`, and the share of
+//! an error that one step leaves beyond: found by trying the very step that runs.
 
 use serde::Serialize;
 
@@ -134,7 +134,9 @@ mod tests {
         f64::hypot(x, y)
     }
 
-    /// The eigenvalues are `omega (-zeta +- sqrt(zeta^2 - 1))`; explicit Euler and RK4 are stable while `|R(h lambda)| <= 1` (on the negative axis RK4 up to the
+    /// The eigenvalues are `omega (-zeta +- sqrt(zeta^2 - 1))`.
+    ///
+    /// Explicit Euler and RK4 are stable while `|R(h lambda)| <= 1` (on the negative axis RK4 up to the
     /// root of z^3 + 4 z^2 + 12 z + 24: Hairer and Wanner 1996, "Solving Ordinary
     /// Differential Equations II", IV.2), semi-implicit Euler by Jury's conditions.
     #[test]
@@ -167,7 +169,9 @@ mod tests {
         }
     }
 
-    /// At critical damping R(-omega h) is a double eigenvalue: 1 + z for explicit Euler, 1/(1 - z) for implicit Euler, exp(z), and for TR-BDF2
+    /// At critical damping R(-omega h) is a double eigenvalue.
+    ///
+    /// It is 1 + z for explicit Euler, 1/(1 - z) for implicit Euler, exp(z), and for TR-BDF2
     /// `(1 + (sqrt(2) - 1) z) / (1 - (1 - 1/sqrt(2)) z)^2`, which is below zero from
     /// `omega h = sqrt(2) + 1` on and tends to zero from below.
     #[test]

@@ -13,7 +13,9 @@ use crate::culling::CullingTest;
 use crate::index::Kind;
 use crate::query::{ItemId, Located, QueryCost};
 use crate::statistics::rate;
-use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility};
+use crate::verify::{
+    ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility, scan,
+};
 
 /// Answers of one subject, and their cost.
 #[derive(Clone, Default, Debug)]
@@ -155,20 +157,24 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
             continue;
         };
         let view = workload.views[frame].as_any();
-        let seen = workload.items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-        let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
+        let answer: Vec<ItemId> = scan(&workload.items, |b| view.sees(b)).collect();
         let errors = truth.errors(&scene.items, &answer);
-        judged.errors += match workload.culling.test {
-            CullingTest::Sphere => errors.of_spheres(),
-            CullingTest::Exact => errors.of_exact_test(),
-            CullingTest::SixPlane | CullingTest::SixBox => errors,
-        };
+        judged.errors += blamed(workload.culling.test, errors);
         judged.judged_queries += 1;
         by_camera.push([errors.false_positives as f64, errors.visible as f64]);
     }
     let excess = rate(&by_camera);
     judged.excess_interval = excess.and_then(|found| Some([found.lower?, found.upper?]));
     judged
+}
+
+/// Errors with their false positives attributed to the planes or to the test.
+pub fn blamed(test: CullingTest, errors: ErrorCount) -> ErrorCount {
+    match test {
+        CullingTest::Sphere => errors.of_spheres(),
+        CullingTest::Exact => errors.of_exact_test(),
+        CullingTest::SixPlane | CullingTest::SixBox => errors,
+    }
 }
 
 /// Verdict on a structure from one answer. A false negative is worse than anything

@@ -6,14 +6,13 @@ use serde::{Serialize, Serializer};
 
 use super::point::{Dimension, Point};
 use crate::camera::Camera;
-use crate::culling::{CameraView, Culling, CullingTest};
-use crate::geometry::Aabb;
-use crate::measure::Status;
+use crate::culling::{CameraView, Culling};
+use crate::measure::{Status, blamed};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::statistics::{Rate, rate};
-use crate::verify::{ErrorCount, Truth};
+use crate::verify::{ErrorCount, Truth, scan};
 
 /// Names of a culling: test, arithmetic, planes and epsilon.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -161,7 +160,10 @@ impl Judged {
         let culling = self.culling;
         let items = culling.test.items(&scene.items);
         let view_of = |camera: &Camera| culling.view(camera, &around).map_err(|e| e.to_string());
-        let answer = |view: &CameraView| scan(&items, view);
+        let answer = |view: &CameraView| -> Vec<ItemId> {
+            let view = view.as_any();
+            scan(&items, |b| view.sees(b)).collect()
+        };
         for camera in &shots.cameras {
             self.views.push(view_of(camera)?);
         }
@@ -231,13 +233,6 @@ impl Judged {
     }
 }
 
-/// The answer of the plain loop.
-pub(super) fn scan(items: &[Aabb], view: &CameraView) -> Vec<ItemId> {
-    let view = view.as_any();
-    let seen = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-    seen.map(|(_, id)| id).collect()
-}
-
 /// Items whose answer changes from one camera to another while the truth about
 /// them stays what it is.
 fn flicker(items: usize, truths: [&Truth; 2], answers: [&[ItemId]; 2]) -> u64 {
@@ -269,15 +264,6 @@ fn worst_miss_px(camera: &Camera, scene: &Scene, truth: &Truth, answer: &[ItemId
         height.map_or(depth, |height| depth / height * PIXELS)
     });
     in_pixels.fold(0.0, f64::max)
-}
-
-/// Errors with the excess put down to planes or to the test.
-fn blamed(test: CullingTest, errors: ErrorCount) -> ErrorCount {
-    match test {
-        CullingTest::Sphere => errors.of_spheres(),
-        CullingTest::Exact => errors.of_exact_test(),
-        CullingTest::SixPlane | CullingTest::SixBox => errors,
-    }
 }
 
 #[cfg(test)]

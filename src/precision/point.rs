@@ -1,5 +1,5 @@
-//! A point of a diagram: a structure, its queries, its errors and its time, and when
-//! one point dominates another.
+//! A point of a diagram: a structure, its queries, its errors and its time, and
+//! when one point dominates another.
 
 use serde::Serialize;
 

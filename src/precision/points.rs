@@ -1,6 +1,6 @@
-//! Points of the diagrams of one scene and path: every structure with every culling,
-//! checked, judged against the exact truth, and timed side by side; and region search
-//! likewise.
+//! Points of the diagrams of one scene and path: every structure with every
+//! culling, checked, judged against the exact truth, and timed side by side; and region
+//! search likewise.
 
 use serde::{Deserialize, Serialize};
 

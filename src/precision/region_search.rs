@@ -231,7 +231,7 @@ impl RegionJudged {
         self.answers.iter().map(count).collect()
     }
 
-    /// Compares the regions found for a camera, points in their order, with this answer.
+    /// Compares the regions found for a camera, point by point, with this answer.
     pub fn is_right(&self, camera: usize, found: &[ItemId]) -> bool {
         let mut rest = found;
         self.answers[camera].iter().all(|answer| {

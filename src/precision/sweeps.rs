@@ -7,15 +7,16 @@
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::judged::{Names, counts_or_null, scan};
+use super::judged::{Names, counts_or_null};
 use crate::camera::{
     Camera, CameraError, Frame, Lens, LensKind, PLANE_METHODS, PlaneOptions, Pose, Surroundings,
 };
 use crate::culling::{Arithmetic, CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
+use crate::query::ItemId;
 use crate::scene::SeededRng;
 use crate::statistics::{Rate, rate};
-use crate::verify::{ErrorCount, Truth};
+use crate::verify::{ErrorCount, Truth, scan};
 
 named! {
     /// Quantity that is swept over.
@@ -68,8 +69,9 @@ pub struct SweepRow {
     pub refused: Option<String>,
 }
 
-/// Mean depth of the views of a world of size 1. Depths are drawn: rounding does the
-/// same to all views by one lens.
+/// Mean depth of the views of a world of size 1.
+///
+/// Depths are drawn: rounding does the same to all views by one lens.
 const DEPTH: f64 = 100.0;
 /// Boxes of each camera.
 const BOXES: usize = 500;
@@ -245,7 +247,8 @@ fn judge(rng: &mut SeededRng, sweep: Sweep, value: f64, tests: &[SweptTest], all
     for (test, judged) in tests.iter().zip(all) {
         match test.view(&camera, &around) {
             Ok(view) => {
-                let answer = scan(&boxes, &view);
+                let view = view.as_any();
+                let answer: Vec<ItemId> = scan(&boxes, |b| view.sees(b)).collect();
                 judged.errors.push(truth.errors(&boxes, &answer));
             }
             Err(error) => judged.refused = Some(error.to_string()),

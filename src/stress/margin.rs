@@ -1,8 +1,9 @@
 //! How far out a box may lie that the exact test still returns: the margin of
 //! its planes, stated once for vectors and extremes.
 
+use crate::arithmetic::Expansion;
 use crate::camera::{Camera, Lens, LensKind, Surroundings};
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, ConvexVolume, Plane};
 
 /// How far outside the camera's volume a box may lie that the exact test still
 /// returns.
@@ -60,4 +61,18 @@ fn openness(lens: &Lens) -> f64 {
         LensKind::Orthographic { .. } | LensKind::Matrix(_) => [0.0; 2],
     };
     slopes.map(|s| 1.0 / libm::hypot(1.0, s)).iter().product()
+}
+
+/// The six-plane test without any rounding.
+pub fn sees_exactly(volume: &ConvexVolume, b: &Aabb) -> bool {
+    let excludes = |plane: &Plane| {
+        // f64 holds the products.
+        let products = plane.normal.as_dvec3() * plane.p_vertex(b).as_dvec3();
+        let mut value = Expansion::from(plane.d);
+        for product in products.to_array() {
+            value.grow(product);
+        }
+        value.sign() < 0
+    };
+    !b.is_empty() && !volume.planes().iter().any(excludes)
 }

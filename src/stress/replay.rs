@@ -22,8 +22,10 @@ pub fn replay(vector: &Vector, structures: &[StructureSpec]) -> Vec<Row> {
     .vector(vector)
 }
 
-/// Structures and planes that vectors are checked with. With anything but the default
-/// planes (an epsilon of zero, say) failures are expected: tests of the suite use it.
+/// Structures and planes that vectors are checked with.
+///
+/// Without the default planes (an epsilon of zero, say) failures are expected: tests of
+/// the suite use it.
 #[derive(Clone, Copy)]
 pub struct Replay<'a> {
     /// Structures that are queried.
@@ -194,8 +196,9 @@ fn refused(built: Result<Box<dyn DynIndex>, BuildError>, wanted: usize) -> Resul
     }
 }
 
-/// The volume, if it exists and should; else a row for each structure. `declared` is
-/// the declared refusal, `otherwise` what is expected without one.
+/// Returns the volume if it exists and should, else adds a row for each structure.
+///
+/// `declared` is the declared refusal, `otherwise` the expected outcome without one.
 fn accepted<V>(
     sheet: &mut Sheet,
     [test, kind]: [&str; 2],

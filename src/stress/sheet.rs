@@ -1,12 +1,10 @@
 //! Rows of one vector at one level: queries of structures and the comparison of
 //! their answers, as sets of names, with the declared ones.
 
-use glam::Vec3;
-
+use super::margin::sees_exactly;
 use super::{Level, Name, Names, Row, Said, Status, Vector};
-use crate::arithmetic::Expansion;
 use crate::culling::CullingTest;
-use crate::geometry::{Aabb, ConvexVolume, Plane};
+use crate::geometry::{Aabb, ConvexVolume};
 use crate::index::{BuildError, DynIndex, caught};
 use crate::oracle::{Oracle, Verdict};
 use crate::query::{AnyVolume, QueryCost};
@@ -157,10 +155,7 @@ impl Sheet<'_> {
         let Some(wanted) = &self.vector.p_vertex_exact_visible else {
             return;
         };
-        let seen = self.names_of(|b| {
-            let excluded = |plane: &Plane| value_at(plane, plane.p_vertex(b)).sign() < 0;
-            !b.is_empty() && !volume.planes().iter().any(excluded)
-        });
+        let seen = self.names_of(|b| sees_exactly(volume, b));
         let got = Ok(seen.iter().cloned().collect());
         let subject = [ORACLE, "six-plane exact"];
         self.answered(None, subject, seen == *wanted, wanted, &got);
@@ -200,15 +195,4 @@ impl Sheet<'_> {
             self.row(Some(name), subject, Status::Fail, expected, got);
         }
     }
-}
-
-/// Value of a plane at a point without any rounding: f64 holds the products.
-fn value_at(plane: &Plane, p: Vec3) -> Expansion {
-    let products = plane.normal.as_dvec3() * p.as_dvec3();
-    let mut value = Expansion::from(plane.d);
-    products
-        .to_array()
-        .into_iter()
-        .for_each(|part| value.grow(part));
-    value
 }

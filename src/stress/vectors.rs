@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer};
 
 use crate::camera::{Camera, CameraError, Lens};
 use crate::geometry::{Aabb, Plane};
-use crate::input::InputError;
+use crate::input::{InputError, read_file};
 use crate::json::{JsonError, from_json};
 use crate::oracle::Pose;
 use crate::shown::plain;
@@ -199,10 +199,7 @@ pub fn built_in() -> Result<Vec<Vector>, InputError> {
 /// # Errors
 /// A file that cannot be read, or is wrong.
 pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
-    let bytes = std::fs::read(path).map_err(|source| InputError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = read_file(path)?;
     read_vectors(&bytes, &path.display().to_string())
 }
 

@@ -23,6 +23,12 @@ pub use trial::{Fault, Trial};
 pub use truth::{ErrorCount, Truth};
 pub use variants::variants;
 
+/// Answer of the plainest loop: the ids of the items that satisfy a test.
+pub fn scan(items: &[Aabb], sees: impl Fn(&Aabb) -> bool) -> impl Iterator<Item = ItemId> {
+    let seen = items.iter().zip(0..).filter(move |(b, _)| sees(b));
+    seen.map(|(_, id)| id)
+}
+
 /// How a structure's answer differs from the reference.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 #[non_exhaustive]

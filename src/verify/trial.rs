@@ -3,7 +3,7 @@
 //! first item that differs. `run`, `verify`, `precision`, `advise` and `stress`
 //! ask in no other way.
 
-use super::Difference;
+use super::{Difference, scan};
 use crate::geometry::Aabb;
 use crate::index::caught;
 use crate::query::{AnyVolume, ItemId};
@@ -45,8 +45,7 @@ impl Trial {
     /// O(items * planes).
     pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) {
         let view = view.into();
-        let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-        self.expect(wanted.map(|(_, id)| id));
+        self.expect(scan(items, |b| view.sees(b)));
     }
 
     /// A question whose right answer is known.

@@ -46,13 +46,8 @@ pub const BOXES: usize = 2048;
 const ALL_EVERY: u64 = 16;
 const FEW: usize = 256;
 
-/// Receiver of progress, and source of interrupts.
-pub trait Progress: Sync {
-    /// Counts one judged case of a family.
-    fn case_done(&self, family: &str);
-    /// Returns true to skip the remaining cases.
-    fn stop(&self) -> bool;
-}
+/// Called with the family before each case; true leaves out the remaining cases.
+pub type Progress<'a> = &'a (dyn Fn(&str) -> bool + Sync);
 
 /// A case that was run: its seed, its group of rows, and its findings.
 type Outcome = (u64, String, Findings);
@@ -66,7 +61,7 @@ impl Extremes<'_> {
     }
 
     /// All families, a section each.
-    pub fn run(&self, progress: &dyn Progress) -> Vec<Section> {
+    pub fn run(&self, progress: Progress) -> Vec<Section> {
         let planes = PLANES_FAMILIES
             .iter()
             .map(|f| self.planes_family(f, progress));
@@ -76,7 +71,7 @@ impl Extremes<'_> {
         planes.chain(cameras).collect()
     }
 
-    fn camera_family(&self, family: &CameraFamily, progress: &dyn Progress) -> Section {
+    fn camera_family(&self, family: &CameraFamily, progress: Progress) -> Section {
         let mut section = Section::new(&format!("generated {}", family.name));
         for &variant in family.variants {
             let group = format!("{}/{}", family.name, (family.label)(variant));
@@ -102,7 +97,7 @@ impl Extremes<'_> {
         section
     }
 
-    fn planes_family(&self, family: &PlanesFamily, progress: &dyn Progress) -> Section {
+    fn planes_family(&self, family: &PlanesFamily, progress: Progress) -> Section {
         let mut section = Section::new(&format!("generated {}", family.name));
         let cases = self.cases.saturating_mul(family.factor);
         let outcomes = self.run_cases(family.name, cases, progress, |_, seed| {
@@ -123,17 +118,16 @@ impl Extremes<'_> {
         &self,
         name: &str,
         cases: u64,
-        progress: &dyn Progress,
+        progress: Progress,
         case: impl Fn(u64, u64) -> (String, Findings) + Sync,
     ) -> Vec<Outcome> {
         let done = Mutex::new(Vec::new());
-        let numbers = (0..cases).take_while(|_| !progress.stop());
+        let numbers = (0..cases).take_while(|_| !progress(name));
         threads::share(self.threads, numbers, |nth| {
             let seed = self.seed.wrapping_add(nth);
             let (group, findings) = case(nth, seed);
             let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             done.push((nth, (seed, group, findings)));
-            progress.case_done(name);
         });
         let mut done = done
             .into_inner()
@@ -211,16 +205,6 @@ mod tests {
     use super::*;
     use crate::index::Registry;
 
-    /// Goes on to the end.
-    struct Quiet;
-
-    impl Progress for Quiet {
-        fn case_done(&self, _family: &str) {}
-        fn stop(&self) -> bool {
-            false
-        }
-    }
-
     #[test]
     fn the_default_run_judges_ten_million_boxes() {
         let variants: usize = CAMERA_FAMILIES.iter().map(|f| f.variants.len()).sum();
@@ -249,12 +233,12 @@ mod tests {
             cases: 1,
             threads: 2,
         };
-        let sections = extremes.run(&Quiet);
+        let sections = extremes.run(&|_| false);
         let alone = Extremes {
             threads: 1,
             ..extremes
         }
-        .run(&Quiet);
+        .run(&|_| false);
         for (section, alone) in sections.iter().zip(&alone) {
             assert_eq!(section.rows, alone.rows, "threads change nothing");
             assert!(

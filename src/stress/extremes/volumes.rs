@@ -12,6 +12,7 @@ use crate::index::StructureSpec;
 use crate::oracle::{Oracle, Verdict};
 use crate::query::AnyVolume;
 use crate::scene::SeededRng;
+use crate::stress::margin::sees_exactly;
 use crate::verify::{RandomCase, VOLUME_KINDS, explain_visibility};
 
 /// A volume and boxes, at planes level.
@@ -149,7 +150,7 @@ impl PlanesCase {
             let seen = self.volume.sees(b);
             let verdict = oracle.verdict(b);
             let (expected, wrong) = if self.exact {
-                let wanted = !b.is_empty() && self.no_plane_excludes(b);
+                let wanted = sees_exactly(&self.volume, b);
                 ("the answer without any rounding", seen != wanted)
             } else if seen {
                 ("no empty box", b.is_empty())
@@ -164,15 +165,6 @@ impl PlanesCase {
                 return;
             }
         }
-    }
-
-    /// The plane test in f64, which holds sums of denormals exactly.
-    fn no_plane_excludes(&self, b: &Aabb) -> bool {
-        let mut planes = self.volume.planes().iter();
-        planes.all(|plane| {
-            let corner = plane.p_vertex(b).as_dvec3();
-            plane.normal.as_dvec3().dot(corner) + f64::from(plane.d) >= 0.0
-        })
     }
 
     /// Error of evaluating a plane at the box, for unit length: 3

@@ -39,7 +39,7 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
                 format!("{} of {count} points answered, {flow:?}", many.len())
             })?;
             for (&p, found) in points.iter().zip(many.iter()) {
-                trial.expect(scan(&asked.items, &p));
+                trial.expect(scan(&asked.items, |b| b.contains_point(p)));
                 let alone = seen(index, &p);
                 let answer = trial.ask(|ids| ids.extend_from_slice(found));
                 let fault = answer.err().map(|fault| fault.explained(|_| None));

@@ -12,7 +12,7 @@ use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 
-use super::Trial;
+use super::{Trial, scan};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{BuildError, Input, RegionIndex};
 use crate::query::{Containment, ItemId, NoRecorder, Predicate, Sink};
@@ -20,7 +20,7 @@ use crate::scene::SeededRng;
 
 use questions::{
     Outcome, Questions, ask, build, cases, counts_are_plausible, each, edges, ensure,
-    generated_scenes, is_right, points, scan, seen, sorted,
+    generated_scenes, is_right, points, seen, sorted,
 };
 
 pub use declared::declared_capabilities_are_true;

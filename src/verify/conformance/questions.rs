@@ -5,7 +5,7 @@ use std::ops::{ControlFlow, Range};
 
 use glam::{DVec3, Vec3};
 
-use super::super::{RandomCase, Trial, edge_scenes, edge_volumes};
+use super::super::{RandomCase, Trial, edge_scenes, edge_volumes, scan};
 use super::super::{explain_containment, explain_visibility};
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions};
 use crate::geometry::{Aabb, ConvexVolume};
@@ -140,7 +140,7 @@ pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     explain: impl Fn(&Aabb) -> String,
 ) -> Outcome {
     let mut trial = Trial::new(items.len());
-    trial.expect(scan(items, volume));
+    trial.expect(scan(items, |b| volume.sees(b)));
     let answer = trial.ask(|ids| *ids = seen(index, volume));
     let why = |id: usize| Some(explain(items.get(id)?));
     let right = answer.map(drop);
@@ -163,12 +163,6 @@ pub(super) fn counts_are_plausible<T: RegionIndex, Q: QueryVolume>(
         let (plain, ids) = (plain.len(), ids.len());
         format!("{plain} ids, {ids} when counted, {planes} planes: {cost:?}")
     })
-}
-
-/// The reference answer: a look at every item.
-pub(super) fn scan<Q: QueryVolume>(items: &[Aabb], volume: &Q) -> impl Iterator<Item = ItemId> {
-    let seen = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));
-    seen.map(|(_, id)| id)
 }
 
 /// Corners and centres of some boxes, and points one step of a float beside.
