@@ -13,11 +13,7 @@ use crate::arithmetic::Expansion;
 pub const SWING_DEG: f64 = 0.618_033_988_749_894_9;
 
 /// The turn of every step.
-pub const SWING: Turn = Turn {
-    yaw_deg: SWING_DEG,
-    pitch_deg: 0.0,
-    roll_deg: 0.0,
-};
+pub const SWING: Turn = Turn::new(SWING_DEG, 0.0, 0.0);
 
 /// The toolkit's own orbit.
 pub const TOOLKIT: &str = "f64-carried";

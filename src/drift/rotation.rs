@@ -15,18 +15,10 @@ use super::walk::Walk;
 use crate::arithmetic::Expansion;
 
 /// Slow and about no axis in particular.
-pub const STEADY: Turn = Turn {
-    yaw_deg: 0.7,
-    pitch_deg: 0.3,
-    roll_deg: 0.1,
-};
+pub const STEADY: Turn = Turn::new(0.7, 0.3, 0.1);
 
 /// A 360th of a turn to the left.
-pub const ONE_DEGREE: Turn = Turn {
-    yaw_deg: 1.0,
-    pitch_deg: 0.0,
-    roll_deg: 0.0,
-};
+pub const ONE_DEGREE: Turn = Turn::new(1.0, 0.0, 0.0);
 
 /// Yaw, pitch and roll by `times` times [`STEADY`], to more than 40 digits.
 fn turned(times: u64) -> Matrix {

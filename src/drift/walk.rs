@@ -21,6 +21,17 @@ pub struct Turn {
     pub roll_deg: f64,
 }
 
+impl Turn {
+    /// A turn by yaw, pitch and roll in degrees.
+    pub const fn new(yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> Turn {
+        Turn {
+            yaw_deg,
+            pitch_deg,
+            roll_deg,
+        }
+    }
+}
+
 /// Takes equal steps: the axes after each of the ascending numbers of them.
 pub type Walk = fn(&Turn, &[u64]) -> Vec<DMat3>;
 

@@ -229,15 +229,13 @@ impl<'a> Built<'a> {
     /// Compares the answers of a way to cull with those of the plain loop.
     fn check(&self, way: Way, judged: &Judged, items: usize) -> Result<(), Verdict> {
         let mut trial = Trial::new(items);
-        judged
-            .answers
-            .iter()
-            .enumerate()
-            .try_for_each(|(n, answer)| {
-                trial.expect(answer.iter().copied());
-                let asked = trial.ask(|out| self.answer(way, n, out)).map(drop);
-                asked.map_err(|fault| Verdict::new(Status::of(&fault), fault.explained(|_| None)))
-            })
+        for (n, answer) in judged.answers.iter().enumerate() {
+            trial.expect(answer.iter().copied());
+            if let Err(fault) = trial.ask(|out| self.answer(way, n, out)) {
+                return Err(Verdict::new(Status::of(&fault), fault.explained(|_| None)));
+            }
+        }
+        Ok(())
     }
 
     /// Compares the answers of a way to search with those by the same numbers.

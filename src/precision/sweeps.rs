@@ -106,11 +106,7 @@ fn tests() -> Vec<SweptTest> {
     let defaults = [false, true].map(|is_plain| with(Culling::default(), is_plain));
     let arithmetics = [Arithmetic::F64, Arithmetic::F32Relative].map(|a| bare(a, method));
     let methods = PLANE_METHODS.map(|(method, ..)| bare(Arithmetic::F32, method));
-    defaults
-        .into_iter()
-        .chain(arithmetics)
-        .chain(methods)
-        .collect()
+    [&defaults[..], &arithmetics, &methods].concat()
 }
 
 impl SweptTest {

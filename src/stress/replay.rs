@@ -80,11 +80,8 @@ impl Replay<'_> {
             let mut scenes = Vec::new();
             if let Some(index) = vector.boxes().position(|b| b.id == *name) {
                 let before: Vec<&Name> = vector.boxes().take(index).map(|b| &b.id).collect();
-                let item = sheet
-                    .names
-                    .iter()
-                    .filter(|name| before.contains(name))
-                    .count();
+                let is_before = |name: &&Name| before.contains(name);
+                let item = sheet.names.iter().filter(is_before).count();
                 let mut scene = sheet.items.to_vec();
                 scene.insert(item, all[index]);
                 scenes.push((scene, item));
@@ -93,10 +90,9 @@ impl Replay<'_> {
                 }
             }
             for spec in self.structures {
-                let built = scenes
-                    .iter()
-                    .map(|(scene, item)| refused(spec.build(scene), *item));
-                let (status, got) = match built.collect::<Result<Vec<String>, String>>() {
+                let build = |(scene, item): &(Vec<Aabb>, usize)| refused(spec.build(scene), *item);
+                let refusals: Result<Vec<String>, String> = scenes.iter().map(build).collect();
+                let (status, got) = match refusals {
                     Ok(texts) => match texts.into_iter().next() {
                         Some(text) => (Status::Refused, text),
                         None => (Status::Fail, "no such box".to_owned()),
@@ -118,11 +114,8 @@ impl Replay<'_> {
         let oracle = sound.and_then(|c| Oracle::of_camera(&stated.pose(), &c.lens, DVec3::ZERO));
         // Where the file does not say what is visible, the oracle does.
         let truth = oracle.as_ref().map(|oracle| sheet.seen_by(oracle));
-        let wanted = vector
-            .expected_visible_camera
-            .clone()
-            .or(truth)
-            .unwrap_or_default();
+        let listed = vector.expected_visible_camera.clone();
+        let wanted = listed.or(truth).unwrap_or_default();
         let cubes = self.built(&CullingTest::Sphere.items(sheet.items));
         for (test, name, _) in TESTS {
             let structures = match test {

@@ -151,18 +151,12 @@ impl Vector {
     /// Planes in f32, bit for bit.
     pub fn planes(&self) -> Option<Vec<Plane>> {
         let plane = |[x, y, z, d]: [f32; 4]| Plane::new(Vec3::new(x, y, z), d);
-        let bits = self.planes_f32_hex.iter().flatten();
-        let bits = bits.map(|row| plane(row.0.map(|x| x.0)));
-        let decimals = self
-            .planes
-            .iter()
-            .flatten()
-            .map(|row| plane(row.0.map(|x| x.0)));
-        match (&self.planes_f32_hex, &self.planes) {
-            (None, None) => None,
-            (None, Some(_)) => Some(decimals.collect()),
-            _ => Some(bits.collect()),
-        }
+        let bits = self.planes_f32_hex.as_ref();
+        let bits = bits.map(|rows| rows.iter().map(|row| plane(row.0.map(|x| x.0))));
+        let decimals = self.planes.as_ref();
+        let decimals = decimals.map(|rows| rows.iter().map(|row| plane(row.0.map(|x| x.0))));
+        bits.map(Iterator::collect)
+            .or(decimals.map(Iterator::collect))
     }
 
     /// Answer of the f32 six-plane test; by default that of the exact one.

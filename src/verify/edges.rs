@@ -1,5 +1,5 @@
-//! Scenes at the edge of what a structure may meet, volumes that touch their
-//! boxes exactly where they can, and points on the faces of a view. Plain data; nothing is checked here.
+//! Degenerate scenes, volumes that touch their boxes exactly where they can, and
+//! points on the faces of a view. Plain data; nothing is checked here.
 
 use glam::{DVec3, Vec3};
 

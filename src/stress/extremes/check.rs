@@ -87,10 +87,8 @@ impl Case {
         let mut found = self.judged();
         let share = share.min(self.items.len());
         let cubes = CullingTest::Sphere.items(&self.items);
-        let boxes = (
-            &self.items[..],
-            found.built(structures, &self.items[..share]),
-        );
+        let items = &self.items[..];
+        let boxes = (items, found.built(structures, &items[..share]));
         let spheres = (&cubes[..], found.built(structures, &cubes[..share]));
         for (arithmetic, arithmetic_name, _) in ARITHMETICS {
             for (test, test_name, _) in TESTS {
@@ -196,12 +194,8 @@ impl Case {
         let mut boxes = seen.iter().zip(cubes);
         let lost = boxes.position(|(seen, cube)| *seen && !sphere.as_any().sees(cube));
         if lost.is_some() {
-            found.fault(
-                subject,
-                lost,
-                "all that the six planes see",
-                "dropped".to_owned(),
-            );
+            let expected = "all that the six planes see";
+            found.fault(subject, lost, expected, "dropped".to_owned());
         }
     }
 
@@ -222,10 +216,9 @@ impl Case {
             judged && drops.deepest > allowed
         };
         if lost || drops.ghosts > 0 {
+            let proven = "nothing dropped that is inside or touches, nothing empty returned";
             let expected = match promised {
-                true => {
-                    "nothing dropped that is inside or touches, nothing empty returned".to_owned()
-                }
+                true => proven.to_owned(),
                 false => format!("nothing dropped that is deeper than {allowed:e}"),
             };
             let got = format!(
@@ -241,14 +234,8 @@ impl Case {
 
     /// The exact test returns nothing that is out by more than its margin.
     fn tight(&self, name: &str, seen: &[bool], found: &mut Findings) {
-        let extra = self
-            .items
-            .iter()
-            .zip(&self.judgements)
-            .zip(seen)
-            .enumerate();
-        for (i, ((b, judgement), &seen)) in extra {
-            if !seen || judgement.verdict != Verdict::Out || b.is_empty() {
+        for (i, (b, judgement)) in self.items.iter().zip(&self.judgements).enumerate() {
+            if !seen[i] || judgement.verdict != Verdict::Out || b.is_empty() {
                 continue;
             }
             let away = -self.oracle.depth(b);
