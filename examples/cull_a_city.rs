@@ -1,5 +1,5 @@
-//! The shortest useful program: the ids of the buildings that a camera sees, and the ids
-//! of those that contain it.
+//! The shortest useful program: the ids of the buildings that a camera sees, and
+//! the ids of those that contain it.
 
 use cullbench::camera::{Camera, Lens, PlaneOptions, look_at};
 use cullbench::index::{Bvh, FrustumQuery, Input, RegionIndex};
