@@ -1,6 +1,7 @@
-//! The registry: a row per structure, made from its declaration. It is a value: another
-//! crate adds its own structure with [`Registry::with`] and passes the registry to
-//! `cli::main_with`.
+//! The registry: a row per structure, made from its declaration.
+//!
+//! It is a value: another crate adds its own structure with [`Registry::with`] and passes
+//! the registry to `cli::main_with`.
 
 use std::hint::black_box;
 
