@@ -1,23 +1,27 @@
-//! What every rule looks at: scene, cameras, the fastest tree built over the
-//! items, and on request the truth about some of the cameras. It decides nothing.
+//! Scene, cameras, fastest tree and visible surfaces that all rules read.
 
 use super::AdviseOptions;
 use crate::camera::PlaneOptions;
 use crate::culling::{CameraView, Culling, CullingTest};
+use crate::funnel::{Chain, FunnelInput, World};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::measure::{Ask, Workload, WorkloadError, input_of};
+use crate::measure::{Protocol, Workload, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::verify::Truth;
+use crate::visibility::SampleGrid;
+use crate::visibility::occlusion::OccluderChoice;
 
-/// Verdicts of the oracle that are asked for: some 50 ns each.
+/// Most verdicts of the oracle: some 50 ns each.
 const MOST_JUDGED: usize = 1_000_000;
-/// Cameras that are judged at most.
+/// Most cameras that are compared with the oracle.
 const MOST_TRUTHS: usize = 16;
+/// Pixels of the default occlusion buffer.
+pub const BUFFER: SampleGrid = SampleGrid::new(320, 180);
 
-pub(super) struct Case<'a> {
+pub struct Case<'a> {
     pub workload: &'a Workload<'a>,
     pub path: &'a CameraPath,
     /// The fastest tree.
@@ -26,6 +30,8 @@ pub(super) struct Case<'a> {
     /// The fastest scan.
     pub scan: StructureSpec,
     pub options: AdviseOptions,
+    /// Every camera as a view of the funnel, or the reason for which there is none.
+    pub world: Result<World<'a>, String>,
 }
 
 impl<'a> Case<'a> {
@@ -34,8 +40,24 @@ impl<'a> Case<'a> {
         path: &'a CameraPath,
         [spec, scan]: [StructureSpec; 2],
         options: &AdviseOptions,
+        protocol: &Protocol,
     ) -> Result<Case<'a>, BuildError> {
         let scene = workload.scene;
+        let input = FunnelInput {
+            scene,
+            path,
+            most_views: usize::MAX,
+            samples: BUFFER,
+            cut_outs: None,
+            mirror: None,
+            chain: &Chain::empty(),
+            structures: &[],
+            protocol,
+            claim: None,
+            occluders: OccluderChoice::All,
+            inner_boxes: None,
+            execution: spec.execution,
+        };
         Ok(Case {
             index: spec.build(input_of(scene, &scene.items))?,
             workload,
@@ -43,30 +65,41 @@ impl<'a> Case<'a> {
             spec,
             scan,
             options: *options,
+            world: World::new(scene, &input, &|_| ())
+                .map_err(|_| "cameras without rays of their own".to_owned()),
         })
+    }
+
+    pub fn scene(&self) -> &'a Scene {
+        self.workload.scene
+    }
+
+    /// Number of cameras.
+    pub fn cameras(&self) -> usize {
+        self.workload.views.len()
     }
 
     /// Cameras of the path with the truth about them, evenly spread.
     pub fn truths(&self) -> Vec<(usize, Truth)> {
-        let cameras = &self.workload.cameras;
         let most = (MOST_JUDGED / self.scene().items.len().max(1)).clamp(1, MOST_TRUTHS);
-        let wanted = most.min(cameras.len());
-        let frames = (0..wanted).map(|n| n * cameras.len() / wanted);
-        let judged = frames.filter_map(|frame| {
-            let truth = Truth::of_scene(&cameras[frame], self.scene())?;
-            Some((frame, truth))
+        let truths = some_of(self.cameras(), most).filter_map(|camera| {
+            let truth = Truth::of_scene(&self.workload.cameras[camera], self.scene())?;
+            Some((camera, truth))
         });
-        judged.collect()
+        truths.collect()
     }
 
-    /// What the tree hands on for a camera of the path, appended.
+    /// Appends the items that the tree finds for a camera of the path.
     pub fn query(&self, camera: usize, out: &mut Vec<ItemId>) {
         let view = self.workload.views[camera].as_any();
         self.index.query(view, out);
     }
 
-    pub fn scene(&self) -> &'a Scene {
-        self.workload.scene
+    /// Items that the tree finds for a camera of the path.
+    pub fn found(&self, camera: usize) -> Vec<ItemId> {
+        let mut found = Vec::new();
+        self.query(camera, &mut found);
+        found
     }
 
     /// The six-plane volumes of the path.
@@ -77,12 +110,17 @@ impl<'a> Case<'a> {
         })
     }
 
+    /// The views of the path.
+    pub fn views(&self) -> &[CameraView] {
+        &self.workload.views
+    }
+
     /// The views of the path by another culling.
-    pub fn views(&self, culling: &Culling) -> Result<Vec<CameraView>, WorkloadError> {
+    pub fn views_by(&self, culling: &Culling) -> Result<Vec<CameraView>, WorkloadError> {
         Ok(Workload::new(self.scene(), self.path, culling)?.views)
     }
 
-    /// The tree over other items, as a culling test has them.
+    /// The tree over the items as a culling test indexes them.
     pub fn tree_for(&self, test: CullingTest) -> Result<Box<dyn DynIndex>, BuildError> {
         let scene = self.scene();
         let items = test.items(&scene.items);
@@ -90,13 +128,13 @@ impl<'a> Case<'a> {
     }
 
     /// The depth of a camera's view, or of the scene where that is infinite.
-    pub fn depth(&self, frame: usize) -> f64 {
-        let far = self.workload.cameras[frame].lens.far();
+    pub fn depth(&self, camera: usize) -> f64 {
+        let far = self.workload.cameras[camera].lens.far();
         far.unwrap_or_else(|| f64::from(self.scene().bounds.extent().length()))
     }
 
-    /// How far rounding moves planes outward about an origin, in depths: the
-    /// largest of all cameras and planes.
+    /// Outward displacement of planes for rounding about a scene's origin, in depths of
+    /// the view: the largest of all cameras and planes.
     pub fn margin(&self, scene: &Scene) -> f64 {
         let around = scene.surroundings();
         let bare = PlaneOptions {
@@ -104,18 +142,19 @@ impl<'a> Case<'a> {
             ..PlaneOptions::default()
         };
         let cameras = self.workload.cameras.iter().enumerate();
-        let margins = cameras.filter_map(|(frame, camera)| {
+        let margins = cameras.filter_map(|(index, camera)| {
             let moved = camera.volume(&PlaneOptions::default(), &around).ok()?;
             let derived = camera.volume(&bare, &around).ok()?;
             let planes = moved.planes().iter().zip(derived.planes());
             let apart = planes.map(|(a, b)| f64::from(a.d) - f64::from(b.d));
-            Some(apart.fold(0.0, f64::max) / self.depth(frame))
+            Some(apart.fold(0.0, f64::max) / self.depth(index))
         });
         margins.fold(0.0, f64::max)
     }
 }
 
-/// An index of one's own, asked with views of one's own.
-pub(super) fn asked<'c>(index: Box<dyn DynIndex>, views: Vec<CameraView>) -> Ask<'c> {
-    Box::new(move |n, out| index.query(views[n].as_any(), out))
+/// At most `most` of `count` indices, evenly spread.
+pub fn some_of(count: usize, most: usize) -> impl Iterator<Item = usize> {
+    let chosen = count.min(most);
+    (0..chosen).map(move |n| n * count / chosen)
 }

@@ -1,10 +1,8 @@
-//! The structure and the culling test to take: from measured cells, and from
-//! what each test costs together with what it lets through. Omissions are
-//! settled elsewhere.
+//! The structure to take, from measured cells, and the culling test to take, from its
+//! time and the cost of drawing its false positives.
 
 use serde::Serialize;
 
-use super::case::{Case, asked};
 use super::trials::{Answered, Trials};
 use crate::culling::{Culling, CullingTest, TESTS};
 use crate::index::{BuildError, Execution, Kind, StructureSpec};
@@ -14,7 +12,6 @@ use crate::verify::ErrorCount;
 
 /// Which structure, and all that took part.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct StructureChoice {
     /// The fastest that answered right; null if none did.
     pub name: Option<String>,
@@ -30,7 +27,6 @@ pub struct StructureChoice {
 
 /// A structure as measured.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct StructureRow {
     /// Label of the structure.
     pub structure: String,
@@ -103,29 +99,21 @@ impl StructureChoice {
         }
     }
 
-    /// The fastest tree or grid, or `wide` if there was none: what rules are forced on.
-    pub(super) fn tree(&self, structures: &[StructureSpec]) -> Result<StructureSpec, BuildError> {
-        self.fastest(structures, |kind| kind != Kind::Scan, TREE)
-    }
-
-    /// The fastest scan, or `linear` if there was none.
-    pub(super) fn scan(&self, structures: &[StructureSpec]) -> Result<StructureSpec, BuildError> {
-        self.fastest(structures, |kind| kind == Kind::Scan, SCAN)
-    }
-
-    fn fastest(
+    /// The fastest tree or grid and the fastest scan, for the rules; without any, `wide`
+    /// and `linear`.
+    pub(super) fn tree_and_scan(
         &self,
         structures: &[StructureSpec],
-        is_one: impl Fn(Kind) -> bool,
-        otherwise: &'static str,
-    ) -> Result<StructureSpec, BuildError> {
+    ) -> Result<[StructureSpec; 2], BuildError> {
         let of_row = |row: &StructureRow| structures.iter().find(|s| s.label == row.structure);
-        let timed = self.rows.iter().filter(|row| row.query_ns.is_some());
-        let found = timed.filter_map(of_row).find(|s| is_one(s.info().kind));
-        found.map_or_else(
-            || named(otherwise, execution(structures)),
-            |s| Ok(s.clone()),
-        )
+        let fastest = |is_scan: bool, otherwise| {
+            let timed = self.rows.iter().filter(|row| row.query_ns.is_some());
+            let mut timed = timed.filter_map(of_row);
+            let found = timed.find(|s| (s.info().kind == Kind::Scan) == is_scan);
+            let found = found.cloned().map(Ok);
+            found.unwrap_or_else(|| named(otherwise, execution(structures)))
+        };
+        Ok([fastest(false, TREE)?, fastest(true, SCAN)?])
     }
 }
 
@@ -151,11 +139,9 @@ pub(super) fn planned(
     label: &str,
 ) -> Result<StructureSpec, BuildError> {
     let found = structures.iter().find(|spec| spec.label == label);
-    let otherwise = || match label == SCAN {
-        true => named(SCAN, execution(structures)),
-        false => named(TREE, execution(structures)),
-    };
-    found.map_or_else(otherwise, |spec| Ok(spec.clone()))
+    let otherwise = if label == SCAN { SCAN } else { TREE };
+    let found = found.cloned().map(Ok);
+    found.unwrap_or_else(|| named(otherwise, execution(structures)))
 }
 
 fn execution(structures: &[StructureSpec]) -> Execution {
@@ -177,7 +163,6 @@ pub(super) fn named(name: &'static str, execution: Execution) -> Result<Structur
 
 /// Which culling test, and all that took part, on the fastest tree.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct TestChoice {
     /// The one with the least total, or the simplest of those that the processes
     /// do not tell from it; null if nothing could be judged.
@@ -192,7 +177,6 @@ pub struct TestChoice {
 
 /// A culling test as measured.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct TestRow {
     /// Name of the test.
     pub test: &'static str,
@@ -219,27 +203,17 @@ pub struct TestRow {
     by_camera: Vec<f64>,
 }
 
-/// A test with its place in the trials.
-pub(super) struct EnteredTest {
-    test: CullingTest,
-    place: usize,
-}
-
-/// Enters every culling test. A camera that has no such view leaves its test
-/// out.
-pub(super) fn enter_tests<'c>(
-    case: &'c Case<'c>,
-    trials: &mut Trials<'c>,
-) -> Result<Vec<EnteredTest>, BuildError> {
+/// Enters every culling test, except where a camera has no such view.
+pub(super) fn enter_tests(trials: &mut Trials) -> Result<Vec<(CullingTest, usize)>, BuildError> {
     let mut entered = Vec::with_capacity(TESTS.len());
     for (test, ..) in TESTS {
         let culling = Culling {
             test,
             ..Culling::default()
         };
-        if let Ok(views) = case.views(&culling) {
-            let place = trials.add(asked(case.tree_for(test)?, views), true);
-            entered.push(EnteredTest { test, place });
+        if let Ok(views) = trials.case.views_by(&culling) {
+            let index = trials.case.tree_for(test)?;
+            entered.push((test, trials.index(index, views)));
         }
     }
     Ok(entered)
@@ -257,17 +231,17 @@ impl TestChoice {
     }
 
     pub(super) fn of(
-        structure: &str,
+        structure: String,
         draw_ns: f64,
-        tests: &[EnteredTest],
+        tests: &[(CullingTest, usize)],
         answered: &Answered,
         times: &OverProcesses,
     ) -> TestChoice {
         let judged = answered.judged as f64;
-        let rows = tests.iter().map(|&EnteredTest { test, place }| {
-            let query = times.ns(place);
-            let errors = answered.errors(place);
-            let by_camera = answered.by_camera(place).unwrap_or_default();
+        let rows = tests.iter().map(|&(test, task)| {
+            let query = times.ns(task);
+            let errors = answered.errors(task);
+            let by_camera = answered.by_camera(task).unwrap_or_default();
             let rate_of = |count: fn(&ErrorCount) -> u64| {
                 let clusters = by_camera.iter();
                 let clusters = clusters.map(|e| [count(e) as f64, e.visible as f64]);
@@ -285,7 +259,7 @@ impl TestChoice {
                 false_negative_ppm: rate_of(|e| e.false_negatives).map(|share| share.per(1e6)),
                 false_positives_per_query: extra,
                 total_ns: query.zip(drawn).map(|(query, drawn)| query.value + drawn),
-                by_process: times.ln_ns(place).iter().map(|ln_ns| ln_ns.exp()).collect(),
+                by_process: times.ln_ns(task).iter().map(|ln_ns| ln_ns.exp()).collect(),
                 by_camera: by_camera
                     .iter()
                     .map(|e| e.false_positives as f64 * draw_ns)
@@ -297,7 +271,7 @@ impl TestChoice {
         TestChoice {
             name: near.first().copied(),
             ties: near.iter().skip(1).copied().collect(),
-            structure: structure.to_owned(),
+            structure,
             rows,
         }
     }
@@ -439,16 +413,19 @@ mod tests {
         let structures = Registry::builtin()
             .structures("octree,linear-scalar")
             .unwrap();
-        let label = |found: Result<StructureSpec, BuildError>| found.unwrap().label;
-        assert_eq!(label(choice.tree(&structures)), "wide");
-        assert_eq!(label(choice.scan(&structures)), "linear");
+        let labels = |choice: &StructureChoice| {
+            choice
+                .tree_and_scan(&structures)
+                .unwrap()
+                .map(|spec| spec.label)
+        };
+        assert_eq!(labels(&choice), ["wide", "linear"]);
         let row = |name: &str| structure(name, Some(1.0), None);
         choice.rows = vec![row("linear-scalar"), row("octree")];
-        assert_eq!(label(choice.tree(&structures)), "octree");
-        assert_eq!(label(choice.scan(&structures)), "linear-scalar");
+        assert_eq!(labels(&choice), ["octree", "linear-scalar"]);
         // A plan names what was found, also what the list does not hold.
         for name in ["octree", "linear-scalar", "wide", "linear"] {
-            assert_eq!(label(planned(&structures, name)), name);
+            assert_eq!(planned(&structures, name).unwrap().label, name);
         }
     }
 }

@@ -1,12 +1,9 @@
-//! Advice about one scene and path: which structure, which culling test, and
-//! what can be left out, each with what was measured for it. It defines the rules
-//! of omission and how their evidence is weighed; scenes, structures, clocks and
-//! the truth belong to other modules.
+//! Advice about a scene and a path: the structure, the culling test and the features to
+//! leave out, each with its measurements.
 
 mod case;
 mod choice;
 mod omission;
-mod options;
 mod rule;
 mod rules;
 mod trials;
@@ -15,24 +12,66 @@ use serde::{Deserialize, Serialize};
 
 pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
 pub use omission::{Check, LeftOutIf, Omission};
-pub use options::{AdviseError, AdviseOptions};
 
-use crate::culling::Culling;
-use crate::index::StructureSpec;
-use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, Workload, timed};
+use crate::culling::{Culling, CullingTest};
+use crate::funnel::check_memory;
+use crate::index::{BuildError, StructureSpec};
+use crate::measure::{
+    OverProcesses, ProcessTimes, Protocol, Schedule, Workload, WorkloadError, timed,
+};
 use crate::path::CameraPath;
 use crate::scene::Scene;
 use crate::statistics::Estimate;
 
 use case::Case;
-use choice::EnteredTest;
-use omission::Draft;
+use rule::{Draft, Rule, Unfit};
 use rules::RULES;
-use trials::{Answered, BASE, Entered, Trials};
+use trials::{Answered, BASE, Trials};
 
-/// What to use and what to leave out, with the evidence.
+/// Costs and limits that the advice depends on.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct AdviseOptions {
+    /// Cost of drawing an item that cannot be seen, ns.
+    pub draw_ns: f64,
+    /// Cost of shading a fragment, ns.
+    pub shade_ns: f64,
+    /// Tolerated rounding of planes, in frustum depths, and drift of a camera's basis,
+    /// radians.
+    pub tolerance: f64,
+    /// Share of the items that move between two updates.
+    pub moved: f64,
+    /// Queries between two updates.
+    pub queries_per_update: f64,
+}
+
+impl Default for AdviseOptions {
+    fn default() -> Self {
+        AdviseOptions {
+            draw_ns: 1000.0,
+            shade_ns: 1.0,
+            tolerance: 1e-5,
+            moved: 0.01,
+            queries_per_update: 1.0,
+        }
+    }
+}
+
+/// A scene and a path without advice.
+#[derive(Debug, thiserror::Error)]
+pub enum AdviseError {
+    /// A camera of the path has no view.
+    #[error(transparent)]
+    Workload(#[from] WorkloadError),
+    /// A structure of a rule cannot be built.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// Nothing to cull, nothing to cull for, or another scene than planned.
+    #[error("{0}")]
+    Refused(String),
+}
+
+/// Structure, test and features to leave out, with the evidence.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Advice {
     /// Name of the scene.
     pub scene: String,
@@ -40,27 +79,27 @@ pub struct Advice {
     pub path: String,
     /// Number of items.
     pub items: usize,
-    /// Bad items that were left out on request.
+    /// Number of bad items that were left out on request.
     pub skipped_items: usize,
     /// Number of cameras.
     pub cameras: usize,
-    /// What the advice was asked for with.
+    /// Costs and limits.
     pub options: AdviseOptions,
-    /// Processes that were timed; an interval needs three or more.
+    /// Number of timed processes; an interval needs three or more.
     pub processes: usize,
-    /// Time of the tree that rules are forced on, entered a second time, / time of
-    /// itself: a check whose interval is to hold 1.
+    /// A/A check: time of the fastest tree, entered a second time, / its own time; the
+    /// interval contains 1.
     pub twin: Option<Estimate>,
-    /// Which structure to take.
+    /// The structure to take.
     pub structure: StructureChoice,
-    /// Which culling test to take.
+    /// The culling test to take.
     pub test: TestChoice,
-    /// What to leave out or keep, a rule each.
+    /// One omission per rule.
     pub omissions: Vec<Omission>,
 }
 
 impl Advice {
-    /// Whether something gave a wrong answer on the way.
+    /// Whether a structure or a side of a rule gave a wrong answer.
     pub fn found_wrong_answers(&self) -> bool {
         let structures = self.structure.rows.iter();
         let omissions = self.omissions.iter().flat_map(|o| &o.checks);
@@ -69,99 +108,98 @@ impl Advice {
     }
 }
 
-/// What all processes time: the plan is the same for each.
+/// Tasks and schedule of the timed pass, the same for all processes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrialPlan {
-    /// The tree and the scan that rules are forced on.
+    /// The tree and the scan of the rules.
     structures: [String; 2],
     schedule: Schedule,
-    /// By way and camera: ids.
+    /// Number of ids, by task and camera.
     expected: Vec<Vec<u64>>,
 }
 
-/// Both sides of every rule, asked, compared and judged, but not timed.
+/// Compared advice before its times.
 pub struct Prepared {
-    /// What the other processes are to measure.
+    /// Tasks and schedule for all processes.
     pub plan: TrialPlan,
-    tests: Vec<EnteredTest>,
-    rules: Vec<Entered>,
+    tests: Vec<(CullingTest, usize)>,
+    rules: Vec<(&'static Rule, Result<Draft, String>)>,
     twin: usize,
     answered: Answered,
-    /// All but what follows from times.
     advice: Advice,
 }
 
-/// What advice is given about, and how it is measured.
+/// Bytes that the structures and trees of all rules take per item; 950 were measured.
+const BYTES_PER_ITEM: u64 = 1000;
+
+/// Scene, path and options.
 #[derive(Clone, Copy)]
 pub struct AdviseInput<'a> {
-    /// The scene that the advice is about.
+    /// The scene.
     pub scene: &'a Scene,
-    /// The cameras that look at it.
+    /// The cameras.
     pub path: &'a CameraPath,
-    /// To choose from.
+    /// Structures to choose from.
     pub structures: &'a [StructureSpec],
-    /// Thresholds and what to judge.
+    /// Costs and limits.
     pub options: &'a AdviseOptions,
     /// Rounds and times of a process.
     pub protocol: &'a Protocol,
 }
 
-impl AdviseInput<'_> {
-    /// Whether there is anything to give advice about.
+impl<'a> AdviseInput<'a> {
+    /// Refuses a scene without items and a path without cameras.
     ///
     /// # Errors
-    /// No items, no cameras.
+    /// [`AdviseError::Refused`].
     pub fn check(&self) -> Result<(), AdviseError> {
-        if self.scene.items.is_empty() {
-            let scene = self.scene.name.clone();
-            return Err(AdviseError::NoItems { scene });
-        }
-        if self.path.cameras.is_empty() {
-            let path = self.path.name.clone();
-            return Err(AdviseError::NoCameras { path });
-        }
-        Ok(())
+        let (scene, path) = (&self.scene.name, &self.path.name);
+        let reason = match (self.scene.items.len(), self.path.cameras.len()) {
+            (0, _) => format!("scene '{scene}' has no items; expected at least one"),
+            (_, 0) => format!("path '{path}' has no cameras; expected at least one"),
+            _ => return Ok(()),
+        };
+        Err(AdviseError::Refused(reason))
+    }
+
+    fn workload(&self) -> Result<Workload<'a>, AdviseError> {
+        let needed = BYTES_PER_ITEM * self.scene.items.len() as u64;
+        check_memory(&self.scene.name, needed)
+            .map_err(|error| AdviseError::Refused(error.to_string()))?;
+        Ok(Workload::new(self.scene, self.path, &Culling::default())?)
     }
 }
 
-/// Forces every rule on and off on the fastest tree, compares both sides with
-/// each other and with the exact truth, and plans how they are timed. `None` if
-/// stopped.
+/// Runs every rule with and without its feature on the fastest tree, compares both sides
+/// with each other and with the exact truth, and plans their times. `None` if stopped.
 ///
 /// # Errors
-/// Nothing to look at, a camera without a view, a scene that the structures of
-/// the rules refuse.
+/// A camera without a view, a scene that a structure of the rules refuses.
 pub fn prepare(
     input: &AdviseInput,
     structure: StructureChoice,
     stop: &dyn Fn() -> bool,
     progress: &dyn Fn(&str),
 ) -> Result<Option<Prepared>, AdviseError> {
-    let AdviseInput {
-        scene,
-        path,
-        structures,
-        options,
-        protocol,
-    } = *input;
-    let workload = Workload::new(scene, path, &Culling::default())?;
-    let specs = [structure.tree(structures)?, structure.scan(structures)?];
-    let labels = specs.each_ref().map(|spec| spec.label.clone());
-    let case = Case::new(&workload, path, specs, options)?;
-    let Some(mut all) = Ways::enter(&case, stop, progress)? else {
+    let AdviseInput { scene, path, .. } = *input;
+    let workload = input.workload()?;
+    let specs = structure.tree_and_scan(input.structures)?;
+    let structures = specs.each_ref().map(|spec| spec.label.clone());
+    let case = Case::new(&workload, path, specs, input.options, input.protocol)?;
+    let Some(mut entered) = Entered::new(&case, stop, progress)? else {
         return Ok(None);
     };
     progress("answers, checked");
-    let answered = all.trials.answered();
-    for rule in &mut all.rules {
-        all.trials.compare(rule);
-    }
-    let cameras = path.cameras.len();
-    let tasks = all.trials.tasks(&answered.counts);
+    let answered = entered.trials.answered();
+    let drafts = entered.rules.iter_mut().flat_map(|(_, draft)| draft);
+    drafts
+        .flat_map(|draft| &mut draft.sides)
+        .for_each(|sides| entered.trials.compare(sides));
+    let tasks = entered.trials.tasks(&answered.counts);
     Ok(Some(Prepared {
         plan: TrialPlan {
-            structures: labels,
-            schedule: Schedule::new(cameras, &tasks, protocol),
+            structures,
+            schedule: Schedule::new(path.cameras.len(), &tasks, input.protocol),
             expected: answered.counts.clone(),
         },
         advice: Advice {
@@ -169,117 +207,114 @@ pub fn prepare(
             path: path.name.clone(),
             items: scene.items.len(),
             skipped_items: scene.skipped_items,
-            cameras,
-            options: *options,
+            cameras: path.cameras.len(),
+            options: *input.options,
             processes: 0,
             twin: None,
             test: TestChoice::untimed(&case.spec.label),
             structure,
             omissions: Vec::new(),
         },
-        tests: all.tests,
-        rules: all.rules,
-        twin: all.twin,
+        tests: entered.tests,
+        rules: entered.rules,
+        twin: entered.twin,
         answered,
     }))
 }
 
-/// Times in this process what was planned; `None` if stopped.
+/// Times of one process; `None` if stopped.
 ///
 /// # Errors
-/// As [`prepare`]; another scene than the one that was planned for.
+/// As [`prepare`]; another scene than planned.
 pub fn time(
     input: &AdviseInput,
     plan: &TrialPlan,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<ProcessTimes>, AdviseError> {
-    let AdviseInput {
-        scene,
-        path,
-        structures,
-        options,
-        protocol,
-    } = *input;
-    let workload = Workload::new(scene, path, &Culling::default())?;
+    let workload = input.workload()?;
     let [tree, scan] = &plan.structures;
-    let specs = [
-        choice::planned(structures, tree)?,
-        choice::planned(structures, scan)?,
-    ];
-    let case = Case::new(&workload, path, specs, options)?;
-    let Some(all) = Ways::enter(&case, stop, &|_| ())? else {
+    let specs = [tree, scan].map(|label| choice::planned(input.structures, label));
+    let [tree, scan] = specs;
+    let case = Case::new(
+        &workload,
+        input.path,
+        [tree?, scan?],
+        input.options,
+        input.protocol,
+    )?;
+    let Some(entered) = Entered::new(&case, stop, &|_| ())? else {
         return Ok(None);
     };
-    let (found, planned) = (all.trials.len(), plan.expected.len());
+    let (found, planned) = (entered.trials.len(), plan.expected.len());
     let cameras = plan.expected.iter().map(Vec::len);
-    if found != planned || cameras.min() != Some(path.cameras.len()) {
-        return Err(AdviseError::OtherPlan { found, planned });
+    if found != planned || cameras.min() != Some(input.path.cameras.len()) {
+        return Err(AdviseError::Refused(format!(
+            "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed \
+             on the way"
+        )));
     }
-    let tasks = all.trials.tasks(&plan.expected);
-    let timed = timed(&tasks, &plan.schedule, protocol, &|_| stop());
+    let once_ns = entered.trials.once_ns.clone();
+    let tasks = entered.trials.tasks(&plan.expected);
+    let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes {
-        once_ns: all.once_ns,
+        once_ns,
         ..ProcessTimes::of(&timed)
     }))
 }
 
 impl Prepared {
-    /// What follows from the times of all processes.
+    /// The advice from the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> Advice {
-        let times = OverProcesses::of(processes);
+        let (times, answered) = (OverProcesses::of(processes), &self.answered);
         let mut advice = self.advice;
         advice.processes = processes.len();
         advice.twin = times.ratio(self.twin, BASE);
-        let structure = std::mem::take(&mut advice.test.structure);
         let draw_ns = advice.options.draw_ns;
-        advice.test = TestChoice::of(&structure, draw_ns, &self.tests, &self.answered, &times);
-        let settled = self.rules.into_iter().map(|rule| {
-            let mut omission = rule.settled(&self.answered, &times);
-            rules::follow_test(&mut omission, &advice.test);
-            omission
+        let structure = std::mem::take(&mut advice.test.structure);
+        advice.test = TestChoice::of(structure, draw_ns, &self.tests, answered, &times);
+        let settled = self.rules.into_iter().map(|(rule, draft)| match draft {
+            Ok(draft) => rule.settled(draft, answered, &times, &advice.test),
+            Err(reason) => rule.not_applicable(reason),
         });
         advice.omissions = settled.collect();
         advice
     }
 }
 
-/// Everything that is asked, in the order that all processes enter it.
-struct Ways<'c> {
+/// All tasks, in the order in which every process enters them.
+struct Entered<'c> {
     trials: Trials<'c>,
-    tests: Vec<EnteredTest>,
-    rules: Vec<Entered>,
+    tests: Vec<(CullingTest, usize)>,
+    rules: Vec<(&'static Rule, Result<Draft, String>)>,
     twin: usize,
-    once_ns: Vec<f64>,
 }
 
-impl<'c> Ways<'c> {
+impl<'c> Entered<'c> {
     /// `None` if stopped.
-    fn enter(
+    fn new(
         case: &'c Case<'c>,
         stop: &dyn Fn() -> bool,
         progress: &dyn Fn(&str),
     ) -> Result<Option<Self>, AdviseError> {
-        let mut drafts: Vec<Draft<'c>> = Vec::with_capacity(RULES.len());
+        let mut trials = Trials::new(case);
+        let mut rules = Vec::with_capacity(RULES.len());
         for rule in RULES {
             if stop() {
                 return Ok(None);
             }
             progress(rule.name);
-            drafts.push(rule.draft(case)?);
+            let draft = match (rule.prepare)(&mut trials) {
+                Err(Unfit::Failed(error)) => return Err(error),
+                Err(Unfit::NotApplicable(reason)) => Err(reason),
+                Ok(draft) => Ok(draft),
+            };
+            rules.push((rule, draft));
         }
-        let mut trials = Trials::new(case);
-        let tests = choice::enter_tests(case, &mut trials)?;
-        let mut once_ns = Vec::new();
-        let drafts = drafts.into_iter();
-        let rules = drafts
-            .map(|draft| trials.enter(draft, &mut once_ns))
-            .collect();
-        Ok(Some(Ways {
+        Ok(Some(Entered {
+            tests: choice::enter_tests(&mut trials)?,
             twin: trials.add_base(),
             trials,
-            tests,
             rules,
-            once_ns,
         }))
     }
 }

@@ -1,50 +1,43 @@
-//! An omission: a rule with its statistic and threshold, both sides of it as
-//! measured, and what follows. The statistics themselves are in `rules`.
+//! An omission: something that may be left out, both sides as measured, and the decision.
 
 use serde::Serialize;
 
-use crate::measure::Ask;
-use crate::statistics::Estimate;
 use crate::verify::ErrorCount;
 
 /// Something that may be left out, and whether it should be.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Omission {
     /// Name of the rule, `plane-masks`.
     pub rule: &'static str,
-    /// What is left out, in words.
+    /// The feature that is left out, in words.
     pub left_out: &'static str,
-    /// What follows if it is left out, and if it is kept.
+    /// Advice if it is left out, and if it is kept.
     #[serde(skip)]
     pub(super) advice: [&'static str; 2],
-    /// What the rule looks at, and its unit.
+    /// Name and unit of the statistic.
     pub statistic_name: &'static str,
-    /// Null where the rule has nothing to say about this scene.
+    /// Null where the rule does not apply to this scene.
     pub statistic: Option<f64>,
-    /// Where the rule changes its mind; null without a statistic.
+    /// Null without a statistic.
     pub threshold: Option<f64>,
-    /// On which side of the threshold the rule leaves out.
+    /// Side of the threshold on which the rule leaves out.
     pub left_out_if: LeftOutIf,
-    /// What statistic and threshold say.
+    /// Whether statistic and threshold leave out.
     pub predicted: Option<bool>,
     /// Share of the time that leaving it out saves; negative where it costs.
     pub saving: Option<f64>,
-    /// What came of statistic, clock and answers.
+    /// Decision from statistic, clock and answers.
     pub decision: Decision,
-    /// Whether the clock, or for the axes beyond six planes the test that is
-    /// taken, says what the rule said; null for a tie, and where neither has a
-    /// say.
+    /// Whether the clock, or for the axes beyond six planes the test that is taken, agrees
+    /// with the rule; null for a tie, and where neither decides.
     pub confirmed: Option<bool>,
     /// The decision in a sentence.
     pub reason: String,
-    /// With the rule forced off and on; the first one decides.
+    /// Measurements with and without the feature; the first one decides.
     pub checks: Vec<Check>,
-    #[serde(skip)]
-    pub(super) by: By,
 }
 
-/// On which side of its threshold the statistic is when the rule leaves out.
+/// Side of its threshold on which a statistic leaves out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LeftOutIf {
@@ -54,21 +47,31 @@ pub enum LeftOutIf {
     AtLeast,
 }
 
+impl LeftOutIf {
+    /// Whether a statistic is on this side of a threshold; `None` for NaN.
+    pub(super) fn holds(self, [statistic, threshold]: [f64; 2]) -> Option<bool> {
+        let order = statistic.partial_cmp(&threshold)?;
+        Some(match self {
+            LeftOutIf::AtMost => order.is_le(),
+            LeftOutIf::AtLeast => order.is_ge(),
+        })
+    }
+}
+
 /// Whether to leave something out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
-#[non_exhaustive]
 pub enum Decision {
-    /// It costs more than it brings.
+    /// It costs more than it saves.
     LeaveOut,
-    /// It pays off, or nothing shows that it does not.
+    /// It pays, or nothing shows that it does not.
     Keep,
-    /// There is nothing of the kind here.
+    /// The scene or the path has nothing of the kind.
     NotApplicable,
 }
 
 impl Decision {
-    /// As tables have it.
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Decision::LeaveOut => "leave out",
@@ -76,53 +79,58 @@ impl Decision {
             Decision::NotApplicable => "not applicable",
         }
     }
+
+    pub(super) fn of(leave_out: bool) -> Decision {
+        match leave_out {
+            true => Decision::LeaveOut,
+            false => Decision::Keep,
+        }
+    }
 }
 
-/// What decides.
+/// The judge of a rule.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum By {
     /// Both sides answer the same: the clock, and the rule where that is a tie.
     Time,
-    /// The rule: the sides differ in more than time.
+    /// The sides differ in more than time: the rule.
     Rule,
 }
 
-/// One rule forced off (kept) and on (left out), on one structure.
+/// Times and answers with a feature (kept) and without it (left out).
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Check {
-    /// What was asked, or done.
+    /// The structure or the work that was measured.
     pub on: String,
-    /// Mean over the cameras, thread CPU time, over the processes as in a run.
+    /// Thread CPU time of a camera, mean over cameras and processes, ns.
     pub kept_ns: f64,
-    /// The same without it.
+    /// The same without the feature.
     pub left_out_ns: f64,
-    /// Time with it / time without: above 1, leaving out is faster. With its 95 %
-    /// interval over the processes; NaN where there is none.
+    /// Time with it / time without: above 1, leaving out is faster. NaN without times.
     pub ratio: f64,
-    /// Lower end of the interval.
+    /// Lower end of the 95 % interval over the processes.
     pub ratio_lower: f64,
     /// Upper end of the interval.
     pub ratio_upper: f64,
     /// Whether every camera got the same set from both.
     pub same_answers: bool,
-    /// Whether it had to.
+    /// Whether both sets must be the same.
     pub same_expected: bool,
-    /// False positives / visible items; null where the truth was not asked.
+    /// False positives / visible items; null without a comparison with the truth.
     pub kept_excess: Option<f64>,
-    /// The same without it.
+    /// The same without the feature.
     pub left_out_excess: Option<f64>,
     /// Visible items that were not returned, in millionths; null as above.
     pub kept_false_negative_ppm: Option<f64>,
-    /// The same without it.
+    /// The same without the feature.
     pub left_out_false_negative_ppm: Option<f64>,
-    /// Sums over the judged cameras, for rules that weigh them.
+    /// Sums over the cameras that are compared with the truth.
     #[serde(skip)]
     pub(super) errors: Option<[ErrorCount; 2]>,
+    /// Number of these cameras.
     #[serde(skip)]
     pub(super) judged: usize,
-    /// Whether leaving out is faster; `None` if the processes do not tell the two
-    /// sides apart.
+    /// Whether leaving out is faster; `None` for a tie.
     #[serde(skip)]
     pub(super) pays: Option<bool>,
 }
@@ -139,7 +147,7 @@ impl Check {
             .is_some_and(|[kept, left]| left.false_negatives > kept.false_negatives)
     }
 
-    /// False positives a query more when it is left out, mean.
+    /// Additional false positives per query without the feature, mean.
     pub(super) fn more_false_positives(&self) -> Option<f64> {
         let [kept, left] = self.errors?;
         let more = left.false_positives as f64 - kept.false_positives as f64;
@@ -147,52 +155,8 @@ impl Check {
     }
 }
 
-/// A way to answer every camera of the path.
-pub(super) enum Way<'c> {
-    /// As the advice would do it otherwise: the fastest tree, six planes, f32.
-    Base,
-    Other(Ask<'c>),
-}
-
-/// A rule forced off and on.
-pub(super) struct Forced<'c> {
-    pub on: String,
-    pub kept: Way<'c>,
-    pub left_out: Way<'c>,
-    /// Whether both must answer the same.
-    pub same: bool,
-    /// Whether answers are about the scene's own items, so that its truth
-    /// judges them.
-    pub judged: bool,
-}
-
-/// Times of a rule beside its checks, over the processes.
-#[derive(Default)]
-pub(super) struct Aside {
-    /// Of [`Draft::pairs`]: time of the first / time of the second.
-    pub ratios: Vec<f64>,
-    /// Of [`Draft::once_ns`].
-    pub once_ns: Vec<f64>,
-    /// Time of the second of these / time of the first, where there are two.
-    pub once_ratio: Option<Estimate>,
-}
-
-/// Completes an omission from its checks and from what was timed beside them.
-pub(super) type Finish = Box<dyn FnOnce(&mut Omission, &Aside)>;
-
-/// An omission before the clock.
-pub(super) struct Draft<'c> {
-    pub omission: Omission,
-    pub forced: Vec<Forced<'c>>,
-    /// Further ways that are compared, two by two.
-    pub pairs: Vec<[Way<'c>; 2]>,
-    /// CPU time of what is done once: taken by every process while it prepares.
-    pub once_ns: Vec<f64>,
-    pub finish: Option<Finish>,
-}
-
 impl Omission {
-    /// What to do, in words; `None` where the rule does not apply.
+    /// Advice in words; `None` where the rule does not apply.
     pub fn advice(&self) -> Option<&'static str> {
         match self.decision {
             Decision::LeaveOut => Some(self.advice[0]),
@@ -201,73 +165,11 @@ impl Omission {
         }
     }
 
-    pub(super) fn because(mut self, reason: impl Into<String>) -> Self {
-        self.reason = reason.into();
-        self
-    }
-
-    pub(super) fn compares(mut self, statistic: f64, threshold: f64) -> Self {
-        self.weigh(statistic, threshold);
-        self
-    }
-
-    pub(super) fn weigh(&mut self, statistic: f64, threshold: f64) {
-        self.statistic = statistic.is_finite().then_some(statistic);
-        self.threshold = threshold.is_finite().then_some(threshold);
-        self.predicted =
-            (!statistic.is_nan() && !threshold.is_nan()).then_some(match self.left_out_if {
-                LeftOutIf::AtMost => statistic <= threshold,
-                LeftOutIf::AtLeast => statistic >= threshold,
-            });
-    }
-
-    pub(super) fn draft<'c>(self, forced: Vec<Forced<'c>>) -> Draft<'c> {
-        Draft {
-            omission: self,
-            forced,
-            pairs: Vec::new(),
-            once_ns: Vec::new(),
-            finish: None,
-        }
-    }
-}
-
-impl Draft<'_> {
-    pub(super) fn finished_by(
-        mut self,
-        finish: impl FnOnce(&mut Omission, &Aside) + 'static,
-    ) -> Self {
-        self.finish = Some(Box::new(finish));
-        self
-    }
-}
-
-impl Omission {
-    /// What follows from the rule and from what was measured.
-    pub(super) fn settled(
-        mut self,
-        checks: Vec<Check>,
-        aside: &Aside,
-        finish: Option<Finish>,
-    ) -> Omission {
-        self.checks = checks;
-        if let Some(check) = self.checks.first() {
-            self.saving = Some(1.0 - 1.0 / check.ratio).filter(|saving| saving.is_finite());
-        }
-        if let Some(finish) = finish {
-            finish(&mut self, aside);
-        }
-        self.decide();
-        self
-    }
-
-    fn decide(&mut self) {
-        let Some(predicted) = self.predicted else {
-            return;
-        };
+    /// Decides by the clock or the rule; a side that misses more is never taken.
+    pub(super) fn decide(&mut self, by: By, predicted: bool) {
         let mut leave_out = predicted;
         if let Some(check) = self.checks.first() {
-            if self.by == By::Time {
+            if by == By::Time {
                 self.confirmed = check.pays.map(|pays| pays == predicted);
                 leave_out = check.pays.unwrap_or(predicted);
             }
@@ -277,14 +179,11 @@ impl Omission {
                     .push_str("; left out, something that is seen would be missed");
             }
         }
-        self.decision = match leave_out {
-            true => Decision::LeaveOut,
-            false => Decision::Keep,
-        };
+        self.decision = Decision::of(leave_out);
     }
 }
 
-/// A check with such a ratio, and what the clock says of leaving out.
+/// A check with the given ratio and decision of the clock.
 #[cfg(test)]
 pub(super) fn check(ratio: f64, pays: Option<bool>) -> Check {
     Check {
@@ -308,13 +207,12 @@ pub(super) fn check(ratio: f64, pays: Option<bool>) -> Check {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rule::unsettled;
+    use super::super::rule::{Finding, some_rule};
     use super::*;
 
     fn settled(by: By, statistic: f64, check: Check) -> Omission {
-        let rule = unsettled(LeftOutIf::AtMost, by);
-        let rule = rule.compares(statistic, 1.0);
-        rule.settled(vec![check], &Aside::default(), None)
+        let rule = some_rule(LeftOutIf::AtMost, by);
+        rule.omission(Finding::new(statistic, 1.0, ""), vec![check])
     }
 
     #[test]
@@ -366,20 +264,14 @@ mod tests {
     }
 
     #[test]
-    fn a_rule_without_a_statistic_says_nothing() {
-        let rule = unsettled(LeftOutIf::AtLeast, By::Time);
-        let omission = rule.settled(Vec::new(), &Aside::default(), None);
+    fn a_rule_without_a_statistic_does_not_apply() {
+        let rule = some_rule(LeftOutIf::AtLeast, By::Time);
+        let omission = rule.not_applicable("for a reason".to_owned());
         assert_eq!(omission.decision, Decision::NotApplicable);
         assert_eq!((omission.predicted, omission.saving), (None, None));
-        // An infinite threshold is none that can be written, but compares.
-        let rule = unsettled(LeftOutIf::AtMost, By::Time);
-        let omission = rule.compares(3.0, f64::INFINITY);
+        // An infinite threshold cannot be written, but compares.
+        let rule = some_rule(LeftOutIf::AtMost, By::Time);
+        let omission = rule.omission(Finding::new(3.0, f64::INFINITY, ""), Vec::new());
         assert_eq!((omission.threshold, omission.predicted), (None, Some(true)));
-    }
-
-    #[test]
-    fn the_saving_is_the_share_of_the_time() {
-        let omission = settled(By::Time, 0.5, check(4.0, Some(true)));
-        assert_eq!(omission.saving, Some(0.75));
     }
 }

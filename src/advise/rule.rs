@@ -1,84 +1,266 @@
-//! What a rule of omission is: what it says of itself, and how it comes to a draft.
+//! A rule of omission: its declaration, both sides as tasks, and the omission that
+//! follows from the facts.
 
 use super::AdviseError;
-use super::case::Case;
-use super::omission::{By, Decision, Draft, LeftOutIf, Omission};
-use crate::index::BuildError;
-use crate::input::InputError;
+use super::choice::TestChoice;
+use super::omission::{By, Check, Decision, LeftOutIf, Omission};
+use super::trials::{Answered, Trials};
+use crate::measure::OverProcesses;
+use crate::statistics::Estimate;
+use crate::verify::ErrorCount;
 
 /// A row of the table of rules.
-pub(super) struct Rule {
+pub struct Rule {
     pub name: &'static str,
-    /// What is left out, in words.
     pub left_out: &'static str,
-    /// What to do if it is left out, and if it is kept.
+    /// Advice if it is left out, and if it is kept.
     pub advice: [&'static str; 2],
     pub statistic_name: &'static str,
     pub left_out_if: LeftOutIf,
     pub by: By,
-    pub prepare: for<'c> fn(&'c Case<'c>, Omission) -> Result<Draft<'c>, Unfit>,
+    /// Enters both sides.
+    pub prepare: for<'c> fn(&mut Trials<'c>) -> Result<Draft, Unfit>,
 }
 
-/// Why a rule has no draft of its own.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum Unfit {
-    /// It does not apply to this scene or these cameras.
-    #[error("{0}")]
+/// A rule without a draft.
+pub enum Unfit {
+    /// It does not apply to this scene or these cameras, for a reason.
     NotApplicable(String),
-    #[error(transparent)]
-    Build(#[from] BuildError),
-    #[error(transparent)]
-    Input(#[from] InputError),
+    Failed(AdviseError),
 }
 
-/// For what says why a rule does not apply.
-pub(super) fn not_applicable(reason: impl ToString) -> Unfit {
+impl<E: Into<AdviseError>> From<E> for Unfit {
+    fn from(error: E) -> Unfit {
+        Unfit::Failed(error.into())
+    }
+}
+
+pub fn not_applicable(reason: impl ToString) -> Unfit {
     Unfit::NotApplicable(reason.to_string())
 }
 
+/// The two sides of a check, by their tasks.
+pub struct Sides {
+    pub on: String,
+    pub kept: usize,
+    pub left_out: usize,
+    /// Whether both must answer the same.
+    same_expected: bool,
+    /// Whether both did.
+    pub same_answers: bool,
+}
+
+impl Sides {
+    /// Two sides that may differ.
+    pub fn new(on: impl ToString, kept: usize, left_out: usize) -> Sides {
+        Sides {
+            on: on.to_string(),
+            kept,
+            left_out,
+            same_expected: false,
+            same_answers: false,
+        }
+    }
+
+    /// Two sides that must answer the same.
+    pub fn same(on: impl ToString, kept: usize, left_out: usize) -> Sides {
+        Sides {
+            same_expected: true,
+            ..Sides::new(on, kept, left_out)
+        }
+    }
+
+    /// The check; NaN where a task has no time, after a panic.
+    fn check(self, answered: &Answered, times: &OverProcesses) -> Check {
+        let (kept, left_out) = (self.kept, self.left_out);
+        let ns = |task| times.ns(task).map_or(f64::NAN, |found| found.value);
+        let ratio = times.ratio(kept, left_out);
+        let ratio = |part: fn(&Estimate) -> f64| ratio.as_ref().map_or(f64::NAN, part);
+        let errors = [kept, left_out].map(|task| answered.errors(task));
+        let excess = |errors: &Option<ErrorCount>| errors.as_ref().and_then(ErrorCount::excess);
+        let missed = |errors: &Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
+        let faster = times.is_faster(left_out, kept);
+        let slower = times.is_faster(kept, left_out);
+        Check {
+            on: self.on,
+            kept_ns: ns(kept),
+            left_out_ns: ns(left_out),
+            ratio: ratio(|r| r.value),
+            ratio_lower: ratio(|r| r.lower.unwrap_or(f64::NAN)),
+            ratio_upper: ratio(|r| r.upper.unwrap_or(f64::NAN)),
+            same_answers: self.same_answers,
+            same_expected: self.same_expected,
+            kept_excess: excess(&errors[0]),
+            left_out_excess: excess(&errors[1]),
+            kept_false_negative_ppm: missed(&errors[0]),
+            left_out_false_negative_ppm: missed(&errors[1]),
+            errors: errors[0].zip(errors[1]).map(|(kept, left)| [kept, left]),
+            judged: answered.judged,
+            pays: (faster || slower).then_some(faster),
+        }
+    }
+}
+
+/// Measured facts of a rule.
+pub struct Facts<'f> {
+    pub checks: Vec<Check>,
+    /// Of [`Draft::pairs`]: time of the first / time of the second.
+    pub ratios: Vec<f64>,
+    /// Of [`Draft::once`], ns.
+    pub once_ns: [f64; 2],
+    /// Time of the second of these / time of the first.
+    pub once_ratio: Option<Estimate>,
+    pub test: &'f TestChoice,
+}
+
+impl Facts<'_> {
+    /// Share of the time that leaving out saves in the first check.
+    pub fn saving(&self) -> Option<f64> {
+        let check = self.checks.first()?;
+        Some(1.0 - 1.0 / check.ratio).filter(|saving| saving.is_finite())
+    }
+}
+
+/// Statistic, threshold and reason of a rule, from its facts.
+#[derive(Clone, Default)]
+pub struct Finding {
+    pub reason: String,
+    /// Statistic and threshold, unless the rule does not apply.
+    pub compared: Option<[f64; 2]>,
+    pub saving: Option<f64>,
+    /// Prediction that replaces that of the statistic.
+    pub predicted: Option<bool>,
+    pub confirmed: Option<bool>,
+    /// Decision that replaces that of rule and clock.
+    pub decision: Option<Decision>,
+}
+
+impl Finding {
+    pub fn new(statistic: f64, threshold: f64, reason: impl Into<String>) -> Finding {
+        Finding {
+            reason: reason.into(),
+            compared: Some([statistic, threshold]),
+            ..Finding::default()
+        }
+    }
+}
+
+/// A rule with its tasks entered, before its times.
+pub struct Draft {
+    /// The first check decides.
+    pub sides: Vec<Sides>,
+    /// Further tasks that are compared, two by two.
+    pub pairs: Vec<[usize; 2]>,
+    /// Index of the first of two things that are timed once in every process.
+    pub once: Option<usize>,
+    conclude: Box<dyn FnOnce(&Facts) -> Finding>,
+}
+
+impl Draft {
+    /// A finding that does not depend on times.
+    pub fn new(sides: Vec<Sides>, finding: Finding) -> Draft {
+        Draft::concluded(sides, move |facts| Finding {
+            saving: facts.saving(),
+            ..finding
+        })
+    }
+
+    /// A finding from the facts.
+    pub fn concluded(
+        sides: Vec<Sides>,
+        conclude: impl FnOnce(&Facts) -> Finding + 'static,
+    ) -> Draft {
+        Draft {
+            sides,
+            pairs: Vec::new(),
+            once: None,
+            conclude: Box::new(conclude),
+        }
+    }
+
+    fn facts<'f>(
+        &mut self,
+        answered: &Answered,
+        times: &OverProcesses,
+        test: &'f TestChoice,
+    ) -> Facts<'f> {
+        let sides = std::mem::take(&mut self.sides).into_iter();
+        let ratio = |&[a, b]: &[usize; 2]| times.ratio(a, b).map_or(f64::NAN, |r| r.value);
+        let once_ns = |n| self.once.map_or(f64::NAN, |first| times.once_ns(first + n));
+        Facts {
+            checks: sides.map(|sides| sides.check(answered, times)).collect(),
+            ratios: self.pairs.iter().map(ratio).collect(),
+            once_ns: [0, 1].map(once_ns),
+            once_ratio: self
+                .once
+                .and_then(|first| times.once_ratio(first + 1, first)),
+            test,
+        }
+    }
+}
+
 impl Rule {
-    /// Nothing found out yet.
-    pub fn omission(&self) -> Omission {
-        Omission {
+    /// The omission of a rule that does not apply.
+    pub fn not_applicable(&self, reason: String) -> Omission {
+        let finding = Finding {
+            reason,
+            ..Finding::default()
+        };
+        self.omission(finding, Vec::new())
+    }
+
+    /// The omission that follows from the measured facts.
+    pub fn settled(
+        &self,
+        mut draft: Draft,
+        answered: &Answered,
+        times: &OverProcesses,
+        test: &TestChoice,
+    ) -> Omission {
+        let facts = draft.facts(answered, times, test);
+        let finding = (draft.conclude)(&facts);
+        self.omission(finding, facts.checks)
+    }
+
+    /// Weighs statistic, clock and answers.
+    pub fn omission(&self, finding: Finding, checks: Vec<Check>) -> Omission {
+        let is_left_out = self.left_out_if;
+        let predicted = finding.compared.and_then(|both| is_left_out.holds(both));
+        let predicted = finding.predicted.or(predicted);
+        let [statistic, threshold] = [0, 1].map(|i| finding.compared.map(|both| both[i]));
+        let mut omission = Omission {
             rule: self.name,
             left_out: self.left_out,
             advice: self.advice,
             statistic_name: self.statistic_name,
-            statistic: None,
-            threshold: None,
+            statistic: statistic.filter(|x| x.is_finite()),
+            threshold: threshold.filter(|x| x.is_finite()),
             left_out_if: self.left_out_if,
-            predicted: None,
-            saving: None,
+            predicted,
+            saving: finding.saving,
             decision: Decision::NotApplicable,
-            confirmed: None,
-            reason: String::new(),
-            checks: Vec::new(),
-            by: self.by,
+            confirmed: finding.confirmed,
+            reason: finding.reason,
+            checks,
+        };
+        if let Some(predicted) = predicted {
+            omission.decide(self.by, predicted);
         }
-    }
-
-    /// Both sides of the rule; neither where it does not apply.
-    pub fn draft<'c>(&self, case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-        match (self.prepare)(case, self.omission()) {
-            Ok(draft) => Ok(draft),
-            Err(Unfit::NotApplicable(why)) => Ok(self.omission().because(why).draft(Vec::new())),
-            Err(Unfit::Build(error)) => Err(error.into()),
-            Err(Unfit::Input(error)) => Err(error.into()),
-        }
+        omission.decision = finding.decision.unwrap_or(omission.decision);
+        omission
     }
 }
 
-/// The omission of some rule.
+/// A rule that enters nothing.
 #[cfg(test)]
-pub(super) fn unsettled(left_out_if: LeftOutIf, by: By) -> Omission {
-    let rule = Rule {
+pub fn some_rule(left_out_if: LeftOutIf, by: By) -> Rule {
+    Rule {
         name: "rule",
         left_out: "something",
         advice: ["", ""],
         statistic_name: "its size",
         left_out_if,
         by,
-        prepare: |_, omission| Ok(omission.draft(Vec::new())),
-    };
-    rule.omission()
+        prepare: |_| Ok(Draft::new(Vec::new(), Finding::default())),
+    }
 }

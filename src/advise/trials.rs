@@ -1,50 +1,34 @@
-//! All ways to answer that the rules and the choice of a test need. They are
-//! entered in the same order in every process; asked, compared and judged in one,
-//! timed side by side in all. What the figures mean is decided elsewhere.
+//! Tasks of the rules and of the choice of a test: entered in the same order in every
+//! process; run, compared and judged in one; timed side by side in all.
 
-use super::case::Case;
-use super::omission::{Aside, Check, Draft, Finish, Omission, Way};
-use crate::measure::{Ask, OverProcesses, TimedTask};
+use std::ops::Deref;
+
+use super::case::{Case, some_of};
+use super::rule::Sides;
+use crate::culling::CameraView;
+use crate::index::DynIndex;
+use crate::measure::{Ask, TimedTask};
 use crate::query::ItemId;
-use crate::statistics::Estimate;
 use crate::verify::{ErrorCount, Trial};
 
-/// The place of [`Way::Base`].
-pub(super) const BASE: usize = 0;
+/// The task that all others are compared with: the fastest tree, six planes, f32.
+pub const BASE: usize = 0;
 
-pub(super) struct Trials<'c> {
-    case: &'c Case<'c>,
-    asks: Vec<Ask<'c>>,
-    /// By place: whether the truth judges it.
-    judged: Vec<bool>,
+pub struct Trials<'c> {
+    pub case: &'c Case<'c>,
+    /// Tasks, and whether each is compared with the truth.
+    asks: Vec<(Ask<'c>, bool)>,
+    /// CPU time of work that each process does once, ns.
+    pub once_ns: Vec<f64>,
 }
 
-/// A rule whose ways are entered, waiting for its times.
-pub(super) struct Entered {
-    omission: Omission,
-    checks: Vec<Place>,
-    pairs: Vec<[usize; 2]>,
-    /// Where its [`Draft::once_ns`] are among those of all rules.
-    once: std::ops::Range<usize>,
-    finish: Option<Finish>,
-}
-
-/// The places of the two sides of a check.
-struct Place {
-    on: String,
-    kept: usize,
-    left_out: usize,
-    same_expected: bool,
-    same_answers: bool,
-}
-
-/// What all ways have answered.
-pub(super) struct Answered {
-    /// By place and camera: ids.
+/// Answers of all tasks.
+pub struct Answered {
+    /// Number of ids, by task and camera.
     pub counts: Vec<Vec<u64>>,
-    /// By place, of those that are judged, and by judged camera.
+    /// Of the tasks that are compared with the truth: errors of each judged camera.
     errors: Vec<Option<Vec<ErrorCount>>>,
-    /// Cameras behind the errors.
+    /// Number of judged cameras.
     pub judged: usize,
 }
 
@@ -53,62 +37,54 @@ impl<'c> Trials<'c> {
         let mut trials = Trials {
             case,
             asks: Vec::new(),
-            judged: Vec::new(),
+            once_ns: Vec::new(),
         };
         trials.add_base();
         trials
     }
 
-    /// What all else is compared with, or that once more; its place.
+    /// Enters the base (again); the index of the task.
     pub fn add_base(&mut self) -> usize {
-        let (index, views) = (self.case.index.as_ref(), &self.case.workload.views);
-        self.add(
-            Box::new(move |n, out| index.query(views[n].as_any(), out)),
-            true,
-        )
+        let case = self.case;
+        self.index(&*case.index, case.views())
     }
 
-    /// The place of the way.
-    pub fn add(&mut self, ask: Ask<'c>, judged: bool) -> usize {
-        self.asks.push(ask);
-        self.judged.push(judged);
+    /// Enters a task whose answers are items of the scene in view; its index.
+    pub fn judged(&mut self, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
+        self.add(Box::new(ask), true)
+    }
+
+    /// Enters a task that is not compared with the truth of the frustum; its index.
+    pub fn unjudged(&mut self, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
+        self.add(Box::new(ask), false)
+    }
+
+    /// Enters an index that is queried with the given views; its index among the tasks.
+    pub fn index(
+        &mut self,
+        index: impl Deref<Target = dyn DynIndex> + 'c,
+        views: impl Deref<Target = [CameraView]> + 'c,
+    ) -> usize {
+        self.judged(move |camera, out| index.query(views[camera].as_any(), out))
+    }
+
+    fn add(&mut self, ask: Ask<'c>, is_judged: bool) -> usize {
+        self.asks.push((ask, is_judged));
         self.asks.len() - 1
     }
 
-    fn place(&mut self, way: Way<'c>, judged: bool) -> usize {
-        match way {
-            Way::Base => BASE,
-            Way::Other(ask) => self.add(ask, judged),
-        }
+    /// Mean number of ids of a task over at most `most` cameras, evenly spread.
+    pub fn mean_count(&self, task: usize, most: usize) -> f64 {
+        let mut out = Vec::new();
+        mean(some_of(self.case.cameras(), most).map(|camera| {
+            out.clear();
+            (self.asks[task].0)(camera, &mut out);
+            out.len() as f64
+        }))
     }
 
-    /// Enters all ways of a rule; `once_ns` are those of the rules before.
-    pub fn enter(&mut self, draft: Draft<'c>, once_ns: &mut Vec<f64>) -> Entered {
-        let checks = draft.forced.into_iter().map(|forced| Place {
-            on: forced.on,
-            kept: self.place(forced.kept, forced.judged),
-            left_out: self.place(forced.left_out, forced.judged),
-            same_expected: forced.same,
-            same_answers: false,
-        });
-        let checks = checks.collect();
-        let pairs = draft.pairs.into_iter();
-        let first = once_ns.len();
-        once_ns.extend(draft.once_ns);
-        Entered {
-            omission: draft.omission,
-            checks,
-            pairs: pairs
-                .map(|pair| pair.map(|way| self.place(way, false)))
-                .collect(),
-            once: first..once_ns.len(),
-            finish: draft.finish,
-        }
-    }
-
-    /// Asks every camera once, and judges.
+    /// Runs every task for every camera, and compares with the truth.
     pub fn answered(&self) -> Answered {
-        let cameras = self.case.workload.views.len();
         let truths = self.case.truths();
         let mut answered = Answered {
             counts: Vec::with_capacity(self.asks.len()),
@@ -116,10 +92,10 @@ impl<'c> Trials<'c> {
             judged: truths.len(),
         };
         let mut out: Vec<ItemId> = Vec::new();
-        for (ask, &judged) in self.asks.iter().zip(&self.judged) {
-            let mut errors = judged.then(Vec::new);
+        for (ask, is_judged) in &self.asks {
+            let mut errors = is_judged.then(Vec::new);
             let mut truths = truths.iter().peekable();
-            let counts = (0..cameras).map(|camera| {
+            let counts = (0..self.case.cameras()).map(|camera| {
                 out.clear();
                 ask(camera, &mut out);
                 let truth = truths.next_if(|(judged, _)| *judged == camera);
@@ -134,28 +110,23 @@ impl<'c> Trials<'c> {
         answered
     }
 
-    /// Finds out which sides of a rule answer the same.
-    pub fn compare(&self, entered: &mut Entered) {
-        for check in &mut entered.checks {
-            check.same_answers = self.same_answers(check.kept, check.left_out);
-        }
-    }
-
-    fn same_answers(&self, a: usize, b: usize) -> bool {
+    /// Finds out whether two sides answer the same.
+    pub fn compare(&self, sides: &mut Sides) {
+        let [kept, left_out] = [sides.kept, sides.left_out].map(|task| &self.asks[task].0);
         let mut trial = Trial::new(self.case.scene().items.len());
         let mut first = Vec::new();
-        (0..self.case.workload.views.len()).all(|camera| {
+        sides.same_answers = (0..self.case.cameras()).all(|camera| {
             first.clear();
-            (self.asks[a])(camera, &mut first);
+            kept(camera, &mut first);
             trial.expect(first.iter().copied());
-            trial.ask(|out| (self.asks[b])(camera, out)).is_ok()
-        })
+            trial.ask(|out| left_out(camera, out)).is_ok()
+        });
     }
 
-    /// All ways, ready to be timed.
+    /// All tasks, to be timed.
     pub fn tasks(self, counts: &[Vec<u64>]) -> Vec<TimedTask<'c>> {
         let asks = self.asks.into_iter().zip(counts);
-        asks.map(|(ask, counts)| TimedTask::new(counts.clone(), ask))
+        asks.map(|((ask, _), counts)| TimedTask::new(counts.clone(), ask))
             .collect()
     }
 
@@ -164,65 +135,22 @@ impl<'c> Trials<'c> {
     }
 }
 
-impl Entered {
-    /// What follows from the times.
-    pub fn settled(self, answered: &Answered, times: &OverProcesses) -> Omission {
-        let ratio = |[a, b]: &[usize; 2]| times.ratio(*a, *b).map_or(f64::NAN, |r| r.value);
-        let aside = Aside {
-            ratios: self.pairs.iter().map(ratio).collect(),
-            once_ratio: match self.once.len() {
-                2 => times.once_ratio(self.once.start + 1, self.once.start),
-                _ => None,
-            },
-            once_ns: self.once.map(|i| times.once_ns(i)).collect(),
-        };
-        let checks = self.checks.into_iter();
-        let checks = checks.map(|check| check.timed(answered, times)).collect();
-        self.omission.settled(checks, &aside, self.finish)
-    }
-}
-
-impl Place {
-    /// NaN where something could not be timed: a panic on the way.
-    fn timed(self, answered: &Answered, times: &OverProcesses) -> Check {
-        let of = |side: usize| times.ns(side).map_or(f64::NAN, |found| found.value);
-        let ratio = times.ratio(self.kept, self.left_out);
-        let ratio = |part: fn(&Estimate) -> f64| ratio.as_ref().map_or(f64::NAN, part);
-        let [kept, left_out] = [self.kept, self.left_out].map(|side| answered.errors(side));
-        let excess = |errors: Option<ErrorCount>| errors.and_then(|e| e.excess());
-        let missed = |errors: Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
-        let faster = times.is_faster(self.left_out, self.kept);
-        let slower = times.is_faster(self.kept, self.left_out);
-        Check {
-            kept_ns: of(self.kept),
-            left_out_ns: of(self.left_out),
-            ratio: ratio(|r| r.value),
-            ratio_lower: ratio(|r| r.lower.unwrap_or(f64::NAN)),
-            ratio_upper: ratio(|r| r.upper.unwrap_or(f64::NAN)),
-            same_answers: self.same_answers,
-            same_expected: self.same_expected,
-            kept_excess: excess(kept),
-            left_out_excess: excess(left_out),
-            kept_false_negative_ppm: missed(kept),
-            left_out_false_negative_ppm: missed(left_out),
-            errors: kept.zip(left_out).map(|(kept, left)| [kept, left]),
-            judged: answered.judged,
-            pays: (faster || slower).then_some(faster),
-            on: self.on,
-        }
-    }
-}
-
 impl Answered {
-    /// Of all judged cameras.
-    pub fn errors(&self, place: usize) -> Option<ErrorCount> {
+    /// Errors of a task over all judged cameras.
+    pub fn errors(&self, task: usize) -> Option<ErrorCount> {
         let mut sum = ErrorCount::default();
-        self.by_camera(place)?.iter().for_each(|own| sum += *own);
+        self.by_camera(task)?.iter().for_each(|own| sum += *own);
         Some(sum)
     }
 
-    /// Of each judged camera.
-    pub fn by_camera(&self, place: usize) -> Option<&[ErrorCount]> {
-        self.errors[place].as_deref()
+    /// Errors of a task, by judged camera.
+    pub fn by_camera(&self, task: usize) -> Option<&[ErrorCount]> {
+        self.errors[task].as_deref()
     }
+}
+
+/// Mean of some values; 0 without any.
+pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.collect();
+    values.iter().sum::<f64>() / values.len().max(1) as f64
 }

@@ -52,10 +52,10 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 1, &args.study.spread)?;
     let input = stages.input(args)?;
-    let begun = Cell::new(0);
+    let is_begun = Cell::new(false);
     let begin = |step: &str| {
-        // The first step may refuse the scene, in one line.
-        if begun.replace(begun.get() + 1) == 1 {
+        // Refusals come before the first step.
+        if !is_begun.replace(true) {
             study.announce(&work(&input), "minutes");
         }
         study.begin(step);

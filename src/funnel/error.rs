@@ -3,8 +3,9 @@
 use serde::Serialize;
 
 use crate::index::BuildError;
-use crate::input::InputError;
+use crate::input::{InputError, gigabytes};
 use crate::measure::WorkloadError;
+use crate::scene::available_bytes;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::Rectangle;
 
@@ -23,6 +24,22 @@ pub enum FunnelError {
     /// Options, cameras and scene do not fit each other, or too little memory is free.
     #[error("{0}")]
     Refused(String),
+}
+
+/// Steps that need less are taken without a look at the memory, bytes.
+const ANYWHERE: u64 = 64 << 20;
+
+/// Refuses a step that needs more memory than is free; unknown memory is no reason.
+pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), FunnelError> {
+    let available = (needed > ANYWHERE).then(available_bytes).flatten();
+    match available.filter(|available| needed > *available) {
+        Some(available) => Err(FunnelError::Refused(format!(
+            "{step}: about {} needed, {} are free; expected fewer items or views",
+            gigabytes(needed),
+            gigabytes(available)
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// A row that is left out of a section of the report.

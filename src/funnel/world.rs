@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::back_ends::back_ends;
-use super::error::FunnelError;
+use super::back_ends::{OCCLUSION_ROWS, back_ends};
+use super::error::{FunnelError, check_memory};
 use super::regions::Regions;
 use super::stage::{BackEnd, Chain, NONE, StageKind};
 use crate::camera::PlaneOptions;
@@ -22,6 +22,10 @@ use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::{OccluderChoice, OccluderScene};
 use crate::visibility::region::Pvs;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
+
+/// Bytes that structure, solids, occluders and trees for rays take per item; 730 were
+/// measured of boxes with one structure.
+const BYTES_PER_ITEM: u64 = 750;
 
 /// Scene, path and options of a study.
 #[derive(Clone, Copy)]
@@ -120,6 +124,10 @@ impl<'a> World<'a> {
         check_options(input)?;
         let views = views(input)?;
         let regions = regions(input)?;
+        check_chain(input, regions.as_ref())?;
+        let ids = 2 * views.len() * (input.structures.len() + StageKind::ALL.len());
+        let needed = (BYTES_PER_ITEM + ids as u64) * scene.items.len() as u64;
+        check_memory(&scene.name, needed)?;
         let mut shape = match surfaces_of(scene) {
             None => Shape::Boxes(Solids::of(scene)),
             Some(surfaces) => Shape::Triangles(surfaces),
@@ -142,7 +150,7 @@ impl<'a> World<'a> {
         }
         begin("occluders");
         let most = input.inner_boxes.unwrap_or(BOXES);
-        let world = World {
+        Ok(World {
             hiders: Hiders::of(scene, shape.boxes(), most, input.execution.threads),
             scene,
             kernel: input.execution.kernel,
@@ -153,27 +161,7 @@ impl<'a> World<'a> {
             choice: input.occluders,
             regions,
             structures,
-        };
-        world.check_chain(input.chain)?;
-        Ok(world)
-    }
-
-    fn check_chain(&self, chain: &Chain) -> Result<(), FunnelError> {
-        for stage in StageKind::OF_ITEMS {
-            let name = chain.of(stage);
-            if name == NONE {
-                continue;
-            }
-            let known = self.names(stage);
-            if !known.iter().any(|other| other == name) {
-                return Err(FunnelError::Refused(format!(
-                    "{} '{name}' needs what the scene does not have; expected one of {}",
-                    stage.name(),
-                    known.join(", ")
-                )));
-            }
-        }
-        Ok(())
+        })
     }
 
     /// Indices of the views.
@@ -271,6 +259,33 @@ fn views(input: &FunnelInput) -> Result<Vec<View>, FunnelError> {
         })
     });
     views.collect()
+}
+
+/// Refuses back ends of the item stages that the scene cannot have.
+fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), FunnelError> {
+    let labels = || input.structures.iter().map(|spec| spec.label.as_str());
+    for stage in StageKind::OF_ITEMS {
+        let is_there = |name: &str| match stage {
+            StageKind::Region => regions.is_some_and(|regions| regions.row(name).is_some()),
+            StageKind::Object => labels().any(|label| label == name),
+            _ => OCCLUSION_ROWS.iter().any(|row| row.back_end.name == name),
+        };
+        let name = input.chain.of(stage);
+        if name != NONE && !is_there(name) {
+            let rows = back_ends(stage, input.scene, false).into_iter();
+            let rows = rows
+                .map(|row| row.name)
+                .filter(|name| *name == NONE || is_there(name));
+            let labels = labels().filter(|_| stage == StageKind::Object);
+            let known: Vec<&str> = rows.chain(labels).collect();
+            return Err(FunnelError::Refused(format!(
+                "{} '{name}' needs what the scene does not have; expected one of {}",
+                stage.name(),
+                known.join(", ")
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses options that the items of the scene cannot have.

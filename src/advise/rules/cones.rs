@@ -5,18 +5,18 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use super::super::case::Case;
-use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use super::super::rule::{Rule, Unfit, not_applicable};
-use super::hidden::{self, PROBED, Removal};
+use super::super::case::{Case, some_of};
+use super::super::omission::{By, LeftOutIf};
+use super::super::rule::{Draft, Rule, Sides, Unfit, not_applicable};
+use super::super::trials::{Trials, mean};
+use super::removal::{PROBED, Removal, weighed};
+use crate::funnel::World;
 use crate::kernel::Kernel;
-use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Surfaces};
 use crate::visibility::triangle::{
     Clusters, Cone, Eye, MOST_TRIANGLES, SafeCones, Selection, TriangleCull,
 };
-use crate::visibility::{NoRays, Rays, surfaces_of};
 
 pub(super) const RULE: Rule = Rule {
     name: "cones",
@@ -38,66 +38,59 @@ const MOST_CONES: usize = 64;
 /// Triangles of a cluster: a face of a box, a wall.
 const OF_A_FACE: usize = 2;
 
-/// Items that a camera meets as clusters, and the cones of these.
+/// Items in view of a camera as clusters, with their cones.
 struct Seen {
     items: Vec<ItemId>,
     clusters: Arc<Clusters>,
-    /// By cluster: the item that it is of.
+    /// Item of each cluster.
     owners: Vec<ItemId>,
     cones: SafeCones,
     eye: Eye,
 }
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let cameras = case.workload.views.len();
-    let surfaces = surfaces_of(case.scene());
-    let few = hidden::frames(cameras, PROBED);
-    let few = few.map(|frame| Seen::of(case, frame, surfaces.as_deref()));
-    let Ok(few) = few.collect::<Result<Vec<Seen>, NoRays>>() else {
-        let reason = "cameras without rays of their own";
-        return Err(not_applicable(reason));
-    };
+/// A few cameras stand for those that follow them. An answer has the item of each cluster
+/// with a triangle left.
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let world = case.world.as_ref().map_err(not_applicable)?;
+    let cameras = case.cameras();
+    let few: Rc<[Seen]> = some_of(cameras, PROBED)
+        .map(|camera| Seen::of(case, world, camera))
+        .collect();
     let sum = |of: fn(&Seen) -> usize| few.iter().map(of).sum::<usize>() as f64;
     let of_item = sum(|seen| seen.clusters.triangles.len()) / sum(|seen| seen.items.len());
     let kernel = case.spec.execution.kernel;
-    let mean = |cones| {
-        let left = few.iter().map(|seen| seen.left(cones).triangles() as f64);
-        hidden::mean(left)
-    };
+    let left = |cones| mean(few.iter().map(|seen| seen.left(cones).triangles() as f64));
     let removal = Removal {
         unit: ["triangle", "triangles"],
-        with: mean(Some(kernel)),
-        without: mean(None),
+        with: left(Some(kernel)),
+        without: left(None),
         cost_ns: case.options.draw_ns / of_item,
         predicted: turned_away(&few),
     };
-    let few = Rc::new(few);
-    let asked = |cones| Way::Other(asked(few.clone(), cameras, cones));
-    let forced = Forced {
-        on: format!(
-            "cone-f32-safe, {}",
-            match case.scene().item_shape() {
-                ItemShape::Mesh => format!("clusters of up to {MOST_TRIANGLES} triangles"),
-                _ => format!("{OF_A_FACE} triangles per cluster"),
-            }
-        ),
-        kept: asked(Some(kernel)),
-        left_out: asked(None),
-        same: false,
-        judged: false,
+    let on = match case.scene().item_shape() {
+        ItemShape::Mesh => format!("clusters of up to {MOST_TRIANGLES} triangles"),
+        _ => format!("{OF_A_FACE} triangles per cluster"),
     };
-    Ok(hidden::weighed(omission, forced, move || removal))
+    let [kept, left_out] = [Some(kernel), None].map(|cones| {
+        let few = few.clone();
+        trials.unjudged(move |n, out| {
+            let seen = &few[n * few.len() / cameras];
+            let selection = seen.left(cones);
+            let clusters = selection.words().iter().zip(&seen.owners);
+            out.extend(clusters.filter(|(word, _)| **word != 0).map(|(_, &id)| id));
+        })
+    });
+    let sides = Sides::new(format!("cone-f32-safe, {on}"), kept, left_out);
+    Ok(weighed(sides, move || removal))
 }
 
 impl Seen {
-    fn of(case: &Case, frame: usize, surfaces: Option<&Surfaces>) -> Result<Seen, NoRays> {
-        let (scene, camera) = (case.scene(), &case.workload.cameras[frame]);
-        Rays::of(camera)?;
-        let mut met = Vec::new();
-        case.query(frame, &mut met);
-        let items = hidden::frames(met.len(), MOST_ITEMS).map(|n| met[n]);
-        let items: Vec<ItemId> = items.collect();
-        let surfaces = Arc::new(match surfaces {
+    fn of(case: &Case, world: &World, camera: usize) -> Seen {
+        let scene = case.scene();
+        let met = case.found(camera);
+        let items: Vec<ItemId> = some_of(met.len(), MOST_ITEMS).map(|n| met[n]).collect();
+        let surfaces = Arc::new(match world.shape.triangles() {
             Some(all) => all.some(&items),
             None => {
                 let boxes = items.iter().map(|&id| scene.items[id as usize]);
@@ -109,15 +102,14 @@ impl Seen {
             _ => Clusters::as_listed(surfaces, OF_A_FACE),
         });
         let owners = clusters.of_item.iter().zip(&items);
-        Ok(Seen {
-            owners: owners
-                .flat_map(|(own, &id)| own.clone().map(move |_| id))
-                .collect(),
+        let owners = owners.flat_map(|(own, &id)| own.clone().map(move |_| id));
+        Seen {
+            owners: owners.collect(),
             cones: SafeCones::of(&clusters),
             clusters,
             items,
-            eye: Eye::of(camera, scene.origin),
-        })
+            eye: Eye::of(&case.workload.cameras[camera], scene.origin),
+        }
     }
 
     /// All triangles, or those that the cones leave.
@@ -130,29 +122,17 @@ impl Seen {
     }
 }
 
-/// Hands on the item of each cluster that has a triangle left. A few cameras stand for
-/// those that follow them.
-fn asked<'c>(few: Rc<Vec<Seen>>, cameras: usize, cones: Option<Kernel>) -> Ask<'c> {
-    Box::new(move |n, out| {
-        let seen = &few[n * few.len() / cameras];
-        let selection = seen.left(cones);
-        let clusters = selection.words().iter().zip(&seen.owners);
-        out.extend(clusters.filter(|(word, _)| **word != 0).map(|(_, &id)| id));
-    })
-}
-
-/// The share of all directions from which a triangle's whole cluster faces away, mean
-/// of the triangles of some clusters.
+/// Share of all directions from which a triangle's whole cluster faces away, mean over
+/// the triangles of some clusters.
 fn turned_away(few: &[Seen]) -> f64 {
-    let some = few.iter().flat_map(|seen| {
-        let clusters = hidden::frames(seen.clusters.len(), MOST_CONES);
-        clusters.map(|cluster| seen.clusters.corners_of(cluster).collect::<Vec<_>>())
-    });
     let (mut triangles, mut away) = (0.0, 0.0);
-    for corners in some {
-        let cone = Cone::fit(&corners);
-        triangles += corners.len() as f64;
-        away += corners.len() as f64 * cone.map_or(0.0, |cone| cone.turned_away());
+    for seen in few {
+        for cluster in some_of(seen.clusters.len(), MOST_CONES) {
+            let corners: Vec<_> = seen.clusters.corners_of(cluster).collect();
+            let count = corners.len() as f64;
+            triangles += count;
+            away += Cone::fit(&corners).map_or(0.0, |cone| count * cone.turned_away());
+        }
     }
     away / triangles
 }

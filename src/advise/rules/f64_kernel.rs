@@ -2,9 +2,9 @@
 //! nothing either, and let through a margin that is mostly far too thin to hold
 //! an item.
 
-use super::super::case::{Case, asked};
-use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use super::super::rule::{Rule, Unfit, not_applicable};
+use super::super::omission::{By, LeftOutIf};
+use super::super::rule::{Draft, Finding, Rule, Sides, Unfit, not_applicable};
+use super::super::trials::{BASE, Trials};
 use crate::culling::{Arithmetic, Culling, CullingTest};
 
 pub(super) const RULE: Rule = Rule {
@@ -17,22 +17,21 @@ pub(super) const RULE: Rule = Rule {
     prepare,
 };
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let wide = Culling {
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let in_f64 = Culling {
         arithmetic: Arithmetic::F64,
         ..Culling::default()
     };
-    let views = case.views(&wide).map_err(not_applicable)?;
+    let views = case.views_by(&in_f64).map_err(not_applicable)?;
+    let kept = trials.index(case.tree_for(CullingTest::SixPlane)?, views);
     let (margin, tolerance) = (case.margin(case.scene()), case.options.tolerance);
-    let omission = omission.compares(margin, tolerance).because(format!(
+    let reason = format!(
         "f32 planes are moved outward by up to {margin:.1e} of the depth; {tolerance:.0e} are tolerated"
-    ));
-    let forced = Forced {
-        on: case.spec.label.clone(),
-        kept: Way::Other(asked(case.tree_for(CullingTest::SixPlane)?, views)),
-        left_out: Way::Base,
-        same: false,
-        judged: true,
-    };
-    Ok(omission.draft(vec![forced]))
+    );
+    let sides = Sides::new(&case.spec.label, kept, BASE);
+    Ok(Draft::new(
+        vec![sides],
+        Finding::new(margin, tolerance, reason),
+    ))
 }

@@ -2,9 +2,9 @@
 //! straightened drift by some 2e-8 a step. A frame that is made anew for each
 //! camera, or takes few steps, does not need it. Checked by walking.
 
-use super::super::case::Case;
-use super::super::omission::{By, Draft, LeftOutIf, Omission};
-use super::super::rule::{Rule, Unfit, not_applicable};
+use super::super::omission::{By, LeftOutIf};
+use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::trials::Trials;
 use crate::drift::rotations;
 use crate::statistics::Estimate;
 
@@ -21,16 +21,16 @@ pub(super) const RULE: Rule = Rule {
     prepare,
 };
 
-/// What an f32 frame drifts by a step: docs/NUMERICS.md.
+/// Drift of an f32 frame per step, radians: docs/NUMERICS.md.
 const DRIFT: f64 = 2e-8;
 /// "Much less than the tolerance" is this share of it.
 const MUCH_LESS: f64 = 0.1;
 const KEPT: &str = "f32-polar-100";
 const LEFT_OUT: &str = "f32";
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let tolerance = case.options.tolerance;
-    let steps = case.workload.cameras.len() as u64;
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let tolerance = trials.case.options.tolerance;
+    let steps = trials.case.workload.cameras.len() as u64;
     let rotations = rotations(&[KEPT, LEFT_OUT], steps);
     let &[(kept, kept_ns), (left_out, left_out_ns)] = &rotations[..] else {
         return Err(not_applicable("no such method"));
@@ -40,30 +40,35 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
         None => "lost".to_owned(),
     };
     let (kept_error, left_out_error) = (walked(kept), walked(left_out));
-    let mut omission = omission.compares(steps as f64 * DRIFT, tolerance * MUCH_LESS);
-    // What was walked outweighs the estimate.
-    if let Some(error) = left_out {
-        omission.confirmed = omission.predicted.map(|said| said == (error <= tolerance));
-        omission.predicted = Some(error <= tolerance);
-    }
-    let mut draft = omission.draft(Vec::new());
-    draft.once_ns = vec![left_out_ns, kept_ns];
-    Ok(draft.finished_by(move |omission, aside| {
-        let ([left_out_ns, kept_ns], Some(ratio)) = (&aside.once_ns[..], &aside.once_ratio) else {
-            return;
+    let compared = [steps as f64 * DRIFT, tolerance * MUCH_LESS];
+    // A walk outweighs the estimate.
+    let predicted = left_out.map(|error| error <= tolerance);
+    let mut draft = Draft::concluded(Vec::new(), move |facts| {
+        let mut finding = Finding {
+            compared: Some(compared),
+            predicted,
+            confirmed: predicted.map(|walked| (compared[0] <= compared[1]) == walked),
+            ..Finding::default()
         };
-        let dearer = dearer(ratio);
-        omission.reason = format!(
+        let ([left_out_ns, kept_ns], Some(ratio)) = (facts.once_ns, &facts.once_ratio) else {
+            return finding;
+        };
+        finding.reason = format!(
             "{steps} steps of {DRIFT:.0e}; walked: {left_out_error} uncorrected at {left_out_ns:.0} ns a step, \
-             {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns ({dearer}); a tenth of \
+             {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns ({}); a tenth of \
              {tolerance:.0e} is used up after some {:.0} steps",
+            dearer(ratio),
             tolerance * MUCH_LESS / DRIFT
         );
-        omission.saving = Some(1.0 - 1.0 / ratio.value);
-    }))
+        finding.saving = Some(1.0 - 1.0 / ratio.value);
+        finding
+    });
+    draft.once = Some(trials.once_ns.len());
+    trials.once_ns.extend([left_out_ns, kept_ns]);
+    Ok(draft)
 }
 
-/// How much longer it takes, and whether the processes show that it does.
+/// A ratio of times in words, with its interval.
 fn dearer(ratio: &Estimate) -> String {
     let value = ratio.value;
     match ratio.lower.zip(ratio.upper) {

@@ -1,12 +1,9 @@
-//! The rules of omission, one file each. A rule comes to its statistic and
-//! threshold and makes both sides of itself ready to be asked; who decides, and
-//! how, is `omission`'s.
+//! The rules of omission, one file each: statistic, threshold, and both sides as tasks.
 
 mod cones;
 mod f64_kernel;
 mod flat;
 mod frame_correction;
-mod hidden;
 mod needless_planes;
 mod no_index;
 mod occlusion;
@@ -14,10 +11,9 @@ mod plane_masks;
 mod rebasing;
 mod rebuild;
 mod regions;
+mod removal;
 mod six_planes;
 mod sorting;
-
-pub(super) use six_planes::follow as follow_test;
 
 use super::rule::Rule;
 

@@ -3,9 +3,9 @@
 
 use std::rc::Rc;
 
-use super::super::case::Case;
-use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use super::super::rule::{Rule, Unfit};
+use super::super::omission::{By, LeftOutIf};
+use super::super::rule::{Draft, Finding, Rule, Sides, Unfit};
+use super::super::trials::{BASE, Trials};
 use crate::culling::CameraView;
 use crate::geometry::{Aabb, ConvexVolume, FrustumPlane};
 use crate::index::DynIndex;
@@ -28,47 +28,37 @@ pub(super) const RULE: Rule = Rule {
 /// Share of the planes below which the saving is lost in noise.
 const THRESHOLD: f64 = 0.01;
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
     let bounds = &case.scene().bounds;
     let (mut needless, mut far, mut all) = (0, 0, 0);
-    let mut fewer = Vec::with_capacity(case.workload.views.len());
+    let mut fewer = Vec::with_capacity(case.cameras());
     for volume in case.volumes() {
         let left = without_needless(volume, bounds);
         all += volume.planes().len();
         needless += volume.planes().len() - left.planes().len();
-        far += usize::from(is_far_needless(volume, bounds));
+        let far_plane = volume.plane(FrustumPlane::Far);
+        far += usize::from(far_plane.is_some_and(|far| far.contains(bounds)));
         fewer.push(CameraView::Volume(left));
     }
     let share = needless as f64 / all.max(1) as f64;
-    let cameras = case.workload.views.len();
-    let omission = omission.compares(share, THRESHOLD).because(format!(
+    let reason = format!(
         "the whole scene is inside of {needless} of {}, and of the far plane for {far} of {}",
         counted(all, "plane"),
-        counted(cameras, "camera")
-    ));
-    let fewer = Rc::new(fewer);
-    let scan: Rc<dyn DynIndex> = Rc::from(case.scan.build(&case.scene().items)?);
-    let views = fewer.clone();
-    let on_tree = Forced {
-        on: case.spec.label.clone(),
-        kept: Way::Base,
-        left_out: Way::Other(Box::new(move |n, out| {
-            case.index.query(views[n].as_any(), out);
-        })),
-        same: true,
-        judged: true,
-    };
-    let other = scan.clone();
-    let on_scan = Forced {
-        on: case.scan.label.clone(),
-        kept: Way::Other(Box::new(move |n, out| {
-            other.query(case.workload.views[n].as_any(), out);
-        })),
-        left_out: Way::Other(Box::new(move |n, out| scan.query(fewer[n].as_any(), out))),
-        same: true,
-        judged: true,
-    };
-    Ok(omission.draft(vec![on_tree, on_scan]))
+        counted(case.cameras(), "camera")
+    );
+    let fewer: Rc<[CameraView]> = fewer.into();
+    let scan: Rc<dyn DynIndex> = case.scan.build(&case.scene().items)?.into();
+    let on_tree = trials.index(&*case.index, fewer.clone());
+    let [kept, left_out] = [
+        trials.index(scan.clone(), case.views()),
+        trials.index(scan, fewer),
+    ];
+    let sides = vec![
+        Sides::same(&case.spec.label, BASE, on_tree),
+        Sides::same(&case.scan.label, kept, left_out),
+    ];
+    Ok(Draft::new(sides, Finding::new(share, THRESHOLD, reason)))
 }
 
 /// The volume without planes that contain the bounds: whatever lies within the
@@ -79,11 +69,6 @@ fn without_needless(volume: &ConvexVolume, bounds: &Aabb) -> ConvexVolume {
     let needed: Vec<_> = needed.map(|(plane, _)| *plane).collect();
     // Finite planes, and no more of them than there were.
     ConvexVolume::from_planes(&needed).unwrap_or_else(|_| volume.clone())
-}
-
-fn is_far_needless(volume: &ConvexVolume, bounds: &Aabb) -> bool {
-    let far = volume.plane(FrustumPlane::Far);
-    far.is_some_and(|far| far.contains(bounds))
 }
 
 #[cfg(test)]

@@ -2,13 +2,10 @@
 //! crossover is measured on evenly spread parts of the scene, by the path's own
 //! cameras, side by side with everything else.
 
-use std::rc::Rc;
-
-use super::super::case::Case;
-use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use super::super::rule::{Rule, Unfit};
+use super::super::omission::{By, LeftOutIf};
+use super::super::rule::{Draft, Finding, Rule, Sides, Unfit};
+use super::super::trials::{BASE, Trials};
 use crate::geometry::Aabb;
-use crate::index::DynIndex;
 
 pub(super) const RULE: Rule = Rule {
     name: "no-index",
@@ -24,48 +21,44 @@ pub(super) const RULE: Rule = Rule {
 const LEAST: usize = 32;
 const MOST: usize = 16_384;
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
     let (scan, tree) = (&case.scan, &case.spec);
     let items = &case.scene().items;
-    let whole: Rc<dyn DynIndex> = Rc::from(scan.build(items)?);
-    let forced = Forced {
-        on: format!("{} against {}", tree.label, scan.label),
-        kept: Way::Base,
-        left_out: asked(case, whole.clone()),
-        same: true,
-        judged: true,
-    };
-    let mut counts = Vec::new();
-    let mut pairs = Vec::new();
+    let whole = trials.index(scan.build(items)?, case.views());
+    let sides = Sides::same(
+        format!("{} against {}", tree.label, scan.label),
+        BASE,
+        whole,
+    );
+    let (mut counts, mut pairs) = (Vec::new(), Vec::new());
     for count in parts_of(items.len()) {
         let part: Vec<Aabb> = (0..count).map(|i| items[i * items.len() / count]).collect();
-        let both = [Rc::from(scan.build(&part)?), Rc::from(tree.build(&part)?)];
-        pairs.push(both.map(|index| asked(case, index)));
+        let both = [scan.build(&part)?, tree.build(&part)?];
+        pairs.push(both.map(|index| trials.index(index, case.views())));
         counts.push(count);
     }
-    pairs.push([asked(case, whole), Way::Base]);
+    pairs.push([whole, BASE]);
     counts.push(items.len());
-    let names = format!("{} / {}", scan.label, tree.label);
-    let mut draft = omission.draft(vec![forced]);
-    draft.pairs = pairs;
-    Ok(draft.finished_by(move |omission, aside| {
-        let ratios = aside.ratios.iter().copied();
-        let parts = counts.iter().copied().zip(ratios);
+    let (names, all) = (
+        format!("{} / {}", scan.label, tree.label),
+        items.len() as f64,
+    );
+    let mut draft = Draft::concluded(vec![sides], move |facts| {
+        let parts = counts.into_iter().zip(facts.ratios.iter().copied());
         let parts: Vec<(usize, f64)> = parts.filter(|(_, ratio)| ratio.is_finite()).collect();
-        let told: Vec<String> = parts
+        let ratios = parts
             .iter()
-            .map(|(count, ratio)| format!("{ratio:.2} at {count}"))
-            .collect();
-        omission.reason = format!("time of {names} on parts of the scene: {}", told.join(", "));
-        let all = counts.last().copied().unwrap_or(0);
-        omission.weigh(all as f64, items_at(&parts));
-    }))
-}
-
-/// An index over items of its own, asked by the path's cameras.
-fn asked<'c>(case: &'c Case<'c>, index: Rc<dyn DynIndex>) -> Way<'c> {
-    let views = &case.workload.views;
-    Way::Other(Box::new(move |n, out| index.query(views[n].as_any(), out)))
+            .map(|(count, ratio)| format!("{ratio:.2} at {count}"));
+        let ratios = ratios.collect::<Vec<_>>().join(", ");
+        let reason = format!("time of {names} on parts of the scene: {ratios}");
+        Finding {
+            saving: facts.saving(),
+            ..Finding::new(all, items_at(&parts), reason)
+        }
+    });
+    draft.pairs = pairs;
+    Ok(draft)
 }
 
 /// Doubled from the smallest, all fewer than `items`.

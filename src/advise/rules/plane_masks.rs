@@ -4,9 +4,9 @@
 
 use std::rc::Rc;
 
-use super::super::case::Case;
-use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use super::super::rule::{Rule, Unfit};
+use super::super::omission::{By, LeftOutIf};
+use super::super::rule::{Draft, Finding, Rule, Sides, Unfit};
+use super::super::trials::Trials;
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
 use crate::index::{FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
@@ -31,12 +31,14 @@ const THRESHOLD: f64 = 0.1;
 /// Cameras whose plane tests are counted.
 const COUNTED: usize = 64;
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let scene = case.scene();
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
     let kernel = case.spec.execution.kernel;
-    let tree = Wide::build(&Input::new(&scene.items), &Default::default())?;
-    let tree = Rc::new(tree);
-    let volumes: Rc<Vec<ConvexVolume>> = Rc::new(case.volumes().cloned().collect());
+    let tree = Rc::new(Wide::build(
+        &Input::new(&case.scene().items),
+        &Default::default(),
+    )?);
+    let volumes: Rc<[ConvexVolume]> = case.volumes().cloned().collect();
     let step = volumes.len().div_ceil(COUNTED).max(1);
     let (mut with, mut without) = (QueryCost::default(), QueryCost::default());
     for volume in volumes.iter().step_by(step) {
@@ -44,25 +46,19 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
         without += tree.counted(&Unmasked(volume)).1;
     }
     let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
-    let omission = match all {
-        0 => omission.because("no plane is ever tested"),
-        _ => omission
-            .compares(1.0 - fewer as f64 / all as f64, THRESHOLD)
-            .because(format!("{fewer} plane tests with masks, {all} without")),
+    let mut finding = Finding {
+        reason: "no plane is ever tested".to_owned(),
+        ..Finding::default()
     };
-    let other = (tree.clone(), volumes.clone());
-    let forced = Forced {
-        on: Wide::INFO.name.to_owned(),
-        kept: Way::Other(Box::new(move |n, out| {
-            see(kernel, &other.0, &Unmasked(&other.1[n]), out);
-        })),
-        left_out: Way::Other(Box::new(move |n, out| {
-            see(kernel, &tree, &volumes[n], out);
-        })),
-        same: true,
-        judged: true,
-    };
-    Ok(omission.draft(vec![forced]))
+    if all > 0 {
+        let reason = format!("{fewer} plane tests with masks, {all} without");
+        finding = Finding::new(1.0 - fewer as f64 / all as f64, THRESHOLD, reason);
+    }
+    let (other, views) = (tree.clone(), volumes.clone());
+    let kept = trials.judged(move |n, out| see(kernel, &other, &Unmasked(&views[n]), out));
+    let left_out = trials.judged(move |n, out| see(kernel, &tree, &volumes[n], out));
+    let sides = Sides::same(Wide::INFO.name, kept, left_out);
+    Ok(Draft::new(vec![sides], finding))
 }
 
 fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<ItemId>) {

@@ -4,9 +4,9 @@
 
 use glam::DVec3;
 
-use super::super::case::{Case, asked};
-use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use super::super::rule::{Rule, Unfit, not_applicable};
+use super::super::omission::{By, LeftOutIf};
+use super::super::rule::{Draft, Finding, Rule, Sides, Unfit, not_applicable};
+use super::super::trials::{BASE, Trials};
 use crate::culling::Culling;
 use crate::measure::Workload;
 use crate::scene::{Scene, WorldBox};
@@ -24,7 +24,8 @@ pub(super) const RULE: Rule = Rule {
     prepare,
 };
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
     let scene = case.scene();
     let is_moved = scene.origin != DVec3::ZERO;
     let elsewhere = if is_moved {
@@ -34,32 +35,28 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
         bounds.min / 2.0 + bounds.max / 2.0
     };
     let other = about(scene, elsewhere).map_err(not_applicable)?;
-    let there = Workload::new(&other, case.path, &Culling::default());
-    let views = there.map_err(not_applicable)?.views;
-    let at_zero = if is_moved { &other } else { scene };
-    let moved = if is_moved { scene } else { &other };
+    let workload = Workload::new(&other, case.path, &Culling::default());
+    let views = workload.map_err(not_applicable)?.views;
+    let there = trials.index(case.spec.build(&other.items)?, views);
+    let (at_zero, moved, sides) = match is_moved {
+        true => (&other, scene, [BASE, there]),
+        false => (scene, &other, [there, BASE]),
+    };
     let (margin, better) = (case.margin(at_zero), case.margin(moved));
-    let omission = omission.compares(margin, case.options.tolerance).because(format!(
+    let reason = format!(
         "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({}, {}, {}); this scene {}",
         moved.origin.x,
         moved.origin.y,
         moved.origin.z,
-        if is_moved { "is moved" } else { "stays where it is" }
-    ));
-    let index = case.spec.build(&other.items)?;
-    let (here, there) = (Way::Base, Way::Other(asked(index, views)));
-    let (kept, left_out) = match is_moved {
-        true => (here, there),
-        false => (there, here),
-    };
-    let forced = Forced {
-        on: case.spec.label.clone(),
-        kept,
-        left_out,
-        same: false,
-        judged: true,
-    };
-    Ok(omission.draft(vec![forced]))
+        if is_moved {
+            "is moved"
+        } else {
+            "stays where it is"
+        }
+    );
+    let sides = Sides::new(&case.spec.label, sides[0], sides[1]);
+    let finding = Finding::new(margin, case.options.tolerance, reason);
+    Ok(Draft::new(vec![sides], finding))
 }
 
 /// The scene's boxes about another origin, rounded outward once more.

@@ -2,9 +2,9 @@
 //! but what it leaves answers more slowly. Weighed for a share of items that
 //! move and a number of queries between two updates.
 
-use super::super::case::{Case, asked};
-use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use super::super::rule::{Rule, Unfit, not_applicable};
+use super::super::omission::{By, LeftOutIf};
+use super::super::rule::{Draft, Finding, Rule, Sides, Unfit, not_applicable};
+use super::super::trials::Trials;
 use crate::measure::{Stopwatch, input_of, move_share};
 
 pub(super) const RULE: Rule = Rule {
@@ -20,12 +20,13 @@ pub(super) const RULE: Rule = Rule {
     prepare,
 };
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
     let scene = case.scene();
     let mut items = scene.items.clone();
     let moved = move_share(&mut items, case.options.moved);
     let mut refitted = case.spec.build(input_of(scene, &scene.items))?;
-    // Some structures make room for refits at the first one.
+    // Some structures allocate room for refits at the first one.
     let can = refitted.refit(&scene.items, &moved);
     let watch = Stopwatch::start();
     if !can || !refitted.refit(&items, &moved) {
@@ -36,35 +37,30 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
     let watch = Stopwatch::start();
     let rebuilt = case.spec.build(input_of(scene, &items))?;
     let rebuild_ns = watch.lap().cpu_ns;
-    let views = || case.workload.views.clone();
-    let forced = Forced {
-        on: format!("{}, queries after an update", case.spec.label),
-        kept: Way::Other(asked(rebuilt, views())),
-        left_out: Way::Other(asked(refitted, views())),
-        same: true,
-        // Moved items are not the scene's.
-        judged: false,
-    };
+    // Moved items are not the scene's: there is no truth about them.
+    let [kept, left_out] = [rebuilt, refitted]
+        .map(|index| trials.unjudged(move |n, out| index.query(case.views()[n].as_any(), out)));
+    let on = format!("{}, queries after an update", case.spec.label);
     let queries = case.options.queries_per_update;
     let (share, count) = (case.options.moved, moved.len());
-    let mut draft = omission.draft(vec![forced]);
-    draft.once_ns = vec![refit_ns, rebuild_ns];
-    Ok(draft.finished_by(move |omission, aside| {
-        let (Some(check), &[refit_ns, rebuild_ns]) = (omission.checks.first(), &aside.once_ns[..])
-        else {
-            return;
-        };
+    let mut draft = Draft::concluded(vec![Sides::same(on, kept, left_out)], move |facts| {
+        let (check, [refit_ns, rebuild_ns]) = (&facts.checks[0], facts.once_ns);
         let slower = queries * (check.left_out_ns - check.kept_ns);
         let kept = rebuild_ns + queries * check.kept_ns;
         let left_out = refit_ns + queries * check.left_out_ns;
-        omission.reason = format!(
+        let reason = format!(
             "{count} items moved by their own size ({} %), {queries} queries an update: refit {:.0} us, \
              rebuild {:.0} us",
             share * 100.0,
             refit_ns / 1e3,
             rebuild_ns / 1e3
         );
-        omission.weigh(slower, rebuild_ns - refit_ns);
-        omission.saving = Some(1.0 - left_out / kept).filter(|saving| saving.is_finite());
-    }))
+        Finding {
+            saving: Some(1.0 - left_out / kept).filter(|saving| saving.is_finite()),
+            ..Finding::new(slower, rebuild_ns - refit_ns, reason)
+        }
+    });
+    draft.once = Some(trials.once_ns.len());
+    trials.once_ns.extend([refit_ns, rebuild_ns]);
+    Ok(draft)
 }

@@ -2,10 +2,11 @@
 //! the exact test adds. They cost test time and save the drawing of what cannot
 //! be seen.
 
-use super::super::case::{Case, asked};
+use super::super::case::Case;
 use super::super::choice::TestChoice;
-use super::super::omission::{By, Decision, Draft, Forced, LeftOutIf, Omission, Way};
-use super::super::rule::{Rule, Unfit, not_applicable};
+use super::super::omission::{By, Decision, LeftOutIf};
+use super::super::rule::{Draft, Finding, Rule, Sides, Unfit, not_applicable};
+use super::super::trials::{BASE, Trials};
 use crate::culling::{Culling, CullingTest};
 
 pub(super) const RULE: Rule = Rule {
@@ -21,53 +22,54 @@ pub(super) const RULE: Rule = Rule {
     prepare,
 };
 
-fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
     let exact = Culling {
         test: CullingTest::Exact,
         ..Culling::default()
     };
-    let views = case.views(&exact).map_err(not_applicable)?;
-    let forced = Forced {
-        on: case.spec.label.clone(),
-        kept: Way::Other(asked(case.tree_for(CullingTest::Exact)?, views)),
-        left_out: Way::Base,
-        same: false,
-        judged: true,
-    };
+    let views = case.views_by(&exact).map_err(not_applicable)?;
+    let kept = trials.index(case.tree_for(CullingTest::Exact)?, views);
+    let sides = Sides::new(&case.spec.label, kept, BASE);
     let draw_ns = case.options.draw_ns;
     let predicted = predicted_excess(case);
-    Ok(omission.draft(vec![forced]).finished_by(move |omission, _| {
-        let Some(check) = omission.checks.first() else {
-            return;
-        };
+    Ok(Draft::concluded(vec![sides], move |facts| {
+        let check = &facts.checks[0];
         let Some(more) = check.more_false_positives() else {
-            return;
+            return Finding {
+                saving: facts.saving(),
+                ..Finding::default()
+            };
         };
         let (drawing, testing) = (more * draw_ns, check.kept_ns - check.left_out_ns);
-        let excess = check.left_out_excess.unwrap_or(0.0);
         let worth = testing / more;
-        let (kept, left_out) = (check.kept_ns, check.left_out_ns + drawing);
-        omission.reason = format!(
+        let left_out = check.left_out_ns + drawing;
+        let reason = format!(
             "{more:.1} items a query too many ({:.2} %; 4 (s/D)^2 predicts {:.2} %) at {draw_ns} ns each, \
              against the extra test time{}",
-            excess * 100.0,
+            check.left_out_excess.unwrap_or(0.0) * 100.0,
             predicted * 100.0,
             match worth.is_finite() && worth > 0.0 {
                 true => format!("; worth it above {worth:.0} ns per item"),
                 false => String::new(),
             }
         );
-        omission.weigh(drawing, testing);
-        omission.saving = Some(1.0 - left_out / kept).filter(|saving| saving.is_finite());
+        let finding = Finding {
+            saving: Some(1.0 - left_out / check.kept_ns).filter(|saving| saving.is_finite()),
+            ..Finding::new(drawing, testing, reason)
+        };
+        following(finding, facts.test)
     }))
 }
 
-/// The test that is taken has these axes or has not: one decision, said once.
-/// The rule's own side is then what it predicted.
-pub(in crate::advise) fn follow(omission: &mut Omission, choice: &TestChoice) {
-    let applies = omission.rule == RULE.name && omission.decision != Decision::NotApplicable;
-    let Some(taken) = choice.name.filter(|_| applies) else {
-        return;
+/// Decides as the test that is taken, which has these axes or has not; the statistic is
+/// then a prediction.
+fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
+    let predicted = finding
+        .compared
+        .and_then(|both| RULE.left_out_if.holds(both));
+    let (Some(predicted), Some(taken)) = (predicted, choice.name) else {
+        return finding;
     };
     let with_axes = |name: &str| {
         let tests = [CullingTest::SixBox, CullingTest::Exact];
@@ -75,16 +77,13 @@ pub(in crate::advise) fn follow(omission: &mut Omission, choice: &TestChoice) {
     };
     let kept = with_axes(taken);
     let is_tie = choice.ties.iter().any(|name| with_axes(name) != kept);
-    omission.decision = match kept {
-        true => Decision::Keep,
-        false => Decision::LeaveOut,
-    };
-    let predicted = omission.predicted.filter(|_| !is_tie);
-    omission.confirmed = predicted.map(|left_out| left_out != kept);
-    omission.reason += &match is_tie {
+    finding.decision = Some(Decision::of(!kept));
+    finding.confirmed = (!is_tie).then_some(predicted != kept);
+    finding.reason += &match is_tie {
         true => format!("; a tie, {taken} is the simplest"),
         false => format!("; {taken} is the test taken"),
     };
+    finding
 }
 
 /// `4 (s/D)^2` for the mean square of the items' edges s and the mean depth D
@@ -102,7 +101,6 @@ fn predicted_excess(case: &Case) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::omission::Aside;
     use super::*;
 
     #[test]
@@ -117,25 +115,24 @@ mod tests {
                 (tests[0], vec![tests[2]], Decision::LeaveOut, None),
                 (tests[1], vec![tests[3]], Decision::Keep, None),
             ] {
-                let rule = RULE
-                    .omission()
-                    .compares(if predicted { 0.5 } else { 2.0 }, 1.0);
-                let mut omission = rule.settled(Vec::new(), &Aside::default(), None);
+                let statistic = if predicted { 0.5 } else { 2.0 };
+                let finding = Finding::new(statistic, 1.0, "");
                 let mut choice = TestChoice {
                     name: Some(taken),
                     ties,
                     structure: "wide".to_owned(),
                     rows: Vec::new(),
                 };
-                follow(&mut omission, &choice);
+                let settled = |choice: &TestChoice| {
+                    RULE.omission(following(finding.clone(), choice), Vec::new())
+                };
+                let omission = settled(&choice);
                 let found = (omission.decision, omission.confirmed);
                 assert_eq!(found, (decision, confirmed), "{taken} {:?}", choice.ties);
                 assert!(omission.reason.contains(taken), "{}", omission.reason);
-                // Nothing could be judged: the rule decides.
+                // Without a test that is taken the rule decides.
                 choice.name = None;
-                let before = omission.decision;
-                follow(&mut omission, &choice);
-                assert_eq!(omission.decision, before);
+                assert_eq!(settled(&choice).decision, Decision::of(predicted));
             }
         }
     }
