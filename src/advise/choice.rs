@@ -1,5 +1,7 @@
-//! The structure to take, from measured cells, and the culling test to take, from its
-//! time and the cost of drawing its false positives.
+//! The structure and the culling test to take.
+//!
+//! A structure is chosen by measured cells, a test by its time and the cost of drawing its
+//! false positives.
 
 use serde::Serialize;
 
@@ -99,8 +101,9 @@ impl StructureChoice {
         }
     }
 
-    /// The fastest tree or grid and the fastest scan, for the rules; without any, `wide`
-    /// and `linear`.
+    /// The fastest tree or grid and the fastest scan, for the rules.
+    ///
+    /// Without any, `wide` and `linear`.
     pub(super) fn tree_and_scan(
         &self,
         structures: &[StructureSpec],
@@ -128,7 +131,7 @@ fn first_ranked(
     first.iter().map(|row| row.structure.clone()).collect()
 }
 
-/// What has no time comes last.
+/// Maps a missing time to the end of the order.
 fn or_last(time: Option<f64>) -> f64 {
     time.unwrap_or(f64::INFINITY)
 }
@@ -148,7 +151,7 @@ fn execution(structures: &[StructureSpec]) -> Execution {
     structures.first().map(|s| s.execution).unwrap_or_default()
 }
 
-/// What rules are forced on where the list has no tree, no scan.
+/// Structures of the rules where the list has no tree, no scan.
 const TREE: &str = "wide";
 const SCAN: &str = "linear";
 
@@ -301,7 +304,7 @@ fn near_the_least(rows: &[TestRow]) -> Vec<&'static str> {
     near
 }
 
-/// By the planes of a view; the sphere test needs an index of its own.
+/// Tests by their number of planes; the sphere test needs an index of its own.
 const SIMPLEST_FIRST: [CullingTest; 4] = [
     CullingTest::SixPlane,
     CullingTest::SixBox,
@@ -394,7 +397,7 @@ mod tests {
             row("six-box", 100.0, 2.0),
         ];
         assert_eq!(near_the_least(&clear), ["six-box"]);
-        // What misses something is out of the question.
+        // What misses something is excluded.
         let mut blind = row("six-plane", 1.0, 0.0);
         blind.false_negative_ppm = rate(&[[1.0, 1e7]]);
         assert_eq!(near_the_least(&[dear, blind]), ["sphere"]);

@@ -1,5 +1,6 @@
-//! Advice about a scene and a path: the structure, the culling test and the features to
-//! leave out, each with its measurements.
+//! Advice about a scene and a path, with its measurements.
+//!
+//! It names a structure, a culling test and the features to leave out.
 
 mod case;
 mod choice;
@@ -99,7 +100,7 @@ pub struct Advice {
 }
 
 impl Advice {
-    /// Whether a structure or a side of a rule gave a wrong answer.
+    /// Returns `true` if a structure or a side of a rule gave a wrong answer.
     pub fn found_wrong_answers(&self) -> bool {
         let structures = self.structure.rows.iter();
         let omissions = self.omissions.iter().flat_map(|o| &o.checks);
@@ -129,7 +130,7 @@ pub struct Prepared {
     advice: Advice,
 }
 
-/// Bytes that the structures and trees of all rules take per item; 950 were measured.
+/// Bytes per item of the structures and trees of all rules; 950 were measured.
 const BYTES_PER_ITEM: u64 = 1000;
 
 /// Scene, path and options.
@@ -170,8 +171,10 @@ impl<'a> AdviseInput<'a> {
     }
 }
 
-/// Runs every rule with and without its feature on the fastest tree, compares both sides
-/// with each other and with the exact truth, and plans their times. `None` if stopped.
+/// Runs every rule with and without its feature on the fastest tree.
+///
+/// Compares both sides with each other and with the exact truth, and plans their times.
+/// `None` if stopped.
 ///
 /// # Errors
 /// A camera without a view, a scene that a structure of the rules refuses.

@@ -1,10 +1,10 @@
-//! An omission: something that may be left out, both sides as measured, and the decision.
+//! An omission: a feature, both sides as measured, and the decision.
 
 use serde::Serialize;
 
 use crate::verify::ErrorCount;
 
-/// Something that may be left out, and whether it should be.
+/// A feature that may be left out, with the decision.
 #[derive(Clone, Debug, Serialize)]
 pub struct Omission {
     /// Name of the rule, `plane-masks`.
@@ -22,14 +22,16 @@ pub struct Omission {
     pub threshold: Option<f64>,
     /// Side of the threshold on which the rule leaves out.
     pub left_out_if: LeftOutIf,
-    /// Whether statistic and threshold leave out.
+    /// `true` if statistic and threshold leave out.
     pub predicted: Option<bool>,
     /// Share of the time that leaving it out saves; negative where it costs.
     pub saving: Option<f64>,
     /// Decision from statistic, clock and answers.
     pub decision: Decision,
-    /// Whether the clock, or for the axes beyond six planes the test that is taken, agrees
-    /// with the rule; null for a tie, and where neither decides.
+    /// `true` if the measurement agrees with the rule.
+    ///
+    /// The clock, or for the axes beyond six planes the test that is taken. Null for a tie,
+    /// and where neither decides.
     pub confirmed: Option<bool>,
     /// The decision in a sentence.
     pub reason: String,
@@ -48,7 +50,7 @@ pub enum LeftOutIf {
 }
 
 impl LeftOutIf {
-    /// Whether a statistic is on this side of a threshold; `None` for NaN.
+    /// Returns `true` if a statistic is on this side of a threshold; `None` for NaN.
     pub(super) fn holds(self, [statistic, threshold]: [f64; 2]) -> Option<bool> {
         let order = statistic.partial_cmp(&threshold)?;
         Some(match self {
@@ -58,7 +60,7 @@ impl LeftOutIf {
     }
 }
 
-/// Whether to leave something out.
+/// Decision about a feature.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Decision {
@@ -112,9 +114,9 @@ pub struct Check {
     pub ratio_lower: f64,
     /// Upper end of the interval.
     pub ratio_upper: f64,
-    /// Whether every camera got the same set from both.
+    /// `true` if every camera got the same set from both.
     pub same_answers: bool,
-    /// Whether both sets must be the same.
+    /// `true` if both sets must be the same.
     pub same_expected: bool,
     /// False positives / visible items; null without a comparison with the truth.
     pub kept_excess: Option<f64>,
@@ -130,18 +132,18 @@ pub struct Check {
     /// Number of these cameras.
     #[serde(skip)]
     pub(super) judged: usize,
-    /// Whether leaving out is faster; `None` for a tie.
+    /// `true` if leaving out is faster; `None` for a tie.
     #[serde(skip)]
     pub(super) pays: Option<bool>,
 }
 
 impl Check {
-    /// Whether two sides that must answer the same did not.
+    /// Returns `true` if two sides that must answer the same did not.
     pub fn is_wrong(&self) -> bool {
         self.same_expected && !self.same_answers
     }
 
-    /// Whether the side that leaves out misses more.
+    /// Returns `true` if the side that leaves out misses more.
     fn loses(&self) -> bool {
         self.errors
             .is_some_and(|[kept, left]| left.false_negatives > kept.false_negatives)

@@ -44,9 +44,9 @@ pub struct Sides {
     pub on: String,
     pub kept: usize,
     pub left_out: usize,
-    /// Whether both must answer the same.
+    /// `true` if both must answer the same.
     same_expected: bool,
-    /// Whether both did.
+    /// `true` if both answered the same.
     pub same_answers: bool,
 }
 
@@ -104,9 +104,9 @@ impl Sides {
 /// Measured facts of a rule.
 pub struct Facts<'f> {
     pub checks: Vec<Check>,
-    /// Of [`Draft::pairs`]: time of the first / time of the second.
+    /// Time of the first / time of the second of each of [`Draft::pairs`].
     pub ratios: Vec<f64>,
-    /// Of [`Draft::once`], ns.
+    /// Times of [`Draft::once`], ns.
     pub once_ns: [f64; 2],
     /// Time of the second of these / time of the first.
     pub once_ratio: Option<Estimate>,

@@ -1,5 +1,7 @@
-//! Tasks of the rules and of the choice of a test: entered in the same order in every
-//! process; run, compared and judged in one; timed side by side in all.
+//! Tasks of the rules and of the choice of a test.
+//!
+//! Every process enters them in the same order; one runs and compares them; all time them
+//! side by side.
 
 use std::ops::Deref;
 
@@ -26,7 +28,7 @@ pub struct Trials<'c> {
 pub struct Answered {
     /// Number of ids, by task and camera.
     pub counts: Vec<Vec<u64>>,
-    /// Of the tasks that are compared with the truth: errors of each judged camera.
+    /// Errors of each judged camera, of tasks that are compared with the truth.
     errors: Vec<Option<Vec<ErrorCount>>>,
     /// Number of judged cameras.
     pub judged: usize,

@@ -1,4 +1,4 @@
-//! Back ends of every stage that a scene can have, and the default chain of a scene.
+//! Back ends of every stage, and the default chain of a scene.
 
 use super::error::LeftOutRow;
 use super::stage::{BackEnd, Chain, NONE, StageKind};
@@ -30,7 +30,7 @@ pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
     dispute.map(|dispute| LeftOutRow::new("stages", "region", dispute))
 }
 
-/// Back ends of a stage that a scene can have, without structures of the object stage.
+/// Back ends of a stage that a scene can have, without structures.
 ///
 /// With `has_cut_outs` some items have holes.
 pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
@@ -83,8 +83,9 @@ pub fn default_test(has_cut_outs: bool) -> &'static str {
 }
 
 impl Chain {
-    /// Default chain of a scene without an object stage: of every stage the safe back end
-    /// that removes the most.
+    /// Default chain of a scene, without an object stage.
+    ///
+    /// It has the safe back end of every stage that removes the most.
     pub fn for_scene(scene: &Scene, has_cut_outs: bool) -> Chain {
         let wanted = [
             (StageKind::Region, PORTAL_CLIP),

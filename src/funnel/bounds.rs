@@ -1,6 +1,6 @@
-//! Lower bounds of stages: the memory that a back end must read and write, and nothing
-//! decided. They are timed beside the stages, so that a ratio to one is paired like any
-//! other.
+//! Lower bounds of stages: the memory that a back end must read and write.
+//!
+//! They are timed beside the stages, so that a ratio to one is paired like any other.
 
 use std::cell::RefCell;
 use std::hint::black_box;

@@ -1,5 +1,7 @@
-//! Conclusions of a funnel, in sentences: the draw cost above which each stage pays, and
-//! the back ends that lost visible items.
+//! Conclusions of a funnel, in sentences.
+//!
+//! They name the draw cost above which each stage pays, and the back ends that lost visible
+//! items.
 
 use super::back_ends::{STENCIL, default_test};
 use super::mirror::MirrorRow;
@@ -8,7 +10,7 @@ use super::report::{FunnelReport, Gain, StageRow};
 use super::stage::StageKind;
 use crate::shown::counted;
 
-/// A sentence for each stage of the chain, and one for each back end that lost items.
+/// A sentence for each stage of the chain, and for each back end that lost items.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
     let lossy = |row: &&StageRow| row.errors.false_negative_count > 0.0;

@@ -1,5 +1,6 @@
-//! Fragment stage: the tests that decide at each sample which of the remaining items is
-//! in front, with the samples and fragments that they take.
+//! Fragment stage: tests of which remaining item is in front at each sample.
+//!
+//! Each test counts the samples and fragments that it takes.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -29,7 +30,7 @@ pub struct FragmentCounts {
     pub asked_count: f64,
     /// Samples that the stencil excludes.
     pub kept_out_count: f64,
-    /// Samples that meet an item: of meshes and maps a triangle, as each is drawn by itself.
+    /// Samples that meet an item; of meshes and maps, a triangle.
     pub fragment_count: f64,
     /// Fragments that the alpha-test drops.
     pub clear_count: f64,
@@ -75,8 +76,10 @@ pub struct Tested {
     pub tallies: Vec<Tally>,
 }
 
-/// Items that the chain leaves, drawn: boxes as they are; of a mesh or a map the triangles
-/// that the triangle stage leaves, and floors and ceilings.
+/// Items that the chain leaves, to be drawn.
+///
+/// Boxes as they are; of a mesh or a map the triangles that the triangle stage leaves, and
+/// floors and ceilings.
 pub struct FragmentStage<'w> {
     world: &'w World<'w>,
     left: Left<'w>,

@@ -14,7 +14,7 @@ use crate::visibility::SampleGrid;
 use crate::visibility::occlusion;
 use crate::visibility::region::{EyePlace, IdSet, Scratch};
 
-/// Appends the items of a view that a stage leaves of those given (`None`: all items).
+/// Appends the items of a view that a stage leaves of those given (`None`: all).
 pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 
 impl World<'_> {
@@ -91,7 +91,7 @@ impl World<'_> {
 /// Items that the back ends of the item stages leave of each view.
 pub struct ItemStages<'w> {
     world: &'w World<'w>,
-    /// By the steps behind which they are left: ascending ids of every view.
+    /// Ascending ids of every view, with the steps behind which they are left.
     left: Vec<(Vec<Step>, Vec<Vec<ItemId>>)>,
 }
 
@@ -101,8 +101,7 @@ impl<'w> ItemStages<'w> {
         ItemStages { world, left }
     }
 
-    /// Runs a chain, every back end in its place in it, and the chain without each of its
-    /// stages; `None` if stopped.
+    /// Runs a chain and every chain that differs from it in one stage; `None` if stopped.
     pub fn all(
         world: &'w World<'w>,
         chain: &Chain,

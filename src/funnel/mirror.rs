@@ -1,5 +1,7 @@
-//! An item as a mirror: the reflected camera draws the samples that see the mirror (the
-//! stencil), or all of them. Both show the same there.
+//! An item as a mirror.
+//!
+//! The reflected camera draws the samples that see the mirror (the stencil), or all of
+//! them. Both show the same there.
 
 use serde::Serialize;
 
@@ -34,8 +36,10 @@ pub struct MirrorRow {
     pub wrong_sample_count: u64,
 }
 
-/// The mirror in every view, behind the items that `steps` leave. It shows every other
-/// item of the scene. `None` if stopped, without views or for triangles.
+/// The mirror in every view, behind the items that `steps` leave.
+///
+/// It shows every other item of the scene. `None` if stopped, without views or for
+/// triangles.
 ///
 /// # Errors
 /// Items that cover too many samples.

@@ -1,5 +1,7 @@
-//! Depth orders: fragments that an early z-test saves, errors of a painter without z-test,
-//! and the time of sorting the items that the chain leaves.
+//! Depth orders of the items that the chain leaves.
+//!
+//! A row has the fragments that an early z-test saves, the errors of a painter without
+//! z-test, and the time of sorting.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -125,7 +127,7 @@ impl Left {
 }
 
 impl Orders {
-    /// Orders of the items behind `steps`; none with a reason for which nothing is drawn.
+    /// Orders of the items behind `steps`; none if `too_much` would be drawn.
     pub fn new(
         world: &World,
         stages: &ItemStages,
@@ -155,8 +157,9 @@ impl Orders {
         orders
     }
 
-    /// Leaves out orders whose pieces cover too many samples. Triangles are met by rays,
-    /// whatever the pieces are.
+    /// Leaves out orders whose pieces cover too many samples.
+    ///
+    /// Triangles are met by rays, whatever the pieces are.
     fn drop_large(&mut self) {
         let cuts = if self.triangles.is_none() {
             self.rows.len()

@@ -1,6 +1,8 @@
-//! Picking: the first and the nearest items along rays of every view by every back end,
-//! and everything in the frustum of a cursor by every structure of the object stage. All
-//! answers are compared with the exact ones.
+//! Picking at the cursors of every view.
+//!
+//! Every back end finds the first and the nearest items along rays, every structure of the
+//! object stage everything in the frustum of a cursor. All answers are compared with the
+//! exact ones.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -131,7 +133,7 @@ impl<'w> Picks<'w> {
         self.pickers.push((row, answer));
     }
 
-    /// Back ends along rays: first the rows of the first item, then those of the nearest.
+    /// Adds back ends along rays: rows of the first item, then of the nearest.
     fn add_rays(&mut self) {
         let world = self.world;
         let (count, build): (usize, Build) = match &world.shape {
@@ -184,7 +186,7 @@ impl<'w> Picks<'w> {
         }
     }
 
-    /// Structures of the object stage, by the frusta of the cursors.
+    /// Adds structures of the object stage, by the frusta of the cursors.
     fn add_frusta(&mut self) {
         let world = self.world;
         for (label, index) in &world.structures {
@@ -204,7 +206,7 @@ impl<'w> Picks<'w> {
         }
     }
 
-    /// Runs code of another crate at every cursor once, so that it panics here or never.
+    /// Runs code of another crate at every cursor once, to panic here or never.
     fn try_out(&self, name: &'static str, pick: &Rc<dyn Pick>) -> Result<(), NotBuilt> {
         let mut hits = Vec::new();
         let ask = || {
@@ -216,7 +218,7 @@ impl<'w> Picks<'w> {
         caught(ask).map_err(|message| NotBuilt::Panicked { name, message })
     }
 
-    /// Every row; the ids are the answers at all cursors of a view, one after the other.
+    /// Every row; the ids are the answers at all cursors of a view in turn.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         self.pickers.iter().map(move |(row, answer)| KeyedTask {
             key: row.key(),
@@ -310,7 +312,7 @@ struct Truth {
 }
 
 impl Truth {
-    /// Whether an answer is the exact one; sorts a set.
+    /// Returns `true` if an answer is the exact one; sorts a set.
     fn agrees(&self, question: PickQuestion, answer: &mut [ItemId]) -> bool {
         match question {
             PickQuestion::First => *answer == self.first[..],

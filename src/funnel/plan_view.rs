@@ -1,4 +1,4 @@
-//! The first view from above: the place of each item, and the stage that removed it.
+//! The first view from above, with the stage that removed each item.
 
 use glam::DVec3;
 

@@ -138,7 +138,7 @@ pub struct StageRow {
     pub back_end: BackEnd,
     /// The structure of the object stage; `null` elsewhere.
     pub structure: Option<String>,
-    /// Whether it is part of the chain.
+    /// `true` for a back end of the chain.
     pub is_chosen: bool,
     /// Unit of the counts: items or triangles.
     pub unit: &'static str,
@@ -205,7 +205,7 @@ pub struct Gain {
     pub with_count: f64,
     /// The same without the stage.
     pub without_count: f64,
-    /// Extra time / removed candidates: the cost of drawing one above which the stage pays.
+    /// Extra time / removed candidates: drawing one must cost more for the stage to pay.
     ///
     /// 0 if it saves time as well; null if it removes nothing or has no time.
     pub break_even_ns: Option<f64>,

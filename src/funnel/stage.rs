@@ -51,7 +51,7 @@ pub struct BackEnd {
     pub summary: &'static str,
     /// Declared guarantee of its answers.
     pub guarantee: Guarantee,
-    /// Whether it does the object stage as well, in one traversal.
+    /// `true` if it does the object stage as well, in one traversal.
     pub does_object_stage: bool,
 }
 

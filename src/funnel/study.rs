@@ -1,5 +1,6 @@
-//! The study: every stage with every back end on the views of a path, compared with the
-//! truth, then timed side by side in one or more processes.
+//! The study: every stage with every back end on the views of a path.
+//!
+//! All are compared with the truth, then timed side by side in one or more processes.
 
 use super::back_ends::{Z, default_test, left_out_of};
 use super::bounds::{bounds, covered_key};
@@ -23,8 +24,9 @@ use crate::measure::{ProcessTimes, Verdict};
 use crate::scene::available_bytes;
 use crate::visibility::{Level, SampleGrid};
 
-/// Bytes that a study takes per sample of a view: rays and depths of two images, and ties
-/// at them. Of a mesh 230 were measured, of boxes 290 to 350, with a mirror 440; where
+/// Bytes per sample of a view: rays, depths and ties of two images.
+///
+/// Of a mesh 230 were measured, of boxes 290 to 350, with a mirror 440; where
 /// nothing is culled 660.
 const BYTES_PER_SAMPLE: u64 = 450;
 /// Images of fewer samples are drawn without a look at the memory.

@@ -1,6 +1,7 @@
-//! Error against run time of one stage: false negatives, false positives and time of each
-//! back end, of the occlusion stage for several sizes of its buffer.
+//! Error against run time of one stage.
 //!
+//! A point has the false negatives, false positives and time of a back end; the occlusion
+//! stage has a point for each of several sizes of its buffer.
 //! The truth has rays between the samples too, so that no size of a buffer judges itself.
 
 use serde::Serialize;
@@ -38,8 +39,9 @@ pub struct SweepPoint {
     /// Thread CPU time of a view.
     #[serde(flatten)]
     pub times: Times,
-    /// Whether no other point is at least as good in time and both errors, and shown
-    /// to be better in one.
+    /// `true` for a point of the Pareto front of time and both errors.
+    ///
+    /// No other point is at least as good in all three and shown to be better in one.
     pub on_front: bool,
 }
 
@@ -185,7 +187,7 @@ impl<'w> Swept<'w> {
     }
 }
 
-/// Compares all points of a stage with the truth and plans their times; `None` if stopped.
+/// Compares all points of a stage with the truth; `None` if stopped.
 ///
 /// # Errors
 /// As [`prepare`](super::prepare).

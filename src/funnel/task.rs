@@ -15,7 +15,7 @@ use crate::statistics::Estimate;
 pub enum FunnelKey {
     /// The last of some stages of whole items, on the items that the others leave.
     Steps(Vec<Step>),
-    /// A back end of the triangle or fragment stage, on the items that the chain leaves.
+    /// A back end of the triangle or fragment stage, behind the chain's item stages.
     Stage(StageKind, String),
     /// A back end with an occlusion buffer of the given columns.
     Buffer(String, u32),
@@ -28,7 +28,7 @@ pub enum FunnelKey {
 }
 
 impl FunnelKey {
-    /// A back end of a stage in its place in a chain; `None` for the one that does nothing.
+    /// A back end of a stage in its place in a chain; `None` for [`NONE`].
     pub fn of_stage(chain: &Chain, stage: StageKind, name: &str) -> Option<FunnelKey> {
         match stage {
             _ if name == NONE => None,
@@ -134,14 +134,15 @@ impl KeyedTimes {
         self.all.ratio(index(key)?, index(other)?)
     }
 
-    /// Whether the processes show that a task is faster than another.
+    /// Returns `true` if the processes show that a task is faster than another.
     pub fn is_faster(&self, key: &FunnelKey, other: &FunnelKey) -> bool {
         let both = self.indices.get(key).zip(self.indices.get(other));
         both.is_some_and(|(own, other)| self.all.is_faster(*own, *other))
     }
 
-    /// Sum of the times of some tasks in each process, ns: 0 without tasks, empty if one
-    /// of them has no times.
+    /// Sum of the times of some tasks in each process, ns.
+    ///
+    /// 0 without tasks, empty if one of them has no times.
     pub fn sums(&self, keys: &[FunnelKey]) -> Vec<f64> {
         let logs = keys.iter().map(|key| {
             let index = self.indices.get(key);

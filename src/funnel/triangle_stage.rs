@@ -20,12 +20,15 @@ use crate::visibility::triangle::{
     Clusters, Counts, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, facing,
 };
 
-/// Bytes that the study of a mesh takes per triangle, beside its scene: trees for rays,
-/// clusters and every back end of both; 310 were measured.
+/// Bytes per triangle of a mesh beside its scene; 310 were measured.
+///
+/// Trees for rays, clusters and every back end of both.
 pub const BYTES_PER_TRIANGLE: u64 = 350;
 
-/// Origin of a view's triangles. Faces of boxes are rounded about the eye, so that none
-/// changes its side; where f32 does not reach from there, about the scene's own origin.
+/// Origin of a view's triangles.
+///
+/// Faces of boxes are rounded about the eye, so that none changes its side; where f32 does
+/// not reach from there, about the scene's own origin.
 fn origin_of(scene: &Scene, camera: &Camera) -> DVec3 {
     let eye = camera.frame.eye;
     let reach = scene.bounds.reach().as_dvec3() + (eye - scene.origin).abs();
@@ -123,7 +126,7 @@ impl TriangleStage {
         kept
     }
 
-    /// Every back end that removes something; the ids are of clusters with a triangle left.
+    /// Every back end; the ids are of clusters with a triangle left.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         let rows = TRIANGLE_ROWS.iter().enumerate();
         let rows = rows.filter(|(_, row)| row.name != NONE);
@@ -180,7 +183,7 @@ mod tests {
     use crate::scene::{SeededRng, WorldBox};
     use crate::visibility::triangle::TRIANGLE_ROWS;
 
-    /// Sides of a box that an eye is in front of and that have an area: two triangles each.
+    /// Triangles on the sides of a box with an area that face an eye, two per side.
     fn seen(b: &WorldBox, eye: DVec3) -> usize {
         let sides = (0..3).filter(|&axis| (0..3).all(|k| k == axis || b.min[k] < b.max[k]));
         let of_axis = |axis: usize| {

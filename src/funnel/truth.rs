@@ -1,4 +1,6 @@
-//! Exactly visible items of each view: solid boxes as boxes, meshes and maps as triangles.
+//! Exactly visible items of each view.
+//!
+//! Solid boxes are boxes to rays, meshes and maps are triangles.
 
 use super::error::{FunnelError, most_drawn};
 use super::world::{Shape, World};
@@ -15,8 +17,10 @@ const FEW: SampleGrid = SampleGrid::new(16, 9);
 /// Visible items of each view with the samples of each, ascending.
 pub type Truth = Vec<Vec<(ItemId, u32)>>;
 
-/// Visible items at the samples of every view and along `random_rays` random rays, whose
-/// items count as one sample each if they are at none. `None` if stopped.
+/// Visible items at the samples of every view and along random rays.
+///
+/// Items that only some of the `random_rays` rays meet count as one sample each. `None` if
+/// stopped.
 ///
 /// # Errors
 /// Too many items in front at the same samples.

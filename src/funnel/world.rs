@@ -23,8 +23,9 @@ use crate::visibility::occlusion::{OccluderChoice, OccluderScene};
 use crate::visibility::region::Pvs;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
 
-/// Bytes that structure, solids, occluders and trees for rays take per item; 730 were
-/// measured of boxes with one structure.
+/// Bytes per item of structure, solids, occluders and trees for rays.
+///
+/// 730 were measured of boxes with one structure.
 const BYTES_PER_ITEM: u64 = 750;
 
 /// Scene, path and options of a study.
@@ -229,8 +230,9 @@ impl<'a> World<'a> {
         ))
     }
 
-    /// Whether a stage of a chain takes time of its own: the object stage does not where
-    /// the occlusion stage does both.
+    /// Returns `true` if a stage of a chain is timed by itself.
+    ///
+    /// The object stage is not where the occlusion stage does both.
     pub fn is_separate(&self, chain: &Chain, stage: StageKind) -> bool {
         let occlusion = self.back_end(StageKind::Occlusion, chain.of(StageKind::Occlusion));
         stage != StageKind::Object || !occlusion.does_object_stage
@@ -347,8 +349,7 @@ mod tests {
     use crate::path::{self, LensDefaults};
     use crate::scene;
 
-    /// A structure that finds nothing, beside one that is right: what is behind a region
-    /// stage is asked of each.
+    /// A structure that finds nothing, beside one that is right, behind a region stage.
     #[test]
     fn an_object_row_behind_a_region_stage_asks_its_structure() {
         const LINEAR: fn() -> StructureSpec = || StructureSpec::parse("linear").expect("linear");

@@ -1,6 +1,7 @@
-//! Normal cones of clusters: a cluster all of whose triangles face away is removed by
-//! one test. Pays unless the cones are so wide that there is hardly such an eye, or
-//! triangles cost next to nothing. Predicted from the width of the cones.
+//! Normal cones of clusters: one test removes a cluster that faces away.
+//!
+//! They pay unless the cones are so wide that there is hardly such an eye, or triangles
+//! cost next to nothing. Predicted from the width of the cones.
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -48,8 +49,9 @@ struct Seen {
     eye: Eye,
 }
 
-/// A few cameras stand for those that follow them. An answer has the item of each cluster
-/// with a triangle left.
+/// Enters both sides on a few cameras, which stand for those that follow them.
+///
+/// An answer has the item of each cluster with a triangle left.
 fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let world = case.world.as_ref().map_err(not_applicable)?;
@@ -122,8 +124,9 @@ impl Seen {
     }
 }
 
-/// Share of all directions from which a triangle's whole cluster faces away, mean over
-/// the triangles of some clusters.
+/// Share of all directions from which a triangle's whole cluster faces away.
+///
+/// The mean over the triangles of some clusters.
 fn turned_away(few: &[Seen]) -> f64 {
     let (mut triangles, mut away) = (0.0, 0.0);
     for seen in few {

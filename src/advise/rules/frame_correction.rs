@@ -1,5 +1,5 @@
 //! Correcting a camera's frame: axes in f32 that are turned and never
-//! straightened drift by some 2e-8 a step. A frame that is made anew for each
+//! straightened drift by some 2e-8 a step. A frame that is built for each
 //! camera, or takes few steps, does not need it. Checked by walking.
 
 use super::super::omission::{By, LeftOutIf};

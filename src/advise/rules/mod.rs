@@ -1,4 +1,4 @@
-//! The rules of omission, one file each: statistic, threshold, and both sides as tasks.
+//! The rules of omission, one file each.
 
 mod cones;
 mod f64_kernel;

@@ -67,7 +67,9 @@ fn parts_of(items: usize) -> impl Iterator<Item = usize> {
     doubled.take_while(move |&count| count < items && count <= MOST)
 }
 
-/// Where the ratio crosses 1 for good: between the last part on which the scan
+/// Number of items at which the ratio last crosses 1.
+///
+/// The crossing lies between the last part on which the scan
 /// is as fast and the next, by the logarithms of both. 0 if it never is,
 /// all items if it always is.
 fn items_at(parts: &[(usize, f64)]) -> f64 {

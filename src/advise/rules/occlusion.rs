@@ -46,8 +46,10 @@ fn masked_inner<'c>(case: &'c Case, buffer: SampleGrid) -> Result<Run<'c>, Unfit
     Ok(world.run_occlusion(&OCCLUSION_ROWS[0], buffer))
 }
 
-/// Predicts the share from a few of the cameras. (Rays to a few items predicted 68 % of a
-/// wood, of which 28 % is removed: many a thing there hides a part of a pixel or of an item.)
+/// Predicts the share from a few of the cameras.
+///
+/// Rays to a few items predicted 68 % of a wood, of which 28 % is removed: many items there
+/// hide a part of a pixel or of an item.
 fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let run = masked_inner(case, BUFFER)?;

@@ -1,6 +1,6 @@
 //! Plane tests below a node that a plane contains: the mask of open planes that
-//! a node hands to its children leaves them out. Forced off by a view whose
-//! nodes never close a plane (unless they close all of them).
+//! a node passes to its children leaves them out. The side without the rule is a view
+//! whose nodes never close a plane (unless they close all of them).
 
 use std::rc::Rc;
 

@@ -1,6 +1,6 @@
 //! Moving the scene to a zero of its own: near the world's zero f32 has digits
-//! enough without. Forced on by moving the scene to its centre where it was not
-//! moved, forced off by leaving it where the world has it.
+//! enough without. One side has the scene about its centre, the other about the world's
+//! zero.
 
 use glam::DVec3;
 

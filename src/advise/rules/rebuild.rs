@@ -1,4 +1,4 @@
-//! Building anew after items have moved: a refit keeps the tree and is quicker,
+//! A rebuild after items have moved: a refit keeps the tree and is quicker,
 //! but what it leaves answers more slowly. Weighed for a share of items that
 //! move and a number of queries between two updates.
 

@@ -1,6 +1,7 @@
-//! The region stage: pays where walls close off most of what the frustum meets, and is
-//! left out where the eye is in the open. Predicted from the regions that a few rays
-//! pass.
+//! The region stage.
+//!
+//! It pays where walls close off most of the items in the frustum, and is left out where
+//! the eye is in the open. Predicted from the regions that a few rays pass.
 
 use std::cell::RefCell;
 

@@ -27,7 +27,7 @@ pub struct Removal {
 }
 
 impl Removal {
-    /// Leaves out where the removed candidates are worth no more than the time of removing.
+    /// Leaves out where removing takes longer than drawing the removed candidates.
     pub fn weigh(&self, check: &Check) -> Finding {
         let (with, without, cost_ns) = (self.with, self.without, self.cost_ns);
         let [one, many] = self.unit;
@@ -63,7 +63,7 @@ impl Removal {
     }
 }
 
-/// A rule of which one side removes something; `removal` is counted after the times.
+/// A rule of which one side removes something, counted after the times.
 pub fn weighed(sides: Sides, removal: impl FnOnce() -> Removal + 'static) -> Draft {
     Draft::concluded(vec![sides], |facts| removal().weigh(&facts.checks[0]))
 }

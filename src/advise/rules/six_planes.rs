@@ -62,8 +62,9 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     }))
 }
 
-/// Decides as the test that is taken, which has these axes or has not; the statistic is
-/// then a prediction.
+/// Decides as the test that is taken, which has these axes or has not.
+///
+/// The statistic is then a prediction.
 fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
     let predicted = finding
         .compared

@@ -1,6 +1,8 @@
-//! Sorting what is left from front to back: with an early z-test a hidden fragment that
-//! comes late is not shaded. Pays where many layers lie behind each other and shading
-//! is dear. Predicted from the layers along a few rays.
+//! Sorting the remaining items from front to back.
+//!
+//! With an early z-test a hidden fragment that comes late is not shaded. Sorting pays where
+//! many layers lie behind each other and shading is expensive. Predicted from the layers
+//! along a few rays.
 
 use std::rc::Rc;
 
@@ -31,7 +33,7 @@ pub(super) const RULE: Rule = Rule {
     prepare,
 };
 
-/// Samples of the images that fragments are counted in, and of the image they stand for.
+/// Samples of the counted images, and of the image for which they stand.
 const COUNTED: SampleGrid = SampleGrid::new(160, 90);
 const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 
@@ -81,7 +83,7 @@ struct Drawn {
     items: usize,
 }
 
-/// Trees over solid boxes, or over triangles with floors and ceilings behind the items.
+/// Trees over solid boxes, or over triangles with floors behind the items.
 enum Index {
     Boxes(RayIndex),
     Triangles(SurfaceIndex),
@@ -133,7 +135,9 @@ impl Drawn {
         met.len()
     }
 
-    /// Predicted share that sorting saves. Of n layers in random order 1 + 1/2 + ... + 1/n
+    /// Predicted share that sorting saves.
+    ///
+    /// Of n layers in random order 1 + 1/2 + ... + 1/n
     /// are nearer than all before them (Knuth, The Art of Computer Programming, 1.2.10) and
     /// shaded, in order only one.
     fn predicted(&self, few: &[(Rays, Vec<ItemId>)]) -> f64 {
