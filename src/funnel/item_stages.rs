@@ -101,7 +101,7 @@ impl<'w> ItemStages<'w> {
         ItemStages { world, left }
     }
 
-    /// Runs a chain and every chain that differs from it in one stage; `None` if stopped.
+    /// Runs a chain and all that differ from it in one stage; `None` if stopped.
     pub fn all(
         world: &'w World<'w>,
         chain: &Chain,

@@ -205,7 +205,7 @@ pub struct Gain {
     pub with_count: f64,
     /// The same without the stage.
     pub without_count: f64,
-    /// Extra time / removed candidates: drawing one must cost more for the stage to pay.
+    /// Extra time / removed candidates, the least draw cost for which the stage pays.
     ///
     /// 0 if it saves time as well; null if it removes nothing or has no time.
     pub break_even_ns: Option<f64>,

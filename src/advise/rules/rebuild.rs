@@ -9,7 +9,7 @@ use crate::measure::{Stopwatch, input_of, move_share};
 
 pub(super) const RULE: Rule = Rule {
     name: "rebuild",
-    left_out: "building anew after items have moved",
+    left_out: "a rebuild after items have moved",
     advice: [
         "refit after items have moved, do not rebuild",
         "rebuild after items have moved",
