@@ -1,6 +1,6 @@
 //! Scene, cameras, fastest tree and visible surfaces that all rules read.
 
-use super::AdviseOptions;
+use super::options::AdviseOptions;
 use crate::camera::PlaneOptions;
 use crate::culling::{CameraView, Culling, CullingTest};
 use crate::funnel::{Chain, FunnelInput, World};

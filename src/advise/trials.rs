@@ -6,11 +6,12 @@
 use std::ops::Deref;
 
 use super::case::{Case, some_of};
-use super::rule::Sides;
+use super::omission::Check;
 use crate::culling::CameraView;
 use crate::index::DynIndex;
-use crate::measure::{Ask, TimedTask};
+use crate::measure::{Ask, OverProcesses, TimedTask};
 use crate::query::ItemId;
+use crate::statistics::Estimate;
 use crate::verify::{ErrorCount, Trial};
 
 /// The task that all others are compared with: the fastest tree, six planes, f32.
@@ -155,4 +156,66 @@ impl Answered {
 pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.collect();
     values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The two sides of a check, by their tasks.
+pub struct Sides {
+    pub on: String,
+    pub kept: usize,
+    pub left_out: usize,
+    /// `true` if both must answer the same.
+    same_expected: bool,
+    /// `true` if both answered the same.
+    pub same_answers: bool,
+}
+
+impl Sides {
+    /// Two sides that may differ.
+    pub fn new(on: impl ToString, kept: usize, left_out: usize) -> Sides {
+        Sides {
+            on: on.to_string(),
+            kept,
+            left_out,
+            same_expected: false,
+            same_answers: false,
+        }
+    }
+
+    /// Two sides that must answer the same.
+    pub fn same(on: impl ToString, kept: usize, left_out: usize) -> Sides {
+        Sides {
+            same_expected: true,
+            ..Sides::new(on, kept, left_out)
+        }
+    }
+
+    /// The check; NaN where a task has no time, after a panic.
+    pub fn check(self, answered: &Answered, times: &OverProcesses) -> Check {
+        let (kept, left_out) = (self.kept, self.left_out);
+        let ns = |task| times.ns(task).map_or(f64::NAN, |found| found.value);
+        let ratio = times.ratio(kept, left_out);
+        let ratio = |part: fn(&Estimate) -> f64| ratio.as_ref().map_or(f64::NAN, part);
+        let errors = [kept, left_out].map(|task| answered.errors(task));
+        let excess = |errors: &Option<ErrorCount>| errors.as_ref().and_then(ErrorCount::excess);
+        let missed = |errors: &Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
+        let faster = times.is_faster(left_out, kept);
+        let slower = times.is_faster(kept, left_out);
+        Check {
+            on: self.on,
+            kept_ns: ns(kept),
+            left_out_ns: ns(left_out),
+            ratio: ratio(|r| r.value),
+            ratio_lower: ratio(|r| r.lower.unwrap_or(f64::NAN)),
+            ratio_upper: ratio(|r| r.upper.unwrap_or(f64::NAN)),
+            same_answers: self.same_answers,
+            same_expected: self.same_expected,
+            kept_excess: excess(&errors[0]),
+            left_out_excess: excess(&errors[1]),
+            kept_false_negative_ppm: missed(&errors[0]),
+            left_out_false_negative_ppm: missed(&errors[1]),
+            errors: errors[0].zip(errors[1]).map(|(kept, left)| [kept, left]),
+            judged: answered.judged,
+            pays: (faster || slower).then_some(faster),
+        }
+    }
 }

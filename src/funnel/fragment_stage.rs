@@ -308,6 +308,6 @@ impl Room {
 
     /// Samples that see a portal before everything that is drawn already.
     fn stencil(&self, canvas: &Canvas, drawn: &Drawn) -> Stencil {
-        Stencil::of_rectangles(canvas, &self.portals, &drawn.depth)
+        drawn.depth.stencil(canvas, &self.portals)
     }
 }

@@ -13,7 +13,7 @@ use super::world::World;
 use crate::camera::Camera;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
-use crate::visibility::fragment::{Canvas, Piece, Stencil, Tests, draw};
+use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 
 /// Items in a mirror. Counts are means per view.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -73,7 +73,7 @@ pub fn mirrored(
         let left = world.listed(stages.items(steps, view));
         let left: Vec<Piece> = left.iter().copied().map(Piece::whole).collect();
         let direct = draw(&canvas, solids, &left, &Tests::default());
-        let stencil = Stencil::of_rectangles(&canvas, &[face], &direct.depth);
+        let stencil = direct.depth.stencil(&canvas, &[face]);
         let reflected = canvas.mirrored(axis, face.min[axis]);
         let screen = reflected.screen();
         let rectangles = solids.boxes.iter().filter_map(|b| screen.rectangle(b));

@@ -7,10 +7,10 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::error::LeftOutRow;
-use super::task::{FunnelKey, KeyedTask, Times};
+use super::task::{FunnelKey, KeyedTask, PickQuestion, Times};
 use super::world::{Shape, World};
 use crate::index::caught;
 use crate::query::ItemId;
@@ -26,22 +26,6 @@ const MOST_FOR_LOOP: usize = 20_000;
 const REACH: f64 = 4.0;
 /// Number of nearest items.
 pub const NEAREST: usize = 8;
-
-named! {
-    /// A question about a cursor.
-    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
-    pub enum PickQuestion {
-        /// The first item along the ray.
-        #[serde(rename = "first item")]
-        First = "first item",
-        /// The nearest few along the ray, and all that are as near as the last of them.
-        #[serde(rename = "nearest 8")]
-        Nearest = "nearest 8",
-        /// Every item in the frustum of a small rectangle about the cursor.
-        #[serde(rename = "all within 4 pixels")]
-        Through = "all within 4 pixels",
-    }
-}
 
 /// A back end of picking over all views.
 #[derive(Clone, Debug, Serialize)]

@@ -4,11 +4,26 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::picks::PickQuestion;
 use super::stage::{Chain, NONE, StageKind, Step};
 use super::world::FunnelInput;
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
 use crate::statistics::Estimate;
+
+named! {
+    /// A question about a cursor.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+    pub enum PickQuestion {
+        /// The first item along the ray.
+        #[serde(rename = "first item")]
+        First = "first item",
+        /// The nearest few along the ray, and all that are as near as the last of them.
+        #[serde(rename = "nearest 8")]
+        Nearest = "nearest 8",
+        /// Every item in the frustum of a small rectangle about the cursor.
+        #[serde(rename = "all within 4 pixels")]
+        Through = "all within 4 pixels",
+    }
+}
 
 /// Identity of a timed task, the same in every process.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]

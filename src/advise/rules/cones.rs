@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use super::super::case::{Case, some_of};
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Rule, Sides, Unfit, not_applicable};
-use super::super::trials::{Trials, mean};
+use super::super::rule::{Draft, Rule, Unfit, not_applicable};
+use super::super::trials::{Sides, Trials, mean};
 use super::removal::{PROBED, Removal, weighed};
 use crate::funnel::World;
 use crate::kernel::Kernel;

@@ -3,8 +3,8 @@
 //! an item.
 
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Sides, Unfit, not_applicable};
-use super::super::trials::{BASE, Trials};
+use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::trials::{BASE, Sides, Trials};
 use crate::culling::{Arithmetic, Culling, CullingTest};
 
 pub(super) const RULE: Rule = Rule {

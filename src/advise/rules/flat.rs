@@ -4,8 +4,8 @@
 
 use super::super::choice::named;
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Sides, Unfit};
-use super::super::trials::Trials;
+use super::super::rule::{Draft, Finding, Rule, Unfit};
+use super::super::trials::{Sides, Trials};
 
 pub(super) const RULE: Rule = Rule {
     name: "third-dimension",

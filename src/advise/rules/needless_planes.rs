@@ -4,8 +4,8 @@
 use std::rc::Rc;
 
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Sides, Unfit};
-use super::super::trials::{BASE, Trials};
+use super::super::rule::{Draft, Finding, Rule, Unfit};
+use super::super::trials::{BASE, Sides, Trials};
 use crate::culling::CameraView;
 use crate::geometry::{Aabb, ConvexVolume, FrustumPlane};
 use crate::index::DynIndex;

@@ -3,8 +3,8 @@
 //! cameras, side by side with everything else.
 
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Sides, Unfit};
-use super::super::trials::{BASE, Trials};
+use super::super::rule::{Draft, Finding, Rule, Unfit};
+use super::super::trials::{BASE, Sides, Trials};
 use crate::geometry::Aabb;
 
 pub(super) const RULE: Rule = Rule {

@@ -3,8 +3,8 @@
 
 use super::super::case::{BUFFER, Case};
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Rule, Sides, Unfit, not_applicable};
-use super::super::trials::{BASE, Trials};
+use super::super::rule::{Draft, Rule, Unfit, not_applicable};
+use super::super::trials::{BASE, Sides, Trials};
 use super::removal::{PROBED, of_items};
 use crate::funnel::{OCCLUSION_ROWS, Run};
 use crate::visibility::SampleGrid;

@@ -5,8 +5,8 @@
 use std::rc::Rc;
 
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Sides, Unfit};
-use super::super::trials::Trials;
+use super::super::rule::{Draft, Finding, Rule, Unfit};
+use super::super::trials::{Sides, Trials};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
 use crate::index::{FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};

@@ -5,8 +5,8 @@
 use glam::DVec3;
 
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Sides, Unfit, not_applicable};
-use super::super::trials::{BASE, Trials};
+use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::trials::{BASE, Sides, Trials};
 use crate::culling::Culling;
 use crate::measure::Workload;
 use crate::scene::{Scene, WorldBox};

@@ -3,8 +3,8 @@
 //! move and a number of queries between two updates.
 
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Sides, Unfit, not_applicable};
-use super::super::trials::Trials;
+use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::trials::{Sides, Trials};
 use crate::measure::{Stopwatch, input_of, move_share};
 
 pub(super) const RULE: Rule = Rule {

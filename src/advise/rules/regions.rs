@@ -7,8 +7,8 @@ use std::cell::RefCell;
 
 use super::super::case::some_of;
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Rule, Sides, Unfit, not_applicable};
-use super::super::trials::{BASE, Trials};
+use super::super::rule::{Draft, Rule, Unfit, not_applicable};
+use super::super::trials::{BASE, Sides, Trials};
 use super::removal::{PROBED, PROBES, of_items};
 use crate::funnel::{PORTAL_CLIP, left_out_of};
 use crate::visibility::region::{EyePlace, IdSet, Scratch, seen_by_samples};

@@ -2,8 +2,8 @@
 //! returns, so the drawing that this saves is weighed against the time that it takes.
 
 use super::super::omission::Check;
-use super::super::rule::{Draft, Finding, Sides};
-use super::super::trials::Trials;
+use super::super::rule::{Draft, Finding};
+use super::super::trials::{Sides, Trials};
 use crate::visibility::SampleGrid;
 
 /// Cameras that a prediction looks at, evenly spread, and rays of each.

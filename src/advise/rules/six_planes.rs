@@ -5,8 +5,8 @@
 use super::super::case::Case;
 use super::super::choice::TestChoice;
 use super::super::omission::{By, Decision, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Sides, Unfit, not_applicable};
-use super::super::trials::{BASE, Trials};
+use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::trials::{BASE, Sides, Trials};
 use crate::culling::{Culling, CullingTest};
 
 pub(super) const RULE: Rule = Rule {

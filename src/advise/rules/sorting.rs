@@ -10,8 +10,8 @@ use glam::DVec3;
 
 use super::super::case::some_of;
 use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Rule, Sides, Unfit, not_applicable};
-use super::super::trials::{BASE, Trials, mean};
+use super::super::rule::{Draft, Rule, Unfit, not_applicable};
+use super::super::trials::{BASE, Sides, Trials, mean};
 use super::removal::{PROBED, PROBES, Removal, weighed};
 use crate::camera::Camera;
 use crate::query::ItemId;

@@ -1,7 +1,9 @@
 //! The z-test: the nearest fragment of each sample, by the exact order of depths.
 
 use super::canvas::{Canvas, Fragment};
+use super::stencil::Stencil;
 use crate::query::ItemId;
+use crate::scene::WorldBox;
 use crate::visibility::truth::{Along, Body, NO_ITEM, SolidBox};
 
 /// The front item of each sample so far; of a tie the lowest id.
@@ -89,5 +91,23 @@ impl<B: Body> DepthBuffer<B> {
         visible.sort_unstable();
         visible.dedup();
         visible
+    }
+}
+
+impl DepthBuffer {
+    /// The samples that see one of several flat rectangles (boxes with no thickness along
+    /// one axis) before the content of the buffer, or as near.
+    pub fn stencil(&self, canvas: &Canvas, rectangles: &[WorldBox]) -> Stencil {
+        let mut stencil = Stencil::new(canvas.grid().samples());
+        for rectangle in rectangles {
+            let visited = canvas.meet(rectangle, None, |sample, at| {
+                let before = |(front, _): (_, _)| canvas.probe(sample).compare(&at, &front).is_le();
+                if self.front(sample).is_none_or(before) {
+                    stencil.mark(sample);
+                }
+            });
+            stencil.tested += visited.tested;
+        }
+        stencil
     }
 }

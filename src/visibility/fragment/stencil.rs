@@ -1,10 +1,6 @@
 //! The stencil-test: the samples on which a portal or a mirror is seen, and no
 //! others, are drawn on in the pass that shows what is beyond it.
 
-use super::canvas::Canvas;
-use super::depth::DepthBuffer;
-use crate::scene::WorldBox;
-
 /// Some of the samples of an image.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Stencil {
@@ -14,21 +10,17 @@ pub struct Stencil {
 }
 
 impl Stencil {
-    /// The samples that see a flat rectangle (a box with no thickness along one axis)
-    /// of several before the content of the depth buffer, or as near.
-    pub fn of_rectangles(canvas: &Canvas, rectangles: &[WorldBox], depth: &DepthBuffer) -> Stencil {
-        let mut stencil = Stencil {
-            marked: vec![false; canvas.grid().samples()],
+    /// A stencil without marked samples.
+    pub fn new(samples: usize) -> Stencil {
+        Stencil {
+            marked: vec![false; samples],
             tested: 0,
-        };
-        for rectangle in rectangles {
-            let visited = canvas.meet(rectangle, None, |sample, at| {
-                let before = |(front, _): (_, _)| canvas.probe(sample).compare(&at, &front).is_le();
-                stencil.marked[sample] |= depth.front(sample).is_none_or(before);
-            });
-            stencil.tested += visited.tested;
         }
-        stencil
+    }
+
+    /// Marks a sample.
+    pub fn mark(&mut self, sample: usize) {
+        self.marked[sample] = true;
     }
 
     /// Tests whether the sample may be drawn on.

@@ -379,7 +379,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     let walls = draw(&canvas, &solids, room, &Tests::default());
     let portal = wall([-1.0, 1.0], [0.0, 2.0]);
     let portal = WorldBox::new(portal.min, DVec3::new(10.0, portal.max.y, portal.max.z));
-    let stencil = Stencil::of_rectangles(&canvas, &[portal], &walls.depth);
+    let stencil = walls.depth.stencil(&canvas, &[portal]);
     assert!((5..400).contains(&stencil.count()), "{}", stencil.count());
     let tests = Tests {
         stencil: Some(&stencil),
@@ -437,7 +437,7 @@ fn a_mirror_shows_reflected_boxes_behind_its_plane() {
         let mut mirror = WorldBox::new(DVec3::splat(-9.0), DVec3::splat(9.0));
         (mirror.min[axis], mirror.max[axis]) = (at, at);
         let nothing = DepthBuffer::new(GRID.samples());
-        let stencil = Stencil::of_rectangles(&canvas, &[mirror], &nothing);
+        let stencil = nothing.stencil(&canvas, &[mirror]);
         let tests = Tests {
             stencil: Some(&stencil),
             surfaces: None,

@@ -1,31 +1,16 @@
 //! Bodies that rays meet: solid boxes and triangles.
 
-use std::cmp::Ordering;
 use std::fmt::Debug;
 
 use glam::{DVec3, Vec3};
 
+use super::along::Along;
 use super::ray_box::Probe;
 use super::ray_triangle::TriangleProbe;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::{SurfaceKind, Surfaces, WorldBox};
 use crate::visibility::{Ray, Solids};
-
-/// A ray prepared for exact tests against one kind of body.
-pub trait Along: Copy {
-    /// A point of the ray on the surface of a body.
-    type At: Copy + Debug;
-
-    /// Exact order of two such points along the ray.
-    fn order(&self, a: &Self::At, b: &Self::At) -> Ordering;
-
-    /// Depth of a point, rounded.
-    fn depth(at: &Self::At) -> f64;
-
-    /// Upper bound of the true depth of a point.
-    fn at_most(at: &Self::At) -> f64;
-}
 
 /// A body that rays meet.
 pub trait Body: Copy + Debug + Send + Sync + 'static {

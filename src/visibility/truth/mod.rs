@@ -2,6 +2,7 @@
 //!
 //! No back end shares this code but for the bodies and their exact tests.
 
+mod along;
 mod body;
 mod ray_box;
 mod ray_index;
@@ -11,7 +12,8 @@ mod sample;
 #[cfg(test)]
 pub(super) mod tests;
 
-pub use body::{Along, Bodies, Body, Boxes, Facet, Facets, SolidBox};
+pub use along::Along;
+pub use body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
 pub use ray_box::{Crossing, Probe};
 pub use ray_index::{BodyIndex, Front, RayIndex, SurfaceIndex};
 pub use ray_triangle::{Meeting, TriangleProbe};

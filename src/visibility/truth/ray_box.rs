@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::body::Along;
+use super::along::Along;
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
 use crate::scene::WorldBox;

@@ -2,7 +2,8 @@
 
 use std::cmp::Ordering;
 
-use super::body::{Along, Bodies, Body, Boxes, Facet, Facets, SolidBox};
+use super::along::Along;
+use super::body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
 use super::ray_tree::RayTree;
 use crate::query::ItemId;
 use crate::scene::Surfaces;
