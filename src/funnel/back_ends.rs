@@ -21,7 +21,7 @@ const ALPHA: &str = "alpha-test";
 /// The test that is restricted to the samples of portals.
 pub const STENCIL: &str = "stencil-test";
 
-/// The region stage of a map whose sectors do not divide the plane, with the reason.
+/// The region stage as left out, if the sectors of a map do not divide the plane.
 pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
     let Regions::Bsp(map) = &scene.regions else {
         return None;

@@ -293,7 +293,7 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
     let within = Camera { frame, lens };
     assert!(tree.exception(&within).unwrap().contains("plane"));
     let tree = BspOrder::within(&solids, 2 * boxes.len());
-    assert!(tree.exception(&camera).unwrap().contains("cutting ended"));
+    assert!(tree.exception(&camera).unwrap().contains("limit on cuts"));
 }
 
 fn of_boxes(name: &str, solids: &Solids) -> Box<dyn DepthOrder> {
@@ -490,8 +490,10 @@ fn screen_rectangles_hold_every_sample_that_meets_the_box() {
     assert!(met > 5000 && held < 8 * met, "the premise: {met} of {held}");
 }
 
-/// Pairs of items of the two maps that overlap, those that the map's own BSP, distances and
-/// the BSP back to front get wrong, and how often a sample is shaded again.
+/// Overlapping pairs, wrongly ordered pairs and overdraw of three draw orders.
+///
+/// The orders are the BSP of the map, distances, and the BSP back to front. The counts
+/// are sums over two maps.
 fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
     let mut counted = [[0; 3]; 3];
     for name in ["freedm-map12", "freedm-map20"] {
@@ -544,8 +546,10 @@ fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
     counted
 }
 
-/// The own BSP of a map gets no pair of walls wrong; distances do, and back to front it
-/// gets all wrong. Of things in one leaf it gets few wrong.
+/// The BSP of a map orders every pair of walls correctly.
+///
+/// Distances get some pairs wrong; the BSP back to front gets all wrong. With things, of
+/// which a leaf may have several, the BSP gets few pairs wrong.
 #[test]
 fn a_maps_own_bsp_orders_its_walls_exactly() {
     let [own, distances, back] = pairs_of_maps(|kind| kind == "linedef");

@@ -9,8 +9,9 @@ use crate::visibility::SampleGrid;
 /// Random rays of a case.
 pub const RAYS: usize = 1_000;
 
-/// Pixels of the buffers, from coarse ones, where much falls between the samples, to
-/// those of a small image.
+/// Resolutions of the occlusion buffers, coarse to that of a small image.
+///
+/// At the coarse ones much falls between the samples.
 const GRIDS: [SampleGrid; 4] = [
     SampleGrid::new(40, 25),
     SampleGrid::new(80, 45),
@@ -18,20 +19,20 @@ const GRIDS: [SampleGrid; 4] = [
     SampleGrid::new(320, 180),
 ];
 
-/// What the back ends are asked.
+/// Input of the back ends under test.
 pub struct StageCase {
     /// Items.
     pub boxes: Vec<WorldBox>,
-    /// What sees them.
+    /// Camera of the view.
     pub camera: Camera,
     /// Pixels of the buffers.
     pub grid: SampleGrid,
-    /// Points that rays are sent through, beside random ones: gaps, seams, rims.
+    /// Targets of rays in addition to the random ones: gaps, seams, rims.
     pub aims: Vec<DVec3>,
 }
 
 impl StageCase {
-    /// On any of the grids, without anywhere to look at in particular.
+    /// A case on a random grid, without targets.
     pub fn new(rng: &mut SeededRng, boxes: Vec<WorldBox>, camera: Camera) -> StageCase {
         StageCase {
             boxes,
@@ -41,8 +42,9 @@ impl StageCase {
         }
     }
 
-    /// With small things beyond corners of the boxes, seen past an edge by a fraction of a
-    /// pixel or not at all.
+    /// Adds slivers: small boxes behind corners of other boxes.
+    ///
+    /// An edge hides them entirely or all but a fraction of a pixel.
     pub fn with_slivers(mut self, rng: &mut SeededRng) -> StageCase {
         let frame = &self.camera.frame;
         let of_boxes = self.boxes.len();
@@ -68,10 +70,10 @@ impl StageCase {
     }
 }
 
-/// Small things beyond corners in a case.
+/// Slivers per case.
 const SLIVERS: usize = 24;
 
-/// A camera in the origin that looks along x, z up, without a far plane.
+/// A camera at the origin that looks along x, z up, without a far plane.
 pub fn along_x(near: f64) -> Camera {
     let lens = Lens::perspective(60.0, 16.0 / 9.0, near, None).expect("a lens");
     looking(DVec3::ZERO, DVec3::X, lens)

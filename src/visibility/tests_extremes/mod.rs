@@ -1,7 +1,8 @@
-//! Generated extremes of the stages beside the object stage. Whatever a ray sees, exactly,
-//! must be handed on by what promises it: worlds full of contacts, far from the origin,
-//! by every kind of lens; gaps of a fraction of a pixel; faces that coincide or just miss
-//! each other; chains of portals.
+//! Generated extremes of the region, occlusion and triangle stages.
+//!
+//! A back end with a guarantee must keep every item that an exact ray meets first.
+//! Cases: worlds full of contacts, far from the origin, by every kind of lens; gaps of a
+//! fraction of a pixel; faces that coincide or just miss each other; chains of portals.
 
 mod case;
 mod portals;
@@ -34,12 +35,12 @@ const RAYS_AT_BOXES: usize = 300;
 /// Extremes of one kind.
 #[derive(Clone, Copy)]
 struct Family {
-    /// As in the table of results.
+    /// Name in the ids of cases.
     name: &'static str,
     draw: Draw,
 }
 
-/// A case of a family, by the stage that it is asked of.
+/// Generator of a family's cases, by stage.
 #[derive(Clone, Copy)]
 enum Draw {
     Occlusion(fn(&mut SeededRng) -> StageCase),
@@ -62,7 +63,7 @@ const fn triangle(name: &'static str, draw: fn(&mut SeededRng) -> TriangleCase) 
     Family { name, draw }
 }
 
-/// All of them.
+/// All families.
 const VISIBILITY_FAMILIES: [Family; 21] = [
     occlusion("occlusion-contacts", |rng| {
         worlds::contacts(rng, 0.0, Kind::Perspective)
@@ -120,11 +121,11 @@ struct Row {
     /// The back end.
     #[expect(dead_code, reason = "printed")]
     back_end: String,
-    /// What is wrong with it.
+    /// `Err` with the reason if the answer is wrong.
     result: Result<(), String>,
 }
 
-/// Cases of a family, each asked by a kernel: a row for each case and back end.
+/// Runs cases of a family with one kernel: a row per case and back end.
 fn rows_of(family: Family, cases: Range<u64>, seed: u64, kernel: Kernel) -> Vec<Row> {
     let mut rows = Vec::new();
     for case in cases {
@@ -157,13 +158,13 @@ fn row(id: &str, back_end: &str, result: Result<(), String>) -> Row {
     }
 }
 
-/// A back end under its name: what it hands on of the items in view.
+/// A back end: its name, and a function from items in view to kept items.
 type BackEnd = (
     String,
     Box<dyn Fn(&OccluderScene, &View, &[ItemId]) -> Vec<ItemId>>,
 );
 
-/// Both couplings of a buffer, the one of two passes by every choice of occluders.
+/// Both couplings of a buffer; two-pass with every choice of occluders.
 fn answers<B: OcclusionBuffer + 'static>(kernel: Kernel, name: &str) -> Vec<BackEnd> {
     let walk: BackEnd = (
         name.to_owned(),
@@ -226,8 +227,9 @@ fn occlusion_rows(
     judged.collect()
 }
 
-/// The items in front of random rays, of rays at edges of boxes, and of those where the
-/// family wants to look.
+/// Items that some ray meets first.
+///
+/// Rays are random, or aim at edges of boxes or at the targets of the case.
 fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) -> Vec<ItemId> {
     let seed = rng.below(usize::MAX) as u64;
     let mut seen = visible_by_random_rays(index, rays, RAYS, seed, 1);
@@ -243,12 +245,12 @@ fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) ->
     seen
 }
 
-/// A point of a box, on each axis anywhere or next to an end.
+/// A point of a box: on each axis anywhere, or next to an end.
 fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
     b.min + (b.max - b.min) * DVec3::new(along(rng), along(rng), along(rng))
 }
 
-/// Whether all that is seen was handed on, and nothing from outside of the view.
+/// Checks that every visible item was kept and that every kept item is in view.
 fn judged(seen: &[ItemId], mut kept: Vec<ItemId>, in_view: &[ItemId]) -> Result<(), String> {
     kept.sort_unstable();
     let lost = seen.iter().filter(|id| kept.binary_search(id).is_err());
@@ -268,7 +270,7 @@ fn nothing_lost(what: &str, lost: &[u32]) -> Result<(), String> {
     }
 }
 
-/// A row for each back end of the region stage; none where no line of sight is proven.
+/// One row per region back end; none if no line of sight is proven.
 fn region_rows(id: &str, chain: &Chain, shrink: f64) -> Vec<Row> {
     let answers = chain.answers(shrink).unwrap_or_default().into_iter();
     let rows = answers.map(|answer| row(id, answer.row, nothing_lost("rooms", &answer.lost)));
@@ -280,7 +282,7 @@ mod tests {
     use super::*;
     use crate::visibility::occlusion::{MaskedCentre, NoOcclusion, ZBuffer};
 
-    /// Rows of a family that fail, and all of them.
+    /// Counts the rows of a family: those that fail, and all.
     fn failing(family: Family, back_ends: &[BackEnd], shrink: f64) -> [usize; 2] {
         let rows: Vec<Row> = (0..100)
             .flat_map(|case| {
@@ -300,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn what_promises_everything_passes() {
+    fn back_ends_with_a_guarantee_pass() {
         for family in VISIBILITY_FAMILIES {
             let rows = rows_of(family, 0..12, 5, Kernel::best());
             let failed: Vec<&Row> = rows.iter().filter(|row| row.result.is_err()).collect();
@@ -310,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn every_instruction_set_is_asked() {
+    fn every_instruction_set_passes() {
         for kernel in Kernel::available() {
             for family in VISIBILITY_FAMILIES {
                 let rows = rows_of(family, 0..4, 9, kernel);
@@ -323,7 +325,7 @@ mod tests {
         }
     }
 
-    /// The same suite on buffers that promise nothing: every family finds what they lose.
+    /// Every family finds items that buffers without a guarantee lose.
     #[test]
     fn unsafe_rows_fail_where_safe_ones_pass() {
         let kernel = Kernel::best();
@@ -354,7 +356,7 @@ mod tests {
         assert!(unnoticed.is_empty(), "{unnoticed:?}");
     }
 
-    /// Openings that rows are told to be too narrow lose rooms.
+    /// Back ends lose rooms if their openings are narrower than the real ones.
     #[test]
     fn openings_that_are_too_narrow_are_noticed() {
         for family in VISIBILITY_FAMILIES {
@@ -367,7 +369,7 @@ mod tests {
         }
     }
 
-    /// A row fails where an item is missing: judged with an answer that lacks one.
+    /// A row fails if its answer lacks a visible item or has an item out of view.
     #[test]
     fn a_missing_item_fails_its_row() {
         let passes =

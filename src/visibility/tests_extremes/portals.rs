@@ -1,5 +1,6 @@
-//! Rooms in a row, seen through slits around one line of sight, with an eye as near to
-//! the first opening as numbers go.
+//! Rooms in a row, seen through slits around one line of sight.
+//!
+//! The eye is as close to the first opening as f64 allows.
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use crate::visibility::region::{
     Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, Source, leads_through, rectangle,
 };
 
-/// A chain of rooms along x, and a line of sight from the first to the last of them.
+/// A chain of rooms along x, and a line of sight from the first to the last.
 pub struct Chain {
     rooms: Vec<WorldBox>,
     openings: Vec<Opening>,
@@ -21,15 +22,16 @@ pub struct Chain {
     rays: Rays,
 }
 
-/// What a row made of a chain.
+/// Rooms that one back end lost in a chain.
 pub struct Answer {
     pub row: &'static str,
-    /// Rooms on the line of sight that it does not list.
+    /// Rooms on the line of sight that the back end does not list.
     pub lost: Vec<u32>,
 }
 
-/// So many rooms, near the origin or far from it. The eye stands before the first opening
-/// by `ahead` of a room's length, where numbers are that fine.
+/// A chain of `length` rooms, near the origin or far from it.
+///
+/// The eye is `ahead` room lengths before the first opening, or one ulp if that is more.
 pub fn chain(rng: &mut SeededRng, length: u32, ahead: f64) -> Chain {
     let base = [DVec3::ZERO, DVec3::new(1e7, -3e6, 12_345.678)][rng.below(2)];
     let ulp = f64::EPSILON * (1.0 + base.abs().max_element());
@@ -67,21 +69,22 @@ pub fn chain(rng: &mut SeededRng, length: u32, ahead: f64) -> Chain {
 }
 
 impl Chain {
-    /// What the rows that promise everything lose, with every opening narrower by
-    /// `shrink` on each side than it is. `None` if the line of sight does not lead through
-    /// the openings, as exact arithmetic has it.
+    /// Answers of the back ends with a guarantee.
+    ///
+    /// Their openings are narrower than the real ones by `shrink` on each side. `None` if
+    /// exact arithmetic does not confirm that the line of sight passes the openings.
     pub fn answers(&self, shrink: f64) -> Option<Vec<Answer>> {
         let graph = RegionGraph::of_boxes(self.rooms.clone(), self.openings.clone());
         let last = self.rooms.len() as u32 - 1;
         if !leads_through(&graph, [0, last], self.ends) {
             return None;
         }
-        let told = self
+        let narrow = self
             .openings
             .iter()
             .map(|opening| narrower(*opening, shrink));
-        let told = RegionGraph::of_boxes(self.rooms.clone(), told.collect());
-        let rows = rows(&Arc::new(told));
+        let narrow = RegionGraph::of_boxes(self.rooms.clone(), narrow.collect());
+        let rows = rows(&Arc::new(narrow));
         let safe = rows.iter().filter(|row| row.back_end.guarantee.is_safe());
         Some(safe.map(|row| self.answer(row)).collect())
     }

@@ -6,29 +6,31 @@ use super::case::{StageCase, along_x, flat};
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::SampleGrid;
 
-/// Resolutions of a fence.
+/// Resolutions of the occlusion buffer for fences.
 const GRIDS: [SampleGrid; 4] = [
     SampleGrid::new(80, 45),
     SampleGrid::new(160, 90),
     SampleGrid::new(320, 180),
     SampleGrid::new(640, 360),
 ];
-/// Distance of the walls.
+/// Distance of the walls from the eye.
 const DISTANCE: f64 = 10.0;
 const NEAR: f64 = 0.1;
 
-/// Left, right, bottom and top of the image, where the walls are.
+/// Left, right, bottom and top of the image at the distance of the walls.
 fn image() -> [f64; 4] {
     along_x(NEAR).lens.window().map(|slope| DISTANCE * slope)
 }
 
-/// Something small behind a wall, on the line of sight through one of its points.
+/// A small box behind a wall, on the line of sight through a point of the wall.
 fn behind(rng: &mut SeededRng, through: DVec3) -> WorldBox {
     let half = DVec3::new(0.5, rng.between(0.02, 0.3), rng.between(0.02, 0.3));
     WorldBox::around(through * rng.between(1.5, 4.0), half)
 }
 
-/// Intervals from `low` to `high`, each `least` to `most` pixels long, with gaps between.
+/// Intervals from `low` to `high` with gaps between them.
+///
+/// Each is `least` to `most` pixels long.
 fn bars(
     rng: &mut SeededRng,
     [low, high]: [f64; 2],
@@ -46,7 +48,7 @@ fn bars(
     bars
 }
 
-/// A wall, and something behind every point of it that light falls through.
+/// A wall, and a small box behind each of its gaps.
 fn wall(rng: &mut SeededRng, mut boxes: Vec<WorldBox>, aims: Vec<DVec3>) -> StageCase {
     boxes.extend(aims.iter().map(|&aim| behind(rng, aim)));
     StageCase {
@@ -103,7 +105,7 @@ pub fn lattice(rng: &mut SeededRng) -> StageCase {
     }
 }
 
-/// Bricks whose seams end on those of the next course: shut, or open by so little.
+/// Bricks whose seams end on the next course: closed, or open by up to 0.001.
 pub fn t_junctions(rng: &mut SeededRng) -> StageCase {
     let (length, height) = (2.0, 0.75);
     let (mut bricks, mut aims) = (Vec::new(), Vec::new());

@@ -6,7 +6,7 @@ use super::case::{StageCase, along_x, flat, looking};
 use crate::camera::Lens;
 use crate::scene::{SeededRng, WorldBox};
 
-/// The same number, or one of its neighbours in f64 or f32.
+/// `x` or one of its neighbours in f64 or f32.
 fn next_to(rng: &mut SeededRng, x: f64) -> f64 {
     match rng.below(5) {
         0 => x,
@@ -17,13 +17,13 @@ fn next_to(rng: &mut SeededRng, x: f64) -> f64 {
     }
 }
 
-/// A random rectangle within two bounds.
+/// A random interval within two bounds.
 fn interval(rng: &mut SeededRng, low: f64, high: f64) -> [f64; 2] {
     let [a, b] = [rng.between(low, high), rng.between(low, high)];
     [a.min(b), a.max(b)]
 }
 
-/// Walls with flat boxes in the planes of their fronts, or next to those.
+/// Walls with flat boxes in or next to the planes of their front faces.
 pub fn decals(rng: &mut SeededRng) -> StageCase {
     let mut boxes = Vec::new();
     let mut aims = Vec::new();
@@ -70,8 +70,10 @@ pub fn eye_at_face(rng: &mut SeededRng) -> StageCase {
     StageCase::new(rng, boxes, looking(eye, forward, lens.expect("a lens"))).with_slivers(rng)
 }
 
-/// Pairs of which the nearer is exactly as large in the image as the one behind it, or
-/// that one stands out by a hair.
+/// Pairs of rectangles that cover the same part of the image.
+///
+/// The farther one is exactly as large in the image as the nearer one, or protrudes by
+/// at most 0.0001.
 pub fn same_size(rng: &mut SeededRng) -> StageCase {
     let (mut boxes, mut aims) = (Vec::new(), Vec::new());
     for _ in 0..12 {
@@ -97,7 +99,7 @@ pub fn same_size(rng: &mut SeededRng) -> StageCase {
     }
 }
 
-/// Things as large in the image as others, up to ten million times as far away.
+/// Boxes of similar sizes in the image, at distances from 2 to 20 million.
 pub fn infinite_far(rng: &mut SeededRng) -> StageCase {
     let boxes = (0..60).map(|_| {
         let distance = 2.0 * libm::pow(10.0, rng.between(0.0, 7.0));
@@ -109,8 +111,7 @@ pub fn infinite_far(rng: &mut SeededRng) -> StageCase {
     StageCase::new(rng, boxes, along_x(1.0))
 }
 
-/// Long walls that cross the plane of the near window: beside it, at its very edge, and
-/// within it.
+/// Long walls that cross the near plane: beside the window, at its edge, within it.
 pub fn near_plane(rng: &mut SeededRng) -> StageCase {
     let near = [0.5, 2.0, 8.0][rng.below(3)];
     let camera = along_x(near);

@@ -1,5 +1,4 @@
-//! The triangle stage: a triangle that a ray meets first must be left, wherever in the
-//! image the ray is.
+//! The triangle stage must keep every triangle that some ray meets first.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -16,18 +15,18 @@ use crate::visibility::triangle::{
 use crate::visibility::truth::SurfaceIndex;
 use crate::visibility::{Ray, Rays};
 
-/// Triangles of a mesh.
+/// Triangles per mesh.
 const OF_MESH: usize = 1_500;
 
-/// What the back ends are asked.
+/// Input of the back ends under test.
 pub struct TriangleCase {
     surfaces: Surfaces,
     camera: Camera,
-    /// Points that rays are sent through beside random ones.
+    /// Targets of rays in addition to the random ones.
     aims: Vec<DVec3>,
 }
 
-/// Triangles that a back end removed though a ray meets them first.
+/// Triangles that a back end removed although a ray meets them first.
 pub struct Lost {
     /// The back end.
     pub row: &'static TriangleRow,
@@ -47,7 +46,7 @@ impl From<StageCase> for TriangleCase {
     }
 }
 
-/// Any of the meshes, from anywhere in it or about it.
+/// A random mesh, seen from a random point in or near its bounds.
 pub fn mesh(rng: &mut SeededRng) -> TriangleCase {
     let mesh = &MESHES[rng.below(MESHES.len())];
     let surfaces = mesh.mesh(OF_MESH, rng.below(1000) as u64);
@@ -67,13 +66,14 @@ pub fn mesh(rng: &mut SeededRng) -> TriangleCase {
 }
 
 impl TriangleCase {
-    /// How many there are.
+    /// Number of triangles.
     pub fn triangles(&self) -> usize {
         self.surfaces.triangles.len()
     }
 
-    /// Triangles that each back end with a promise loses, by rays anywhere in the image, most
-    /// of them at triangles.
+    /// Triangles that each back end with a guarantee loses.
+    ///
+    /// At least half of the rays aim at triangles, the others at random points of the image.
     pub fn lost(self, rng: &mut SeededRng, kernel: Kernel) -> Vec<Lost> {
         let rays = Rays::of(&self.camera).expect("a camera with a lens");
         let aimed: Vec<DVec3> = (0..RAYS).map(|_| self.point(rng)).collect();
@@ -105,7 +105,7 @@ impl TriangleCase {
         lost.collect()
     }
 
-    /// A point of a triangle, next to an edge or a corner mostly.
+    /// A point of a random triangle, mostly next to an edge or a corner.
     fn point(&self, rng: &mut SeededRng) -> DVec3 {
         let triangle = rng.below(self.triangles()) as u32;
         let [a, b, c] = self.surfaces.corners(triangle).map(Vec3::as_dvec3);
@@ -114,14 +114,14 @@ impl TriangleCase {
     }
 }
 
-/// Every triangle by its corners.
+/// Map from corners to the triangles that have them.
 struct Met {
     index: SurfaceIndex,
     /// Clusters and bits of the triangles with these corners.
     places: HashMap<[[u32; 3]; 3], Vec<(usize, u64)>>,
 }
 
-/// Corners by which triangles are told apart.
+/// Bits of a triangle's corners, as a key of a map.
 fn key(corners: [Vec3; 3]) -> [[u32; 3]; 3] {
     corners.map(|corner| corner.to_array().map(f32::to_bits))
 }
@@ -141,7 +141,7 @@ impl Met {
         }
     }
 
-    /// Clusters and bits of what is met first by some ray.
+    /// Clusters and bits of the triangles that some ray meets first.
     fn first(&self, rays: impl Iterator<Item = Ray>) -> Vec<(usize, u64)> {
         let meetings = rays.filter_map(|ray| self.index.front_of(&ray).meeting);
         let places = meetings.flat_map(|meeting| &self.places[&key(meeting.corners())]);

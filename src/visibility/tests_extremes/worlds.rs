@@ -6,7 +6,7 @@ use super::case::{StageCase, looking};
 use crate::camera::{Camera, Lens};
 use crate::scene::{SeededRng, WorldBox};
 
-/// How the world is projected.
+/// Kind of projection.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     Perspective,
@@ -14,15 +14,17 @@ pub enum Kind {
     OffAxis,
 }
 
-/// Boxes of any shape around a point that is `far_out` from the origin, before a camera.
+/// Boxes around a point `far_out` from the origin, and a camera that looks at them.
 pub fn contacts(rng: &mut SeededRng, far_out: f64, kind: Kind) -> StageCase {
     let boxes = world(rng, far_out);
     let camera = camera(rng, far_out, kind);
     StageCase::new(rng, boxes, camera).with_slivers(rng)
 }
 
-/// Boxes of any shape, every other time on whole numbers so that faces coincide, and
-/// standing on one floor.
+/// Boxes of any shape around a point `far_out` from the origin.
+///
+/// In half of the worlds coordinates are whole numbers, so that faces coincide; in half
+/// of them most boxes stand on one floor.
 fn world(rng: &mut SeededRng, far_out: f64) -> Vec<WorldBox> {
     let [whole, standing] = [rng.below(2) == 0, rng.below(2) == 0];
     let about = DVec3::new(far_out, -far_out, 0.0);
@@ -44,7 +46,9 @@ fn world(rng: &mut SeededRng, far_out: f64) -> Vec<WorldBox> {
     boxes.collect()
 }
 
-/// Every other eye within the bounds, and views along axes among them.
+/// A random camera.
+///
+/// Half of the eyes are within the bounds; a third of the views are along axes.
 fn camera(rng: &mut SeededRng, far_out: f64, kind: Kind) -> Camera {
     let reach = if rng.below(2) == 0 { 9.0 } else { 25.0 };
     let mut eye = (rng.point() * 2.0 - 1.0) * reach;

@@ -221,7 +221,7 @@ impl DepthOrder for BspOrder {
 
     fn exception(&self, camera: &Camera) -> Option<&'static str> {
         if self.is_cut_short {
-            return Some("cutting ended before everything was parted");
+            return Some("the limit on cuts was reached before all items were separated");
         }
         let Camera { frame, lens } = camera;
         let parallel = lens.is_orthographic();

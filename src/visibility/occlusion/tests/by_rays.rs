@@ -1,4 +1,4 @@
-//! What random rays see, by trying every box; and what a back end then misses.
+//! Items that random rays meet first, by brute force, and those that are lost.
 
 use glam::{DVec3, Vec3};
 
@@ -9,7 +9,7 @@ use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
-/// A scene made ready.
+/// A scene with its solids and occluders.
 pub struct Ready {
     pub scene: Scene,
     pub solids: Solids,
@@ -40,7 +40,7 @@ impl Ready {
         camera.volume(&PlaneOptions::default(), &around).unwrap()
     }
 
-    /// The items that no plane excludes, by trying each.
+    /// Items that no plane of the volume excludes; tests every item.
     pub fn in_view(&self, volume: &ConvexVolume) -> Vec<ItemId> {
         let items = self.scene.items.iter().enumerate();
         let seen = items.filter(|(_, b)| volume.sees(b));
@@ -48,7 +48,7 @@ impl Ready {
     }
 }
 
-/// Where a ray enters a box, if it does so between near and far.
+/// Depth at which a ray enters a box, if that is between near and far.
 pub fn entry(ray: &Ray, b: &WorldBox) -> Option<f64> {
     let (mut enters, mut leaves) = (f64::NEG_INFINITY, f64::INFINITY);
     for axis in 0..3 {
@@ -67,7 +67,7 @@ pub fn entry(ray: &Ray, b: &WorldBox) -> Option<f64> {
     (enters <= leaves && enters >= ray.near && enters <= ray.far).then_some(enters)
 }
 
-/// The items that a ray meets first, all of them where several are as near.
+/// Items that a ray meets first: several if their depths are equal.
 pub fn front(ray: &Ray, boxes: &[WorldBox]) -> Vec<ItemId> {
     let mut least = f64::INFINITY;
     let mut first = Vec::new();
@@ -84,8 +84,10 @@ pub fn front(ray: &Ray, boxes: &[WorldBox]) -> Vec<ItemId> {
     first
 }
 
-/// The items that are in front of some of so many rays, in order: every other ray
-/// anywhere in the image, the rest at points of items, on their edges mostly.
+/// Items that some of `count` rays meet first, in order.
+///
+/// Every other ray is at a random point of the image; the rest aim at points of items,
+/// mostly close to their edges.
 pub fn seen_by_rays(
     rays: &Rays,
     boxes: &[WorldBox],
@@ -107,7 +109,7 @@ pub fn seen_by_rays(
     seen
 }
 
-/// A point of a box, a little off its edges mostly.
+/// A point of a box, mostly close to an edge.
 fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
     let mut along = || match rng.below(3) {
         0 => rng.unit(),
@@ -117,7 +119,7 @@ fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
     b.min + (b.max - b.min) * DVec3::new(along(), along(), along())
 }
 
-/// Those of `seen` that are not in `kept`.
+/// Items of `seen` that are not in `kept`.
 pub fn missing(seen: &[ItemId], kept: &[ItemId]) -> Vec<ItemId> {
     let mut kept = kept.to_vec();
     kept.sort_unstable();
@@ -125,7 +127,7 @@ pub fn missing(seen: &[ItemId], kept: &[ItemId]) -> Vec<ItemId> {
     lost.copied().collect()
 }
 
-/// A view made by a camera, for the length of a test.
+/// Calls `ask` with the view of a camera.
 pub fn with_view<R>(
     ready: &Ready,
     camera: &Camera,

@@ -1,4 +1,6 @@
-//! Items of maps behind boxes in their solid: nothing that a ray sees may be missing.
+//! Items of Doom maps behind occluder boxes in their solid space.
+//!
+//! No item that a ray meets first may be missing.
 
 use glam::DVec3;
 
@@ -13,8 +15,9 @@ use crate::visibility::region::doom::DoomMap;
 use crate::visibility::truth::{SurfaceIndex, visible_by_random_rays};
 use crate::visibility::{SampleGrid, Solids};
 
-/// Of a map: how many items were removed and how many lost, with boxes in its solid that
-/// were changed first.
+/// Counts the items of a map that were removed, and those of them that are visible.
+///
+/// `change` is applied to each occluder box first.
 fn removed_and_lost(name: &str, change: impl Fn(&mut WorldBox)) -> [usize; 2] {
     let scene = load(name, &Default::default()).unwrap();
     let map = DoomMap::of_scene(&scene).unwrap();

@@ -1,4 +1,6 @@
-//! Items of meshes behind boxes inside others: nothing that a ray sees may be missing.
+//! Items of meshes behind boxes inscribed in other items.
+//!
+//! No item that a ray meets first may be missing.
 
 use glam::DVec3;
 
@@ -13,7 +15,7 @@ use crate::visibility::inscribed::InnerBoxes;
 use crate::visibility::truth::{SurfaceIndex, visible_by_random_rays};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
-/// Anywhere about a scene, or in the box of an item: in its mesh as likely as not.
+/// A camera at a random point of the scene's bounds or of an item's box.
 fn camera(scene: &Scene, rng: &mut SeededRng, parallel: bool) -> Camera {
     let b = match rng.below(2) {
         0 => scene.bounds,

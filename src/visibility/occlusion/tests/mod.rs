@@ -1,4 +1,4 @@
-//! The stage against rays, one by one and in f64.
+//! Checks of the occlusion stage against single rays in f64.
 
 mod by_rays;
 mod lanes;
@@ -19,14 +19,16 @@ use crate::query::ItemId;
 use by_rays::Ready;
 pub use none::NoOcclusion;
 
-/// How many cases a test that takes minutes goes through: `cargo test --release --lib --
-/// --ignored`, and this variable for more or fewer.
-fn asked_for(variable: &str, cases: usize) -> usize {
+/// Number of cases of a long test: the environment variable, or `cases`.
+///
+/// Run by `cargo test --release --lib -- --ignored`.
+fn case_count(variable: &str, cases: usize) -> usize {
     std::env::var(variable).map_or(cases, |n| n.parse().unwrap())
 }
 
-/// What is left of the items in the view, in order: by two passes, and interleaved
-/// where the back end allows it.
+/// Items in view that are kept, in order, by each coupling.
+///
+/// Two passes first; then interleaved if the back end supports it.
 fn kept<B: OcclusionBuffer>(ready: &Ready, view: &View, kernel: Kernel) -> Vec<Vec<ItemId>> {
     let mut answers = vec![by_two_passes::<B>(ready, view, OccluderChoice::All, kernel)];
     if B::ALTERNATES {

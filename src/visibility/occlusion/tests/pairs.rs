@@ -1,11 +1,13 @@
-//! Pairs of boxes made to be confused: edges on borders and centres of pixels and faces
-//! as near as one another, but for the last places of their coordinates.
+//! Pairs of boxes that are hard to tell apart.
+//!
+//! Edges are on borders and centres of pixels; depths of faces are equal but for the last
+//! bits of their coordinates.
 
 use glam::DVec3;
 
 use super::super::{MaskedCentre, MaskedInner, OcclusionBuffer, ZBuffer};
 use super::by_rays::{Ready, with_view};
-use super::{asked_for, kept};
+use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
@@ -13,7 +15,7 @@ use crate::visibility::truth::Probe;
 use crate::visibility::{Ray, SampleGrid};
 
 const GRID: SampleGrid = SampleGrid::new(64, 40);
-/// Slope of a pixel of an image of 90 degrees from top to bottom.
+/// Slope of a pixel of an image with a vertical field of view of 90 degrees.
 const PIXEL: f64 = 2.0 / 40.0;
 const NEAR: f64 = 0.5;
 
@@ -26,7 +28,9 @@ fn nudged(x: f64, rng: &mut SeededRng) -> f64 {
     x + ulp * (rng.below(5) as f64 - 2.0)
 }
 
-/// A box from `depth` on with edges on borders of pixels, or some part of one further.
+/// A box whose front is at `depth`, with edges on borders of pixels.
+///
+/// Some edges are a quarter or half of a pixel further.
 fn on_pixels(columns: [usize; 2], rows: [usize; 2], depth: f64, rng: &mut SeededRng) -> WorldBox {
     let mut at = |border: usize, count: u32| {
         let border = border as f64 + [0.0, 0.0, 0.25, 0.5][rng.below(4)];
@@ -42,7 +46,7 @@ fn on_pixels(columns: [usize; 2], rows: [usize; 2], depth: f64, rng: &mut Seeded
     WorldBox::new(low, high)
 }
 
-/// Two borders from the first to the last one, mostly close to those.
+/// An interval within two borders, mostly close to both.
 fn within([first, last]: [usize; 2], rng: &mut SeededRng) -> [usize; 2] {
     let mut by = |room: usize| match rng.below(8) {
         step @ 0..3 => step.min(room),
@@ -53,7 +57,7 @@ fn within([first, last]: [usize; 2], rng: &mut SeededRng) -> [usize; 2] {
     [from, last - by(last - from)]
 }
 
-/// What may hide, and what it may hide.
+/// A possible occluder, and a box that it may hide.
 fn pair(rng: &mut SeededRng) -> [WorldBox; 2] {
     let mut some = |count: u32| {
         let from = 1 + rng.below(count as usize - 8);
@@ -67,8 +71,9 @@ fn pair(rng: &mut SeededRng) -> [WorldBox; 2] {
     [hides, hidden]
 }
 
-/// Whether a ray to some point of the second box's face, its corners first, meets it and
-/// not the first box before. Exact.
+/// Returns `true` if some ray meets the second box and not the first one before it.
+///
+/// The rays go to the corners and to random points of the second box's front. Exact.
 fn is_seen(boxes: &[WorldBox; 2], eye: DVec3, rng: &mut SeededRng) -> bool {
     let [hides, hidden] = boxes;
     (0..8).any(|number| {
@@ -100,8 +105,7 @@ fn is_seen(boxes: &[WorldBox; 2], eye: DVec3, rng: &mut SeededRng) -> bool {
     })
 }
 
-/// How many pairs there are whose second box is seen, hidden, removed and removed though
-/// it is seen.
+/// Pairs whose second box is seen, is removed, and is removed although it is seen.
 #[derive(Default, Debug)]
 struct Counts {
     seen: usize,
@@ -164,11 +168,11 @@ fn pixel_centres_lose_second_boxes_of_pairs() {
     assert!(lost.iter().all(|&lost| lost > 0), "{lost:?}");
 }
 
-/// More pairs than a test has time for, `OCCLUSION_PAIRS` of them.
+/// A run of minutes over `OCCLUSION_PAIRS` pairs.
 #[test]
 #[ignore = "minutes"]
 fn whole_pixels_lose_no_second_box_of_many_pairs() {
-    let counts = counts::<MaskedInner>(asked_for("OCCLUSION_PAIRS", 10_000_000));
+    let counts = counts::<MaskedInner>(case_count("OCCLUSION_PAIRS", 10_000_000));
     println!("{counts:?}");
     assert_eq!(counts.lost, 0);
 }

@@ -1,4 +1,4 @@
-//! Rules of the stage, each on a few boxes made for it.
+//! Rules of the occlusion stage, each on a few boxes.
 
 use glam::DVec3;
 
@@ -17,7 +17,7 @@ fn solid(min: [f64; 3], max: [f64; 3]) -> WorldBox {
     WorldBox::new(min.into(), max.into())
 }
 
-/// What both couplings keep, which has to be the same.
+/// Items that both couplings keep; panics if their answers differ.
 fn kept_of<B: OcclusionBuffer>(boxes: &[WorldBox], eye: DVec3, lens: Lens) -> Vec<ItemId> {
     let ready = Ready::of(Scene::from_boxes("few", boxes).unwrap());
     let frame = Frame::looking_along(eye, DVec3::X, DVec3::Z).unwrap();
@@ -33,7 +33,7 @@ fn perspective(near: f64) -> Lens {
     Lens::perspective(60.0, 1.6, near, None).unwrap()
 }
 
-/// Far outside of every view, so that no other box reaches the scene's bounds.
+/// Boxes far outside of every view: no other box reaches the scene's bounds.
 fn bounds() -> [WorldBox; 2] {
     [solid([-90.0; 3], [-89.0; 3]), solid([900.0; 3], [901.0; 3])]
 }

@@ -1,4 +1,4 @@
-//! Picket fences: what shows through a gap, however narrow, is visible.
+//! Picket fences: an item behind a gap is visible, however narrow the gap.
 
 use glam::DVec3;
 
@@ -10,8 +10,9 @@ use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::SampleGrid;
 
-/// Of items behind a fence with gaps of so many pixels, how many that rays through
-/// the gaps see are missing; and how many items there are that they see.
+/// Counts the items behind a fence that are lost, and those that are visible.
+///
+/// The gaps are `gap` pixels wide; an item is visible if a ray through a gap meets it.
 fn lost_behind_fence<B: OcclusionBuffer>(grid: SampleGrid, gap: f64, seed: u64) -> (usize, usize) {
     let mut rng = SeededRng::new(seed);
     let lens = Lens::perspective(60.0, 16.0 / 9.0, 0.1, None).unwrap();

@@ -1,10 +1,10 @@
-//! Scenes of the generators, seen from the street.
+//! Generated scenes, seen from street level.
 
 use glam::{DVec3, Vec3};
 
 use super::super::{CullStats, Interleaved, MaskedCentre, MaskedInner, OcclusionBuffer};
 use super::by_rays::{Ready, missing, seen_by_rays, with_view};
-use super::{asked_for, kept};
+use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{LoadOptions, SeededRng, load};
@@ -13,7 +13,7 @@ use crate::visibility::truth::{RayIndex, visible_by_random_rays};
 
 const GRID: SampleGrid = SampleGrid::new(160, 90);
 
-/// Eyes 1.7 above the lowest point, outside of all boxes, looking about.
+/// Cameras 1.7 above the lowest point, outside of all boxes, in random directions.
 pub fn cameras(ready: &Ready, count: usize) -> Vec<Camera> {
     let mut rng = SeededRng::new(11);
     let world = ready.scene.world_bounds();
@@ -98,10 +98,12 @@ fn every_instruction_set_gives_the_same_answer() {
     }
 }
 
-/// [`CullStats`] of six views. What is asked, drawn and kept depends on the order of the
-/// walk and on nothing else: a quicker walk has the same counts.
+/// [`CullStats`] of six views.
+///
+/// The counts of tested, drawn and kept boxes depend on the order of the traversal only: a
+/// faster traversal has the same counts.
 #[test]
-fn the_walk_asks_draws_and_keeps_what_it_did() {
+fn the_walk_tests_draws_and_keeps_pinned_numbers_of_boxes() {
     let pinned = [[2067, 202, 398], [1160, 214, 183], [6003, 2535, 3529]];
     for (spec, [boxes, drawn, kept]) in SCENES.into_iter().zip(pinned) {
         let ready = ready(spec);
@@ -122,13 +124,13 @@ fn the_walk_asks_draws_and_keeps_what_it_did() {
     }
 }
 
-/// More rays between the samples than a test has time for, `OCCLUSION_RAYS` over all.
+/// A run of minutes over `OCCLUSION_RAYS` rays between the samples.
 #[test]
 #[ignore = "minutes"]
 fn streets_lose_nothing_along_many_more_rays() {
     let scenes = ["city:n=10k", "city:n=100k", "rooms:n=50k", "forest:n=50k"];
     let (views, threads) = (8, 2);
-    let rays_each = asked_for("OCCLUSION_RAYS", 100_000_000) / (scenes.len() * views);
+    let rays_each = case_count("OCCLUSION_RAYS", 100_000_000) / (scenes.len() * views);
     for spec in scenes {
         let ready = ready(spec);
         let index = RayIndex::build(&ready.solids);

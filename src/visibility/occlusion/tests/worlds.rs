@@ -6,7 +6,7 @@ use super::super::{
     HierarchicalZ, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer,
 };
 use super::by_rays::{Ready, missing, point_between, seen_by_rays, with_view};
-use super::{asked_for, kept};
+use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
@@ -150,7 +150,7 @@ fn no_occlusion_loses_nothing() {
 #[test]
 #[ignore = "minutes"]
 fn whole_pixels_lose_nothing_in_many_more_worlds() {
-    let count = asked_for("OCCLUSION_WORLDS", 25_000) as u64;
+    let count = case_count("OCCLUSION_WORLDS", 25_000) as u64;
     for (far_out, parallel) in [(0.0, false), (0.0, true), (1e7, false), (1e7, true)] {
         let (lost, removed) = losses::<MaskedInner>(1000..1000 + count, far_out, parallel);
         println!("far out {far_out}, parallel {parallel}: {removed} removed, {lost} lost");

@@ -12,8 +12,10 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::Rays;
 
-/// Rooms in a row along an axis with slits around one line, which extend on each side
-/// of it by `margin`; an eye in the first room, and a point in the last, on it.
+/// Rooms in a row along an axis, with slits around one line of sight.
+///
+/// The slits extend by a margin on each side of the line. `ends` are the eye in the first
+/// room and a point in the last one, both on the line.
 struct Chain {
     rooms: Vec<WorldBox>,
     openings: Vec<Opening>,
