@@ -18,7 +18,7 @@ const RANDOM_FLOOR: f64 = 1e7;
 const TIES_FLOOR: f64 = 5e6;
 const REPEATS: usize = 9;
 
-/// Questions: every oracle is asked about every box.
+/// Questions: every oracle tests every box.
 struct Workload {
     name: &'static str,
     oracles: Vec<Oracle>,

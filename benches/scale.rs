@@ -28,12 +28,12 @@ const STRUCTURES: [(&str, usize); 6] = [
     ("octree", 10_000_000),
 ];
 
-/// What the wide tree promises, on one thread and on a quiet machine.
+/// Goals of the wide tree, on one thread and a quiet machine.
 const MOST_BUILD_NS: f64 = 90.0;
 const MOST_BYTES: f64 = 30.0;
 const MOST_EXPONENT: f64 = 0.35;
 
-/// As in the suite `growth`.
+/// Number of visible items, as in the suite `growth`.
 const FIXED: usize = 500;
 
 /// Builds are repeated this often, or until they have taken this long.

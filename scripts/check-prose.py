@@ -1,11 +1,7 @@
 #!/usr/bin/env python3
 """The mechanical part of the rules for prose: how doc comments begin, and phrases for which there
-is a plainer one. Reads comments and strings of src and examples, docs, README and CHANGELOG.
-scripts/prose.allowed has a count per rule that may only fall. Standard library only.
-
-usage: scripts/check-prose.py [--list] [--record]
-  --list     print every occurrence, allowed or not
-  --record   write today's counts, none of which may be above the recorded one
+is a plainer one. Reads comments and strings of all Rust code, docs, README and CHANGELOG. Prints
+every occurrence and fails if there is any. Standard library only.
 """
 
 import re
@@ -13,8 +9,9 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-ALLOWED = ROOT / "scripts" / "prose.allowed"
 LONGEST_SUMMARY = 80
+RUST = ["src", "tests", "benches", "examples", "fuzz/src"]
+FOLDERS = [*((folder, "*.rs") for folder in RUST), ("docs", "*.md")]
 
 # Rule -> what to write. A space in a phrase is any white space, a line break of a comment or of
 # a string included.
@@ -57,7 +54,7 @@ def compiled(phrase):
 
 
 def files():
-    for folder, pattern in [("src", "*.rs"), ("examples", "*.rs"), ("docs", "*.md")]:
+    for folder, pattern in FOLDERS:
         yield from sorted((ROOT / folder).rglob(pattern))
     yield from (ROOT / name for name in ["README.md", "CHANGELOG.md"])
 
@@ -106,29 +103,14 @@ def advice(rule):
     }.get(rule) or f"write: {PHRASES[rule]}"
 
 
-def main(arguments):
-    found = {rule: [] for rule in ["doc-opener", "doc-length", *PHRASES]}
-    for rule, *where in occurrences():
-        found[rule].append(where)
-    rows = ALLOWED.read_text().splitlines() if ALLOWED.exists() else []
-    counts = dict(row.split("\t") for row in rows if row and not row.startswith("#"))
-    allowed = {rule: int(counts.get(rule, 0 if counts else len(found[rule]))) for rule in found}
-    over = [rule for rule in found if len(found[rule]) > allowed[rule]]
-    for rule in found if "--list" in arguments else over:
-        for name, number, text in found[rule]:
-            print(f"{name}:{number}: {text} ({advice(rule)})")
-    for rule in over:
-        expected = f"{len(found[rule])} found; expected at most {allowed[rule]}"
-        print(f"check-prose: {rule}: {expected}", file=sys.stderr)
-    if "--record" in arguments and not over:
-        head = "# Rule and how often it is still broken; may only fall: check-prose.py --record\n"
-        rows = (f"{rule}\t{len(where)}\n" for rule, where in found.items() if where)
-        ALLOWED.write_text(head + "".join(rows))
-    fewer = sum(allowed[rule] - len(found[rule]) for rule in found if rule not in over)
-    if fewer and "--record" not in arguments:
-        print(f"check-prose: {fewer} fewer than allowed; record that with --record")
-    return 1 if over else 0
+def main():
+    count = 0
+    for count, (rule, name, number, text) in enumerate(occurrences(), 1):
+        print(f"{name}:{number}: {text} ({advice(rule)})")
+    if count:
+        print(f"check-prose: {count} found; expected none", file=sys.stderr)
+    return 1 if count else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

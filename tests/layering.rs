@@ -140,8 +140,9 @@ fn leaves(tree: &str, found: &mut Vec<String>) {
     }
 }
 
-/// What the code of a module names of this crate, from the root of the crate on,
-/// and whether it hands it on (`pub use`).
+/// Paths of this crate that a module uses, each with `true` for a `pub use`.
+///
+/// The paths begin at the root of the crate.
 fn named(module: &str, code: &str, modules: &BTreeMap<String, PathBuf>) -> Vec<(String, bool)> {
     let mut found = Vec::new();
     for statement in code.split(';') {
@@ -199,8 +200,8 @@ fn no_files_import_each_other_in_a_circle() {
         .iter()
         .map(|(name, file)| (name, named(name, &code(file), &modules)))
         .collect();
-    // A name that a module hands on is its owner's.
-    let handed_on: BTreeMap<(&String, &str), &String> = used
+    // A re-exported name belongs to the module that defines it.
+    let exported: BTreeMap<(&String, &str), &String> = used
         .iter()
         .flat_map(|(module, paths)| paths.iter().map(move |path| (*module, path)))
         .filter(|(_, (_, is_public))| *is_public)
@@ -217,7 +218,7 @@ fn no_files_import_each_other_in_a_circle() {
                     .map(|(module, _)| (module, &names[n..]))
             });
             let (module, rest) = known.expect("the root is a module");
-            let next = rest.first().and_then(|name| handed_on.get(&(module, name)));
+            let next = rest.first().and_then(|name| exported.get(&(module, name)));
             match next {
                 Some(next) if **next != path => {
                     path = [&[&next[..]], &rest[1..]].concat().join("::")

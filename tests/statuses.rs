@@ -1,7 +1,8 @@
-//! Every status of a report happens: structures that allocate without end, hang,
-//! abort or panic fail their own rows and nobody else's. This file is the
-//! program and its test in one (`harness = false`): with [`CHILD`] set it is
-//! `cullbench` with those structures, else it starts itself.
+//! Every status of a report, by structures with faults.
+//!
+//! Structures that allocate without end, hang, abort or panic fail their own rows and no
+//! others. This file is both the program and its test (`harness = false`): with [`CHILD`]
+//! set it is `cullbench` with those structures, else it starts itself.
 
 use std::env;
 use std::fs::OpenOptions;
@@ -20,7 +21,7 @@ use serde_json::{Value, json};
 /// Set for the processes that are the program.
 const CHILD: &str = "CULLBENCH_TEST_STATUSES_CHILD";
 
-/// What a structure does where it should build or answer.
+/// Fault of a structure at its build or its queries.
 trait Mishap: Send + Sync + 'static {
     const NAME: &'static str;
     fn at_build() {}
@@ -292,7 +293,7 @@ impl Mishap for HangsLate {
     }
 }
 
-/// What has ended a process is not given another `--timeout` by `--resume`.
+/// `--resume` skips the structure that ended a process: no second `--timeout`.
 fn a_resumed_run_does_not_try_again_what_has_ended_a_process() {
     let folder = tempfile::tempdir().expect("a folder");
     let line = "run --scene city:n=300 --path orbit:frames=4 --processes 60 --no-bounds \

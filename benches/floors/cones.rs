@@ -1,6 +1,8 @@
-//! The floor of cones: clusters whose triangles all turn away are found, sixteen cones at a
-//! time and with the margin for rounding, several times as fast as by meshoptimizer's
-//! documented test of one cone at a time: its stand-in, and the crate with feature `peers`.
+//! Floor of cones: how much faster they are than the test of meshoptimizer.
+//!
+//! `cones` tests sixteen clusters at a time, with a margin for rounding. The documented
+//! test of meshoptimizer, one cone at a time, is measured as a stand-in, and as the crate
+//! itself with feature `peers`.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -30,8 +32,9 @@ const BUILDS: usize = 5;
 /// Time of theirs / time of ours, at least: less must not be proven.
 const LEAST_AHEAD: f64 = 4.0;
 
-/// Times every scene on every instruction set, and judges those that have vectors; how
-/// many floors are missed.
+/// Times every scene on every instruction set; returns how many floors are missed.
+///
+/// Only instruction sets with vectors have a floor.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
     let missed_in = |source| missed_in(source, only_test, turns);
     SCENES.into_iter().map(missed_in).sum()

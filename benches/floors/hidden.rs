@@ -1,5 +1,6 @@
-//! Floors of the occlusion stage as a whole, from the street: what the guarantee costs
-//! beside the same buffer without one, and what a removed item costs.
+//! Floors of the occlusion stage: time of the guarantee and per removed item.
+//!
+//! The guarantee is compared with the same buffer without one. Cameras are at street level.
 
 use std::hint::black_box;
 
@@ -19,15 +20,18 @@ const PATH: &str = "street:frames=32";
 const GRID: SampleGrid = SampleGrid::new(320, 180);
 /// Time with the guarantee / time without, at most.
 const MOST_TIMES: f64 = 1.05;
-/// How often scene and buffers are made anew: their place in memory is worth as much as the
-/// few percent between the two.
+/// Number of builds of scene and buffers.
+///
+/// Their addresses change times by a few percent, as much as the difference measured.
 const BUILDS: usize = 7;
 
-/// Of scenes of more items that is printed and not judged: most of them are smaller than a
-/// pixel, and none covers one wholly.
+/// Items of a scene, at most, for the floor of the guarantee.
+///
+/// In larger scenes most items are smaller than a pixel and none covers one; their ratio
+/// is printed only.
 const MOST_ITEMS: usize = 100_000;
 
-/// By scene: time of a removed item, at most.
+/// Time per removed item, at most, by scene.
 const REMOVED: [(&str, f64); 6] = [
     ("city:n=10000", 22.0),
     ("city:n=100000", 4.0),

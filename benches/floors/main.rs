@@ -85,17 +85,18 @@ const FLOORS: [Floor; 8] = [
     },
 ];
 
-/// What every floor is measured against.
+/// Structure to whose time every floor is a ratio.
 const YARDSTICK: &str = "linear-scalar";
 
-/// What the harness may add to a query.
+/// Share of a query's time that the harness may add.
 const MOST_OVERHEAD: f64 = 0.01;
 /// Passes of the harness and of the loop, in turns.
 const TURNS: usize = 41;
 
-/// Time of the harness / time of a loop by hand over the same cameras, for a short
-/// query and a long one; the number of structures for which it is proven to be
-/// above 1 + [`MOST_OVERHEAD`].
+/// Compares the harness with a plain loop over the same cameras.
+///
+/// Returns the number of structures for which the ratio of times is significantly above
+/// 1 + [`MOST_OVERHEAD`]. Structures have short and long queries.
 fn harness_overhead(only_test: bool, turns: usize) -> u32 {
     let (_, scene, cameras) = loaded("city:n=20000", "flythrough:frames=512,visible=2%", false);
     let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
@@ -172,7 +173,7 @@ fn harness_overhead(only_test: bool, turns: usize) -> u32 {
     missed
 }
 
-/// Judges some floors: only tested or timed, in so many turns; how many are missed.
+/// Checks some floors, given `only_test` and `turns`; returns how many are missed.
 type Part = fn(bool, usize) -> u32;
 
 /// Time of one task / time of another, from turns of both: the mean of the ratios'
@@ -185,8 +186,9 @@ fn ratio(turns: usize, mut one: impl FnMut() -> f64, mut other: impl FnMut() -> 
     as_ratio(&ratios.collect::<Vec<_>>())
 }
 
-/// Ratios of pairs that were built anew each time, since the place in memory is worth some
-/// percent: their mean, with its interval over the builds.
+/// Mean ratio over pairs of builds, with its interval.
+///
+/// Each pair is built again, since addresses in memory change times by some percent.
 fn over_builds(builds: usize, of_one: impl FnMut(usize) -> f64) -> [f64; 3] {
     as_ratio(&(0..builds).map(of_one).map(f64::ln).collect::<Vec<_>>())
 }
@@ -207,7 +209,7 @@ fn shortened(source: &str, only_test: bool) -> String {
     }
 }
 
-/// That scene, as it is called, and a path through it.
+/// Name of a scene, the scene, and a path through it; see [`shortened`].
 fn loaded(source: &str, path: &str, only_test: bool) -> (String, Scene, CameraPath) {
     let source = shortened(source, only_test);
     let scene = scene::load(&source, &Default::default()).expect(&source);

@@ -42,7 +42,7 @@ impl Work for Project<'_> {
     }
 }
 
-/// What the boxes of a view's blocks are tested with.
+/// Rectangles of the boxes of a view's blocks, with masks of their lanes.
 type Asked = [(Rects, LaneMask)];
 
 /// How many of them are hidden, sixteen at a time.
@@ -82,7 +82,7 @@ impl Work for Alone<'_> {
     }
 }
 
-/// What some block of the view asks: its boxes that have a rectangle.
+/// Collects the rectangles of all boxes in view, block by block.
 struct Ask<'a>(
     &'a OccluderScene,
     &'a View<'a>,

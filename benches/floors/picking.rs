@@ -1,5 +1,6 @@
-//! The floor of picking: the first item under a cursor is found no later than by `obvhs`,
-//! in items as boxes and as triangles.
+//! Floor of picking: finding the first item is no slower than with `obvhs`.
+//!
+//! Items are boxes and triangles.
 
 use std::hint::black_box;
 
@@ -32,8 +33,9 @@ const BUILDS: usize = 9;
 /// Time / time of obvhs, at most: more than that must not be proven.
 const MOST_TIMES: f64 = 1.0;
 
-/// Times every scene on every instruction set, and judges those that have vectors; how
-/// many floors are missed.
+/// Times every scene on every instruction set; returns how many floors are missed.
+///
+/// Only instruction sets with vectors have a floor.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
     let missed_in = |source| missed_in(source, only_test, turns);
     SCENES.into_iter().map(missed_in).sum()

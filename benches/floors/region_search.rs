@@ -1,5 +1,6 @@
-//! What exactness costs region search: a structure that is asked for points as they
-//! were written, beside the same structure with the points rounded to f32, on a tiling.
+//! Overhead of exact region search over a search in f32, on a tiling.
+//!
+//! One structure is queried with f64 points and with the same points rounded to f32.
 
 use std::hint::black_box;
 
@@ -17,8 +18,7 @@ const POINTS: usize = 1 << 14;
 /// Time of exact search / time in f32.
 const MOST_TIMES: f64 = 1.25;
 
-/// Points in regions drawn at random: anywhere in them, or within an ulp of f32 of a
-/// face, on either side.
+/// Random points in random regions, or within an f32 ulp of their faces.
 fn points(scene: &Scene, beside_faces: bool) -> Vec<DVec3> {
     let boxes = scene.regions.boxes(&scene.items);
     let mut rng = SeededRng::new(18);

@@ -1,6 +1,6 @@
-//! The floor of a stored set of visible regions: asking what is seen from a region and
-//! reading the answer takes little more than reading the stored row; and what finding the
-//! eye's region adds to it.
+//! Floor of a stored PVS: a query takes little more than reading the stored row.
+//!
+//! Also prints the time of finding the region of the eye.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use super::{loaded, over_builds, ratio, verdict};
 
 const PATH: &str = "street:frames=32";
 const SCENE: &str = "rooms:n=50000";
-/// How often the rows are stored anew.
+/// Number of builds of the stored rows.
 const BUILDS: usize = 9;
 /// Time of the answer / time of reading the row, at most: more must not be proven.
 const MOST_TIMES: f64 = 1.5;

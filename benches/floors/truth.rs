@@ -1,5 +1,6 @@
-//! The floor of the sample truth: so many exact rays a second on one thread, among boxes
-//! and among triangles.
+//! Floor of the sample truth: exact rays per second and thread.
+//!
+//! The rays meet boxes and triangles.
 
 use std::hint::black_box;
 

@@ -27,7 +27,7 @@ use table::{
     ALL, LEAST_OF_TREES, MOST_BUILD_NS, MOST_BYTES, MOST_RANGES_US, TINY, TREES, WORLDS, Way, World,
 };
 
-/// Of a row: views that the heat before it asks about.
+/// Views per row in the heat, which comes before the row.
 const HEAT_VIEWS: usize = 4;
 /// Time of a crate / time of the fastest crate proper, in the heat, from which on
 /// it is left out of the row: no noise makes up for that.
@@ -56,7 +56,7 @@ impl World {
     }
 }
 
-/// What was judged, and how it came out.
+/// Counts of checked and of missed goals.
 struct Judge {
     only_test: bool,
     missed: u32,
@@ -109,7 +109,7 @@ fn quotient(base: &ReportCell, other: &ReportCell) -> Option<Metric> {
     })
 }
 
-/// Of a structure whose answers are right.
+/// Time per query of a structure; `None` if its answers are wrong.
 fn query_ns(cell: &ReportCell) -> Option<f64> {
     let sound = cell.status == Status::Ok;
     let time = cell.metrics.get("query_ns").filter(|_| sound);
@@ -138,9 +138,10 @@ fn is_own_grid<Name>(kind: Kind, origin: &Origin<Name>) -> bool {
     origin.is_ours() && kind == Kind::Grid
 }
 
-/// Those that stay in a row, and those that are left out of it: peers far
-/// behind the fastest crate over some of the views. Whoever cannot answer stays,
-/// for the row to say so.
+/// Splits the subjects into those of the row and those left out.
+///
+/// Peers far behind the fastest crate over some of the views are left out. A subject
+/// that fails stays, so that the row shows its failure.
 fn heat(entered: Vec<Subject>, workload: &Workload) -> (Vec<Subject>, Vec<Subject>) {
     let step = workload.views.len().div_ceil(HEAT_VIEWS);
     let time = |subject: &Subject| {
@@ -248,7 +249,7 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     }
 }
 
-/// What is the same on all ways through a scene.
+/// Checks the goals that do not depend on the path: build time and memory.
 fn judge_build(judge: &mut Judge, world: &World, subject: &Subject, items: usize) {
     let (Ok(built), false) = (&subject.built, world.cold) else {
         return;

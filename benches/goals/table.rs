@@ -150,9 +150,8 @@ pub const WORLDS: [World; 9] = [
     },
 ];
 
-/// Of the subject, in every world: CPU time of a build, and memory, an item.
+/// CPU time of a build and memory, per item, at most; in every world.
 pub const MOST_BUILD_NS: f64 = 90.0;
 pub const MOST_BYTES: f64 = 30.0;
-/// Of `wide`, in every warm world where all is visible: CPU time of an answer in
-/// ranges.
+/// CPU time of an answer in ranges, at most; in warm worlds where all is visible.
 pub const MOST_RANGES_US: f64 = 0.1;

@@ -1,6 +1,8 @@
-//! Any bytes for every reader: no panic, no hang, errors of one line, and what was read can be
-//! used, and written and read again the same. One program, so that one is linked;
-//! `FUZZ_READER` says which reader it is.
+//! Feeds arbitrary bytes to a reader.
+//!
+//! Readers must not panic or hang, and errors have one line. Data that was read can be
+//! used, and is the same after writing and reading it again. All readers are in one
+//! program to link once; `FUZZ_READER` selects the reader.
 #![no_main]
 
 mod runs;

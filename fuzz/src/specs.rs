@@ -1,4 +1,4 @@
-//! Readers of typed text: scenes, paths, structures, suites and the language that names them.
+//! Readers of typed text: scenes, paths, structures, suites and their specs.
 
 use std::sync::LazyLock;
 
@@ -53,8 +53,10 @@ fn structures(list: &str) {
     }
 }
 
-/// The spec, unless a number of it makes a large scene or a long path. What could be the name
-/// of a file is told as it is: that one would have control characters in it.
+/// Parses a spec; `None` if one of its numbers makes a large scene or a long path.
+///
+/// Text with control characters is skipped, as error messages print names of files as
+/// they are.
 fn small(line: &str) -> Option<Spec> {
     let spec = read(Spec::parse_behind("mesh:", line))?;
     if line.contains(char::is_control) {

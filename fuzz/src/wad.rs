@@ -1,4 +1,4 @@
-//! Doom maps: a map that is accepted has one region for every point and can be seen through.
+//! Doom maps: every point of an accepted map has one region, and all stages work.
 
 use std::sync::Arc;
 
@@ -30,7 +30,7 @@ pub fn wad(bytes: &[u8]) {
     }
 }
 
-/// What the stages of the funnel make of a map.
+/// Runs the stages of the funnel on a map.
 fn see_through(map: Arc<DoomMap>, scene: &Scene) {
     let surfaces = map.surfaces(scene);
     assert_eq!(surfaces.items(), scene.items.len() + map.sectors.len());

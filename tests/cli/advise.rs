@@ -16,7 +16,7 @@ const SMALL: &str =
 const RULES: &str = "needless-planes plane-masks no-index six-planes regions occlusion occlusion-buffer \
      cones sorting third-dimension rebasing rebuild f64-kernel frame-correction";
 
-/// Of one process: for what is no time.
+/// Advice from one process, for checks of everything but times.
 pub fn advice(folder: &Path, line: &str) -> Value {
     json(&works(
         folder,

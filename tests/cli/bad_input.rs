@@ -1,5 +1,7 @@
-//! What cannot be read, made or written: exit code 2, one line that names the
-//! place, what was found and what was expected, and not a trace on disk.
+//! Input that cannot be read, generated or written.
+//!
+//! The program ends with exit code 2 and one line that names the place, what was found and
+//! what was expected, and leaves nothing on disk.
 
 use std::fs;
 
@@ -376,7 +378,7 @@ fn several_bad_rows_are_counted_and_skipped_on_request() {
     assert_eq!(written.lines().count(), 3);
 }
 
-/// So many columns that looking for each among all others takes minutes.
+/// 300,001 columns: comparing each with all others would take minutes.
 #[test]
 fn a_column_twice_is_found_among_very_many() {
     use std::fmt::Write;

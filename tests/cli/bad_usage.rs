@@ -1,4 +1,4 @@
-//! Wrong usage: unknown names, wrong values of options, and places that cannot be written.
+//! Wrong usage: unknown names, wrong values of options, paths without write access.
 
 use std::fs;
 
@@ -215,7 +215,7 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
     for (command, out, wanted) in cases {
         all_refused(&folder, &[format!("{command} {out}")], wanted);
     }
-    // Somebody's own file in the folder of a run.
+    // The folder has a file that is not of a run.
     fs::create_dir(folder.path().join("mine")).expect("writable");
     fs::write(folder.path().join("mine/samples.csv"), "mine").expect("writable");
     let mine = format!("{run} mine");

@@ -1,5 +1,7 @@
-//! Small inputs with a right answer that is easily missed: maps with lumps or linedefs out
-//! of order, numbers at the ends of f32, CSV that is not closed.
+//! Small inputs that are easily answered wrongly.
+//!
+//! Maps with lumps or linedefs out of order, numbers at the limits of f32, CSV whose quotes
+//! are not closed.
 
 use std::path::PathBuf;
 
@@ -12,8 +14,9 @@ fn cases() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/cases"))
 }
 
-/// Runs `funnel`; what promises to lose nothing must keep its word. The report, and what
-/// is visible in all views together.
+/// Runs `funnel`; returns the report and the sum of visible items over all views.
+///
+/// Panics if a back end with a guarantee loses an item.
 fn funnel(scene: &str, path: &str, options: &str) -> (Value, f64) {
     let line = format!(
         "funnel --scene {scene} --path {path} --samples 48x32 --processes 1 --format json {options}"
@@ -83,8 +86,7 @@ fn a_foreign_lump_among_a_maps_own_changes_nothing() {
     }
 }
 
-/// How much is seen in maps whose sectors their lines close or do not: the same, without
-/// regions.
+/// Maps whose lines do not close their sectors have no regions and lose no item.
 #[test]
 fn sectors_that_their_lines_do_not_close_lose_nothing() {
     let maps = [

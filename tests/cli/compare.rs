@@ -284,7 +284,7 @@ fn statuses_go_before_times() {
             text.contains(&format!("ok to {name}")) && !text.contains('\x1b'),
             "{text}"
         );
-        // It was wrong already, or nobody has asked it before.
+        // Wrong in OLD already, or absent from OLD.
         let twice = with_change(|new| status(bvh(new), name));
         fs::copy(twice.path().join("new.json"), twice.path().join("old.json")).expect("writable");
         assert_eq!(rows(&compare(twice.path(), "", 1), "failed in both"), 1);
@@ -310,7 +310,7 @@ fn statuses_go_before_times() {
         fs::rename(lost.path().join("kept"), &new).expect("writable");
         assert_eq!(rows(&compare(lost.path(), "", 0), "gained"), 1);
         fs::copy(&old, &new).expect("writable");
-        // What is asked of neither has not failed.
+        // A cell that neither run measured has not failed.
         let both = match name {
             "left_out" => "1 unmeasured",
             _ => "1 failed in both",

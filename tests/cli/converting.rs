@@ -19,7 +19,7 @@ fn convert(folder: &Path, line: &str, file: &str) -> (String, String) {
     (text, done.err)
 }
 
-/// What is seen, by both columns that tell answers apart.
+/// Counts of visible items and sums of their ids, as returned by `query`.
 fn seen(folder: &Path, scene: &str) -> Vec<[String; 3]> {
     let line = format!("query --scene {scene} --cameras cameras.csv --structure linear,bvh");
     let rows = rows(&works(folder, &line));
@@ -71,7 +71,7 @@ fn a_converted_scene_gives_the_same_answers_and_the_same_bytes_again() {
     assert!(text.ends_with(",tower,\"x\ny\"\n"), "{text}");
 }
 
-/// What `query`, `locate` and `verify` tell of `boxes.csv` in a folder.
+/// Output of `query`, `locate` and `verify` for `boxes.csv` in a folder.
 fn told(folder: &Path) -> [String; 3] {
     let query = "query --scene boxes.csv --cameras cameras.csv --structure linear,bvh --ids";
     let locate = "locate --scene boxes.csv --points points.csv --structure linear,bvh";

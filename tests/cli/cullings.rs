@@ -226,8 +226,7 @@ fn verify_holds_the_default_planes_to_the_camera() {
     assert!(count("--epsilon 0") < 4 * 399, "{}", count("--epsilon 0"));
 }
 
-/// Parallel rays in one file with perspective ones, through query, run, verify, funnel
-/// and check.
+/// Orthographic and perspective cameras in one file, read by every command.
 #[test]
 fn orthographic_cameras_are_typed() {
     let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,up_x,up_y,up_z,ortho_height,fovy_deg,near,far\n\

@@ -1,5 +1,6 @@
-//! Names and labels that somebody else chose: what would steer a terminal, break
-//! a picture or be carried out by a spreadsheet, on every way out.
+//! Names and labels from untrusted input, in every kind of output.
+//!
+//! They may contain control sequences of terminals, markup, or formulas of spreadsheets.
 
 use std::fs;
 

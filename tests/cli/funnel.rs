@@ -1,5 +1,6 @@
-//! `funnel`: a scene whose answer is seen with the naked eye, the fields of its JSON
-//! and CSV, promises that hold on generated scenes, and refusals. No time is judged.
+//! `funnel`: a scene with an obvious answer, fields of JSON and CSV, guarantees.
+//!
+//! Errors are tested as well. The guarantees are checked on generated scenes. No test depends on a time.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +11,7 @@ use serde_json::Value;
 use super::process::*;
 use super::{BOXES, EYE_LOOK};
 
-/// A wall, a box behind it, one beside it, one behind the camera, and one around it.
+/// A wall, and boxes behind it, beside it, behind the camera and around the camera.
 const SCENE: &str = "\
 10,-5,-1,11,5,10
 20,-1,0,21,1,2
@@ -124,8 +125,7 @@ fn assert_fits(text: &str) {
     }
 }
 
-/// Intervals make the times wide, large scenes the counts, and names are as long as they
-/// are.
+/// Wide tables: times with intervals, counts of large scenes, and long names.
 #[test]
 fn tables_of_many_items_with_intervals_fit() {
     let more = "--path street:frames=2 --samples 32x18 --processes 3";
@@ -322,7 +322,7 @@ fn lower_bounds_are_of_the_back_ends_beside_them() {
     }
 }
 
-/// What is under a cursor is what promises to be exact says, for every question.
+/// Checks that picking back ends with a guarantee are right, for every question.
 pub fn picked_exactly(report: &Value) {
     let picks = array(report, "picks");
     for question in ["first item", "nearest 8", "all within 4 pixels"] {
@@ -339,8 +339,10 @@ pub fn picked_exactly(report: &Value) {
     assert!(number(crates, "wrong_count") < 0.02 * number(crates, "ray_count"));
 }
 
-/// Orders of items of triangles: those by boxes, and what the scene has beside them. All draw
-/// the same fragments, and sorted ones shade no more than those in the order of their ids.
+/// Checks the draw orders of items made of triangles.
+///
+/// The scene has the orders by boxes and those named by `more`. All draw the same
+/// fragments; sorted orders shade no more than the order of ids.
 pub fn orders_of_triangles(report: &Value, more: &[&str]) {
     let orders = array(report, "orders");
     let names: Vec<_> = orders

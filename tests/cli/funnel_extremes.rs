@@ -1,5 +1,4 @@
-//! `funnel` of scenes at the ends of what it takes: sizes, windows, and how many items lie
-//! behind each other.
+//! `funnel` at its limits: sizes of scenes, windows, and depth complexity.
 
 use std::fs;
 use std::path::Path;
@@ -71,7 +70,7 @@ fn areas_that_overflow_and_windows_too_narrow_for_f32_lose_nothing() {
     );
 }
 
-/// Forty boxes that overlap are cut into hundreds of parts, each as large in the image.
+/// Forty overlapping boxes, cut into hundreds of parts that each fill the image.
 #[test]
 fn an_order_that_cuts_too_much_is_left_out_and_says_why() {
     let of = |i: i32| format!("{0},-50,-50,{1},50,50\n", f64::from(i) * 1e-3, 100 + i);

@@ -9,8 +9,7 @@ use super::BOXES;
 use super::funnel::{LINE, counted, folder, plain_report, row, rows};
 use super::process::*;
 
-/// The wall as a mirror: what is behind the camera is seen in it, what is behind the wall
-/// is not.
+/// The wall as a mirror shows items behind the camera, but none behind the wall.
 #[test]
 fn a_mirror_shows_what_is_before_it_on_its_own_samples() {
     let folder = folder();
@@ -150,7 +149,7 @@ fn a_stencil_of_portals_saves_samples_and_shows_the_same() {
         }
         let asked = ["z-test", "stencil-test"].map(|test| counted(&report, test, "asked_count"));
         assert!(asked[1] < 0.6 * asked[0], "{asked:?}");
-        // What was not kept out was asked, and so were the samples of the portals.
+        // Fragments that were not kept out were tested, as were the samples of the portals.
         let kept_out = counted(&report, "stencil-test", "kept_out_count");
         assert!(asked[1] + kept_out > asked[0], "{asked:?} {kept_out}");
         let said = array(&report, "conclusions").iter();

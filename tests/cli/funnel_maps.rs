@@ -1,11 +1,11 @@
-//! `funnel` of Doom maps: regions, the faces of walls, what is drawn with floors and ceilings.
+//! `funnel` of Doom maps: regions, faces of walls, floors and ceilings.
 
 use std::path::Path;
 
 use super::funnel::{counted, orders_of_triangles, picked_exactly, row, rows};
 use super::process::*;
 
-/// Of all that is in view: behind walls, floors and ceilings.
+/// The depth test removes items behind walls, floors and ceilings.
 #[test]
 fn a_map_is_drawn_with_its_floors_and_ceilings() {
     let line = "funnel --scene freedm-map20 --path street:frames=8 --frames 1 --samples 64x36 \
@@ -69,8 +69,10 @@ fn a_map_has_regions_and_the_faces_of_its_walls() {
     picked_exactly(&report);
 }
 
-/// Linedefs that have the pool on both sides: it is where the map's tree has it, and no
-/// floor of the room about it hides what stands in it.
+/// Linedefs that have the same sector, a pool, on both sides.
+///
+/// The pool lies where the BSP of the map has it, and no floor of the room around it
+/// hides the items in it.
 #[test]
 fn a_map_whose_linedefs_disagree_has_no_regions_and_loses_nothing() {
     let folder = tempfile::tempdir().unwrap();

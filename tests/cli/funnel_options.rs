@@ -1,5 +1,4 @@
-//! `funnel`: options beside the chain: another choice of occluders, boxes inside meshes, and
-//! every question of picking.
+//! `funnel`: choice of occluders, boxes inside meshes, questions of picking.
 
 use std::path::Path;
 use std::sync::LazyLock;

@@ -1,5 +1,4 @@
-//! What the program says of itself: lists, help, JSON wherever it is offered,
-//! and that everything in a list can be used.
+//! Lists, help texts and their JSON; every entry of a list can be used.
 
 use std::fs;
 use std::path::Path;

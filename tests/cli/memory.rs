@@ -1,5 +1,6 @@
-//! Memory that cannot be had is one line and exit code 2, or a row that is left out, in
-//! every command, and never the end of the program.
+//! Failed allocations are one line and exit code 2, or a row that is left out.
+//!
+//! No command aborts because of one.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +8,7 @@ use std::process::Command;
 use super::PROGRAM;
 use super::process::*;
 
-/// Runs a command that may take so many KiB of address space.
+/// Runs a command with an address space of `kibibytes` KiB.
 fn limited(folder: &Path, kibibytes: u32, line: &str) -> Done {
     let mut command = Command::new("sh");
     let script = format!("ulimit -v {kibibytes}; exec {PROGRAM} {line}");

@@ -1,5 +1,4 @@
-//! Generated meshes as scenes: every command takes the boxes of their items, and the
-//! funnel their triangles.
+//! Generated meshes as scenes: `funnel` uses their triangles, other commands boxes.
 
 use std::path::Path;
 

@@ -1,5 +1,4 @@
-//! Where output goes: a reader who leaves early, a full disk, and files that
-//! are links or pipes.
+//! Targets of output: a pipe that is closed early, a full disk, links and pipes.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -10,7 +9,7 @@ use super::process::*;
 use super::queries::QUERY;
 use super::runs::{cells, check_run};
 
-/// Runs a command of whose output only so many lines are read.
+/// Runs a command and closes its output after `lines` lines.
 fn cut_off(folder: &Path, line: &str, lines: usize) -> Done {
     let (reader, writer) = std::io::pipe().expect("a pipe");
     let mut reader = (lines > 0).then(|| BufReader::new(reader));
@@ -69,7 +68,7 @@ fn a_reader_who_leaves_early_is_no_error() {
         let done = cut_off(folder.path(), line, 0);
         assert_eq!((done.code, done.err.as_str()), (Some(0), ""), "{line}");
     }
-    // The figures are on disk, whether or not somebody reads the table.
+    // The figures are on disk although the table could not be printed.
     let report = check_run(&folder.path().join("run"));
     assert_eq!(cells(&report).len(), 2 * timed_names().len());
     assert!(report["run"]["finished_at"].is_string());
@@ -124,7 +123,7 @@ fn a_full_disk_is_one_error_line() {
     }
     // The table is lost, the cells are not.
     check_run(&folder.path().join("run"));
-    // Not even the error can be told: still no panic.
+    // Not even the error can be printed: still no panic.
     let mut command = command(folder.path(), "scene info nothing");
     let status = command.stderr(full()).status();
     assert_eq!(status.expect("the program starts").code(), Some(2));
@@ -237,7 +236,7 @@ fn scenes_and_cameras_come_from_pipes() {
     );
 }
 
-/// What no worker of this version says is one line with what was said, and no times.
+/// Output that is not of a worker is one error line that quotes it, and no times.
 #[cfg(unix)]
 #[test]
 fn a_program_that_speaks_another_protocol_is_one_error_line() {

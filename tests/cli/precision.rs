@@ -36,7 +36,7 @@ fn rate(row: &Value, name: &str) -> f64 {
     number(&row[name], "value")
 }
 
-/// What makes a culling: test, arithmetic, planes, epsilon.
+/// Key of a culling: test, arithmetic, planes, epsilon.
 fn culling(point: &Value) -> String {
     let of = |name: &str| point[name].to_string();
     ["test", "arithmetic", "planes", "epsilon"]
@@ -194,7 +194,7 @@ fn errors_belong_to_the_culling_and_not_to_the_structure() {
     assert_eq!(errors["\"exact\" \"f64\" \"frame\" 0.0"][4], 0.0);
 }
 
-/// What less is better of.
+/// Columns of which less is better.
 const DIMENSIONS: [&str; 6] = [
     "false_negative_count",
     "touch_dropped_count",

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use super::{BOXES, EYE_LOOK, PROGRAM};
 
-/// What came of a command.
+/// Exit code and output of a command.
 #[derive(Debug)]
 pub struct Done {
     pub code: Option<i32>,
@@ -45,7 +45,7 @@ pub fn cullbench(folder: &Path, line: &str) -> Done {
     }
 }
 
-/// What else is on stderr than how much there is to do.
+/// Text of stderr without the line about the amount of work.
 pub fn besides_work(err: &str) -> &str {
     match err.split_once('\n') {
         Some((first, rest)) if first.starts_with("at work: ") => rest,
@@ -53,8 +53,9 @@ pub fn besides_work(err: &str) -> &str {
     }
 }
 
-/// Runs a command that must succeed without a word on stderr, but for how much there
-/// is to do; its output.
+/// Runs a command that must succeed, and returns its output.
+///
+/// Nothing but the line about the amount of work may be on stderr.
 pub fn works(folder: &Path, line: &str) -> String {
     let done = cullbench(folder, line);
     let err = besides_work(&done.err);

@@ -146,7 +146,7 @@ fn damaged_points() {
     });
 }
 
-/// What can be read can be asked, whatever it says.
+/// Vectors that can be read can be queried, whatever their values.
 #[test]
 fn damaged_vectors() {
     let good = r#"{"format": 1, "vectors": [{"id": "a", "category": "c", "camera": {"eye": [0, 0, 0],

@@ -270,7 +270,7 @@ fn a_box_finds_what_it_touches_and_nothing_an_ulp_away() {
     assert!(sought.iter().filter(|s| s.1.len() > 1).count() > 50);
     let folder = folder(&[("boxes.csv", scene.as_bytes())]);
     check_search(&folder, "boxes.csv", ["box", "--boxes", BOXES], &sought);
-    // Whatever f64 holds can be searched by; what is bad in it is told by its line alone.
+    // Any finite f64 can be searched for; a bad box is reported by its line alone.
     let all: Vec<usize> = (0..items.len()).collect();
     let wide = ([-1e300, -1e300, -1e300, 1e300, 1e300, 1e300], all);
     check_search(&folder, "boxes.csv", ["box", "--boxes", BOXES], &[wide]);

@@ -48,7 +48,7 @@ fn a_run_is_reported_as_markdown_as_pictures_and_as_a_page() {
         assert!(speedup.is_some_and(|ratio| ratio > 0.0), "{bound}");
     }
     assert!(!text.contains("| p95 |"), "{text}");
-    // Nobody asked other crates.
+    // The run has no other crates.
     assert!(!text.contains("speed-up vs fastest peer"));
     let rows = text.lines().filter(|line| line.starts_with('|'));
     for (before, row) in text.lines().zip(text.lines().skip(1)) {

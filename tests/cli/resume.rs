@@ -1,5 +1,6 @@
-//! `run --resume`: killed at any moment, a run goes on and loses nothing; what
-//! is not the same run any more is refused by name.
+//! `run --resume` continues a run that was killed at any moment, and loses nothing.
+//!
+//! If something about the run has changed since, the error names the change.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -320,7 +321,7 @@ fn a_run_writes_through_no_link() {
         assert_eq!(fs::read(&other).expect("there"), before, "{name}");
         fs::rename(&other, run.join(name)).expect("moved");
     }
-    // What is made anew takes the link's place.
+    // The new file replaces the link.
     let before = linked("report.json");
     works(folder.path(), "run --resume --out r");
     assert_eq!(fs::read(&other).expect("there"), before);

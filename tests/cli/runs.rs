@@ -23,8 +23,10 @@ const METRICS: &str = "query_ns ns_per_visible visible_count cull_rate speedup \
     nodes_tested items_tested build_ms memory_bytes_per_item \
     locate_ns locate_batched_ns comparisons regions_found";
 
-/// What holds for the files of every run, finished or not: the fields of the
-/// contract, every path with all structures, samples where the cells say.
+/// Checks the files of a run, finished or not.
+///
+/// The report has the documented fields and every path with all structures; samples are
+/// where the cells say.
 pub fn check_run(run: &Path) -> Value {
     let report = report(run);
     let top = "schema_version run machine toolchain source noise cells bounds";

@@ -12,7 +12,7 @@ use super::runs::{cells, report};
 const PLAN: &str = "run --scene city:n=300 --scene uniform:n=200 --path orbit:frames=4 \
     --path spin:frames=4 --structure linear,bvh --processes 2 --no-bounds";
 
-/// What cells are asked and what they answer: all but times.
+/// Questions and answers of the cells: everything but times.
 fn answers(run: &Path) -> Vec<Value> {
     let of_cell = |cell: &Value| {
         let counted = [
@@ -42,7 +42,7 @@ fn answers(run: &Path) -> Vec<Value> {
     cells(&report(run)).iter().map(of_cell).collect()
 }
 
-/// What the processes saw and found, camera by camera, and where samples end.
+/// Keys of the parts of a stream, and their counts of visible items per camera.
 fn streamed(run: &Path) -> Vec<(Value, Value)> {
     let text = fs::read_to_string(run.join("stream.jsonl")).expect("a stream");
     let parts = text.lines().map(json).filter(|line| line["line"] == "part");

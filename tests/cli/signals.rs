@@ -27,7 +27,7 @@ fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
     }
 }
 
-/// Sends Ctrl-C and waits for the end. Nobody reads the output until then.
+/// Sends Ctrl-C and waits for the end. The output is not read until then.
 fn interrupt(child: Child) -> Done {
     signal(child, "-INT")
 }
@@ -245,7 +245,7 @@ fn a_scene_that_changes_during_a_run_is_named() {
         format!("{BOXES}\n9,9,9,9,9,9\n"),
     )
     .expect("written");
-    wait_until("the run goes on", || {
+    wait_until("the run continues", || {
         child.try_wait().expect("a child").is_some()
     });
     let output = child.wait_with_output().expect("a child");

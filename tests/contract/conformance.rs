@@ -22,7 +22,8 @@ use glam::Vec3;
 
 thread_local! {
     /// The parameters that this thread builds structures with; empty for the defaults.
-    /// Were they part of the type, each set would compile the whole suite anew.
+    ///
+    /// As part of the type, each set would compile the whole suite again.
     static PARAMS: Cell<&'static str> = const { Cell::new("") };
 }
 

@@ -1,6 +1,7 @@
-//! The contract of a structure, and of what asks, times and judges it: the same sets by
-//! every structure, instruction set and number of threads, pinned; and the same suites
-//! put to the proof, by structures and roads that are broken on purpose.
+//! The contract of structures, and of the code that queries, times and checks them.
+//!
+//! Every structure, instruction set and number of threads returns the same pinned sets.
+//! Structures and code paths that are broken on purpose check that the suites fail.
 
 mod conformance;
 mod kernels;

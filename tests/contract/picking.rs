@@ -1,5 +1,4 @@
-//! Conformance of the picking back ends: what each declares exact is the answer of the
-//! plain loop.
+//! Picking back ends that declare exactness return the answer of a plain loop.
 
 use cullbench::kernel::Kernel;
 use cullbench::scene::{self, Scene, SeededRng, WorldBox};

@@ -75,7 +75,7 @@ fn ranges<T: RegionIndex>(index: &T, items: &[Aabb], volumes: &[ConvexVolume]) {
     }
 }
 
-/// What only the wide tree does: other orders, replays.
+/// Checks of the wide tree alone: other orders, replays.
 fn wide(tree: &Wide, items: &[Aabb], volumes: &[ConvexVolume]) {
     let params = WideParams {
         order: BlockOrder::Morton,
@@ -175,8 +175,9 @@ fn packed<I: Isa>(isa: I, out: &mut Vec<u32>, words: usize, rows: &[([u32; LANES
     }
 }
 
-/// Rows and parts of rows into lists of all lengths: exactly the room that was
-/// asked for is used, with every mask that has one run of lanes.
+/// Appends rows and parts of rows to lists of all lengths.
+///
+/// Exactly the reserved room is used, with every mask that is one run of lanes.
 #[test]
 fn rows_go_into_any_place() {
     let row: [u32; LANES] = std::array::from_fn(|lane| 100 + lane as u32);

@@ -16,7 +16,7 @@ fn check<T: RegionIndex>(kernel: Kernel, scene: &Scene, volumes: &[ConvexVolume]
     for volume in volumes {
         let what = format!("{} on {}", T::INFO.name, scene.name);
         let mut ids = index.visible(volume);
-        // Somebody else's range, which ends where tree order begins.
+        // A range of another query, which ends where tree order begins.
         let theirs = Range {
             start: u32::MAX,
             end: 0,

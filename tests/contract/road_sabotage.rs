@@ -139,7 +139,7 @@ fn statuses(workload: &Workload, subjects: &[Subject]) -> Vec<Status> {
     cells.iter().map(|cell| cell.status).collect()
 }
 
-/// What one process hands over.
+/// Result of one process.
 fn part(process: u32, known: Option<&Known>) -> Part {
     let scene = scene();
     let (workload, subjects) = (workload(&scene), subjects("linear,bvh,octree", &scene));
@@ -186,8 +186,10 @@ fn what_is_timed_is_what_is_checked() {
     assert_eq!(found, [Status::Ok, Status::Unsafe]);
 }
 
-/// Reference and structures agree, because both are asked with views of cameras
-/// that look elsewhere: only the truth of the cameras themselves can tell.
+/// A reference that agrees with all structures although all are wrong.
+///
+/// They are queried with views of cameras that look elsewhere; only the truth computed
+/// from the cameras differs.
 #[test]
 fn a_reference_that_is_wrong_together_with_all_structures_is_unsafe() {
     let scene = scene();

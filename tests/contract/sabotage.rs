@@ -46,7 +46,7 @@ const SLICES_FOR_RANGES: Fault = 24;
 const CLAIMS_THREADS: Fault = 25;
 const THREADS_CHANGE_IT: Fault = 26;
 
-/// What the tree says of itself; some of it are lies.
+/// Capabilities that the tree declares; some declarations are false.
 type Claims = u8;
 
 const THAT_IT_REFITS: Claims = 0;
@@ -66,8 +66,9 @@ const fn declared(claims: Claims) -> Info {
 }
 
 thread_local! {
-    /// How the trees are broken that this thread builds. Were it a parameter of the type,
-    /// each fault would compile the whole suite anew.
+    /// Fault of the trees that this thread builds.
+    ///
+    /// As a parameter of the type, each fault would compile the whole suite again.
     static FAULT: Cell<Fault> = const { Cell::new(NONE) };
 }
 

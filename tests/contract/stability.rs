@@ -27,9 +27,10 @@ const PATHS: [&str; 5] = [
     "spin:frames=3,far=inf",
 ];
 
-/// Scene, path, and the first 64 bits of a SHA-256 over what is asked (the
-/// scene's digest, eyes, planes) and of one over all answers. A scene far from
-/// zero gives the very answers of the one at zero.
+/// Scene, path, and the first 64 bits of the SHA-256 of questions and of answers.
+///
+/// The questions are the digest of the scene, eyes and planes. A scene far from the
+/// origin has exactly the answers of the one at the origin.
 const PINNED: &[[&str; 4]] = &[
     [
         "uniform:n=1200,seed=7",
@@ -340,7 +341,7 @@ struct Structures {
     regions: Vec<Named>,
 }
 
-/// A structure that is asked by one of the kernels, with the names of both.
+/// A structure that one of the kernels queries, with the names of both.
 type Named = (String, Box<dyn DynIndex>);
 
 fn over(items: &[Aabb], own_tree: Option<&PlaneTree>) -> Vec<Named> {
@@ -459,8 +460,9 @@ impl Digest {
     }
 }
 
-/// The digests of a scene along a path: of what is asked, and of the answers.
-/// Adds up how many ids went into it.
+/// Digests of a scene along a path: of the questions, and of the answers.
+///
+/// Adds the number of ids to `found`.
 fn digests(scene: &Scene, structures: &Structures, path: &str, found: &mut usize) -> [String; 2] {
     let path = path::load(path, scene, &LensDefaults::default()).expect(path);
     let (mut asked, mut answered) = (Digest::default(), Digest::default());

@@ -15,7 +15,7 @@ use cullbench::stress::{Replay, Row, Status, built_in, replay};
 use glam::Vec3;
 use serde_json::Value;
 
-/// Whether a plane drops a box, in a way of its own.
+/// A replacement of the plane test: returns `true` if the plane drops the box.
 type Drops = fn(usize, &Plane, &Aabb) -> bool;
 
 /// A scan that asks a plane test of its own instead of THE plane test.
@@ -270,7 +270,7 @@ fn planes_without_a_margin_fail_vectors_and_every_family() {
     }
 }
 
-/// What a wrong camera loses or gains is seen as well.
+/// The suite reports items that a wrong camera loses or gains.
 #[test]
 fn a_view_that_is_a_little_off_drops_boxes() {
     let family = &CAMERA_FAMILIES[0];

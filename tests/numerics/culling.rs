@@ -114,8 +114,9 @@ prop_compose! {
 }
 
 proptest! {
-    /// What the six planes of a derivation keep, the planes that `six-box` and `exact`
-    /// add must not lose: no margin is proven for sums of those.
+    /// `six-box` and `exact` keep every visible box, whatever derives the six planes.
+    ///
+    /// No margin is proven for the sums of planes that these tests add.
     #[test]
     fn planes_that_a_test_adds_lose_nothing_whatever_the_derivation(view in a_wide_view()) {
         let Some((camera, boxes)) = view else { return Ok(()) };

@@ -49,7 +49,7 @@ impl SeededRng {
     }
 }
 
-/// Where an infinite volume is probed: so many times near.
+/// Depth at which an infinite volume is probed, as a multiple of the near distance.
 const DEEP: f64 = 1e6;
 
 const KINDS: [&str; 5] = [
@@ -135,7 +135,7 @@ fn hair(view: &View, p: DVec3) -> f64 {
     2e-14 * ((p - view.eye).length() + view.near.abs() + view.far.unwrap_or(0.0))
 }
 
-/// Whether the point is visible beyond the doubt of f64.
+/// Returns `true` if the point is visible by more than the rounding error of f64.
 fn surely_inside(view: &View, p: DVec3) -> bool {
     view.depth_inside(p) >= hair(view, p)
 }

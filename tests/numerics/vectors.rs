@@ -159,7 +159,7 @@ fn named(names: &[String], ids: &[ItemId], what: &str) -> BTreeSet<String> {
     found
 }
 
-/// What is missing and what is too much, for the message of a failure.
+/// Panics with the missing and the extra ids if two sets differ.
 fn check_equal(what: &str, found: &BTreeSet<String>, wanted: &BTreeSet<String>) {
     let missing: Vec<_> = wanted.difference(found).collect();
     let extra: Vec<_> = found.difference(wanted).collect();

@@ -1,7 +1,8 @@
-//! Where the planes and matrices of a camera lie. Every named plane is tested
-//! with probe points on both sides, in every convention, against a camera
-//! written out by hand; glam's own matrices and the lecture's look-at must
-//! agree with ours, and the controls must turn and slide as the lecture says.
+//! Positions of the planes and matrices of a camera.
+//!
+//! Every named plane is tested with probe points on both sides, in every convention,
+//! against a camera written out by hand. The matrices of glam and the look-at matrix of
+//! the lecture must agree with ours; the controls must turn and slide as in the lecture.
 
 mod controls;
 mod matrices;
@@ -22,7 +23,7 @@ use proptest::test_runner::{Config, RngSeed, TestRunner};
 
 /// Half an ulp of 1 in f32.
 const U: f64 = 1.0 / (1u64 << 24) as f64;
-/// Where an infinite volume is probed: so many times near.
+/// Depth at which an infinite volume is probed, as a multiple of the near distance.
 const DEEP: f64 = 1000.0;
 
 /// Always the same cameras, and no files of failures.
@@ -158,8 +159,7 @@ fn tolerance(method: PlaneMethod, face: FrustumPlane, view: &View, p: DVec3) -> 
     per_unit * U * size
 }
 
-/// What the volume of an infinite lens must know: everything probed here lies
-/// within.
+/// Bounds for the volume of an infinite lens, which contain every probe.
 fn surroundings(view: &View) -> Surroundings {
     let corners = view.corners(view.far_or(DEEP));
     let reach = corners

@@ -28,7 +28,7 @@ fn on_face(view: &View, face: FrustumPlane) -> Vec<DVec3> {
     points
 }
 
-/// What probing a camera came to, per method and face.
+/// Counts of probes, per method and face.
 #[derive(Default, Debug)]
 struct Tally {
     /// Probes just inside this face that no other face was in doubt about.
@@ -71,7 +71,7 @@ fn probe(setup: &Setup, tallies: &mut Tallies) -> Result<(), String> {
                         on + (on - middle) / 2.0,
                     ];
                     for (i, p) in probes.into_iter().enumerate() {
-                        // Exactly the point that the f32 plane is asked about.
+                        // Exactly the point that the f32 plane tests.
                         let p32 = p.as_vec3();
                         let p = p32.as_dvec3();
                         let mut doubtful = false;

@@ -1,5 +1,4 @@
-//! What a depth means: boxes worked by hand, and the promise that no shorter
-//! move changes the verdict.
+//! Depths of the oracle: boxes worked by hand; no shorter move changes a verdict.
 
 use cullbench::geometry::{Aabb, ConvexVolume, Plane};
 use cullbench::oracle::{Oracle, Verdict};

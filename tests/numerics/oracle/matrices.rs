@@ -20,7 +20,7 @@ use super::wide::Dyadic;
 
 type Entries = [[f64; 4]; 4];
 
-/// As it is written for a convention.
+/// Entries of a matrix in a convention.
 fn written(matrix: &DMat4, convention: MatrixConvention) -> Entries {
     let columns = matrix.to_cols_array_2d();
     match convention {

@@ -1,7 +1,8 @@
-//! The oracle put to the proof. Expected verdicts come from the verified
-//! vectors and from a linear program solved in whole numbers (`simplex`), which
-//! knows nothing of certificates; the camera's planes come from a
-//! floating-point arithmetic of 640 bits (`wide`) by formulas of its own.
+//! Checks of the oracle against independent computations.
+//!
+//! Expected verdicts come from the verified vectors and from a linear program solved in
+//! integers (`simplex`), which uses no certificates. The planes of a camera come from
+//! 640-bit floating-point arithmetic (`wide`) by independent formulas.
 //!
 //! `CULLBENCH_ORACLE_CASES` is the number of cases of each kind; what is run by
 //! default takes seconds (docs/NUMERICS.md has the figures of long runs).

@@ -13,8 +13,9 @@ use super::cases;
 use super::draw::{SeededRng, grid_box};
 use super::simplex;
 
-/// What a run met: cases by verdict, and how many of them no plane shows alone
-/// (edges against edges, corners, bounds).
+/// Cases of a run by verdict: all, and those that no single plane decides.
+///
+/// The latter are edges against edges, corners, and bounds.
 #[derive(Default, Debug)]
 struct Tally {
     verdicts: [usize; 3],

@@ -48,7 +48,7 @@ pub fn verdict(planes: &[ExactPlane], b: &Aabb) -> Verdict {
     let extent = [0, 1, 2].map(|k| high[k].in_units(grid) - &low[k]);
 
     // Rows are `constant + coefficients . (x - low, t)`: every plane may have
-    // a unit of its own, as only the sign of t is asked for.
+    // a unit of its own, as only the sign of t matters.
     let mut rows = Vec::new();
     for [x, y, z, d] in constraints {
         let unit = unit_of([x, y, z]);

@@ -144,6 +144,6 @@ fn all_vectors_at_camera_level() {
     assert!(count >= CAMERA_BOXES, "{count}");
 }
 
-/// What the file holds at the least.
+/// Minimum number of boxes in the file.
 const PLANES_BOXES: usize = 672;
 const CAMERA_BOXES: usize = 656;
