@@ -95,8 +95,9 @@ impl<B: Body> DepthBuffer<B> {
 }
 
 impl DepthBuffer {
-    /// The samples that see one of several flat rectangles (boxes with no thickness along
-    /// one axis) before the content of the buffer, or as near.
+    /// Marks the samples at which a rectangle is no farther than the depth buffer.
+    ///
+    /// A rectangle is a box without thickness along one axis.
     pub fn stencil(&self, canvas: &Canvas, rectangles: &[WorldBox]) -> Stencil {
         let mut stencil = Stencil::new(canvas.grid().samples());
         for rectangle in rectangles {
