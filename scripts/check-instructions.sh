@@ -16,7 +16,7 @@ trap 'rm -rf "$work"' EXIT
 count() { # program structure
     rm -rf "$work/run" "$work"/out.*
     valgrind --tool=callgrind --trace-children=yes --collect-atstart=no \
-        --toggle-collect='*timing::Pass::time*' --callgrind-out-file="$work/out.%p" \
+        --toggle-collect='*timing::TaskTimer::time*' --callgrind-out-file="$work/out.%p" \
         "$1" run --suite compare --processes 1 --scene "$scene" --path "$path" \
         --structure "$2" --out "$work/run" >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 2; }
     total=$(cat "$work"/out.* | awk '/^totals:/ { sum += $2 } END { printf "%d", sum }')

@@ -1,5 +1,5 @@
-//! The contract of a structure: its input, its declaration, and its one query. The
-//! forms of the query that callers use are provided.
+//! The contract of a structure, [`RegionIndex`]: build, memory, one generic query.
+//! [`FrustumQuery`] provides the forms of the query that callers use.
 
 use std::ops::{ControlFlow, Range};
 
@@ -90,7 +90,7 @@ impl MemoryUsage {
     }
 }
 
-/// Input of a build.
+/// Input of a build: items, and optionally a partition and a thread pool.
 ///
 /// Items are numbered by their index in the slice. An empty box (min > max) is
 /// an item that no query ever returns.
@@ -141,7 +141,7 @@ impl<'a, Items: AsRef<[Aabb]> + ?Sized> From<&'a Items> for Input<'a> {
     }
 }
 
-/// Parameters of a structure without any.
+/// [`RegionIndex::Params`] of a structure without parameters.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoParams {}
@@ -198,18 +198,19 @@ pub trait RegionIndex: Sized + Send + Sync {
         ControlFlow::Continue(())
     }
 
-    /// Takes over the new bounds of `moved` items (`items` holds all bounds,
-    /// the new ones included; they are finite) without a new build. False,
-    /// with the structure unchanged, if it cannot; the caller then rebuilds.
-    /// A structure that declares [`Capabilities::refits`](super::Capabilities)
-    /// declines only where an item becomes or ceases to be empty; one that does
-    /// not, always.
+    /// Takes over the new bounds of `moved` items without a new build.
+    ///
+    /// `items` holds the bounds of all items, the new ones included; they are
+    /// finite. Returns false, with the structure unchanged, if a rebuild is needed:
+    /// where an item becomes or ceases to be empty, and always from a structure that
+    /// does not declare [`Capabilities::refits`](super::Capabilities).
     fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
         false
     }
 
-    /// Item ids in the structure's own order, if its answers can be ranges of it
-    /// (it passes them to [`Sink::accept_range`]):
+    /// Item ids in the order that ranges passed to [`Sink::accept_range`] refer to.
+    ///
+    /// `None` from a structure without such an order, which does not declare
     /// [`Capabilities::ranges`](super::Capabilities).
     fn tree_order(&self) -> Option<&[ItemId]> {
         None
@@ -294,7 +295,9 @@ pub trait FrustumQuery: RegionIndex {
 
 impl<T: RegionIndex> FrustumQuery for T {}
 
-/// A query as work: `kernel.run(Query { index, volume, sink, recorder })`.
+/// One query with its arguments, for a [`Kernel`] to run.
+///
+/// `kernel.run(Query { index, volume, sink, recorder })`
 pub struct Query<'a, T, Q, S, R> {
     /// The structure.
     pub index: &'a T,

@@ -1,5 +1,6 @@
-//! One object type for all structures. Dispatch happens once per query, never
-//! per node: behind each method is a traversal compiled for that structure,
+//! [`DynIndex`], the object type of all structures.
+//!
+//! Dispatch happens once per query, never per node: behind each method is a traversal compiled for that structure,
 //! volume, recorder and instruction set.
 
 use glam::Vec3;
@@ -11,8 +12,7 @@ use crate::query::{
     AnyVolume, Dispatched, ItemId, Located, NoRecorder, QueryContext, QueryCost, each_volume,
 };
 
-/// Kernel of queries and threads of builds: a value that a
-/// [`StructureSpec`](super::StructureSpec) carries. Answers do not depend on it.
+/// Kernel of queries and number of threads of builds. Answers do not depend on it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Execution {
     /// Instruction set of queries.

@@ -11,12 +11,15 @@ use crate::geometry::{LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, pairs};
 use crate::query::{ItemId, Recorder, Sink};
 
-/// Distance of prefetches, in blocks: enough to hide a cache miss, and not enough
-/// to evict lines before their use.
+/// Distance of prefetches, in blocks.
+///
+/// Enough to hide a cache miss, and not enough to evict lines before their use.
 pub const AHEAD: usize = 12;
 
-/// Most items of a tree (3 MiB of blocks) that is expected to fit the nearest
-/// caches, where prefetches cost more than they gain.
+/// Most items of a tree that is not prefetched (3 MiB of blocks).
+///
+/// Such a tree is expected to fit the nearest caches, where prefetches cost more than
+/// they gain.
 const NEAR: usize = 131_072;
 
 /// Decides whether the blocks of a tree over `items` items are prefetched.
@@ -124,7 +127,7 @@ impl Frontier {
     }
 }
 
-/// Nodes for which no plane is open any more.
+/// List of nodes that are inside of all planes.
 #[derive(Default)]
 pub struct NodeList {
     /// Longer than `used`, so that sixteen lanes can always be stored.

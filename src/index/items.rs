@@ -1,4 +1,4 @@
-//! Items that a structure has to hold: their ids, and records of bounds and id.
+//! Non-empty items, which every structure holds: their ids, and records for builds.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use super::BuildError;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 
-/// Ids of the items that a structure has to hold: all non-empty ones, ascending.
+/// Ids of all non-empty items, ascending, after a check of all bounds.
 ///
 /// # Errors
 /// An item with a NaN or infinite bound; more items than ids.

@@ -1,6 +1,7 @@
-//! The linear scans: every box against every plane, O(n). `linear-scalar` is the
-//! textbook loop and the yardstick of every ratio; `linear` gives the same answer
-//! from blocks of sixteen boxes.
+//! The linear scans: every box against every plane, O(n).
+//!
+//! `linear-scalar` is the textbook loop. `linear` gives the same answer from blocks of
+//! sixteen boxes and is the reference of every speed-up.
 
 use std::ops::ControlFlow;
 
@@ -10,31 +11,6 @@ use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, Region
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, first_lanes, pairs};
 use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests, UnpreparedPlanes};
-
-/// Tests items in blocks and passes runs of kept ones to the sink.
-///
-/// Each block comes with the position of its lane 0 and a mask of the lanes that count.
-/// The leaf test of every tree and the region search of the linear scan.
-#[inline(always)]
-pub fn scan_blocks<'b, I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
-    isa: I,
-    blocks: impl Iterator<Item = (usize, LaneMask, &'b BoxBlock)>,
-    ids: &[ItemId],
-    (volume, mask): (&Q, PlaneMask),
-    sink: &mut S,
-    recorder: &mut R,
-) -> ControlFlow<()> {
-    for (start, lanes, block) in blocks {
-        let tested = lanes.count_ones();
-        recorder.items_tested(tested);
-        recorder.planes_tested(tested * Q::planes_open(mask));
-        let kept = volume.kept_lanes(isa, block, mask) & lanes;
-        if kept != 0 {
-            sink.accept_lanes(isa, ids, start, kept)?;
-        }
-    }
-    ControlFlow::Continue(())
-}
 
 /// The plain loop over an array of boxes, which ends the test of a box at the first
 /// plane that excludes it. O(n) per query.
@@ -46,7 +22,7 @@ pub struct LinearScalar {
 impl RegionIndex for LinearScalar {
     const INFO: Info = Info::new(
         "linear-scalar",
-        "the textbook loop over all boxes, O(n): the yardstick",
+        "the textbook loop over all boxes, O(n)",
         Kind::Scan,
         Origin::Ours,
     );
@@ -79,6 +55,9 @@ impl RegionIndex for LinearScalar {
     }
 }
 
+/// Number of blocks that one call of the sink tests: 64 KiB of ids.
+const BLOCKS_PER_CALL: usize = 1024;
+
 /// The scan over blocks: all planes against sixteen boxes at once, no early exit.
 /// O(n) per query, with a constant several times smaller.
 pub struct Linear {
@@ -87,7 +66,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// Tests every block against all planes: `open` plane tests per item.
+    /// Tests every block against all planes; `open` is their number.
     #[inline(always)]
     fn scan_all<P: Planes<C::Isa>, C: Context>(
         &self,
@@ -99,9 +78,9 @@ impl Linear {
         let (sink, recorder) = cx.parts();
         let rows = self.ids.rows();
         let mut items = self.ids.len();
-        for (i, blocks) in self.boxes.blocks().chunks(TOGETHER).enumerate() {
-            let rows = &rows[i * TOGETHER..][..blocks.len()];
-            let tests = AllOf {
+        for (i, blocks) in self.boxes.blocks().chunks(BLOCKS_PER_CALL).enumerate() {
+            let rows = &rows[i * BLOCKS_PER_CALL..][..blocks.len()];
+            let tests = BlockTests {
                 blocks,
                 planes,
                 items,
@@ -110,7 +89,7 @@ impl Linear {
                 four: [0; 4],
             };
             sink.accept_tested(isa, rows, tests)?;
-            items -= items.min(TOGETHER * LANES);
+            items -= items.min(BLOCKS_PER_CALL * LANES);
         }
         ControlFlow::Continue(())
     }
@@ -166,22 +145,20 @@ impl RegionIndex for Linear {
     }
 }
 
-/// Blocks that are passed to the sink together: 64 KiB of ids.
-const TOGETHER: usize = 1024;
-
-/// Consecutive blocks, all planes open.
-struct AllOf<'a, P, R> {
+/// The tests of consecutive blocks against all planes, run by the sink.
+struct BlockTests<'a, P, R> {
     blocks: &'a [BoxBlock],
     planes: P,
     /// Number of items in these blocks and the following ones.
     items: usize,
+    /// Number of open planes.
     open: u32,
     recorder: &'a mut R,
-    /// Results of four blocks that are tested together.
+    /// Results of the four blocks that were tested together last.
     four: [LaneMask; 4],
 }
 
-impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for AllOf<'_, P, R> {
+impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for BlockTests<'_, P, R> {
     const SPARSE: bool = true;
 
     #[inline(always)]
@@ -214,6 +191,31 @@ impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for AllOf<'_, P, R> {
     }
 }
 
+/// Tests blocks of items and passes runs of visible items to the sink.
+///
+/// Each block comes with the position of its lane 0 and a mask of the lanes in use.
+/// The leaf test of the packed trees and the region search of `linear`.
+#[inline(always)]
+pub fn scan_blocks<'b, I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
+    isa: I,
+    blocks: impl Iterator<Item = (usize, LaneMask, &'b BoxBlock)>,
+    ids: &[ItemId],
+    (volume, mask): (&Q, PlaneMask),
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    for (start, lanes, block) in blocks {
+        let tested = lanes.count_ones();
+        recorder.items_tested(tested);
+        recorder.planes_tested(tested * Q::planes_open(mask));
+        let kept = volume.kept_lanes(isa, block, mask) & lanes;
+        if kept != 0 {
+            sink.accept_lanes(isa, ids, start, kept)?;
+        }
+    }
+    ControlFlow::Continue(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -226,7 +228,7 @@ mod tests {
         // A plane across an axis keeps the empty box, where its sum is a NaN.
         let slab = [Plane::new(Vec3::X, -2.0), Plane::new(-Vec3::X, 40.0)];
         let volumes = [&slab[..], &[]].map(|planes| ConvexVolume::from_planes(planes).unwrap());
-        let together = TOGETHER * LANES;
+        let together = BLOCKS_PER_CALL * LANES;
         for count in [
             0,
             17,

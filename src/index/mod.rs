@@ -1,7 +1,21 @@
-//! The structures, their contract and the registry of all of them.
+//! Spatial index structures, the contract that all satisfy, and their registry.
 //!
-//! To add one, write a file beside this one and a row in [`Registry::builtin`], or in a
-//! crate of your own call [`Registry::with`]; list, run, query, verify, benches and
+//! Read `contract` first, then `linear`, the smallest structure. The other files:
+//!
+//! | files | contents |
+//! |---|---|
+//! | `contract`, `info` | [`RegionIndex`] and its input; the declaration [`Info`] |
+//! | `registry`, `erased` | a row per structure; the same structures without their types |
+//! | `linear`, `grid`, `wide/` | the two scans, the uniform grid, the 16-ary implicit tree |
+//! | `tree/` | the packed tree of `bvh`, `bsp`, `octree` and `quadtree`, with its queries |
+//! | `build/` | a builder of packed trees per file: `bvh`, `bsp`, `cells` (octree, quadtree) |
+//! | `textbook/`, `peers/` | plain forms for comparison; structures of other crates |
+//! | `items`, `positions` | for builds: non-empty items; for refits: tree positions of items |
+//! | `frontier`, `padded_ids` | for queries of trees and blocks: open nodes; rows of ids |
+//! | `box_test`, `centre_bounds` | for the grid, textbook forms and peers: one box at a time |
+//!
+//! To add a structure, write a file beside this one and a row in [`Registry::builtin`], or
+//! in a crate of your own call [`Registry::with`]; list, run, query, verify, benches and
 //! conformance tests read the registry.
 
 mod box_test;

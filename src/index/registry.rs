@@ -20,10 +20,12 @@ use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
 use crate::threads::Pool;
 
-/// The words of a list for all structures, and for all but the textbook forms.
+/// Name in a list that stands for all structures.
 const ALL: &str = "all";
+/// Name in a list that stands for all structures but the textbook forms.
 const DEFAULT: &str = "default";
 
+/// A build without the structure's type; parameters are JSON.
 type Build = fn(Execution, &Input<'_>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;
 
 /// A row of a registry: a structure without its type.
@@ -164,7 +166,7 @@ impl Registry {
         self
     }
 
-    /// In the order in which they were added.
+    /// All rows, in the order in which they were added.
     pub fn rows(&self) -> &[Row] {
         &self.rows
     }
@@ -254,14 +256,14 @@ impl Registry {
     }
 }
 
-/// A requested structure: its row with parameters.
+/// A structure as typed on the command line: its row with parameters.
 #[derive(Clone, Debug)]
 pub struct StructureSpec {
     /// The typed text: `bvh` or `bvh:leaf=4`.
     pub label: String,
     /// The structure.
     pub row: Row,
-    /// Complete, defaults filled in.
+    /// All parameters, defaults filled in.
     pub params: Value,
     /// Kernel and threads: the best kernel and one thread unless changed by
     /// [`StructureSpec::by`].

@@ -1,5 +1,4 @@
-//! An answer so far as it is compared and printed: how many ids, and a digest that
-//! does not depend on their order.
+//! [`Answer`]: number of ids and a digest that does not depend on their order.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +31,7 @@ impl Answer {
     }
 }
 
-/// Sum of ids found: what `query` and `locate` print as a checksum.
+/// Sum of the ids, the checksum that `query` and `locate` print.
 pub fn id_sum(ids: &[ItemId]) -> u64 {
     ids.iter().map(|&id| u64::from(id)).sum()
 }

@@ -1,7 +1,7 @@
-//! Physical limits, measured beside the structures: what the memory alone would
-//! cost. A bound answers nothing and is never ranked; it takes part in the same
-//! rounds, so that a ratio to it is paired like any other. It defines the table of
-//! bounds and what each of them does.
+//! Lower bounds, timed beside the structures: the cost of memory accesses alone.
+//!
+//! A bound answers nothing and is never ranked. It takes part in the same rounds as the
+//! structures, so that a ratio to it is paired like any other.
 
 use super::{Subject, TimedTask, Workload};
 use crate::geometry::{Aabb, BoxBlocks};
@@ -18,18 +18,20 @@ pub struct Bound {
     pub summary: &'static str,
     /// The metric that holds time of a structure / time of this bound.
     pub ratio: &'static str,
-    /// Makes it, with its own copy of the data; `None` where it has nothing to
-    /// do or what it needs is not among the subjects.
+    /// Makes the task of the bound, with its own copy of the data.
+    ///
+    /// `None` if there is nothing to read or copy, or if it needs a structure that
+    /// is not among the subjects.
     pub make: for<'a> fn(&Material<'a>) -> Option<TimedTask<'a>>,
 }
 
-/// Material that a bound is made from.
+/// Queries, structures and answers that a bound is made from.
 pub struct Material<'a> {
     /// The queries that it bounds.
     pub workload: &'a Workload<'a>,
     /// Structures built on the scene, under the names on the command line.
     pub subjects: &'a [Subject],
-    /// Items visible to each camera of the path, as everyone counted them.
+    /// Number of items that each camera of the path sees.
     pub visible: Vec<u64>,
 }
 
@@ -51,7 +53,7 @@ pub static BOUNDS: &[Bound] = rows! { Bound { name, summary, ratio, make }
         "times_replay", replay;
 };
 
-/// A pass over the blocks as a kernel does it.
+/// One pass over all blocks, as work for a kernel.
 struct Read<'a>(&'a BoxBlocks);
 
 impl Work for Read<'_> {
@@ -74,7 +76,7 @@ fn read<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     })
 }
 
-/// All items that have a box, as the structures store them.
+/// All non-empty boxes in blocks, as the structures store them.
 fn blocks_of(items: &[Aabb]) -> BoxBlocks {
     let mut blocks = BoxBlocks::with_capacity(items.len());
     for b in items.iter().filter(|b| !b.is_empty()) {

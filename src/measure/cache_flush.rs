@@ -1,24 +1,26 @@
-//! Cold queries: a sweep over the caches, and outputs that do not grow while
-//! they are timed. The timed pass decides when to sweep.
+//! Cold queries: a sweep over the caches, and outputs that do not grow while timed.
 
 use super::schedule::Protocol;
 use super::task::TimedTask;
 use crate::query::ItemId;
 
-/// Room behind the answer that a structure may ask for while it writes it.
+/// Number of ids of spare room in an output: structures write whole rows.
 const SLACK: usize = 64;
 
-/// Sweep and outputs of cold queries. One sweep serves one query of every task:
-/// each has data of its own, which no other query brings back, and its own
-/// output.
+/// Sweep and outputs of cold queries.
+///
+/// One sweep serves one query of every task: each task has its own data, which no other
+/// query loads into the caches, and its own output.
 pub(super) struct Cold {
     pub(super) sweep: Sweep,
+    /// An output per task.
     pub(super) outs: Vec<Vec<ItemId>>,
 }
 
 impl Cold {
-    /// The outputs have their final size: a query that runs once per sweep
-    /// must not pay for their growth.
+    /// Allocates the sweep, and outputs of their final size.
+    ///
+    /// A query that runs once per sweep must not pay for the growth of its output.
     pub(super) fn new(protocol: &Protocol, tasks: &[TimedTask]) -> Cold {
         let most = |c: &TimedTask| c.expected.iter().copied().max().unwrap_or(0) as usize;
         Cold {
@@ -35,7 +37,7 @@ impl Cold {
     }
 }
 
-/// Something larger than the last cache, to be read between cold queries.
+/// Memory larger than the last cache, overwritten between cold queries.
 pub(super) struct Sweep(Vec<u64>);
 
 impl Sweep {

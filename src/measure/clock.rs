@@ -10,7 +10,7 @@ use cpu_time::ThreadTime;
 pub struct Lap {
     /// CPU time of this thread.
     pub cpu_ns: f64,
-    /// Time on the wall: other programs count.
+    /// Wall time, other programs included.
     pub wall_ns: f64,
 }
 
@@ -22,7 +22,7 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// Both clocks are running from here on.
+    /// Starts both clocks.
     #[inline]
     pub fn start() -> Self {
         let wall = Instant::now();

@@ -1,6 +1,7 @@
-//! The count pass: every subject answers every query, with the counting
-//! recorder and as it will be timed, and every answer is compared with the
-//! reference before anything is timed.
+//! The count pass, which compares every answer with the reference, and the oracle.
+//!
+//! [`count_pass`]: every subject answers every query twice, with the counting recorder and
+//! as it will be timed. [`judge`] compares the right answers with the exact truth.
 
 use std::time::{Duration, Instant};
 
@@ -30,8 +31,9 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// Lower bound of the time of a query of a pass, ns: from counters alone, and so
-    /// the same in every run. Far below the real time of most structures.
+    /// Lower bound of the time of a query of a pass, ns, from counters alone.
+    ///
+    /// The same in every run, and far below the real time of most structures.
     pub(super) fn least_ns(&self, pass: Pass) -> f64 {
         let queries = self.answers[pass as usize].len().max(1) as f64;
         20.0 + 0.1 * self.costs[pass as usize].comparisons() as f64 / queries
@@ -42,11 +44,13 @@ impl Counted {
     }
 }
 
-/// Longest a subject may take for its whole count pass.
+/// Most time that a subject may take for its whole count pass.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Counts and verifies. One reference serves all subjects of a camera.
-/// A subject that fails once, or was not built, is skipped.
+/// Counts and verifies all queries of all subjects.
+///
+/// One reference answer serves all subjects. A subject that fails once, or was not built,
+/// is skipped.
 pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> Vec<Counted> {
     let fresh = |subject: &Subject| Counted {
         verdict: subject.built.as_ref().err().cloned().unwrap_or_default(),
@@ -78,7 +82,7 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 let start = Instant::now();
                 let cost = &mut counted.costs[pass as usize];
                 let counting = trial.ask(|out| built.count(workload, pass, n, out, cost));
-                // What will be timed is another traversal.
+                // The timed traversal is compiled without the recorder: checked as well.
                 let answered = match counting.map(drop) {
                     Ok(()) => trial
                         .ask(|out| built.answer(workload, pass, n, out))
@@ -142,8 +146,9 @@ pub struct Judged {
     pub excess_interval: Option<[f64; 2]>,
 }
 
-/// Checks the answers of the reference, which all right structures share, with the
-/// oracle. As many cameras as `most` verdicts allow, at least one.
+/// Checks the reference answers, which all right structures share, with the oracle.
+///
+/// As many cameras as `most` verdicts of the oracle allow, at least one, at most 16.
 pub fn judge(workload: &Workload, most: usize) -> Judged {
     let scene = workload.scene;
     let count = workload.cameras.len();
@@ -177,8 +182,7 @@ pub fn blamed(test: CullingTest, errors: ErrorCount) -> ErrorCount {
     }
 }
 
-/// Verdict on a structure from one answer. A false negative is worse than anything
-/// that is returned too much.
+/// Verdict on a structure from one answer and the time spent so far.
 fn verdict(
     answered: Result<(), Fault>,
     spent: Duration,
@@ -202,8 +206,9 @@ fn verdict(
     }
 }
 
-/// Notes a structure that declares itself no scan, but works like one:
-/// it tests (almost) every item for a sliver of the scene.
+/// Adds a note to a structure that declares no scan, but works like one.
+///
+/// It tests at least 90 % of the items for at most 0.1 % visible ones.
 fn note_scan(counted: &mut Counted, items: usize) {
     let answers = &counted.answers[Pass::Queries as usize];
     let queries = answers.len().max(1) as u64;

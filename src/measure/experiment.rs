@@ -1,6 +1,6 @@
-//! An experiment: a plan of scenes, paths, cache states, culling tests and
-//! structures, and one process's way through it. The plan is the same for all
-//! processes.
+//! The plan of a run, and the measurement of one scene by one process.
+//!
+//! A [`Plan`] is the same for all processes; a [`Share`] says what one process measures.
 
 use std::collections::BTreeMap;
 
@@ -22,11 +22,10 @@ use crate::input::InputError;
 use crate::path::{self, LensDefaults, PathError};
 use crate::scene::{self, LoadOptions, Scene};
 
-/// Updates and what many of them do to queries are measured in every so many-th
-/// process: they cost many builds.
+/// Updates are measured in every n-th process, because they cost many builds.
 const UPDATES_EVERY: u32 = 4;
 
-/// How much is measured.
+/// Amount of measurement: processes, rounds, times.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Effort {
     /// Processes that the rounds are spread over; an interval needs ten.
@@ -35,10 +34,10 @@ pub struct Effort {
     pub rounds: [usize; 2],
     /// CPU time of a task in one process, ns.
     pub task_ns: f64,
-    /// The timed cameras are as many as a plain loop over all items answers in
-    /// this time, ns.
+    /// Time in which a plain loop over all items answers the timed cameras, ns:
+    /// decides on their number.
     pub pass_ns: f64,
-    /// Measurements beside frustum queries.
+    /// Additional measurements.
     pub beside: Beside,
 }
 
@@ -50,11 +49,11 @@ pub enum Beside {
     Nothing,
     /// Region search of the cameras' eyes among the scene's regions.
     RegionSearch,
-    /// Region search, updates, a twin and lower bounds.
+    /// Region search, updates, lower bounds, and one structure measured twice.
     All,
 }
 
-/// A scene with the ways through it.
+/// A scene of a plan with its camera paths.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PlannedScene {
     /// File, sample or spec, as [`crate::scene::load`] takes it.
@@ -68,40 +67,42 @@ pub struct PlannedScene {
 /// Plan of a run: data, complete before anything runs.
 #[derive(Clone)]
 pub struct Plan {
-    /// Measured one after the other.
+    /// Scenes, measured one after the other.
     pub scenes: Vec<PlannedScene>,
-    /// All of them take part in every group.
+    /// Structures, all of which take part in every group.
     pub structures: Vec<StructureSpec>,
     /// Culling tests with their arithmetic and planes, each a group of its own.
     pub cullings: Vec<Culling>,
     /// Lens of cameras whose path has none.
     pub lens: LensDefaults,
-    /// How scenes are read.
+    /// Options for reading scenes.
     pub load: LoadOptions,
     /// Most cameras of a path, evenly spread; the others are left out.
     pub most_cameras: usize,
-    /// How many processes, rounds and tasks.
+    /// Processes, rounds and additional measurements.
     pub effort: Effort,
-    /// Measure lower bounds beside the structures.
+    /// True if lower bounds are timed beside the structures.
     pub bounds: bool,
     /// Seed of the order in which structures are measured.
     pub seed: u64,
 }
 
-/// A path, whether caches are cold, and the culling.
+/// A group of one scene: path, cache state and culling test.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Question {
     /// File or spec of the path.
     pub path: String,
-    /// Empty the caches before each query.
+    /// True if caches are emptied before each query.
     pub cold: bool,
     /// Test, arithmetic and planes.
     pub culling: Culling,
 }
 
 impl Plan {
-    /// All queries of a scene. Tests over boxes come before those over spheres, so that
-    /// structures are built twice at most.
+    /// The groups of a scene, in the order in which they are measured.
+    ///
+    /// Tests over boxes come before those over spheres, so that structures are built
+    /// twice at most.
     pub fn questions(&self, scene: &PlannedScene) -> Vec<Question> {
         let of_spheres = |c: &&Culling| c.test == CullingTest::Sphere;
         let (spheres, boxes): (Vec<&Culling>, Vec<&Culling>) =
@@ -121,7 +122,7 @@ impl Plan {
         questions
     }
 
-    /// The key of the group that a question is on a scene.
+    /// The key of a group of a scene.
     pub fn key(&self, scene: &PlannedScene, question: &Question) -> GroupKey {
         GroupKey::of(
             &scene.source,
@@ -131,8 +132,7 @@ impl Plan {
         )
     }
 
-    /// All groups of cells that are compared with each other, in the order in
-    /// which they are measured.
+    /// Keys of all groups, in the order in which they are measured.
     pub fn groups(&self) -> Vec<GroupKey> {
         let of_scene = |scene| {
             let questions = self.questions(scene).into_iter();
@@ -141,7 +141,7 @@ impl Plan {
         self.scenes.iter().flat_map(of_scene).collect()
     }
 
-    /// All cells.
+    /// Keys of all cells: each structure in each group.
     pub fn cells(&self) -> Vec<CellKey> {
         let cells_of = |group: GroupKey| {
             self.structures.iter().map(move |spec| CellKey {
@@ -160,8 +160,9 @@ impl Plan {
         share.process.is_multiple_of(UPDATES_EVERY) && self.has_all() && !share.plan_only
     }
 
-    /// Share `i` of `n` (from 1): every n-th pair of scene and path, with all
-    /// structures, cache states and tests of it together.
+    /// Shard `i` of `n` (from 1), a smaller plan: every n-th pair of scene and path.
+    ///
+    /// Structures, cache states and tests of a pair stay together.
     pub fn shard(mut self, i: usize, n: usize) -> Plan {
         let mut pair = 0;
         for scene in &mut self.scenes {
@@ -174,7 +175,7 @@ impl Plan {
         self
     }
 
-    /// All structures, and the first that is no scan a second time.
+    /// Builds all structures, and the first that is no scan a second time (the twin).
     fn subjects(
         &self,
         scene: &Scene,
@@ -182,13 +183,13 @@ impl Plan {
         share: &Share,
         notice: Notice,
     ) -> Vec<Subject> {
-        let proper = self
+        let preferred = self
             .structures
             .iter()
             .find(|s| s.row.info.kind != Kind::Scan);
-        let twin = proper.or(self.structures.first());
+        let twin = preferred.or(self.structures.first());
         let once = self.structures.iter().map(|s| (s, false));
-        // What has ended a process would end this one too, as a twin as well.
+        // A structure that has ended a process is not tried again, not as a twin either.
         let twin = twin.filter(|spec| self.has_all() && !share.failed.contains_key(&spec.label));
         once.chain(twin.map(|s| (s, true)))
             .map(|(spec, is_twin)| {
@@ -228,23 +229,23 @@ pub enum ExperimentError {
     Spec(#[from] crate::spec::SpecError),
 }
 
-/// One process's share of one scene.
+/// The groups of one scene that one process measures, and what it starts from.
 #[derive(Clone, Default, Debug, Serialize, Deserialize)]
 pub struct Share {
-    /// Its number; the first, 0, counts and plans for the others.
+    /// Number of the process; the first, 0, counts and plans for the others.
     pub process: u32,
-    /// Per question: results of the first process; `None` in the first process.
+    /// Per group: answers and schedule of the first process; `None` in that process.
     pub known: Vec<Option<Known>>,
-    /// Per question: true if it is to be measured.
+    /// Per group: true if it is to be measured.
     pub wanted: Vec<bool>,
-    /// Count, check and plan only.
+    /// True to count, check and plan without timing.
     pub plan_only: bool,
-    /// Structures that have ended a process before, with what became of them.
+    /// Structures that have ended a process before, each with its verdict.
     pub failed: BTreeMap<String, Verdict>,
 }
 
 impl Share {
-    /// The whole of a scene with `questions` questions, in the first process.
+    /// All groups of a scene with `questions` groups, in the first process.
     pub fn first(questions: usize) -> Share {
         Share {
             known: vec![None; questions],
@@ -254,8 +255,10 @@ impl Share {
     }
 }
 
-/// Measures one process's share of one scene. `keep` gets each part as soon as
-/// it is there. False if stopped.
+/// Measures one process's share of one scene; returns false if stopped.
+///
+/// Builds the structures, then measures group after group. `keep` gets each part as soon
+/// as its group is finished.
 ///
 /// # Errors
 /// A scene or a path that cannot be read or made, a camera without a view.
@@ -291,9 +294,9 @@ pub fn measure_scene(
         };
         notice(None, &question.path);
         let scale = known.and_then(|known| known.lens_scale);
-        let way = path::load_scaled(&question.path, &scene, &plan.lens, scale)?;
-        let way = way.at_most(plan.most_cameras);
-        let workload = Workload::new(&scene, &way, &question.culling)?;
+        let path = path::load_scaled(&question.path, &scene, &plan.lens, scale)?;
+        let path = path.at_most(plan.most_cameras);
+        let workload = Workload::new(&scene, &path, &question.culling)?;
         let group = GroupPlan {
             scene: &info,
             path: PathInfo::of(&question.path, &workload, question.cold),
@@ -321,7 +324,7 @@ pub fn measure_scene(
         else {
             return Ok(false);
         };
-        // Once for each scene; a comparison of programs looks at queries alone.
+        // In the first group of each scene only.
         if first && plan.has_updates(share) {
             for subject in &mut part.subjects {
                 let spec = plan.structures.iter().find(|s| s.label == subject.label);

@@ -1,6 +1,8 @@
-//! One process and one group of cells: ask, guard, compare, judge, time. The
-//! first process counts, judges and plans; the others compare digests with what
-//! it found, keep to its plan, and time.
+//! [`measure_part`]: the measurement of one group of cells by one process.
+//!
+//! The first process counts, checks with the oracle, makes the schedules, and times. The
+//! others compare the digests of answers with those of the first, and time by its schedules.
+//! The group as a result, [`Group`](super::Group), is in `results`.
 
 use std::collections::BTreeMap;
 
@@ -16,12 +18,12 @@ use super::{
 };
 use crate::statistics::{interquartile_mean, median};
 
-/// Verdicts of the oracle that a group may take: some 50 ns each.
+/// Most verdicts of the oracle per group; one takes about 50 ns.
 const MOST_JUDGED: usize = 400_000;
-/// Fewest groups of cameras that a tail is read off.
+/// Fewest groups of cameras for quantiles of the query time.
 pub(super) const LEAST_TAIL: usize = 20;
 
-/// Settings that a group is measured with.
+/// Settings of the measurement of one group by one process.
 pub struct GroupPlan<'a> {
     /// The scene, as reports have it.
     pub scene: &'a SceneInfo,
@@ -33,15 +35,44 @@ pub struct GroupPlan<'a> {
     pub protocol: Protocol,
     /// Lower bounds to be timed beside the structures.
     pub bounds: &'a [Bound],
-    /// From the first process; `None` in the first process itself.
+    /// Answers and schedules of the first process; `None` in that process.
     pub known: Option<&'a Known>,
-    /// Count, check and plan only.
+    /// True to count, check and plan without timing.
     pub plan_only: bool,
-    /// Time region search as well.
+    /// True if region search is timed as well.
     pub locate: bool,
 }
 
-/// Measures a group; `None` if stopped.
+/// A structure under test with its verdict so far.
+struct Entry<'a> {
+    subject: &'a Subject,
+    verdict: Verdict,
+    /// Answers and costs; in the first process only.
+    counted: Option<Counted>,
+}
+
+impl Entry<'_> {
+    fn runs(&self) -> bool {
+        self.verdict.status == Status::Ok
+    }
+
+    fn part(&self, workload: &Workload) -> SubjectPart {
+        let built = self.subject.built.as_ref().ok();
+        let counted = self.counted.as_ref().filter(|_| self.runs());
+        SubjectPart {
+            label: self.subject.label(),
+            build_ms: built.map(|b| b.build_ms),
+            memory_bytes: built.map(|b| b.memory.total() as u64),
+            update_ms: built.map(|b| b.update_ms.clone()).unwrap_or_default(),
+            counts: counted.map_or_else(BTreeMap::new, |c| counts(c, workload.scene.items.len())),
+            ..SubjectPart::unknown(&self.subject.spec, self.verdict.clone())
+        }
+    }
+}
+
+/// Measures a group in this process; `None` if stopped.
+///
+/// Returns the part, and the samples of each task.
 pub fn measure_part(
     workload: &Workload,
     subjects: &[Subject],
@@ -72,17 +103,17 @@ pub fn measure_part(
     let mut schedules = [None, None];
     let passes = if plan.locate { 2 } else { 1 };
     for &pass in &Pass::ALL[..passes] {
-        let mut entered = enter(workload, &entries, pass, &answers[pass as usize]);
+        let mut keyed = tasks_of(workload, &entries, pass, &answers[pass as usize]);
         if pass == Pass::Queries {
-            bounds = enter_bounds(&mut entered, workload, subjects, &answers[0], plan.bounds);
+            bounds = add_bounds(&mut keyed, workload, subjects, &answers[0], plan.bounds);
         }
         let given = plan.known.and_then(|known| known.pass(pass).0);
         let protocol = Protocol {
             task_ns: plan.protocol.task_ns * pass.share(),
             ..plan.protocol
         };
-        let schedule = entered.schedule(given, workload.views.len(), &protocol);
-        let labels = entered.keys().iter().map(|(label, _)| label);
+        let schedule = keyed.schedule(given, workload.views.len(), &protocol);
+        let labels = keyed.keys().iter().map(|(label, _)| label);
         let structures: Vec<_> = labels.map(|l| structure_of(l, &bounds)).collect();
         let turn = |task: usize| {
             notice(structures[task], TIMING);
@@ -90,9 +121,9 @@ pub fn measure_part(
         };
         let timed = match plan.plan_only {
             true => Vec::new(),
-            false => timed(entered.tasks(), &schedule, &plan.protocol, &turn)?,
+            false => timed(keyed.tasks(), &schedule, &plan.protocol, &turn)?,
         };
-        for (key, result) in entered.keys().iter().zip(timed) {
+        for (key, result) in keyed.keys().iter().zip(timed) {
             tasks.push(task_part(key, &result, &schedule));
             let mut own = entries.iter_mut().filter(|e| e.subject.label() == key.0);
             if let (Err(verdict), Some(entry)) = (&result, own.next()) {
@@ -102,7 +133,7 @@ pub fn measure_part(
             samples.push((key.0.clone(), key.1, own));
         }
         schedules[pass as usize] = Some(KeyedSchedule {
-            keys: entered.keys().to_vec(),
+            keys: keyed.keys().to_vec(),
             schedule,
         });
     }
@@ -130,20 +161,20 @@ pub fn measure_part(
     Some((part, samples))
 }
 
-/// The structure whose task this is: a twin's original, no bound's.
+/// Label of the structure that has this task, `#twin` removed; `None` for a bound.
 fn structure_of<'l>(label: &'l str, bounds: &[String]) -> Option<&'l str> {
     let is_bound = bounds.iter().any(|bound| bound == label);
     (!is_bound).then(|| label.strip_suffix(TWIN).unwrap_or(label))
 }
 
-/// The tasks of all structures that are right so far.
-fn enter<'a>(
+/// The tasks of a pass, for all structures that are right so far.
+fn tasks_of<'a>(
     workload: &'a Workload,
     entries: &[Entry<'a>],
     pass: Pass,
     answers: &[Answer],
 ) -> Tasks<'a, TaskKey> {
-    let mut entered = Tasks::default();
+    let mut keyed = Tasks::default();
     for kind in TaskKind::ALL
         .into_iter()
         .filter(|kind| Pass::of(*kind) == pass)
@@ -155,15 +186,15 @@ fn enter<'a>(
             let least_ns = entry.counted.as_ref().map(|c| c.least_ns(pass));
             let label = &entry.subject.spec.label;
             let task = TimedTask::of(kind, label, workload, built, answers, least_ns);
-            entered.push((entry.subject.label(), kind), task);
+            keyed.push((entry.subject.label(), kind), task);
         }
     }
-    entered
+    keyed
 }
 
-/// Adds the lower bounds that there are on the workload, and returns their names.
-fn enter_bounds<'a>(
-    entered: &mut Tasks<'a, TaskKey>,
+/// Adds the lower bounds that apply to the workload, and returns their names.
+fn add_bounds<'a>(
+    keyed: &mut Tasks<'a, TaskKey>,
     workload: &'a Workload,
     subjects: &'a [Subject],
     visible: &[Answer],
@@ -178,12 +209,13 @@ fn enter_bounds<'a>(
     for bound in bounds.iter().filter(|_| !visible.is_empty()) {
         if let Some(task) = (bound.make)(&material) {
             names.push(bound.name.to_owned());
-            entered.push((bound.name.to_owned(), TaskKind::Query), task);
+            keyed.push((bound.name.to_owned(), TaskKind::Query), task);
         }
     }
     names
 }
 
+/// The times of a task, from its samples.
 fn task_part(key: &TaskKey, result: &Result<Timed, Verdict>, schedule: &Schedule) -> TaskPart {
     let nothing = Timed::default();
     let timed = result.as_ref().unwrap_or(&nothing);
@@ -205,8 +237,10 @@ fn task_part(key: &TaskKey, result: &Result<Timed, Verdict>, schedule: &Schedule
     }
 }
 
-/// Per group of `largest` consecutive timed cameras the median over the rounds
-/// of the mean CPU ns per query.
+/// CPU ns per query of each group of `largest` consecutive timed cameras.
+///
+/// The median over the rounds of the mean of a group; `largest` is the largest batch of
+/// all tasks, so that the groups are the same for all.
 fn tail(timed: &Timed, largest: usize, schedule: &Schedule) -> Vec<f64> {
     let position: BTreeMap<u32, usize> = schedule.cameras.iter().copied().zip(0..).collect();
     let mut groups: BTreeMap<usize, BTreeMap<u32, (f64, f64)>> = BTreeMap::new();
@@ -223,7 +257,7 @@ fn tail(timed: &Timed, largest: usize, schedule: &Schedule) -> Vec<f64> {
     groups.values().filter_map(middle).collect()
 }
 
-/// Counts, and compares all answers with the reference, and it with the oracle.
+/// Compares all answers with the reference, and the reference with the oracle.
 fn count<'a>(
     workload: &Workload,
     subjects: &'a [Subject],
@@ -260,42 +294,16 @@ fn count<'a>(
     (entries.collect(), Some(judged))
 }
 
-/// Answers of every structure that is right; empty if none is.
+/// The right answers, from the first structure that is right; empty if none is.
 fn right_answers(entries: &[Entry]) -> [Vec<Answer>; 2] {
     let right = entries.iter().find(|e| e.runs());
     let counted = right.and_then(|e| e.counted.as_ref());
     counted.map_or_else(Default::default, |c| c.answers.clone())
 }
 
-/// A structure on its way through the passes.
-struct Entry<'a> {
-    subject: &'a Subject,
-    verdict: Verdict,
-    /// In the first process only.
-    counted: Option<Counted>,
-}
-
-impl Entry<'_> {
-    fn runs(&self) -> bool {
-        self.verdict.status == Status::Ok
-    }
-
-    fn part(&self, workload: &Workload) -> SubjectPart {
-        let built = self.subject.built.as_ref().ok();
-        let counted = self.counted.as_ref().filter(|_| self.runs());
-        SubjectPart {
-            label: self.subject.label(),
-            build_ms: built.map(|b| b.build_ms),
-            memory_bytes: built.map(|b| b.memory.total() as u64),
-            update_ms: built.map(|b| b.update_ms.clone()).unwrap_or_default(),
-            counts: counted.map_or_else(BTreeMap::new, |c| counts(c, workload.scene.items.len())),
-            ..SubjectPart::unknown(&self.subject.spec, self.verdict.clone())
-        }
-    }
-}
-
-/// Queries with every camera that will be timed. The answers must be those of the
-/// first process, which compared them with the reference.
+/// Compares the answers for all cameras of the schedules with the first process's.
+///
+/// The first process has compared its answers with the reference.
 fn compare_digests(
     subject: &Subject,
     workload: &Workload,
@@ -344,7 +352,7 @@ fn compare_digests(
     Verdict::ok()
 }
 
-/// Means per query of what was counted.
+/// Metrics of the count pass by name, means per query.
 fn counts(counted: &Counted, items: usize) -> BTreeMap<String, f64> {
     let [queries, searches] = [0, 1].map(|pass| counted.answers[pass].len() as f64);
     let [visible, found] = [0, 1].map(|pass| {

@@ -1,6 +1,6 @@
-//! A subject of a measurement: a structure, built over its own copy of the
-//! data so that no other warms it. Here are the timing of the
-//! build and the guard against panics.
+//! [`Subject`]: a structure under test, built over its own copy of the data.
+//!
+//! No other structure warms its data. Times the build; a panic becomes a verdict.
 
 use super::clock::Stopwatch;
 use super::guarded::guarded;
@@ -15,9 +15,9 @@ use crate::scene::Scene;
 /// A structure with its two indexes: over the items (what does the camera
 /// see) and over the regions (where is the camera).
 pub struct Subject {
-    /// Structure, parameters and how it is executed.
+    /// Structure, parameters, kernel and threads.
     pub spec: StructureSpec,
-    /// Entered a second time, as a check: it must be as fast as the first.
+    /// True for the second copy of a structure, which must be as fast as the first.
     pub is_twin: bool,
     /// The indexes, or why there are none.
     pub built: Result<Built, Verdict>,
@@ -53,7 +53,7 @@ impl Built {
         }
     }
 
-    /// The same with the counting recorder.
+    /// [`Built::answer`] with the counting recorder.
     pub(super) fn count(
         &self,
         workload: &Workload,
@@ -106,7 +106,7 @@ impl Subject {
         self
     }
 
-    /// The name in samples: a twin is told apart.
+    /// Label on the command line; a twin's ends in `#twin`.
     pub fn label(&self) -> String {
         match self.is_twin {
             true => format!("{}{TWIN}", self.spec.label),
@@ -154,7 +154,7 @@ fn build(
     })
 }
 
-/// Why there is nothing to ask.
+/// Verdict of a structure that could not be built.
 fn not_built(error: BuildError) -> Verdict {
     let status = match error {
         BuildError::Panicked { .. } => Status::Panicked,

@@ -1,8 +1,8 @@
-//! Keys of cells: everything that identifies a result.
+//! Keys of groups, cells and tasks: everything that identifies a result.
 
 use serde::{Deserialize, Serialize};
 
-/// Key of a group: the part in common to cells that are compared.
+/// Key of a group: all settings that cells must share to be compared.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct GroupKey {
     /// Name of the scene, parameters included.
@@ -33,7 +33,7 @@ impl GroupKey {
     }
 }
 
-/// A cell: a structure in a group.
+/// Key of a cell: a structure in a group.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CellKey {
     /// Group that the cell is compared within.
@@ -58,7 +58,7 @@ named! {
     }
 }
 
-/// Passes of a group, each timed by itself.
+/// The two passes of a group, each counted and timed by itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Pass {
     /// Frustum queries, one per camera; lower bounds take part.
@@ -70,6 +70,7 @@ pub(super) enum Pass {
 impl Pass {
     pub(super) const ALL: [Pass; 2] = [Pass::Queries, Pass::Searches];
 
+    /// The pass that times tasks of this kind.
     pub(super) fn of(task: TaskKind) -> Pass {
         match task {
             TaskKind::Query => Pass::Queries,
@@ -77,8 +78,9 @@ impl Pass {
         }
     }
 
-    /// CPU time of a task of this pass / time of a frustum query's.
-    /// Region search is not what structures are ranked by.
+    /// CPU time of a task of this pass / that of a task of frustum queries.
+    ///
+    /// Region search gets less, because structures are ranked by frustum queries.
     pub(super) fn share(self) -> f64 {
         match self {
             Pass::Queries => 1.0,
@@ -86,7 +88,7 @@ impl Pass {
         }
     }
 
-    /// Object of one query, for messages.
+    /// Name of the object that one query is for, in messages.
     pub(super) fn question(self) -> &'static str {
         match self {
             Pass::Queries => "camera",
@@ -95,6 +97,5 @@ impl Pass {
     }
 }
 
-/// Key of a task of a group: label of a structure or a lower bound, and what it is
-/// timed at.
+/// Key of a task: label of a structure or a lower bound, and kind of query.
 pub type TaskKey = (String, TaskKind);

@@ -1,10 +1,32 @@
-//! Measuring: a count pass that verifies every answer, then a timed pass that
-//! counts nothing. It defines the protocol, the clocks and the metrics; it
-//! knows neither how a structure works nor how results are written.
+//! Measurement: a count pass that verifies every answer, then a timed pass.
 //!
-//! The pipeline of every measurement: [`Workload`] (scene, views, points) ->
-//! [`Subject`]s (built structures) -> [`count_pass`] -> [`timed_rounds`] ->
-//! [`ReportCell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
+//! Independent of how structures work and of how results are written.
+//!
+//! A [`Plan`] has groups of cells: a group is a scene, a path, a cache state and a culling
+//! test ([`GroupKey`]), a cell is one structure in it. [`measure_scene`] runs in each process
+//! of a run, and per group:
+//!
+//! 1. a [`Workload`]: the queries along the path; and [`Subject`]s: the built structures;
+//! 2. [`measure_part`]: in the first process [`count_pass`] and [`judge`], in the others a
+//!    comparison of digests; then the timed pass, [`timed`], of [`TimedTask`]s by a
+//!    [`Schedule`], in which the lower bounds [`BOUNDS`] take part;
+//! 3. a [`Part`]: the results of this process for this group.
+//!
+//! [`Group::of`] derives the [`ReportCell`]s of a group from the parts of all processes.
+//! Other studies time their own tasks with [`Tasks`], [`timed`] and [`OverProcesses`].
+//!
+//! | files | contents |
+//! |---|---|
+//! | `experiment`, `key` | plan, groups and cells of a run; one process's share of a scene |
+//! | `group`, `process_result` | measurement of one group in one process; its result, [`Part`] |
+//! | `workload`, `index_under_test` | queries; built structures |
+//! | `count`, `answer` | count pass, oracle; digests of answers |
+//! | `task`, `tasks`, `schedule` | one timed task; a keyed list of them; their schedule |
+//! | `timing`, `orders`, `clock`, `cache_flush` | timed pass; order of tasks; clocks; cold caches |
+//! | `update`, `refitted`, `bounds` | updates of moved items; lower bounds |
+//! | `results`, `cell`, `cell_info`, `metrics` | cells of a report from parts |
+//! | `over_processes` | times of a study's tasks over several processes |
+//! | `guarded`, `progress`, `environment` | panics as verdicts; progress; machine and toolchain |
 
 mod answer;
 mod bounds;
@@ -92,8 +114,7 @@ named! {
 }
 
 impl Status {
-    /// Status of a structure with a wrong answer: a false negative is worse than
-    /// anything that is returned too much.
+    /// Status of a structure with a fault; a false negative outranks a false positive.
     pub fn of(fault: &Fault) -> Status {
         match fault {
             Fault::Panicked(_) => Status::Panicked,
@@ -108,7 +129,7 @@ impl Status {
     }
 }
 
-/// A status with its reason.
+/// Result of a check: a status with its reason.
 #[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Verdict {
     /// How it ended.
@@ -118,12 +139,12 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Nothing wrong.
+    /// [`Status::Ok`], without a reason.
     pub fn ok() -> Self {
         Verdict::default()
     }
 
-    /// A status that has to be explained.
+    /// A status other than [`Status::Ok`], with its reason.
     pub fn new(status: Status, reason: impl Into<String>) -> Self {
         Verdict {
             status,

@@ -1,14 +1,16 @@
-//! The order of the tasks in each round, balanced so that neither a position
-//! nor a neighbour favours a task. Timing itself is `timing`'s.
+//! The order of the tasks in each round of a timed pass.
+//!
+//! Balanced, so that neither a position nor a neighbour favours a task.
 
 use crate::scene::SeededRng;
 
-/// Orders in which every task takes every position once and follows every other
-/// once in as many rounds as there are tasks (twice in twice as many for
-/// odd numbers): a Williams square (E. J. Williams 1949, "Experimental designs
-/// balanced for the estimation of residual effects of treatments"), its names
-/// drawn again for each block. A task behind one that streams through
-/// the caches starts worse than others; a fixed neighbour would be a bias.
+/// Balanced orders of n tasks: a Williams square per block of n rounds.
+///
+/// In a block every task takes every position once and follows every other task once; for
+/// odd n a block has 2n rounds, and everything occurs twice. Each block permutes the tasks
+/// at random. (E. J. Williams 1949, "Experimental designs balanced for the estimation of
+/// residual effects of treatments".) A task that follows one that streams through the
+/// caches starts worse than others, so a fixed neighbour would be a bias.
 pub struct Orders {
     names: Vec<usize>,
     turn: usize,
@@ -16,6 +18,7 @@ pub struct Orders {
 }
 
 impl Orders {
+    /// Orders of `count` tasks.
     pub fn new(count: usize, seed: u64) -> Orders {
         Orders {
             names: (0..count).collect(),

@@ -1,5 +1,6 @@
-//! The times of tasks in one process, and over several: values, ratios and who
-//! is faster, by the estimators of a run.
+//! Times of the tasks of a study, in one process and over several.
+//!
+//! Values, ratios and orders by the estimators of a run, which has `results` instead.
 
 use std::borrow::Borrow;
 

@@ -1,6 +1,7 @@
-//! Results of one process for one group of cells: plain data that goes from
-//! process to process and into the stream of a run. `results` turns the parts
-//! of all processes into cells.
+//! [`Part`]: the results of one process for one group of cells.
+//!
+//! Plain data that goes from process to process and into the stream of a run. `results`
+//! makes the cells of a report from the parts of all processes.
 
 use std::collections::BTreeMap;
 
@@ -14,33 +15,36 @@ use super::{
     Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, TaskKind, Verdict,
 };
 
-/// Counts and plan of the first process; the others keep to it.
+/// Results of one process for one group of cells.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct Known {
-    /// Right answer of every camera. Empty if the process should count for itself.
-    pub visible: Vec<Answer>,
-    /// Right answer of every eye.
-    pub located: Vec<Answer>,
-    /// Schedule of frustum queries, bounds last. `None` where nothing is timed.
-    pub query: Option<KeyedSchedule<TaskKey>>,
-    /// Schedule of region searches.
-    pub locate: Option<KeyedSchedule<TaskKey>>,
-    /// Scale of the lens where the path names a visible share.
-    pub lens_scale: Option<f64>,
+pub struct Part {
+    /// Key of the group.
+    pub key: GroupKey,
+    /// Number of the process; the first, 0, counts and plans.
+    pub process: u32,
+    /// The scene, as reports have it.
+    pub scene: SceneInfo,
+    /// The path, as reports have it.
+    pub path: PathInfo,
+    /// Answers and schedules for the other processes; from the first process only.
+    pub known: Option<Known>,
+    /// How the answers differ from the exact truth; the first process only.
+    pub judged: Option<Judged>,
+    /// Structures in the order of the plan, twins last.
+    pub subjects: Vec<SubjectPart>,
+    /// Structures that had ended a process on this scene before.
+    ///
+    /// They are not tried again, not by a resumed run either.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub failed: BTreeMap<String, Verdict>,
+    /// Names of the lower bounds among the tasks.
+    pub bounds: Vec<String>,
+    /// Tasks in the order of the schedules.
+    pub tasks: Vec<TaskPart>,
 }
 
-impl Known {
-    /// Schedule of a pass, if it is timed, and the right answers.
-    pub(super) fn pass(&self, pass: Pass) -> (Option<&KeyedSchedule<TaskKey>>, &[Answer]) {
-        match pass {
-            Pass::Queries => (self.query.as_ref(), &self.visible),
-            Pass::Searches => (self.locate.as_ref(), &self.located),
-        }
-    }
-}
-
-/// A structure in one process.
+/// Results of one structure in one process; its query times are in [`TaskPart`]s.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SubjectPart {
@@ -63,11 +67,11 @@ pub struct SubjectPart {
     pub update_ms: Vec<f64>,
     /// ln of (query time after many refits / on a fresh build of the same boxes).
     pub refitted_ln: Option<f64>,
-    /// Means per query of what the count pass counted; the first process only.
+    /// Metrics of the count pass, means per query; the first process only.
     pub counts: BTreeMap<String, f64>,
 }
 
-/// Times of one task in one process.
+/// Times of one task of a structure or a lower bound in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TaskPart {
@@ -89,36 +93,36 @@ pub struct TaskPart {
     pub returned: u64,
 }
 
-/// One process, one group.
+/// Right answers and schedules of the first process, which all others use.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct Part {
-    /// The group.
-    pub key: GroupKey,
-    /// 0 is the first, which counts and plans.
-    pub process: u32,
-    /// The scene, as reports have it.
-    pub scene: SceneInfo,
-    /// The path, as reports have it.
-    pub path: PathInfo,
-    /// Counts and plan for the other processes; from the first process only.
-    pub known: Option<Known>,
-    /// How the answers differ from the exact truth; the first process only.
-    pub judged: Option<Judged>,
-    /// Structures in the order of the plan, twins last.
-    pub subjects: Vec<SubjectPart>,
-    /// Structures that had ended a process on this scene before: they are not
-    /// tried again, by a run that is resumed neither.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub failed: BTreeMap<String, Verdict>,
-    /// Names of the lower bounds among the tasks.
-    pub bounds: Vec<String>,
-    /// Tasks in the order of the schedules.
-    pub tasks: Vec<TaskPart>,
+pub struct Known {
+    /// Right answer of the frustum query of every camera.
+    ///
+    /// Empty if the process that gets it is to count for itself.
+    pub visible: Vec<Answer>,
+    /// Right answer of the region search at every eye.
+    pub located: Vec<Answer>,
+    /// Schedule of frustum queries, bounds last. `None` where nothing is timed.
+    pub query: Option<KeyedSchedule<TaskKey>>,
+    /// Schedule of region searches.
+    pub locate: Option<KeyedSchedule<TaskKey>>,
+    /// Scale of the lens where the path names a visible share.
+    pub lens_scale: Option<f64>,
+}
+
+impl Known {
+    /// Schedule of a pass, if it is timed, and the right answers.
+    pub(super) fn pass(&self, pass: Pass) -> (Option<&KeyedSchedule<TaskKey>>, &[Answer]) {
+        match pass {
+            Pass::Queries => (self.query.as_ref(), &self.visible),
+            Pass::Searches => (self.locate.as_ref(), &self.located),
+        }
+    }
 }
 
 impl SubjectPart {
-    /// A structure that was not tried.
+    /// The results of a structure that was not tried.
     pub fn unknown(spec: &StructureSpec, verdict: Verdict) -> SubjectPart {
         SubjectPart {
             label: spec.label.clone(),
@@ -136,9 +140,11 @@ impl SubjectPart {
 }
 
 impl Part {
-    /// Differences of the timed pass from the plan, by label: a task that is not
-    /// planned or not in its place, rounds too many, samples missing or counted
-    /// twice. Answers are known, so the ids of a whole pass are too.
+    /// Differences of the timed pass from the schedules of the first process, by label.
+    ///
+    /// A task that is not planned or not in its position, too many rounds, samples
+    /// missing or counted twice. The number of ids of a whole pass follows from the
+    /// right answers.
     pub fn contradictions(&self, known: &Known) -> Vec<(&str, Verdict)> {
         let mut found = Vec::new();
         for pass in Pass::ALL {

@@ -1,8 +1,9 @@
-//! Notices of a process about its current step, for progress and time limits.
+//! Callback that gets the current step of a process, for progress and time limits.
 
-/// The step that is noticed at every turn of a timed pass.
+/// Step that is reported at every turn of a timed pass.
 pub const TIMING: &str = "timing";
 
-/// Gets each next step of a process: the structure (none for the harness's own
-/// work) and the step.
+/// Callback that gets each step of a process.
+///
+/// Its arguments are the structure, `None` for steps without one, and the step.
 pub type Notice<'n> = &'n dyn Fn(Option<&str>, &str);

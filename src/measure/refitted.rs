@@ -1,19 +1,21 @@
-//! Effect of many updates on the queries of a structure that refits.
+//! Query time of a structure after many refits, against a fresh build.
 
 use super::input_of;
 use super::update::{MOST_UPDATED, USUAL_SHARE, move_share};
 use super::{Answer, Protocol, TimedTask, Workload, guarded, timed_rounds};
 use crate::index::{DynIndex, StructureSpec};
 
-/// Updates after which queries are timed again.
+/// Number of updates before queries are timed.
 const MANY: usize = 32;
-/// Cameras and rounds of a query after many updates.
+/// Most timed cameras.
 const CAMERAS: usize = 24;
+/// Number of rounds.
 const ROUNDS: usize = 7;
 
-/// ln of (query time after many refits / query time on a fresh build of the same
-/// boxes), frustum queries side by side in one process. `None` for a structure
-/// that does not refit, a scene too large, or answers that differ.
+/// ln of (query time after many refits / query time on a fresh build).
+///
+/// Frustum queries over the same boxes, timed side by side in one process. `None` for a
+/// structure that does not refit, a scene too large, or answers that differ.
 pub(super) fn refitted_ln(
     spec: &StructureSpec,
     workload: &Workload,

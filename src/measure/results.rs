@@ -1,7 +1,7 @@
-//! Cells of a report from the parts of all processes.
+//! [`Group::of`]: the cells of a report from the parts of all processes.
 //!
-//! Every value, interval, ratio and rank comes from the same quantities, the logarithms
-//! of time of each structure in each process, by the estimators of
+//! Every value, interval, ratio and rank of times comes from the same quantities, the
+//! ln of the time of each structure in each process, by the estimators of
 //! [`crate::statistics`].
 
 use std::collections::BTreeMap;
@@ -22,7 +22,7 @@ use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted, speedup,
 };
 
-/// In the order of [`UPDATE_SHARES`].
+/// Metrics of updates, in the order of [`UPDATE_SHARES`].
 const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
     "update_ms_0_1_percent",
     "update_ms",
@@ -37,7 +37,7 @@ const TIME_METRICS: [(TaskKind, &str, Option<&str>); 3] = [
     (TaskKind::LocateBatched, "locate_batched_ns", None),
 ];
 
-/// Quantiles over groups of cameras.
+/// Metrics that are quantiles over groups of cameras, each with its quantile.
 const TAIL_METRICS: [(&str, f64); 4] = [
     ("query_ns_p5", 0.05),
     ("query_ns_p95", 0.95),
@@ -45,25 +45,27 @@ const TAIL_METRICS: [(&str, f64); 4] = [
     ("query_ns_max", 1.0),
 ];
 
-/// The structure that speed-ups refer to.
+/// Label of the structure that speed-ups refer to.
 pub const YARDSTICK: &str = "linear";
 
-/// All cells of a group, with what was measured beside them.
+/// All cells of a group, and the results of lower bounds, twin and region search.
 #[non_exhaustive]
 pub struct Group {
-    /// Structures in the order of the plan.
+    /// Cells of the structures, in the order of the plan.
     pub cells: Vec<ReportCell>,
-    /// Lower bounds: no structures, never ranked.
+    /// Cells of the lower bounds, which are never ranked.
     pub bounds: Vec<ReportCell>,
-    /// The structure that was entered twice, and second time / first time: the
-    /// interval should contain 1.
+    /// Label of the structure that was measured twice, and time of its twin / its own.
+    ///
+    /// The interval should contain 1.
     pub twin: Option<(String, Estimate)>,
-    /// The ranks of structures by their times of region search.
+    /// Ranks of the structures by their times of region search, by label.
     pub located: Vec<(String, usize)>,
 }
 
-/// Measures a group in this process alone: values and ranks by order, without
-/// intervals. `None` if stopped.
+/// Measures a group in this process alone; `None` if stopped.
+///
+/// Values have no intervals, and ranks are the order of the values.
 pub fn measure_group(
     workload: &Workload,
     subjects: &[Subject],
@@ -92,20 +94,20 @@ impl Group {
     /// # Panics
     /// Without parts.
     pub fn of(parts: &[Part]) -> Group {
-        let facts = Facts::of(parts);
+        let merged = MergedParts::of(parts);
         let first = &parts[0];
         let subjects = first.subjects.iter();
         let mut cells: Vec<ReportCell> = subjects
             .filter(|s| !s.label.ends_with(TWIN))
-            .map(|subject| facts.cell(subject))
+            .map(|subject| merged.cell(subject))
             .collect();
-        for (i, rank) in facts.ranks(&cells, TaskKind::Query) {
+        for (i, rank) in merged.ranks(&cells, TaskKind::Query) {
             cells[i].rank = Some(rank);
         }
-        let located = facts.ranks(&cells, TaskKind::Locate).into_iter();
+        let located = merged.ranks(&cells, TaskKind::Locate).into_iter();
         Group {
-            bounds: first.bounds.iter().map(|name| facts.bound(name)).collect(),
-            twin: facts.twin(),
+            bounds: first.bounds.iter().map(|name| merged.bound(name)).collect(),
+            twin: merged.twin(),
             located: located
                 .map(|(i, rank)| (cells[i].structure.clone(), rank))
                 .collect(),
@@ -114,20 +116,21 @@ impl Group {
     }
 }
 
-/// The parts of a group in the form that cells are read off.
-struct Facts<'p> {
+/// The parts of a group, with times by structure and task.
+struct MergedParts<'p> {
     parts: &'p [Part],
+    /// Answers and schedules of the first process.
     known: Option<&'p Known>,
-    /// Structures whose timed pass is not what the plan asks for.
+    /// Structures whose timed pass differs from the schedule.
     contradictions: Vec<(&'p str, Verdict)>,
-    /// ln ns per query in each process, by label and task.
-    logs: BTreeMap<(&'p str, TaskKind), Vec<f64>>,
-    /// The yardstick; without one, the first structure that has times.
+    /// ln of the CPU ns per query in each process, by label and task.
+    ln_ns: BTreeMap<(&'p str, TaskKind), Vec<f64>>,
+    /// Label that times are paired with: [`YARDSTICK`], or else the first with times.
     reference: Option<&'p str>,
 }
 
-impl<'p> Facts<'p> {
-    fn of(parts: &'p [Part]) -> Facts<'p> {
+impl<'p> MergedParts<'p> {
+    fn of(parts: &'p [Part]) -> MergedParts<'p> {
         let mut logs: BTreeMap<_, Vec<f64>> = BTreeMap::new();
         for task in parts.iter().flat_map(|part| &part.tasks) {
             let rounds: Vec<f64> = task.rounds_ns.iter().map(|ns| ns.ln()).collect();
@@ -136,7 +139,7 @@ impl<'p> Facts<'p> {
                 logs.entry(key).or_default().push(ln_ns);
             }
         }
-        // What is not there in every process is paired with nothing.
+        // Tasks without a time in some process cannot be paired.
         let processes = logs.values().map(Vec::len).max().unwrap_or(0);
         logs.retain(|_, own| own.len() == processes);
         let known = parts.iter().find_map(|part| part.known.as_ref());
@@ -144,34 +147,36 @@ impl<'p> Facts<'p> {
             let of_part = |part: &'p Part| part.contradictions(known);
             parts.iter().flat_map(of_part).collect()
         });
-        let mut facts = Facts {
+        let mut merged = MergedParts {
             parts,
             known,
             contradictions,
-            logs,
+            ln_ns: logs,
             reference: None,
         };
         let labels = parts[0].subjects.iter().map(|s| s.label.as_str());
-        facts.reference = std::iter::once(YARDSTICK).chain(labels).find(|label| {
-            let is_timed = facts.logs.contains_key(&(*label, TaskKind::Query));
-            is_timed && facts.verdict(label).status == Status::Ok
+        merged.reference = std::iter::once(YARDSTICK).chain(labels).find(|label| {
+            let is_timed = merged.ln_ns.contains_key(&(*label, TaskKind::Query));
+            is_timed && merged.verdict(label).status == Status::Ok
         });
-        facts
+        merged
     }
 
     fn has_yardstick(&self) -> bool {
         self.reference == Some(YARDSTICK)
     }
 
-    fn log<'s>(&'s self, label: &'s str, task: TaskKind) -> Option<&'s [f64]> {
-        self.logs.get(&(label, task)).map(Vec::as_slice)
+    /// ln of the times of a task in each process, ns.
+    fn ln_ns<'s>(&'s self, label: &'s str, task: TaskKind) -> Option<&'s [f64]> {
+        self.ln_ns.get(&(label, task)).map(Vec::as_slice)
     }
 
-    /// Times of a structure and of the reference, ln ns in each process.
+    /// ln of the times of the reference and of a structure in each process, ns.
     fn paired<'s>(&'s self, label: &'s str, task: TaskKind) -> Option<[&'s [f64]; 2]> {
-        Some([self.log(self.reference?, task)?, self.log(label, task)?])
+        Some([self.ln_ns(self.reference?, task)?, self.ln_ns(label, task)?])
     }
 
+    /// Time of a task over all processes, ns.
     fn ns(&self, label: &str, task: TaskKind) -> Option<Estimate> {
         let [reference, own] = self.paired(label, task)?;
         one_run(reference, own)
@@ -190,6 +195,7 @@ impl<'p> Facts<'p> {
         failed.or(first).cloned().unwrap_or_else(Verdict::ok)
     }
 
+    /// Results of a structure in each process.
     fn subjects<'l>(
         &self,
         label: &'l str,
@@ -204,7 +210,7 @@ impl<'p> Facts<'p> {
         all.filter(move |t| t.label == label && t.task == TaskKind::Query)
     }
 
-    /// Visible items of a timed camera, mean.
+    /// Mean number of visible items of the timed cameras.
     fn visible_when_timed(&self) -> Option<f64> {
         let known = self.known?;
         let cameras = &known.query.as_ref()?.schedule.cameras;
@@ -213,6 +219,7 @@ impl<'p> Facts<'p> {
         Some(visible / cameras.len() as f64)
     }
 
+    /// The cell of a structure, its rank excluded.
     fn cell(&self, subject: &SubjectPart) -> ReportCell {
         let label = subject.label.as_str();
         let verdict = self.verdict(label);
@@ -227,7 +234,7 @@ impl<'p> Facts<'p> {
         }
         let mut left_out = Vec::new();
         if right {
-            // A stream may hold others.
+            // Listed metrics only: a stream may hold others.
             for metric in METRICS {
                 metrics.set(metric.name, subject.counts.get(metric.name).copied());
             }
@@ -248,13 +255,14 @@ impl<'p> Facts<'p> {
         }
     }
 
+    /// The cell of a lower bound.
     fn bound(&self, name: &str) -> ReportCell {
         let mut metrics = Metrics::default();
         self.time_metrics(&mut metrics, name);
         self.timed(name, self.verdict(name), metrics)
     }
 
-    /// A cell with what structures and lower bounds have in common.
+    /// A cell with the fields that structures and lower bounds have in common.
     fn timed(&self, label: &str, verdict: Verdict, metrics: Metrics) -> ReportCell {
         let first = &self.parts[0];
         ReportCell {
@@ -276,7 +284,7 @@ impl<'p> Facts<'p> {
         }
     }
 
-    /// Metrics that an ok cell has elsewhere and not here.
+    /// Metrics that this cell lacks though its structure is right, with the reason.
     fn left_out(&self, label: &str) -> Vec<String> {
         let is_large = self.parts[0].scene.total_count > MOST_UPDATED;
         let has_few_groups = |task: &TaskPart| task.tail_ns.len() < LEAST_TAIL;
@@ -284,7 +292,7 @@ impl<'p> Facts<'p> {
             is_large.then(|| {
                 format!("update_ms: scenes of more than {MOST_UPDATED} items are not moved")
             }),
-            (self.log(label, TaskKind::Locate).is_none())
+            (self.ln_ns(label, TaskKind::Locate).is_none())
                 .then(|| "locate_ns: this suite times frustum queries only".to_owned()),
             (self.queries(label).any(has_few_groups)).then(|| {
                 format!("query_ns_p95: fewer than {LEAST_TAIL} comparable groups of cameras")
@@ -304,7 +312,7 @@ impl<'p> Facts<'p> {
         let (batch, cameras_timed) = planned.unwrap_or_default();
         let mut by_process = BTreeMap::new();
         for (task, metric, _) in TIME_METRICS {
-            if let Some(own) = self.log(label, task) {
+            if let Some(own) = self.ln_ns(label, task) {
                 by_process.insert(metric.to_owned(), own.iter().map(|x| x.exp()).collect());
             }
         }
@@ -313,7 +321,7 @@ impl<'p> Facts<'p> {
             by_process.insert("build_ms".to_owned(), builds);
         }
         CellTimes {
-            processes: self.log(label, TaskKind::Query).map_or(0, <[f64]>::len),
+            processes: self.ln_ns(label, TaskKind::Query).map_or(0, <[f64]>::len),
             rounds: (self.queries(label).map(|t| t.rounds_ns.len()).min()).unwrap_or(0),
             cameras_timed,
             cameras_checked: self.known.map_or(0, |known| known.visible.len()),
@@ -322,7 +330,7 @@ impl<'p> Facts<'p> {
         }
     }
 
-    /// A positive value of a structure over the processes that have it.
+    /// Mean over processes of a positive value of a structure.
     fn over_processes(
         &self,
         label: &str,
@@ -339,8 +347,8 @@ impl<'p> Facts<'p> {
             let update = self.over_processes(label, |s| s.update_ms.get(share).copied());
             metrics.estimate(name, update);
         }
-        let worn: Vec<f64> = self.subjects(label).filter_map(|s| s.refitted_ln).collect();
-        metrics.estimate("refitted_over_rebuilt", one_run(&worn, &worn));
+        let refitted: Vec<f64> = self.subjects(label).filter_map(|s| s.refitted_ln).collect();
+        metrics.estimate("refitted_over_rebuilt", one_run(&refitted, &refitted));
         let items = self.parts[0].scene.total_count as f64;
         let bytes = self.subjects(label).find_map(|s| s.memory_bytes);
         metrics.set(
@@ -377,8 +385,7 @@ impl<'p> Facts<'p> {
         }
     }
 
-    /// Queries after which the build is repaid against the yardstick, `None` if never,
-    /// from the times that are shown.
+    /// Queries after which the build is repaid against the yardstick; `None` if never.
     fn break_even(&self, label: &str) -> Option<f64> {
         let cost = |label: &str| -> Option<[f64; 2]> {
             let build = self.over_processes(label, |s| s.build_ms)?.value * 1e6;
@@ -390,10 +397,10 @@ impl<'p> Facts<'p> {
         (gain > 0.0 && price > 0.0).then(|| (price / gain).ceil())
     }
 
-    /// Time of `label` / time of `other`: the ratio of the two shown values.
+    /// Time of `label` / time of `other`, equal to the ratio of the two shown values.
     fn ratio(&self, label: &str, other: &str) -> Option<Estimate> {
         let [reference, own] = self.paired(label, TaskKind::Query)?;
-        ratio(reference, own, self.log(other, TaskKind::Query)?)
+        ratio(reference, own, self.ln_ns(other, TaskKind::Query)?)
     }
 
     fn twin(&self) -> Option<(String, Estimate)> {
@@ -402,7 +409,7 @@ impl<'p> Facts<'p> {
         Some((original.to_owned(), self.ratio(twin, original)?))
     }
 
-    /// Position and rank of each ok cell that has times of a task.
+    /// Index and rank of each ok cell that has times of a task.
     fn ranks(&self, cells: &[ReportCell], task: TaskKind) -> Vec<(usize, usize)> {
         let ok = cells.iter().enumerate();
         let ok = ok.filter(|(_, cell)| cell.status == Status::Ok);

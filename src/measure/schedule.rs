@@ -1,6 +1,7 @@
-//! Schedule of a timed pass, fixed before it begins: timed cameras, queries per
-//! clock reading, and rounds of each task. The same for all processes of a run
-//! and for both sides of a comparison.
+//! Schedule of a timed pass: cameras, queries per clock reading, rounds of tasks.
+//!
+//! The first process of a run makes it from a [`Protocol`]; all others use the same one, and
+//! so do both sides of a comparison.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +11,7 @@ use super::task::TimedTask;
 use crate::query::ItemId;
 use crate::statistics::median;
 
-/// How much is to be measured.
+/// Limits that a schedule is made within: rounds, time, cameras, cache state.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Protocol {
     /// Rounds of a task, at least and at most.
@@ -20,24 +21,26 @@ pub struct Protocol {
     pub task_ns: f64,
     /// Most cameras that are timed, evenly spread over the path.
     pub cameras: usize,
-    /// Stream over the caches before every query.
+    /// True if the caches are streamed over before every query.
     pub cold: bool,
-    /// Decides on the order of the tasks in each round.
+    /// Seed of the order of the tasks in each round.
     pub seed: u64,
     /// Bytes to stream over for a cold query.
     pub cache_bytes: usize,
 }
 
-/// A clock reading with its loop costs at most this, ns; a lap is made long
-/// enough for it. On Linux reading a thread's CPU time is a system call.
+/// Upper bound of the cost of a clock reading with its loop, ns.
+///
+/// Laps are made long enough for it. On Linux reading a thread's CPU time is a system
+/// call.
 pub const CLOCK_NS: f64 = 650.0;
 /// Largest share of a lap that the clock may take.
 pub const MOST_OVERHEAD: f64 = 0.01;
-/// Cold queries cost a sweep over memory each: fewer cameras.
+/// Most cameras of a cold pass, where each query costs a sweep over memory.
 const COLD_CAMERAS: usize = 24;
-/// Never so few that a path is one view.
+/// Fewest cameras that are timed, so that a path is more than one view.
 const LEAST_CAMERAS: usize = 8;
-/// Queries that a cost is measured by where it is not counted.
+/// Number of queries that the cost of a task is estimated from.
 const PILOT: usize = 24;
 
 /// The plan of one timed pass.
@@ -67,7 +70,7 @@ pub struct TaskPlan {
 }
 
 impl Protocol {
-    /// The cameras that are timed, of `count`.
+    /// Indices of the timed cameras among `count`, evenly spread.
     pub fn cameras_of(&self, count: usize) -> Vec<u32> {
         let most = match self.cold {
             true => self.cameras.min(COLD_CAMERAS),
@@ -78,9 +81,9 @@ impl Protocol {
     }
 }
 
-/// Most cameras that a plain loop over `items` items answers within `pass_ns`.
-/// It depends on the question alone, so that every run of one command times the
-/// same cameras.
+/// Number of cameras that a plain loop over `items` items answers within `pass_ns`.
+///
+/// It depends on no measurement, so that every run of a command times the same cameras.
 pub fn cameras_within(pass_ns: f64, items: usize) -> usize {
     /// Time of a box in the plain loop, ns.
     const BOX_NS: f64 = 5.0;
@@ -88,9 +91,10 @@ pub fn cameras_within(pass_ns: f64, items: usize) -> usize {
 }
 
 impl Schedule {
-    /// Plans a pass over `count` cameras. Queries per clock reading follow from
-    /// what was counted, and are the same in every run; where a task does not
-    /// know its cost, from the median of a few queries.
+    /// Plans a pass over `count` cameras.
+    ///
+    /// Queries per clock reading follow from [`TimedTask::least_ns`] and are the same in
+    /// every run; for a task without it, from the median time of a few queries.
     pub fn new(count: usize, tasks: &[TimedTask], protocol: &Protocol) -> Schedule {
         let cameras = protocol.cameras_of(count);
         let timed = cameras.len().max(1);
@@ -129,7 +133,7 @@ impl Schedule {
         }
     }
 
-    /// The plan for the tasks `kept` of the ones it was made for.
+    /// The same schedule with only the tasks at the positions `kept`.
     pub fn of_tasks(&self, kept: &[usize]) -> Schedule {
         Schedule {
             tasks: kept.iter().map(|&i| self.tasks[i]).collect(),
@@ -138,22 +142,22 @@ impl Schedule {
     }
 }
 
-/// Median CPU time of a query, ns.
+/// Median CPU time of a query, ns, from a few cameras.
 fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
     let some = cameras.len().min(PILOT);
-    let mut asked: Vec<u32> = (0..some)
+    let mut queried: Vec<u32> = (0..some)
         .map(|k| cameras[k * cameras.len() / some])
         .collect();
     if task.ask_many.is_some() {
-        asked = cameras.to_vec();
+        queried = cameras.to_vec();
         let watch = Stopwatch::start();
-        task.ask_all(&asked, out);
-        return watch.lap().cpu_ns / asked.len().max(1) as f64;
+        task.ask_all(&queried, out);
+        return watch.lap().cpu_ns / queried.len().max(1) as f64;
     }
     // Twice: the first time fills caches and grows the output.
     let mut laps = Vec::new();
     for turn in 0..2 {
-        for camera in &asked {
+        for camera in &queried {
             let watch = Stopwatch::start();
             task.ask_all(std::slice::from_ref(camera), out);
             if turn == 1 {
@@ -165,7 +169,7 @@ fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
     (middle - CLOCK_NS).max(middle / 8.0).max(1.0)
 }
 
-/// The smallest power of two of queries that makes the clock negligible.
+/// Queries per clock reading: a power of two that makes the clock negligible.
 fn batch(query_ns: f64, cameras: usize) -> usize {
     let needed = CLOCK_NS / (MOST_OVERHEAD * query_ns.max(1.0));
     (needed.ceil().max(1.0) as usize)

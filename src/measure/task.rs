@@ -1,28 +1,30 @@
-//! Those that take part in a timed pass: the questions there are, and how a
-//! structure answers them. Clocks and rounds are the pass's own.
+//! [`TimedTask`], a participant of a timed pass: a closure that answers queries.
+//!
+//! Made from a structure and a [`TaskKind`]; lower bounds and other studies make their own
+//! with [`TimedTask::new`].
 
 use std::cell::{Cell, RefCell};
 
 use super::{Answer, Built, TaskKind, Workload};
 use crate::query::{ItemId, Located};
 
-/// Answers query number n: appends ids to an empty output.
+/// Answers the query of the camera with this index: appends ids to an empty output.
 pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
 
-/// Answers several queries at once; the number of ids of them all.
+/// Answers the queries of several cameras at once; returns the number of all ids.
 pub type AskMany<'a> = Box<dyn Fn(&[u32]) -> u64 + 'a>;
 
-/// One that takes part in a timed pass: how it answers query `place`
-/// (appending to an empty output), and what it must return.
+/// A participant of a timed pass: its queries and the right sizes of their answers.
 pub struct TimedTask<'a> {
     /// Answers one query.
     pub ask: Ask<'a>,
-    /// Takes the place of `ask`, and a whole pass is one batch.
+    /// Answers all queries of a pass in one batch; used instead of `ask` if present.
     pub ask_many: Option<AskMany<'a>>,
-    /// Number of ids of every query.
+    /// Number of ids that each query must return.
     pub expected: Vec<u64>,
-    /// Lower bound of the time of a query, ns, from counters: the same in every run.
-    /// `None` where nothing was counted.
+    /// Lower bound of the time of a query, ns; `None` where nothing was counted.
+    ///
+    /// It comes from counters, so it is the same in every run.
     pub least_ns: Option<f64>,
 }
 
@@ -37,7 +39,7 @@ impl<'a> TimedTask<'a> {
         }
     }
 
-    /// A structure that counted right, asked a task of a workload.
+    /// The task that a structure answers queries of a kind on a workload.
     pub(super) fn of(
         task: TaskKind,
         label: &str,
@@ -49,8 +51,8 @@ impl<'a> TimedTask<'a> {
         let ask: Ask = match task {
             TaskKind::Query => {
                 let index = built.items.as_ref();
-                let ask = move |place: usize, out: &mut Vec<ItemId>| {
-                    index.query(workload.views[place].as_any(), out);
+                let ask = move |camera: usize, out: &mut Vec<ItemId>| {
+                    index.query(workload.views[camera].as_any(), out);
                 };
                 match slowed(label) {
                     Some(every) => twice_in(every, ask),
@@ -59,8 +61,8 @@ impl<'a> TimedTask<'a> {
             }
             TaskKind::Locate | TaskKind::LocateBatched => {
                 let index = built.regions();
-                Box::new(move |place, out| {
-                    workload.search(place, out, |p, out| index.locate(p, out));
+                Box::new(move |camera, out| {
+                    workload.search(camera, out, |p, out| index.locate(p, out));
                 })
             }
         };
@@ -73,27 +75,28 @@ impl<'a> TimedTask<'a> {
         }
     }
 
-    /// Asks the queries of some places; the number of ids returned.
+    /// Answers the queries of some cameras; returns the number of ids.
     #[inline]
-    pub(super) fn ask_all(&self, places: &[u32], out: &mut Vec<ItemId>) -> u64 {
+    pub(super) fn ask_all(&self, cameras: &[u32], out: &mut Vec<ItemId>) -> u64 {
         if let Some(ask_many) = &self.ask_many {
-            return ask_many(places);
+            return ask_many(cameras);
         }
         let mut returned = 0;
-        for &place in places {
+        for &camera in cameras {
             out.clear();
-            (self.ask)(place as usize, out);
+            (self.ask)(camera as usize, out);
             returned += std::hint::black_box(&*out).len() as u64;
         }
         returned
     }
 }
 
-/// In a test build (`CULLBENCH_TEST_BUILD=1 cargo build`) a file `PROGRAM.slowed`
-/// beside the program that says `octree:20` makes its octree answer every 20th
-/// query twice, 5 % more work: scripts/check-compare.sh shows with it what
-/// `compare --against` finds. Two copies of one file differ by nothing else; two
-/// builds would, by some percent, by how they were laid out.
+/// Number n if a test build is to answer every n-th query of this structure twice.
+///
+/// In a test build (`CULLBENCH_TEST_BUILD=1 cargo build`) a file `PROGRAM.slowed` beside
+/// the program with the text `octree:20` makes its octree answer every 20th query twice,
+/// 5 % more work. scripts/check-compare.sh shows with it what `compare --against` finds:
+/// two copies of one file differ by nothing else, two builds by their code layout too.
 fn slowed(label: &str) -> Option<usize> {
     option_env!("CULLBENCH_TEST_BUILD")?;
     let mut file = std::env::current_exe().ok()?.into_os_string();
@@ -103,29 +106,31 @@ fn slowed(label: &str) -> Option<usize> {
     every.parse().ok().filter(|_| name == label)
 }
 
+/// Answers every n-th query twice.
 fn twice_in<'a>(every: usize, ask: impl Fn(usize, &mut Vec<ItemId>) + 'a) -> Ask<'a> {
-    let asked = Cell::new(0_usize);
-    Box::new(move |place, out| {
-        asked.set(asked.get() + 1);
-        if asked.get().is_multiple_of(every) {
-            ask(place, out);
+    let answered = Cell::new(0_usize);
+    Box::new(move |camera, out| {
+        answered.set(answered.get() + 1);
+        if answered.get().is_multiple_of(every) {
+            ask(camera, out);
             out.clear();
         }
-        ask(place, out);
+        ask(camera, out);
     })
 }
 
-/// Region search for several points of the path in one call. The memory for
-/// points and answers is kept from call to call.
+/// Region search at the eyes of several cameras in one call.
+///
+/// The memory for points and answers is kept from call to call.
 fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> {
     let index = built.regions();
     let kept = RefCell::new((Vec::new(), Located::default(), Vec::new()));
-    Box::new(move |places| {
+    Box::new(move |cameras| {
         let (points, located, region) = &mut *kept.borrow_mut();
         points.clear();
         let mut is_refined = false;
-        points.extend(places.iter().map(|&place| {
-            let sought = &workload.sought[place as usize];
+        points.extend(cameras.iter().map(|&camera| {
+            let sought = &workload.sought[camera as usize];
             is_refined |= workload.scene.is_refined(sought);
             sought.local
         }));
@@ -134,10 +139,10 @@ fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> 
             return std::hint::black_box(&*located).ids().len() as u64;
         }
         let mut found = 0;
-        for (&place, ids) in places.iter().zip(located.iter()) {
+        for (&camera, ids) in cameras.iter().zip(located.iter()) {
             region.clear();
             region.extend_from_slice(ids);
-            let sought = &workload.sought[place as usize];
+            let sought = &workload.sought[camera as usize];
             workload.scene.refine(sought, region, 0);
             found += std::hint::black_box(&*region).len() as u64;
         }

@@ -1,11 +1,13 @@
-//! Keyed tasks of one timed pass: times are found by key, never by position. With
-//! their schedule, which goes to the other processes.
+//! The list of tasks of a timed pass, with a key per task (`task` has the task).
+//!
+//! Times are found by key, never by position. [`KeyedSchedule`] is the schedule that other
+//! processes get.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Protocol, Schedule, TimedTask};
 
-/// Tasks of one timed pass, in the order in which they are pushed.
+/// Tasks of one timed pass and their keys, in the order in which they are pushed.
 pub struct Tasks<'a, K> {
     keys: Vec<K>,
     tasks: Vec<TimedTask<'a>>,
@@ -50,8 +52,10 @@ impl<'a, K: PartialEq> Tasks<'a, K> {
         &self.tasks
     }
 
-    /// Schedule for the tasks, for `cameras` cameras; with a `given` one, its plan of
-    /// those tasks that are here. Tasks that `given` does not have are dropped.
+    /// Makes the schedule of the tasks for `cameras` cameras.
+    ///
+    /// With a `given` schedule, returns its part for these tasks and drops the tasks
+    /// that it does not have.
     pub fn schedule(
         &mut self,
         given: Option<&KeyedSchedule<K>>,

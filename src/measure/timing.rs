@@ -1,7 +1,8 @@
-//! The timed pass: rounds in balanced random order over all tasks, each warmed
-//! up, several queries per clock reading where one is short. When it is to be
-//! cold, the caches are streamed over before every camera's queries. What is
-//! timed and how often is the [`Schedule`]'s.
+//! The timed pass: [`timed`] times tasks by a [`Schedule`].
+//!
+//! Rounds in balanced random order over all tasks, each warmed up, with several queries per
+//! clock reading where one is short. In a cold pass the caches are streamed over before the
+//! queries of every camera.
 
 use std::time::{Duration, Instant};
 
@@ -24,15 +25,15 @@ const WARM_UP: Duration = Duration::from_millis(2);
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Sample {
-    /// From 0.
+    /// Number of the round, from 0.
     pub round: u32,
     /// Index in the path of the first camera.
     pub frame: u32,
-    /// Consecutive cameras of this reading.
+    /// Number of consecutive timed cameras in this reading.
     pub queries: u32,
-    /// Per query.
+    /// CPU time per query.
     pub cpu_ns: f64,
-    /// Per query, on the wall.
+    /// Wall time per query.
     pub wall_ns: f64,
     /// Ids returned by all queries of the sample: each sample is a test too.
     pub returned: u64,
@@ -52,8 +53,7 @@ impl Timed {
         self.samples.chunk_by(|a, b| a.round == b.round)
     }
 
-    /// Mean time per query of each round the task took part in, over all timed
-    /// cameras, by one of the clocks; ns.
+    /// Mean time per query of each round, by one of the clocks, ns.
     pub fn round_means(&self, clock: impl Fn(&Sample) -> f64) -> Vec<f64> {
         self.rounds()
             .map(|round| {
@@ -65,8 +65,9 @@ impl Timed {
             .collect()
     }
 
-    /// The time of this task in this process: interquartile mean over the rounds
-    /// of the logarithm of CPU ns per query. `None` without rounds.
+    /// Time of the task in this process: ln of the CPU ns per query.
+    ///
+    /// The interquartile mean over the rounds; `None` without rounds.
     pub fn ln_ns(&self) -> Option<f64> {
         let means = self.round_means(|s| s.cpu_ns);
         interquartile_mean(&means.iter().map(|ns| ns.ln()).collect::<Vec<_>>())
@@ -83,7 +84,9 @@ impl Timed {
     }
 }
 
-/// Plans and times a pass over `count` cameras: [`Schedule::new`], [`timed`].
+/// Makes a schedule for `count` cameras and times the tasks by it, in one process.
+///
+/// [`Schedule::new`], then [`timed`]; `None` if stopped.
 pub fn timed_rounds(
     count: usize,
     tasks: &[TimedTask],
@@ -98,12 +101,11 @@ pub fn timed_rounds(
     )
 }
 
-/// Times the tasks by a schedule. `turn` gets the number of the task before
-/// each of its turns, and ends the pass by returning true: its samples are then
-/// worthless and the result is `None`.
+/// Times the tasks by a schedule; returns the samples or the failure of each task.
 ///
-/// A sample whose number of ids differs from what was expected makes its task
-/// `wrong`; a panic on the way is the result of its task alone.
+/// `turn` gets the number of a task before each of its turns and stops the pass by
+/// returning true; the result is then `None`. A sample with another number of ids than
+/// [`TimedTask::expected`] makes its task `wrong`; a panic fails its task alone.
 ///
 /// # Panics
 /// If the schedule is of another number of tasks.
@@ -114,13 +116,13 @@ pub fn timed(
     turn: &dyn Fn(usize) -> bool,
 ) -> Option<Vec<Result<Timed, Verdict>>> {
     assert_eq!(tasks.len(), schedule.tasks.len(), "a plan for each task");
-    let mut pass = Pass {
+    let mut timer = TaskTimer {
         cameras: &schedule.cameras,
         tasks,
         results: tasks.iter().map(|_| Ok(Timed::default())).collect(),
     };
     if schedule.cameras.is_empty() {
-        return Some(pass.results);
+        return Some(timer.results);
     }
     let mut cold = schedule.cold.then(|| Cold::new(protocol, tasks));
     let mut orders = Orders::new(tasks.len(), protocol.seed);
@@ -140,7 +142,7 @@ pub fn timed(
                     let out = &mut cold.outs[task];
                     // Batched points come once a round.
                     if first % batch(task) == 0 {
-                        pass.guarded(task, |pass| pass.time(task, round, first, batch(task), out));
+                        timer.guarded(task, |t| t.time(task, round, first, batch(task), out));
                     }
                 }
             }
@@ -149,28 +151,27 @@ pub fn timed(
                 if turn(task) {
                     return None;
                 }
-                pass.guarded(task, |pass| {
+                timer.guarded(task, |timer| {
                     warm_up(&tasks[task], &schedule.cameras, batch(task), &mut out);
                     for first in (0..schedule.cameras.len()).step_by(batch(task)) {
-                        pass.time(task, round, first, batch(task), &mut out);
+                        timer.time(task, round, first, batch(task), &mut out);
                     }
                 });
             }
         }
     }
-    Some(pass.results)
+    Some(timer.results)
 }
 
-/// Results of a pass, filled in by its rounds.
-struct Pass<'p, 'a> {
+/// Times batches of queries and keeps the samples of all tasks.
+struct TaskTimer<'p, 'a> {
     cameras: &'p [u32],
     tasks: &'p [TimedTask<'a>],
     results: Vec<Result<Timed, Verdict>>,
 }
 
-impl Pass<'_, '_> {
-    /// Does something for a task that has not failed yet; a panic on the way is
-    /// its result.
+impl TaskTimer<'_, '_> {
+    /// Runs `work` for a task that has not failed yet; a panic fails the task.
     fn guarded(&mut self, task: usize, work: impl FnOnce(&mut Self)) {
         if self.results[task].is_err() {
             return;
@@ -180,34 +181,34 @@ impl Pass<'_, '_> {
         }
     }
 
-    /// Times a batch of cameras from the `first` on, unless the task has
-    /// answered wrongly before. A function of its own in the program:
-    /// scripts/check-instructions.sh counts what is executed in it.
+    /// Times one batch of cameras from the `first` on, unless the task has failed.
+    ///
+    /// Not inlined, because scripts/check-instructions.sh counts the instructions in it.
     #[inline(never)]
     fn time(&mut self, task: usize, round: u32, first: usize, batch: usize, out: &mut Vec<ItemId>) {
         let Ok(timed) = &mut self.results[task] else {
             return;
         };
         let own = &self.tasks[task];
-        let asked = &self.cameras[first..(first + batch).min(self.cameras.len())];
+        let queried = &self.cameras[first..(first + batch).min(self.cameras.len())];
         let watch = Stopwatch::start();
-        let returned = own.ask_all(asked, out);
+        let returned = own.ask_all(queried, out);
         let lap = watch.lap();
-        let queries = asked.len() as f64;
-        let expected: u64 = asked.iter().map(|&c| own.expected[c as usize]).sum();
+        let queries = queried.len() as f64;
+        let expected: u64 = queried.iter().map(|&c| own.expected[c as usize]).sum();
         if returned != expected {
             let reason = format!(
                 "the timed pass returned {returned} ids from camera {} on, the count pass \
                  {expected}",
-                asked[0]
+                queried[0]
             );
             self.results[task] = Err(Verdict::new(Status::Wrong, reason));
             return;
         }
         timed.samples.push(Sample {
             round,
-            frame: asked[0],
-            queries: asked.len() as u32,
+            frame: queried[0],
+            queries: queried.len() as u32,
             cpu_ns: lap.cpu_ns / queries,
             wall_ns: lap.wall_ns / queries,
             returned,
@@ -215,6 +216,7 @@ impl Pass<'_, '_> {
     }
 }
 
+/// Runs a pass of the task, or its first part, without timing it.
 fn warm_up(task: &TimedTask, cameras: &[u32], batch: usize, out: &mut Vec<ItemId>) {
     let started = Instant::now();
     for cameras in cameras.chunks(batch) {

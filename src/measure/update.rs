@@ -1,4 +1,4 @@
-//! Items that move: what an update costs.
+//! Cost of updating an index after items have moved.
 
 use super::clock::Stopwatch;
 use super::input_of;
@@ -9,14 +9,15 @@ use crate::scene::Scene;
 
 /// Shares of the items that move in the updates that are measured.
 pub const UPDATE_SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
-/// The share that moves in the update before them, and in each of the many.
+/// Share of the items that move in an untimed update.
 pub(super) const USUAL_SHARE: f64 = 0.01;
 /// Largest scene whose updates are measured: they need a second copy of it.
 pub(super) const MOST_UPDATED: usize = 2_000_000;
 
-/// Moves a share of the items by their own size and times bringing the index
-/// up to date, CPU ms; once for each share, on an index that is then thrown
-/// away. The first update, which touches memory for the first time, is not timed.
+/// Times an update for each of [`UPDATE_SHARES`], CPU ms; consumes the index.
+///
+/// Each update moves a share of the items by their own size. The first one, which touches
+/// memory for the first time, is not timed.
 pub(super) fn measure_updates(
     spec: &StructureSpec,
     scene: &Scene,
@@ -39,7 +40,7 @@ pub(super) fn measure_updates(
     Ok(times)
 }
 
-/// Moves evenly spread items by their own extent; which ones.
+/// Moves evenly spread items by their own extent; returns their ids.
 pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
     let count = ((items.len() as f64 * share).round() as usize).clamp(1, items.len());
     let moved: Vec<ItemId> = (0..count)

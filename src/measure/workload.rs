@@ -1,5 +1,6 @@
-//! Queries for every subject: the views of a camera path and the points to
-//! locate, made before the first clock starts and the same for all.
+//! The queries along one camera path: views for frustums, points for region search.
+//!
+//! Made before the first clock starts, and the same for all structures.
 
 use std::borrow::Cow;
 
@@ -35,10 +36,9 @@ pub struct Workload<'a> {
     pub views: Vec<CameraView>,
     /// Scale of the lens where the path names a visible share.
     pub lens_scale: Option<f64>,
-    /// The eyes of the path, to be located among the scene's regions: as
-    /// structures get them, and as they are.
+    /// Eyes of the cameras in f32, as region search gets them.
     pub points: Vec<Vec3>,
-    /// The same eyes as they were written.
+    /// The same eyes in f64 too, for the exact test of what an index returns.
     pub sought: Vec<Sought>,
 }
 
@@ -54,6 +54,8 @@ pub struct WorkloadError {
 }
 
 impl<'a> Workload<'a> {
+    /// Makes the queries of all cameras of a path.
+    ///
     /// # Errors
     /// A camera whose view cannot be made (its planes do not fit f32, or the
     /// choices contradict each other); its place in the path is named.
@@ -86,15 +88,15 @@ impl<'a> Workload<'a> {
         })
     }
 
-    /// Region search: the answer of an index for the point of a place, made exact
-    /// ([`Scene::search`]).
+    /// Region search at the eye of a camera: the answer of `ask`, made exact by
+    /// [`Scene::search`].
     #[inline]
     pub fn search(
         &self,
-        place: usize,
+        camera: usize,
         out: &mut Vec<ItemId>,
         ask: impl FnOnce(Vec3, &mut Vec<ItemId>),
     ) {
-        self.scene.search(&self.sought[place], out, ask);
+        self.scene.search(&self.sought[camera], out, ask);
     }
 }

@@ -225,7 +225,7 @@ impl Descent for Planes {
     fn refit(&mut self, tree: &PackedTree, node: usize) {
         match self {
             Planes::Any(splits) => measure_reach(splits, tree, node),
-            Planes::Axes(treelets) => treelets.measure(tree, node),
+            Planes::Axes(treelets) => treelets.fit(tree, node),
         }
     }
 

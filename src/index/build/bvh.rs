@@ -1,6 +1,7 @@
-//! The bounding volume hierarchy of the crate `obvhs`: its builders decide
-//! the topology, and the items are then reordered so that an accepted subtree
-//! is one slice. obvhs has no frustum traversal; ours is the packed tree's.
+//! The bounding volume hierarchy `bvh`: a tree of the crate `obvhs`, packed.
+//!
+//! `ploc` runs the steps of obvhs's builder. Its leaves are then copied into a packed tree
+//! in depth-first order, so that an accepted subtree is one slice of ids.
 
 use std::borrow::Cow;
 
@@ -42,9 +43,9 @@ impl Default for BvhParams {
     }
 }
 
-/// Cost of a node against that of an item, by which leaves are put together:
-/// items are tested sixteen at a time, so it pays to fill leaves more than
-/// obvhs's own 3 does.
+/// Cost of a node / cost of an item, by which obvhs merges leaves.
+///
+/// Items are tested sixteen at a time, so fuller leaves pay than by obvhs's default, 3.
 const COLLAPSE_COST: f32 = 30.0;
 
 /// The presets of obvhs by their own names.
@@ -79,10 +80,12 @@ impl BvhPreset {
     }
 }
 
-/// Items in stacks of the very same bounds. Clustering by nearest neighbour
-/// finds no nearest one among equals: obvhs gets one box per stack, and the
-/// stack's items share its leaf.
+/// Items grouped by equal bounds: a stack holds all items of one box.
+///
+/// Clustering by nearest neighbour finds no nearest one among equal boxes, so obvhs gets
+/// one box per stack, and the items of the stack share its leaf.
 struct Stacks {
+    /// Item ids, stack by stack.
     members: Vec<ItemId>,
     /// First member of each stack, and the end of the last one; empty if every item
     /// is a stack of its own.
@@ -113,6 +116,7 @@ impl Stacks {
         }
     }
 
+    /// Item ids of a stack.
     fn get(&self, stack: u32) -> &[ItemId] {
         let stack = stack as usize;
         match self.starts.get(stack..stack + 2) {
@@ -140,9 +144,10 @@ impl Stacks {
     }
 }
 
-/// A power of two that scales the scene to about unit size, or 1 for coordinates
-/// between 2^-40 and 2^40: beyond, the areas that the builder compares would
-/// overflow or vanish in f32.
+/// Power of two that scales the scene to about unit size.
+///
+/// 1 for coordinates between 2^-40 and 2^40. Beyond, the areas that the builder
+/// compares would overflow or vanish in f32.
 pub fn scale_for(items: &[Aabb]) -> f32 {
     let largest = Aabb::union_of(items).reach().max_element();
     let exponent = libm::ilogbf(largest);
@@ -153,7 +158,7 @@ pub fn scale_for(items: &[Aabb]) -> f32 {
     libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
 }
 
-/// The packed tree of obvhs's topology. O(n).
+/// Copies the topology of obvhs's tree into a packed tree. O(n).
 fn packed(items: &[Aabb], stacks: &Stacks, built: &Bvh2) -> PackedTree {
     PackedTree::grow(stacks.members.len(), 0, |tree, _, node: u32, children| {
         let node = &built.nodes[node as usize];

@@ -1,4 +1,8 @@
-//! The builders of packed trees, a file each; octree and quadtree share one.
+//! Builders of packed trees, each an implementation of
+//! [`TreeBuilder`](super::tree::TreeBuilder).
+//!
+//! `bvh` (its clustering in `ploc`), `bsp` (its choice of planes in `bsp_split_planes`),
+//! and `cells` with octree and quadtree.
 
 pub mod bsp;
 pub mod bsp_split_planes;

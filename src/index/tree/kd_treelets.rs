@@ -1,6 +1,9 @@
-//! Region search by axis-parallel planes alone: a k-d tree down to a few items
-//! per leaf, four levels to a treelet of three cache lines. The planes and the
-//! descents of one point and of many; items and upper shape are the packed tree's.
+//! Region search by axis-parallel planes alone: [`Treelets`], a descent of `bsp`.
+//!
+//! A k-d tree with four levels per treelet of three cache lines. It has the shape of a
+//! packed binary tree, continued below its leaves to a few items per leaf; the items
+//! stay in the packed tree. Order of the file: one treelet with its tables, construction,
+//! refit, and the descents of one point and of many.
 
 use std::ops::{ControlFlow, Range};
 
@@ -15,11 +18,18 @@ use crate::query::{ManySink, Predicate, Recorder, Sink};
 /// Most items of a leaf of the descent: one or two blocks.
 pub const DESCENT_LEAF: usize = LANES;
 
-/// Levels of a binary tree that a treelet decides, and the subtrees below it.
+/// Levels of the binary tree in a treelet.
 const LEVELS: usize = 4;
+/// Subtrees below a treelet.
 const CHILDREN: usize = 1 << LEVELS;
-/// The lane that is no plane.
+/// Number of planes of a treelet, and the lane after them, which holds their axes.
 const AXES: usize = CHILDREN - 1;
+
+/// Most treelets on a way from the root to a leaf.
+///
+/// A division leaves at least a quarter of the items on either side, so 2^32 items have
+/// at most 77 levels of planes. Two successive treelets take at least four of them.
+const MOST_HEIGHT: usize = 48;
 
 /// Four levels of planes (a treelet: Aila and Karras 2010, "Architecture
 /// considerations for tracing incoherent rays"). Lane 0 is the root, lanes 1
@@ -36,11 +46,14 @@ struct Treelet {
     children: [u32; CHILDREN],
 }
 
+/// Bit that distinguishes the number of a leaf from that of a treelet.
 const LEAF: u32 = 1 << 31;
 
 impl Treelet {
-    /// All goes to the lower side, where a branch ends before the last level.
-    /// NaN compares false, so the upper side is never entered.
+    /// A treelet whose planes send every point to the lower side.
+    ///
+    /// Lanes stay so where a branch ends before the last level. NaN compares false,
+    /// so the upper side is never entered.
     const UNUSED: Treelet = {
         let mut high = [f32::INFINITY; CHILDREN];
         high[AXES] = 0.0;
@@ -93,9 +106,11 @@ impl Treelet {
     }
 }
 
-/// Bit of each lane's plane, and its bits among the axes for y and z.
+/// Bit of each lane's plane in a set of planes.
 const BITS: [u32; CHILDREN] = powers_of_two(1, 1);
+/// Bit of the axes that is set for each lane if its plane is across y.
 const Y: [u32; CHILDREN] = powers_of_two(1, 2);
+/// Bit of the axes that is set for each lane if its plane is across z.
 const Z: [u32; CHILDREN] = powers_of_two(2, 2);
 
 const fn powers_of_two(first: u32, step: usize) -> [u32; CHILDREN] {
@@ -108,16 +123,22 @@ const fn powers_of_two(first: u32, step: usize) -> [u32; CHILDREN] {
     bits
 }
 
-/// Planes above the last level, and as a mask; the last level as a mask.
+/// Number of planes above the last level of a treelet.
 const TOP_PLANES: usize = CHILDREN / 2 - 1;
+/// Bits of those planes.
 const TOP: usize = (1 << TOP_PLANES) - 1;
+/// Bits of the planes of the last level, from bit 0 on.
 const LAST: usize = (1 << (CHILDREN / 2)) - 1;
 
-/// For the planes above the last level whose lower (upper) side the point is
-/// on: the children that lie on the wrong side of none of those that have them
-/// on that side.
+/// Children that are open, by the set of planes whose lower side holds the point.
+///
+/// The index is a set of planes above the last level. A child is open if all planes whose
+/// lower side contains the child are in the set.
 static LOWER: [u16; TOP + 1] = reachable(0);
+/// Children that are open, by the set of planes whose upper side holds the point.
 static UPPER: [u16; TOP + 1] = reachable(1);
+
+/// Table of open children for the lower (0) or the upper (1) side.
 
 const fn reachable(side: usize) -> [u16; TOP + 1] {
     let mut table = [0; TOP + 1];
@@ -145,8 +166,9 @@ const fn reachable(side: usize) -> [u16; TOP + 1] {
     table
 }
 
-/// The bits of a byte at the even places: the lower children of the planes of
-/// the last level.
+/// The bits of a byte, moved to the even positions of a word.
+///
+/// These are the lower children of the planes of the last level.
 static SPREAD: [u16; LAST + 1] = {
     let mut table = [0; LAST + 1];
     let mut planes = 0;
@@ -161,23 +183,22 @@ static SPREAD: [u16; LAST + 1] = {
     table
 };
 
-/// The planes over a packed binary tree.
+/// A k-d tree over the items of a packed binary tree, cut into treelets.
 #[derive(Clone, Default, Debug)]
 pub struct Treelets {
     treelets: Vec<Treelet>,
     /// The first item of each leaf, and the end of the last one.
     starts: Vec<u32>,
-    /// The plane or leaf of each node of the tree.
-    places: Vec<Place>,
+    /// The plane or leaf of each node of the packed tree.
+    refs: Vec<PlaneOrLeaf>,
     /// Most treelets on a way from the root to a leaf.
     height: usize,
 }
 
-/// A plane, as sixteen times its treelet plus its lane; or [`LEAF`] and the number
-/// of a leaf.
-type Place = u32;
+/// A plane (16 * treelet + lane) or a leaf ([`LEAF`] | number).
+type PlaneOrLeaf = u32;
 
-/// A node of the binary tree before it is cut into treelets; depth-first order.
+/// A node of the k-d tree before it is cut into treelets, in depth-first order.
 struct Branch {
     /// The branch of the upper side; 0 for a leaf.
     upper: usize,
@@ -203,7 +224,7 @@ impl Branch {
 ///
 /// Branches are in depth-first order. `cuts` has the number of items before the plane for each
 /// division of more than [`DESCENT_LEAF`] items within a leaf, in the same order.
-fn grow(
+fn list_branches(
     tree: &PackedTree,
     node: Option<usize>,
     items: Range<u32>,
@@ -228,19 +249,20 @@ fn grow(
         },
         None => return 0,
     };
-    let below = grow(tree, lower, items.start..middle, cuts, branches);
+    let below = list_branches(tree, lower, items.start..middle, cuts, branches);
     branches[at].upper = branches.len();
-    let above = grow(tree, upper, middle..items.end, cuts, branches);
+    let above = list_branches(tree, upper, middle..items.end, cuts, branches);
     branches[at].height = 1 + below.max(above);
     branches[at].height
 }
 
 impl Treelets {
-    /// The planes over a binary tree, continued below its leaves by `cuts` as
-    /// [`grow`] reads them. O(n).
+    /// Builds the k-d tree over a packed binary tree. O(n).
+    ///
+    /// `cuts` continue it below the leaves, as [`list_branches`] reads them.
     pub fn over(tree: &PackedTree, cuts: Vec<u32>) -> Treelets {
         let mut treelets = Treelets {
-            places: vec![LEAF; tree.nodes().len()],
+            refs: vec![LEAF; tree.nodes().len()],
             ..Treelets::default()
         };
         if tree.nodes().is_empty() {
@@ -248,7 +270,7 @@ impl Treelets {
         }
         let count = tree.ids().len() as u32;
         let mut branches = Vec::new();
-        grow(
+        list_branches(
             tree,
             Some(0),
             0..count,
@@ -256,18 +278,18 @@ impl Treelets {
             &mut branches,
         );
         treelets.treelets.push(Treelet::UNUSED);
-        treelets.cut(&branches, 0, (0, 0), 1);
+        treelets.assign(&branches, 0, (0, 0), 1);
         treelets.starts.push(count);
         treelets.treelets.shrink_to_fit();
         treelets.starts.shrink_to_fit();
         for node in (0..tree.nodes().len()).rev() {
-            treelets.measure(tree, node);
+            treelets.fit(tree, node);
         }
         treelets
     }
 
-    /// Places a branch in a lane of a treelet, and its descendants below.
-    fn cut(
+    /// Assigns a branch to a lane of a treelet, and its descendants to those below.
+    fn assign(
         &mut self,
         branches: &[Branch],
         at: usize,
@@ -277,12 +299,12 @@ impl Treelets {
         self.height = self.height.max(depth);
         let branch = &branches[at];
         let is_leaf = branch.upper == 0;
-        let mut place = (treelet * CHILDREN + lane) as Place;
+        let mut place = (treelet * CHILDREN + lane) as PlaneOrLeaf;
         if !is_leaf && !branch.begins_treelet(lane) {
-            // In use from here on; measured later.
+            // In use from here on; `fit` computes the plane.
             self.treelets[treelet].low[lane] = f32::INFINITY;
-            self.cut(branches, at + 1, (treelet, 2 * lane + 1), depth);
-            self.cut(branches, branch.upper, (treelet, 2 * lane + 2), depth);
+            self.assign(branches, at + 1, (treelet, 2 * lane + 1), depth);
+            self.assign(branches, branch.upper, (treelet, 2 * lane + 2), depth);
         } else {
             while lane < AXES {
                 lane = 2 * lane + 1;
@@ -292,51 +314,52 @@ impl Treelets {
                 let below = self.treelets.len();
                 self.treelets[treelet].children[child] = below as u32;
                 self.treelets.push(Treelet::UNUSED);
-                return self.cut(branches, at, (below, 0), depth + 1);
+                return self.assign(branches, at, (below, 0), depth + 1);
             }
             place = LEAF | self.starts.len() as u32;
             self.treelets[treelet].children[child] = place;
             self.starts.push(branch.start);
         }
         if let Some(node) = branch.node {
-            self.places[node] = place;
+            self.refs[node] = place;
         }
     }
 
-    /// Takes the plane of a node, and those below it if it is a leaf, from the
-    /// tree's bounds.
-    pub fn measure(&mut self, tree: &PackedTree, node: usize) {
-        let place = self.places[node];
+    /// Computes the plane of a node from the bounds of its children.
+    ///
+    /// For a leaf of the packed tree, all planes below it, from the bounds of items.
+    pub fn fit(&mut self, tree: &PackedTree, node: usize) {
+        let place = self.refs[node];
         if tree.is_leaf(node) {
-            self.measure_below(tree, place);
+            self.fit_below(tree, place);
         } else {
             let lower = &tree.nodes()[node + 1];
             let upper = &tree.nodes()[lower.after()];
-            self.part(place, &lower.bounds, &upper.bounds);
+            self.set_plane(place, &lower.bounds, &upper.bounds);
         }
     }
 
-    /// Down to the leaves; the bounds of all items.
-    fn measure_below(&mut self, tree: &PackedTree, place: Place) -> Aabb {
+    /// Computes a plane and all planes below it; returns the bounds of their items.
+    fn fit_below(&mut self, tree: &PackedTree, place: PlaneOrLeaf) -> Aabb {
         if place & LEAF != 0 {
             let bounds = self.items(place).map(|place| tree.boxes().get(place));
             return bounds.fold(Aabb::EMPTY, |all, b| all.union(&b));
         }
-        let lower = self.measure_below(tree, self.below(place, 0));
+        let lower = self.fit_below(tree, self.side(place, 0));
         if self.treelets[place as usize / CHILDREN].is_unused(place as usize % CHILDREN) {
             return lower;
         }
-        let upper = self.measure_below(tree, self.below(place, 1));
-        self.part(place, &lower, &upper);
+        let upper = self.fit_below(tree, self.side(place, 1));
+        self.set_plane(place, &lower, &upper);
         lower.union(&upper)
     }
 
-    /// The place of the lower or the upper side of a plane.
-    fn below(&self, place: Place, side: usize) -> Place {
+    /// The plane or leaf on the lower (0) or the upper (1) side of a plane.
+    fn side(&self, place: PlaneOrLeaf, side: usize) -> PlaneOrLeaf {
         let (treelet, lane) = (place as usize / CHILDREN, place as usize % CHILDREN);
         let lane = 2 * lane + 1 + side;
         match lane.checked_sub(AXES) {
-            None => (treelet * CHILDREN + lane) as Place,
+            None => (treelet * CHILDREN + lane) as PlaneOrLeaf,
             Some(child) => match self.treelets[treelet].children[child] {
                 leaf if leaf & LEAF != 0 => leaf,
                 below => below * CHILDREN as u32,
@@ -344,7 +367,8 @@ impl Treelets {
         }
     }
 
-    fn part(&mut self, place: Place, lower: &Aabb, upper: &Aabb) {
+    /// Sets a plane from the bounds of its two sides.
+    fn set_plane(&mut self, place: PlaneOrLeaf, lower: &Aabb, upper: &Aabb) {
         let axis = split_axis(lower, upper);
         let (treelet, lane) = (place as usize / CHILDREN, place as usize % CHILDREN);
         self.treelets[treelet].set(lane, axis, lower.max[axis], upper.min[axis]);
@@ -354,7 +378,7 @@ impl Treelets {
     pub fn bytes(&self) -> usize {
         size_of_val(&self.treelets[..])
             + size_of_val(&self.starts[..])
-            + size_of_val(&self.places[..])
+            + size_of_val(&self.refs[..])
     }
 
     /// The items of a leaf.
@@ -377,8 +401,7 @@ impl Treelets {
         if self.treelets.is_empty() {
             return ControlFlow::Continue(());
         }
-        // The treelets above the present one with the children still to be
-        // entered.
+        // Treelets above the present one, with the children still to be entered.
         let mut above = [(0, 0); MOST_HEIGHT];
         let mut level = 0;
         let (mut at, mut open) = (0, self.open(0, p, recorder));
@@ -408,14 +431,16 @@ impl Treelets {
         }
     }
 
+    /// Children of a treelet that may hold the point, counted by the recorder.
     #[inline(always)]
     fn open<R: Recorder>(&self, at: usize, p: Vec3, recorder: &mut R) -> u32 {
         recorder.nodes_tested(AXES as u32);
         self.treelets[at].sides(p)
     }
 
-    /// Searches for many points, a group of them level by level: the loads of
-    /// a level do not wait for each other.
+    /// Region search for groups of points, each level by level.
+    ///
+    /// The loads of a level do not wait for each other.
     #[inline(always)]
     pub fn query_many<S: ManySink>(
         &self,
@@ -429,8 +454,7 @@ impl Treelets {
             if !self.treelets.is_empty() {
                 now.extend((0..group.len() as u32).map(|point| Cursor { point, at: 0 }));
             }
-            // Descents keep the order of their points, and those that have
-            // come to a leaf their place among the others.
+            // Cursors stay in the order of their points, those at leaves included.
             for _ in 0..self.height {
                 next.clear();
                 for &Cursor { point, at } in &now {
@@ -453,14 +477,14 @@ impl Treelets {
                 std::mem::swap(&mut now, &mut next);
             }
             let items_of = |leaf| self.items(leaf);
-            tree.answer(group, first, &now, items_of, &mut ids, sink)?;
+            tree.answer_group(group, first, &now, items_of, &mut ids, sink)?;
         }
         ControlFlow::Continue(())
     }
 }
 
-/// The axis of the plane between two parts: on which they share least of their
-/// extent.
+/// Axis of the plane between two boxes: the one on which they overlap least,
+/// relative to the extent of both.
 fn split_axis(lower: &Aabb, upper: &Aabb) -> usize {
     let shared = (lower.max - upper.min) / lower.union(upper).extent();
     // A NaN (no extent, or one beyond f32) is as bad as all of it.
@@ -471,8 +495,3 @@ fn split_axis(lower: &Aabb, upper: &Aabb) -> usize {
     let best = (0..3).min_by(|&a, &b| shared(a).total_cmp(&shared(b)));
     best.unwrap_or(0)
 }
-
-/// Treelets above each other: a division leaves a quarter of the items or more
-/// on either side, so there are at most 77 levels of planes over all ids, and
-/// of a treelet's at least one in two is passed.
-const MOST_HEIGHT: usize = 48;

@@ -1,7 +1,15 @@
-//! The tree that all builders share: one layout, one traversal, one refit.
+//! The packed tree, which `bvh`, `bsp`, `octree` and `quadtree` share.
 //!
-//! A builder decides only how items are grouped and, if it keeps planes, how points
-//! descend.
+//! [`Tree`] is the structure: a [`PackedTree`] made by a [`TreeBuilder`] (`index/build`),
+//! which decides how items are grouped and, by its [`Descent`], how points descend.
+//!
+//! | file | contents |
+//! |---|---|
+//! | `node`, `packed` | nodes in depth-first order; layout, construction, refit |
+//! | `wide_nodes` | the same nodes in blocks of sixteen, for queries by volumes |
+//! | `search`, `stack` | queries by volumes, by points, by many points |
+//! | `partition` | top-down construction by a [`Splitter`] |
+//! | `kd_treelets` | region search by axis-parallel planes, a descent of `bsp` |
 
 pub mod kd_treelets;
 mod node;
@@ -26,13 +34,13 @@ pub use node::TreeNode;
 pub use packed::PackedTree;
 pub use partition::{Part, Splitter, build_top_down};
 
-/// A builder of packed trees: a row of the registry.
+/// A builder of packed trees; [`Tree<Self>`](Tree) is the structure.
 pub trait TreeBuilder: Send + Sync {
     /// [`RegionIndex::INFO`]; `refits` and `ranges` are capabilities of every tree.
     const INFO: Info;
     /// [`RegionIndex::Params`].
     type Params: Default + Serialize + DeserializeOwned;
-    /// Region search: `()` for nodes' bounds, or planes that the builder keeps.
+    /// Descent of region search: `()` for nodes' bounds, or planes of the builder.
     type Descent: Descent;
 
     /// Builds the tree.
@@ -45,7 +53,7 @@ pub trait TreeBuilder: Send + Sync {
     ) -> Result<(PackedTree, Self::Descent), BuildError>;
 }
 
-/// The way in which region search descends a tree.
+/// Descent of region search through a packed tree, from the root to the leaves.
 pub trait Descent: Send + Sync {
     /// Heap bytes.
     fn bytes(&self) -> usize;
@@ -63,7 +71,7 @@ pub trait Descent: Send + Sync {
         recorder: &mut R,
     ) -> ControlFlow<()>;
 
-    /// [`RegionIndex::query_many`].
+    /// Region search for many points, as [`RegionIndex::query_many`].
     #[inline(always)]
     fn locate_many<I: Isa, S: ManySink>(
         &self,

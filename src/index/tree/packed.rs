@@ -1,6 +1,7 @@
-//! The packed tree: nodes in depth-first order over items in tree order, so that
-//! every subtree is one slice of either; item bounds in blocks of sixteen. Layout,
-//! construction, memory and refit; `search` has the queries.
+//! The packed tree: layout, construction, memory, refit. Queries are in `search`.
+//!
+//! Nodes are in depth-first order, items in the order of their leaves ("tree order"), so
+//! that every subtree is one slice of either. Item bounds are in blocks of sixteen.
 
 use super::node::{TreeNode, children, is_leaf};
 use super::wide_nodes::WideNodes;
@@ -13,9 +14,13 @@ use crate::query::ItemId;
 /// any number of children.
 #[derive(Default)]
 pub struct PackedTree {
+    /// In depth-first order.
     nodes: Vec<TreeNode>,
+    /// Item bounds in tree order.
     boxes: BoxBlocks,
+    /// Item ids in tree order.
     ids: Vec<ItemId>,
+    /// Levels from the root to the deepest leaf.
     depth: usize,
     /// The nodes again, sixteen to a block, for queries by volumes.
     pub(super) wide_nodes: WideNodes,

@@ -15,14 +15,15 @@ pub struct Part<C> {
     pub cell: Option<C>,
 }
 
-/// The way in which a group of items is divided.
+/// Divides groups of items: what a top-down builder has of its own.
 pub trait Splitter {
     /// State of a group, such as its cell.
     type Cell: Copy;
 
-    /// Reorders the records so that the parts lie one after the other, and
-    /// pushes the parts. No part, or a single one, means that the group
-    /// cannot be divided in this way. `node` is the index of the group's node.
+    /// Reorders the records so that the parts are contiguous, and pushes the parts.
+    ///
+    /// No part, or a single one, means that the group cannot be divided in this
+    /// way. `node` is the index of the group's node.
     fn split(
         &mut self,
         records: &mut [Record],

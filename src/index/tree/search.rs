@@ -1,5 +1,8 @@
-//! Queries of the packed tree, the same for every builder: by volumes level by
-//! level, by points along the nodes, and by many points at once.
+//! Queries of the packed tree, the same for every builder.
+//!
+//! [`PackedTree::query`] descends level by level through the wide nodes for a volume and
+//! calls [`PackedTree::walk`] for a point, one pass along the nodes in memory order.
+//! [`PackedTree::query_many`] searches for many points.
 
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
@@ -19,17 +22,39 @@ use crate::query::{
     Containment, Context, ItemId, ManySink, NoRecorder, QueryContext, QueryVolume, Recorder, Sink,
 };
 
-/// The memory of a traversal, kept between queries.
+/// Memory of a traversal by level, kept between queries.
 #[derive(Default)]
 struct Scratch {
+    /// Wide nodes of the present level.
     here: Frontier,
+    /// Wide nodes of the next level.
     below: Frontier,
+    /// Tree nodes of the leaves that straddle a plane.
     leaves: Frontier,
 }
 
 thread_local! {
     static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
 }
+
+/// Number of points that descend together.
+///
+/// Enough to hide the waits for memory, few enough for their data to stay in the
+/// nearest caches.
+pub const GROUP: usize = 64;
+
+/// A point and the node that its descent has reached.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Cursor {
+    /// Index of the point in its group.
+    pub point: u32,
+    /// Index of a node; in treelets, of a treelet or leaf.
+    pub at: u32,
+}
+
+/// Fewest items of a tree whose points are searched for in turn. Smaller trees fit
+/// the caches, where there are no misses to overlap (docs/adr/0009).
+const INTERLEAVED_FROM: usize = 1 << 18;
 
 impl PackedTree {
     /// Passes every item that the volume sees to the sink: items that hold a point in
@@ -45,9 +70,11 @@ impl PackedTree {
         }
     }
 
-    /// Searches by level. Sink and recorder are separate parameters here, as in all
-    /// that loops over nodes or blocks: the compiler can assume that references that
-    /// are parameters do not alias. It is worth 3 to 7 %.
+    /// Searches level by level for the items of a volume.
+    ///
+    /// Sink and recorder are separate parameters here and in all functions that loop
+    /// over nodes or blocks, because the compiler can assume that references passed
+    /// as parameters do not alias.
     #[inline(always)]
     fn search<I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
         &self,
@@ -61,8 +88,8 @@ impl PackedTree {
             return ControlFlow::Continue(());
         };
         recorder.nodes_tested(1);
-        let (verdict, mask) = volume.classify(&root.bounds, volume.mask(), recorder);
-        match verdict {
+        let (containment, mask) = volume.classify(&root.bounds, volume.mask(), recorder);
+        match containment {
             Containment::Outside => {
                 recorder.subtrees_rejected(1);
                 return ControlFlow::Continue(());
@@ -197,7 +224,7 @@ impl PackedTree {
 
     /// Passes every item that the volume sees to the sink, in tree order.
     ///
-    /// One walk along the nodes in memory order: it jumps over a rejected subtree,
+    /// One pass over the nodes in memory order: it jumps over a rejected subtree,
     /// passes an accepted one as a single slice, and keeps the open planes of a
     /// straddling one for all nodes up to its end.
     #[inline(always)]
@@ -219,8 +246,8 @@ impl PackedTree {
                 top = below.pop().unwrap_or(top);
             }
             recorder.nodes_tested(1);
-            let (verdict, mask) = volume.classify(&node.bounds, top.1, recorder);
-            match verdict {
+            let (containment, mask) = volume.classify(&node.bounds, top.1, recorder);
+            match containment {
                 Containment::Outside => {
                     recorder.subtrees_rejected(1);
                     at = node.after;
@@ -267,8 +294,9 @@ impl PackedTree {
         }
     }
 
-    /// Region search for many points by the nodes' bounds, as
-    /// [`RegionIndex::query_many`](crate::index::RegionIndex::query_many).
+    /// Region search for many points by the nodes' bounds.
+    ///
+    /// See [`RegionIndex::query_many`](crate::index::RegionIndex::query_many).
     #[inline(always)]
     pub fn query_many<I: Isa, S: ManySink>(
         &self,
@@ -276,8 +304,8 @@ impl PackedTree {
         points: &[Vec3],
         sink: &mut S,
     ) -> ControlFlow<()> {
-        if self.ids().len() >= WAITS_FROM {
-            return self.query_in_turn(points, sink);
+        if self.ids().len() >= INTERLEAVED_FROM {
+            return self.query_interleaved(points, sink);
         }
         let mut ids = Vec::new();
         for (p, point) in points.iter().zip(0..) {
@@ -289,10 +317,12 @@ impl PackedTree {
         ControlFlow::Continue(())
     }
 
-    /// Searches for groups of points; each point of a group advances by one node in
-    /// turn, so that their cache misses overlap.
+    /// Region search for groups of points whose steps alternate.
+    ///
+    /// Each point of a group advances by one node in turn, so that their cache misses
+    /// overlap.
     #[inline(always)]
-    fn query_in_turn<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
+    fn query_interleaved<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
         let nodes = self.nodes();
         let (mut leaves, mut ids) = (Vec::new(), Vec::new());
         let mut open: Vec<Cursor> = Vec::with_capacity(GROUP);
@@ -328,17 +358,18 @@ impl PackedTree {
             // Stable: within a point the leaves are in tree order.
             leaves.sort_by_key(|leaf: &Cursor| leaf.point);
             let items_of = |leaf: u32| nodes[leaf as usize].items();
-            self.answer(group, first, &leaves, items_of, &mut ids, sink)?;
+            self.answer_group(group, first, &leaves, items_of, &mut ids, sink)?;
             leaves.clear();
         }
         ControlFlow::Continue(())
     }
 
-    /// Tests the items of the leaves that a group of points has reached and passes
-    /// the answers to the sink, point by point. `leaves` are in the order of the
-    /// points, `first` is the index of the group's first point, `ids` is scratch.
+    /// Tests the items of the leaves that a group of points has reached.
+    ///
+    /// Passes the answers to the sink, point by point. `leaves` are in the order of
+    /// the points, `first` is the index of the group's first point, `ids` is scratch.
     #[inline(always)]
-    pub fn answer<S: ManySink>(
+    pub fn answer_group<S: ManySink>(
         &self,
         group: &[Vec3],
         first: u32,
@@ -381,25 +412,6 @@ fn prefetch_leaf(nodes: &[TreeNode], entries: &[u32], i: usize) {
     }
 }
 
-/// Points that descend together.
-///
-/// Enough to hide the waits for memory, few enough for their data to stay in the
-/// nearest caches.
-pub const GROUP: usize = 64;
-
-/// A point during its descent, or the leaf that it has reached.
-#[derive(Clone, Copy, Default, Debug)]
-pub struct Cursor {
-    /// Index of the point in its group.
-    pub point: u32,
-    /// A node or leaf, numbered as its tree does.
-    pub at: u32,
-}
-
-/// Fewest items of a tree that does not fit the caches. In smaller ones, steps in
-/// turn only cost (docs/adr/0009).
-const WAITS_FROM: usize = 1 << 18;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -441,7 +453,7 @@ mod tests {
                 .collect();
             points[70].y = f32::NAN;
             let (mut turns, mut alone) = (Located::default(), Located::default());
-            assert!(tree.query_in_turn(&points, &mut turns).is_continue());
+            assert!(tree.query_interleaved(&points, &mut turns).is_continue());
             assert!(tree.query_many(BASELINE, &points, &mut alone).is_continue());
             assert_eq!(turns, alone);
             assert_eq!(turns.len(), points.len());
