@@ -1,5 +1,6 @@
-//! Commands and options. Their parsers ([`values`]) check single values; the
-//! commands check the rest.
+//! Commands and options.
+//!
+//! Parsers of options ([`values`]) check single values; the commands check combinations.
 
 use std::path::PathBuf;
 
@@ -14,8 +15,7 @@ use super::shared_args::{
 };
 use super::values;
 
-/// Which spatial index finds what a camera sees, and where the camera is:
-/// how fast, and is the answer right?
+/// Benchmarks spatial indexes: frustum culling and region search, with checked answers
 #[derive(Parser, Debug)]
 #[command(name = "cullbench", version, about, max_term_width = 100, after_help = EXAMPLES)]
 #[command(mut_subcommands(taking_negative_numbers))]
@@ -24,8 +24,7 @@ pub struct Cli {
     pub command: Command,
 }
 
-/// The command with options whose values may begin with a minus: what is wrong with
-/// them is said by their own readers.
+/// Lets values of options begin with a minus, so that their parsers report the error.
 fn taking_negative_numbers(command: clap::Command) -> clap::Command {
     let command = command.mut_subcommands(taking_negative_numbers);
     command.mut_args(|arg| {
@@ -41,46 +40,46 @@ Examples:
   cullbench query --scene city:n=100000 --cameras orbit:frames=8 --structure all
   cullbench locate --scene freedm-map12 --points points.csv --structure bvh
   cullbench advise --scene my.csv                      which structure, test and shortcuts suit your scene
-  cullbench compare old/report.json new/report.json    what has become slower since
+  cullbench compare old/report.json new/report.json    regressions between two runs
 
-Scenes and paths are files or specs such as city:n=100000,seed=7; `cullbench list` names them all.
-Exit codes: 0 ok, 1 a wrong answer, none at all or failed verification, 2 usage or bad input,
-3 a regression (compare), 130 interrupted.";
+Scenes and paths are files or specs such as city:n=100000,seed=7; see `cullbench list`.
+Exit codes: 0 ok, 1 wrong or missing answer or failed verification, 2 wrong usage or bad input,
+3 regression (compare), 130 interrupted.";
 
 #[derive(Subcommand, Debug)]
 pub enum Command {
-    /// Show the structures, scenes, paths, tests and metrics there are
+    /// List the available structures, scenes, paths, tests and metrics
     List(ListArgs),
     /// Measure structures on scenes along camera paths (the main job)
     Run(RunArgs),
     /// Join the shards of a plan (run --shard) into one run
     Merge(MergeArgs),
-    /// Show what a run found: ranked tables, bounds, crossovers, growth
+    /// Show the results of a run: ranked tables, lower bounds, crossovers, growth
     Report(ReportArgs),
-    /// Compare a run with an older one: what is slower, faster or wrong
+    /// Compare a run with an older one: list slower, faster and wrong structures
     Compare(CompareArgs),
-    /// Answer frustum queries: what each structure sees from each camera
+    /// Run frustum queries: the visible items per structure and camera
     Query(QueryArgs),
-    /// Answer region searches: which regions hold each point
+    /// Run region searches: the regions that contain each point
     Locate(LocateArgs),
     /// Cross-check all structures against the reference scan
     Verify(VerifyArgs),
-    /// Error against run time: every test, arithmetic and derivation of the planes
+    /// Plot error against time for every test, arithmetic and plane derivation
     Precision(PrecisionArgs),
-    /// The visibility funnel: what each stage from region to fragment removes, at what
-    /// cost
+    /// Measure the visibility funnel: items removed per stage, from regions to
+    /// fragments, and the time
     Funnel(FunnelArgs),
-    /// Advise: which structure, which test, which work can be skipped, with the
-    /// evidence
+    /// Recommend a structure, a test and work to skip for a scene, with the evidence
     Advise(AdviseArgs),
-    /// Errors of camera updates (turn, orbit, chase) after up to ten million steps
+    /// Measure errors of camera updates (turn, orbit, chase) after up to ten million
+    /// steps
     Drift(DriftArgs),
-    /// Replay test vectors and generated extremes, each with its declared outcome
+    /// Replay test vectors and generated extremes, and check their declared outcomes
     Stress(StressArgs),
-    /// Look at, generate or convert scenes
+    /// Inspect, generate or convert scenes
     #[command(subcommand)]
     Scene(SceneCommand),
-    /// Show the machine, toolchain and source that reports record
+    /// Show the machine, toolchain and source as recorded in reports
     Env(EnvArgs),
     /// Measure one share of a run (started by `run` and `compare` themselves)
     #[command(hide = true)]
@@ -110,7 +109,7 @@ pub struct ListArgs {
     pub format: TableFormat,
 }
 
-/// The measurement: the same for `run` and `compare --against`.
+/// Options of a measurement, shared by `run` and `compare --against`.
 #[derive(Args, Debug)]
 pub struct WhatArgs {
     /// The scenes, paths and rounds: quick, standard, full, compare or growth [default:
@@ -123,8 +122,8 @@ pub struct WhatArgs {
     /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
     #[arg(long, visible_alias = "cameras", value_name = "PATH")]
     pub path: Vec<String>,
-    /// Structures, e.g. linear,bvh:leaf=4; may be repeated; also all, or default (all
-    /// but the textbook forms) [default: all for the suites standard and full, else
+    /// Structures, e.g. linear,bvh:leaf=4, or all, or default (all but the textbook
+    /// forms); may be repeated [default: all for the suites standard and full, else
     /// default; compare --against: the trees, linear and wide]
     #[arg(long, value_name = "LIST")]
     pub structure: Vec<String>,
@@ -134,7 +133,7 @@ pub struct WhatArgs {
     /// Seed of the order in which structures are measured
     #[arg(long, default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
     pub seed: u64,
-    /// Measure with cold caches as well (the suite full does by itself)
+    /// Measure with cold caches as well (always on in the suite full)
     #[arg(long)]
     pub cold: bool,
     /// Do not measure the lower bounds: reading all items, copying all answers
@@ -156,12 +155,12 @@ pub struct WhatArgs {
 const RUN_HELP: &str = "\
 Columns of the tables:
   query           CPU time of one frustum query, with its 95 % interval over the processes
-  p95             of groups of cameras; from twenty comparable groups on
-  speed-up        time of linear / time: the ratio of the two shown times
+  p95             95th percentile over groups of cameras, given twenty comparable groups
+  speed-up        time of linear / time of the structure
   / read          time / time of reading the bounds of all items once (bound-read)
   locate          time of one region search
-  query after 32  query time after 32 updates of 1 % / on a fresh build
-Structures share a rank where no test over the processes tells them apart.";
+  query after 32  query time after 32 updates of 1 % / query time of a fresh build
+Structures share a rank if their times do not differ significantly.";
 
 #[derive(Args, Debug)]
 #[command(after_help = RUN_HELP)]
@@ -172,8 +171,8 @@ pub struct RunArgs {
     /// new one under results/]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Continue the run in --out (or the newest unfinished one under results/) with its
-    /// own options
+    /// Continue the run in --out (or the newest unfinished one under results/) with the
+    /// options of that run
     #[arg(long)]
     pub resume: bool,
     /// Processes to spread the rounds over; ten or more give intervals [default: the
@@ -194,8 +193,8 @@ Example:
   cullbench run --shard 2/2 --out part2
   cullbench merge part1 part2 --out whole
 
-Shards of one plan by one build of the program on machines of one kind belong together; anything
-else is refused by name, as are a cell in two shards and a shard that is missing.";
+All shards must be of the same plan, from the same build of the program, on machines of the same
+kind. It is an error if two shards have the same cell or a shard is missing.";
 
 #[derive(Args, Debug)]
 #[command(after_help = MERGE_HELP)]
@@ -206,7 +205,7 @@ pub struct MergeArgs {
     /// A new folder for report.json, summary.csv, samples.csv and stream.jsonl
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Join what is there, though other parts of the plan are missing
+    /// Join the given shards although other parts of the plan are missing
     #[arg(long)]
     pub partial: bool,
 }
@@ -233,10 +232,10 @@ Examples:
   cullbench compare old.json new.json --threshold 10% --metric query_ns,build_ms
   cullbench compare old.json new.json --markdown > changes.md
 
-Two reports: each structure relative to the others of its scene and path, process by process;
-what moved all of them at once is one line. A report of one process is inconclusive. A finer
-answer: compare --against BINARY, which runs both programs in turns.
-Exit codes: 0 no regression, 1 a wrong answer in NEW, 2 usage or bad input, 3 slower or lost.";
+Two reports are compared process by process, each structure relative to the others of its scene
+and path; a change of all structures at once is reported as one line. Reports of one process are
+inconclusive. compare --against BINARY resolves smaller changes: it runs both programs in turns.
+Exit codes: 0 no regression, 1 wrong answer in NEW, 2 wrong usage or bad input, 3 slower or lost.";
 
 #[derive(Args, Debug)]
 #[command(after_help = COMPARE_HELP)]
@@ -253,7 +252,7 @@ pub struct CompareArgs {
     pub against: Option<PathBuf>,
     #[command(flatten)]
     pub what: WhatArgs,
-    /// The largest change that counts as the same: 5% or 0.05
+    /// Largest relative change that counts as no change: 5% or 0.05
     #[arg(
         long,
         value_name = "SHARE",
@@ -262,8 +261,8 @@ pub struct CompareArgs {
         allow_hyphen_values = true
     )]
     pub threshold: f64,
-    /// The metrics to judge by, of query_ns, locate_ns, locate_batched_ns, build_ms;
-    /// may be repeated
+    /// Metrics to compare: query_ns, locate_ns, locate_batched_ns, build_ms; may be
+    /// repeated
     #[arg(
         long,
         value_name = "LIST",
@@ -271,7 +270,7 @@ pub struct CompareArgs {
         conflicts_with = "against"
     )]
     pub metric: Vec<String>,
-    /// Show what stayed the same as well
+    /// Show unchanged cells as well
     #[arg(long)]
     pub all: bool,
     #[arg(long, value_enum, default_value = "table")]
@@ -328,14 +327,14 @@ pub struct LocateArgs {
     pub kernel: KernelArgs,
 }
 
-/// Points or boxes to search for: one of the two.
+/// Points or boxes to search for.
 #[derive(Args, Debug)]
 #[group(required = true, multiple = false)]
 pub struct SoughtArgs {
-    /// Points CSV: x,y,z; the regions that hold each point
+    /// Points CSV (x,y,z): find the regions that contain each point
     #[arg(long, value_name = "FILE")]
     pub points: Option<PathBuf>,
-    /// Boxes CSV; the items that overlap each box (closed bounds)
+    /// Boxes CSV: find the items that overlap each box (closed bounds)
     #[arg(long, value_name = "FILE")]
     pub boxes: Option<PathBuf>,
 }
@@ -374,18 +373,18 @@ pub struct VerifyArgs {
 pub struct PrecisionArgs {
     #[command(flatten)]
     pub study: StudyArgs,
-    /// Cameras of the path to look at, evenly spread
+    /// Number of cameras to use, evenly spread over the path
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = values::whole(1..=u32::MAX))]
     pub frames: u32,
     /// Cubes for each ratio of the size sweep; 0 skips all sweeps
     #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = values::whole(0..=usize::MAX))]
     pub cubes: usize,
-    /// Draw false positives against time as an SVG file too
+    /// Also draw false positives against time as an SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    /// Another stage of the funnel in place of the frustum: occlusion (over the sizes
-    /// of its buffer), region (portals) or triangle (cones); the first structure does
-    /// the object stage, the path is street if none is named
+    /// Study another stage of the funnel instead of the object stage: occlusion (sizes
+    /// of its buffer), region (portals) or triangle (cones). The first structure runs
+    /// the object stage; the default path is street
     #[arg(long, value_name = "STAGE", value_parser = values::stage)]
     pub stage: Option<StageKind>,
     #[arg(long, value_enum, default_value = "table")]
@@ -397,14 +396,14 @@ pub struct PrecisionArgs {
 pub struct AdviseArgs {
     #[command(flatten)]
     pub study: StudyArgs,
-    /// Cost of drawing an item that cannot be seen, ns
+    /// Cost of drawing an item that is not visible, ns
     #[arg(long, value_name = "NS", default_value_t = 1000.0, value_parser = values::at_least_zero)]
     pub draw_ns: f64,
     /// Cost of shading a fragment, ns (1 shades an image of 1920 x 1080 in 2 ms)
     #[arg(long, value_name = "NS", default_value_t = 1.0, value_parser = values::at_least_zero)]
     pub shade_ns: f64,
-    /// The largest error to accept: of planes in depths of the view, of a camera frame
-    /// in radians
+    /// Largest acceptable error: of planes relative to the depth of the view, of a
+    /// camera basis in radians
     #[arg(long, value_name = "SHARE", default_value_t = 1e-5, value_parser = values::above_zero)]
     pub tolerance: f64,
     /// Share of the items that move between two updates
@@ -422,11 +421,10 @@ pub struct DriftArgs {
     /// Number of steps; errors are shown at 1e3, 1e4, ... and at the last one
     #[arg(long, value_name = "N", default_value = "1e6", value_parser = values::steps)]
     pub steps: u64,
-    /// The largest error of a recommended way to turn or orbit after all steps
+    /// Largest error after all steps of a method to recommend for turns or orbits
     #[arg(long, value_name = "RAD", default_value_t = 1e-6, value_parser = values::above_zero)]
     pub tolerance: f64,
-    /// Spring arms to study: linear, collision (stiffens as it is stretched, and has a
-    /// stop)
+    /// Spring arms to study: linear, collision (stiffens when stretched, and has a stop)
     #[arg(
         long,
         value_name = "LIST",
@@ -456,10 +454,10 @@ pub struct DriftArgs {
     /// Simulated time over which the largest error of a spring arm is taken
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = values::within(1.0..=1e3))]
     pub seconds: f64,
-    /// Largest position error of a spring arm to recommend; its target swings by one
+    /// Largest position error of a spring arm to recommend; the target swings by 1
     #[arg(long, value_name = "ERROR", default_value_t = 1e-3, value_parser = values::above_zero)]
     pub arm_tolerance: f64,
-    /// Draw error against time of the spring arms as an SVG file too
+    /// Also draw error against time of the spring arms as an SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     #[command(flatten)]
@@ -470,7 +468,7 @@ pub struct DriftArgs {
 
 #[derive(Args, Debug)]
 pub struct StressArgs {
-    /// A file of test vectors instead of what is built in; may be repeated
+    /// A file of test vectors instead of the built-in ones; may be repeated
     #[arg(long, value_name = "FILE")]
     pub vectors: Vec<PathBuf>,
     /// Structures, e.g. linear,bvh:leaf=4

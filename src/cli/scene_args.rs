@@ -9,11 +9,11 @@ use super::shared_args::TableFormat;
 
 #[derive(Subcommand, Debug)]
 pub enum SceneCommand {
-    /// Show what is in a scene
+    /// Show the contents of a scene
     Info(SceneInfoArgs),
     /// Write a scene as boxes CSV
     Generate(SceneGenerateArgs),
-    /// Write any scene as a file that every command reads
+    /// Write any scene to a file that every command reads
     Convert(SceneConvertArgs),
 }
 
@@ -52,10 +52,9 @@ Examples:
   cullbench scene convert helsinki city.csv
   cullbench scene convert city:n=1000 | head
 
-Boxes CSV is in world coordinates, in the order of the ids and with all labels. Bounds are written
-in f64, as they came in and not as f32 holds them: queries of the file have the same answers, and
-converting it again gives the same bytes. Regions, camera places and a map's own tree stay
-behind.";
+Boxes CSV has world coordinates and all labels, in the order of ids. Bounds are written in f64 as
+they were read, not rounded to f32: queries on the file have the same answers, and converting it
+again writes the same bytes. Regions, camera places and the tree of a map are not written.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_HELP)]

@@ -1,5 +1,6 @@
-//! Options of several commands: scenes, lenses, culling tests, instruction sets,
-//! and the processes of a study.
+//! Options of several commands.
+//!
+//! Scenes, lenses, culling tests, instruction sets, and the processes of a study.
 
 use super::values;
 use crate::camera::{
@@ -35,13 +36,13 @@ impl SceneArgs {
     }
 }
 
-/// How queries are computed; the answers are the same.
+/// Instruction set and threads; answers do not depend on them.
 #[derive(Args, Debug)]
 pub struct KernelArgs {
     /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
     #[arg(long = "kernel", value_name = "NAME", value_parser = values::kernel)]
     pub name: Option<Kernel>,
-    /// Threads of a build; query and locate divide cameras and points among them
+    /// Threads per build; query and locate divide cameras and points among them
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(1..=MOST_THREADS))]
     pub threads: usize,
 }
@@ -58,7 +59,7 @@ impl KernelArgs {
         Ok(specs.map(|spec| spec.by(execution)).collect())
     }
 
-    /// Fails where this machine lacks the instruction set.
+    /// Fails if this machine lacks the instruction set.
     pub fn execution(&self) -> Result<Execution, SpecError> {
         let kernel = self.name.unwrap_or_else(Kernel::best);
         let kernel = kernel.checked().map_err(|error| {
@@ -94,14 +95,13 @@ pub struct StudyArgs {
     pub kernel: KernelArgs,
 }
 
-/// How times are spread over processes, for a study of one scene and path.
+/// Distribution of measurements over processes, for a study of one scene and path.
 #[derive(Args, Debug)]
 pub struct SpreadArgs {
-    /// Processes to spread the rounds over; ten or more give intervals, one gives
-    /// values alone
+    /// Processes to spread the rounds over; ten or more give intervals, one gives none
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::whole(1..=1000u32))]
     pub processes: u32,
-    /// Seed of all that is random: scenes of sweeps, order of measurement
+    /// Random seed: scenes of sweeps, order of measurement
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
     pub seed: u64,
 }
@@ -138,14 +138,14 @@ impl SpreadArgs {
     }
 }
 
-/// Fewest rounds of a process: of fewer no mean leaves out a disturbed one.
+/// Minimum rounds per process, so that a mean can exclude a disturbed round.
 const LEAST_ROUNDS: usize = 3;
 /// CPU time of a task in all processes, ns.
 const TASK_NS: f64 = 150e6;
 /// Time of a plain loop over all items by all timed cameras, ns.
 const PASS_NS: f64 = 20e6;
 
-/// Values for cameras that do not bring their own.
+/// Lens of cameras without their own values.
 #[derive(Args, Debug)]
 pub struct LensArgs {
     /// Vertical field of view in degrees for cameras without one
@@ -158,11 +158,11 @@ pub struct LensArgs {
     /// for paths]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
-    /// Far plane for cameras without one, or inf; beyond 1.7e38 is inf too [default:
+    /// Far plane for cameras without one, or inf; values beyond 1.7e38 are inf [default:
     /// 1000 for recorded cameras, the scene for paths]
     #[arg(long, value_parser = values::far)]
     pub far: Option<f64>,
-    /// How cameras that are matrices (columns m00 to m33: row, column) are read:
+    /// Convention of cameras given as matrices (columns m00 to m33: row, column):
     /// column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d
     /// (clip = x M); reversed depth and infinite far are recognised
     #[arg(long, value_name = "NAME")]
@@ -191,7 +191,7 @@ impl LensArgs {
     }
 }
 
-/// How a camera's view is made and tested.
+/// Derivation of a camera's planes, and the numbers of the culling test.
 #[derive(Args, Debug)]
 pub struct CullingArgs {
     /// Derivation of the planes: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32,
@@ -202,13 +202,13 @@ pub struct CullingArgs {
     // With the largest one everything is visible.
     #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::within(0.0..=1e9))]
     pub epsilon: f64,
-    /// Numbers the culling test is carried out in: f32, f64, f32-relative
+    /// Number format of the culling test: f32, f64, f32-relative
     #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::choice("arithmetic", &ARITHMETICS))]
     pub arithmetic: Arithmetic,
 }
 
 impl CullingArgs {
-    /// The culling test of that name with everything else as asked for.
+    /// The culling test of that name, with the other settings from the options.
     pub fn culling(&self, test: &str) -> Result<Culling, SpecError> {
         Ok(Culling {
             test: values::choice("test", &TESTS)(test)?,
