@@ -15,7 +15,7 @@ use super::shared_args::{
 };
 use super::values;
 
-/// Benchmarks spatial indexes: frustum culling and region search, with checked answers
+/// Benchmarks spatial indexes: frustum culling, region search, checked answers
 #[derive(Parser, Debug)]
 #[command(name = "cullbench", version, about, max_term_width = 100, after_help = EXAMPLES)]
 #[command(mut_subcommands(taking_negative_numbers))]
@@ -24,7 +24,7 @@ pub struct Cli {
     pub command: Command,
 }
 
-/// Lets values of options begin with a minus, so that their parsers report the error.
+/// Lets values begin with a minus, so that parsers of options report the error.
 fn taking_negative_numbers(command: clap::Command) -> clap::Command {
     let command = command.mut_subcommands(taking_negative_numbers);
     command.mut_args(|arg| {
@@ -424,7 +424,7 @@ pub struct DriftArgs {
     /// Largest error after all steps of a method to recommend for turns or orbits
     #[arg(long, value_name = "RAD", default_value_t = 1e-6, value_parser = values::above_zero)]
     pub tolerance: f64,
-    /// Spring arms to study: linear, collision (stiffens when stretched, and has a stop)
+    /// Spring arms to study: linear, collision (stiffens when stretched, has a stop)
     #[arg(
         long,
         value_name = "LIST",

@@ -158,7 +158,7 @@ pub struct LensArgs {
     /// for paths]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
-    /// Far plane for cameras without one, or inf; values beyond 1.7e38 are inf [default:
+    /// Far plane for cameras without one, or inf; beyond 1.7e38 counts as inf [default:
     /// 1000 for recorded cameras, the scene for paths]
     #[arg(long, value_parser = values::far)]
     pub far: Option<f64>,
