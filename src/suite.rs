@@ -1,7 +1,7 @@
 //! The suites of the main job: which scenes, which ways through them, how
 //! long. A table and nothing else.
 
-use crate::measure::{Beside, Effort};
+use crate::measure::{Effort, Extras};
 
 /// A named set of scenes and paths with the time to spend on them.
 #[non_exhaustive]
@@ -75,7 +75,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [2, 40],
             task_ns: 2.5e6,
             pass_ns: 7e6,
-            beside: Beside::All,
+            extras: Extras::All,
         },
         structures: "default",
     },
@@ -100,7 +100,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 60],
             task_ns: 60e6,
             pass_ns: 100e6,
-            beside: Beside::All,
+            extras: Extras::All,
         },
         structures: "all",
     },
@@ -128,7 +128,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 40],
             task_ns: 40e6,
             pass_ns: 100e6,
-            beside: Beside::All,
+            extras: Extras::All,
         },
         structures: "all",
     },
@@ -145,7 +145,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [12, 80],
             task_ns: 80e6,
             pass_ns: 40e6,
-            beside: Beside::Nothing,
+            extras: Extras::Nothing,
         },
         structures: "default",
     },
@@ -163,7 +163,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 40],
             task_ns: 60e6,
             pass_ns: 200e6,
-            beside: Beside::All,
+            extras: Extras::All,
         },
         structures: "default",
     },

@@ -146,8 +146,8 @@ impl Duel<'_> {
     /// own side to be counted.
     fn share(&self, scene: usize, process: u32, [new, own]: [&[Part]; 2]) -> Share {
         let planned = &self.plan.scenes[scene];
-        let questions = self.plan.questions(planned);
-        let keys = questions.iter().map(|asked| self.plan.key(planned, asked));
+        let groups = self.plan.groups_of(planned);
+        let keys = groups.iter().map(|group| self.plan.key(planned, group));
         let known = keys.map(|key| {
             let answers = counted(own, &key);
             Some(Known {
@@ -162,7 +162,7 @@ impl Duel<'_> {
         });
         Share {
             process,
-            wanted: vec![true; questions.len()],
+            wanted: vec![true; groups.len()],
             known: known.collect(),
             failed: BTreeMap::new(),
             plan_only: false,

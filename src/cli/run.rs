@@ -158,9 +158,9 @@ impl Run {
     /// All processes of a scene.
     fn scene(&mut self, scene: usize) -> anyhow::Result<()> {
         let planned = self.plan.plan.scenes[scene].clone();
-        let questions = self.plan.plan.questions(&planned);
-        let keys = questions.iter();
-        let keys = keys.map(|question| self.plan.plan.key(&planned, question));
+        let groups = self.plan.plan.groups_of(&planned);
+        let keys = groups.iter();
+        let keys = keys.map(|group| self.plan.plan.key(&planned, group));
         let keys: Vec<GroupKey> = keys.collect();
         let mut failed = self.failed_before(&planned.source);
         for process in 0..self.plan.plan.effort.processes {

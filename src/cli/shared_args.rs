@@ -9,7 +9,7 @@ use crate::camera::{
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, TESTS};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
-use crate::measure::{Beside, Effort, Machine, Protocol};
+use crate::measure::{Effort, Extras, Machine, Protocol};
 use crate::path::LensDefaults;
 use crate::scene::LoadOptions;
 use crate::spec::SpecError;
@@ -119,7 +119,7 @@ impl SpreadArgs {
             ],
             task_ns: TASK_NS / f64::from(self.processes),
             pass_ns: PASS_NS,
-            beside: Beside::RegionSearch,
+            extras: Extras::RegionSearch,
         }
     }
 

@@ -38,13 +38,13 @@ pub struct Effort {
     /// decides on their number.
     pub pass_ns: f64,
     /// Additional measurements.
-    pub beside: Beside,
+    pub extras: Extras,
 }
 
 /// Measurements beside frustum queries.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
-pub enum Beside {
+pub enum Extras {
     /// Frustum queries only.
     Nothing,
     /// Region search of the cameras' eyes among the scene's regions.
@@ -89,7 +89,7 @@ pub struct Plan {
 
 /// A group of one scene: path, cache state and culling test.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Question {
+pub struct SceneGroup {
     /// File or spec of the path.
     pub path: String,
     /// True if caches are emptied before each query.
@@ -103,15 +103,15 @@ impl Plan {
     ///
     /// Tests over boxes come before those over spheres, so that structures are built
     /// twice at most.
-    pub fn questions(&self, scene: &PlannedScene) -> Vec<Question> {
+    pub fn groups_of(&self, scene: &PlannedScene) -> Vec<SceneGroup> {
         let of_spheres = |c: &&Culling| c.test == CullingTest::Sphere;
         let (spheres, boxes): (Vec<&Culling>, Vec<&Culling>) =
             self.cullings.iter().partition(of_spheres);
-        let mut questions = Vec::new();
+        let mut groups = Vec::new();
         for cullings in [boxes, spheres] {
             for path in &scene.paths {
                 for &cold in &scene.caches {
-                    questions.extend(cullings.iter().map(|&&culling| Question {
+                    groups.extend(cullings.iter().map(|&&culling| SceneGroup {
                         path: path.clone(),
                         cold,
                         culling,
@@ -119,24 +119,19 @@ impl Plan {
                 }
             }
         }
-        questions
+        groups
     }
 
     /// The key of a group of a scene.
-    pub fn key(&self, scene: &PlannedScene, question: &Question) -> GroupKey {
-        GroupKey::of(
-            &scene.source,
-            &question.path,
-            question.cold,
-            &question.culling,
-        )
+    pub fn key(&self, scene: &PlannedScene, group: &SceneGroup) -> GroupKey {
+        GroupKey::of(&scene.source, &group.path, group.cold, &group.culling)
     }
 
     /// Keys of all groups, in the order in which they are measured.
     pub fn groups(&self) -> Vec<GroupKey> {
         let of_scene = |scene| {
-            let questions = self.questions(scene).into_iter();
-            questions.map(move |question| self.key(scene, &question))
+            let groups = self.groups_of(scene).into_iter();
+            groups.map(move |group| self.key(scene, &group))
         };
         self.scenes.iter().flat_map(of_scene).collect()
     }
@@ -153,7 +148,7 @@ impl Plan {
     }
 
     fn has_all(&self) -> bool {
-        self.effort.beside == Beside::All
+        self.effort.extras == Extras::All
     }
 
     fn has_updates(&self, share: &Share) -> bool {
@@ -245,11 +240,11 @@ pub struct Share {
 }
 
 impl Share {
-    /// All groups of a scene with `questions` groups, in the first process.
-    pub fn first(questions: usize) -> Share {
+    /// All groups of a scene with `groups` groups, in the first process.
+    pub fn first(groups: usize) -> Share {
         Share {
-            known: vec![None; questions],
-            wanted: vec![true; questions],
+            known: vec![None; groups],
+            wanted: vec![true; groups],
             ..Share::default()
         }
     }
@@ -276,36 +271,36 @@ pub fn measure_scene(
     let sweep = Machine::capture().cache_sweep_bytes();
     let mut built: Option<(bool, Vec<Subject>)> = None;
     let mut first = true;
-    for (n, question) in plan.questions(planned).into_iter().enumerate() {
+    for (n, group) in plan.groups_of(planned).into_iter().enumerate() {
         if !share.wanted[n] {
             continue;
         }
         let known = share.known[n].as_ref();
         // Built once for all tests over boxes, and again for spheres.
-        let of_spheres = question.culling.test == CullingTest::Sphere;
+        let of_spheres = group.culling.test == CullingTest::Sphere;
         if built.as_ref().is_none_or(|(kind, _)| *kind != of_spheres) {
             // The old ones go first: memory for one set is enough.
             drop(built.take());
-            let all = plan.subjects(&scene, question.culling.test, share, notice);
+            let all = plan.subjects(&scene, group.culling.test, share, notice);
             built = Some((of_spheres, all));
         }
         let Some((_, subjects)) = &built else {
             continue;
         };
-        notice(None, &question.path);
+        notice(None, &group.path);
         let scale = known.and_then(|known| known.lens_scale);
-        let path = path::load_scaled(&question.path, &scene, &plan.lens, scale)?;
+        let path = path::load_scaled(&group.path, &scene, &plan.lens, scale)?;
         let path = path.at_most(plan.most_cameras);
-        let workload = Workload::new(&scene, &path, &question.culling)?;
-        let group = GroupPlan {
+        let workload = Workload::new(&scene, &path, &group.culling)?;
+        let settings = GroupPlan {
             scene: &info,
-            path: PathInfo::of(&question.path, &workload, question.cold),
+            path: PathInfo::of(&group.path, &workload, group.cold),
             process: share.process,
             protocol: Protocol {
                 rounds: plan.effort.rounds,
                 task_ns: plan.effort.task_ns,
                 cameras: cameras_within(plan.effort.pass_ns, scene.items.len()),
-                cold: question.cold,
+                cold: group.cold,
                 // Other orders in each process.
                 seed: plan.seed.wrapping_add(u64::from(share.process)),
                 cache_bytes: sweep,
@@ -317,10 +312,10 @@ pub fn measure_scene(
             },
             known,
             plan_only: share.plan_only,
-            locate: plan.effort.beside != Beside::Nothing,
+            locate: plan.effort.extras != Extras::Nothing,
         };
-        let protocol = group.protocol;
-        let Some((mut part, samples)) = measure_part(&workload, subjects, group, notice, stop)
+        let protocol = settings.protocol;
+        let Some((mut part, samples)) = measure_part(&workload, subjects, settings, notice, stop)
         else {
             return Ok(false);
         };
@@ -376,7 +371,7 @@ mod tests {
                 rounds: [1, 1],
                 task_ns: 1e4,
                 pass_ns: 1e4,
-                beside: Beside::All,
+                extras: Extras::All,
             },
             bounds: false,
             seed: 1,
@@ -417,10 +412,8 @@ mod tests {
             assert!(!cells[..n].contains(cell), "{cell:?} comes twice");
         }
         for scene in &plan.scenes {
-            let questions = plan.questions(scene);
-            let mut spheres = questions
-                .iter()
-                .map(|q| q.culling.test == CullingTest::Sphere);
+            let groups = plan.groups_of(scene);
+            let mut spheres = groups.iter().map(|g| g.culling.test == CullingTest::Sphere);
             let first = spheres.position(|is_sphere| is_sphere);
             assert!(first.is_some_and(|first| first > 0));
             assert!(spheres.all(|is_sphere| is_sphere), "boxes after spheres");
@@ -431,7 +424,7 @@ mod tests {
     fn one_process_has_the_cells_of_the_plan_in_its_order() {
         let plan = plan();
         let mut groups = Vec::new();
-        let all_of = |planned: &PlannedScene| Share::first(plan.questions(planned).len());
+        let all_of = |planned: &PlannedScene| Share::first(plan.groups_of(planned).len());
         for planned in &plan.scenes {
             let mut keep = |part: Part, _| groups.push((part.key.clone(), Group::of(&[part])));
             let share = all_of(planned);
@@ -465,7 +458,7 @@ mod tests {
         let mut plan = plan();
         plan.scenes.truncate(1);
         let verdict = Verdict::new(super::super::Status::OutOfMemory, "while building");
-        let mut share = Share::first(plan.questions(&plan.scenes[0]).len());
+        let mut share = Share::first(plan.groups_of(&plan.scenes[0]).len());
         share.failed.insert("bvh".to_owned(), verdict.clone());
         let building = std::cell::RefCell::new(Vec::new());
         let notice = |structure: Option<&str>, step: &str| {

@@ -68,7 +68,7 @@ pub(crate) use count::blamed;
 pub use count::{Counted, Judged, count_pass, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
-    Beside, Effort, ExperimentError, Plan, PlannedScene, Question, Share, measure_scene,
+    Effort, ExperimentError, Extras, Plan, PlannedScene, SceneGroup, Share, measure_scene,
 };
 pub use group::{GroupPlan, measure_part};
 pub use guarded::guarded;

@@ -7,7 +7,7 @@ use super::Report;
 use super::stream::{Header, KeptPart, Stream, utc};
 use crate::index::StructureSpec;
 use crate::measure::{
-    Beside, Effort, ExperimentError, Machine, Part, Plan, PlannedScene, Share, measure_scene,
+    Effort, ExperimentError, Extras, Machine, Part, Plan, PlannedScene, Share, measure_scene,
 };
 
 /// A plan that the calling process measures alone. Times have no intervals:
@@ -53,7 +53,7 @@ impl Experiment {
                     rounds: [3, 40],
                     task_ns: 1e8,
                     pass_ns: 1e8,
-                    beside: Beside::RegionSearch,
+                    extras: Extras::RegionSearch,
                 },
                 bounds: false,
                 seed: 1,
@@ -92,7 +92,7 @@ impl Experiment {
         header.run.processes = 1;
         let mut stream = Stream::of(header);
         for planned in &self.plan.scenes {
-            let share = Share::first(self.plan.questions(planned).len());
+            let share = Share::first(self.plan.groups_of(planned).len());
             let mut keep = |part: Part, _| {
                 stream.parts.push(KeptPart {
                     part,
