@@ -220,7 +220,7 @@ fn verify_holds_the_default_planes_to_the_camera() {
     // Without a margin there is nothing to hold to it, and that is said.
     let unheld = works(here.path(), &format!("verify {scene} --arithmetic f64"));
     for (told, says) in [(&told, false), (&unheld, true)] {
-        assert_eq!(told.contains("not against the cameras"), says, "{told}");
+        assert_eq!(told.contains("not with the cameras"), says, "{told}");
     }
     assert_eq!(count(""), 4 * 399, "every box touches the view or is in it");
     assert!(count("--epsilon 0") < 4 * 399, "{}", count("--epsilon 0"));

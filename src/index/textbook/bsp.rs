@@ -116,13 +116,14 @@ impl Planes<'_> {
         };
         let mut node = Node::with(bounds, &cut);
         let half_spaces = [plane, Plane::new(-plane.normal, -plane.d)];
-        for ((records, at), half_space) in of.iter().zip(own).zip(half_spaces) {
-            if !records.is_empty() {
-                let mut side = self.divided(records, at, level + 1);
-                side.half_space = Some(half_space);
-                node.children.push(side);
-            }
-        }
+        let sides = of.iter().zip(own).zip(half_spaces);
+        node.children = sides
+            .filter(|((records, _), _)| !records.is_empty())
+            .map(|((records, at), half_space)| Node {
+                half_space: Some(half_space),
+                ..self.divided(records, at, level + 1)
+            })
+            .collect();
         node
     }
 }

@@ -60,7 +60,7 @@ pub struct Node {
     /// The items that the node itself keeps, and their ids.
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
-    children: Vec<Node>,
+    children: Box<[Node]>,
 }
 
 impl Node {
@@ -71,7 +71,7 @@ impl Node {
             half_space: None,
             boxes: records.iter().map(|r| r.bounds).collect(),
             ids: records.iter().map(|r| r.id).collect(),
-            children: Vec::new(),
+            children: Box::default(),
         }
     }
 
