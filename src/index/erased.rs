@@ -56,7 +56,7 @@ pub trait DynIndex: Send + Sync {
 }
 
 /// A structure with the kernel of its queries.
-pub struct By<T> {
+pub struct WithKernel<T> {
     /// The structure.
     pub index: T,
     /// The kernel.
@@ -64,7 +64,7 @@ pub struct By<T> {
 }
 
 // Sinks that collect never end a query.
-impl<T: RegionIndex> DynIndex for By<T> {
+impl<T: RegionIndex> DynIndex for WithKernel<T> {
     fn memory(&self) -> MemoryUsage {
         self.index.memory()
     }
@@ -121,7 +121,7 @@ mod tests {
         let own = each_volume!(volume, v => index.counted(v));
         let mut counted = <(Vec<ItemId>, QueryCost)>::default();
         let kernel = Kernel::best();
-        By { index, kernel }.query_counted(volume, &mut counted.0, &mut counted.1);
+        WithKernel { index, kernel }.query_counted(volume, &mut counted.0, &mut counted.1);
         [own, counted]
     }
 

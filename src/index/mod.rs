@@ -47,7 +47,7 @@ pub(crate) use build::ploc;
 pub use catch_panic::caught;
 pub(crate) use contract::check_range;
 pub use contract::{BuildError, FrustumQuery, Input, MemoryUsage, NoParams, Query, RegionIndex};
-pub use erased::{By, DynIndex, Execution};
+pub use erased::{DynIndex, Execution, WithKernel};
 pub use grid::UniformGrid;
 pub use info::{Capabilities, Info, Kind, Origin};
 pub use items::{Record, indexable};

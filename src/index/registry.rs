@@ -10,9 +10,9 @@ use serde_json::{Map, Value};
 #[cfg(feature = "peers")]
 use super::peers;
 use super::{
-    Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, By, DynIndex, Execution, Info, Input, Linear,
+    Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, DynIndex, Execution, Info, Input, Linear,
     LinearScalar, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex, UniformGrid,
-    Wide, caught,
+    Wide, WithKernel, caught,
 };
 use crate::geometry::PlaneTree;
 use crate::json::told;
@@ -71,7 +71,7 @@ impl Row {
                 let pool = Pool::new(execution.threads);
                 let index = T::build(&input.pool(&pool), &typed::<T>(params)?)?;
                 let kernel = execution.kernel;
-                Ok(Box::new(By { index, kernel }))
+                Ok(Box::new(WithKernel { index, kernel }))
             },
             params: |params| {
                 let filled = typed::<T>(params)?;
