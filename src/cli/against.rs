@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -69,6 +69,8 @@ pub struct Duel<'a> {
     pub args: Vec<String>,
     pub programs: [PathBuf; 2],
     pub threshold: f64,
+    /// Counts and checks the answers only, if false.
+    pub is_timed: bool,
     pub patience: Duration,
     /// Receives the pairs that are done, the most there may be, and the step.
     pub progress: &'a dyn Fn(usize, usize, &str),
@@ -82,19 +84,15 @@ impl Duel<'_> {
     /// it cannot read.
     pub fn run(&self) -> anyhow::Result<Against> {
         let started = Instant::now();
-        let (first, most) = pairs(self.threshold);
+        let (first, most) = match self.is_timed {
+            true => pairs(self.threshold),
+            false => (0, 0),
+        };
         let seen = self.count(most)?;
         let mut cells = self.cells(&seen);
         let mut rng = Pcg64::seed_from_u64(self.plan.seed);
-        for pair in 0..most {
-            (self.progress)(pair, most, "pairs of processes");
-            for scene in 0..self.plan.scenes.len() {
-                let both = self.pair(scene, pair as u32, &seen, &mut rng)?;
-                for (side, parts) in both.iter().enumerate() {
-                    note(&mut cells, side, parts);
-                }
-            }
-            let pairs = pair + 1;
+        let mut pairs = 0;
+        loop {
             let is_last = pairs == most;
             let is_look = pairs >= first && (pairs - first).is_multiple_of(MORE);
             if (is_look || is_last) && (judge_cells(&mut cells, self.threshold) || is_last) {
@@ -108,8 +106,15 @@ impl Duel<'_> {
                     seconds: started.elapsed().as_secs_f64(),
                 });
             }
+            (self.progress)(pairs, most, "pairs of processes");
+            for scene in 0..self.plan.scenes.len() {
+                let both = self.pair(scene, pairs as u32, &seen, &mut rng)?;
+                for (side, parts) in both.iter().enumerate() {
+                    note(&mut cells, side, parts);
+                }
+            }
+            pairs += 1;
         }
-        bail!("a comparison of no pairs")
     }
 
     /// Has both sides count and check their answers.

@@ -10,13 +10,14 @@ use clap::parser::ValueSource;
 use serde_json::json;
 
 use super::against::{Against, Duel};
-use super::args::{Cli, CompareArgs};
-use super::compare_table::{Basis, CompareTable, Side};
+use super::args::Cli;
+use super::compare_args::{CompareArgs, Gate};
+use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD};
 use super::study::progress;
 use super::{Ending, interrupt, run_plan, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{CellKey, Machine, Status};
-use crate::report::{Changes, JudgedRow, Lone, work_changes};
+use crate::report::{Changes, JudgedRow, Lone, WORK, work_changes};
 use crate::scene;
 
 const SUITE: &str = "compare";
@@ -34,7 +35,8 @@ pub fn compare_against(
     binary: &Path,
     threshold: f64,
 ) -> anyhow::Result<Ending> {
-    if threshold < LEAST_THRESHOLD {
+    let is_timed = args.gate == Gate::Time;
+    if is_timed && threshold < LEAST_THRESHOLD {
         bail!(
             "--threshold is {}; expected at least {}: two builds of one source differ by as much",
             text::percent(threshold),
@@ -53,6 +55,7 @@ pub fn compare_against(
         plan: &plan.plan,
         programs: [binary.to_owned(), new],
         threshold,
+        is_timed,
         patience: Duration::from_secs(args.what.timeout),
         progress: &|done, most, step| {
             bar.set_length(most as u64);
@@ -65,7 +68,9 @@ pub fn compare_against(
     let found = duel.run();
     bar.finish_and_clear();
     let found = found?;
-    let busy = load.load.filter(|l| *l > 0.5 * load.cores as f64);
+    let busy = load
+        .load
+        .filter(|l| is_timed && *l > 0.5 * load.cores as f64);
     let note = |busy| {
         format!(
             "the machine was busy (load average {busy:.1} on {} cores): both sides suffered \
@@ -78,16 +83,21 @@ pub fn compare_against(
         old,
         new,
         basis: Basis::Pairs,
-        head: format!(
-            "{} × {} rounds × {} cameras in {:.0} s",
-            text::counted(found.pairs, "pair"),
-            found.rounds,
-            found.cameras,
-            found.seconds
-        ),
+        gate: args.gate,
+        fail_inconclusive: args.fail_inconclusive,
+        head: match args.gate {
+            Gate::Time => format!(
+                "{} × {} rounds × {} cameras in {:.0} s",
+                text::counted(found.pairs, "pair"),
+                found.rounds,
+                found.cameras,
+                found.seconds
+            ),
+            Gate::Work => WORK_HEAD.to_owned(),
+        },
         notes: busy.map(note).into_iter().collect(),
         settings: Vec::new(),
-        changes: changes(&found, threshold),
+        changes: changes(&found, threshold, args.gate),
     };
     unread_is_fine(table.show(args))?;
     Ok(table.ending())
@@ -123,7 +133,7 @@ fn side(program: &Path) -> anyhow::Result<Side> {
     })
 }
 
-fn changes(found: &Against, threshold: f64) -> Changes {
+fn changes(found: &Against, threshold: f64, gate: Gate) -> Changes {
     let mut changes = Changes {
         threshold,
         ..Changes::default()
@@ -148,15 +158,24 @@ fn changes(found: &Against, threshold: f64) -> Changes {
         changes
             .work_changed
             .extend(work_changes(&key, &cell.counts[0], &cell.counts[1]));
-        let row = JudgedRow::of_statuses(key.clone(), old, new).unwrap_or_else(|| {
-            let [old, new] = cell.shown();
-            let pairs = cell.ln_ns.each_ref().map(Vec::len);
-            JudgedRow {
-                pairs_ln_ns: Some(cell.ln_ns.clone()),
-                ..JudgedRow::by_times(key, "query_ns", (old, new), cell.judgement, pairs)
-            }
+        if let Some(row) = JudgedRow::of_statuses(key.clone(), old, new) {
+            changes.rows.push(row);
+            continue;
+        }
+        if gate == Gate::Work {
+            let rows = WORK.iter().map(|counter| {
+                let [old, new] = cell.counts.each_ref().map(|own| own.get(*counter).copied());
+                JudgedRow::by_work(key.clone(), counter, (old, new), threshold)
+            });
+            changes.rows.extend(rows);
+            continue;
+        }
+        let [old, new] = cell.shown();
+        let pairs = cell.ln_ns.each_ref().map(Vec::len);
+        changes.rows.push(JudgedRow {
+            pairs_ln_ns: Some(cell.ln_ns.clone()),
+            ..JudgedRow::by_times(key, "query_ns", (old, new), cell.judgement, pairs)
         });
-        changes.rows.push(row);
     }
     changes.rows.sort_by(JudgedRow::order);
     changes

@@ -8,10 +8,12 @@ use crate::drift::{ARMS, ArmKind};
 use crate::funnel::StageKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::compare_args::CompareArgs;
 use super::funnel_args::FunnelArgs;
 use super::scene_args::SceneCommand;
 use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs, TableFormat,
+    WhatArgs,
 };
 use super::values;
 
@@ -109,49 +111,6 @@ pub struct ListArgs {
     pub format: TableFormat,
 }
 
-/// Options of a measurement, shared by `run` and `compare --against`.
-#[derive(Args, Debug)]
-pub struct WhatArgs {
-    /// The scenes, paths and rounds: quick, standard, full, compare or growth [default:
-    /// quick; compare --against: compare]
-    #[arg(long, value_name = "SUITE")]
-    pub suite: Option<String>,
-    /// A scene (file or spec) instead of the suite's; may be repeated
-    #[arg(long, value_name = "SCENE")]
-    pub scene: Vec<String>,
-    /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
-    #[arg(long, visible_alias = "cameras", value_name = "PATH")]
-    pub path: Vec<String>,
-    /// Structures, e.g. linear,bvh:leaf=4, or all, or default (all but the textbook
-    /// forms); may be repeated [default: all for the suites standard and full, else
-    /// default; compare --against: the trees, linear and wide]
-    #[arg(long, value_name = "LIST")]
-    pub structure: Vec<String>,
-    /// The culling test: sphere, six-plane, six-box or exact; may be repeated
-    #[arg(long, value_name = "TEST", default_value = "six-plane")]
-    pub test: Vec<String>,
-    /// Seed of the order in which structures are measured
-    #[arg(long, default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
-    pub seed: u64,
-    /// Measure with cold caches as well (always on in the suite full)
-    #[arg(long)]
-    pub cold: bool,
-    /// Do not measure the lower bounds: reading all items, copying all answers
-    #[arg(long)]
-    pub no_bounds: bool,
-    /// Seconds without progress after which a structure has timed out
-    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = values::whole(1..=u64::MAX))]
-    pub timeout: u64,
-    #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
-    pub lens: LensArgs,
-    #[command(flatten)]
-    pub culling: CullingArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
-}
-
 const RUN_HELP: &str = "\
 Columns of the tables:
   query           CPU time of one frustum query, with its 95 % interval over the processes
@@ -185,6 +144,10 @@ pub struct RunArgs {
     /// Measure share i of n of the plan only; `merge` joins the reports
     #[arg(long, value_name = "i/n")]
     pub shard: Option<String>,
+    /// Keep the report as a baseline as well: results/baselines/NAME.json, which
+    /// `compare --baseline NAME` reads; one of this name is replaced
+    #[arg(long, value_name = "NAME", value_parser = values::baseline, conflicts_with_all = ["plan", "shard"])]
+    pub save: Option<String>,
 }
 
 const MERGE_HELP: &str = "\
@@ -224,60 +187,9 @@ pub struct ReportArgs {
     /// Write one self-contained page with the tables and charts
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
-}
-
-const COMPARE_HELP: &str = "\
-Examples:
-  cullbench compare results/before results/after
-  cullbench compare old.json new.json --threshold 10% --metric query_ns,build_ms
-  cullbench compare old.json new.json --markdown > changes.md
-
-Two reports are compared process by process, each structure relative to the others of its scene
-and path; a change of all structures at once is reported as one line. Reports of one process are
-inconclusive. compare --against BINARY resolves smaller changes: it runs both programs in turns.
-Exit codes: 0 no regression, 1 wrong answer in NEW, 2 wrong usage or bad input, 3 slower or lost.";
-
-#[derive(Args, Debug)]
-#[command(after_help = COMPARE_HELP)]
-pub struct CompareArgs {
-    /// report.json of the older run, or the folder it is in
-    #[arg(value_name = "OLD.json", required_unless_present = "against")]
-    pub old: Option<PathBuf>,
-    /// report.json of the newer run, or the folder it is in
-    #[arg(value_name = "NEW.json", required_unless_present = "against")]
-    pub new: Option<PathBuf>,
-    /// Run another build of this program against this one instead: OLD is that binary
-    /// (a name without a slash is looked up in PATH), NEW is this
-    #[arg(long, value_name = "BINARY", conflicts_with_all = ["old", "new"])]
-    pub against: Option<PathBuf>,
-    #[command(flatten)]
-    pub what: WhatArgs,
-    /// Largest relative change that counts as no change: 5% or 0.05
-    #[arg(
-        long,
-        value_name = "SHARE",
-        default_value = "5%",
-        value_parser = values::threshold,
-        allow_hyphen_values = true
-    )]
-    pub threshold: f64,
-    /// Metrics to compare: query_ns, locate_ns, locate_batched_ns, build_ms; may be
-    /// repeated
-    #[arg(
-        long,
-        value_name = "LIST",
-        default_value = "query_ns",
-        conflicts_with = "against"
-    )]
-    pub metric: Vec<String>,
-    /// Show unchanged cells as well
-    #[arg(long)]
-    pub all: bool,
-    #[arg(long, value_enum, default_value = "table")]
-    pub format: TableFormat,
-    /// Print Markdown, for a pull request
-    #[arg(long, conflicts_with = "format")]
-    pub markdown: bool,
+    /// Write the figures in the Bencher Metric Format (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub bencher: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

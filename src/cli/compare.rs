@@ -2,16 +2,16 @@
 //! report.json and measures nothing; the verdicts come from `report`, the table
 //! from `compare_table`.
 
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use serde_json::json;
 
-use super::args::CompareArgs;
-use super::compare_table::{Basis, CompareTable, Side, name, reason};
-use super::{Ending, text, unread_is_fine};
+use super::compare_args::{CompareArgs, Gate};
+use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD, name, reason};
+use super::{Ending, baseline, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
-    Changes, JUDGED_METRICS, Lone, Outcome, Report, Setting, changes, read_report, settings,
+    Changes, JUDGED_METRICS, Lone, Outcome, Report, Setting, WORK, changes, read_report, settings,
 };
 use crate::spec::SpecError;
 
@@ -21,11 +21,23 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         return super::against_table::compare_against(registry, args, binary, threshold);
     }
     super::against_table::expect_none_of_a_run()?;
-    let metrics = metrics(&args.metric)?;
-    let (Some(old), Some(new)) = (&args.old, &args.new) else {
-        bail!("two reports, or --against BINARY: expected one of them");
+    let metrics = match (args.gate, args.metric.is_empty()) {
+        (Gate::Time, true) => vec![JUDGED_METRICS[0]],
+        (Gate::Time, false) => metrics(&args.metric)?,
+        (Gate::Work, is_free) => {
+            ensure!(
+                is_free,
+                "--metric names times; expected none with --gate work"
+            );
+            WORK.to_vec()
+        }
     };
-    let (old, new) = (read_report(old)?, read_report(new)?);
+    let [old, new] = match (&args.baseline, &args.old, &args.new) {
+        // The only run that is named is NEW.
+        (Some(name), new, _) => baseline::sides(name, new.as_deref())?,
+        (None, Some(old), Some(new)) => [read_report(old)?, read_report(new)?],
+        _ => bail!("two reports, or --against BINARY: expected one of them"),
+    };
     let changes = changes(&old, &new, threshold, &metrics);
     if changes.cells_in_common == 0 {
         bail!("{}", nothing_in_common(&changes));
@@ -46,8 +58,13 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         old: side(&old),
         new: side(&new),
         basis: Basis::Reports,
-        head: format!("{} vs {}", processes(&old), processes(&new)),
-        notes: notes(&old, &new, &settings),
+        gate: args.gate,
+        fail_inconclusive: args.fail_inconclusive,
+        head: match args.gate {
+            Gate::Time => format!("{} vs {}", processes(&old), processes(&new)),
+            Gate::Work => WORK_HEAD.to_owned(),
+        },
+        notes: notes(&old, &new, &settings, args.gate),
         settings,
         changes,
     };
@@ -96,13 +113,13 @@ fn nothing_in_common(changes: &Changes) -> String {
 }
 
 /// Lines before the figures.
-fn notes(old: &Report, new: &Report, settings: &[Setting]) -> Vec<String> {
+fn notes(old: &Report, new: &Report, settings: &[Setting], gate: Gate) -> Vec<String> {
     let mut notes = Vec::new();
     for setting in settings {
         let values = format!("'{}' and '{}'", setting.old, setting.new);
         notes.push(format!("{} differs: {} {values}", setting.of, setting.what));
     }
-    if settings.iter().any(|setting| setting.is_machine) {
+    if gate == Gate::Time && settings.iter().any(|setting| setting.is_machine) {
         notes.push(
             "different machines: a verdict says how a structure stands among the others there, \
              not how fast the program became"

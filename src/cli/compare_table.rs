@@ -6,8 +6,8 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::args::CompareArgs;
-use super::document::{Block, to_markdown, to_terminal};
+use super::compare_args::{CompareArgs, Gate};
+use super::document::{Block, folded, to_markdown, to_terminal};
 use super::shared_args::TableFormat;
 use super::table::Table;
 use super::{Ending, print_json, text};
@@ -17,6 +17,9 @@ use crate::shown::number;
 
 /// Counters in the list; `--all` shows every one.
 const LISTED: usize = 20;
+
+/// Head of a comparison by `--gate work`.
+pub const WORK_HEAD: &str = "nodes, items and planes tested per query";
 
 /// OLD or NEW.
 pub struct Side {
@@ -38,6 +41,9 @@ pub struct CompareTable {
     pub old: Side,
     pub new: Side,
     pub basis: Basis,
+    pub gate: Gate,
+    /// True if an inconclusive cell is a regression.
+    pub fail_inconclusive: bool,
     /// "14 pairs × 100 rounds × 128 cameras", "10 vs 10 processes".
     pub head: String,
     /// Lines before the figures.
@@ -47,19 +53,48 @@ pub struct CompareTable {
 }
 
 impl CompareTable {
-    /// 1 for a wrong answer, otherwise 3 for slower or lost.
+    /// 1 for a wrong answer, otherwise 3 for a regression.
     pub fn ending(&self) -> Ending {
+        self.verdict().0
+    }
+
+    /// The ending and its name in JSON.
+    fn verdict(&self) -> (Ending, &'static str) {
+        let is_undecided = self.changes.count(Outcome::Inconclusive) > 0;
         match (self.changes.is_wrong(), self.changes.is_regression()) {
-            (true, _) => Ending::WrongAnswer,
-            (false, true) => Ending::Regression,
-            (false, false) => Ending::Ok,
+            (true, _) => (Ending::WrongAnswer, "wrong_answer"),
+            (false, true) => (Ending::Regression, "regression"),
+            _ if self.fail_inconclusive && is_undecided => (Ending::Regression, "inconclusive"),
+            (false, false) => (Ending::Ok, "ok"),
         }
+    }
+
+    /// The verdict, the counts and the worst cell, in a line.
+    fn summary(&self) -> String {
+        let verdict = match self.verdict().1 {
+            "ok" => "no regression".to_owned(),
+            other => other.replace('_', " "),
+        };
+        let is_bad =
+            |row: &&JudgedRow| row.outcome < Outcome::Different && self.ending() != Ending::Ok;
+        let worst = self.changes.rows.first().filter(is_bad);
+        let worst = worst.map(|row| {
+            let change = row.metric.zip(row.ratio());
+            let change =
+                change.map(|(metric, ratio)| format!(": {metric} {}", change_of(ratio, None)));
+            format!("; worst: {}{}", name(&row.cell), change.unwrap_or_default())
+        });
+        let counts = self.counts_line();
+        format!(
+            "cullbench: {verdict}: {counts}{}",
+            worst.unwrap_or_default()
+        )
     }
 
     /// Prints the comparison in the chosen format.
     pub fn show(&self, args: &CompareArgs) -> io::Result<()> {
         let text = match (args.markdown, args.format) {
-            (true, _) => to_markdown(&self.blocks(args.all)),
+            (true, _) => folded(&self.summary(), &to_markdown(&self.blocks(args.all))),
             (false, TableFormat::Table) => to_terminal(&self.blocks(args.all), usize::MAX),
             (false, TableFormat::Json) => return self.json(),
         };
@@ -72,6 +107,7 @@ impl CompareTable {
             old: &'c Value,
             new: &'c Value,
             verdict: &'static str,
+            gate: &'static str,
             counts: Value,
             head: &'c str,
             notes: &'c [String],
@@ -85,10 +121,10 @@ impl CompareTable {
         let document = Document {
             old: &self.old.json,
             new: &self.new.json,
-            verdict: match self.ending() {
-                Ending::WrongAnswer => "wrong_answer",
-                Ending::Regression => "regression",
-                _ => "ok",
+            verdict: self.verdict().1,
+            gate: match self.gate {
+                Gate::Time => "time",
+                Gate::Work => "work",
             },
             counts: Value::Object(counts.into_iter().collect()),
             head: &self.head,
@@ -130,15 +166,16 @@ impl CompareTable {
         lines.extend(lone_lines("OLD", &changes.only_in_old));
         lines.extend(lone_lines("NEW", &changes.only_in_new));
         lines.extend(self.advice());
-        lines.push(counts_line(changes));
+        lines.push(self.counts_line());
         blocks.extend(lines.into_iter().map(Block::Line));
         blocks
     }
 
     fn table(&self, rows: &[&JudgedRow]) -> Table {
-        let (change, processes) = match self.basis {
-            Basis::Reports => ("change vs the others [95 %]", "processes"),
-            Basis::Pairs => ("change [95 %]", "pairs"),
+        let (change, processes) = match (self.gate, self.basis) {
+            (Gate::Work, _) => ("change", "processes"),
+            (Gate::Time, Basis::Reports) => ("change vs the others [95 %]", "processes"),
+            (Gate::Time, Basis::Pairs) => ("change [95 %]", "pairs"),
         };
         let mut table = Table::of(&format!(
             "scene | path, test | structure | metric | >old | >new | >{change} | >resolves \
@@ -155,8 +192,8 @@ impl CompareTable {
                 metric.to_owned(),
                 text::some(row.old, |value| shown(metric, value)),
                 text::some(row.new, |value| shown(metric, value)),
-                text::some(judged, |found| {
-                    change_of(found.ratio, found.lower.zip(found.upper))
+                text::some(row.ratio().filter(|ratio| ratio.is_finite()), |ratio| {
+                    change_of(ratio, judged.and_then(|found| found.lower.zip(found.upper)))
                 }),
                 text::some(resolution, |share| format!("{:.1} %", share * 100.0)),
                 match (self.basis, row.processes) {
@@ -168,7 +205,39 @@ impl CompareTable {
                 reason(row),
             ]);
         }
-        table
+        match self.gate {
+            Gate::Time => table,
+            Gate::Work => table.without_empty_columns(),
+        }
+    }
+
+    /// "2 slower, 3 inconclusive, 1 faster, 92 same of 98 cells".
+    fn counts_line(&self) -> String {
+        let changes = &self.changes;
+        // The verdicts of the gate are shown in any case.
+        let is_of_gate = |outcome: Outcome| match self.gate {
+            Gate::Time => outcome.is_judged(),
+            Gate::Work => matches!(
+                outcome,
+                Outcome::MoreWork | Outcome::LessWork | Outcome::Same
+            ),
+        };
+        let outcomes = Outcome::ALL.into_iter();
+        let shown = outcomes.filter(|outcome| is_of_gate(*outcome) || changes.count(*outcome) > 0);
+        let counts = shown.map(|outcome| {
+            let count = text::count(changes.count(outcome));
+            format!("{count} {}", outcome.name().replace('_', " "))
+        });
+        let counts: Vec<String> = counts.collect();
+        let rows = match (changes.rows.len(), changes.cells_in_common) {
+            (rows, cells) if rows == cells => text::counted(cells, "cell"),
+            (rows, cells) => format!(
+                "{} of {}",
+                text::counted(rows, "figure"),
+                text::counted(cells, "cell")
+            ),
+        };
+        format!("{} of {rows}", counts.join(", "))
     }
 
     /// Advice on inconclusive cells, if there are any.
@@ -308,25 +377,4 @@ fn lone_lines(side: &str, cells: &[Lone]) -> Vec<String> {
         format!("only in {side}: {name}: {status}{why}")
     });
     [first].into_iter().chain(wrong).collect()
-}
-
-/// "2 slower, 3 inconclusive, 1 faster, 92 same of 98 cells".
-fn counts_line(changes: &Changes) -> String {
-    // The four verdicts are shown in any case.
-    let outcomes = Outcome::ALL.into_iter();
-    let shown = outcomes.filter(|outcome| outcome.is_judged() || changes.count(*outcome) > 0);
-    let counts = shown.map(|outcome| {
-        let count = text::count(changes.count(outcome));
-        format!("{count} {}", outcome.name().replace('_', " "))
-    });
-    let counts: Vec<String> = counts.collect();
-    let rows = match (changes.rows.len(), changes.cells_in_common) {
-        (rows, cells) if rows == cells => text::counted(cells, "cell"),
-        (rows, cells) => format!(
-            "{} of {}",
-            text::counted(rows, "figure"),
-            text::counted(cells, "cell")
-        ),
-    };
-    format!("{} of {rows}", counts.join(", "))
 }

@@ -87,6 +87,12 @@ pub fn to_markdown(blocks: &[Block]) -> String {
     parts.collect::<Vec<_>>().join("\n")
 }
 
+/// A text of Markdown folded behind a line, as GitHub and GitLab show it.
+pub fn folded(line: &str, text: &str) -> String {
+    let line = html(line);
+    format!("<details>\n<summary>{line}</summary>\n\n{text}\n</details>\n")
+}
+
 /// The document for a terminal of `width` columns.
 pub fn to_terminal(blocks: &[Block], width: usize) -> String {
     let parts = blocks.iter().map(|block| match block {

@@ -11,7 +11,9 @@ use super::args::ReportArgs;
 use super::document::{Block, to_html, to_markdown};
 use super::surface_charts::{self, Picture};
 use super::table::Table;
-use super::{Ending, expect_folder, expect_places, surface_tables, tell, text, write_text};
+use super::{
+    Ending, bencher, expect_folder, expect_places, surface_tables, tell, text, write_text,
+};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
@@ -23,6 +25,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     let outputs = [
         ("--markdown", args.markdown.as_deref()),
         ("--html", args.html.as_deref()),
+        ("--bencher", args.bencher.as_deref()),
     ];
     // Of a run's folder the report is read.
     expect_places(&outputs, &[&args.report, &args.report.join("report.json")])?;
@@ -37,6 +40,9 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     if let Some(path) = &args.markdown {
         write_text(path, &to_markdown(&blocks))?;
     }
+    if let Some(path) = &args.bencher {
+        write_text(path, &bencher::format(&report)?)?;
+    }
     match &args.svg {
         Some(folder) if pictures.is_empty() => tell(&format!(
             "note: no chart in {}; a chart needs a structure that was measured on two sizes of a \
@@ -49,7 +55,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     if let Some(path) = &args.html {
         blocks.extend(pictures.into_iter().map(|p| Block::Picture(p.svg)));
         write_text(path, &to_html(&title(&report), &blocks))?;
-    } else if args.markdown.is_none() && args.svg.is_none() {
+    } else if args.markdown.is_none() && args.svg.is_none() && args.bencher.is_none() {
         io::stdout().write_all(to_markdown(&blocks).as_bytes())?;
     }
     Ok(Ending::Ok)

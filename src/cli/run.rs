@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
@@ -16,7 +17,9 @@ use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::show_scene;
 use super::study::progress;
-use super::{Ending, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine};
+use super::{
+    Ending, baseline, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine,
+};
 use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
@@ -28,6 +31,8 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
         return print_plan(registry, args);
     }
     expect_folder("--out", args.out.as_deref())?;
+    let folder = args.save.as_ref().map(|_| Path::new(baseline::FOLDER));
+    expect_folder("--save", folder)?;
     if args.resume {
         let (folder, stream, begun) = resume(args)?;
         let plan = plan(registry, &begun)?;
@@ -35,7 +40,8 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
             .with_context(|| folder.path().display().to_string())?;
         interrupt::from_now_on_finish();
         let folder = go_on(folder, &stream)?;
-        return Run::new(args, plan, folder, stream)?.all();
+        let save = args.save.clone().or(begun.save);
+        return Run::new(args, plan, folder, stream)?.all(save);
     }
     let plan = plan(registry, args)?;
     plan.check_inputs()?;
@@ -45,7 +51,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     interrupt::from_now_on_finish();
     let machine = Machine::capture().by(args.what.kernel.execution()?.kernel);
     let (folder, stream) = create(args, &plan, machine)?;
-    Run::new(args, plan, folder, stream)?.all()
+    Run::new(args, plan, folder, stream)?.all(args.save.clone())
 }
 
 /// The cells as JSON lines, nothing measured.
@@ -93,7 +99,8 @@ impl Run {
         })
     }
 
-    fn all(mut self) -> anyhow::Result<Ending> {
+    /// Measures all scenes; keeps a finished run as the baseline `save`.
+    fn all(mut self, save: Option<String>) -> anyhow::Result<Ending> {
         let (mut stopped, mut unshown) = (false, None);
         for scene in 0..self.plan.plan.scenes.len() {
             stopped = match self.scene(scene) {
@@ -131,10 +138,14 @@ impl Run {
         // Tables before files: where a file cannot be written, what was measured is seen.
         let shown = unread_is_fine(surface_tables::show(&report));
         self.folder.save(&report)?;
+        let save = save.filter(|_| !stopped);
+        if let Some(name) = &save {
+            baseline::save(name, &report)?;
+        }
         if let Some(error) = unshown.or(shown.err()) {
             return Err(error.into());
         }
-        unread_is_fine(self.close(&report))?;
+        unread_is_fine(self.close(&report, save.as_deref()))?;
         if stopped {
             tell("interrupted: finished cells were saved; continue with --resume");
         }
@@ -281,7 +292,7 @@ impl Run {
         Ok(())
     }
 
-    fn close(&self, report: &Report) -> io::Result<()> {
+    fn close(&self, report: &Report, save: Option<&str>) -> io::Result<()> {
         let cells = report.cells.iter();
         let failed = cells.filter(|cell| cell.status.is_failure()).count();
         let mut out = io::stdout().lock();
@@ -300,6 +311,13 @@ impl Run {
             "{}/{{report.json, summary.csv, samples.csv, stream.jsonl}}",
             text::plain(&self.folder.path().display().to_string())
         )?;
+        if let Some(name) = save {
+            writeln!(
+                out,
+                "{}: compare --baseline {name}",
+                baseline::file(name).display()
+            )?;
+        }
         out.flush()
     }
 }

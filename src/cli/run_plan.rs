@@ -3,7 +3,8 @@
 
 use anyhow::bail;
 
-use super::args::{RunArgs, WhatArgs};
+use super::args::RunArgs;
+use super::shared_args::WhatArgs;
 use crate::culling::Culling;
 use crate::index::Registry;
 use crate::measure::{GroupKey, Plan, PlannedScene, Workload};

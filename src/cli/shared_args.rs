@@ -36,6 +36,49 @@ impl SceneArgs {
     }
 }
 
+/// Options of a measurement, shared by `run` and `compare --against`.
+#[derive(Args, Debug)]
+pub struct WhatArgs {
+    /// The scenes, paths and rounds: quick, standard, full, compare or growth [default:
+    /// quick; compare --against: compare]
+    #[arg(long, value_name = "SUITE")]
+    pub suite: Option<String>,
+    /// A scene (file or spec) instead of the suite's; may be repeated
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Vec<String>,
+    /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
+    #[arg(long, visible_alias = "cameras", value_name = "PATH")]
+    pub path: Vec<String>,
+    /// Structures, e.g. linear,bvh:leaf=4, or all, or default (all but the textbook
+    /// forms); may be repeated [default: all for the suites standard and full, else
+    /// default; compare --against: the trees, linear and wide]
+    #[arg(long, value_name = "LIST")]
+    pub structure: Vec<String>,
+    /// The culling test: sphere, six-plane, six-box or exact; may be repeated
+    #[arg(long, value_name = "TEST", default_value = "six-plane")]
+    pub test: Vec<String>,
+    /// Seed of the order in which structures are measured
+    #[arg(long, default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
+    pub seed: u64,
+    /// Measure with cold caches as well (always on in the suite full)
+    #[arg(long)]
+    pub cold: bool,
+    /// Do not measure the lower bounds: reading all items, copying all answers
+    #[arg(long)]
+    pub no_bounds: bool,
+    /// Seconds without progress after which a structure has timed out
+    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = values::whole(1..=u64::MAX))]
+    pub timeout: u64,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+    #[command(flatten)]
+    pub culling: CullingArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
+}
+
 /// Instruction set and threads; answers do not depend on them.
 #[derive(Args, Debug)]
 pub struct KernelArgs {

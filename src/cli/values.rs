@@ -95,6 +95,17 @@ pub fn threshold(typed: &str) -> Result<f64, SpecError> {
     expected(share.filter(|share| *share >= 0.0), what)
 }
 
+/// Name of a baseline, which becomes the name of a file.
+pub fn baseline(name: &str) -> Result<String, SpecError> {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
+    let sound = name.chars().all(is_plain) && (1..=100).contains(&name.len());
+    let name = Some(name).filter(|name| sound && !name.starts_with(['.', '-']));
+    expected(
+        name.map(str::to_owned),
+        "a name of at most 100 letters, digits, '.', '_' and '-'",
+    )
+}
+
 /// `1e7` or `10M`.
 pub fn steps(text: &str) -> Result<u64, SpecError> {
     let steps = parse_number(text)

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, work_changes};
+use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, WORK, work_changes};
 use super::matching::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
 use super::{Report, ReportCell};
 use crate::measure::{CellKey, GroupKey, Status};
@@ -18,7 +18,7 @@ const LEAST_OTHERS: usize = 3;
 const LEAST_PROCESSES: usize = 3;
 
 /// Compares a report with an older one by these metrics of
-/// [`JUDGED_METRICS`](super::JUDGED_METRICS). `threshold` 0.05 is 5 %.
+/// [`JUDGED_METRICS`](super::JUDGED_METRICS) or of [`WORK`]. `threshold` 0.05 is 5 %.
 ///
 /// Per process, ln(time) of a structure minus the median of the other
 /// structures that both reports have in the group, each about its mean in the
@@ -51,10 +51,15 @@ pub fn changes(old: &Report, new: &Report, threshold: f64, metrics: &[&'static s
             None => comparable.push(pair),
         }
     }
-    for metric in metrics {
-        found.rows.extend(by_metric(&comparable, metric, threshold));
+    for &metric in metrics {
+        found.rows.extend(match WORK.contains(&metric) {
+            true => by_work(&comparable, metric, threshold),
+            false => by_metric(&comparable, metric, threshold),
+        });
     }
-    found.common_shift = common_shift(&comparable);
+    if metrics.iter().any(|metric| !WORK.contains(metric)) {
+        found.common_shift = common_shift(&comparable);
+    }
     found.rows.sort_by(JudgedRow::order);
     found
 }
@@ -183,6 +188,19 @@ fn by_metric(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Judged
     rows
 }
 
+/// The rows of one counter, in the order of the pairs.
+fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedRow> {
+    let rows = pairs.iter().map(|(old, new)| {
+        let values = (old.value(counter), new.value(counter));
+        let mut row = JudgedRow::by_work(new.key(), counter, values, threshold);
+        if row.outcome == Outcome::Unmeasured {
+            row.reason = Some(why_unmeasured(values));
+        }
+        row
+    });
+    rows.collect()
+}
+
 /// ln(time) less what moved the median of the others, process by process;
 /// `None` with too few others.
 fn relative<'c>(own: &Candidate, all: impl Iterator<Item = &'c Candidate>) -> Option<Logs> {
@@ -271,228 +289,4 @@ fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::ranking::tests::cell;
-    use super::super::settings;
-    use super::*;
-    use serde_json::json;
-
-    const QUERY: &[&str] = &["query_ns"];
-    const NAMES: [&str; 5] = ["a", "b", "c", "d", "e"];
-    /// Far apart, so that no median over them is one of its neighbours'.
-    const LEVELS: [f64; 5] = [50.0, 100.0, 130.0, 150.0, 900.0];
-
-    /// A report of these cells.
-    fn report(cells: Vec<ReportCell>) -> Report {
-        let report = json!({
-            "schema_version": 2,
-            "run": { "id": "r", "started_at": "", "finished_at": "", "command": "", "seed": 1,
-                "suite": null, "generator": "" },
-            "machine": { "cpu": "a", "features": [], "instruction_set": "avx2", "cores": 2,
-                "caches": [], "memory_bytes": null, "os": null, "kernel": null, "load": null },
-            "toolchain": { "rustc": "1", "target": null, "flags": "", "profile": null,
-                "opt_level": null, "features": [], "lock_digest": "" },
-            "source": { "version": "0", "commit": null, "dirty": null },
-            "noise": { "aa_ratio": null, "twins": [] },
-            "cells": [], "bounds": [],
-        });
-        let report: Report = serde_json::from_value(report).unwrap();
-        Report { cells, ..report }
-    }
-
-    /// A cell with a time in each process: the machine's speed, common to all
-    /// cells, and a little of its own.
-    fn timed(name: &str, ns: f64, processes: usize, day: f64) -> ReportCell {
-        let mut timed = cell("s", 10, "p", name, ns);
-        let own = name.bytes().map(usize::from).sum::<usize>();
-        let times = (0..processes).map(|process| {
-            let machine = 1.0 + 0.2 * ((process * 7 % 5) as f64 / 4.0 - 0.5);
-            let noise = 1.0 + 0.01 * (((process + own) * 3 % 7) as f64 / 6.0 - 0.5);
-            ns * machine * noise * day
-        });
-        timed
-            .times
-            .by_process
-            .insert("query_ns".to_owned(), times.collect());
-        timed.times.processes = processes;
-        timed.times.cameras_timed = 8;
-        timed.times.batch = 4;
-        timed
-    }
-
-    fn all(processes: usize, day: f64) -> Report {
-        let cells = NAMES.iter().zip(LEVELS);
-        report(
-            cells
-                .map(|(name, ns)| timed(name, ns, processes, day))
-                .collect(),
-        )
-    }
-
-    fn outcomes(changes: &Changes) -> Vec<(&str, Outcome)> {
-        let rows = changes.rows.iter();
-        rows.map(|row| (row.cell.structure.as_str(), row.outcome))
-            .collect()
-    }
-
-    #[test]
-    fn one_structure_that_moved_is_found_whatever_the_day_was_like() {
-        for (factor, wanted) in [(1.3, Outcome::Slower), (0.7, Outcome::Faster)] {
-            let (old, mut new) = (all(10, 1.0), all(12, 1.5));
-            new.cells[1] = timed("b", 100.0 * factor, 12, 1.5);
-            let found = changes(&old, &new, 0.05, QUERY);
-            let row = found
-                .rows
-                .iter()
-                .find(|row| row.cell.structure == "b")
-                .unwrap();
-            assert_eq!((row.outcome, row.processes), (wanted, [10, 12]));
-            let judged = row.judgement.unwrap();
-            assert!((judged.ratio / factor - 1.0).abs() < 0.01, "{judged:?}");
-            assert_eq!(found.count(Outcome::Same), 4, "{:?}", outcomes(&found));
-            assert_eq!(found.is_regression(), wanted == Outcome::Slower);
-            // What moved all of them is said of all of them.
-            let shift = found.common_shift.unwrap();
-            assert!(shift.lower < Some(1.5) && Some(1.5) < shift.upper);
-            assert_eq!(shift.cells, 5);
-        }
-    }
-
-    #[test]
-    fn one_process_and_few_others_are_inconclusive() {
-        for (was, is) in [(1, 1), (1, 10), (10, 2)] {
-            let (old, mut new) = (all(was, 1.0), all(is, 1.0));
-            new.cells[1] = timed("b", 500.0, is, 1.0);
-            let found = changes(&old, &new, 0.05, QUERY);
-            assert_eq!(found.count(Outcome::Inconclusive), 5, "{was} {is}");
-            let b = found.rows.iter().find(|r| r.cell.structure == "b").unwrap();
-            assert!(b.reason.as_ref().unwrap().contains("under three processes"));
-            assert!(!found.is_regression());
-        }
-        // Two of three structures: which of them moved is not known.
-        let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
-        new.cells[1] = timed("b", 500.0, 10, 1.0);
-        for report in [&mut old, &mut new] {
-            report.cells.truncate(3);
-        }
-        let found = changes(&old, &new, 0.05, QUERY);
-        assert_eq!(found.count(Outcome::Inconclusive), 3);
-        // Worst first, by the quotient of the values.
-        let first = &found.rows[0];
-        assert_eq!(first.judgement.unwrap().ratio, 5.0);
-        assert!(first.reason.as_ref().unwrap().contains("under three other"));
-    }
-
-    #[test]
-    fn other_cameras_or_batches_are_another_measurement() {
-        for change in [
-            (|cell| cell.times.cameras_timed = 128) as fn(&mut ReportCell),
-            |cell| cell.times.batch = 8,
-            |cell| cell.scene.digest.push('x'),
-            |cell| cell.path.camera_count += 1,
-        ] {
-            let (old, mut new) = (all(10, 1.0), all(10, 1.0));
-            new.cells[1] = timed("b", 500.0, 10, 1.0);
-            change(&mut new.cells[1]);
-            let found = changes(&old, &new, 0.05, QUERY);
-            assert_eq!(found.rows[0].outcome, Outcome::Different);
-            assert_eq!(found.count(Outcome::Same), 4);
-            new.cells.iter_mut().skip(2).for_each(change);
-            change(&mut new.cells[0]);
-            let found = changes(&old, &new, 0.05, QUERY);
-            assert!(found.why_nothing_was_judged().is_some());
-        }
-    }
-
-    #[test]
-    fn statuses_and_questions_go_before_times() {
-        let of = |old: Status, new: Status, asked_the_same: bool| {
-            let (mut was, mut is) = (all(10, 1.0), all(10, 1.0));
-            is.cells[1] = timed("b", 900.0, 10, 1.0);
-            (was.cells[1].status, is.cells[1].status) = (old, new);
-            if !asked_the_same {
-                is.cells[1].scene.digest = "other".to_owned();
-            }
-            let found = changes(&was, &is, 0.05, &["query_ns", "build_ms"]);
-            let rows: Vec<_> = found
-                .rows
-                .iter()
-                .filter(|r| r.cell.structure == "b")
-                .collect();
-            let row = (rows[0].outcome, rows.len());
-            (row.0, row.1, found.is_wrong(), found.is_regression())
-        };
-        use Status::{LeftOut, Ok, Panicked, Refused, Wrong};
-        for (old, new, same, wanted) in [
-            (Ok, Ok, true, (Outcome::Slower, 2, false, true)),
-            (Ok, Ok, false, (Outcome::Different, 1, false, false)),
-            (Ok, Wrong, true, (Outcome::Broken, 1, true, false)),
-            (Ok, Panicked, false, (Outcome::Broken, 1, true, false)),
-            (Ok, Refused, true, (Outcome::Lost, 1, false, true)),
-            (Wrong, Ok, true, (Outcome::Gained, 1, false, false)),
-            (
-                LeftOut,
-                Refused,
-                true,
-                (Outcome::FailedInBoth, 1, false, false),
-            ),
-            (
-                Refused,
-                Wrong,
-                true,
-                (Outcome::FailedInBoth, 1, true, false),
-            ),
-            (Refused, Ok, false, (Outcome::Different, 1, false, false)),
-        ] {
-            assert_eq!(of(old, new, same), wanted, "{old:?} to {new:?}, {same}");
-        }
-    }
-
-    #[test]
-    fn counters_are_compared_exactly_and_judge_nothing() {
-        let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
-        for (report, planes) in [(&mut old, 100.0), (&mut new, 100.001)] {
-            for (name, value) in [("planes_tested", planes), ("items_tested", 7.0)] {
-                let mut metric = report.cells[1].metrics["query_ns"].clone();
-                metric.value = value;
-                report.cells[1].metrics.insert(name.to_owned(), metric);
-            }
-        }
-        let found = changes(&old, &new, 0.05, QUERY);
-        let work = &found.work_changed;
-        assert_eq!((work.len(), work[0].counter), (1, "planes_tested"));
-        assert_eq!((work[0].old, work[0].new), (100.0, 100.001));
-        assert_eq!(found.count(Outcome::Same), 5);
-        // Of another scene they are another question's.
-        new.cells[1].scene.digest.push('x');
-        assert!(changes(&old, &new, 0.05, QUERY).work_changed.is_empty());
-    }
-
-    #[test]
-    fn only_what_has_times_is_judged() {
-        let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
-        old.cells[1].metrics.get_mut("query_ns").unwrap().value = f64::NAN;
-        new.cells[2].metrics.clear();
-        let found = changes(&old, &new, 0.05, &["query_ns", "locate_ns"]);
-        assert_eq!(found.count(Outcome::Unmeasured), 7);
-        // Three are left, with two others each.
-        assert_eq!(found.count(Outcome::Inconclusive), 3);
-        // What neither side ever had is no news.
-        let news = found.rows.iter().filter(|row| row.is_news());
-        assert_eq!(news.count(), 5);
-        assert!(found.why_nothing_was_judged().is_none());
-        let found = changes(&old, &new, 0.05, &["locate_ns"]);
-        assert!(found.why_nothing_was_judged().is_some());
-    }
-
-    #[test]
-    fn facts_of_machine_and_build_that_differ_are_named() {
-        let (old, mut new) = (all(3, 1.0), all(3, 1.0));
-        assert!(settings(&old, &new).is_empty());
-        new.machine.cpu = None;
-        new.toolchain.flags = "-O".to_owned();
-        let found = settings(&old, &new);
-        let found: Vec<_> = found.iter().map(|s| (s.what, s.is_machine)).collect();
-        assert_eq!(found, [("cpu", true), ("flags", false)]);
-    }
-}
+mod tests;

@@ -27,6 +27,9 @@ pub static COUNTERS: &[&str] = &[
     "memory_bytes_per_item",
 ];
 
+/// The counters of the work of a frustum query, which `compare --gate work` judges.
+pub static WORK: &[&str] = &["nodes_tested", "items_tested", "planes_tested"];
+
 named! {
     /// Outcome of a cell, worst first.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
@@ -39,6 +42,8 @@ named! {
         Lost = "lost",
         /// Takes longer: proven, and by more than the comparison's floor.
         Slower = "slower",
+        /// Tests more nodes, items or planes, by more than the threshold.
+        MoreWork = "more_work",
         /// Not the same question: not judged.
         Different = "different",
         /// No time above zero on one side at least: not judged.
@@ -51,6 +56,8 @@ named! {
         Inconclusive = "inconclusive",
         /// Takes less time: proven, and by more than the floor.
         Faster = "faster",
+        /// Tests fewer nodes, items or planes, by more than the threshold.
+        LessWork = "less_work",
         /// A change of the threshold's size is ruled out.
         Same = "same",
     }
@@ -172,6 +179,37 @@ impl JudgedRow {
         }
     }
 
+    /// A cell by one of the counters in [`WORK`], which are exact: any growth by more
+    /// than `threshold` is more work.
+    pub fn by_work(
+        cell: CellKey,
+        counter: &'static str,
+        (old, new): (Option<f64>, Option<f64>),
+        threshold: f64,
+    ) -> JudgedRow {
+        let most = 1.0 + threshold;
+        let outcome = match old.zip(new) {
+            None => Outcome::Unmeasured,
+            Some((old, new)) if new > old * most => Outcome::MoreWork,
+            Some((old, new)) if old > new * most => Outcome::LessWork,
+            Some(_) => Outcome::Same,
+        };
+        JudgedRow {
+            metric: Some(counter),
+            old,
+            new,
+            ..JudgedRow::unjudged(cell, outcome, None)
+        }
+    }
+
+    /// new / old, as judged or of the work.
+    pub fn ratio(&self) -> Option<f64> {
+        let is_work = self.metric.is_some_and(|metric| WORK.contains(&metric));
+        let values = self.old.zip(self.new).filter(|_| is_work);
+        let judged = self.judgement.map(|found| found.ratio);
+        judged.or(values.map(|(old, new)| new / old))
+    }
+
     /// Returns true if the row is worth reading: not the same as before, not a
     /// metric that neither side ever had, not a failure as before.
     pub fn is_news(&self) -> bool {
@@ -187,9 +225,9 @@ impl JudgedRow {
 
     /// Worst first; among the faster ones the one that gained most.
     pub fn order(&self, other: &JudgedRow) -> Ordering {
-        let ratio = |row: &JudgedRow| row.judgement.map_or(1.0, |found| found.ratio);
+        let ratio = |row: &JudgedRow| row.ratio().unwrap_or(1.0);
         let by_ratio = match self.outcome {
-            Outcome::Faster => ratio(self).total_cmp(&ratio(other)),
+            Outcome::Faster | Outcome::LessWork => ratio(self).total_cmp(&ratio(other)),
             _ => ratio(other).total_cmp(&ratio(self)),
         };
         self.outcome.cmp(&other.outcome).then(by_ratio)
@@ -290,9 +328,10 @@ impl Changes {
         paired.chain(alone).any(Status::is_failure)
     }
 
-    /// Returns true if a right answer takes longer or is no longer given.
+    /// Returns true if a right answer takes longer or more work or is no longer given.
     pub fn is_regression(&self) -> bool {
-        self.count(Outcome::Slower) + self.count(Outcome::Lost) > 0
+        let worse = [Outcome::Slower, Outcome::MoreWork, Outcome::Lost];
+        self.rows.iter().any(|row| worse.contains(&row.outcome))
     }
 
     /// The first row, if no row at all could be judged.
@@ -318,7 +357,7 @@ mod tests {
 
     #[test]
     fn every_metric_and_counter_is_one_of_the_list() {
-        for name in JUDGED_METRICS.iter().chain(COUNTERS) {
+        for name in JUDGED_METRICS.iter().chain(COUNTERS).chain(WORK) {
             assert!(METRICS.iter().any(|info| info.name == *name), "{name}");
         }
     }

@@ -25,7 +25,7 @@ pub use files::{FolderError, bare};
 pub use folder::{RunFolder, StoppedRun, save_report};
 pub use growth::{Growth, growths};
 pub use judging::{
-    COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WorkChange,
+    COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WORK, WorkChange,
     work_changes,
 };
 pub use merge::{Merged, merge};

@@ -254,7 +254,12 @@ fn markdown_holds_the_table() {
         row.contains("| bvh | query\\_ns |") && row.contains("| slower |"),
         "{row}"
     );
-    assert!(last_line(&text).starts_with("1 slower"), "{text}");
+    // One line with the verdict, the rest folded.
+    let summary = "<details>\n<summary>cullbench: regression: 1 slower, 0 inconclusive, 0 faster, \
+        9 same of 10 cells; worst: bvh on uniform:n=300, orbit:frames=8, six-plane: query_ns \
+        +100.0 %</summary>\n\n";
+    assert!(text.starts_with(summary), "{text}");
+    assert!(text.ends_with("\n\n</details>\n"), "{text}");
     all_refused(
         &folder,
         &[format!("{COMPARE} --markdown --format json")],

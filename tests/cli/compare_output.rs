@@ -16,7 +16,7 @@ fn json_says_the_same_with_types() {
         assert_eq!(last["structure"], "bsp");
     });
     let done = json(&compare(folder.path(), "--format json", 3));
-    let fields = "old new verdict counts head notes settings advice threshold cells_in_common rows \
+    let fields = "old new verdict gate counts head notes settings advice threshold cells_in_common rows \
         work_changed only_in_old only_in_new common_shift";
     assert_eq!(keys(&done), set(fields));
     assert_eq!(done["verdict"], "regression");
@@ -27,8 +27,8 @@ fn json_says_the_same_with_types() {
         (&json!(10), &json!(9))
     );
     assert_eq!(done["advice"], json!(null));
-    let outcomes = "broken lost slower different unmeasured failed_in_both gained inconclusive \
-        faster same";
+    let outcomes = "broken lost slower more_work different unmeasured failed_in_both gained \
+        inconclusive faster less_work same";
     assert_eq!(keys(&done["counts"]), set(outcomes));
     assert_eq!(
         (&done["counts"]["slower"], &done["counts"]["same"]),

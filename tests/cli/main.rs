@@ -20,6 +20,7 @@ mod funnel_extremes;
 mod funnel_fragments;
 mod funnel_maps;
 mod funnel_options;
+mod gates;
 mod kernels;
 mod listing;
 mod matrices;

@@ -1,0 +1,264 @@
+//! Comparisons in CI: gates, baselines, Bencher, and the commands of docs/CI.md.
+
+use std::fs;
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use super::compare::{COMPARE, bvh, cells, compare, last_line, row_with, scale, with_change};
+use super::process::*;
+
+/// The bvh on the orbit with this many times the planes tested.
+fn with_planes(factor: f64) -> TempDir {
+    with_change(|new| {
+        let planes = &mut bvh(new)["metrics"]["planes_tested"]["value"];
+        *planes = json!(factor * planes.as_f64().expect("a count"));
+        // No gate of the work judges times, on whatever machine.
+        cells(new)
+            .iter_mut()
+            .for_each(|cell| scale(cell, "query_ns", 3.0));
+        new["machine"]["cpu"] = json!("Another");
+    })
+}
+
+#[test]
+fn work_beyond_the_threshold_is_a_regression() {
+    let more = with_planes(1.1);
+    let text = compare(more.path(), "--gate work", 3);
+    let verdict = "1 more work, 0 less work, 29 same of 30 figures of 10 cells";
+    assert_eq!(last_line(&text), verdict, "{text}");
+    let row = row_with(&text, "more work");
+    assert!(
+        row.contains("bvh") && row.contains("planes_tested"),
+        "{row}"
+    );
+    assert!(row.contains(" +10.0 % "), "{row}");
+    for absent in ["slower", "NEW takes", "different machines", "processes"] {
+        assert!(!text.contains(absent), "'{absent}' in:\n{text}");
+    }
+    compare(more.path(), "--gate work --threshold 11%", 0);
+    compare(more.path(), "--gate work --threshold 0", 3);
+    let done = json(&compare(more.path(), "--gate work --format json", 3));
+    assert_eq!(done["verdict"], "regression");
+    assert_eq!(
+        (&done["gate"], &done["common_shift"]),
+        (&json!("work"), &json!(null))
+    );
+    let worst = &done["rows"][0];
+    assert_eq!(worst["verdict"], "more_work");
+    assert_eq!(number(worst, "new"), 1.1 * number(worst, "old"));
+    // The times are the default's, and no gate of the work.
+    compare(more.path(), "", 0);
+    let less = with_planes(0.5);
+    let text = compare(less.path(), "--gate work", 0);
+    assert!(
+        last_line(&text).starts_with("0 more work, 1 less work"),
+        "{text}"
+    );
+    assert!(row_with(&text, "less work").contains(" -50.0 % "), "{text}");
+    // From nothing to something is growth beyond every share.
+    let from_none = with_change(|new| {
+        assert_eq!(cells(new)[1]["structure"], "linear");
+        cells(new)[1]["metrics"]["nodes_tested"]["value"] = json!(7);
+    });
+    compare(from_none.path(), "--gate work --threshold 900%", 3);
+}
+
+#[test]
+fn the_gate_of_the_work_sees_lost_and_wrong_answers() {
+    for (status, code) in [("refused", 3), ("wrong", 1)] {
+        let folder = with_change(|new| bvh(new)["status"] = json!(status));
+        compare(folder.path(), "--gate work", code);
+    }
+    let uncounted = with_change(|new| {
+        for cell in cells(new) {
+            let metrics = cell["metrics"].as_object_mut().expect("an object");
+            metrics.retain(|name, _| !name.ends_with("_tested"));
+        }
+    });
+    let work = format!("{COMPARE} --gate work");
+    let wanted = "nothing can be judged | 30 without a figure | only in OLD";
+    all_refused(&uncounted, std::slice::from_ref(&work), wanted);
+    for (options, wanted) in [
+        (
+            "--gate work --metric build_ms",
+            "--metric names times | expected none with --gate work",
+        ),
+        ("--gate memory", "--gate | memory | expected | time, work"),
+    ] {
+        all_refused(&uncounted, &[format!("{COMPARE} {options}")], wanted);
+    }
+}
+
+#[test]
+fn inconclusive_fails_where_it_shall() {
+    let few = with_change(|new| cells(new).retain(|cell| cell["structure"] == "bvh"));
+    compare(few.path(), "", 0);
+    let text = compare(few.path(), "--fail-inconclusive", 3);
+    assert!(text.contains("2 inconclusive cells: "), "{text}");
+    let done = json(&compare(few.path(), "--fail-inconclusive --format json", 3));
+    assert_eq!(done["verdict"], "inconclusive");
+    let text = compare(few.path(), "--fail-inconclusive --markdown", 3);
+    assert!(
+        text.contains("<summary>cullbench: inconclusive: 0 slower, 2 inc"),
+        "{text}"
+    );
+    let same = with_change(|_| ());
+    let done = compare(same.path(), "--fail-inconclusive --markdown", 0);
+    assert!(
+        done.contains("<summary>cullbench: no regression: 0 slower"),
+        "{done}"
+    );
+}
+
+const RUN: &str = "run --scene uniform:n=50 --path orbit:frames=4 --structure linear,bvh \
+    --processes 1 --no-bounds";
+
+#[test]
+fn a_saved_run_is_the_baseline_of_the_newest() {
+    let folder = folder(&[]);
+    let path = folder.path();
+    all_refused(
+        &folder,
+        &["compare --baseline main"],
+        "no baseline 'main' in results/baselines | expected one that `run --save NAME` kept",
+    );
+    let text = works(path, &format!("{RUN} --save main --out first"));
+    assert!(
+        last_line(&text).starts_with("results/baselines/main.json"),
+        "{text}"
+    );
+    let read = |file: &str| json(&fs::read_to_string(path.join(file)).expect(file));
+    assert_eq!(
+        read("results/baselines/main.json"),
+        read("first/report.json")
+    );
+    all_refused(
+        &folder,
+        &["compare --baseline main"],
+        "no run in results | expected",
+    );
+    all_refused(
+        &folder,
+        &["compare --baseline main first"],
+        "is the baseline 'main' itself",
+    );
+    works(path, RUN);
+    let id = |line: &str| {
+        let done = works(path, &format!("{line} --gate work --format json"));
+        json(&done)["new"]["id"].as_str().expect("an id").to_owned()
+    };
+    // Neither an older run nor a folder that is named otherwise is the newest run.
+    for name in ["20200101T000000Z-old", "reference"] {
+        let other = path.join("results").join(name);
+        fs::create_dir(&other).expect("writable");
+        fs::copy(path.join("first/report.json"), other.join("report.json")).expect("writable");
+    }
+    let newest = id("compare --baseline main");
+    // By its name, and not the folder of baselines.
+    works(path, &format!("{RUN} --out second"));
+    assert_eq!(
+        id("compare --baseline main second"),
+        read("second/report.json")["run"]["id"]
+    );
+    assert_eq!(id("compare --baseline main"), newest);
+    // Again: the newer one stays.
+    works(path, &format!("{RUN} --save main --out third"));
+    assert_eq!(
+        read("results/baselines/main.json"),
+        read("third/report.json")
+    );
+    for (line, wanted) in [
+        (
+            "compare --baseline old",
+            "no baseline 'old' in results/baselines | available: main",
+        ),
+        (
+            "compare --baseline main first second",
+            "cannot be used with",
+        ),
+        (
+            "compare --baseline main --against first",
+            "cannot be used with",
+        ),
+        ("compare first", "NEW.json"),
+        (
+            "run --save a/b",
+            "--save is 'a/b' | expected a name of at most 100 letters",
+        ),
+        ("run --save ..", "--save is '..'"),
+        ("run --save ''", "--save is ''"),
+        ("run --save main --shard 1/2", "cannot be used with"),
+    ] {
+        all_refused(&folder, &[line], wanted);
+    }
+    // Before anything is measured.
+    fs::remove_dir_all(path.join("results")).expect("writable");
+    fs::create_dir(path.join("results")).expect("writable");
+    fs::write(path.join("results/baselines"), "no folder").expect("writable");
+    all_refused(
+        &folder,
+        &["run --save main"],
+        "results/baselines: not a folder | --save",
+    );
+}
+
+#[test]
+fn two_programs_are_compared_by_their_counters_alone() {
+    let folder = folder(&[]);
+    let line = "compare --scene uniform:n=50 --path orbit:frames=4 --structure linear,bvh \
+        --gate work --threshold 0 --against";
+    let text = works(folder.path(), &format!("{line} {}", super::PROGRAM));
+    let verdict = "0 more work, 0 less work, 6 same of 6 figures of 2 cells";
+    assert_eq!(last_line(&text), verdict, "{text}");
+    assert!(text.contains("nodes, items and planes tested per query, threshold 0.00 %"));
+}
+
+#[test]
+fn bencher_gets_every_right_cell_once() {
+    let folder = with_change(|new| cells(new)[0]["status"] = json!("wrong"));
+    let text = works(folder.path(), "report new.json --bencher b.json");
+    assert_eq!(text, "");
+    let written = fs::read_to_string(folder.path().join("b.json")).expect("written");
+    let benchmarks = json(&written);
+    let benchmarks = benchmarks.as_object().expect("an object");
+    assert_eq!(benchmarks.len(), 9);
+    let found = &benchmarks["bvh on uniform:n=300, orbit:frames=8, six-plane, f32, frame"];
+    let measures = "latency locate-ns build-ms nodes-tested items-tested planes-tested \
+        memory-bytes-per-item";
+    assert_eq!(keys(found), set(measures));
+    let mut report = json(&fs::read_to_string(folder.path().join("new.json")).expect("there"));
+    let own = |name: &str, value: &mut Value| value["metrics"][name]["value"].clone();
+    let cell = bvh(&mut report);
+    assert_eq!(found["latency"]["value"], own("query_ns", cell));
+    assert_eq!(
+        found["planes-tested"],
+        json!({ "value": own("planes_tested", cell) })
+    );
+    let wanted = "b.json: an input or another output | --bencher";
+    all_refused(&folder, &["report b.json --bencher b.json"], wanted);
+}
+
+/// Each with its options, if not with its measurement.
+#[test]
+fn the_commands_of_the_workflows_exist() {
+    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/CI.md"));
+    let text = text
+        .expect("docs/CI.md")
+        .replace("target/release/\"$PROGRAM\" ", "cullbench ");
+    let mut in_code = false;
+    let lines = text.lines().filter(|line| {
+        in_code ^= line.starts_with("```");
+        in_code
+    });
+    let commands = lines.flat_map(|line| line.split("&&")).filter_map(|part| {
+        let end = part.find(['>', '#', '|']).unwrap_or(part.len());
+        part[..end].trim().strip_prefix("cullbench ")
+    });
+    let folder = folder(&[]);
+    let tried = commands.map(|command| {
+        let done = cullbench(folder.path(), &format!("{command} --help"));
+        assert_eq!((done.code, done.err.as_str()), (Some(0), ""), "{command}");
+    });
+    assert_eq!(tried.count(), 10);
+}
