@@ -81,7 +81,7 @@ pub static SUITES: &[Suite] = &[
     },
     Suite {
         name: "standard",
-        summary: "as quick with a million items, more paths and more rounds; several minutes",
+        summary: "like quick, with a million items, more paths and more rounds; several minutes",
         plan: scenes! { cold: false;
             "uniform:n=10000" ["flythrough:frames=512,visible=2%"];
             "uniform:n=1000000" ["flythrough:visible=0.1%", "flythrough:visible=2%", "orbit", "outside"];
@@ -106,7 +106,9 @@ pub static SUITES: &[Suite] = &[
     },
     Suite {
         name: "full",
-        summary: "the crossover surface: three worlds from a thousand to a million items, 0.1 % to all of them visible, and the real ones, warm and cold; less than half an hour, with the structures of other crates less than one",
+        summary: "the crossover surface: three worlds from a thousand to a million items, 0.1 % \
+                  to all of them visible, and the real ones, warm and cold; less than half an \
+                  hour, or less than an hour with the structures of other crates",
         plan: scenes! { cold: true;
             "uniform:n=1000" surface!(512);
             "uniform:n=10000" surface!(512, "flythrough:frames=512,visible=500");
@@ -134,7 +136,8 @@ pub static SUITES: &[Suite] = &[
     },
     Suite {
         name: "compare",
-        summary: "what `compare --against` runs: a real scene and two generated ones, frustum queries only; a minute and a half by itself",
+        summary: "for `compare --against`: a real scene and two generated ones, frustum queries \
+                  only; a minute and a half by itself",
         plan: scenes! { cold: false;
             "helsinki" ["flythrough:frames=128,visible=2%"];
             "city:n=20000" ["flythrough:frames=128,visible=2%"];

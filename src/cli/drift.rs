@@ -148,7 +148,7 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
     let (all, turns) = (&report.rotation, &report.one_degree_turns);
     let figures: [(&str, fn(&RotationDrift) -> f64); 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
-        ("angle off in rad after", |d| d.angle_error_rad),
+        ("angular error in rad after", |d| d.angle_error_rad),
         ("position on orbit off after", |d| d.orbit_position_error),
         ("radius of orbit off after", |d| d.orbit_radius_error),
     ];
@@ -156,7 +156,7 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
         let of = |d: &RotationDrift| (d.method, d.steps, scientific(figure(d)));
         writeln!(out, "{}", grid(title, steps, all, of))?;
     }
-    let title = "in steps of 1 degree: angle off in rad after";
+    let title = "in steps of 1 degree: angular error in rad after";
     let head = |turns| text::counted(turns as usize, "turn");
     let of = |d: &TurnDrift| (d.method, d.turns, format!("{:.3e}", d.angle_error_rad));
     writeln!(out, "{}", grid(title, head, turns, of))?;

@@ -33,7 +33,8 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     blocks.extend(report.solid_blocks.as_ref().map(solid_blocks));
     if let Some(made) = &report.cut_outs {
         let line = format!(
-            "{} of the items are cut out by a mask ({}, tiles of {}): they hide nothing where it has holes.",
+            "{} of the items are cut out by a mask ({}, tiles of {}): they hide nothing at its \
+             holes.",
             made.item_count, made.mask, made.tile
         );
         blocks.insert(2, Block::Line(line));
@@ -44,16 +45,19 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     }
     // Not every scene has all of them.
     for (heading, table) in [
-        ("Samples and fragments of what is left", fragments(report)),
-        ("What is seen in the mirror", mirror(report)),
-        ("What is left, drawn in every order", orders(report)),
-        ("What is under a cursor", picks(report)),
         (
-            "Lower bounds: what must at least be read or written",
+            "Samples and fragments of the remaining items",
+            fragments(report),
+        ),
+        ("Items seen in the mirror", mirror(report)),
+        ("Draw orders of the remaining items", orders(report)),
+        ("Picking: items under a cursor", picks(report)),
+        (
+            "Lower bounds: the least that must be read or written",
             bounds(report),
         ),
         (
-            "With and without each stage of the chain, and the draw cost above which it pays",
+            "With and without each stage of the chain, and the draw cost above which it pays off",
             gains(report),
         ),
     ] {
@@ -65,8 +69,8 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         }
     }
     if report.stages.iter().any(|row| row.fragments.is_some()) {
-        let line = "The fragment stage is timed as it is done here: exactly, along the ray of each \
-                    sample, on one thread. A graphics processor does it in hardware.";
+        let line = "The time of the fragment stage is that of an exact test along the ray of each \
+                    sample, on one thread. A GPU does this in hardware.";
         blocks.push(Block::Line(line.into()));
     }
     blocks.extend(report.left_out.iter().map(|row| {
@@ -138,7 +142,7 @@ fn solid_blocks(row: &BlocksRow) -> Block {
             text::time(row.build_ns)
         ),
         unclosed => format!(
-            "Occluders: none, as the linedefs of {} do not close, or disagree with others.",
+            "Occluders: none, since the linedefs of {} are not closed or contradict others.",
             text::counted(unclosed, "sector")
         ),
     })
@@ -212,7 +216,7 @@ fn count(mean: f64) -> String {
 /// Counts of fragments, by the name of a test.
 fn fragment_table<'c>(tests: impl Iterator<Item = (&'c str, &'c FragmentCounts)>) -> Table {
     let mut table =
-        Table::of("test | >samples asked | >kept out | >fragments | >clear | >shaded | >covered");
+        Table::of("test | >samples tested | >kept out | >fragments | >clear | >shaded | >covered");
     for (name, counts) in tests {
         let counts = counts.in_order().into_iter().map(count);
         table.add_row([name.to_owned()].into_iter().chain(counts));

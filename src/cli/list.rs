@@ -109,7 +109,9 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                 ];
                 Ok((info.name.to_owned(), columns, info.summary.to_owned()))
             });
-            let note = "Parameters follow the name: bvh:leaf=4,preset=medium\nLists of structures: all, default (what is timed by default) or names with commas between";
+            let note = "Parameters follow the name: bvh:leaf=4,preset=medium\nLists of \
+                        structures: all, default (those timed by default) or names separated by \
+                        commas";
             (
                 "structures",
                 note.to_owned(),
@@ -133,7 +135,9 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                 .map(|s| format!("  {:<9} {}", s.name, s.summary))
                 .collect();
             let note = format!(
-                "n counts the triangles of a mesh.\nA scene is also a file: boxes CSV, or a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes are works of others: `cullbench licences`.\nSuites of `run`:\n{}",
+                "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, or \
+                 a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes have licences of their \
+                 own: `cullbench licences`.\nSuites of `run`:\n{}",
                 suites.join("\n")
             );
             (

@@ -53,7 +53,7 @@ fn of_points(p: &Precision) -> Vec<String> {
         return vec!["No point that is safe by its margin has a time.".to_owned()];
     };
     let mut all = vec![format!(
-        "Fastest of those that cannot miss anything: {} at {}, excess {} %.",
+        "Fastest point that cannot miss an item: {} at {}, false positives {} %.",
         named(fastest),
         time(&fastest.times),
         percent(fastest.errors.excess)
@@ -62,7 +62,7 @@ fn of_points(p: &Precision) -> Vec<String> {
     let tight = sound.find(|point| extra(point) < extra(fastest));
     if let Some(tight) = tight {
         all.push(format!(
-            "Less excess begins at {} times its time: {}, excess {} %.",
+            "Fewer false positives take {} times as long or more: {}, {} %.",
             ratio(tight, fastest),
             named(tight),
             percent(tight.errors.excess)
@@ -87,7 +87,7 @@ fn of_storage(p: &Precision) -> Option<String> {
     let least = p.points.iter().filter(is_sound);
     let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
     Some(format!(
-        "Least memory: {} at {} B/item, excess {} %, {}.",
+        "Least memory: {} at {} B/item, false positives {} %, {}.",
         named(least),
         text::significant(memory(&least)),
         percent(least.errors.excess),
@@ -105,8 +105,8 @@ fn of_regions(p: &Precision) -> Option<String> {
     let cost = same.next().and_then(|point| point.times.query_ns);
     let cost = cost.zip(plain.times.query_ns);
     Some(format!(
-        "Region search in f32 is wrong for {} % of {} (farthest {} outside); an exact look at the hits \
-         leaves {} wrong and takes {} times as long on {}.",
+        "Region search in f32 is wrong for {} % of {} (farthest {} outside); an exact test of the \
+         hits leaves {} wrong and takes {} times as long on {}.",
         percent(plain.errors.wrong),
         text::counted(plain.errors.points as usize, "point"),
         text::significant(plain.errors.worst_false),
@@ -123,8 +123,8 @@ fn of_sizes(rows: &[SizeRow]) -> Option<String> {
     };
     let (first, last) = (rows.first()?, rows.last()?);
     Some(format!(
-        "Six planes return {} % too much at s/D = {} and {} % at {}; the exact test with epsilon {} and \
-         {} %.",
+        "Six planes return {} % false positives at s/D = {} and {} % at {}; the exact test with \
+         epsilon {} and {} %.",
         of(first, "six-plane"),
         first.size_over_depth,
         of(last, "six-plane"),
@@ -144,7 +144,7 @@ fn of_sweeps(rows: &[SweepRow]) -> Vec<String> {
         let errors = default.filter_map(|row| row.errors);
         let default: u64 = errors.map(|errors| errors.false_negatives).sum();
         if lost(&worst) == 0.0 {
-            return Some(format!("Over {name} nothing is missed by any."));
+            return Some(format!("Over {name}, no test misses an item."));
         }
         Some(format!(
             "Over {name} the default misses {default}; most is missed by {} at {}: {} ppm.",

@@ -52,11 +52,11 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
         errors_table(&fastest)
     ))?;
     say(
-        "± is the 95 % interval over the cameras; <: none observed, 95 % upper bound 3/n. By source: false \
-         positives by storage/planes/test, of all cameras. px: how deep \
-         the deepest miss reaches into a view 1080 pixels high. Flicker: items that change from a \
-         camera to the next of the path while their truth does not, of the visible. c is the factor \
-         of the conservative epsilon. Structures have the same errors.",
+        "± is the 95 % interval over the cameras; <: none observed, 95 % upper bound 3/n. FP: false \
+         positives, % of the visible items; by source: storage/planes/test, of all cameras. px: how deep \
+         the deepest miss reaches into a view 1080 pixels high. Flicker: items that change between \
+         successive cameras of the path while their truth does not, of the visible. c is the factor \
+         of the conservative epsilon. All structures have the same errors.",
     )?;
     say(&format!(
         "\nTimes, the fastest structure for each:\n{}",
@@ -75,16 +75,16 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
         front_lines(p)
     ))?;
     say(
-        "* On the front: no other point as good in every error, in the depth of its misses, in memory \
-         and in time is shown to be better in one. A tie shares it: what is better by the values is \
-         not told apart by intervals paired by camera and by process.",
+        "* On the Pareto front: no other point is significantly better in an error, the depth of \
+         misses, memory or time and as good in the rest. Points that do not differ significantly \
+         (intervals paired by camera and by process) share the front.",
     )?;
     say(&format!(
         "\nRegion search, the fastest structure for each:\n{}",
         regions_table(p)
     ))?;
     say(&format!(
-        "\nHow many cameras until the order of the points by time stands:\n{}",
+        "\nNumber of cameras after which the order of the points by time is final:\n{}",
         stability_table(p)
     ))?;
     if !outcome.size_sweep.is_empty() {
@@ -159,7 +159,7 @@ fn by_source(errors: &ErrorCount) -> String {
 fn errors_table(points: &[&CullingPoint]) -> Table {
     let columns: &[Column<&&CullingPoint>] = &[
         ("culling", |point| culling(point)),
-        (">excess %", |point| percent(point.errors.excess)),
+        (">FP %", |point| percent(point.errors.excess)),
         (">by source", |point| {
             some(point.errors.counts.as_ref(), by_source)
         }),
@@ -207,7 +207,7 @@ fn front_lines(p: &Precision) -> String {
     let line = |&i: &usize| {
         let point = &p.points[i];
         format!(
-            "* {}: {}, {} B/item, excess {} %, missed {} ppm{}",
+            "* {}: {}, {} B/item, FP {} %, missed {} ppm{}",
             named(point),
             some(point.times.query_ns, text::time),
             text::significant(point.errors.memory_bytes_per_item),
@@ -285,8 +285,8 @@ fn sizes_note(rows: &[SizeRow]) -> String {
         Some(format!("{} {ns}", t.test))
     });
     format!(
-        "{} frusta and {} for each ratio; ± is how far another seed may come out (99.999 %), from the \
-         spread over the frusta. ns per box in blocks of sixteen: {}.",
+        "{} frusta and {} for each ratio; ± bounds the result of another seed (99.999 %), from \
+         the spread over the frusta. ns per box in blocks of sixteen: {}.",
         text::count(first.frusta),
         text::counted(first.cubes as usize, "cube"),
         costs.collect::<Vec<_>>().join(", ")

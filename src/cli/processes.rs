@@ -153,8 +153,8 @@ impl Worker {
             let text = String::from_utf8_lossy(&line[..line.len().min(300)]);
             let text = shortened(text.trim_end(), 60);
             anyhow::anyhow!(
-                "a worker said '{text}'; expected a message of protocol {PROTOCOL}: the program is \
-                 of another version"
+                "a worker printed '{text}'; expected a message of protocol {PROTOCOL}: the \
+                 program is of another version"
             )
         })?;
         Ok(Some(match message {
@@ -310,7 +310,7 @@ impl Workers {
                 file.write_all(&bytes)?;
                 Ok(file)
             });
-            let place = || format!("{source}: cannot be kept for the processes to read");
+            let place = || format!("{source}: cannot be copied for the processes to read");
             let file = kept.map_err(bare).with_context(place)?;
             spooled.insert(source, std::path::absolute(file.path())?);
             spool.push(file);

@@ -123,13 +123,13 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     let kept = scene.settled()?;
     if !lost.is_empty() {
         tell(&format!(
-            "note: {} left behind; boxes CSV holds boxes and labels",
+            "note: {} not written; boxes CSV has boxes and labels only",
             lost.join(", ")
         ));
     }
     if kept.origin != origin {
         tell(&format!(
-            "note: it will be read back about {}, not about {origin}",
+            "note: the file will be read with the origin {}, not {origin}",
             kept.origin
         ));
     }

@@ -154,8 +154,9 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         .count();
     writeln!(
         out,
-        "{lossy} of {} points lost something visible; {} of them promise that they do not. Than a * \
-         nothing is as good in time and both errors and shown to be better in one.",
+        "{lossy} of {} points dropped visible items; {} of these have a guarantee. * On the \
+         Pareto front: no other point is significantly better in time or an error and as good in \
+         the rest.",
         sweep.points.len(),
         safe.filter(|point| point.errors.false_negative_count > 0.0)
             .count()

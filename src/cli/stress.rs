@@ -107,7 +107,7 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         }
     })?;
     if interrupted {
-        tell("interrupted: only what is shown was checked");
+        tell("interrupted: only the cases shown were checked");
     }
     let failed = sections
         .iter()
@@ -197,8 +197,8 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     if tally.boxes > 0 {
         writeln!(
             out,
-            "{} judged at camera level: {} visible, {} of them boundary contacts ({} \
-             too close to decide); {} and {}; lost without the epsilon: {}; refused because sums could \
+            "{} checked at camera level: {} visible, {} of them boundary contacts ({} too close \
+             to decide); {} and {}; dropped without the epsilon: {}; refused because sums could \
              overflow: {}",
             text::counted(tally.boxes as usize, "box"),
             text::count(tally.seen as usize),

@@ -122,10 +122,10 @@ fn break_even(surface: &Surface) -> Option<Table> {
 pub fn of_surface(surface: &Surface) -> Vec<Block> {
     let mut blocks = vec![
         Block::Line(
-            "The fastest (= where no test tells them apart) and its speed-up vs linear; none \
-             where a scan wins. Shares stand under the nearest, by its logarithm, of 1, 1.5, 2, \
-             3, 5, 7, 10, ... percent; (at ...) where that is more than a tenth off. ~ N lies \
-             between two sizes, in the logarithms of size and speed-up."
+            "The fastest structure (= if differences are not significant) and its speed-up vs \
+             linear; none if a scan wins. Shares are rounded on a log scale to 1, 1.5, 2, 3, 5, \
+             7, 10, ... percent; (at ...) gives a share that is more than a tenth off. ~ N is \
+             interpolated between two sizes, on log scales."
                 .to_owned(),
         ),
         Block::Table(winners(surface)),
@@ -133,7 +133,7 @@ pub fn of_surface(surface: &Surface) -> Vec<Block> {
     blocks.extend(crossings(surface).map(Block::Table));
     if let Some(rows) = break_even(surface) {
         blocks.push(Block::Line(
-            "Queries after which the build is repaid against the linear scan:".to_owned(),
+            "Queries after which the build pays off against the linear scan:".to_owned(),
         ));
         blocks.push(Block::Table(rows));
     }

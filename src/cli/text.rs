@@ -35,7 +35,7 @@ pub fn conclusion(report: &Report) -> String {
         ""
     };
     format!(
-        "95 % intervals over {}{few}; a structure entered twice agreed with itself in {} of {}",
+        "95 % intervals over {}{few}; A/A check: {} of {} intervals contain 1",
         of_planned(format!("{least} processes")),
         twins.clone().filter(|holds| *holds).count(),
         counted(twins.count(), "comparison")

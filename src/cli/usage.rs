@@ -67,6 +67,6 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
         found = format!("{found} {}", missing.join(", "));
     }
     let usage = usage.map(|usage| format!("; expected {usage}"));
-    let help = "; --help tells what can be given".to_owned();
+    let help = "; see --help".to_owned();
     Some(found + &expected.or(usage).unwrap_or(help))
 }

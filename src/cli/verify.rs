@@ -124,7 +124,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     };
     unread_is_fine(show(&outcome, args.format))?;
     if interrupted {
-        tell("interrupted: only what is shown was checked");
+        tell("interrupted: only the cases shown were checked");
     }
     Ok(Ending::of_checks(outcome.ok, interrupted))
 }
@@ -414,7 +414,7 @@ fn differ(
     index.query_many(&[case.point, nowhere, case.point], &mut many);
     if !many.iter().eq([out, &[], out]) {
         let why = format!(
-            "region search: a batch of points is answered otherwise than one by one: {many:?}"
+            "region search: a batch of points has other answers than single points: {many:?}"
         );
         return Err(Verdict::new(Status::Wrong, why));
     }
@@ -457,8 +457,8 @@ fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
     if !outcome.against_cameras {
         writeln!(
             out,
-            "Planes without the whole margin may lose what is visible: structures were compared \
-             with each other, not with the cameras."
+            "Planes without the full margin may drop visible items: structures were compared with \
+             each other, not with the cameras."
         )?;
     }
     Ok(())

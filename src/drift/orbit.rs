@@ -23,13 +23,13 @@ pub const TOOLKIT: &str = "f64-carried";
 pub const CARRIERS: &[Method] = rows! { Method { name, summary, sum, walk }
     "f32-carried", "the f32 eye turned about the centre each step",
         Sum::Turns, single::carried::<false>;
-    "f32-carried-radius", "the same, put back to its distance each step",
+    "f32-carried-radius", "the same, moved back to its distance each step",
         Sum::Turns, single::carried::<true>;
     TOOLKIT, "the f64 eye and its axes turned each step, around and over: this toolkit's orbit",
         Sum::Turns, toolkit_orbit;
-    "f64-carried-radius", "the f64 eye alone, put back to its distance each step",
+    "f64-carried-radius", "the f64 eye alone, moved back to its distance each step",
         Sum::Turns, double::carried::<true>;
-    "f64-angle", "the eye recomputed from an f64 angle in degrees, whole turns taken off",
+    "f64-angle", "the eye recomputed from an f64 angle in degrees, modulo 360",
         Sum::Angles, summed_orbit;
 };
 

@@ -59,7 +59,7 @@ pub const METHODS: &[Method] = rows! { Method { name, summary, sum, walk }
     "f32-radians", "f32 angles summed in radians, axes recomputed by sine and cosine",
         Sum::Angles, single::angles::<RADIANS>;
     "f32-degrees", "the same in degrees", Sum::Angles, single::angles::<DEGREES>;
-    "f32-degrees-wrapped", "the same in degrees, whole turns taken off",
+    "f32-degrees-wrapped", "the same in degrees, modulo 360",
         Sum::Angles, single::angles::<WRAPPED>;
     "f64", "f64 axes, turned and never corrected", Sum::Turns, double::frame::<NONE>;
     "f64-gram-schmidt", "f64 axes, Gram-Schmidt after each step",
@@ -69,7 +69,7 @@ pub const METHODS: &[Method] = rows! { Method { name, summary, sum, walk }
         Sum::Turns, toolkit;
     "f64-quaternion", "f64 quaternion, normalised after each step", Sum::Turns, double::quaternion;
     "f64-radians", "f64 angles summed in radians", Sum::Angles, double::angles::<RADIANS>;
-    "f64-degrees-wrapped", "f64 angles summed in degrees, whole turns taken off",
+    "f64-degrees-wrapped", "f64 angles summed in degrees, modulo 360",
         Sum::Angles, double::angles::<WRAPPED>;
     "f64-lecture", "this toolkit's camera with the lecture's 3.142/180 for pi/180",
         Sum::Turns, lecture;

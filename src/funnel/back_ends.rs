@@ -65,8 +65,8 @@ fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> impl Iterator<Item = Bac
         ),
         false => ([Z, "the nearest fragment of each sample, exactly"], exact),
     };
-    let alpha = ([ALPHA, "the nearest fragment that is no hole"], exact);
-    let beyond = "the same, beyond the eye's room only where its portals are seen";
+    let alpha = ([ALPHA, "the nearest opaque fragment"], exact);
+    let beyond = "the same, but beyond the eye's room only at samples that see its portals";
     let has_rooms = matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty());
     let rows = [
         (true, z),

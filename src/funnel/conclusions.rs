@@ -21,7 +21,7 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
     sentences.extend(report.stages.iter().find(is_last).map(|last| {
         format!(
-            "Of {} items {:.1} are left and {:.1} are in front at a sample, per view.",
+            "Of {} items, {:.1} remain and {:.1} are in front at some sample, per view.",
             report.items, last.errors.output_count, last.errors.truth_count
         )
     }));
@@ -32,13 +32,13 @@ fn of_gain(gain: &Gain) -> String {
     let what = format!("{} ({})", gain.stage.name(), gain.back_end);
     let (removed, unit) = (gain.removed(), gain.unit);
     if removed <= 0.0 {
-        return format!("{what} removes nothing that the other stages leave: leave it out.");
+        return format!("{what} removes nothing that the other stages leave: skip it.");
     }
     match gain.break_even_ns {
         Some(0.0) => format!("{what} removes {removed:.1} {unit} per view and saves time as well."),
         Some(ns) => format!(
-            "{what} removes {removed:.1} {unit} per view and pays where {} one of them takes more \
-             than {ns:.1} ns.",
+            "{what} removes {removed:.1} {unit} per view and pays off if {} one of them takes \
+             more than {ns:.1} ns.",
             match gain.stage {
                 StageKind::Fragment => "shading",
                 _ => "drawing",
@@ -57,7 +57,7 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     let (stencil, with) = test(STENCIL)?;
     let (other, without) = test(default_test(report.cut_outs.is_some()))?;
     Some(format!(
-        "fragment {} asks {with:.0} samples per view in place of {without:.0} ({:.1} % fewer) and \
+        "fragment {} tests {with:.0} samples per view instead of {without:.0} ({:.1} % fewer) and \
          leaves {} items as {} does.",
         stencil.back_end.name,
         (1.0 - with / without) * 100.0,
@@ -71,8 +71,9 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
 
 fn of_mirror(row: &MirrorRow) -> String {
     format!(
-        "In item {} as a mirror across {} (in front in {}, at {:.1} samples per view) {:.1} items are \
-         seen; the stencil asks {:.0} samples per view in place of {:.0}, and {} are shown differently.",
+        "In item {} as a mirror across {} (in front in {}, at {:.1} samples per view) {:.1} items \
+         are seen; with the stencil, {:.0} samples per view are tested instead of {:.0}, and {} \
+         differ.",
         row.item,
         row.axis,
         counted(row.view_count, "view"),
@@ -95,7 +96,7 @@ fn of_order(row: &OrderRow) -> impl Iterator<Item = String> {
 fn of_loss(row: &StageRow) -> String {
     let errors = &row.errors;
     format!(
-        "{} {} lost {:.2} visible items per view, one of them {} samples large.",
+        "{} {} drops {:.2} visible items per view; the largest covers {} samples.",
         row.back_end.stage.name(),
         row.back_end.name,
         errors.false_negative_count,

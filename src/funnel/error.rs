@@ -86,8 +86,8 @@ pub fn fits_drawing(
     let samples: u64 = rectangles.map(|rectangle| rectangle.samples()).sum();
     match samples > most {
         true => Err(format!(
-            "{samples} samples to be drawn in a view, those of each item counted; \
-             expected at most {most}: fewer --samples or fewer items"
+            "{samples} samples drawn in a view, summed over its items; expected at most {most}: \
+             fewer --samples or fewer items"
         )),
         false => Ok(()),
     }

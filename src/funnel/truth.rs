@@ -44,9 +44,8 @@ pub fn visible(
         let most = most_drawn(samples);
         if in_front > most {
             return Err(FunnelError::Refused(format!(
-                "camera {}: about {in_front} items in front at the samples, those of each sample \
-                 counted; expected at most {most}: fewer --samples or fewer items with a common \
-                 face",
+                "camera {}: about {in_front} front items, summed over the samples; expected at \
+                 most {most}: fewer --samples or fewer items with a common face",
                 world.views[view].camera
             )));
         }

@@ -328,7 +328,7 @@ fn regions(input: &FunnelInput) -> Result<Option<Regions>, FunnelError> {
         (Ok(mut regions), Some(claim)) => match regions.claim(claim) {
             true => return Ok(Some(regions)),
             false => format!(
-                "the claim of what is seen from where is of {} regions; expected the scene's {}",
+                "the potentially visible set has {} regions; expected the scene's {}",
                 claim.len(),
                 regions.graph.len()
             ),

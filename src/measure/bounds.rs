@@ -45,11 +45,11 @@ impl Material<'_> {
 
 /// All bounds, in the order in which they are shown.
 pub static BOUNDS: &[Bound] = rows! { Bound { name, summary, ratio, make }
-    "bound-read", "reads the bounds of all items once, 24 bytes each, and decides nothing",
+    "bound-read", "reads the bounds of all items once, 24 bytes each, and tests nothing",
         "times_read", read;
     "bound-memcpy", "copies as many ids as are visible, 4 bytes each, in one piece",
         "times_memcpy", memcpy;
-    "bound-replay", "reads the blocks and copies the ids that 'wide' does, and decides nothing",
+    "bound-replay", "reads the blocks and copies the ids that 'wide' does, and tests nothing",
         "times_replay", replay;
 };
 

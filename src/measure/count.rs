@@ -124,7 +124,7 @@ fn batch_verdict(workload: &Workload, subject: &Built) -> Verdict {
         alone.clear();
         index.locate(p, &mut alone);
         if many.len() != workload.points.len() || many.of(n) != alone {
-            let reason = format!("point {n} of a batch is answered otherwise than alone");
+            let reason = format!("point {n} has another answer in a batch than alone");
             return Verdict::new(Status::Wrong, reason);
         }
     }

@@ -29,8 +29,9 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, summary }
     "query_wall_ns", "ns", "as query_ns, wall time";
     "ns_per_visible", "ns", "query_ns / visible items of a timed camera, mean; interval scaled likewise";
     "speedup", "1", "time of linear / time of this structure: above 1 is faster; the ratio of the two query_ns";
-    "times_read", "1", "time of this structure / time of reading all item bounds once (bound-read): what a scan is above the memory's speed";
-    "times_memcpy", "1", "time of this structure / time of copying as many ids (bound-memcpy): what an answer is above its own size";
+    "times_read", "1", "time of this structure / time of reading all item bounds once \
+                        (bound-read); a tree can be below 1";
+    "times_memcpy", "1", "time of this structure / time of copying as many ids (bound-memcpy)";
     "times_replay", "1", "time of this structure / time of a replay of what 'wide' reads and copies; only beside wide";
     "nodes_tested", "nodes", "node bounds classified per query, mean";
     "planes_tested", "planes", "plane tests per query, of nodes and items, mean";

@@ -116,7 +116,7 @@ fn a_mesh_is_a_scene_of_every_command() {
     let generated = cullbench(folder.path(), "scene convert mesh:forest:n=5k f.csv");
     assert_eq!(generated.code, Some(0));
     assert!(
-        generated.err.contains("triangles left behind"),
+        generated.err.contains("triangles not written"),
         "{generated:?}"
     );
     let run = "run --scene mesh:forest:n=5k,seed=2 --path street:frames=4 --structure linear,bvh \

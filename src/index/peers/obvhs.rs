@@ -58,7 +58,7 @@ impl PeerObvhs {
 impl BoxTested for PeerObvhs {
     const ABOUT: Info = Info::new(
         "peer-obvhs",
-        "crate obvhs, medium build, its own nodes walked",
+        "crate obvhs, medium build, its own nodes traversed",
         Kind::Tree,
         Origin::Crate("obvhs"),
     );

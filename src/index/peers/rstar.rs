@@ -43,7 +43,7 @@ pub struct PeerRstar(RTree<Record>);
 impl BoxTested for PeerRstar {
     const ABOUT: Info = Info::new(
         "peer-rstar",
-        "crate rstar, bulk-loaded, its nodes walked from the root, whole subtrees accepted",
+        "crate rstar, bulk-loaded, its nodes traversed from the root, whole subtrees accepted",
         Kind::Tree,
         Origin::Crate("rstar"),
     );

@@ -159,8 +159,8 @@ impl Extremes<'_> {
         for ([group, structure, test], cases) in checked {
             let expected = match (structure.as_str(), level) {
                 (SCALAR, Level::Camera) => "drops nothing that is inside or touches",
-                (SCALAR, Level::Planes) => "drops nothing but what rounding hides",
-                _ => "returns the very set of the scalar loop",
+                (SCALAR, Level::Planes) => "drops nothing beyond the rounding error",
+                _ => "returns exactly the set of the scalar loop",
             };
             section.rows.push(Row {
                 id: format!("{group}/from seed {}", self.seed),
@@ -169,7 +169,7 @@ impl Extremes<'_> {
                 test,
                 status: Status::Pass,
                 expected: expected.into(),
-                got: format!("so in all of {cases} cases").into(),
+                got: format!("in all {cases} cases").into(),
             });
         }
     }

@@ -156,7 +156,7 @@ impl PlanesCase {
                 ("no empty box", b.is_empty())
             } else {
                 let deep = verdict != Verdict::Out && oracle.depth(b) > self.roundings(b);
-                ("nothing dropped but what rounding hides", deep)
+                ("nothing dropped beyond the rounding error", deep)
             };
             if wrong {
                 let answer = if seen { "seen" } else { "dropped" };

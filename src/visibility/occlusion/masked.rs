@@ -40,8 +40,8 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     const SUMMARY: &'static str = if WHOLE {
         "masked tiles of 8 x 4 pixels; only wholly covered pixels hide"
     } else {
-        "masked tiles of 8 x 4 pixels; pixels hide whose centre is covered \
-         (stand-in for Hasselgren, Andersson, Akenine-Moeller 2016)"
+        "masked tiles of 8 x 4 pixels; pixels whose centre is covered hide (stand-in for \
+         Hasselgren, Andersson, Akenine-Moeller 2016)"
     };
     const GUARANTEE: Guarantee = if WHOLE {
         Guarantee::Conservative

@@ -38,7 +38,7 @@ impl ZBuffer {
 
 impl OcclusionBuffer for ZBuffer {
     const SUMMARY: &'static str =
-        "one depth a pixel, at its centre; every pixel of a box is tested";
+        "one depth per pixel, at its centre; every pixel of a box is tested";
     const GUARANTEE: Guarantee = Guarantee::Unproven;
     const COVERAGE: Coverage = Coverage::Centre;
     const ALTERNATES: bool = true;

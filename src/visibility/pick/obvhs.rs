@@ -20,7 +20,7 @@ use ::obvhs::ray::{Ray as TheirRay, RayHit};
 /// The row of the binary tree.
 pub const ROW: BackEnd = BackEnd {
     name: "obvhs",
-    summary: "crate obvhs, binary tree, one item a leaf, its ray_traverse",
+    summary: "crate obvhs, binary tree, one item per leaf, its ray_traverse",
     // Rays, nodes and boxes are rounded to f32.
     guarantee: Guarantee::Unproven,
     boxes: |boxes, _| Obvhs::<Bvh2, _>::boxed(boxes, ROW.name),

@@ -20,7 +20,7 @@ pub enum PvsError {
     #[error("{}: {}; expected {}", .0.place(), .0.found, .0.expected_of(FORM))]
     Json(JsonError),
     /// A region that is not there.
-    #[error("pair {pair} names region {region} of {regions}; expected less")]
+    #[error("pair {pair}: region {region} is out of range; expected less than {regions}")]
     Region {
         /// Index of the pair.
         pair: usize,
@@ -175,7 +175,10 @@ mod tests {
     fn other_files_are_typed_errors() {
         let error = |text: &str| Pvs::from_json(text).unwrap_err().to_string();
         assert!(error("[]").contains("expected {\"regions\""));
-        assert!(error(r#"{"regions":2,"sees":[[0,2]]}"#).contains("pair 0 names region 2 of 2"));
+        assert!(
+            error(r#"{"regions":2,"sees":[[0,2]]}"#)
+                .contains("pair 0: region 2 is out of range; expected less than 2")
+        );
         assert!(error(r#"{"regions":1,"sees":[],"more":1}"#).contains("more"));
         assert!(error(r#"{"regions":99999,"sees":[]}"#).contains("at most 65536"));
     }

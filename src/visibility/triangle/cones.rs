@@ -27,7 +27,7 @@ pub const ROW: TriangleRow = TriangleRow {
 /// The row of four cones per cluster.
 pub const ROW_SEVERAL: TriangleRow = TriangleRow {
     name: "several-cones",
-    summary: "Four cones per cluster, each of triangles turned alike, rounding proven",
+    summary: "Four cones per cluster, each of triangles of similar orientation, rounding proven",
     guarantee: Guarantee::Conservative,
     build: |clusters| Box::new(Cones::<4>::of(clusters)),
 };

@@ -29,7 +29,7 @@ pub struct OrderRow {
 /// All orders.
 pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, build }
     "none", "items in the order of their ids", Guarantee::Unproven, whole::by_id;
-    "tree", "items as they lie in the tree 'wide', the same for all views",
+    "tree", "items in the order of the tree 'wide', the same for all views",
         Guarantee::Unproven, whole::by_tree;
     "centre-distance", "sorted by the distance of the centre of each box",
         Guarantee::Unproven, whole::by_centre;
@@ -38,6 +38,6 @@ pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, bui
     "bsp", "planes through faces of boxes, which are cut where they cross: exact",
         Guarantee::Exact, bsp::order;
     // In a leaf of walls that surround it nothing hides a wall but what is no wall.
-    "map-bsp", "the map's own BSP leaf by leaf, what is in one leaf by distance",
+    "map-bsp", "the map's own BSP leaf by leaf, items of one leaf by distance",
         Guarantee::Unproven, partition::order;
 };
