@@ -15,11 +15,11 @@ use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs, TableFormat,
     WhatArgs,
 };
-use super::values;
+use super::{text, values};
 
 /// Benchmarks spatial indexes: frustum culling, region search, checked answers
 #[derive(Parser, Debug)]
-#[command(name = "cullbench", version, about, max_term_width = 100, after_help = EXAMPLES)]
+#[command(name = "cullbench", version, about, term_width = text::width().min(100), after_help = EXAMPLES)]
 #[command(mut_subcommands(taking_negative_numbers))]
 pub struct Cli {
     #[command(subcommand)]
@@ -37,16 +37,17 @@ fn taking_negative_numbers(command: clap::Command) -> clap::Command {
 
 const EXAMPLES: &str = "\
 Examples:
-  cullbench run                                        the quick suite, a ranked table per scene
+  cullbench run                                        the quick suite
   cullbench run --scene my.csv --path my_cameras.csv   your scene, your cameras
   cullbench query --scene city:n=100000 --cameras orbit:frames=8 --structure all
   cullbench locate --scene freedm-map12 --points points.csv --structure bvh
-  cullbench advise --scene my.csv                      which structure, test and shortcuts suit your scene
+  cullbench advise --scene my.csv                      structure, test, shortcuts
   cullbench compare old/report.json new/report.json    regressions between two runs
 
-Scenes and paths are files or specs such as city:n=100000,seed=7; see `cullbench list`.
-Exit codes: 0 ok, 1 wrong or missing answer or failed verification, 2 wrong usage or bad input,
-3 regression (compare), 130 interrupted.";
+Scenes and paths are files or specs such as city:n=100000,seed=7;
+see `cullbench list`.
+Exit codes: 0 ok, 1 wrong or missing answer or failed verification, 2 wrong
+usage or bad input, 3 regression (compare), 130 interrupted.";
 
 #[derive(Subcommand, Debug)]
 pub enum Command {
@@ -113,12 +114,16 @@ pub struct ListArgs {
 
 const RUN_HELP: &str = "\
 Columns of the tables:
-  query           CPU time of one frustum query, with its 95 % interval over the processes
-  p95             95th percentile over groups of cameras, given twenty comparable groups
+  query           CPU time of one frustum query, with its 95 % interval over the
+                  processes
+  p95             95th percentile over groups of cameras, given twenty
+                  comparable groups
   speed-up        time of linear / time of the structure
-  / read          time / time of reading the bounds of all items once (bound-read)
+  / read          time / time of reading the bounds of all items once
+                  (bound-read)
   locate          time of one region search
-  query after 32  query time after 32 updates of 1 % / query time of a fresh build
+  query after 32  query time after 32 updates of 1 % / query time of a fresh
+                  build
 Structures share a rank if their times do not differ significantly.";
 
 #[derive(Args, Debug)]
@@ -156,8 +161,9 @@ Example:
   cullbench run --shard 2/2 --out part2
   cullbench merge part1 part2 --out whole
 
-All shards must be of the same plan, from the same build of the program, on machines of the same
-kind. It is an error if two shards have the same cell or a shard is missing.";
+All shards must be of the same plan, from the same build of the program, on
+machines of the same kind. It is an error if two shards have the same cell or a
+shard is missing.";
 
 #[derive(Args, Debug)]
 #[command(after_help = MERGE_HELP)]
@@ -222,6 +228,7 @@ pub struct QueryArgs {
 }
 
 #[derive(Args, Debug)]
+#[command(override_usage = "cullbench locate [OPTIONS] --scene <SCENE> <--points|--boxes> <FILE>")]
 pub struct LocateArgs {
     /// A scene: boxes CSV, Doom WAD, built-in name or spec
     #[arg(long)]

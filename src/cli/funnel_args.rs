@@ -14,29 +14,35 @@ use crate::visibility::occlusion::OccluderChoice;
 
 const FUNNEL_HELP: &str = "\
 Columns of the table:
-  in, out      items (triangles in the triangle stage) that the stage receives and passes, per view
-  truth        received items in front at some sample; received triangles that face the eye
-  FP, FN       false positives (passed, not visible) and false negatives (visible, not passed)
+  in, out      items (triangles in the triangle stage) that the stage receives
+               and passes, per view
+  truth        received items in front at some sample; received triangles that
+               face the eye
+  FP, FN       false positives (passed, not visible) and false negatives
+               (visible, not passed)
   time         CPU time of the stage per view, with half of its 95 % interval
   per item     time / number of removed items
-All back ends of a stage receive the output of the chain's previous stage. * marks a back end of the
-chain, ? one without a guarantee. NAME is a value of the column `by`; none leaves a stage out. The
-truth is exact, along the rays through the samples. If the occlusion stage traverses its own tree
-(masked-inner, masked), its time includes the object stage.
+All back ends of a stage receive the output of the chain's previous stage. *
+marks a back end of the chain, ? one without a guarantee. NAME is a value of the
+column `by`; none leaves a stage out. The truth is exact, along the rays through
+the samples. If the occlusion stage traverses its own tree (masked-inner,
+masked), its time includes the object stage.
 
-Orders: pairs of items that overlap in the image, pairs drawn in the wrong order, and samples that
-show a wrong item without a z-test. Lower bounds do only what any program must at least do; they
-decide nothing.
+Orders: pairs of items that overlap in the image, pairs drawn in the wrong
+order, and samples that show a wrong item without a z-test. Lower bounds do only
+what any program must at least do; they decide nothing.
 
-With and without a stage: the items, triangles (triangle stage) or shaded fragments (fragment stage)
-that remain in the end. The stage pays off if drawing or shading one of them takes longer than the
-last column. A fragment is an item at a sample, in meshes and maps a triangle at a sample; orders
-draw whole items. The time of the fragment stage is that of an exact test on one thread.
+With and without a stage: the items, triangles (triangle stage) or shaded
+fragments (fragment stage) that remain in the end. The stage pays off if drawing
+or shading one of them takes longer than the last column. A fragment is an item
+at a sample, in meshes and maps a triangle at a sample; orders draw whole items.
+The time of the fragment stage is that of an exact test on one thread.
 
-Items with cut-outs hide nothing in the occlusion stage, and at a sample only where their mask is
-opaque: z-test treats them as solid, alpha-test tests the mask. stencil-test (rooms) draws items
-beyond the eye's room only at the samples that see its portals. Walls of rooms have no cut-outs;
-picking treats every item as solid.";
+Items with cut-outs hide nothing in the occlusion stage, and at a sample only
+where their mask is opaque: z-test treats them as solid, alpha-test tests the
+mask. stencil-test (rooms) draws items beyond the eye's room only at the samples
+that see its portals. Walls of rooms have no cut-outs; picking treats every item
+as solid.";
 
 #[derive(Args, Debug)]
 #[command(after_help = FUNNEL_HELP)]

@@ -7,17 +7,13 @@ use serde_json::{Map, Value, json};
 
 use super::args::{ListArgs, ListTopic};
 use super::shared_args::TableFormat;
-use super::table::Table;
-use super::{Ending, print_json};
+use super::{Ending, print_json, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::METRICS;
 use crate::path::{PATH_PARAMS, PATHS};
 use crate::scene::{FAMILIES, MESHES, SAMPLES, SCENE_PARAMS};
 use crate::suite::SUITES;
-
-/// Long summaries wrap at this width.
-const LIST_WIDTH: u16 = 110;
 
 /// Name, further columns by name, summary.
 type Row = (String, Vec<(&'static str, Value)>, String);
@@ -36,17 +32,11 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
                 all.insert(name.to_owned(), rows.into_iter().map(as_json).collect());
             }
             TableFormat::Table => {
-                let mut header = vec![name];
-                header.extend(rows.first().iter().flat_map(|r| r.1.iter().map(|c| c.0)));
-                header.push("");
-                let mut table = Table::new(header, &[]).fit(LIST_WIDTH);
-                for (name, columns, summary) in rows {
-                    let columns = columns.into_iter().map(|(_, value)| told(&value));
-                    table.add_row([name].into_iter().chain(columns).chain([summary]));
-                }
-                writeln!(out, "{table}")?;
+                let rows = rows.into_iter().map(told);
+                let entries = text::entries(&rows.collect::<Vec<_>>(), text::width());
+                writeln!(out, "{name}\n{entries}")?;
                 if !note.is_empty() {
-                    writeln!(out, "{note}\n")?;
+                    writeln!(out, "{}\n", text::wrapped(note.trim_end(), text::width()))?;
                 }
             }
         }
@@ -71,12 +61,29 @@ fn timed(info: &Info) -> &'static str {
     }
 }
 
-/// A column's value as a table shows it.
-fn told(value: &Value) -> String {
-    match value {
+/// A row for people: its name and its summary with what the columns hold.
+fn told((name, columns, summary): Row) -> [String; 2] {
+    let of = |value: &Value| match value {
         Value::String(text) => text.clone(),
-        Value::Array(words) => words.iter().map(told).collect::<Vec<_>>().join(", "),
+        Value::Array(words) => {
+            let words = words.iter().filter_map(Value::as_str);
+            words.collect::<Vec<_>>().join(", ")
+        }
         other => other.to_string(),
+    };
+    let columns = columns.iter().map(|(column, value)| match *column {
+        "origin" | "timed" => format!("{column} {}", of(value)),
+        // As they are typed behind the name.
+        "params" => of(value).replace("\":", "=").replace(['{', '}', '"'], ""),
+        _ => of(value),
+    });
+    let columns: Vec<String> = columns.filter(|column| !column.is_empty()).collect();
+    let columns = columns.join("; ");
+    // A unit stands behind the summary.
+    match columns.len() {
+        0 => [name, summary],
+        1..12 => [name, format!("{summary} ({columns})")],
+        _ => [name, format!("{summary}\n{columns}")],
     }
 }
 
@@ -130,15 +137,14 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                 let licence = format!("real; {}", s.licence);
                 row(s.name, &[("params", &licence)], s.summary)
             });
-            let suites: Vec<String> = SUITES
+            let suites = SUITES
                 .iter()
-                .map(|s| format!("  {:<9} {}", s.name, s.summary))
-                .collect();
+                .map(|s| [s.name.to_owned(), s.summary.to_owned()]);
+            let suites = text::entries(&suites.collect::<Vec<_>>(), text::width());
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, or \
                  a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes have licences of their \
-                 own: `cullbench licences`.\nSuites of `run`:\n{}",
-                suites.join("\n")
+                 own: `cullbench licences`.\nSuites of `run`:\n{suites}"
             );
             (
                 "scenes",

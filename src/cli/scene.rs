@@ -8,7 +8,6 @@ use serde_json::json;
 
 use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
 use super::shared_args::TableFormat;
-use super::table::Table;
 use super::{Ending, expect_place_for, interrupt, load_scene, print_json, tell, text};
 use crate::measure::SceneInfo;
 use crate::report::write_atomically;
@@ -40,18 +39,18 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         print_json(&value)?;
         return Ok(Ending::Ok);
     }
-    let mut table = Table::new(["scene", &info.name], &[]);
     let [low, high, origin] = [info.bounds_min, info.bounds_max, info.origin]
         .map(|v| format!("({}, {}, {})", v[0], v[1], v[2]));
     let mut rows = vec![
+        ("scene", text::plain(&info.name).into()),
         ("items", text::count(info.total_count)),
         ("bounds", format!("{low} to {high}")),
         ("origin", origin),
         (
-            "longest edges",
+            "sizes",
             match sizes {
                 [Some(low), Some(middle), Some(high)] => {
-                    format!("min {low}, median {middle}, max {high}")
+                    format!("longest edge min {low}, median {middle}, max {high}")
                 }
                 _ => "no items".to_owned(),
             },
@@ -72,13 +71,10 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         rows.push(("portals", text::count(portals)));
     }
     if !scene.places.is_empty() {
-        rows.push(("camera places", text::count(scene.places.len())));
+        rows.push(("places", text::counted(scene.places.len(), "camera")));
     }
     if info.skipped_items > 0 {
-        rows.push(("bad items left out", text::count(info.skipped_items)));
-    }
-    for (name, value) in rows {
-        table.add_row([name, &value]);
+        rows.push(("left out", text::counted(info.skipped_items, "bad item")));
     }
     for labels in &scene.labels {
         let counts = labels.histogram();
@@ -91,10 +87,17 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         if !more.is_empty() {
             shown += &format!(", and {} more", text::count(more.len()));
         }
-        table.add_row([format!("label {}", labels.column), shown]);
+        rows.push((
+            "label",
+            text::plain(&format!("{}: {shown}", labels.column)).into(),
+        ));
     }
-    table.add_row(["digest (SHA-256)", &info.digest]);
-    writeln!(io::stdout(), "{table}")?;
+    rows.push(("SHA-256", info.digest));
+    let rows = rows
+        .into_iter()
+        .map(|(name, value)| [name.to_owned(), value]);
+    let entries = text::entries(&rows.collect::<Vec<_>>(), text::width());
+    write!(io::stdout(), "{entries}")?;
     Ok(Ending::Ok)
 }
 

@@ -52,9 +52,10 @@ Examples:
   cullbench scene convert helsinki city.csv
   cullbench scene convert city:n=1000 | head
 
-Boxes CSV has world coordinates and all labels, in the order of ids. Bounds are written in f64 as
-they were read, not rounded to f32: queries on the file have the same answers, and converting it
-again writes the same bytes. Regions, camera places and the tree of a map are not written.";
+Boxes CSV has world coordinates and all labels, in the order of ids. Bounds are
+written in f64 as they were read, not rounded to f32: queries on the file have
+the same answers, and converting it again writes the same bytes. Regions, camera
+places and the tree of a map are not written.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_HELP)]

@@ -7,6 +7,9 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement};
 
 use super::text::plain;
 
+/// Blanks between the columns of a bare table.
+const GAP: usize = 2;
+
 /// A column of rows `R`: its head, with `>` before that of numbers, and its cell of
 /// a row.
 pub type Column<R> = (&'static str, fn(&R) -> String);
@@ -69,6 +72,58 @@ impl Table {
     pub fn fit(mut self, width: u16) -> Table {
         self.width = Some(width);
         self
+    }
+
+    /// The table without columns that do not fit, for [`Table::bare`].
+    ///
+    /// The named ones go, in this order, until `width` characters hold a row.
+    pub fn within(&self, width: usize, first_to_go: &[&str]) -> Table {
+        let (widths, mut gone) = (self.widths(), first_to_go.iter());
+        let mut left: Vec<usize> = (0..widths.len()).collect();
+        while left.iter().map(|&c| widths[c] + GAP).sum::<usize>() > width + GAP {
+            let Some(name) = gone.next() else { break };
+            left.retain(|&column| self.header[column] != *name);
+        }
+        self.of_columns(&left)
+    }
+
+    fn of_columns(&self, columns: &[usize]) -> Table {
+        let chosen = |row: &Vec<String>| columns.iter().map(|&c| row[c].clone()).collect();
+        let is_right = |&place: &usize| self.right.contains(&columns[place]);
+        Table {
+            header: chosen(&self.header),
+            right: (0..columns.len()).filter(is_right).collect(),
+            rows: self.rows.iter().map(chosen).collect(),
+            width: self.width,
+        }
+    }
+
+    /// The widest cell of each column, in characters.
+    fn widths(&self) -> Vec<usize> {
+        let rows = || std::iter::once(&self.header).chain(&self.rows);
+        let width = |column: usize| rows().map(move |row| plain(&row[column]).chars().count());
+        let columns = 0..self.header.len();
+        columns.map(|c| width(c).max().unwrap_or(0)).collect()
+    }
+
+    /// The table without borders, a line per row.
+    pub fn bare(&self) -> String {
+        let widths = self.widths();
+        let mut text = String::new();
+        for row in std::iter::once(&self.header).chain(&self.rows) {
+            let mut line = String::new();
+            for (column, (cell, width)) in row.iter().zip(&widths).enumerate() {
+                let (cell, gap) = (plain(cell), if column > 0 { GAP } else { 0 });
+                line += &" ".repeat(gap);
+                line += &match self.right.contains(&column) {
+                    true => format!("{cell:>width$}"),
+                    false => format!("{cell:<width$}"),
+                };
+            }
+            text += line.trim_end();
+            text.push('\n');
+        }
+        text
     }
 
     /// The table without the columns that are empty in every row.
@@ -141,5 +196,19 @@ mod tests {
         assert_eq!(kept.header, ["name", "some"]);
         assert_eq!(kept.right, [1]);
         assert_eq!(kept.rows, [["a", ""], ["b", "7"]]);
+    }
+
+    #[test]
+    fn columns_go_in_their_order_until_the_rest_fits() {
+        let mut table = Table::of("name | >p95 | >time | note");
+        table.add_row(["wide", "9 us", "7 us", "of 12"]);
+        let within = |width| table.within(width, &["note", "p95"]).bare();
+        assert_eq!(
+            within(23),
+            "name   p95  time  note\nwide  9 us  7 us  of 12\n"
+        );
+        assert_eq!(within(22), "name   p95  time\nwide  9 us  7 us\n");
+        assert_eq!(within(12), "name  time\nwide  7 us\n");
+        assert_eq!(within(1), within(12));
     }
 }

@@ -1,6 +1,7 @@
 //! Figures as text.
 
 use std::io::{self, StdoutLock, Write};
+use std::iter::repeat;
 
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
@@ -156,6 +157,24 @@ pub fn wrapped(text: &str, width: usize) -> String {
     lines.join("\n")
 }
 
+/// A name and a text per row, the text wrapped into a column of its own.
+pub fn entries(rows: &[[String; 2]], width: usize) -> String {
+    let names = rows.iter().map(|[name, _]| name.chars().count());
+    let names = names.max().unwrap_or(0);
+    let mut all = String::new();
+    for [name, text] in rows {
+        let text = wrapped(text, width.saturating_sub(names + 4));
+        for (line, name) in text
+            .lines()
+            .zip([name.as_str()].into_iter().chain(repeat("")))
+        {
+            all += format!("  {name:<names$}  {line}").trim_end();
+            all.push('\n');
+        }
+    }
+    all
+}
+
 /// " [lower, upper]" in a unit; nothing if an end is not known.
 pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
     match ends {
@@ -226,6 +245,13 @@ pub fn percent(share: f64) -> String {
         return ">99.99 %".to_owned();
     }
     format!("{rounded} %")
+}
+
+/// Columns of the terminal behind standard output; 80 of anything else.
+pub fn width() -> usize {
+    let size = console::Term::stdout().size_checked();
+    let columns = size.map(|(_, columns)| usize::from(columns));
+    columns.filter(|columns| *columns > 0).unwrap_or(80)
 }
 
 /// Standard output for people, without control characters from outside.
@@ -363,6 +389,11 @@ mod tests {
         assert_eq!(
             wrapped("a  b\nfour words of text", 11),
             "a  b\nfour words\nof text"
+        );
+        let rows = [["a", "one two three\n4"], ["name", "5"]];
+        assert_eq!(
+            entries(&rows.map(|row| row.map(str::to_owned)), 16),
+            "  a     one two\n        three\n        4\n  name  5\n"
         );
     }
 }

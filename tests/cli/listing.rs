@@ -44,6 +44,35 @@ fn json_outputs_are_json() {
 }
 
 #[test]
+fn help_lists_and_scenes_fit_eighty_columns_of_a_pipe() {
+    let fits = |line: &str| {
+        let told = works(Path::new("."), line);
+        let long = told.lines().find(|line| line.chars().count() > 80);
+        assert!(
+            long.is_none() && told.lines().count() > 1,
+            "{line}: {long:?}"
+        );
+    };
+    for command in "run merge report compare query locate verify precision funnel advise drift \
+                    stress scene env completions man licences list"
+        .split_whitespace()
+    {
+        fits(&format!("{command} --help"));
+    }
+    for line in [
+        "--help",
+        "scene info --help",
+        "scene generate --help",
+        "scene convert --help",
+        "list",
+        "scene info helsinki",
+        "scene info uniform:n=20,offset=1e9",
+    ] {
+        fits(line);
+    }
+}
+
+#[test]
 fn every_scene_and_path_of_the_list_can_be_used() {
     let here = Path::new(".");
     let list = json(&works(here, "list --format json"));
