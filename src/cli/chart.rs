@@ -15,18 +15,6 @@ use super::text;
 /// Outcome of drawing.
 pub type Drawn = Result<(), Box<dyn Error>>;
 
-/// Colours of series, distinguishable by brightness too.
-pub const COLOURS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
-    RGBColor(120, 120, 120),
-];
-
 /// Part of a picture.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 

@@ -2,13 +2,15 @@
 //! or for a terminal, and the escaping of each.
 
 use super::table::Table;
-use super::text;
+use super::{palette, text};
 
 pub enum Block {
     /// A heading of the first, second or third level.
     Heading(u8, String),
     Line(String),
     Table(Table),
+    /// A table of numbers that HTML shades row by row.
+    Heat(Table),
     /// A picture as SVG, which only HTML can hold.
     Picture(String),
 }
@@ -29,22 +31,50 @@ fn markdown_table(table: &Table) -> String {
     out
 }
 
-fn html_table(table: &Table) -> String {
-    let line = |tag: &str, cells: &[String]| {
-        let cells = cells.iter().enumerate().map(|(column, cell)| {
-            let class = match table.right.contains(&column) {
-                true => " class=\"n\"",
-                false => "",
+/// A table that scrolls inside itself. A row of a structure has its name as `data-s`;
+/// `is_heat` shades each number by its share of the largest of its row.
+fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
+    let is_right = |column: &usize| table.right.contains(column);
+    let head = table.header.iter().enumerate().map(|(column, name)| {
+        let class = if is_right(&column) {
+            " class=\"n\""
+        } else {
+            ""
+        };
+        format!("<th scope=\"col\"{class}>{}</th>", html(name))
+    });
+    let of_structures = table.header.first().is_some_and(|name| name == "structure");
+    let row = |row: &Vec<String>| {
+        let most = row.iter().filter_map(|cell| cell.parse().ok());
+        let most = most.fold(0.0, f64::max);
+        let cells = row.iter().enumerate().map(|(column, cell)| {
+            let shade = match cell.parse::<f64>() {
+                Ok(value) if is_heat => {
+                    let shade = 1.0 - (most / value).log2() / 3.0;
+                    format!(" style=\"--v:{:.2}\"", shade.clamp(0.0, 1.0))
+                }
+                _ => String::new(),
             };
-            format!("<{tag}{class}>{}</{tag}>", html(cell))
+            let text = html(cell);
+            match column {
+                0 => format!("<th scope=\"row\">{text}</th>"),
+                n if is_right(&n) => format!("<td class=\"n\"{shade}>{text}</td>"),
+                _ => format!("<td>{text}</td>"),
+            }
         });
-        format!("<tr>{}</tr>\n", cells.collect::<String>())
+        let cells: String = cells.collect();
+        match row.first().filter(|_| of_structures) {
+            Some(name) => format!("<tr data-s=\"{}\">{cells}</tr>\n", html(name)),
+            None => format!("<tr>{cells}</tr>\n"),
+        }
     };
-    let rows = table.rows.iter().map(|row| line("td", row));
     format!(
-        "<table>\n<thead>{}</thead>\n<tbody>\n{}</tbody>\n</table>\n",
-        line("th", &table.header),
-        rows.collect::<String>()
+        "<div class=\"t\" tabindex=\"0\"><table{}><caption>{}</caption>\n<thead><tr>{}</tr></thead>\n\
+         <tbody>\n{}</tbody></table></div>\n",
+        if is_heat { " class=\"heat\"" } else { "" },
+        html(caption),
+        head.collect::<String>(),
+        table.rows.iter().map(row).collect::<String>()
     )
 }
 
@@ -60,7 +90,8 @@ fn markdown(text: &str) -> String {
     escaped.collect()
 }
 
-fn html(text: &str) -> String {
+/// Text of an element or an attribute.
+pub fn html(text: &str) -> String {
     let mut text = text::plain(text).replace('&', "&amp;");
     for (mark, name) in [
         ("<", "&lt;"),
@@ -81,7 +112,7 @@ pub fn to_markdown(blocks: &[Block]) -> String {
             Some(format!("{marks} {}\n", markdown(text)))
         }
         Block::Line(text) => Some(markdown(text) + "\n"),
-        Block::Table(rows) => Some(markdown_table(rows)),
+        Block::Table(rows) | Block::Heat(rows) => Some(markdown_table(rows)),
         Block::Picture(_) => None,
     });
     parts.collect::<Vec<_>>().join("\n")
@@ -99,30 +130,34 @@ pub fn to_terminal(blocks: &[Block], width: usize) -> String {
         Block::Heading(_, text) | Block::Line(text) => {
             text::wrapped(&text::plain(text), width) + "\n"
         }
-        Block::Table(table) => format!("{table}\n"),
+        Block::Table(table) | Block::Heat(table) => format!("{table}\n"),
         Block::Picture(_) => String::new(),
     });
     parts.collect()
 }
 
-const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;max-width:75rem;margin:2rem auto;\
-padding:0 1rem}table{border-collapse:collapse;margin:1rem 0;display:block;overflow-x:auto}\
-th,td{padding:.2rem .6rem;border-bottom:1px solid #ddd;text-align:left;white-space:nowrap}\
-.n{text-align:right;font-variant-numeric:tabular-nums}svg{max-width:100%;height:auto}";
-
 /// The document as one page that needs no other file.
 pub fn to_html(title: &str, blocks: &[Block]) -> String {
+    let mut caption = title;
     let parts = blocks.iter().map(|block| match block {
-        Block::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", html(text)),
+        Block::Heading(level, text) => {
+            caption = text;
+            format!("<h{level}>{}</h{level}>\n", html(text))
+        }
         Block::Line(text) => format!("<p>{}</p>\n", html(text)),
-        Block::Table(rows) => html_table(rows),
+        Block::Table(rows) => html_table(rows, caption, false),
+        Block::Heat(rows) => html_table(rows, caption, true),
         Block::Picture(svg) => format!("<figure>{svg}</figure>\n"),
     });
+    let parts: String = parts.collect();
     format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>{}</title>\
-         <style>{STYLE}</style></head>\n<body>\n{}</body>\n</html>\n",
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/><meta \
+         name=\"viewport\" content=\"width=device-width\"/><title>{}</title>\n<style>{}{}</style>\
+         </head>\n<body><main>\n{parts}</main>\n<script>{}</script></body>\n</html>\n",
         html(title),
-        parts.collect::<String>()
+        include_str!("assets/page.css"),
+        palette::style(),
+        include_str!("assets/page.js"),
     )
 }
 
@@ -148,11 +183,11 @@ mod tests {
         );
         let page = to_html(nasty, &blocks);
         assert!(
-            !page.contains("<script>") && page.contains("<svg></svg>"),
+            !page.contains("b<script>") && page.contains("<svg></svg>"),
             "{page}"
         );
-        let cell =
-            "<td>a|b&lt;script&gt; `c` &amp; &quot;d&quot;\\u{202e}</td><td class=\"n\">1</td>";
+        let cell = "<th scope=\"row\">a|b&lt;script&gt; `c` &amp; &quot;d&quot;\\u{202e}</th><td \
+                    class=\"n\">1</td>";
         assert!(page.contains(cell), "{page}");
     }
 }

@@ -7,7 +7,8 @@ use std::io::{self, Write};
 
 use plotters::prelude::*;
 
-use super::chart::{Area, Axis, COLOURS, Drawn, around, is_drawn, legend, log_log, svg};
+use super::chart::{Area, Axis, Drawn, around, is_drawn, legend, log_log, svg};
+use super::palette::COLOURS;
 use super::table::{Column, Table};
 use super::text::{self, some};
 use crate::drift::{ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, StabilityLimit};

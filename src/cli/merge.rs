@@ -6,9 +6,10 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::args::MergeArgs;
+use super::report::page;
 use super::run_resume::same_recorded;
 use super::{Ending, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine};
-use crate::report::{Stream, merge as join, read_stream};
+use crate::report::{Stream, merge as join, read_stream, save_page};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     expect_folder("--out", Some(&args.out))?;
@@ -29,6 +30,7 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
         tell(&format!("note: no shard has {}", merged.missing_named()));
     }
     let report = merged.stream.report();
+    save_page(&args.out, &page(&report))?;
     unread_is_fine(surface_tables::show(&report))?;
     unread_is_fine(close(args, report.cells.len()))?;
     let failed = report.has_failed();
@@ -39,7 +41,7 @@ fn close(args: &MergeArgs, cells: usize) -> io::Result<()> {
     let mut out = io::stdout().lock();
     writeln!(
         out,
-        "{} of {}\n{}/{{report.json, summary.csv, samples.csv, stream.jsonl}}",
+        "{} of {}\n{}/{{report.html, report.json, summary.csv, samples.csv, stream.jsonl}}",
         text::counted(cells, "cell"),
         text::counted(args.runs.len(), "shard"),
         text::plain(&args.out.display().to_string())

@@ -30,6 +30,8 @@ mod funnel_table;
 mod interrupt;
 mod list;
 mod merge;
+mod page_plots;
+mod palette;
 mod precision;
 mod precision_chart;
 mod precision_conclusions;
@@ -56,6 +58,7 @@ mod tests_same_truth;
 mod text;
 mod usage;
 mod values;
+mod verdict;
 mod verify;
 mod worker;
 

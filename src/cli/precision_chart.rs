@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 
 use plotters::prelude::*;
 
-use super::chart::{Area, Axis, COLOURS, Drawn, around, is_drawn, left_out, legend, log_log, svg};
+use super::chart::{Area, Axis, Drawn, around, is_drawn, left_out, legend, log_log, svg};
+use super::palette::COLOURS;
 use super::precision_tables::CullingPoint;
 use super::text;
 use crate::precision::{Point, Precision, RegionErrors};

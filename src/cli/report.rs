@@ -10,15 +10,17 @@ use anyhow::Context;
 use super::args::ReportArgs;
 use super::document::{Block, to_html, to_markdown};
 use super::surface_charts::{self, Picture};
-use super::table::Table;
+use super::table::{Column, Table};
+use super::verdict::verdict;
 use super::{
-    Ending, bencher, expect_folder, expect_places, surface_tables, tell, text, write_text,
+    Ending, bencher, expect_folder, expect_places, page_plots, surface_tables, tell, text,
+    write_text,
 };
 use crate::index::Registry;
-use crate::measure::Status;
+use crate::measure::{METRICS, Status};
 use crate::report::{
-    Comparison, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
-    times_as_fast,
+    Comparison, Ranked, Report, ReportCell, base_of, comparisons, growths, read_report, standings,
+    surfaces, times_as_fast,
 };
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
@@ -32,13 +34,12 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     expect_folder("--svg", args.svg.as_deref())?;
     let mut report = read_report(&args.report)?;
     declare(&mut report, registry);
-    let pictures = match args.svg.is_some() || args.html.is_some() {
+    let pictures = match args.svg.is_some() {
         true => surface_charts::pictures(&surfaces(comparisons(&report)))?,
         false => Vec::new(),
     };
-    let mut blocks = blocks(&report);
     if let Some(path) = &args.markdown {
-        write_text(path, &to_markdown(&blocks))?;
+        write_text(path, &to_markdown(&blocks(&report)))?;
     }
     if let Some(path) = &args.bencher {
         write_text(path, &bencher::format(&report)?)?;
@@ -53,13 +54,69 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         None => {}
     }
     if let Some(path) = &args.html {
-        blocks.extend(pictures.into_iter().map(|p| Block::Picture(p.svg)));
-        write_text(path, &to_html(&title(&report), &blocks))?;
+        write_text(path, &page(&report))?;
     } else if args.markdown.is_none() && args.svg.is_none() && args.bencher.is_none() {
-        io::stdout().write_all(to_markdown(&blocks).as_bytes())?;
+        io::stdout().write_all(to_markdown(&blocks(&report)).as_bytes())?;
     }
     Ok(Ending::Ok)
 }
+
+/// The page of a run.
+pub fn page(report: &Report) -> String {
+    let mut blocks = blocks(report);
+    blocks.extend(glossary());
+    to_html(&title(report), &blocks)
+}
+
+/// Meaning of every column of figures.
+fn glossary() -> [Block; 2] {
+    let mut table = Table::of("column | meaning");
+    for (column, meaning) in MEANINGS {
+        table.add_row([*column, *meaning]);
+    }
+    let figures = FIGURES.iter().chain(&BUILDS).map(|row| (row.0, row.1));
+    let figures = [
+        ("query", "query_ns"),
+        ("p95", "query_ns_p95"),
+        ("speed-up vs linear", "speedup"),
+    ]
+    .into_iter()
+    .chain(figures);
+    for (column, metric) in figures {
+        let info = METRICS.iter().find(|info| info.name == metric);
+        table.add_row([column, info.map_or("", |info| info.summary)]);
+    }
+    [Block::Heading(2, "Columns".to_owned()), Block::Table(table)]
+}
+
+/// Columns that are no metrics.
+const MEANINGS: &[(&str, &str)] = &[
+    (
+        "structure",
+        "name and parameters of the structure; bound-: a lower bound, no structure",
+    ),
+    (
+        "rank",
+        "1 is the fastest; structures that no test tells apart share a rank",
+    ),
+    ("[95 %]", "95 % interval over the processes"),
+    (
+        "speed-up vs fastest peer",
+        "time of the fastest structure of another crate / time of this structure",
+    ),
+    (
+        "break-even",
+        "queries of that path after which the build is repaid against linear; empty if never",
+    ),
+    (
+        "geometric mean",
+        "mean of the speed-ups over all scenes and paths; shades are relative to the best of a row",
+    ),
+    (
+        "status",
+        "ok: the answers are right; anything else has its reason under Statuses",
+    ),
+];
 
 /// Older reports do not say what their structures are: the registry does, where
 /// it has one of the very same name.
@@ -92,11 +149,18 @@ fn title(report: &Report) -> String {
 }
 
 fn blocks(report: &Report) -> Vec<Block> {
-    let mut blocks = vec![Block::Heading(1, title(report))];
-    blocks.extend(about(report).into_iter().map(Block::Line));
+    let mut blocks = vec![
+        Block::Heading(1, title(report)),
+        Block::Line(verdict(report)),
+    ];
     let all = comparisons(report);
+    let base = base_of(&all);
+    if let Some(base) = base.filter(|_| all.len() > 1) {
+        blocks.push(Block::Heading(2, format!("Speed-up over {base}")));
+        blocks.push(Block::Heat(matrix(&all, base)));
+    }
     let mut scene = "";
-    for comparison in &all {
+    for (place, comparison) in all.iter().enumerate() {
         let about = comparison.about();
         if about.scene.name != scene {
             scene = &about.scene.name;
@@ -111,12 +175,19 @@ fn blocks(report: &Report) -> Vec<Block> {
                 }
             )));
         }
-        blocks.extend(of_comparison(comparison));
+        blocks.extend(of_comparison(comparison, base));
+        let next = all.get(place + 1).map(|next| &next.about().scene.name);
+        if next != Some(&about.scene.name) {
+            let of_scene = all.iter().filter(|c| c.about().scene.name == scene);
+            blocks.extend(builds(&of_scene.collect::<Vec<_>>()));
+        }
     }
     for surface in surfaces(all).iter().filter(|surface| surface.spans()) {
         let heading = format!("Crossover: {}", surface_tables::title(surface));
         blocks.push(Block::Heading(2, heading));
         blocks.extend(surface_tables::of_surface(surface));
+        let figures = page_plots::growth(surface, &surface_tables::class);
+        blocks.extend(figures.into_iter().map(Block::Picture));
     }
     let growths = growths(report);
     if !growths.is_empty() {
@@ -124,7 +195,80 @@ fn blocks(report: &Report) -> Vec<Block> {
         blocks.push(Block::Heading(2, heading));
         blocks.push(Block::Table(surface_tables::of_growths(&growths)));
     }
+    blocks.extend(statuses(report));
+    blocks.push(Block::Heading(2, "Machine and command".to_owned()));
+    blocks.extend(about(report).into_iter().map(Block::Line));
     blocks
+}
+
+/// A row per scene and path, a column per structure, and the geometric means.
+fn matrix(all: &[Comparison], base: &str) -> Table {
+    let standings = standings(all, base);
+    let names = standings.iter().map(|standing| standing.structure);
+    let mut table = Table::of_numbers(["scene, path"].into_iter().chain(names));
+    for comparison in all {
+        let about = comparison.about();
+        let mut name = format!("{}, {}", about.scene.name, about.path.name);
+        if about.path.cache != "warm" {
+            name += &format!(", {}", about.path.cache);
+        }
+        let ratios = standings.iter().map(|standing| {
+            let cell = comparison.cell(standing.structure);
+            let ratio = cell.and_then(|cell| comparison.speedup(base, cell));
+            text::some(ratio, |(ratio, _)| text::significant(ratio))
+        });
+        table.add_row([name].into_iter().chain(ratios));
+    }
+    let means = standings.iter().map(|s| text::significant(s.speedup));
+    table.add_row(["geometric mean".to_owned()].into_iter().chain(means));
+    table
+}
+
+/// Cost of the builds on a scene, and when it is repaid on each path.
+fn builds(comparisons: &[&Comparison]) -> Vec<Block> {
+    let paths = comparisons.iter().map(|comparison| {
+        let about = comparison.about();
+        format!("break-even, {}, {}", about.path.name, about.test)
+    });
+    let heads = BUILDS.iter().map(|row| row.0.to_owned());
+    let mut table = Table::of_numbers(
+        ["structure".to_owned()]
+            .into_iter()
+            .chain(heads)
+            .chain(paths),
+    );
+    for Ranked { cell, .. } in comparisons.iter().take(1).flat_map(|c| &c.ranked) {
+        let figures = BUILDS.iter();
+        let figures = figures.map(|(_, metric, show)| text::some(cell.value(metric), show));
+        let queries = comparisons.iter().map(|comparison| {
+            let own = comparison.cell(&cell.structure);
+            let queries = own.and_then(|own| own.value("break_even_queries"));
+            text::some(queries, |n| text::count(n as usize))
+        });
+        let name = [cell.structure.clone()].into_iter();
+        table.add_row(name.chain(figures).chain(queries));
+    }
+    let heading = Block::Heading(3, "Build, memory and break-even".to_owned());
+    vec![heading, Block::Table(table.without_empty_columns())]
+}
+
+/// All cells that are not ok, with their reasons.
+fn statuses(report: &Report) -> Vec<Block> {
+    let others = report.cells.iter().chain(&report.bounds);
+    let others: Vec<&ReportCell> = others.filter(|cell| cell.status != Status::Ok).collect();
+    let heading = Block::Heading(2, "Statuses".to_owned());
+    if others.is_empty() {
+        let told = format!("All of {} ok.", text::counted(report.cells.len(), "cell"));
+        return vec![heading, Block::Line(told)];
+    }
+    let columns: &[Column<&ReportCell>] = &[
+        ("structure", |cell| cell.structure.clone()),
+        ("scene", |cell| cell.scene.name.clone()),
+        ("path", |cell| cell.path.name.clone()),
+        ("status", |cell| cell.status.name().to_owned()),
+        ("reason", |cell| cell.reason.clone().unwrap_or_default()),
+    ];
+    vec![heading, Block::Table(Table::with(others, columns))]
 }
 
 fn known(text: &Option<String>) -> &str {
@@ -170,7 +314,7 @@ fn about(report: &Report) -> Vec<String> {
     lines
 }
 
-fn of_comparison(comparison: &Comparison) -> Vec<Block> {
+fn of_comparison(comparison: &Comparison, base: Option<&str>) -> Vec<Block> {
     let about = comparison.about();
     let share = |metric: &str, what: &str| {
         let value = comparison.of_any(metric)?;
@@ -205,16 +349,12 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
     let basis = format!("{}.", text::basis(comparison));
     let mut blocks = vec![Block::Heading(3, heading), Block::Line(basis)];
     blocks.extend(false_positives(comparison).map(Block::Line));
+    let plot = base.and_then(|base| page_plots::speedups(comparison, base));
+    blocks.extend(plot.map(Block::Picture));
     blocks.push(Block::Table(table.without_empty_columns()));
     if !comparison.bounds.is_empty() {
-        let meaning = "/ read, / copy, / build: time / time of that lower bound.";
+        let meaning = "/ read, / copy: time / time of that lower bound.";
         blocks.push(Block::Line(meaning.to_owned()));
-    }
-    for cell in comparison.ranked.iter().map(|ranked| ranked.cell) {
-        if let Some(reason) = &cell.reason {
-            let (structure, status) = (&cell.structure, cell.status.name());
-            blocks.push(Block::Line(format!("{structure}: {status}: {reason}")));
-        }
     }
     blocks
 }
@@ -233,18 +373,24 @@ fn false_positives(comparison: &Comparison) -> Option<String> {
     Some(format!("False positives: {told}."))
 }
 
-/// Columns of single figures: head, metric and form.
-const FIGURES: [(&str, &str, fn(f64) -> String); 6] = [
+/// A column of single figures: head, metric and form.
+type Figure = (&'static str, &'static str, fn(f64) -> String);
+
+/// Those of the queries of a path.
+const FIGURES: [Figure; 3] = [
     ("/ read", "times_read", text::significant),
     ("/ copy", "times_memcpy", text::significant),
-    ("/ build", "build_ms", |ms| text::time(ms * 1e6)),
+    ("locate", "locate_ns", text::time),
+];
+
+/// Those of a structure on a scene.
+const BUILDS: [Figure; 4] = [
+    ("build", "build_ms", |ms| text::time(ms * 1e6)),
+    ("update of 1 %", "update_ms", |ms| text::time(ms * 1e6)),
+    ("query after 32", "refitted_over_rebuilt", text::significant),
     ("bytes per item", "memory_bytes_per_item", |b| {
         format!("{b:.1}")
     }),
-    ("break-even queries", "break_even_queries", |n| {
-        text::count(n as usize)
-    }),
-    ("locate", "locate_ns", text::time),
 ];
 
 fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String> {

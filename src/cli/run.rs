@@ -13,6 +13,7 @@ use super::args::RunArgs;
 use super::interrupt::Interrupted;
 use super::processes::{Ended, Said, Workers};
 use super::protocol::Job;
+use super::report::page;
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::show_scene;
@@ -24,7 +25,7 @@ use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
 };
-use crate::report::{Line, Report, RunFolder, Stream, temporary_in};
+use crate::report::{Line, Report, RunFolder, Stream, save_page, temporary_in};
 
 pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     if args.plan {
@@ -138,6 +139,7 @@ impl Run {
         // Tables before files: where a file cannot be written, what was measured is seen.
         let shown = unread_is_fine(surface_tables::show(&report));
         self.folder.save(&report)?;
+        save_page(self.folder.path(), &page(&report))?;
         let save = save.filter(|_| !stopped);
         if let Some(name) = &save {
             baseline::save(name, &report)?;
@@ -308,7 +310,7 @@ impl Run {
         }
         writeln!(
             out,
-            "{}/{{report.json, summary.csv, samples.csv, stream.jsonl}}",
+            "{}/{{report.html, report.json, summary.csv, samples.csv, stream.jsonl}}",
             text::plain(&self.folder.path().display().to_string())
         )?;
         if let Some(name) = save {

@@ -4,7 +4,8 @@
 
 use plotters::prelude::*;
 
-use super::chart::{Area, Axis, COLOURS, Drawn, around, is_drawn, left_out, legend, log_log, svg};
+use super::chart::{Area, Axis, Drawn, around, is_drawn, left_out, legend, log_log, svg};
+use super::palette::{COLOURS, Look, SHAPES};
 use super::{surface_tables, text};
 use crate::report::{Place, Surface};
 
@@ -105,26 +106,36 @@ fn draw(root: &Area, caption: &str, curves: &[Curve]) -> Drawn {
         ("mean time per query (thread CPU)", times, &text::time),
     ];
     let mut chart = log_log(root, caption, axes)?;
-    for (i, (structure, points)) in curves.iter().enumerate() {
-        let colour = COLOURS[i % COLOURS.len()];
-        // Colours come round again; marks then differ.
-        let hollow = i / COLOURS.len() % 2 == 1;
+    for (structure, points) in curves {
+        let look = Look::of(structure);
+        let colour = COLOURS[look.colour];
         let points: Vec<(f64, f64)> = points.iter().map(|&(n, ns)| (n as f64, ns)).collect();
         let line = LineSeries::new(points.iter().copied(), colour.stroke_width(2));
-        let mark = move |at: (i32, i32)| match hollow {
-            true => Circle::new(at, 4, colour.stroke_width(1)),
-            false => Circle::new(at, 4, colour.filled()),
-        };
         chart
             .draw_series(line)?
             .label(*structure)
-            .legend(move |(x, y)| mark((x + 8, y)));
-        chart.draw_series(points.iter().map(|&at| match hollow {
-            true => Circle::new(at, 4, colour.stroke_width(1)),
-            false => Circle::new(at, 4, colour.filled()),
-        }))?;
+            .legend(move |(x, y)| EmptyElement::at((x + 8, y)) + area(look) + outline(look));
+        let marks = points.iter();
+        chart.draw_series(marks.map(|&at| EmptyElement::at(at) + area(look) + outline(look)))?;
     }
     legend(&mut chart, SeriesLabelPosition::UpperLeft)
+}
+
+/// Area of a structure's mark.
+fn area(look: Look) -> Polygon<(i32, i32)> {
+    let colour = if look.hollow {
+        WHITE
+    } else {
+        COLOURS[look.colour]
+    };
+    Polygon::new(SHAPES[look.shape], colour)
+}
+
+/// Outline of a structure's mark.
+fn outline(look: Look) -> PathElement<(i32, i32)> {
+    let corners = SHAPES[look.shape];
+    let outline = corners.iter().chain(&corners[..1]).copied();
+    PathElement::new(outline.collect::<Vec<_>>(), COLOURS[look.colour])
 }
 
 #[cfg(test)]

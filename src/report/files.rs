@@ -10,6 +10,7 @@ use crate::json::JsonError;
 pub(super) const REPORT: &str = "report.json";
 pub(super) const SUMMARY: &str = "summary.csv";
 pub(super) const SAMPLES: &str = "samples.csv";
+pub(super) const PAGE: &str = "report.html";
 pub(super) const STREAM: &str = "stream.jsonl";
 
 /// The first line of samples.csv.

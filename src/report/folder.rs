@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use tempfile::NamedTempFile;
 
-use super::files::{FolderError, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY};
+use super::files::{FolderError, PAGE, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY};
 use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Line, Stream};
 use super::writing::{locked_temporary_in, replace_atomically, sweep};
@@ -251,7 +251,7 @@ impl StoppedRun {
 /// # Errors
 /// An error that names the folder.
 pub(super) fn refuse_taken(path: &Path) -> Result<(), FolderError> {
-    let files = [REPORT, SUMMARY, SAMPLES, STREAM];
+    let files = [REPORT, SUMMARY, SAMPLES, STREAM, PAGE];
     // A link that leads nowhere is one too.
     let is_there = |file| fs::symlink_metadata(path.join(file)).is_ok();
     match files.into_iter().any(is_there) {
@@ -294,6 +294,14 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
         }
         reader.consume(read);
     }
+}
+
+/// Writes the page of a run into its folder; replaces links.
+///
+/// # Errors
+/// What the file system says.
+pub fn save_page(folder: &Path, page: &str) -> Result<(), FolderError> {
+    replace_atomically(&folder.join(PAGE), |out| out.write_all(page.as_bytes()))
 }
 
 /// Writes report.json and summary.csv into a folder; replaces links.

@@ -14,6 +14,7 @@ mod model;
 mod ranking;
 mod reading;
 mod setting;
+mod standing;
 mod stream;
 mod surface;
 mod writing;
@@ -22,7 +23,7 @@ pub use crate::measure::{ReportCell, SamplesRef};
 pub use changes::changes;
 pub use experiment::Experiment;
 pub use files::{FolderError, bare};
-pub use folder::{RunFolder, StoppedRun, save_report};
+pub use folder::{RunFolder, StoppedRun, save_page, save_report};
 pub use growth::{Growth, growths};
 pub use judging::{
     COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WORK, WorkChange,
@@ -33,6 +34,7 @@ pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
 pub use ranking::{Comparison, Ranked, comparisons, times_as_fast};
 pub use reading::{read_report, read_stream};
 pub use setting::{Setting, settings};
+pub use standing::{Speedup, Standing, base_of, standings};
 pub use stream::{Difference, Header, KeptPart, Line, Stream, dated, utc};
 pub use surface::{Crossing, Place, Surface, surfaces};
 pub use writing::{temporary_in, try_folder, try_place, write_atomically};

@@ -27,6 +27,7 @@ mod matrices;
 #[cfg(target_os = "linux")]
 mod memory;
 mod meshes;
+mod page;
 mod pipes;
 mod precision;
 mod precision_options;

@@ -56,7 +56,7 @@ fn assert_complete(run: &Path) {
     let names: BTreeSet<&str> = names.iter().map(String::as_str).collect();
     assert_eq!(
         names,
-        set("report.json samples.csv stream.jsonl summary.csv")
+        set("report.html report.json samples.csv stream.jsonl summary.csv")
     );
 }
 

@@ -1,0 +1,123 @@
+//! The page that `run` writes: well-formed, whole, and a mark for each structure.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::process::Command;
+
+use serde_json::json;
+
+use super::process::*;
+
+/// Text between two texts, everywhere.
+fn between<'t>(text: &'t str, begin: &str, end: &str) -> Vec<&'t str> {
+    let parts = text.split(begin).skip(1);
+    parts.filter_map(|part| part.split(end).next()).collect()
+}
+
+/// The names of elements still open at the end; every end tag closes the last of them.
+fn assert_well_formed(page: &str) {
+    let (mut open, mut rest) = (Vec::new(), page);
+    while let Some((text, tag)) = rest.split_once('<') {
+        assert!(!text.contains('>'), "a bare '>' after {open:?}: {text}");
+        let (tag, after) = tag.split_once('>').expect("the end of a tag");
+        rest = after;
+        let name = tag.split([' ', '\n']).next().unwrap_or_default();
+        assert_eq!(tag.matches('"').count() % 2, 0, "{tag}");
+        if let Some(name) = name.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(name), "after {open:?}");
+        } else if !tag.ends_with('/') && name != "!DOCTYPE" {
+            open.push(name);
+        }
+        if ["script", "style"].contains(&name) {
+            let end = rest.find(&format!("</{name}>")).expect("its end");
+            rest = &rest[end..];
+        }
+    }
+    assert_eq!(open, [""; 0]);
+}
+
+#[test]
+fn a_run_writes_one_whole_page_with_a_mark_for_each_structure() {
+    let folder = folder(&[]);
+    let run = "run --scene uniform:n=300 --scene city:n=300 --path orbit:frames=8 \
+        --path outside:frames=8 --structure linear,bvh,wide --processes 3 --out run";
+    works(folder.path(), run);
+    let file = folder.path().join("run/report.html");
+    let page = fs::read_to_string(&file).expect("a page");
+    works(folder.path(), "report run --html again.html");
+    let again = fs::read_to_string(folder.path().join("again.html")).expect("a page");
+    assert!(page == again, "two pages of one run");
+
+    assert_well_formed(&page);
+    for outside in ["http", "@import", "url(", " src="] {
+        assert!(!page.contains(outside), "loads something: {outside}");
+    }
+    let plots = between(&page, "<svg class=\"plot\"", "</figure>");
+    assert_eq!(plots.len(), 4, "scenes and paths");
+    for plot in plots {
+        let marks: Vec<&str> = between(plot, "<g class=\"s ", "</g>");
+        let names: BTreeSet<&str> = marks
+            .iter()
+            .flat_map(|g| between(g, "data-s=\"", "\""))
+            .collect();
+        assert_eq!((marks.len(), names), (3, set("bvh linear wide")));
+        for mark in marks {
+            assert_eq!(mark.matches("<polygon class=\"mark").count(), 1, "{mark}");
+            assert!(
+                mark.contains("data-query-ns=\"")
+                    && mark.contains("class=\"interval\"") != mark.contains("\"linear\""),
+                "{mark}"
+            );
+        }
+    }
+    let text = page.find("<p>Take ").expect("a conclusion");
+    assert!(
+        text < page.find("<h2>").expect("a heading"),
+        "the conclusion is not first"
+    );
+    assert!(page.contains("in the geometric mean over 4 comparisons"));
+    for heading in ["Statuses", "Machine and command", "Columns"] {
+        assert!(page.contains(&format!("<h2>{heading}</h2>")), "{heading}");
+    }
+
+    let script = between(&page, "<script>", "</script>");
+    let script_file = folder.path().join("page.js");
+    fs::write(&script_file, script[0]).expect("writable");
+    // Where there is a node.
+    if let Ok(done) = Command::new("node")
+        .arg("--check")
+        .arg(&script_file)
+        .output()
+    {
+        assert!(
+            done.status.success(),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
+    }
+}
+
+/// No status is hidden; without linear, speed-ups refer to another structure.
+#[test]
+fn what_failed_is_on_the_page_with_its_reason_and_has_no_mark() {
+    let folder = folder(&[]);
+    let run = "run --scene city:n=300 --path orbit:frames=8 --structure bvh,wide,octree \
+        --processes 3 --out run";
+    works(folder.path(), run);
+    let path = folder.path().join("run/report.json");
+    let mut report = json(&fs::read_to_string(&path).expect("a report"));
+    let cells = report["cells"].as_array_mut().expect("an array");
+    let wide = cells.iter_mut().find(|cell| cell["structure"] == "wide");
+    let wide = wide.expect("a cell");
+    (wide["status"], wide["reason"]) = (json!("wrong"), json!("item 3 <is> missing"));
+    wide["rank"] = json!(null);
+    fs::write(&path, report.to_string()).expect("writable");
+    works(folder.path(), "report run --html page.html");
+    let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
+    assert_well_formed(&page);
+    assert!(page.contains("<td>wrong</td><td>item 3 &lt;is&gt; missing</td>"));
+    assert!(page.contains("1 of 3 cells is wrong: see Statuses."));
+    assert_eq!(page.matches("<polygon class=\"mark").count(), 2);
+    assert!(page.contains("Speed-up over "));
+    assert!(!page.contains("Speed-up over linear"));
+}
