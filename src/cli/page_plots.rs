@@ -214,9 +214,9 @@ fn growth_at(surface: &Surface, share: f64, visible: &str) -> Option<String> {
     let y = |value: f64| 10.0 + (bottom - 20.0) * (1.0 - ns.at(value));
     let mut parts = String::new();
     for tick in ns.ticks(10.0) {
-        parts += &line("grid", [12.0, 70.0], [y(tick), y(tick)]);
-        let (y, name) = (y(tick) + 4.0, text::time(tick));
-        parts += &format!("<text x=\"11%\" y=\"{y:.1}\" text-anchor=\"end\">{name}</text>\n");
+        parts += &line("grid", [0.0, 70.0], [y(tick), y(tick)]);
+        let (y, name) = (y(tick) - 4.0, text::time(tick));
+        parts += &format!("<text x=\"0\" y=\"{y:.1}\">{name}</text>\n");
     }
     let mut sizes: Vec<usize> = points().map(|p| p.0).collect();
     sizes.sort_unstable();

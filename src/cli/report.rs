@@ -258,7 +258,7 @@ fn statuses(report: &Report) -> Vec<Block> {
     let others: Vec<&ReportCell> = others.filter(|cell| cell.status != Status::Ok).collect();
     let heading = Block::Heading(2, "Statuses".to_owned());
     if others.is_empty() {
-        let told = format!("All of {} ok.", text::counted(report.cells.len(), "cell"));
+        let told = format!("{}, all ok.", text::counted(report.cells.len(), "cell"));
         return vec![heading, Block::Line(told)];
     }
     let columns: &[Column<&ReportCell>] = &[

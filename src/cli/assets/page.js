@@ -122,6 +122,7 @@
       });
       th.replaceChildren(button);
     });
+    for (const th of all("tbody th", table)) th.title = th.textContent;
     const copy = el("button", "copy as Markdown", { type: "button", className: "copy" });
     copy.addEventListener("click", async () => {
       const seen = (cells) => [...cells].filter((cell) => !cell.classList.contains("off"));
