@@ -131,7 +131,7 @@ Structures share a rank if their times do not differ significantly.";
 pub struct RunArgs {
     #[command(flatten)]
     pub what: WhatArgs,
-    /// Folder for report.html, report.json, summary.csv, samples.csv and stream.jsonl [default: a
+    /// Folder for the page, the report, the samples and the stream [default: a
     /// new one under results/]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -171,7 +171,7 @@ pub struct MergeArgs {
     /// Folders of finished shards
     #[arg(value_name = "RUN", required = true)]
     pub runs: Vec<PathBuf>,
-    /// A new folder for report.html, report.json, summary.csv, samples.csv and stream.jsonl
+    /// A new folder for the page, the report, the samples and the stream
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Join the given shards although other parts of the plan are missing
@@ -190,7 +190,7 @@ pub struct ReportArgs {
     /// Write the crossover charts (time against items) into a folder
     #[arg(long, value_name = "DIR")]
     pub svg: Option<PathBuf>,
-    /// Write one self-contained page with charts and tables (`run` writes it as report.html)
+    /// Write one self-contained page with charts and tables, as `run` does
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
     /// Write the figures in the Bencher Metric Format (JSON)

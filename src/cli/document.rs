@@ -31,8 +31,9 @@ fn markdown_table(table: &Table) -> String {
     out
 }
 
-/// A table that scrolls inside itself. A row of a structure has its name as `data-s`;
-/// `is_heat` shades each number by its share of the largest of its row.
+/// A table that scrolls inside itself.
+///
+/// A row of a structure has its name as `data-s`; `is_heat` shades each number by its share of the largest of its row.
 fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
     let is_right = |column: &usize| table.right.contains(column);
     let head = table.header.iter().enumerate().map(|(column, name)| {

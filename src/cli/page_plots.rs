@@ -78,8 +78,9 @@ fn figure(label: &str, caption: &str, height: f64, parts: &str) -> String {
     )
 }
 
-/// Speed-ups of a comparison over `base`, a dot with its 95 % interval per structure,
-/// the fastest on top. Lines join the dots of one rank.
+/// Speed-ups over `base`: a dot with its 95 % interval per structure.
+///
+/// The fastest is on top. Lines join the dots of one rank.
 pub fn speedups(comparison: &Comparison, base: &str) -> Option<String> {
     let sound = comparison.sound();
     let rows: Vec<(&ReportCell, Speedup)> = sound

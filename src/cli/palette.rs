@@ -95,7 +95,7 @@ impl Look {
     }
 }
 
-/// Rules of a style sheet: the class `cN` has colour N, on light and on dark grounds.
+/// Rules of a style sheet: the class `cN` has colour N, on light or dark grounds.
 pub fn style() -> String {
     let rules = |colours: [RGBColor; 8]| -> String {
         let rule = |(n, RGBColor(r, g, b))| format!(".c{n}{{color:rgb({r},{g},{b})}}");

@@ -22,8 +22,10 @@ pub struct Standing<'r> {
     pub worst: f64,
 }
 
-/// Structure that all speed-ups refer to: linear where it was measured; otherwise the
-/// slowest of those that rank in most comparisons.
+/// Structure that all speed-ups refer to.
+///
+/// It is linear where that was measured; otherwise the slowest that ranks in most
+/// comparisons.
 pub fn base_of<'r>(comparisons: &[Comparison<'r>]) -> Option<&'r str> {
     let sound = || comparisons.iter().flat_map(Comparison::sound);
     let linear = sound().find(|cell| cell.structure == YARDSTICK);
@@ -56,8 +58,9 @@ impl<'r> Comparison<'r> {
     }
 }
 
-/// All structures that rank anywhere: those of most comparisons first, then by their
-/// mean speed-up.
+/// All structures that rank anywhere.
+///
+/// Those of most comparisons come first, then those of the highest speed-up.
 pub fn standings<'r>(comparisons: &[Comparison<'r>], base: &str) -> Vec<Standing<'r>> {
     let mut names: Vec<&str> = Vec::new();
     for cell in comparisons.iter().flat_map(Comparison::sound) {

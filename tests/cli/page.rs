@@ -14,7 +14,7 @@ fn between<'t>(text: &'t str, begin: &str, end: &str) -> Vec<&'t str> {
     parts.filter_map(|part| part.split(end).next()).collect()
 }
 
-/// The names of elements still open at the end; every end tag closes the last of them.
+/// Every end tag closes the last element that is open, and none stays open.
 fn assert_well_formed(page: &str) {
     let (mut open, mut rest) = (Vec::new(), page);
     while let Some((text, tag)) = rest.split_once('<') {
