@@ -59,7 +59,7 @@ impl std::error::Error for JsonError {}
 /// # Errors
 /// Bytes that are no UTF-8, no JSON, or of another form.
 pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
-    // What some editors put in front of UTF-8.
+    // The byte order mark that some editors write.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let (good, bad) = bytes.split_at(error.valid_up_to());

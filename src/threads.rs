@@ -1,5 +1,6 @@
-//! How many threads may share a piece of work, and how they share it out. What is
-//! measured runs on one thread. Jobs and the order of their results belong to the callers.
+//! Distribution of work over threads, and the limit of their number.
+//!
+//! Measured work runs on one thread. Callers define jobs and the order of results.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};

@@ -79,7 +79,7 @@ impl Lens {
     /// A lens of any kind but a matrix.
     ///
     /// # Errors
-    /// As the constructor of that kind; no far plane for an orthographic lens; a matrix.
+    /// Those of the kind's constructor; an orthographic lens without far plane; a matrix.
     pub fn new(kind: LensKind, near: f64, far: Option<f64>) -> Result<Lens, CameraError> {
         match kind {
             LensKind::Perspective { fovy_deg, aspect } => {
@@ -163,8 +163,8 @@ impl Lens {
         [-y * aspect, y * aspect, -y, y]
     }
 
-    /// How high the view is at a depth, world units; `None` for a matrix, which
-    /// has no window of its own.
+    /// Height of the view at a depth, in world units; `None` for a matrix, which has no
+    /// window.
     pub fn height_at(&self, depth: f64) -> Option<f64> {
         let [_, _, bottom, top] = self.window();
         let reach = if self.is_orthographic() { 1.0 } else { depth };
@@ -239,7 +239,7 @@ impl Camera {
         let matrix = ViewProjection::new(entries, convention)?;
         let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
         let eye = matrix.eye;
-        // What is visible does not depend on the frame, so any up will do.
+        // Visibility does not depend on the camera basis, so any up vector will do.
         let with = |up: DVec3| Pose::Forward { eye, forward, up }.frame();
         let frame = with(up).or_else(|_| with(forward.any_orthogonal_vector()))?;
         Ok(Camera {

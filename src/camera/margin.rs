@@ -95,8 +95,7 @@ impl Margin {
         }
     }
 
-    /// The plane moved outward: far enough for every visible box, whatever
-    /// rounding does to it.
+    /// The plane moved outward, so that no rounding error drops a visible box.
     pub(super) fn moved(&self, name: Option<FrustumPlane>, plane: &Plane, slack: f64) -> Plane {
         let d = f64::from(plane.d);
         let error = self.c * UNIT_ROUNDOFF * self.size(name, plane);

@@ -18,7 +18,7 @@ named! {
     #[serde(rename_all = "kebab-case")]
     pub enum PlaneMethod, PLANE_METHODS {
         ///
-        /// Of a camera that is a matrix: from its rows.
+        /// For a camera given as a matrix, the planes come from its rows.
         #[default]
         Frame = "frame", "from the camera's frame in f64, rounded once (default)";
         FrameF32 = "frame-f32", "from the frame, every operation in f32";

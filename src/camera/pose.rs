@@ -93,7 +93,7 @@ impl Pose {
     }
 }
 
-/// The unit vector along `v`, whatever its length above 0.
+/// Unit vector along `v`, for any length above 0.
 pub(super) fn unit(v: DVec3) -> DVec3 {
     // Twice: 1/largest alone overflows for subnormal lengths.
     let scaled = v / v.abs().max_element();

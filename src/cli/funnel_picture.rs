@@ -73,7 +73,7 @@ fn draw_on(root: &Area, report: &FunnelReport) -> Drawn {
             .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 14, y + 5)], colour.filled()));
     }
     for [dx, dy] in plan.edges {
-        // What lies beyond the picture would be moved to its border, and turned.
+        // A point beyond the picture would be clamped to its border, which turns the line.
         let far = reach / dx.abs().max(dy.abs()).max(f64::MIN_POSITIVE);
         let line = [(x, y), (x + dx * far, y + dy * far)];
         chart.draw_series([PathElement::new(line, BLACK.stroke_width(1))])?;

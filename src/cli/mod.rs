@@ -203,8 +203,9 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
     }
 }
 
-/// One line on stderr, whatever is in the text. Unlike `eprintln!` it does
-/// not panic where standard error is closed.
+/// Prints a text as one line on stderr.
+///
+/// Unlike `eprintln!`, does not panic if standard error is closed.
 fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "{}", text::message(line));
 }

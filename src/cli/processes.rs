@@ -325,7 +325,7 @@ impl Workers {
         })
     }
 
-    /// Sees a job through in a process of its own, on the next processor.
+    /// Runs a job in a separate process, on the next processor.
     ///
     /// # Errors
     /// As [`see_through`].

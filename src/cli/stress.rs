@@ -42,7 +42,7 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         cases,
         threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
     };
-    // By every other instruction set of this machine too, but less of it.
+    // A smaller check of every other instruction set of this machine.
     let chosen = args.kernel.execution()?.kernel;
     let all_kernels = args.kernel.name.is_none();
     let others = || Kernel::available().filter(|&kernel| all_kernels && kernel != chosen);

@@ -1,7 +1,8 @@
-//! Extended planes: what the six planes of a frustum leave undecided, as more
-//! planes. With them the p-vertex test becomes the full separating axis test.
-//! Selected in f64 for speed; whatever is selected is a safe plane, because it
-//! is a sum of given ones. The oracle has the theory and the exact version.
+//! Extended planes, which complete the six planes of a frustum.
+//!
+//! With them the p-vertex test is the full separating axis test. They are selected in f64
+//! for speed; every selected plane is safe, because it is a sum of given planes. The
+//! oracle has the theory and the exact version.
 //!
 //! All planes are about a point near the volume (the eye): about a zero far
 //! away the digits of small features would be lost.
@@ -51,7 +52,7 @@ pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
                 parts.map(|(w, plane)| w * sign * of(plane)).sum::<f64>()
             };
             let (n, d) = (sum(&|p| p.normal[axis]), sum(&|p| p.d));
-            // What other axes are left with in the normal, and roundings of the offset.
+            // Residues of the other axes in the normal, and rounding errors of the offset.
             let cost = (dropped + RESIDUE) * 2.0 * reach + RESIDUE * sum(&|p| p.d.abs()).abs();
             let offset = (d + cost) / n.abs();
             let sound = n.abs() > CANCELLED && dropped <= UNIT * n.abs();

@@ -196,9 +196,10 @@ impl Culling {
         })
     }
 
-    /// Planes of the test beyond the faces, about the eye. Derived from the frame's
-    /// planes in f64, whatever the derivation: sums of rounded planes can be turned by
-    /// more than a margin covers.
+    /// Planes of the test beyond the faces, about the eye.
+    ///
+    /// They are derived in f64 from the planes of the camera basis, for every plane
+    /// method: rounding can turn sums of rounded planes by more than the margin covers.
     fn more(
         &self,
         camera: &Camera,
@@ -215,7 +216,7 @@ impl Culling {
             ..Surroundings::default()
         };
         let faces = camera.convex_volume_f64(&about_eye)?;
-        // Of the items about the eye, or of the volume where they are not known.
+        // Reach of the items about the eye, or of the volume if the items are unknown.
         let reach = match around.reach {
             Vec3::ZERO => farthest_corner(faces.planes()),
             of_scene => (of_scene.as_dvec3() + local_eye.abs()).length(),

@@ -90,8 +90,9 @@ pub struct Method {
     pub name: &'static str,
     /// One line about what it does.
     pub summary: &'static str,
-    /// Classical order: of the error for steps far below 1/omega. Of the closed form on
-    /// the collision arm, by the stretch that it freezes.
+    /// Classical order of the error, for steps far below 1/omega.
+    ///
+    /// The order of the closed form on the collision arm comes from its frozen stretch.
     pub order: u32,
     #[serde(skip)]
     pub(super) substeps: &'static [u32],
@@ -288,7 +289,7 @@ mod tests {
         assert!((order.expect("an order") - 1.0).abs() < 0.1, "{order:?}");
     }
 
-    /// The figures of the study as it was with every reference of its own.
+    /// Pins the errors of some methods.
     #[test]
     fn errors_of_the_collision_arm_have_their_known_size() {
         for (stiffness, label, wanted) in [

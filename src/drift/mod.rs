@@ -33,7 +33,7 @@ use walk::{QUERIES, QUERY_STEPS, walking};
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
 pub const MOST_STEPS: u64 = 1_000_000_000;
 
-/// Whole turns that are looked at, in steps of one degree.
+/// Numbers of whole turns to measure, in steps of one degree.
 const TURNS: [u64; 2] = [1, 1000];
 
 /// Scope of the study.

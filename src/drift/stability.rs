@@ -1,5 +1,7 @@
-//! Limits of stability of the spring arm's methods in `omega h`, and the share of
-//! an error that one step leaves beyond: found by trying the very step that runs.
+//! Stability limits of the spring arm's methods, in `omega h`.
+//!
+//! Also the share of an error that remains after one step at large `omega h`. Both are found
+//! numerically, with the same step function as the study.
 
 use serde::Serialize;
 

@@ -159,7 +159,7 @@ impl Orders {
 
     /// Leaves out orders whose pieces cover too many samples.
     ///
-    /// Triangles are met by rays, whatever the pieces are.
+    /// Orders of triangles are never left out: rays meet triangles, not pieces.
     fn drop_large(&mut self) {
         let cuts = if self.triangles.is_none() {
             self.rows.len()

@@ -122,7 +122,7 @@ impl Aabb {
         self.min * 0.5 + self.max * 0.5
     }
 
-    /// The bits of its six numbers: the key by which the very same boxes are found.
+    /// Bits of the six bounds, as a key of identical boxes.
     #[inline]
     pub fn bits(&self) -> [[u32; 3]; 2] {
         let of = |p: Vec3| [p.x.to_bits(), p.y.to_bits(), p.z.to_bits()];
@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(Aabb::union_of(&[unit, inverted]), unit);
         let nothing = Aabb::union_of(&[inverted]);
         assert!(nothing.is_empty() && Aabb::union_of(&[]).is_empty());
-        // What no box reaches must not make planes' sums infinite.
+        // An empty union must not make the sums of planes infinite.
         assert_eq!(nothing.reach(), Vec3::ZERO);
     }
 

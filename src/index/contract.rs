@@ -179,8 +179,8 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// in the order of [`RegionIndex::query`], point after point. `Break` if the sink
     /// ended the batch.
     ///
-    /// By default one point after the other; a structure that interleaves several
-    /// descents overrides it.
+    /// The default searches point by point; a structure that interleaves several descents
+    /// overrides it.
     #[inline(always)]
     fn query_many<I: Isa, S: ManySink>(
         &self,

@@ -37,8 +37,10 @@ pub trait DynIndex: Send + Sync {
     fn memory(&self) -> MemoryUsage;
     /// See [`RegionIndex::query`]. Nothing is counted.
     fn query(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>);
-    /// The same query, its cost added to `cost`. By the portable instruction set: cost
-    /// and answer are the same by all. All volumes of planes share one compiled traversal.
+    /// The same query; adds its cost to `cost`.
+    ///
+    /// Runs on the portable instruction set, as cost and answer do not depend on it. All
+    /// volumes of planes share one compiled traversal.
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// See [`RegionIndex::query_many`]; clears `out` first.
     fn query_many(&self, points: &[Vec3], out: &mut Located);

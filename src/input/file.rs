@@ -25,7 +25,7 @@ pub fn is_readable(path: &Path) -> bool {
 /// it works on it.
 ///
 /// # Errors
-/// What the file system says, with the path.
+/// I/O errors, with the path.
 pub fn read_file(path: &Path) -> Result<Arc<[u8]>, InputError> {
     let io = |source| InputError::Io {
         path: path.to_owned(),

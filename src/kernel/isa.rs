@@ -14,9 +14,9 @@ pub fn first_lanes(count: usize) -> LaneMask {
 
 /// An instruction set: sixteen f32 lanes and sixteen u32 lanes.
 ///
-/// Every operation rounds once, to nearest, and lane by lane; so whatever is
-/// written in them comes out bit for bit the same on every instruction set. A
-/// value of such a type is the proof that the processor has it.
+/// Every operation rounds once, to nearest, lane by lane; code written with these
+/// operations has bit-identical results on every instruction set. A value of such a type
+/// is the proof that the processor supports the instructions.
 pub trait Isa: Copy {
     /// True if the registers hold the coefficients of six planes and a block.
     const MANY_REGISTERS: bool = false;
@@ -30,8 +30,9 @@ pub trait Isa: Copy {
     /// Appends row after row.
     type Packer<'a>: Pack<'a, Self>;
 
-    /// Does the piece in a function of its own, compiled for these instructions:
-    /// a loop that is to keep its numbers in registers needs one.
+    /// Runs a piece in a separate function, compiled for these instructions.
+    ///
+    /// A loop needs a separate function to keep its values in registers.
     #[inline(always)]
     fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
         piece.run(self)

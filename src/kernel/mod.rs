@@ -1,12 +1,12 @@
-//! Instruction sets to choose from at run time: one source, compiled once for
-//! each of them, and the same answer bit for bit. Unsafe code is in the folder
-//! `x86` and nowhere else in the crate; where plain arrays are the vectors (other
-//! architectures, interpreters, `--cfg plain_vectors`) it is left out, and the
-//! compiler forbids any.
+//! Instruction sets, selected at run time.
 //!
-//! No kernel contracts a product and a sum into a fused multiply-add: Rust
-//! never does so unasked, whatever the instruction set offers, and the plane
-//! test relies on it.
+//! One source is compiled once per instruction set; results are bit-identical. Unsafe code
+//! is in the folder `x86` and nowhere else in the crate. Builds whose vectors are plain
+//! arrays (other architectures, interpreters, `--cfg plain_vectors`) omit that folder, and
+//! the compiler forbids unsafe code in them.
+//!
+//! No kernel contracts a product and a sum into a fused multiply-add: Rust does not do
+//! this implicitly on any instruction set, and the plane test relies on it.
 
 mod inlined;
 mod isa;
@@ -46,8 +46,8 @@ named! {
 /// A piece of work that [`Kernel::run`] compiles for each instruction set, whose
 /// vectors it is given as `isa`.
 ///
-/// `run` and all that is hot in it must be `#[inline(always)]`: what stays a
-/// call of its own was compiled for the portable set.
+/// `run` and all hot functions in it must be `#[inline(always)]`: a function that is not
+/// inlined is compiled for the portable set.
 pub trait Work {
     /// Result of the work.
     type Output;

@@ -44,7 +44,7 @@ impl Counted {
     }
 }
 
-/// Most time that a subject may take for its whole count pass.
+/// Time limit of the whole count pass of a subject.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Counts and verifies all queries of all subjects.
@@ -148,7 +148,7 @@ pub struct Judged {
 
 /// Checks the reference answers, which all right structures share, with the oracle.
 ///
-/// As many cameras as `most` verdicts of the oracle allow, at least one, at most 16.
+/// Checks as many cameras as `most` verdicts of the oracle allow, from 1 to 16.
 pub fn judge(workload: &Workload, most: usize) -> Judged {
     let scene = workload.scene;
     let count = workload.cameras.len();

@@ -22,7 +22,7 @@ use std::cell::OnceCell;
 use super::number::{HalfSpace, Number, Precision};
 use super::rough::{RoughSpaces, may_agree};
 
-/// Extent of a volume, whatever the box.
+/// Extent of a volume, independent of the box.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Extent {
     /// No point satisfies all constraints.
@@ -177,8 +177,9 @@ impl Search {
         }
     }
 
-    /// Three constraints whose normals leave one axis only. Of those that
-    /// bound the same direction the tightest says all.
+    /// Adds certificates of three constraints whose sum has one axis only.
+    ///
+    /// Only the tightest of those that bound the same direction is needed.
     fn triples(&mut self) {
         let mut candidates = Vec::new();
         let mut best = [f64::INFINITY; 6];

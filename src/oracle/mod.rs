@@ -74,8 +74,9 @@ pub struct Oracle {
 }
 
 impl Oracle {
-    /// Planes level: the planes as they are, with no error whatever. Nothing
-    /// overflows or underflows: all products have at most four factors of f32.
+    /// Oracle at planes level, for the planes as they are, without any error.
+    ///
+    /// Products have at most four factors of f32, so nothing overflows or underflows.
     pub fn of_volume(volume: &ConvexVolume) -> Oracle {
         let planes = volume.planes().iter().map(|plane| HalfSpace {
             normal: plane.normal.to_array().map(Into::into),

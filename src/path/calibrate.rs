@@ -5,7 +5,7 @@ use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions, Surroundi
 use crate::geometry::Aabb;
 use crate::scene::Scene;
 
-/// Most items and cameras that are looked at per step of the search.
+/// Maximum numbers of items and cameras sampled per step of the search.
 const MOST_ITEMS: usize = 8_000;
 const MOST_CAMERAS: usize = 128;
 /// Items of the sample that a camera sees at least, on average, at the cost of

@@ -335,7 +335,7 @@ impl Optics {
         let far = far.filter(|far| *far <= FARTHEST);
         let near = match spec.text("near") {
             Some(_) => Some(spec.number("near", 0.0)?),
-            // What an eye among items looks at may be an arm's length away.
+            // Items may be an arm's length away from an eye among them.
             None if spec.name() == "street" => defaults.near.or(Some(0.1)),
             None => defaults.near,
         };

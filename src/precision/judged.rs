@@ -73,8 +73,9 @@ pub(super) fn counts_or_null<S: Serializer>(
     serializer.collect_map(named.map(|(name, count)| (name, errors.map(|_| count))))
 }
 
-/// The cameras that are looked at, evenly spread over a path, and behind each of
-/// them its neighbour on the path, for what changes from frame to frame.
+/// Cameras to test, evenly spread over a path, each with its successor on the path.
+///
+/// The successors show changes from frame to frame.
 pub(super) struct Shots {
     pub cameras: Vec<Camera>,
     /// One for each camera, or none for a path of one camera.

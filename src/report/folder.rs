@@ -92,7 +92,7 @@ impl RunFolder {
     /// Appends a line, whole or not at all as far as a reader can tell.
     ///
     /// # Errors
-    /// What the file system says.
+    /// I/O errors.
     pub fn append(&mut self, line: &Line) -> Result<(), FolderError> {
         let written = line.to_json().and_then(|text| self.stream.write_all(&text));
         written.map_err(FolderError::io(&self.path.join(STREAM)))
@@ -101,7 +101,7 @@ impl RunFolder {
     /// Appends a part: its samples first, then the line that refers to them.
     ///
     /// # Errors
-    /// What the file system says.
+    /// I/O errors.
     pub fn keep(&mut self, part: Part, samples: &[TaskSamples]) -> Result<KeptPart, FolderError> {
         let key = &part.key;
         let mut rows = BTreeMap::new();
@@ -136,7 +136,7 @@ impl RunFolder {
     /// Writes report.json and summary.csv of what the stream holds.
     ///
     /// # Errors
-    /// What the file system says.
+    /// I/O errors.
     pub fn save(&self, report: &Report) -> Result<(), FolderError> {
         save_report(&self.path, report)
     }
@@ -223,7 +223,7 @@ impl StoppedRun {
     /// Cuts off what is not whole, to be appended to.
     ///
     /// # Errors
-    /// What the file system says.
+    /// I/O errors.
     pub fn go_on(self, stream: &Stream) -> Result<RunFolder, FolderError> {
         let mut folder = RunFolder {
             samples: open(&self.path.join(SAMPLES))?,
@@ -307,7 +307,7 @@ pub fn save_page(folder: &Path, page: &str) -> Result<(), FolderError> {
 /// Writes report.json and summary.csv into a folder; replaces links.
 ///
 /// # Errors
-/// What the file system says.
+/// I/O errors.
 pub fn save_report(folder: &Path, report: &Report) -> Result<(), FolderError> {
     replace_atomically(&folder.join(SUMMARY), |out| {
         write_summary(&report.cells, out)

@@ -19,7 +19,7 @@ use crate::shown::plain;
 /// Fields that it does not know are ignored.
 ///
 /// # Errors
-/// What the file system says, not a report, or one of another schema version.
+/// I/O errors, a file that is not a report, or another schema version.
 pub fn read_report(path: &Path) -> Result<Report, FolderError> {
     let stream = path.join(STREAM);
     if !path.is_dir() || !stream.is_file() {
@@ -28,7 +28,7 @@ pub fn read_report(path: &Path) -> Result<Report, FolderError> {
             false => path.to_owned(),
         });
     }
-    // What was derived last may lack what has been measured since.
+    // An unfinished report may lack results that the stream has.
     match read_json(path.join(REPORT)) {
         Ok(report) if report.run.finished_at.is_some() => Ok(report),
         _ => Ok(read_stream(&stream)?.0.report()),

@@ -20,7 +20,7 @@ const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
 /// is written to and never replaced.
 ///
 /// # Errors
-/// What the file system says, with the path.
+/// I/O errors, with the path.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -83,7 +83,7 @@ fn is_stream(found: &fs::Metadata) -> bool {
 /// a folder that is read-only or full is found before the work.
 ///
 /// # Errors
-/// What the file system says, with the path.
+/// I/O errors, with the path.
 pub fn try_place(path: &Path) -> Result<(), FolderError> {
     let attempt = || -> io::Result<()> {
         let target = match fs::metadata(path) {
@@ -100,7 +100,7 @@ pub fn try_place(path: &Path) -> Result<(), FolderError> {
 /// The same of a folder that is there or is to be made.
 ///
 /// # Errors
-/// What the file system says, with the path.
+/// I/O errors, with the path.
 pub fn try_folder(path: &Path) -> Result<(), FolderError> {
     let folder = path.ancestors().find(|folder| folder.exists());
     try_writing(folder.unwrap_or(Path::new("."))).map_err(FolderError::io(path))
@@ -114,7 +114,7 @@ fn try_writing(folder: &Path) -> io::Result<()> {
 /// Makes a file that ends with this process, or with the next write beside it.
 ///
 /// # Errors
-/// What the file system says.
+/// I/O errors.
 pub fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     Ok(locked_temporary_in(folder)?.0)
 }

@@ -53,7 +53,7 @@ pub struct Thing {
 
 /// The names of the maps in a WAD file, in file order.
 ///
-/// Of several maps of one name only the last counts.
+/// If several maps have the same name, only the last counts.
 pub fn map_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
     let wad = Wad::open(bytes, file)?;
     let names = wad.markers().into_iter().map(|(name, _)| name.to_owned());

@@ -1,6 +1,7 @@
-//! Rates of rare things, such as false positives per visible item, with their
-//! sampling error. What is seen by one camera is one observation: its items see
-//! the same planes and err together.
+//! Rates of rare events (false positives per visible item) with sampling errors.
+//!
+//! A camera is one observation: its items share the same planes, so their errors are
+//! correlated.
 
 use serde::{Deserialize, Serialize};
 

@@ -10,7 +10,7 @@ named! {
     pub enum Guarantee {
         /// The visible set itself.
         Exact = "exact",
-        /// All that is visible, by any ray whatever, and something more.
+        /// A superset of the items that are visible along any ray.
         Conservative = "conservative",
         /// The set that the rays of a sample grid see.
         SampleExact = "sample-exact",

@@ -1,6 +1,7 @@
-//! The rays of a camera: one for each sample of an image. A ray is three f64 of
-//! direction (and three of origin), rounded once and then taken as they are, so
-//! every back end and the truth ask about the very same line.
+//! Rays of a camera, one per sample of an image.
+//!
+//! Direction and origin of a ray are f64, rounded once and exact from there on, so that
+//! every back end and the truth test the same line.
 
 use glam::DVec3;
 

@@ -1,6 +1,7 @@
-//! Cutting a set of boxes in two by the surface area heuristic, for trees that rays
-//! go through: 16 bins an axis (Wald 2007, "On fast construction of SAH-based bounding
-//! volume hierarchies"). What is made of the halves is each tree's own.
+//! Splits of boxes by the surface area heuristic, for trees that rays traverse.
+//!
+//! 16 bins per axis (Wald 2007, "On fast construction of SAH-based bounding volume
+//! hierarchies"). Each tree builds its nodes from the halves.
 
 use std::ops::Range;
 

@@ -1,9 +1,9 @@
 //! A box scene as solids: each item hides what is behind its box, exactly.
 //!
-//! What a solid is to a ray: it is met where the ray enters it, if that is between
-//! near and far. A ray that enters it before the near plane (or begins inside it)
-//! does not meet it: there is only its inside to be seen from there, which, as the
-//! back of any closed surface, is not drawn and hides nothing.
+//! A ray meets a solid where it enters the solid, if that is between near and far. A ray
+//! that enters before the near plane (or begins inside) does not meet the solid: only the
+//! inside is visible from there, which, as the back of any closed surface, is not drawn
+//! and hides nothing.
 
 use glam::DVec3;
 
@@ -26,7 +26,7 @@ pub struct Solids {
 }
 
 impl Solids {
-    /// All items of a scene, whatever their shape is. O(n).
+    /// Boxes of all items of a scene, for any shape of the items. O(n).
     pub fn of(scene: &Scene) -> Solids {
         let boxes: Vec<WorldBox> = scene.written().collect();
         let inner = boxes.iter().map(|b| rounded_inward(b, scene.origin));

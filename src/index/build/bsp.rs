@@ -64,7 +64,7 @@ impl Split {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum PlaneSource {
-    /// `import` where the scene has a tree of its own, else `median`.
+    /// `import` if the scene has its own tree, else `median`.
     Auto,
     /// Axis-parallel planes by the surface area heuristic, 16 bins (Wald 2007,
     /// "On fast construction of SAH-based bounding volume hierarchies").

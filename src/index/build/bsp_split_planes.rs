@@ -58,7 +58,7 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
     let (count, half) = (records.len(), records.len() / 2);
     let quarter = count.div_ceil(4);
-    // Few items may be divided unevenly: their depth has a bound of its own.
+    // Few items may be divided unevenly: the depth of small subtrees is bounded separately.
     let sizes: &[usize] = match count <= DESCENT_LEAF {
         true => &[quarter, 1],
         false => &[quarter],

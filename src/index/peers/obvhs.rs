@@ -126,7 +126,7 @@ impl BoxTested for PeerObvhs {
         let mut open = Stack::new((root.first_index, ()));
         while let Some((first, ())) = open.pop() {
             for node in [&nodes[first as usize], &nodes[first as usize + 1]] {
-                // A leaf of one item has the item's bounds: no test of its own.
+                // A leaf of one item has the bounds of the item: it needs no second test.
                 let single = node.prim_count == 1;
                 if !single {
                     tally.node(test);

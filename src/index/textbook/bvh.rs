@@ -26,8 +26,8 @@ impl Division for ObvhsNodes {
     const SUMMARY: &str = "lecture form: the nodes of crate obvhs, one at a time";
 
     fn root(input: &Input<'_>, mut records: Vec<Record>, params: &TextbookParams) -> Node {
-        // Items with the very same bounds are one to the builder, which finds no nearest
-        // one among them.
+        // Items with identical bounds are one primitive for the builder, whose search for
+        // the nearest neighbour fails among them.
         let key = |r: &Record| r.bounds.bits();
         records.sort_unstable_by_key(|r| (key(r), r.id));
         let stacks: Vec<&[Record]> = records.chunk_by(|a, b| key(a) == key(b)).collect();

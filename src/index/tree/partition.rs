@@ -15,7 +15,7 @@ pub struct Part<C> {
     pub cell: Option<C>,
 }
 
-/// Divides groups of items: what a top-down builder has of its own.
+/// Divides groups of items: the part that differs between top-down builders.
 pub trait Splitter {
     /// State of a group, such as its cell.
     type Cell: Copy;

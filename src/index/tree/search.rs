@@ -396,7 +396,7 @@ impl PackedTree {
         }
         let mut from = 0;
         for (end, point) in ends[..group.len()].iter().zip(first..) {
-            // A point without a leaf has no end of its own.
+            // A point without a leaf has no end; its list is empty.
             let end = from.max(*end);
             sink.accept(point, &ids[from..end])?;
             from = end;

@@ -1,6 +1,8 @@
-//! Orders items so that every run of 16^k of them, from a multiple of 16^k on,
-//! is a compact group, as an implicit tree of blocks needs it. By medians that fall
-//! on block boundaries, or by Morton codes, for faster builds and slower queries.
+//! Order of items for an implicit tree of blocks.
+//!
+//! Every run of 16^k items that starts at a multiple of 16^k is a compact group. The order
+//! comes from medians on block boundaries, or from Morton codes, which build faster and
+//! query slower.
 
 use std::cmp::Ordering;
 use std::sync::{Mutex, PoisonError};
@@ -47,7 +49,8 @@ impl Point {
     }
 }
 
-/// The ids in block order: the same whatever the number of threads.
+/// Ids in block order, which do not depend on the number of threads.
+///
 /// O(n log n). Morton codes are sorted on one thread.
 pub fn block_ordered(
     items: &[Aabb],

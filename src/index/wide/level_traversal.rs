@@ -75,7 +75,8 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
     }
 
     /// Passes the items of a frontier's leaves that no open plane drops to the sink.
-    /// Of many leaves, those with a single open plane come first, plane by plane.
+    ///
+    /// If there are many leaves, those with a single open plane come first, plane by plane.
     #[inline(always)]
     pub fn test_leaves(
         &mut self,

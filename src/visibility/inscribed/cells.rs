@@ -24,8 +24,9 @@ impl Cells {
 
     /// Finds the box of inside cells that holds the most that are in no box yet.
     ///
-    /// Returns it with their number. Of several the largest, so that boxes overlap and leave no seam to look through. Its
-    /// lowest slab of z is one of `lows`. `None` if no cell is left. O(n⁴) in common cases.
+    /// Returns the box with the number of those cells; of equal boxes the largest, so that
+    /// boxes overlap without seams. The lowest slab of z of the box is one of `lows`. `None`
+    /// if no cell is left. O(n⁴) in common cases.
     pub fn next_box(&mut self, lows: Range<usize>) -> Option<(u32, CellBox)> {
         let n = self.n;
         let open = self.open_below();

@@ -1,10 +1,11 @@
-//! The interleaved coupling: the tree is walked front to back; blocks are tested
-//! before they are opened; what is found visible and large is drawn at once; and
-//! what was found visible early is tested once more at the end.
+//! The interleaved coupling: a front-to-back traversal that tests and draws.
 //!
-//! Of all blocks that are still to be opened the nearest comes first, wherever it is
-//! in the tree: less is drawn that something nearer hides than by going down child by
-//! child, and a masked buffer loses less (docs/adr/0021-nearest-block-first.md).
+//! Blocks are tested before they are opened. Large visible items are drawn at once; items
+//! that were found visible early are tested again at the end.
+//!
+//! The nearest open block of the whole tree comes next. Compared with a depth-first order,
+//! fewer items are drawn that a nearer one hides, and a masked buffer loses less
+//! (docs/adr/0021-nearest-block-first.md).
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

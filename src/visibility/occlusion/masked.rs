@@ -102,7 +102,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
                 let Some(reference) = self.reference[at..].first_chunk::<LANES>() else {
                     return false;
                 };
-                // By the reference of the tile, as it mostly is.
+                // In most cases the reference depth of the tile decides.
                 let passed = isa.at_most(isa.load(reference), nearness);
                 let mut open = passed & first_lanes(last + 1 - column);
                 while open != 0 {
@@ -140,7 +140,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         let wide = !isa.zeros(isa.words(&across));
         let high = !isa.zeros(isa.words(&down));
         let mut hidden = small;
-        // The lower row of tiles is looked at if it is another one.
+        // The lower row of tiles is tested if it differs from the upper one.
         for (y, other) in [(&rects.y0, LaneMask::MAX), (&rects.y1, high)] {
             let asked = hidden & other;
             if asked != 0 {
@@ -207,8 +207,9 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         parts
     }
 
-    /// Those of the lanes that are hidden as far as one row of tiles goes: the one that
-    /// holds the pixels of rows `y`. Of `wide` lanes two tiles of it are looked at.
+    /// Lanes that are hidden in the row of tiles that contains the pixels of rows `y`.
+    ///
+    /// Two tiles of the row are tested for `wide` lanes, else one.
     #[inline(always)]
     fn hidden_in_row<I: Isa>(
         &self,
@@ -249,7 +250,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
                 left &= left - 1;
                 masks[lane] = self.mask[at[lane] as usize + side];
             }
-            // Of the other lanes anything may come out.
+            // The results of the other lanes are unspecified.
             let mut shown = [0; LANES];
             for lane in 0..LANES {
                 let first_column = (rects.x0[lane] & !7) + (side * TILE_WIDTH) as i32;

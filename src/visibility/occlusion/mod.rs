@@ -1,15 +1,16 @@
-//! Which of the items in the view are hidden by others.
+//! Occlusion stage: removes items in the view that other items hide.
 //!
-//! Back ends are buffers that occluders are drawn into ([`OcclusionBuffer`]), each
-//! in a file of its own, under two couplings: [`TwoPass`] (all occluders, then all
-//! candidates) and [`Interleaved`] (front to back on a tree of its own).
+//! Back ends are buffers that occluders are drawn into ([`OcclusionBuffer`]), one per
+//! file, with two couplings: [`TwoPass`] (all occluders, then all candidates) and
+//! [`Interleaved`] (front to back, with its own tree).
 //!
 //! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it
 //! enters it, between near and far; a box that some ray enters before the near
-//! plane is not drawn; items as near as an occluder are not hidden by it. Of a mesh
-//! what is drawn are boxes inside the items ([`OccluderScene::among`]): a ray that enters
-//! one has met the item's surface before, unless that was before the near plane. Of a map
-//! they are boxes of its solid, below the ground of a mesh boxes too, which are no items.
+//! plane is not drawn; an occluder does not hide items at the same depth. The occluders
+//! of a mesh are boxes inside its items ([`OccluderScene::among`]): a ray that enters one
+//! has met the surface of the item before, unless that was before the near plane. The
+//! occluders of a map are boxes in its solid space, and those of a terrain are boxes below
+//! the ground; neither are items.
 
 mod buffer;
 mod hierarchical_z;

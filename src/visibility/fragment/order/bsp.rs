@@ -2,14 +2,14 @@
 //! through faces of boxes, each across an axis; boxes that a plane passes through
 //! are cut in two.
 //!
-//! On the eye's side of a plane every entry is before those on the other side, so
-//! the order of what planes part is exact. What no plane parts or cuts are boxes
-//! with the same bounds, of which a ray that passes enters one or several, by their
-//! own faces, at the same depth; or flat ones in a face of another. So the order is
-//! exact for boxes that overlap in space as well. Two limits are left, and told where
-//! they are met ([`DepthOrder::exception`]): cutting ends where there are too many
-//! parts, or too many planes about them; and rays that run within a plane have both of
-//! its sides on the eye's.
+//! A ray enters boxes on the eye's side of a plane before those on the other side, so the
+//! order of boxes that a plane separates is exact. Boxes that no plane separates or cuts
+//! have the same bounds, and a ray enters them at the same depth; or they are flat and lie
+//! in a face of another box. The order is therefore exact even for overlapping boxes.
+//!
+//! Two exceptions remain, which [`DepthOrder::exception`] returns: cutting ends if there
+//! are too many parts or planes, and for a ray within a plane both sides are on the eye's
+//! side.
 
 use super::contract::{self, DepthOrder, Piece, ToOrder};
 use super::whole::nearest;
@@ -118,8 +118,7 @@ impl BspOrder {
     }
 }
 
-/// The parts up to the plane, and those from it on. What lies in it counts as
-/// below.
+/// Parts below and above a plane; parts within the plane count as below.
 fn sides(parts: Vec<Part>, axis: usize, at: f64) -> [Vec<Part>; 2] {
     let (mut below, mut above) = (Vec::new(), Vec::new());
     for part in parts {
@@ -171,10 +170,10 @@ fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
         };
         for &at in low.iter().chain(&high) {
             let below = high.partition_point(|&x| x <= at);
-            // What lies in the plane is below it.
+            // Parts within the plane count as below.
             let above = count - low.partition_point(|&x| x < at) - equal(&flat, at);
             let cut = count - below - above;
-            // What was cut at a plane is never cut there again: this ends.
+            // A part is never cut twice at the same plane, so the recursion ends.
             let parts_them = cut > 0 || (below < count && above < count);
             if !parts_them || cut > room {
                 continue;

@@ -1,13 +1,13 @@
-//! A partition of the scene's own, such as the BSP of a Doom map.
+//! Draw order by a partition that the scene has, such as the BSP of a Doom map.
 //!
-//! Leaves from front to back, and in each the parts of the items in it.
+//! Leaves are drawn from front to back, and in each leaf the parts of its items.
 //!
-//! Whatever the planes are, on a ray from the eye all of a leaf comes before all of one
-//! behind it, so between leaves the order is exact, but for what rounding does within
-//! [`SLACK`] of a plane. In a leaf what has all the rest before it comes last, in any order:
-//! the walls around a room hide nothing in it, and none of them another. What is left is
-//! sorted by distance. (Fuchs, Kedem and Naylor 1980; linuxdoom 1.10, r_bsp.c, draws the
-//! walls of a leaf the same way, and then its things by distance.)
+//! A ray from the eye meets all of a leaf before all of a leaf behind it, so the order
+//! between leaves is exact, except for rounding within [`SLACK`] of a plane. In a leaf,
+//! items that are behind all the others come last, in any order: the walls around a room
+//! hide neither its content nor each other. The rest is sorted by distance. (Fuchs, Kedem
+//! and Naylor 1980; linuxdoom 1.10, r_bsp.c, draws the walls of a leaf the same way, and
+//! then its things by distance.)
 
 use glam::DVec3;
 
