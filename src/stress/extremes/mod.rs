@@ -169,7 +169,7 @@ impl Extremes<'_> {
                 test,
                 status: Status::Pass,
                 expected: expected.into(),
-                got: format!("in all {cases} cases").into(),
+                got: format!("so in all of {cases} cases").into(),
             });
         }
     }
