@@ -95,7 +95,7 @@ impl Duel<'_> {
         loop {
             let is_last = pairs == most;
             let is_look = pairs >= first && (pairs - first).is_multiple_of(MORE);
-            if (is_look || is_last) && (judge_cells(&mut cells, self.threshold) || is_last) {
+            if (is_look && judge_cells(&mut cells, self.threshold)) || is_last {
                 let mut known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
                 let query = known.find_map(|known| known.query.as_ref());
                 return Ok(Against {

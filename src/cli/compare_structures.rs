@@ -155,11 +155,14 @@ fn all_agree(rows: &[Row], what: &str) -> bool {
     agree
 }
 
+/// Head and cell of a column.
+pub type Column<'a, Row> = (&'a str, &'a dyn Fn(&Row) -> Value);
+
 /// Writes the answers that `ask` passes to its argument as CSV or JSON.
 /// A reader who leaves early changes neither questions nor answers.
 pub fn write(
     format: RowFormat,
-    columns: &[(&str, &dyn Fn(&Row) -> Value)],
+    columns: &[Column<'_, Row>],
     ask: impl FnOnce(&mut dyn FnMut(Vec<Row>) -> io::Result<()>) -> anyhow::Result<bool>,
 ) -> anyhow::Result<bool> {
     let mut out = BufWriter::new(Unread(io::stdout().lock()));

@@ -146,7 +146,7 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
         turn.yaw_deg, turn.pitch_deg, turn.roll_deg, report.period_steps
     )?;
     let (all, turns) = (&report.rotation, &report.one_degree_turns);
-    let figures: [(&str, fn(&RotationDrift) -> f64); 4] = [
+    let figures: [Figure<RotationDrift>; 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
         ("angular error in rad after", |d| d.angle_error_rad),
         ("position on orbit off after", |d| d.orbit_position_error),
@@ -165,10 +165,13 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
     recommend("a camera base", &report.recommended_rotation, out)
 }
 
+/// Title of a table of errors, and its cell.
+type Figure<T> = (&'static str, fn(&T) -> f64);
+
 fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
     let swing = format!("an eye carried around by {SWING_DEG:.3} degrees per step");
     writeln!(out, "Orbits: {swing}")?;
-    let figures: [(&str, fn(&OrbitDrift) -> f64); 2] = [
+    let figures: [Figure<OrbitDrift>; 2] = [
         ("position off after", |d| d.position_error),
         ("radius off after", |d| d.radius_error),
     ];

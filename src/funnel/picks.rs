@@ -132,7 +132,7 @@ impl<'w> Picks<'w> {
                 (surfaces.triangles.len(), build)
             }
         };
-        let mut built: Vec<((&str, &'static str, Guarantee), Rc<dyn Pick>)> = Vec::new();
+        let mut built = Vec::<(_, Rc<dyn Pick>)>::new();
         for row in BACK_ENDS {
             if row.name == "linear" && count > MOST_FOR_LOOP {
                 continue;

@@ -64,6 +64,7 @@ pub use bounds::{BOUNDS, Bound, Material};
 pub use cell::{CellTimes, ReportCell, SamplesRef};
 pub use cell_info::{PathInfo, SceneInfo};
 pub use clock::{Lap, Stopwatch};
+#[cfg(feature = "cli")]
 pub(crate) use count::blamed;
 pub use count::{Counted, Judged, count_pass, judge};
 pub use environment::{Machine, Source, Toolchain};

@@ -25,8 +25,8 @@ pub type OctreeTextbook = Textbook<OctreeCells>;
 /// "Visibility", "Region search"), over boxes.
 ///
 /// As in [`OctreeTextbook`], an item lies with the smallest cell that contains it. Cells
-/// are columns through the whole scene, over the two axes in which it is widest. O(log n
-/// + answers) per query where the scene is flat and items are small against their
+/// are columns through the whole scene, over the two axes in which it is widest. Takes
+/// O(log n + answers) per query where the scene is flat and items are small against their
 /// cells; nothing is culled by height.
 pub type QuadtreeTextbook = Textbook<QuadtreeCells>;
 

@@ -139,7 +139,6 @@ static LOWER: [u16; TOP + 1] = reachable(0);
 static UPPER: [u16; TOP + 1] = reachable(1);
 
 /// Table of open children for the lower (0) or the upper (1) side.
-
 const fn reachable(side: usize) -> [u16; TOP + 1] {
     let mut table = [0; TOP + 1];
     let mut planes = 0;

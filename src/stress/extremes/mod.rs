@@ -191,8 +191,10 @@ pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Cas
     let lens = lens.map_err(|error| error.to_string())?;
     let frame = pose.frame().map_err(|error| error.to_string())?;
     let camera = Camera { frame, lens };
-    let mut around = Surroundings::default();
-    around.origin = draft.origin;
+    let mut around = Surroundings {
+        origin: draft.origin,
+        ..Surroundings::default()
+    };
     let items = adversarial(rng, &camera, &around, draft.shapes, BOXES);
     let items = items.ok_or("a lens without corners")?;
     around.reach = Aabb::union_of(&items).reach();

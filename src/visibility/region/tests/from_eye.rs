@@ -175,7 +175,7 @@ fn openings_with_a_thickness_are_seen_through() {
             row.from_eye(&rays, &mut Scratch::default(), &mut out);
             out.len()
         };
-        rows(&graph).iter().map(|row| count(row)).collect()
+        rows(&graph).iter().map(&mut count).collect()
     };
     assert_eq!(answers(DVec3::X), [3, 3, 3]);
     assert_eq!(answers(DVec3::NEG_X), [1, 1, 1]);
