@@ -42,7 +42,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     let [low, high, origin] = [info.bounds_min, info.bounds_max, info.origin]
         .map(|v| format!("({}, {}, {})", v[0], v[1], v[2]));
     let mut rows = vec![
-        ("scene", text::plain(&info.name).into()),
+        ("scene", text::plain(&info.name)),
         ("items", text::count(info.total_count)),
         ("bounds", format!("{low} to {high}")),
         ("origin", origin),
@@ -87,10 +87,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         if !more.is_empty() {
             shown += &format!(", and {} more", text::count(more.len()));
         }
-        rows.push((
-            "label",
-            text::plain(&format!("{}: {shown}", labels.column)).into(),
-        ));
+        rows.push(("label", text::plain(&format!("{}: {shown}", labels.column))));
     }
     rows.push(("SHA-256", info.digest));
     let rows = rows
