@@ -25,6 +25,12 @@ pub struct StructureChoice {
     pub region_search_ties: Vec<String>,
     /// Fastest first; what failed comes last.
     pub rows: Vec<StructureRow>,
+    /// `true` if the one to take is a scan.
+    #[serde(skip)]
+    pub is_scan: bool,
+    /// `true` if scans and others were timed.
+    #[serde(skip)]
+    pub(super) is_open: bool,
 }
 
 /// A structure as measured.
@@ -98,7 +104,21 @@ impl StructureChoice {
             region_search: first_located.next(),
             region_search_ties: first_located.collect(),
             rows,
+            is_scan: false,
+            is_open: false,
         }
+    }
+
+    /// Notes the kinds of what was timed.
+    pub(super) fn note_kinds(&mut self, structures: &[StructureSpec]) {
+        let is_scan = |label: &str| {
+            let spec = structures.iter().find(|spec| spec.label == label);
+            spec.is_some_and(|spec| spec.info().kind == Kind::Scan)
+        };
+        self.is_scan = self.name.as_deref().is_some_and(is_scan);
+        let timed = self.rows.iter().filter(|row| row.query_ns.is_some());
+        let mut scans = timed.map(|row| is_scan(&row.structure));
+        self.is_open = scans.any(|scan| scan != self.is_scan);
     }
 
     /// The fastest tree or grid and the fastest scan, for the rules.

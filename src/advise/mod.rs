@@ -138,13 +138,14 @@ impl<'a> AdviseInput<'a> {
 /// A camera without a view, a scene that a structure of the rules refuses.
 pub fn prepare(
     input: &AdviseInput,
-    structure: StructureChoice,
+    mut structure: StructureChoice,
     stop: &dyn Fn() -> bool,
     progress: &dyn Fn(&str),
 ) -> Result<Option<Prepared>, AdviseError> {
     let AdviseInput { scene, path, .. } = *input;
     let workload = input.workload()?;
     let specs = structure.tree_and_scan(input.structures)?;
+    structure.note_kinds(input.structures);
     let structures = specs.each_ref().map(|spec| spec.label.clone());
     let case = Case::new(&workload, path, specs, input.options, input.protocol)?;
     let Some(mut entered) = Entered::new(&case, stop, progress)? else {
@@ -234,10 +235,10 @@ impl Prepared {
         let structure = std::mem::take(&mut advice.test.structure);
         advice.test = TestChoice::of(structure, draw_ns, &self.tests, answered, &times);
         let settled = self.rules.into_iter().map(|(rule, draft)| match draft {
-            Ok(draft) => rule.settled(draft, answered, &times, &advice.test),
+            Ok(draft) => rule.settled(draft, answered, &times, (&advice.structure, &advice.test)),
             Err(reason) => rule.not_applicable(reason),
         });
-        advice.omissions = settled.collect();
+        advice.omissions = settled.collect::<Vec<_>>();
         advice
     }
 }

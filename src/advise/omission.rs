@@ -11,9 +11,21 @@ pub struct Omission {
     pub rule: &'static str,
     /// The feature that is left out, in words.
     pub left_out: &'static str,
-    /// Advice if it is left out, and if it is kept.
+    /// Feature that is needed or not: `plane masks`.
     #[serde(skip)]
-    pub(super) advice: [&'static str; 2],
+    pub feature: &'static str,
+    /// `true` if the feature is what leaves out, not what is left out.
+    #[serde(skip)]
+    pub is_saving: bool,
+    /// Time kept and left out, with all that follows from it, ns.
+    #[serde(skip)]
+    pub cost_ns: Option<[f64; 2]>,
+    /// `true` if the processes do not tell these two apart.
+    #[serde(skip)]
+    pub is_tie: bool,
+    /// Assumption or error that decides, in a few words.
+    #[serde(skip)]
+    pub note: String,
     /// Name and unit of the statistic.
     pub statistic_name: &'static str,
     /// Null where the rule does not apply to this scene.
@@ -158,11 +170,11 @@ impl Check {
 }
 
 impl Omission {
-    /// Advice in words; `None` where the rule does not apply.
-    pub fn advice(&self) -> Option<&'static str> {
+    /// Returns `true` if the feature is needed; `None` where the rule does not apply.
+    pub fn is_needed(&self) -> Option<bool> {
         match self.decision {
-            Decision::LeaveOut => Some(self.advice[0]),
-            Decision::Keep => Some(self.advice[1]),
+            Decision::LeaveOut => Some(self.is_saving),
+            Decision::Keep => Some(!self.is_saving),
             Decision::NotApplicable => None,
         }
     }
@@ -179,6 +191,7 @@ impl Omission {
                 leave_out = false;
                 self.reason
                     .push_str("; left out, something that is seen would be missed");
+                self.note = "without, items are missed".to_owned();
             }
         }
         self.decision = Decision::of(leave_out);

@@ -1,7 +1,7 @@
 //! A rule of omission: its declaration, both sides as tasks, and the omission that
 //! follows from the facts.
 
-use super::choice::TestChoice;
+use super::choice::{StructureChoice, TestChoice};
 use super::omission::{By, Check, Decision, LeftOutIf, Omission};
 use super::options::AdviseError;
 use super::trials::{Answered, Sides, Trials};
@@ -12,8 +12,10 @@ use crate::statistics::Estimate;
 pub struct Rule {
     pub name: &'static str,
     pub left_out: &'static str,
-    /// Advice if it is left out, and if it is kept.
-    pub advice: [&'static str; 2],
+    /// Feature that is needed or not, as the terminal names it.
+    pub feature: &'static str,
+    /// `true` if the feature is what leaves out, not what is left out.
+    pub is_saving: bool,
     pub statistic_name: &'static str,
     pub left_out_if: LeftOutIf,
     pub by: By,
@@ -38,6 +40,9 @@ pub fn not_applicable(reason: impl ToString) -> Unfit {
     Unfit::NotApplicable(reason.to_string())
 }
 
+/// Structure and test to take.
+type Choice<'f> = (&'f StructureChoice, &'f TestChoice);
+
 /// Measured facts of a rule.
 pub struct Facts<'f> {
     pub checks: Vec<Check>,
@@ -47,6 +52,7 @@ pub struct Facts<'f> {
     pub once_ns: [f64; 2],
     /// Time of the second of these / time of the first.
     pub once_ratio: Option<Estimate>,
+    pub structure: &'f StructureChoice,
     pub test: &'f TestChoice,
 }
 
@@ -65,6 +71,11 @@ pub struct Finding {
     /// Statistic and threshold, unless the rule does not apply.
     pub compared: Option<[f64; 2]>,
     pub saving: Option<f64>,
+    /// Time with and without, where more than the first check counts, ns.
+    pub cost_ns: Option<[f64; 2]>,
+    pub is_tie: Option<bool>,
+    /// Assumption or error that decides, in at most 30 characters.
+    pub note: String,
     /// Prediction that replaces that of the statistic.
     pub predicted: Option<bool>,
     pub confirmed: Option<bool>,
@@ -79,6 +90,18 @@ impl Finding {
             compared: Some([statistic, threshold]),
             ..Finding::default()
         }
+    }
+
+    pub fn noted(mut self, note: String) -> Finding {
+        self.note = note;
+        self
+    }
+
+    /// The finding with the cost of both sides, drawing or updates included.
+    pub fn costing(mut self, [kept, left_out]: [f64; 2]) -> Finding {
+        self.saving = Some(1.0 - left_out / kept).filter(|saving| saving.is_finite());
+        self.cost_ns = Some([kept, left_out]);
+        self
     }
 }
 
@@ -119,7 +142,7 @@ impl Draft {
         &mut self,
         answered: &Answered,
         times: &OverProcesses,
-        test: &'f TestChoice,
+        choice: Choice<'f>,
     ) -> Facts<'f> {
         let sides = std::mem::take(&mut self.sides).into_iter();
         let ratio = |&[a, b]: &[usize; 2]| times.ratio(a, b).map_or(f64::NAN, |r| r.value);
@@ -131,7 +154,8 @@ impl Draft {
             once_ratio: self
                 .once
                 .and_then(|first| times.once_ratio(first + 1, first)),
-            test,
+            structure: choice.0,
+            test: choice.1,
         }
     }
 }
@@ -152,9 +176,9 @@ impl Rule {
         mut draft: Draft,
         answered: &Answered,
         times: &OverProcesses,
-        test: &TestChoice,
+        choice: Choice,
     ) -> Omission {
-        let facts = draft.facts(answered, times, test);
+        let facts = draft.facts(answered, times, choice);
         let finding = (draft.conclude)(&facts);
         self.omission(finding, facts.checks)
     }
@@ -165,10 +189,19 @@ impl Rule {
         let predicted = finding.compared.and_then(|both| is_left_out.holds(both));
         let predicted = finding.predicted.or(predicted);
         let [statistic, threshold] = [0, 1].map(|i| finding.compared.map(|both| both[i]));
+        let first = checks.first();
         let mut omission = Omission {
             rule: self.name,
             left_out: self.left_out,
-            advice: self.advice,
+            feature: self.feature,
+            is_saving: self.is_saving,
+            cost_ns: finding
+                .cost_ns
+                .or(first.map(|c| [c.kept_ns, c.left_out_ns])),
+            is_tie: finding
+                .is_tie
+                .unwrap_or(finding.cost_ns.is_none() && first.is_some_and(|c| c.pays.is_none())),
+            note: finding.note,
             statistic_name: self.statistic_name,
             statistic: statistic.filter(|x| x.is_finite()),
             threshold: threshold.filter(|x| x.is_finite()),
@@ -194,7 +227,8 @@ pub fn some_rule(left_out_if: LeftOutIf, by: By) -> Rule {
     Rule {
         name: "rule",
         left_out: "something",
-        advice: ["", ""],
+        feature: "something",
+        is_saving: false,
         statistic_name: "its size",
         left_out_if,
         by,

@@ -68,7 +68,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let step = "with and without every rule";
     let times = study.times(step, setting.path.lens_scale, trials)?;
     let advice = prepared.conclude(&times);
-    print(args.format, &advice, || show(&advice))?;
+    print(args.format, &advice, || show(&advice, args.all_columns))?;
     Ok(Ending::of(!advice.found_wrong_answers()))
 }
 
@@ -145,24 +145,190 @@ fn options(args: &AdviseArgs) -> AdviseOptions {
     }
 }
 
-fn show(advice: &Advice) -> io::Result<()> {
+/// The advice, and before it the evidence where it is wanted.
+fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
     let mut out = text::terminal();
-    writeln!(
-        out,
-        "{}: {}; {}: {}; {}",
+    let say =
+        |out: &mut dyn Write, line: &str| writeln!(out, "{}", text::wrapped(line, text::width()));
+    let head = format!(
+        "{}: {}; {}: {}\n{}\n",
         text::plain(&advice.scene),
         text::counted(advice.items, "item"),
         text::plain(&advice.path),
         text::counted(advice.cameras, "camera"),
         text::over(advice.processes, advice.twin.as_ref())
-    )?;
-    writeln!(out, "\nStructures, all answers checked:")?;
-    writeln!(out, "{}", structure_table(&advice.structure))?;
+    );
+    say(&mut out, &head)?;
+    if all_columns {
+        show_evidence(&mut out, advice)?;
+    }
     for row in &advice.structure.rows {
         if let Some(reason) = &row.reason {
-            writeln!(out, "{}: {}: {reason}", row.structure, row.status)?;
+            say(
+                &mut out,
+                &format!("{}: {}: {reason}", row.structure, row.status),
+            )?;
         }
     }
+    say(&mut out, &(taken(advice) + "\n"))?;
+    write!(
+        out,
+        "{}",
+        rule_table(advice)
+            .within(text::width(), &["gain", "cost", ""])
+            .bare()
+    )?;
+    let rules = || advice.omissions.iter();
+    let reasons: Vec<String> = rules()
+        .filter_map(|omission| {
+            Some(format!(
+                "{} ({})",
+                omission.feature,
+                not_for(advice, omission)?
+            ))
+        })
+        .collect();
+    if !reasons.is_empty() {
+        say(&mut out, &format!("Does not apply: {}", reasons.join(", ")))?;
+    }
+    let wrong = rules().filter(|rule| rule.checks.iter().any(Check::is_wrong));
+    for omission in wrong {
+        say(
+            &mut out,
+            &format!(
+                "WRONG: {}: answers with and without differ",
+                omission.feature
+            ),
+        )?;
+    }
+    let contradicted = rules().filter(|rule| rule.confirmed == Some(false));
+    let contradicted: Vec<&str> = contradicted.map(|rule| rule.feature).collect();
+    if !contradicted.is_empty() {
+        let names = contradicted.join(", ");
+        say(
+            &mut out,
+            &format!("\nPredicted otherwise, decided as measured: {names}"),
+        )?;
+    }
+    if !all_columns {
+        say(&mut out, "\nevidence: --all-columns")?;
+    }
+    out.flush()
+}
+
+/// Structure and test to take, in a sentence.
+fn taken(advice: &Advice) -> String {
+    let choice = &advice.structure;
+    let Some(name) = &choice.name else {
+        return "No structure answered right".to_owned();
+    };
+    let row = choice.rows.iter().find(|row| row.structure == *name);
+    let next = choice.rows.iter().find(|row| {
+        row.query_ns.is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
+    });
+    let faster = next.and_then(|next| {
+        let times = text::significant(next.query_ns? / row?.query_ns?);
+        Some(format!("{times} x {}, the next", next.structure))
+    });
+    let linear = row.and_then(|row| row.speedup).filter(|_| !choice.is_scan);
+    let linear = linear.map(|times| format!("{} x linear", text::significant(times)));
+    let figures: Vec<String> = linear.into_iter().chain(faster).collect();
+    let figures = match figures.is_empty() {
+        true => String::new(),
+        false => format!(" ({})", figures.join(", ")),
+    };
+    let test = some(advice.test.name, |test| {
+        format!(", test {test}{}", ties(&advice.test.ties))
+    });
+    let repaid = some(row.and_then(|row| row.break_even_queries), |n| {
+        format!(
+            " Its build is repaid after {}.",
+            text::counted(n as usize, "query")
+        )
+    });
+    let search = some(choice.region_search.as_ref(), |name| {
+        format!(
+            " For region search: {name}{}.",
+            ties(&choice.region_search_ties)
+        )
+    });
+    format!(
+        "Take structure {name}{figures}{}{test}.{repaid}{search}",
+        ties(&choice.ties)
+    )
+}
+
+/// Reason for which a feature is neither needed nor not needed.
+fn not_for(advice: &Advice, omission: &Omission) -> Option<String> {
+    let of_nodes = ["plane-masks", "third-dimension", "rebuild"].contains(&omission.rule);
+    match omission.is_needed() {
+        None => Some(omission.reason.clone()),
+        Some(_) if of_nodes && advice.structure.is_scan => advice
+            .structure
+            .name
+            .as_ref()
+            .map(|name| format!("{name} has no nodes")),
+        Some(_) => None,
+    }
+}
+
+/// Features that are needed and those that are not, with the cost of both.
+fn rule_table(advice: &Advice) -> Table {
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    for (needed, title) in [(true, "Needed"), (false, "Not needed")] {
+        let rules = advice
+            .omissions
+            .iter()
+            .filter(|rule| rule.is_needed() == Some(needed) && not_for(advice, rule).is_none());
+        let of_rules = rules.map(|rule| {
+            let mut sides = rule.cost_ns.unwrap_or([f64::NAN; 2]);
+            if rule.is_saving {
+                sides.reverse();
+            }
+            let [with, without] = sides;
+            let ratio = if needed {
+                without / with
+            } else {
+                with / without
+            };
+            let shown = |ns: f64| some(Some(ns).filter(|ns| ns.is_finite()), text::time);
+            let ratio = match rule.is_tie && advice.processes >= 3 {
+                true => "tie".to_owned(),
+                false => some(Some(ratio).filter(|x| x.is_finite()), |x| {
+                    format!("{} x", text::significant(x))
+                }),
+            };
+            vec![
+                format!("  {}", rule.feature),
+                shown(with),
+                shown(without),
+                ratio,
+                rule.note.clone(),
+            ]
+        });
+        let of_rules: Vec<_> = of_rules.collect();
+        if !of_rules.is_empty() {
+            let ratio = if needed { "gain" } else { "cost" };
+            rows.push(
+                [title, "with", "without", ratio, ""]
+                    .map(str::to_owned)
+                    .into(),
+            );
+            rows.extend(of_rules);
+        }
+    }
+    let mut table = Table::of("Rule | >with | >without | >x | ");
+    if !rows.is_empty() {
+        table.header = rows.remove(0);
+    }
+    table.rows = rows;
+    table
+}
+
+/// Every structure, test and rule with its times.
+fn show_evidence(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
+    writeln!(out, "\nStructures, all answers checked:")?;
+    writeln!(out, "{}", structure_table(&advice.structure))?;
     writeln!(
         out,
         "\nCulling tests on {}, with {} ns to draw an item that cannot be seen:",
@@ -188,46 +354,7 @@ fn show(advice: &Advice) -> io::Result<()> {
             omission.rule, omission.reason
         )?;
     }
-    show_advice(&mut out, advice)?;
-    out.flush()
-}
-
-/// The advice in a few lines.
-fn show_advice(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
-    writeln!(out, "\nAdvice:")?;
-    let choice = &advice.structure;
-    let Some(name) = &choice.name else {
-        return writeln!(out, "  no structure answered right");
-    };
-    let row = choice.rows.first();
-    let times = some(row.and_then(|row| row.speedup), |times| {
-        format!(", {} x linear", text::significant(times))
-    });
-    let repaid = some(row.and_then(|row| row.break_even_queries), |n| {
-        let queries = text::counted(n as usize, "query");
-        format!("; its build is repaid after {queries}")
-    });
-    writeln!(
-        out,
-        "  structure: {name}{times}{}{repaid}",
-        ties(&choice.ties)
-    )?;
-    if let Some(name) = &choice.region_search {
-        writeln!(
-            out,
-            "  region search: {name}{}",
-            ties(&choice.region_search_ties)
-        )?;
-    }
-    if let Some(test) = advice.test.name {
-        writeln!(out, "  test: {test}{}", ties(&advice.test.ties))?;
-    }
-    for omission in &advice.omissions {
-        if let Some(told) = omission.advice() {
-            writeln!(out, "  {}: {told}", omission.rule)?;
-        }
-    }
-    Ok(())
+    writeln!(out)
 }
 
 fn ties(names: &[impl AsRef<str>]) -> String {

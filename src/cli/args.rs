@@ -331,6 +331,9 @@ pub struct AdviseArgs {
     /// Queries between two updates
     #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = values::at_least_zero)]
     pub queries_per_update: f64,
+    /// Show the evidence too: every structure, test and rule with its times
+    #[arg(long)]
+    pub all_columns: bool,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
 }

@@ -343,24 +343,41 @@ fn bad_items_that_are_left_out_are_in_the_result() {
 }
 
 #[test]
-fn the_table_ends_with_the_advice() {
-    let table = works(Path::new("."), &format!("{SMALL} 1"));
+fn the_advice_fits_eighty_columns_and_the_evidence_is_asked_for() {
+    let line = format!("{SMALL} 1");
+    let told = works(Path::new("."), &line);
     assert!(
-        table.contains("1 process: times without intervals"),
-        "{table}"
+        told.contains("1 process: times without intervals"),
+        "{told}"
     );
-    assert!(!table.contains('\u{1b}'), "{table}");
-    let (_, advice) = table.split_once("\nAdvice:\n").expect("the advice");
+    assert!(
+        told.lines().all(|line| line.chars().count() <= 80),
+        "{told}"
+    );
     for part in [
-        "  structure: ",
-        "  region search: ",
-        "  test: ",
-        "  no-index: ",
+        "\nTake structure ",
+        ", test ",
+        "For region search: ",
+        "\n  index  ",
     ] {
-        assert!(advice.contains(part), "{part}: {advice}");
+        assert!(told.contains(part), "{part}: {told}");
     }
+    // What is assumed stands in its line.
+    let culling = told.lines().find(|line| line.contains("occlusion culling"));
+    assert!(
+        culling.is_some_and(|line| line.contains("1000 ns/item")),
+        "{told}"
+    );
+    for word in ["leave out", "keep"] {
+        assert!(!told.contains(word), "{word}: {told}");
+    }
+    let all = works(Path::new("."), &format!("{line} --all-columns"));
+    assert!(
+        !all.contains('\u{1b}') && all.contains("\nTake structure "),
+        "{all}"
+    );
     for name in set(RULES) {
-        assert!(table.contains(&format!("\n  {name}: ")), "{name}");
+        assert!(all.contains(&format!("\n  {name}: ")), "{name}");
     }
 }
 

@@ -22,10 +22,8 @@ use crate::visibility::triangle::{
 pub(super) const RULE: Rule = Rule {
     name: "cones",
     left_out: "normal cones of clusters of triangles",
-    advice: [
-        "no normal cones: draw every triangle of what is left",
-        "cull clusters that face away by their normal cones",
-    ],
+    feature: "normal cones",
+    is_saving: false,
     statistic_name: "share of the triangles of the items in the view whose cluster faces away",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,

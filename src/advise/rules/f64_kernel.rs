@@ -10,7 +10,8 @@ use crate::culling::{Arithmetic, Culling, CullingTest};
 pub(super) const RULE: Rule = Rule {
     name: "f64-kernel",
     left_out: "the plane test in f64",
-    advice: ["f32 plane tests are enough", "use f64 plane tests"],
+    feature: "double precision",
+    is_saving: false,
     statistic_name: "margin for rounding to f32 / depth of the view",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,
@@ -32,6 +33,6 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let sides = Sides::new(&case.spec.label, kept, BASE);
     Ok(Draft::new(
         vec![sides],
-        Finding::new(margin, tolerance, reason),
+        Finding::new(margin, tolerance, reason).noted(format!("f32 errs by {margin:.0e} of depth")),
     ))
 }

@@ -3,17 +3,15 @@
 //! three-dimensional either way.
 
 use super::super::choice::named;
-use super::super::omission::{By, LeftOutIf};
+use super::super::omission::{By, Decision, LeftOutIf};
 use super::super::rule::{Draft, Finding, Rule, Unfit};
 use super::super::trials::{Sides, Trials};
 
 pub(super) const RULE: Rule = Rule {
     name: "third-dimension",
     left_out: "the third dimension of cells",
-    advice: [
-        "two-dimensional cells are enough",
-        "use three-dimensional cells",
-    ],
+    feature: "third dimension",
+    is_saving: false,
     statistic_name: "height of the scene",
     left_out_if: LeftOutIf::AtMost,
     by: By::Time,
@@ -38,5 +36,15 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
         .map(|index| trials.index(index, case.views()));
     let sides = Sides::same("octree against quadtree", kept, left_out);
-    Ok(Draft::new(vec![sides], Finding::new(height, cell, reason)))
+    Ok(Draft::concluded(vec![sides], move |facts| {
+        let taken = facts.structure.name.as_deref().unwrap_or_default();
+        let flat = taken.starts_with("quadtree");
+        let is_either = flat || taken.starts_with("octree");
+        Finding {
+            saving: facts.saving(),
+            decision: is_either.then_some(Decision::of(flat)),
+            note: "octree against quadtree".to_owned(),
+            ..Finding::new(height, cell, reason)
+        }
+    }))
 }

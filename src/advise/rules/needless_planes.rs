@@ -15,10 +15,8 @@ use crate::shown::counted;
 pub(super) const RULE: Rule = Rule {
     name: "needless-planes",
     left_out: "planes that the whole scene is inside of",
-    advice: [
-        "skip the planes that the whole scene is inside of",
-        "test every plane: the scene reaches beyond them",
-    ],
+    feature: "every plane",
+    is_saving: false,
     statistic_name: "share of all planes that the n-vertex of the scene's bounds is inside of",
     left_out_if: LeftOutIf::AtLeast,
     by: By::Time,
@@ -58,7 +56,11 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
         Sides::same(&case.spec.label, BASE, on_tree),
         Sides::same(&case.scan.label, kept, left_out),
     ];
-    Ok(Draft::new(sides, Finding::new(share, THRESHOLD, reason)))
+    Ok(Draft::new(
+        sides,
+        Finding::new(share, THRESHOLD, reason)
+            .noted(format!("scene is inside {:.0} % of them", share * 100.0)),
+    ))
 }
 
 /// The volume without planes that contain the bounds: whatever lies within the

@@ -2,7 +2,7 @@
 //! crossover is measured on evenly spread parts of the scene, by the path's own
 //! cameras, side by side with everything else.
 
-use super::super::omission::{By, LeftOutIf};
+use super::super::omission::{By, Decision, LeftOutIf};
 use super::super::rule::{Draft, Finding, Rule, Unfit};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::geometry::Aabb;
@@ -10,7 +10,8 @@ use crate::geometry::Aabb;
 pub(super) const RULE: Rule = Rule {
     name: "no-index",
     left_out: "the index itself",
-    advice: ["no index: a scan is fast enough", "an index pays off"],
+    feature: "index",
+    is_saving: false,
     statistic_name: "items",
     left_out_if: LeftOutIf::AtMost,
     by: By::Time,
@@ -52,9 +53,16 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
             .map(|(count, ratio)| format!("{ratio:.2} at {count}"));
         let ratios = ratios.collect::<Vec<_>>().join(", ");
         let reason = format!("time of {names} on parts of the scene: {ratios}");
+        let (taken, crossing) = (facts.structure, items_at(&parts));
         Finding {
             saving: facts.saving(),
-            ..Finding::new(all, items_at(&parts), reason)
+            // As the structure taken, wherever there was a choice.
+            decision: taken.is_open.then_some(Decision::of(taken.is_scan)),
+            note: match crossing {
+                0.0 => "a scan is never as fast".to_owned(),
+                _ => format!("a scan wins up to {crossing:.0} items"),
+            },
+            ..Finding::new(all, crossing, reason)
         }
     });
     draft.pairs = pairs;

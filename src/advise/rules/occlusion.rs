@@ -12,10 +12,8 @@ use crate::visibility::SampleGrid;
 pub(super) const RULE: Rule = Rule {
     name: "occlusion",
     left_out: "occlusion culling",
-    advice: [
-        "no occlusion culling: too little is hidden",
-        "cull what is hidden (masked-inner)",
-    ],
+    feature: "occlusion culling",
+    is_saving: false,
     statistic_name: "share of the items in the view that others hide",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,
@@ -25,7 +23,8 @@ pub(super) const RULE: Rule = Rule {
 pub(super) const BUFFER_RULE: Rule = Rule {
     name: "occlusion-buffer",
     left_out: "half of the occlusion buffer's columns and rows",
-    advice: ["a buffer of 160x90 is enough", "use a buffer of 320x180"],
+    feature: "320x180 buffer",
+    is_saving: false,
     statistic_name: "share of the items left by 160x90 that 320x180 removes as well",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,

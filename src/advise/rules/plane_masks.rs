@@ -15,10 +15,8 @@ use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume
 pub(super) const RULE: Rule = Rule {
     name: "plane-masks",
     left_out: "tests of planes that a node above is inside of (by masks)",
-    advice: [
-        "use plane masking",
-        "do without plane masking: it saves too little",
-    ],
+    feature: "plane masks",
+    is_saving: true,
     statistic_name: "share of the plane tests that masks save",
     left_out_if: LeftOutIf::AtLeast,
     by: By::Time,
@@ -52,7 +50,9 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     };
     if all > 0 {
         let reason = format!("{fewer} plane tests with masks, {all} without");
-        finding = Finding::new(1.0 - fewer as f64 / all as f64, THRESHOLD, reason);
+        let saved = 1.0 - fewer as f64 / all as f64;
+        finding = Finding::new(saved, THRESHOLD, reason)
+            .noted(format!("save {:.0} % of plane tests", saved * 100.0));
     }
     let (other, views) = (tree.clone(), volumes.clone());
     let kept = trials.judged(move |n, out| see(kernel, &other, &Unmasked(&views[n]), out));

@@ -14,10 +14,8 @@ use crate::scene::{Scene, WorldBox};
 pub(super) const RULE: Rule = Rule {
     name: "rebasing",
     left_out: "rebasing the scene",
-    advice: [
-        "no need to rebase the scene",
-        "rebase the scene: move its origin to its middle",
-    ],
+    feature: "rebasing",
+    is_saving: false,
     statistic_name: "margin for rounding in world coordinates / depth of the view",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,
@@ -55,7 +53,8 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
         }
     );
     let sides = Sides::new(&case.spec.label, sides[0], sides[1]);
-    let finding = Finding::new(margin, case.options.tolerance, reason);
+    let finding = Finding::new(margin, case.options.tolerance, reason)
+        .noted(format!("f32 errs by {margin:.0e} of depth"));
     Ok(Draft::new(vec![sides], finding))
 }
 

@@ -10,10 +10,8 @@ use crate::measure::{Stopwatch, input_of, move_share};
 pub(super) const RULE: Rule = Rule {
     name: "rebuild",
     left_out: "a rebuild after items have moved",
-    advice: [
-        "refit after items have moved, do not rebuild",
-        "rebuild after items have moved",
-    ],
+    feature: "rebuilds",
+    is_saving: false,
     statistic_name: "what queries on the refitted tree cost more until the next update, ns",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,
@@ -55,10 +53,9 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
             refit_ns / 1e3,
             rebuild_ns / 1e3
         );
-        Finding {
-            saving: Some(1.0 - left_out / kept).filter(|saving| saving.is_finite()),
-            ..Finding::new(slower, rebuild_ns - refit_ns, reason)
-        }
+        Finding::new(slower, rebuild_ns - refit_ns, reason)
+            .noted(format!("{} % moved, {queries} queries each", share * 100.0))
+            .costing([kept, left_out])
     });
     draft.once = Some(trials.once_ns.len());
     trials.once_ns.extend([refit_ns, rebuild_ns]);

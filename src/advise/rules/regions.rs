@@ -16,10 +16,8 @@ use crate::visibility::region::{EyePlace, IdSet, Scratch, seen_by_samples};
 pub(super) const RULE: Rule = Rule {
     name: "regions",
     left_out: "the region stage (portals)",
-    advice: [
-        "no region stage: portals close off too little",
-        "find the regions that are seen before their items (portal-clip)",
-    ],
+    feature: "portals",
+    is_saving: false,
     statistic_name: "share of the items in the view that lie in no region that is seen",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,

@@ -54,11 +54,22 @@ impl Removal {
         );
         let kept = check.kept_ns + with * cost_ns;
         let left_out = check.left_out_ns + without * cost_ns;
+        let short = |ns: f64| format!("{ns:.*}", if ns < 10.0 { 2 } else { 0 });
+        let note = format!(
+            "{} ns/{}{}",
+            (cost_ns * 1e1).round() / 1e1,
+            one.trim_start_matches("shaded "),
+            match testing > 0.0 && removed > 0.0 {
+                true => format!(", pays from {}", short(testing / removed)),
+                false => String::new(),
+            }
+        );
         let is_known = self.predicted.is_finite() && pays.is_finite();
         Finding {
-            saving: Some(1.0 - left_out / kept).filter(|saving| saving.is_finite()),
             confirmed: is_known.then_some((self.predicted <= pays) == (share <= pays)),
             ..Finding::new(share, pays, reason)
+                .noted(note)
+                .costing([kept, left_out])
         }
     }
 }

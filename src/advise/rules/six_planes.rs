@@ -12,10 +12,8 @@ use crate::culling::{Culling, CullingTest};
 pub(super) const RULE: Rule = Rule {
     name: "six-planes",
     left_out: "axes beyond the six planes",
-    advice: [
-        "six planes are enough",
-        "use the exact test (separating axes): six planes are not enough",
-    ],
+    feature: "axes beyond planes",
+    is_saving: false,
     statistic_name: "cost of drawing what six planes let through, ns a query",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,
@@ -54,10 +52,9 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
                 false => String::new(),
             }
         );
-        let finding = Finding {
-            saving: Some(1.0 - left_out / check.kept_ns).filter(|saving| saving.is_finite()),
-            ..Finding::new(drawing, testing, reason)
-        };
+        let finding = Finding::new(drawing, testing, reason)
+            .noted(format!("with {draw_ns} ns/item drawn"))
+            .costing([check.kept_ns, left_out]);
         following(finding, facts.test)
     }))
 }
@@ -77,8 +74,18 @@ fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
         tests.iter().any(|test| test.name() == name)
     };
     let kept = with_axes(taken);
+    // The side taken by its test, the other by its best.
+    let total = |with: bool| {
+        let rows = choice.rows.iter().filter(|row| with_axes(row.test) == with);
+        let rows = rows.filter(|row| with != kept || row.test == taken);
+        rows.filter_map(|row| row.total_ns).min_by(f64::total_cmp)
+    };
+    finding.cost_ns = total(true)
+        .zip(total(false))
+        .map(|(with, without)| [with, without]);
     let is_tie = choice.ties.iter().any(|name| with_axes(name) != kept);
     finding.decision = Some(Decision::of(!kept));
+    finding.is_tie = Some(is_tie);
     finding.confirmed = (!is_tie).then_some(predicted != kept);
     finding.reason += &match is_tie {
         true => format!("; a tie, {taken} is the simplest"),

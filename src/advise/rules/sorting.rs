@@ -23,10 +23,8 @@ use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 pub(super) const RULE: Rule = Rule {
     name: "sorting",
     left_out: "sorting what is left from front to back",
-    advice: [
-        "no sorting: draw in the order of the tree",
-        "sort what is left from front to back",
-    ],
+    feature: "depth sorting",
+    is_saving: false,
     statistic_name: "share of the shaded fragments that an early z-test saves once items are sorted",
     left_out_if: LeftOutIf::AtMost,
     by: By::Rule,
