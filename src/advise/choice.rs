@@ -432,6 +432,8 @@ mod tests {
             region_search_ties: Vec::new(),
             region_search: None,
             rows: Vec::new(),
+            is_scan: false,
+            is_open: false,
         };
         let structures = Registry::builtin()
             .structures("octree,linear-scalar")
