@@ -135,7 +135,7 @@ fn every_rule_is_there_once_with_both_sides_checked() {
                 .contains(&omission["decision"])
         );
         // Where nothing but time differs and it differs by far, the clock decides.
-        let by_time = set("needless-planes plane-masks no-index third-dimension").contains(name);
+        let by_time = set("needless-planes plane-masks third-dimension").contains(name);
         if let Some(check) = array(omission, "checks").first().filter(|_| by_time) {
             let (lower, upper) = (number(check, "ratio_lower"), number(check, "ratio_upper"));
             if lower > 1.2 || upper < 0.8 {
@@ -165,6 +165,26 @@ fn every_rule_is_there_once_with_both_sides_checked() {
     };
     for name in "needless-planes plane-masks no-index sorting third-dimension rebuild".split(' ') {
         assert!(expected(name), "{name}");
+    }
+}
+
+#[test]
+fn index_and_third_dimension_follow_the_structure_taken() {
+    for (scene, structures) in [
+        ("uniform:n=900", "linear,octree"),
+        ("uniform:n=900", "linear,quadtree"),
+        ("uniform:n=8", "linear,octree-textbook"),
+    ] {
+        let line = format!("advise --scene {scene} --path orbit:frames=4 --structure {structures}");
+        let advice = advice(Path::new("."), &line);
+        let taken = advice["structure"]["name"].as_str().expect("a structure");
+        let index = &rule(&advice, "no-index")["decision"];
+        let third = &rule(&advice, "third-dimension")["decision"];
+        match taken {
+            "linear" => assert_eq!(index, "leave_out", "{advice}"),
+            "quadtree" => assert_eq!([index, third], ["keep", "leave_out"], "{advice}"),
+            _ => assert_eq!([index, third], ["keep", "keep"], "{advice}"),
+        }
     }
 }
 

@@ -54,7 +54,11 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
             rebuild_ns / 1e3
         );
         Finding::new(slower, rebuild_ns - refit_ns, reason)
-            .noted(format!("{} % moved, {queries} queries each", share * 100.0))
+            .noted(format!(
+                "{} % moved, {queries} {} each",
+                share * 100.0,
+                if queries == 1.0 { "query" } else { "queries" }
+            ))
             .costing([kept, left_out])
     });
     draft.once = Some(trials.once_ns.len());
