@@ -201,7 +201,8 @@ fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
             ),
         )?;
     }
-    let contradicted = rules().filter(|rule| rule.confirmed == Some(false));
+    let contradicted =
+        rules().filter(|rule| rule.confirmed == Some(false) && not_for(advice, rule).is_none());
     let contradicted: Vec<&str> = contradicted.map(|rule| rule.feature).collect();
     if !contradicted.is_empty() {
         let names = contradicted.join(", ");
