@@ -90,7 +90,7 @@ fn an_order_that_cuts_too_much_is_left_out_and_says_why() {
         (&"orders".into(), &"bsp".into())
     );
     let reason = row["reason"].as_str().expect("a reason");
-    assert!(reason.contains("samples to be drawn in a view"), "{reason}");
+    assert!(reason.contains("samples drawn in a view"), "{reason}");
     let orders = array(&report, "orders");
     assert!(orders.iter().all(|order| order["name"] != "bsp") && orders.len() >= 4);
     for order in orders {

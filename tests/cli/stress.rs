@@ -85,7 +85,7 @@ fn extremes_are_generated_from_a_seed() {
         assert!(rows.iter().any(|row| of(&row)), "{family}");
     }
     let table = works(Path::new("."), "stress --cases 1 --structure linear");
-    let boxes = "151,552 boxes judged at camera level";
+    let boxes = "151,552 boxes checked at camera level";
     assert!(
         table.contains(boxes)
             && table.contains("no false negatives and no dropped boundary contacts"),
