@@ -93,9 +93,9 @@ impl Duel<'_> {
         let mut rng = Pcg64::seed_from_u64(self.plan.seed);
         let mut pairs = 0;
         loop {
-            let is_last = pairs == most;
-            let is_look = pairs >= first && (pairs - first).is_multiple_of(MORE);
-            if (is_look && judge_cells(&mut cells, self.threshold)) || is_last {
+            let is_due = pairs >= first && (pairs - first).is_multiple_of(MORE);
+            let is_look = is_due || pairs == most;
+            if is_look && (judge_cells(&mut cells, self.threshold) || pairs == most) {
                 let mut known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
                 let query = known.find_map(|known| known.query.as_ref());
                 return Ok(Against {

@@ -39,7 +39,7 @@ pub fn conclusion(report: &Report) -> String {
         "95 % intervals over {}{few}; A/A check: {} of {} intervals contain 1",
         of_planned(format!("{least} processes")),
         twins.clone().filter(|holds| *holds).count(),
-        counted(twins.count(), "comparison")
+        count(twins.count())
     )
 }
 
