@@ -113,17 +113,21 @@ pub struct ListArgs {
 }
 
 const RUN_HELP: &str = "\
-Columns of the tables:
-  query           CPU time of one frustum query, with its 95 % interval over the
-                  processes
+One scene and path: a row per structure. Several: a row per scene and path with
+the speed-up of each structure, and the geometric means. Columns that are wider
+than the terminal (80 characters in a pipe) are left to --all-columns.
+  time per query  CPU time of one frustum query; ±: 95 % interval over processes
+  vs linear       time of linear / time of the structure; where linear has no
+                  times, the slowest structure stands in its place
   p95             95th percentile over groups of cameras, given twenty
                   comparable groups
-  speed-up        time of linear / time of the structure
-  / read          time / time of reading the bounds of all items once
-                  (bound-read)
+  / read          time / time of reading the bounds of all items (bound-read)
+  / copy          time / time of copying the answer (bound-memcpy)
+  / replay        time / time of reading and copying what wide does
   locate          time of one region search
-  query after 32  query time after 32 updates of 1 % / query time of a fresh
-                  build
+  update of 1 %   time of an update after 1 % of the items have moved
+  query after 32  query time after 32 such updates / query time of a fresh build
+  repaid after    queries after which the build is repaid against linear
 Structures share a rank if their times do not differ significantly.";
 
 #[derive(Args, Debug)]
@@ -143,6 +147,9 @@ pub struct RunArgs {
     /// suite's]
     #[arg(long, value_name = "N", value_parser = values::whole(1..=1000u32))]
     pub processes: Option<u32>,
+    /// Show every column and every scene and path, in several tables if need be
+    #[arg(long)]
+    pub all_columns: bool,
     /// Print the cells as JSON lines instead of measuring them
     #[arg(long, conflicts_with = "resume")]
     pub plan: bool,

@@ -8,8 +8,9 @@ use anyhow::Context;
 use super::args::MergeArgs;
 use super::report::page;
 use super::run_resume::same_recorded;
-use super::{Ending, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine};
-use crate::report::{Stream, merge as join, read_stream, save_page};
+use super::run_table::{show, show_written};
+use super::{Ending, expect_folder, interrupt, tell, text, unread_is_fine};
+use crate::report::{Report, Stream, merge as join, read_stream, save_page};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     expect_folder("--out", Some(&args.out))?;
@@ -31,21 +32,22 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     }
     let report = merged.stream.report();
     save_page(&args.out, &page(&report))?;
-    unread_is_fine(surface_tables::show(&report))?;
-    unread_is_fine(close(args, report.cells.len()))?;
+    unread_is_fine(show(&report, false))?;
+    unread_is_fine(close(args, &report))?;
     let failed = report.has_failed();
     Ok(Ending::of(!failed))
 }
 
-fn close(args: &MergeArgs, cells: usize) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    writeln!(
-        out,
-        "{} of {}\n{}/{{report.html, report.json, summary.csv, samples.csv, stream.jsonl}}",
-        text::counted(cells, "cell"),
+fn close(args: &MergeArgs, report: &Report) -> io::Result<()> {
+    let mut out = text::terminal();
+    let basis = format!(
+        "{} of {}; {}",
+        text::counted(report.cells.len(), "cell"),
         text::counted(args.runs.len(), "shard"),
-        text::plain(&args.out.display().to_string())
-    )?;
+        text::conclusion(report)
+    );
+    writeln!(out, "\n{}", text::wrapped(&basis, text::width()))?;
+    show_written(&mut out, &args.out)?;
     out.flush()
 }
 

@@ -44,6 +44,7 @@ mod run;
 mod run_plan;
 mod run_resume;
 mod run_table;
+mod run_verdict;
 mod scene;
 mod scene_args;
 mod shared_args;

@@ -1,5 +1,5 @@
 //! `cullbench run`, the main job: plan, measure scene by scene in processes of
-//! its own, keep every finished part on disk, show a ranked table per scene.
+//! its own, keep every finished part on disk, show the conclusion.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -16,16 +16,15 @@ use super::protocol::Job;
 use super::report::page;
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
-use super::run_table::show_scene;
+use super::run_table::{show, show_written};
 use super::study::progress;
-use super::{
-    Ending, baseline, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine,
-};
+use super::{Ending, baseline, expect_folder, interrupt, tell, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
 };
-use crate::report::{Line, Report, RunFolder, Stream, save_page, temporary_in};
+use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_page, temporary_in};
+use crate::suite::DEFAULT_PATH;
 
 pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     if args.plan {
@@ -74,6 +73,7 @@ struct Run {
     workers: Workers,
     bar: ProgressBar,
     started: Instant,
+    all_columns: bool,
 }
 
 impl Run {
@@ -94,6 +94,7 @@ impl Run {
                 &|| temporary_in(folder.path()),
             )?,
             started: Instant::now(),
+            all_columns: args.all_columns,
             plan,
             folder,
             stream,
@@ -102,7 +103,7 @@ impl Run {
 
     /// Measures all scenes; keeps a finished run as the baseline `save`.
     fn all(mut self, save: Option<String>) -> anyhow::Result<Ending> {
-        let (mut stopped, mut unshown) = (false, None);
+        let mut stopped = false;
         for scene in 0..self.plan.plan.scenes.len() {
             stopped = match self.scene(scene) {
                 Ok(()) => false,
@@ -113,13 +114,6 @@ impl Run {
                     return Err(error);
                 }
             };
-            let source = &self.plan.plan.scenes[scene].source;
-            let report = self.stream.report_of(|key| key.scene == *source);
-            // A table that cannot be shown is no reason to stop measuring.
-            let shown = self
-                .bar
-                .suspend(|| unread_is_fine(show_scene(&report, source)));
-            unshown = unshown.or(shown.err());
             if stopped {
                 break;
             }
@@ -137,16 +131,14 @@ impl Run {
         }
         let report = self.stream.report();
         // Tables before files: where a file cannot be written, what was measured is seen.
-        let shown = unread_is_fine(surface_tables::show(&report));
+        let shown = unread_is_fine(show(&report, self.all_columns));
         self.folder.save(&report)?;
         save_page(self.folder.path(), &page(&report))?;
         let save = save.filter(|_| !stopped);
         if let Some(name) = &save {
             baseline::save(name, &report)?;
         }
-        if let Some(error) = unshown.or(shown.err()) {
-            return Err(error.into());
-        }
+        shown?;
         unread_is_fine(self.close(&report, save.as_deref()))?;
         if stopped {
             tell("interrupted: finished cells were saved; continue with --resume");
@@ -164,7 +156,11 @@ impl Run {
                 drop(self.workers);
                 self.folder.discard();
             }
-            false => drop(self.folder.save(&self.stream.report())),
+            false => {
+                let report = self.stream.report();
+                let _ = show(&report, self.all_columns);
+                drop(self.folder.save(&report));
+            }
         }
     }
 
@@ -297,29 +293,63 @@ impl Run {
     fn close(&self, report: &Report, save: Option<&str>) -> io::Result<()> {
         let cells = report.cells.iter();
         let failed = cells.filter(|cell| cell.status.is_failure()).count();
-        let mut out = io::stdout().lock();
-        writeln!(
-            out,
-            "\n{} in {:.1} s, {failed} wrong; {}",
+        let width = text::width();
+        let mut out = text::terminal();
+        let basis = format!(
+            "{} in {:.1} s, {failed} wrong; {}",
             text::counted(report.cells.len(), "cell"),
             self.started.elapsed().as_secs_f64(),
             text::conclusion(report)
-        )?;
+        );
+        writeln!(out, "\n{}", text::wrapped(&basis, width))?;
         for warning in &report.noise.warnings {
-            writeln!(out, "warning: {warning}")?;
+            let warning = format!("warning: {warning}");
+            writeln!(out, "{}", text::wrapped(&warning, width))?;
         }
-        writeln!(
-            out,
-            "{}/{{report.html, report.json, summary.csv, samples.csv, stream.jsonl}}",
-            text::plain(&self.folder.path().display().to_string())
-        )?;
+        if let Some(line) = next(report, width) {
+            writeln!(out, "{line}")?;
+        }
+        show_written(&mut out, self.folder.path())?;
         if let Some(name) = save {
-            writeln!(
-                out,
-                "{}: compare --baseline {name}",
-                baseline::file(name).display()
-            )?;
+            let file = baseline::file(name);
+            writeln!(out, "        {}: compare --baseline {name}", file.display())?;
         }
         out.flush()
+    }
+}
+
+/// The command that a reader will want next, with what it gives if that fits into
+/// `width` characters; `None` where nothing is ranked.
+fn next(report: &Report, width: usize) -> Option<String> {
+    let program = report.run.command.split(' ').next()?;
+    let all = comparisons(report);
+    let first = all.iter().find(|c| c.winners().next().is_some())?.about();
+    let (scene, path) = (quoted(&first.scene.name), quoted(&first.path.name));
+    let (command, path, gives) = match report.run.suite {
+        Some(_) => ("run", None, "the same for a scene of your own"),
+        None => ("advise", Some(path), "which shortcuts pay here"),
+    };
+    let scene = path.as_ref().map_or("FILE", |_| &scene);
+    let mut line = format!("next    {program} {command} --scene {scene}");
+    if let Some(path) = path.filter(|_| first.path.name != DEFAULT_PATH) {
+        let is_within = line.chars().count() + path.chars().count() + 8 <= width;
+        // The shell joins the two lines.
+        let gap = if is_within { " " } else { " \\\n        " };
+        line += &format!("{gap}--path {path}");
+    }
+    let is_within = line.chars().count() + gives.len() + 2 <= width;
+    Some(if is_within {
+        format!("{line}  {gives}")
+    } else {
+        line
+    })
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,%+@".contains(c);
+    match word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
     }
 }

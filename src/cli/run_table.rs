@@ -1,144 +1,334 @@
-//! The ranked tables of a scene at the end of its part of `cullbench run`, narrow
-//! enough for a terminal of a hundred columns.
+//! The end of `cullbench run` on the terminal: tables, then the conclusion.
+//!
+//! One scene and path is a row per structure, several are a row each.
 
 use std::io::{self, Write};
+use std::path::Path;
 
-use super::table::Table;
-use super::text;
-use crate::report::{Comparison, Ranked, Report, ReportCell, comparisons};
+use super::table::{Column, Table};
+use super::{run_verdict, surface_tables, text};
+use crate::measure::Status;
+use crate::report::{Comparison, Overall, Ranked, Report, ReportCell, comparisons, times_as_fast};
+use crate::shown::shortened;
+use crate::spec::parse_number;
 
-/// A table for each path, cache state and culling test, then the cost of builds.
-pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
-    let mut all = comparisons(report);
-    all.retain(|c| c.about().scene.name == scene);
-    let Some(first) = all.first() else {
-        return Ok(());
-    };
-    let about = &first.about().scene;
+/// Shows the tables and conclusions of each cache state and culling test.
+pub fn show(report: &Report, all_columns: bool) -> io::Result<()> {
+    let all = comparisons(report);
+    let width = text::width();
     let mut out = text::terminal();
-    writeln!(
-        out,
-        "\n{}: {}, {}{}{}",
-        text::plain(scene),
-        text::counted(about.total_count, "item"),
-        text::counted(about.region_count, "region"),
-        match about.skipped_items {
-            0 => String::new(),
-            bad => format!(", {} left out", text::counted(bad, "bad item")),
-        },
-        match about.total_count {
-            0 => "; nothing is ranked",
-            _ => "",
-        }
-    )?;
+    let mut shown: Vec<[&str; 2]> = Vec::new();
     for comparison in &all {
-        for line in heads(comparison) {
-            writeln!(out, "{}", text::plain(&line))?;
+        let key = key(comparison);
+        if shown.contains(&key) {
+            continue;
         }
-        let bounds = comparison.bounds.iter().map(|cell| (String::new(), *cell));
-        write!(out, "{}", table(QUERIES, ranked(comparison).chain(bounds)))?;
-        for line in reasons(comparison) {
-            writeln!(out, "{}", text::plain(&line))?;
+        shown.push(key);
+        let group = all.iter().filter(|c| self::key(c) == key);
+        let group: Vec<&Comparison> = group.collect();
+        let overall = Overall::of(&group);
+        writeln!(out)?;
+        let told = match &group[..] {
+            [one] => {
+                write!(out, "{}", of_one(one, overall.base, all_columns, width))?;
+                run_verdict::of_one(one, overall.base)
+            }
+            _ => {
+                let rows: Vec<_> = labels(&group).into_iter().zip(group.clone()).collect();
+                write!(out, "{}", of_many(&rows, &overall, all_columns, width))?;
+                for one in group.iter().filter(|_| all_columns) {
+                    write!(out, "\n{}", of_one(one, overall.base, true, width))?;
+                }
+                run_verdict::of_many(&rows, &overall)
+            }
+        };
+        for line in reasons(&group).into_iter().chain([told]) {
+            writeln!(out, "{}", text::wrapped(&line, width))?;
         }
     }
-    let unranked = ranked(first).map(|(_, cell)| (String::new(), cell));
-    write!(out, "{}", table(BUILDS, unranked))?;
+    surface_tables::show(&mut out, report, width)?;
     out.flush()
 }
 
-/// Lines above a table: the queries, their errors, and the basis of the times.
-fn heads(comparison: &Comparison) -> [String; 2] {
+/// Cache state and culling test: times of others are not averaged.
+fn key<'r>(comparison: &Comparison<'r>) -> [&'r str; 2] {
     let about = comparison.about();
-    let mut head = format!("{}, {}", about.path.name, about.test);
-    if about.path.cache != "warm" {
-        head += &format!(" ({})", about.path.cache);
+    [&about.path.cache, &about.test]
+}
+
+/// Lines above a table: the scene, the queries, and what they return.
+fn heads(comparison: &Comparison) -> Vec<String> {
+    let cell = comparison.about();
+    let (scene, path) = (&cell.scene, &cell.path);
+    let mut first = format!(
+        "{}: {}, {}",
+        scene.name,
+        text::counted(scene.total_count, "item"),
+        text::counted(scene.region_count, "region")
+    );
+    if scene.skipped_items > 0 {
+        let bad = text::counted(scene.skipped_items, "bad item");
+        first += &format!(", {bad} left out");
     }
-    if let Some(culled) = comparison.of_any("cull_rate") {
-        head += &format!(": {} culled", text::percent(culled));
+    if scene.total_count == 0 {
+        first += "; nothing is ranked";
     }
+    let views = text::counted(path.camera_count, "view");
+    let mut second = format!("{}: {views}, {}", path.name, cell.test);
+    if path.cache != "warm" {
+        second += &format!(", {}", path.cache);
+    }
+    let visible = comparison.of_any("cull_rate").map(|culled| 1.0 - culled);
+    let visible = visible.map(|visible| format!("{} of the items are visible", share(visible)));
     let sources = text::by_source(comparison);
     let sources = sources.map(|items| format!("{items} {}", text::BY_SOURCE));
-    match (text::false_positives(comparison), sources) {
-        (Some(share), None) => head += &format!(", {share} false positives"),
-        (Some(share), Some(items)) => head += &format!(", {share} false positives ({items})"),
-        (None, Some(items)) => head += &format!(", false positives {items}"),
-        (None, None) => {}
-    }
-    [head, text::basis(comparison)]
+    let excess = match (text::false_positives(comparison), sources) {
+        (Some(share), None) => Some(format!("{share} false positives")),
+        (Some(share), Some(items)) => Some(format!("{share} false positives ({items})")),
+        (None, sources) => sources.map(|items| format!("false positives {items}")),
+    };
+    let third: Vec<String> = visible.into_iter().chain(excess).collect();
+    let lines = [first, second, third.join(", ")].into_iter();
+    lines.filter(|line| !line.is_empty()).collect()
 }
 
-/// The cells of structures with their ranks: fastest first, and last, unranked,
-/// what failed.
-fn ranked<'r>(comparison: &Comparison<'r>) -> impl Iterator<Item = (String, &'r ReportCell)> {
-    let ranked = comparison.ranked.iter();
-    ranked.map(|Ranked { rank, cell }| (rank.map_or("-".to_owned(), |n| n.to_string()), *cell))
-}
-
-/// A column: what is over it, and its figure of a cell.
-type Column = (&'static str, fn(&ReportCell) -> String);
-
-/// Columns of the queries of a path. A status stands in place of a missing time.
-const QUERIES: &[Column] = &[
-    ("query [95 %]", |cell| match cell.metrics.get("query_ns") {
-        None => cell.status.name().to_owned(),
-        found => text::time_estimate(found),
-    }),
-    ("p95", |cell| of(cell, "query_ns_p95", text::time)),
-    ("speed-up [95 %]", |cell| {
-        text::estimate(cell.metrics.get("speedup"))
-    }),
-    ("/ read", |cell| of(cell, "times_read", text::significant)),
-    ("locate", |cell| of(cell, "locate_ns", text::time)),
-];
-
-/// Columns of a structure on a scene.
-const BUILDS: &[Column] = &[
-    ("build", |cell| {
-        of(cell, "build_ms", |ms| text::time(ms * 1e6))
-    }),
-    ("update of 1 %", |cell| {
-        of(cell, "update_ms", |ms| text::time(ms * 1e6))
-    }),
-    ("query after 32", |cell| {
-        of(cell, "refitted_over_rebuilt", |ratio| {
-            format!("x {}", text::significant(ratio))
-        })
-    }),
-    ("bytes per item", |cell| {
-        of(cell, "memory_bytes_per_item", |bytes| format!("{bytes:.1}"))
-    }),
-];
-
-fn of(cell: &ReportCell, metric: &str, show: fn(f64) -> String) -> String {
-    cell.value(metric).map(show).unwrap_or_default()
-}
-
-/// A table of a row per cell, without empty columns; nothing if all are empty.
-fn table<'r>(columns: &[Column], cells: impl Iterator<Item = (String, &'r ReportCell)>) -> String {
-    let header = ["structure"].into_iter().chain(columns.iter().map(|c| c.0));
-    let mut table = Table::of_numbers(header);
-    for (rank, cell) in cells {
-        let figures = columns.iter().map(|(_, figure)| figure(cell));
-        let name = format!("{rank:>2} {}", cell.structure);
-        table.add_row([name].into_iter().chain(figures));
-    }
-    let table = table.without_empty_columns();
-    match table.header.len() {
-        0 | 1 => String::new(),
-        _ => format!("{table}\n"),
+/// A share in percent with three digits, never rounded up to 100.
+fn share(share: f64) -> String {
+    match share {
+        0.99..1.0 => text::percent(share),
+        _ => format!("{} %", text::significant(share * 100.0)),
     }
 }
 
-/// Why cells are not ok.
-fn reasons<'c>(comparison: &'c Comparison) -> impl Iterator<Item = String> + 'c {
-    let ranked = comparison.ranked.iter().map(|ranked| ranked.cell);
-    let cells = ranked.chain(comparison.bounds.iter().copied());
-    cells.filter_map(|cell| {
-        let reason = cell.reason.as_deref()?;
-        let (structure, path) = (&cell.structure, &cell.path.name);
-        Some(format!(
-            "{structure} on {path}: {}: {reason}",
-            cell.status.name()
-        ))
-    })
+/// A row of the table of one scene and path.
+struct Row<'r> {
+    name: String,
+    cell: &'r ReportCell,
+    base: Option<&'r ReportCell>,
+}
+
+/// Columns by priority: what does not fit is left to `--all-columns`, and so is all
+/// that stands behind the first [`SHOWN`].
+fn columns<'r>() -> [Column<Row<'r>>; 14] {
+    [
+        ("structure", |row| row.name.clone()),
+        (">time per query", |row| {
+            match row.cell.metrics.get("query_ns") {
+                None => row.cell.status.name().to_owned(),
+                Some(time) => text::time_with(time),
+            }
+        }),
+        (">vs", |row| {
+            let ratio = row.base.and_then(|base| times_as_fast(base, row.cell));
+            let ratio = ratio.filter(|_| matches!(row.cell.status, Status::Ok));
+            text::some(ratio, |ratio| format!("{} x", text::significant(ratio)))
+        }),
+        (">build", |row| {
+            of(row, "build_ms", |ms| text::time(ms * 1e6))
+        }),
+        (">bytes/item", |row| {
+            of(row, "memory_bytes_per_item", |bytes| format!("{bytes:.1}"))
+        }),
+        (">p95", |row| of(row, "query_ns_p95", text::time)),
+        (">speed-up [95 %]", |row| {
+            text::estimate(row.cell.metrics.get("speedup"))
+        }),
+        (">/ read", |row| of(row, "times_read", text::significant)),
+        (">/ copy", |row| of(row, "times_memcpy", text::significant)),
+        (">/ replay", |row| {
+            of(row, "times_replay", text::significant)
+        }),
+        (">locate", |row| of(row, "locate_ns", text::time)),
+        (">update of 1 %", |row| {
+            of(row, "update_ms", |ms| text::time(ms * 1e6))
+        }),
+        (">query after 32", |row| {
+            of(row, "refitted_over_rebuilt", |ratio| {
+                format!("x {}", text::significant(ratio))
+            })
+        }),
+        (">repaid after", |row| {
+            of(row, "break_even_queries", |queries| {
+                text::count(queries as usize)
+            })
+        }),
+    ]
+}
+
+/// Number of columns shown by default.
+const SHOWN: usize = 5;
+
+fn of(row: &Row, metric: &str, show: fn(f64) -> String) -> String {
+    text::some(row.cell.value(metric), show)
+}
+
+/// Head and table of one scene and path.
+fn of_one(comparison: &Comparison, base: Option<&str>, all: bool, width: usize) -> String {
+    let base = base.and_then(|base| comparison.sound_cell(base));
+    let row = |rank: &str, cell| Row {
+        name: format!("{rank:>2} {}", shortened(&cell_name(cell), width / 2)),
+        cell,
+        base,
+    };
+    let ranked = comparison
+        .ranked
+        .iter()
+        .map(|Ranked { rank, cell }| match rank {
+            Some(rank) => row(&rank.to_string(), cell),
+            None => row("-", cell),
+        });
+    let bounds = comparison
+        .bounds
+        .iter()
+        .filter(|_| all)
+        .map(|cell| row("", cell));
+    let columns = columns();
+    let columns = if all { &columns[..] } else { &columns[..SHOWN] };
+    let mut table = Table::with(ranked.chain(bounds), columns);
+    table.header[2] = text::some(base, |base| format!("vs {}", cell_name(base)));
+    let mut lines = heads(comparison);
+    if all {
+        lines.push(text::basis(comparison));
+    }
+    let lines = lines
+        .iter()
+        .map(|line| text::wrapped(&text::plain(line), width) + "\n");
+    let parts = table.without_empty_columns().parts(width);
+    let shown = if all { parts.len() } else { 1 };
+    let parts = parts
+        .iter()
+        .take(shown)
+        .map(|part| format!("\n{}", part.bare()));
+    lines.chain(parts).chain(["\n".to_owned()]).collect()
+}
+
+fn cell_name(cell: &ReportCell) -> String {
+    text::plain(&cell.structure)
+}
+
+/// Speed-ups: a row per scene and path, a column per structure, the base's time.
+fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: usize) -> String {
+    let of_base = |name: &str| overall.base == Some(name);
+    let mut columns: Vec<_> = overall.standings.iter().collect();
+    columns.sort_by_key(|standing| !of_base(standing.structure));
+    let names = columns.iter().map(|standing| standing.structure.to_owned());
+    let mut table = Table::of_numbers([String::new()].into_iter().chain(names));
+    for (label, comparison) in rows {
+        let base = overall.base.and_then(|base| comparison.sound_cell(base));
+        let figure = |structure: &str| {
+            let mut cells = comparison.ranked.iter();
+            let Some(found) = cells.find(|ranked| ranked.cell.structure == structure) else {
+                return String::new();
+            };
+            let is_first = if found.rank == Some(1) { "*" } else { " " };
+            let time = text::some(found.cell.value("query_ns"), text::time);
+            let shown = match (found.rank, base) {
+                (None, _) => found.cell.status.name().to_owned(),
+                (_, Some(base)) if !of_base(structure) => {
+                    text::some(times_as_fast(base, found.cell), text::significant)
+                }
+                _ => time,
+            };
+            shown + is_first
+        };
+        let figures = columns.iter().map(|standing| figure(standing.structure));
+        table.add_row([shortened(label, width / 2)].into_iter().chain(figures));
+    }
+    if let Some(base) = overall.base {
+        let mean = |speedup: Option<f64>| text::some(speedup, |x| text::significant(x) + " ");
+        let means = columns.iter().map(|standing| mean(standing.speedup));
+        let label = format!("geometric mean, x {base}");
+        table.add_row([label].into_iter().chain(means));
+    }
+    let parts = table.parts(width);
+    let shown = if all { parts.len() } else { 1 };
+    let hidden = parts[shown..].iter().map(|part| part.header.len() - 1);
+    let more = match hidden.sum() {
+        0 => String::new(),
+        hidden => format!(
+            "; {}: --all-columns",
+            text::counted(hidden, "slower structure")
+        ),
+    };
+    let parts: Vec<String> = parts[..shown].iter().map(Table::bare).collect();
+    format!("{}\n* fastest or tied{more}\n\n", parts.join("\n"))
+}
+
+/// Short names of scenes and paths: "city 100k flythrough 2 %".
+///
+/// The full ones where two would be the same.
+fn labels(all: &[&Comparison]) -> Vec<String> {
+    let of = |comparison: &Comparison, show: fn(&str) -> String| {
+        let about = comparison.about();
+        format!("{} {}", show(&about.scene.name), show(&about.path.name))
+    };
+    let short: Vec<String> = all.iter().map(|c| of(c, short)).collect();
+    let is_unique = |label: &String| short.iter().filter(|other| *other == label).count() == 1;
+    match short.iter().all(is_unique) {
+        true => short,
+        false => all.iter().map(|c| of(c, str::to_owned)).collect(),
+    }
+}
+
+/// A file without its folder, a spec without keys and frames: "city 100k".
+fn short(source: &str) -> String {
+    let Some((name, parameters)) = source.rsplit_once(':').filter(|(_, p)| p.contains('=')) else {
+        let file = source.rsplit(['/', '\\']).next();
+        return shortened(file.unwrap_or(source), 24);
+    };
+    let values = parameters
+        .split(',')
+        .filter_map(|pair| match pair.split_once('=')? {
+            ("frames", _) => None,
+            ("n", count) => Some(format!(" {}", short_count(count))),
+            ("visible", share) => Some(format!(" {}", share.replace('%', " %"))),
+            _ => Some(format!(" {pair}")),
+        });
+    shortened(&format!("{name}{}", values.collect::<String>()), 36)
+}
+
+/// "100000" as "100k".
+fn short_count(typed: &str) -> String {
+    let count = parse_number(typed).unwrap_or(f64::NAN);
+    match (count % 1e6 == 0.0, count % 1e3 == 0.0) {
+        (true, _) => format!("{}M", count / 1e6),
+        (_, true) => format!("{}k", count / 1e3),
+        _ => typed.to_owned(),
+    }
+}
+
+/// Reasons why cells are not ok, each once with the number of its paths.
+fn reasons(group: &[&Comparison]) -> Vec<String> {
+    let mut found: Vec<(String, usize)> = Vec::new();
+    let ranked = group
+        .iter()
+        .flat_map(|c| c.ranked.iter().map(|ranked| ranked.cell));
+    let bounds = group.iter().flat_map(|c| c.bounds.iter().copied());
+    for cell in ranked.chain(bounds) {
+        let Some(reason) = &cell.reason else {
+            continue;
+        };
+        let line = format!("{}: {}: {reason}", cell.structure, cell.status.name());
+        match found.iter_mut().find(|(known, _)| *known == line) {
+            Some((_, count)) => *count += 1,
+            None => found.push((line, 1)),
+        }
+    }
+    let of = |count: usize| match group.len() {
+        1 => String::new(),
+        all => format!(" ({count} of {all} paths)"),
+    };
+    let lines = found
+        .into_iter()
+        .map(|(line, count)| text::plain(&line) + &of(count));
+    lines.collect()
+}
+
+/// Shows the files of a run.
+pub fn show_written(out: &mut impl Write, folder: &Path) -> io::Result<()> {
+    writeln!(out, "report  {}:", folder.display())?;
+    writeln!(
+        out,
+        "        report.json, summary.csv, samples.csv, stream.jsonl"
+    )
 }

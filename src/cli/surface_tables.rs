@@ -169,30 +169,30 @@ pub fn of_growths(growths: &[Growth]) -> Table {
     table
 }
 
-/// At the end of a run, where there is anything to cross.
-pub fn show(report: &Report) -> io::Result<()> {
-    let mut out = text::terminal();
+/// Shows crossovers and growth in tables of at most `width` characters.
+pub fn show(out: &mut impl Write, report: &Report, width: usize) -> io::Result<()> {
+    let mut tables = Vec::new();
     for surface in surfaces(comparisons(report)) {
         // A world of one size has its ranked tables; that is the surface.
         if surface.sizes().len() < 2 {
             continue;
         }
-        let title = text::plain(&title(&surface));
-        writeln!(out, "\ncrossover surface: {title}")?;
-        writeln!(out, "{}", winners(&surface))?;
-        if let Some(rows) = crossings(&surface) {
-            writeln!(out, "{}", rows)?;
-        }
+        let title = format!("\ncrossover surface: {}", title(&surface));
+        tables.push((title, winners(&surface)));
+        tables.extend(crossings(&surface).map(|rows| (String::new(), rows)));
     }
     let growths = growths(report);
     if !growths.is_empty() {
-        writeln!(
-            out,
-            "\ngrowth at a fixed number of visible items [95 % interval]"
-        )?;
-        writeln!(out, "{}", of_growths(&growths))?;
+        let title = "\ngrowth at a fixed number of visible items [95 % interval]";
+        tables.push((title.to_owned(), of_growths(&growths)));
     }
-    out.flush()
+    for (title, table) in tables {
+        for (n, part) in table.parts(width).iter().enumerate() {
+            let title = if n == 0 { &title } else { "" };
+            writeln!(out, "{}\n{}", title, part.bare().trim_end())?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

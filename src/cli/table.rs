@@ -74,17 +74,30 @@ impl Table {
         self
     }
 
-    /// The table without columns that do not fit, for [`Table::bare`].
-    ///
-    /// The named ones go, in this order, until `width` characters hold a row.
-    pub fn within(&self, width: usize, first_to_go: &[&str]) -> Table {
-        let (widths, mut gone) = (self.widths(), first_to_go.iter());
-        let mut left: Vec<usize> = (0..widths.len()).collect();
-        while left.iter().map(|&c| widths[c] + GAP).sum::<usize>() > width + GAP {
-            let Some(name) = gone.next() else { break };
-            left.retain(|&column| self.header[column] != *name);
+    /// The table as tables of at most `width` characters, for [`Table::bare`]: each has
+    /// the names, which stand before the first numbers, and as many further columns as
+    /// fit, at least one.
+    pub fn parts(&self, width: usize) -> Vec<Table> {
+        let widths = self.widths();
+        let names = self.right.iter().min().map_or(1, |first| *first.max(&1));
+        let name_width: usize = widths.iter().take(names).map(|own| own + GAP).sum();
+        let (mut parts, mut left) = (Vec::<Vec<usize>>::new(), 0);
+        for (column, own) in widths.iter().enumerate().skip(names) {
+            match parts.last_mut() {
+                Some(part) if GAP + own <= left => {
+                    part.push(column);
+                    left -= GAP + own;
+                }
+                _ => {
+                    parts.push((0..names).chain([column]).collect());
+                    left = width.saturating_sub(name_width + own);
+                }
+            }
         }
-        self.of_columns(&left)
+        parts
+            .iter()
+            .map(|columns| self.of_columns(columns))
+            .collect()
     }
 
     fn of_columns(&self, columns: &[usize]) -> Table {
@@ -199,16 +212,20 @@ mod tests {
     }
 
     #[test]
-    fn columns_go_in_their_order_until_the_rest_fits() {
-        let mut table = Table::of("name | >p95 | >time | note");
-        table.add_row(["wide", "9 us", "7 us", "of 12"]);
-        let within = |width| table.within(width, &["note", "p95"]).bare();
+    fn bare_tables_fit_by_leaving_columns_to_the_next_part() {
+        let mut table = Table::of("name | >one | two | >three");
+        table.add_row(["a", "1.5", "x", "33333333"]);
         assert_eq!(
-            within(23),
-            "name   p95  time  note\nwide  9 us  7 us  of 12\n"
+            table.bare(),
+            "name  one  two     three\na     1.5  x    33333333\n"
         );
-        assert_eq!(within(22), "name   p95  time\nwide  9 us  7 us\n");
-        assert_eq!(within(12), "name  time\nwide  7 us\n");
-        assert_eq!(within(1), within(12));
+        let parts = |width: usize| {
+            let parts = table.parts(width);
+            parts.iter().map(Table::bare).collect::<Vec<_>>()
+        };
+        assert_eq!(parts(24), [table.bare()]);
+        let (first, rest) = ("name  one  two\na     1.5  x\n", "name     three\n");
+        assert_eq!(parts(23), [first, &format!("{rest}a     33333333\n")]);
+        assert_eq!(parts(0).len(), 3);
     }
 }

@@ -29,18 +29,21 @@ pub fn conclusion(report: &Report) -> String {
             of_planned(counted(least.max(1), "process"))
         );
     }
-    let twins = report.noise.twins.iter().filter_map(|t| t.holds_one());
     let few = if least < 10 {
         "; fewer than ten make wide intervals"
     } else {
         ""
     };
-    format!(
-        "95 % intervals over {}{few}; A/A check: {} of {} intervals contain 1",
-        of_planned(format!("{least} processes")),
-        twins.clone().filter(|holds| *holds).count(),
-        count(twins.count())
-    )
+    let over = of_planned(format!("{least} processes"));
+    let twins: Vec<bool> = (report.noise.twins.iter())
+        .filter_map(|twin| twin.holds_one())
+        .collect();
+    let hold = twins.iter().filter(|holds| **holds).count();
+    let check = match twins.len() {
+        0 => String::new(),
+        all => format!("; A/A check: {hold} of {all} intervals contain 1"),
+    };
+    format!("95 % intervals over {over}{few}{check}")
 }
 
 /// Nanoseconds with three significant digits and a fitting unit.
@@ -126,6 +129,27 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
         true => format!("<{margin:.decimals$}"),
         false => format!("{shown:.decimals$}±{margin:.decimals$}"),
     }
+}
+
+/// " ± 11 %" where the interval is nearly symmetric in the logarithm.
+///
+/// Elsewhere the interval in a unit; nothing if an end is not known.
+pub fn uncertainty(metric: &Metric, unit: f64) -> String {
+    let ends = metric.lower.zip(metric.upper);
+    let logs = ends.map(|(lower, upper)| [metric.value / lower, upper / metric.value].map(f64::ln));
+    match logs {
+        Some([below, above]) if (below - above).abs() <= 0.2 * above && above < 0.5 => {
+            let percent = below.max(above).exp_m1() * 100.0;
+            let digits = usize::from(percent < 1.0);
+            format!(" ± {percent:.digits$} %")
+        }
+        _ => interval([metric.lower, metric.upper], unit),
+    }
+}
+
+/// A time with its uncertainty: "3.64 us ± 11 %".
+pub fn time_with(metric: &Metric) -> String {
+    time(metric.value) + &uncertainty(metric, unit(metric.value).0)
 }
 
 /// A rate per `units` with half of its 95 % interval; nothing if there is none.
@@ -285,6 +309,25 @@ mod tests {
         assert_eq!(shown([Some(1201.0), Some(1681.0)]), "1.3±0.4 us");
         assert_eq!(shown([Some(1300.0), None]), "1.30 us");
         assert_eq!(time_plus_minus(None, [None, None]), "");
+    }
+
+    #[test]
+    fn a_margin_is_a_share_where_the_interval_is_symmetric() {
+        let shown = |value: f64, lower, upper| {
+            let unit = "ns".to_owned();
+            time_with(&Metric {
+                value,
+                lower,
+                upper,
+                unit,
+            })
+        };
+        assert_eq!(shown(3640.0, Some(3280.0), Some(4040.0)), "3.64 us ± 11 %");
+        assert_eq!(shown(100.0, Some(99.6), Some(100.4)), "100 ns ± 0.4 %");
+        assert_eq!(shown(100.0, Some(100.0), Some(100.0)), "100 ns ± 0.0 %");
+        assert_eq!(shown(100.0, Some(90.0), Some(101.0)), "100 ns [90.0, 101]");
+        assert_eq!(shown(100.0, Some(40.0), Some(250.0)), "100 ns [40.0, 250]");
+        assert_eq!(shown(100.0, Some(0.0), None), "100 ns");
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod judging;
 mod matching;
 mod merge;
 mod model;
+mod overall;
 mod ranking;
 mod reading;
 mod setting;
@@ -31,6 +32,7 @@ pub use judging::{
 };
 pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
+pub use overall::{Mean, Overall};
 pub use ranking::{Comparison, Ranked, comparisons, times_as_fast};
 pub use reading::{read_report, read_stream};
 pub use setting::{Setting, settings};

@@ -83,6 +83,11 @@ impl<'r> Comparison<'r> {
         ranked.map(|r| r.cell)
     }
 
+    /// The cell of a structure, if it has a rank.
+    pub fn sound_cell(&self, structure: &str) -> Option<&'r ReportCell> {
+        self.sound().find(|cell| cell.structure == structure)
+    }
+
     /// The fastest structure that is not this crate's own and whose answers are
     /// right.
     pub fn fastest_peer(&self) -> Option<&'r ReportCell> {

@@ -115,8 +115,7 @@ impl<'r> Place<'r> {
 
     /// The sound cell of a structure.
     pub fn cell(&self, structure: &str) -> Option<&'r ReportCell> {
-        let mut sound = self.comparison.sound();
-        sound.find(|cell| cell.structure == structure)
+        self.comparison.sound_cell(structure)
     }
 }
 

@@ -249,7 +249,9 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
         &format!("run --scene none.csv --structure linear,bvh {run} none"),
     );
     assert!(
-        table.contains("none.csv: no items, no regions; nothing is ranked"),
+        table.contains("none.csv: no items, no regions; nothing is ranked")
+            && table.contains("Nothing is ranked: the scene has no items.")
+            && !table.contains("\nnext "),
         "{table}"
     );
     assert!(
@@ -286,6 +288,8 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
     );
     assert!(table.contains("one.csv: 1 item, 1 region\n"), "{table}");
     assert!(table.contains("\n1 cell in "), "{table}");
+    let alone = "per query; no other structure has a time.";
+    assert!(table.contains(alone), "{table}");
     let compared = works(folder.path(), "compare one one");
     assert!(compared.contains(", 1 cell\n"), "{compared}");
     let verdict = "0 slower, 1 inconclusive, 0 faster, 0 same of 1 cell\n";
@@ -322,17 +326,20 @@ fn what_storage_returns_too_much_is_told_only_where_there_is_any() {
     let run = |scene: &str, path: &str, out: &str| {
         let line = format!("run --scene {scene} --path {path} --structure linear --no-bounds");
         let table = works(folder.path(), &format!("{line} --processes 1 --out {out}"));
-        (table, works(folder.path(), &format!("report {out}")))
+        (
+            prose(&table),
+            works(folder.path(), &format!("report {out}")),
+        )
     };
     let (table, text) = run("far.csv", "beside.csv", "one");
-    let wanted = ", 200 % false positives (2/0/0 by storage/planes/test)\n";
+    let wanted = ", 200 % false positives (2/0/0 by storage/planes/test) structure ";
     assert!(table.contains(wanted), "{table}");
     let wanted =
         "False positives: 200 % of the visible items; 2/0/0 items by storage/planes/test.\n";
     assert!(text.contains(wanted), "{text}");
     // Nothing is visible, and something is returned.
     let (table, text) = run("far.csv", "away.csv", "two");
-    let wanted = ", false positives 3/0/0 by storage/planes/test\n";
+    let wanted = ", false positives 3/0/0 by storage/planes/test structure ";
     assert!(table.contains(wanted), "{table}");
     let wanted = "False positives: 3/0/0 items by storage/planes/test; nothing is visible.\n";
     assert!(text.contains(wanted), "{text}");
@@ -342,6 +349,133 @@ fn what_storage_returns_too_much_is_told_only_where_there_is_any() {
         text.contains("False positives: 0 % of the visible items.\n"),
         "{text}"
     );
+}
+
+/// The lines of a table: from its header to the first empty line.
+fn table_of<'t>(out: &'t str, header: &str) -> Vec<&'t str> {
+    let lines = out.lines().skip_while(|line| !line.starts_with(header));
+    lines.take_while(|line| !line.is_empty()).collect()
+}
+
+/// Lines of prose, joined again.
+pub fn prose(out: &str) -> String {
+    out.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn a_run_ends_with_its_conclusion_in_eighty_columns() {
+    let folder = folder(&[]);
+    let all = works(
+        folder.path(),
+        &format!("{TINY} --structure default,octree-textbook --processes 3 --all-columns"),
+    );
+    let short = works(folder.path(), &format!("{TINY} --resume"));
+    for out in [&all, &short] {
+        let wide = out.lines().find(|line| line.chars().count() > 80);
+        assert_eq!(wide, None, "{out}");
+    }
+    let rows = table_of(&short, "structure");
+    let heads: Vec<&str> = rows[0]
+        .split("  ")
+        .filter(|head| !head.is_empty())
+        .collect();
+    let wanted = [
+        "structure",
+        "time per query",
+        "vs linear",
+        "build",
+        "bytes/item",
+    ];
+    assert_eq!(heads.iter().map(|h| h.trim()).collect::<Vec<_>>(), wanted);
+    assert_eq!(rows.len(), 1 + timed_names().len() + 1, "{short}");
+    for column in [
+        "/ read",
+        "/ copy",
+        "locate",
+        "update of 1 %",
+        "query after 32",
+        "bound-read",
+    ] {
+        assert!(all.contains(column), "no {column}: {all}");
+        assert!(!short.contains(column), "{column}: {short}");
+    }
+    // The sentence has the ratios of the two times that the report has.
+    let report = report(&folder.path().join("out/run"));
+    let mut cells: Vec<(f64, &str, u64)> = cells(&report)
+        .iter()
+        .map(|cell| {
+            let time = cell["metrics"]["query_ns"]["value"].as_f64();
+            let name = cell["structure"].as_str().expect("a name");
+            (
+                time.expect("a time"),
+                name,
+                cell["rank"].as_u64().expect("a rank"),
+            )
+        })
+        .collect();
+    cells.sort_by(|a, b| (a.2, a.0).partial_cmp(&(b.2, b.0)).expect("numbers"));
+    let told = prose(&short);
+    let winners = cells.iter().filter(|cell| cell.2 == 1).count();
+    let ratio = |cell: &(f64, &str, u64)| {
+        let ratio = cell.0 / cells[0].0;
+        let digits = usize::from(ratio < 100.0) + usize::from(ratio < 10.0);
+        format!("{ratio:.digits$} x as fast as {}", cell.1)
+    };
+    let next = format!("{}, the next best", ratio(&cells[winners]));
+    assert!(told.contains(&next), "no '{next}': {told}");
+    assert_eq!(told.contains("(a tie)"), winners > 1, "{told}");
+    for wanted in [
+        "All structures returned the sets of the reference scan in all 16 views, of which",
+        "A/A check:",
+        "next cullbench advise --scene uniform:n=200 --path orbit:frames=16",
+        "report out/run/report.html report.json, summary.csv, samples.csv, stream.jsonl",
+    ] {
+        assert!(told.contains(wanted), "no '{wanted}': {told}");
+    }
+}
+
+#[test]
+fn several_paths_have_a_row_each_and_a_geometric_mean() {
+    let folder = folder(&[]);
+    let paths = "--path orbit:frames=8,visible=20% --path outside:frames=8";
+    let line = format!("run --scene uniform:n=1000 --scene city:n=300 {paths} --processes 3");
+    let out = works(folder.path(), &format!("{line} --out r"));
+    let rows = table_of(&out, "   ");
+    assert_eq!(rows.len(), 1 + 4 + 1, "{out}");
+    assert!(rows[1].starts_with("uniform 1k orbit 20 %  "), "{out}");
+    assert!(out.contains("slower structures: --all-columns"), "{out}");
+    assert!(out.lines().all(|line| line.chars().count() <= 80), "{out}");
+    let all = works(
+        folder.path(),
+        &format!("{line} --out r --resume --all-columns"),
+    );
+    for name in timed_names() {
+        assert!(all.contains(&name), "no {name}: {all}");
+    }
+    // Means of the report's own ratios, of the structure in the second column.
+    let report = report(&folder.path().join("r"));
+    let best = rows[0].split_whitespace().nth(1).expect("a structure");
+    let of_best = cells(&report).iter().filter(|c| c["structure"] == best);
+    let ratios = of_best.map(|c| c["metrics"]["speedup"]["value"].as_f64().expect("a ratio"));
+    let mean = (ratios.map(f64::ln).sum::<f64>() / 4.0).exp();
+    let shown = rows[5].split_whitespace().nth(5).expect("a mean");
+    let shown: f64 = shown.parse().expect("a number");
+    assert!((shown / mean - 1.0).abs() < 6e-3, "{shown} {mean}: {out}");
+    let told = prose(&out);
+    assert!(told.contains("linear in the geometric mean"), "{told}");
+    assert!(told.contains(" of 4."), "{told}");
+    // Without linear, the slowest structure is the base, and is named as that.
+    let out = works(
+        folder.path(),
+        &format!("{line} --structure bvh,uniform-grid --out s"),
+    );
+    let told = prose(&out);
+    let bases = ["bvh", "uniform-grid"].map(|base| {
+        told.contains(&format!(
+            "Speed-ups refer to {base}, the slowest: linear has no times."
+        )) && told.contains(&format!("geometric mean, x {base} 1.00 "))
+    });
+    assert!(bases.contains(&true), "{told}");
 }
 
 #[test]

@@ -1,0 +1,205 @@
+//! Conclusions of a run in sentences.
+//!
+//! The winner, its lead over the next best and over the base, the queries that repay its
+//! build, and how its answers were checked.
+
+use super::text;
+use crate::measure::{Status, YARDSTICK};
+use crate::report::{Comparison, Mean, Overall, ReportCell, times_as_fast};
+
+/// "a", "a and b", "a, b and c".
+fn listed(names: &[&str], last: &str) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., end] => format!("{} {last} {end}", first.join(", ")),
+    }
+}
+
+/// "linear, a flat scan".
+fn described(base: &str) -> String {
+    match base {
+        YARDSTICK => format!("{base}, a flat scan"),
+        _ => base.to_owned(),
+    }
+}
+
+fn times(ratio: f64) -> String {
+    format!("{} x", text::significant(ratio))
+}
+
+/// Conclusion of one scene and path.
+pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
+    let mut told = vec![ranking(comparison, base)];
+    told.extend(base.and_then(fallback));
+    told.extend(repaid(comparison));
+    told.extend(checked(&[comparison]));
+    told.join(" ")
+}
+
+fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
+    let winners: Vec<&ReportCell> = comparison.winners().collect();
+    let Some(best) = winners.first() else {
+        return match comparison.about().scene.total_count {
+            0 => "Nothing is ranked: the scene has no items.".to_owned(),
+            _ => "Nothing is ranked: no structure has times of right answers.".to_owned(),
+        };
+    };
+    let names: Vec<&str> = winners.iter().map(|cell| cell.structure.as_str()).collect();
+    let time = text::some(best.value("query_ns"), text::time);
+    let next = comparison.sound().nth(winners.len());
+    let lead = |cell: &ReportCell| text::some(times_as_fast(cell, best), times);
+    let Some(next) = next else {
+        return match names[..] {
+            [one] => format!("{one} takes {time} per query; no other structure has a time."),
+            _ => format!(
+                "A tie: no test tells {} apart. The fastest takes {time} per query.",
+                listed(&names, "and")
+            ),
+        };
+    };
+    let base = base.filter(|base| !names.contains(base) && *base != next.structure);
+    let of_base = base.and_then(|base| comparison.sound_cell(base));
+    let tie = if names.len() > 1 { " (a tie)" } else { "" };
+    format!(
+        "Take {}{tie}: {} as fast as {}, the next best{}.",
+        match names[..] {
+            [one] => described(one),
+            _ => listed(&names, "or"),
+        },
+        lead(next),
+        described(&next.structure),
+        text::some(of_base, |cell| format!(
+            ", and {} as fast as {}",
+            lead(cell),
+            described(&cell.structure)
+        ))
+    )
+}
+
+/// The base of speed-ups, where it is not the usual one.
+fn fallback(base: &str) -> Option<String> {
+    let other = base != YARDSTICK;
+    other.then(|| format!("Speed-ups refer to {base}, the slowest: {YARDSTICK} has no times."))
+}
+
+fn repaid(comparison: &Comparison) -> Option<String> {
+    let best = comparison.winners().next()?;
+    let queries = best.value("break_even_queries")? as usize;
+    let whose = match comparison.winners().count() {
+        1 => "Its build".to_owned(),
+        _ => format!("The build of {}", best.structure),
+    };
+    let queries = match queries {
+        1 => "one query".to_owned(),
+        _ => format!("{} queries", text::count(queries)),
+    };
+    Some(format!("{whose} is repaid after {queries}."))
+}
+
+/// Checks of the answers: by the reference scan, and in exact arithmetic.
+fn checked(all: &[&Comparison]) -> Option<String> {
+    let cells = || all.iter().flat_map(|c| &c.ranked).map(|r| r.cell);
+    let tried = cells()
+        .filter(|cell| cell.status != Status::LeftOut)
+        .count();
+    let right = cells().filter(|cell| cell.status == Status::Ok).count();
+    let most = |of: fn(&ReportCell) -> usize| {
+        let of_each = all.iter().filter_map(|c| c.range(of));
+        of_each.map(|(_, most)| most).sum::<usize>()
+    };
+    let views = most(|cell| cell.times.cameras_checked);
+    let timed = most(|cell| cell.times.cameras_timed);
+    let judged = all.iter().filter_map(|c| c.of_any("judged_queries"));
+    let who = match right {
+        _ if right == tried => "All structures".to_owned(),
+        _ if all.len() == 1 => format!("{right} of {tried} structures"),
+        _ => format!("{} of {} cells", text::count(right), text::count(tried)),
+    };
+    (right > 0 && views > 0).then(|| {
+        format!(
+            "{who} returned the sets of the reference scan in {}, of which {} timed and {} \
+             checked in exact arithmetic.",
+            match views {
+                1 => "the only view".to_owned(),
+                _ => format!("all {} views", text::count(views)),
+            },
+            were(timed),
+            were(judged.sum::<f64>() as usize)
+        )
+    })
+}
+
+fn were(count: usize) -> String {
+    match count {
+        0 => "none was".to_owned(),
+        1 => "one was".to_owned(),
+        _ => format!("{} were", text::count(count)),
+    }
+}
+
+/// Conclusion of several scenes and paths with their labels.
+pub fn of_many(all: &[(String, &Comparison)], overall: &Overall) -> String {
+    let comparisons: Vec<&Comparison> = all.iter().map(|row| row.1).collect();
+    let mut told = vec![standing(all, overall)];
+    told.extend(overall.base.and_then(fallback));
+    told.extend(checked(&comparisons));
+    told.join(" ")
+}
+
+fn standing(all: &[(String, &Comparison)], overall: &Overall) -> String {
+    let mut ranked = overall.standings.iter().filter(|s| s.speedup.is_some());
+    let (Some(base), Some(best)) = (overall.base, ranked.next()) else {
+        return "No structure has times everywhere, so there are no means.".to_owned();
+    };
+    let tied: Vec<&Mean> = ranked.clone().take_while(|s| s.ties_with(best)).collect();
+    let next = ranked.nth(tied.len());
+    let lead = best.speedup.unwrap_or(1.0);
+    let names: Vec<&str> = [best].iter().chain(&tied).map(|s| s.structure).collect();
+    let mut told = match &names[..] {
+        [one] => format!("{one} is the fastest on the whole"),
+        _ => format!("{} tie on the whole", listed(&names, "and")),
+    };
+    told += &format!(": {} {base} in the geometric mean", times(lead));
+    if let Some(next) = next.filter(|next| next.structure != base) {
+        let ratio = lead / next.speedup.unwrap_or(lead);
+        told += &format!(", {} {}, the next best", times(ratio), next.structure);
+    }
+    let firsts = [best].into_iter().chain(tied.iter().copied());
+    let firsts: Vec<String> = firsts.map(|s| s.first_in.to_string()).collect();
+    let firsts: Vec<&str> = firsts.iter().map(String::as_str).collect();
+    told += &format!(
+        "; first or tied in {} of {}.",
+        listed(&firsts, "and"),
+        all.len()
+    );
+    let mut elsewhere: Vec<(f64, String)> = all
+        .iter()
+        .filter_map(|(label, comparison)| {
+            let first = comparison.winners().next()?;
+            let own = comparison
+                .sound()
+                .find(|c| names.contains(&c.structure.as_str()))?;
+            let ratio = times_as_fast(own, first).filter(|_| own.rank != Some(1))?;
+            Some((
+                ratio,
+                format!("{} by {} ({label})", first.structure, times(ratio)),
+            ))
+        })
+        .collect();
+    elsewhere.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let shown: Vec<&str> = elsewhere.iter().take(3).map(|row| row.1.as_str()).collect();
+    if !shown.is_empty() {
+        told += &format!(
+            " Others are ahead in {}{}: {}.",
+            elsewhere.len(),
+            if elsewhere.len() > shown.len() {
+                ", most of all"
+            } else {
+                ""
+            },
+            listed(&shown, "and")
+        );
+    }
+    told
+}
