@@ -59,7 +59,6 @@ mod tests_same_truth;
 mod text;
 mod usage;
 mod values;
-mod verdict;
 mod verify;
 mod worker;
 

@@ -6,8 +6,8 @@ use std::ops::Range;
 use super::chart::{around, is_drawn, left_out};
 use super::document::html;
 use super::palette::{Look, SHAPES};
+use super::run_verdict::times;
 use super::text;
-use super::verdict::times;
 use crate::report::{Comparison, ReportCell, Speedup, Surface};
 
 /// Series of a plot with a colour; the others are grey.

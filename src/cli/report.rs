@@ -11,16 +11,15 @@ use super::args::ReportArgs;
 use super::document::{Block, to_html, to_markdown};
 use super::surface_charts::{self, Picture};
 use super::table::{Column, Table};
-use super::verdict::verdict;
 use super::{
-    Ending, bencher, expect_folder, expect_places, page_plots, surface_tables, tell, text,
-    write_text,
+    Ending, bencher, expect_folder, expect_places, page_plots, run_table, surface_tables, tell,
+    text, write_text,
 };
 use crate::index::Registry;
 use crate::measure::{METRICS, Status};
 use crate::report::{
-    Comparison, Ranked, Report, ReportCell, base_of, comparisons, growths, read_report, standings,
-    surfaces, times_as_fast,
+    Comparison, Overall, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
+    times_as_fast,
 };
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
@@ -149,15 +148,15 @@ fn title(report: &Report) -> String {
 }
 
 fn blocks(report: &Report) -> Vec<Block> {
-    let mut blocks = vec![
-        Block::Heading(1, title(report)),
-        Block::Line(verdict(report)),
-    ];
+    let mut blocks = vec![Block::Heading(1, title(report))];
     let all = comparisons(report);
-    let base = base_of(&all);
-    if let Some(base) = base.filter(|_| all.len() > 1) {
-        blocks.push(Block::Heading(2, format!("Speed-up over {base}")));
-        blocks.push(Block::Heat(matrix(&all, base)));
+    for group in run_table::groups(&all) {
+        let overall = Overall::of(&group);
+        blocks.push(Block::Line(run_table::conclusion(&group, &overall)));
+        if let Some(base) = overall.base.filter(|_| group.len() > 1) {
+            blocks.push(Block::Heading(2, format!("Speed-up over {base}")));
+            blocks.push(Block::Heat(matrix(&group, &overall, base)));
+        }
     }
     let mut scene = "";
     for (place, comparison) in all.iter().enumerate() {
@@ -175,6 +174,7 @@ fn blocks(report: &Report) -> Vec<Block> {
                 }
             )));
         }
+        let base = Overall::of(&[comparison]).base;
         blocks.extend(of_comparison(comparison, base));
         let next = all.get(place + 1).map(|next| &next.about().scene.name);
         if next != Some(&about.scene.name) {
@@ -202,8 +202,8 @@ fn blocks(report: &Report) -> Vec<Block> {
 }
 
 /// A row per scene and path, a column per structure, and the geometric means.
-fn matrix(all: &[Comparison], base: &str) -> Table {
-    let standings = standings(all, base);
+fn matrix(all: &[&Comparison], overall: &Overall, base: &str) -> Table {
+    let standings = &overall.standings;
     let names = standings.iter().map(|standing| standing.structure);
     let mut table = Table::of_numbers(["scene, path"].into_iter().chain(names));
     for comparison in all {
@@ -213,13 +213,15 @@ fn matrix(all: &[Comparison], base: &str) -> Table {
             name += &format!(", {}", about.path.cache);
         }
         let ratios = standings.iter().map(|standing| {
-            let cell = comparison.cell(standing.structure);
+            let cell = comparison.sound_cell(standing.structure);
             let ratio = cell.and_then(|cell| comparison.speedup(base, cell));
             text::some(ratio, |(ratio, _)| text::significant(ratio))
         });
         table.add_row([name].into_iter().chain(ratios));
     }
-    let means = standings.iter().map(|s| text::significant(s.speedup));
+    let means = standings
+        .iter()
+        .map(|s| text::some(s.speedup, text::significant));
     table.add_row(["geometric mean".to_owned()].into_iter().chain(means));
     table
 }
@@ -241,7 +243,7 @@ fn builds(comparisons: &[&Comparison]) -> Vec<Block> {
         let figures = BUILDS.iter();
         let figures = figures.map(|(_, metric, show)| text::some(cell.value(metric), show));
         let queries = comparisons.iter().map(|comparison| {
-            let own = comparison.cell(&cell.structure);
+            let own = comparison.sound_cell(&cell.structure);
             let queries = own.and_then(|own| own.value("break_even_queries"));
             text::some(queries, |n| text::count(n as usize))
         });

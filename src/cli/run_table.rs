@@ -17,37 +17,54 @@ pub fn show(report: &Report, all_columns: bool) -> io::Result<()> {
     let all = comparisons(report);
     let width = text::width();
     let mut out = text::terminal();
-    let mut shown: Vec<[&str; 2]> = Vec::new();
-    for comparison in &all {
-        let key = key(comparison);
-        if shown.contains(&key) {
-            continue;
-        }
-        shown.push(key);
-        let group = all.iter().filter(|c| self::key(c) == key);
-        let group: Vec<&Comparison> = group.collect();
+    for group in groups(&all) {
         let overall = Overall::of(&group);
         writeln!(out)?;
-        let told = match &group[..] {
-            [one] => {
-                write!(out, "{}", of_one(one, overall.base, all_columns, width))?;
-                run_verdict::of_one(one, overall.base)
-            }
+        match &group[..] {
+            [one] => write!(out, "{}", of_one(one, overall.base, all_columns, width))?,
             _ => {
                 let rows: Vec<_> = labels(&group).into_iter().zip(group.clone()).collect();
                 write!(out, "{}", of_many(&rows, &overall, all_columns, width))?;
                 for one in group.iter().filter(|_| all_columns) {
                     write!(out, "\n{}", of_one(one, overall.base, true, width))?;
                 }
-                run_verdict::of_many(&rows, &overall)
             }
-        };
-        for line in reasons(&group).into_iter().chain([told]) {
+        }
+        for line in reasons(&group)
+            .into_iter()
+            .chain([conclusion(&group, &overall)])
+        {
             writeln!(out, "{}", text::wrapped(&line, width))?;
         }
     }
     surface_tables::show(&mut out, report, width)?;
     out.flush()
+}
+
+/// Comparisons of one cache state and culling test each.
+pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>> {
+    let mut groups: Vec<Vec<&Comparison>> = Vec::new();
+    for comparison in all {
+        match groups
+            .iter_mut()
+            .find(|group| key(group[0]) == key(comparison))
+        {
+            Some(group) => group.push(comparison),
+            None => groups.push(vec![comparison]),
+        }
+    }
+    groups
+}
+
+/// Conclusion of a group in sentences.
+pub fn conclusion(group: &[&Comparison], overall: &Overall) -> String {
+    match group {
+        [one] => run_verdict::of_one(one, overall.base),
+        _ => {
+            let rows: Vec<_> = labels(group).into_iter().zip(group.to_vec()).collect();
+            run_verdict::of_many(&rows, overall)
+        }
+    }
 }
 
 /// Cache state and culling test: times of others are not averaged.

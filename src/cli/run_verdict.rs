@@ -24,7 +24,8 @@ fn described(base: &str) -> String {
     }
 }
 
-fn times(ratio: f64) -> String {
+/// "1.62 x".
+pub fn times(ratio: f64) -> String {
     format!("{} x", text::significant(ratio))
 }
 

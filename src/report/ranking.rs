@@ -3,7 +3,7 @@
 
 use super::matching::grouped;
 use super::{Report, ReportCell};
-use crate::measure::{Judged, Metric, Status};
+use crate::measure::{Judged, Metric, Status, YARDSTICK};
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
@@ -65,6 +65,9 @@ fn ranked(cells: Vec<&ReportCell>) -> Vec<Ranked<'_>> {
     ranked
 }
 
+/// A speed-up with the ends of its 95 % interval, where it has one.
+pub type Speedup = (f64, Option<[f64; 2]>);
+
 impl<'r> Comparison<'r> {
     /// Any of its cells: scene, path and test are the same in all.
     pub fn about(&self) -> &'r ReportCell {
@@ -86,6 +89,19 @@ impl<'r> Comparison<'r> {
     /// The cell of a structure, if it has a rank.
     pub fn sound_cell(&self, structure: &str) -> Option<&'r ReportCell> {
         self.sound().find(|cell| cell.structure == structure)
+    }
+
+    /// The speed-up of a cell over the structure `base` of the same comparison.
+    pub fn speedup(&self, base: &str, cell: &ReportCell) -> Option<Speedup> {
+        if base == YARDSTICK {
+            let found = cell.metrics.get("speedup")?;
+            return Some((found.value, found.lower.zip(found.upper).map(Into::into)));
+        }
+        let base = self.sound_cell(base)?.value("query_ns")?;
+        let own = cell.metrics.get("query_ns")?;
+        let ends = own.upper.zip(own.lower);
+        let ends = ends.map(|(most, least)| [base / most, base / least]);
+        Some((base / own.value, ends))
     }
 
     /// The fastest structure that is not this crate's own and whose answers are
