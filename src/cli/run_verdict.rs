@@ -3,6 +3,8 @@
 //! The winner, its lead over the next best and over the base, the queries that repay its
 //! build, and how its answers were checked.
 
+use std::collections::BTreeMap;
+
 use super::text;
 use crate::measure::{Status, YARDSTICK};
 use crate::report::{Comparison, Mean, Overall, ReportCell, times_as_fast};
@@ -35,6 +37,7 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     told.extend(base.and_then(fallback));
     told.extend(repaid(comparison));
     told.extend(checked(&[comparison]));
+    told.extend(failed(&[comparison]));
     told.join(" ")
 }
 
@@ -131,6 +134,18 @@ fn checked(all: &[&Comparison]) -> Option<String> {
     })
 }
 
+/// Cells without a right answer, by their status.
+fn failed(all: &[&Comparison]) -> Option<String> {
+    let statuses = || all.iter().flat_map(|c| &c.ranked).map(|r| r.cell.status);
+    let mut failed = BTreeMap::<&str, usize>::new();
+    for status in statuses().filter(|s| !matches!(s, Status::Ok | Status::LeftOut)) {
+        *failed.entry(status.name()).or_default() += 1;
+    }
+    let each: Vec<String> = failed.iter().map(|(s, n)| format!("{n} {s}")).collect();
+    let cells = text::counted(statuses().count(), "cell");
+    (!each.is_empty()).then(|| format!("Not ok, of {cells}: {}.", each.join(", ")))
+}
+
 fn were(count: usize) -> String {
     match count {
         0 => "none was".to_owned(),
@@ -145,6 +160,7 @@ pub fn of_many(all: &[(String, &Comparison)], overall: &Overall) -> String {
     let mut told = vec![standing(all, overall)];
     told.extend(overall.base.and_then(fallback));
     told.extend(checked(&comparisons));
+    told.extend(failed(&comparisons));
     told.join(" ")
 }
 

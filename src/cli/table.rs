@@ -74,6 +74,19 @@ impl Table {
         self
     }
 
+    /// The table without columns that do not fit, for [`Table::bare`].
+    ///
+    /// The named ones go, in this order, until `width` characters hold a row.
+    pub fn within(&self, width: usize, first_to_go: &[&str]) -> Table {
+        let (widths, mut gone) = (self.widths(), first_to_go.iter());
+        let mut left: Vec<usize> = (0..widths.len()).collect();
+        while left.iter().map(|&c| widths[c] + GAP).sum::<usize>() > width + GAP {
+            let Some(name) = gone.next() else { break };
+            left.retain(|&column| self.header[column] != *name);
+        }
+        self.of_columns(&left)
+    }
+
     /// The table as tables of at most `width` characters, for [`Table::bare`]: each has
     /// the names, which stand before the first numbers, and as many further columns as
     /// fit, at least one.
@@ -209,6 +222,20 @@ mod tests {
         assert_eq!(kept.header, ["name", "some"]);
         assert_eq!(kept.right, [1]);
         assert_eq!(kept.rows, [["a", ""], ["b", "7"]]);
+    }
+
+    #[test]
+    fn columns_go_in_their_order_until_the_rest_fits() {
+        let mut table = Table::of("name | >p95 | >time | note");
+        table.add_row(["wide", "9 us", "7 us", "of 12"]);
+        let within = |width| table.within(width, &["note", "p95"]).bare();
+        assert_eq!(
+            within(23),
+            "name   p95  time  note\nwide  9 us  7 us  of 12\n"
+        );
+        assert_eq!(within(22), "name   p95  time\nwide  9 us  7 us\n");
+        assert_eq!(within(12), "name  time\nwide  7 us\n");
+        assert_eq!(within(1), within(12));
     }
 
     #[test]

@@ -125,7 +125,9 @@ fn a_saved_run_is_the_baseline_of_the_newest() {
     );
     let text = works(path, &format!("{RUN} --save main --out first"));
     assert!(
-        last_line(&text).starts_with("results/baselines/main.json"),
+        last_line(&text)
+            .trim_start()
+            .starts_with("results/baselines/main.json"),
         "{text}"
     );
     let read = |file: &str| json(&fs::read_to_string(path.join(file)).expect(file));
