@@ -343,7 +343,7 @@ fn reasons(group: &[&Comparison]) -> Vec<String> {
 
 /// Shows the files of a run.
 pub fn show_written(out: &mut impl Write, folder: &Path) -> io::Result<()> {
-    writeln!(out, "report  {}:", folder.display())?;
+    writeln!(out, "report  {}", folder.join("report.html").display())?;
     writeln!(
         out,
         "        report.json, summary.csv, samples.csv, stream.jsonl"
