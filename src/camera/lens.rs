@@ -173,7 +173,10 @@ impl Lens {
 
     /// Returns whether all lines of sight are parallel.
     pub fn is_orthographic(&self) -> bool {
-        matches!(self.kind, LensKind::Orthographic { .. })
+        match self.kind {
+            LensKind::Matrix(matrix) => matrix.is_parallel,
+            kind => matches!(kind, LensKind::Orthographic { .. }),
+        }
     }
 
     /// The eight corners of the view volume in the frame's world, near ones
@@ -227,8 +230,9 @@ fn check_window(name: &str, low: f64, high: f64) -> Result<(), CameraError> {
 impl Camera {
     /// The camera of a view-projection matrix.
     ///
-    /// The matrix is its lens. The frame has the position of the eye and the direction of
-    /// view; turning or moving it does not change what is visible.
+    /// The matrix is its lens. The frame has the position of the eye (the centre of the
+    /// near plane if the matrix is orthographic) and the direction of view; turning or
+    /// moving it does not change what is visible.
     ///
     /// # Errors
     /// As [`ViewProjection::new`].
@@ -238,6 +242,10 @@ impl Camera {
     ) -> Result<Camera, CameraError> {
         let matrix = ViewProjection::new(entries, convention)?;
         let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
+        let forward = match matrix.is_parallel {
+            true => matrix.axis().map_or(forward, |[_, ahead]| ahead),
+            false => forward,
+        };
         let eye = matrix.eye;
         // Visibility does not depend on the camera basis, so any up vector will do.
         let with = |up: DVec3| Pose::Forward { eye, forward, up }.frame();

@@ -38,16 +38,17 @@ pub const FARTHEST: f64 = (f32::MAX / 2.0) as f64;
 /// coordinates.
 type Four = [Expansion; 4];
 
-/// A view-projection matrix that has an eye.
+/// A view-projection matrix.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ViewProjection {
     /// For column vectors: clip = rows * (x, y, z, 1).
     pub(super) rows: [[f64; 4]; 4],
-    /// Depth from 0 to w instead of from -w.
-    from_zero: bool,
+    convention: MatrixConvention,
     /// True if depth is larger at the near plane.
-    is_reversed: bool,
-    /// Rounded.
+    pub(super) is_reversed: bool,
+    /// True if it is orthographic.
+    pub(super) is_parallel: bool,
+    /// Rounded; the centre of the near plane for an orthographic matrix.
     pub(super) eye: DVec3,
     /// Distances of the eye from the near and the far plane, rounded: a scale.
     pub(super) near: f64,
@@ -58,8 +59,7 @@ pub struct ViewProjection {
 impl ViewProjection {
     /// # Errors
     /// An entry that is not finite, or neither zero nor of a size from 1e-60 to
-    /// 1e60; a singular matrix; an orthographic one, which has no eye; one whose
-    /// clip volume is empty.
+    /// 1e60; a singular matrix; one whose clip volume is empty.
     pub fn new(
         entries: [[f64; 4]; 4],
         convention: MatrixConvention,
@@ -78,11 +78,9 @@ impl ViewProjection {
                 MatrixConvention::ColumnGl | MatrixConvention::ColumnD3d => entries,
                 MatrixConvention::RowGl | MatrixConvention::RowD3d => transposed,
             },
-            from_zero: match convention {
-                MatrixConvention::ColumnGl | MatrixConvention::RowGl => false,
-                MatrixConvention::ColumnD3d | MatrixConvention::RowD3d => true,
-            },
+            convention,
             is_reversed: false,
+            is_parallel: false,
             eye: DVec3::ZERO,
             near: 0.0,
             far: None,
@@ -90,7 +88,9 @@ impl ViewProjection {
         let inverse = matrix.inverse().ok_or_else(|| {
             CameraError::invalid("the matrix is singular", "one that has an inverse")
         })?;
-        (matrix.eye, matrix.is_reversed) = eye(&inverse)?;
+        let eye;
+        (eye, matrix.is_reversed) = eye_of(&inverse);
+        matrix.is_parallel = eye.is_none();
         let ahead = matrix
             .clip_corners()
             .map(|c| unprojected(&inverse, c)[3].sign());
@@ -99,6 +99,11 @@ impl ViewProjection {
             || "the matrix sees nothing, no point has w > 0 within its clip volume".to_owned(),
             "another sign or --matrix-convention",
         )?;
+        let centre = || matrix.axis().map(|[near, _]| near);
+        matrix.eye = eye.or_else(centre).ok_or_else(|| {
+            let found = "the matrix has its near plane at infinity";
+            CameraError::invalid(found, "a view that f64 holds")
+        })?;
         let is_bounded = ahead.iter().all(|&sign| sign > 0);
         for (name, plane) in matrix.planes_about(&[matrix.eye]) {
             match name {
@@ -117,7 +122,15 @@ impl ViewProjection {
 
     /// Returns whether depth begins at 0, and not at -w.
     pub fn is_from_zero(&self) -> bool {
-        self.from_zero
+        match self.convention {
+            MatrixConvention::ColumnGl | MatrixConvention::RowGl => false,
+            MatrixConvention::ColumnD3d | MatrixConvention::RowD3d => true,
+        }
+    }
+
+    /// Returns whether the clip space may have y downward.
+    pub(super) fn is_vulkan(&self) -> bool {
+        self.convention == MatrixConvention::ColumnD3d
     }
 
     /// The planes in f64 about the sum of some points, of unit length: sums and
@@ -130,7 +143,7 @@ impl ViewProjection {
         let [x, y, z, w] = self.exact_rows();
         let sum = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] + &b[k]);
         let difference = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] - &b[k]);
-        let low = if self.from_zero {
+        let low = if self.is_from_zero() {
             z.clone()
         } else {
             sum(&w, &z)
@@ -171,7 +184,7 @@ impl ViewProjection {
 
     /// Left or right, bottom or top, each at both ends of depth.
     fn clip_corners(&self) -> [[f64; 4]; 8] {
-        let lowest = if self.from_zero { 0.0 } else { -1.0 };
+        let lowest = if self.is_from_zero() { 0.0 } else { -1.0 };
         let side = |i: usize, bit: usize| if i & bit == 0 { -1.0 } else { 1.0 };
         std::array::from_fn(|i| {
             let depth = if i & 4 == 0 { lowest } else { 1.0 };
@@ -180,7 +193,7 @@ impl ViewProjection {
     }
 
     /// The inverse but for a positive factor; `None` if there is none.
-    fn inverse(&self) -> Option<[Four; 4]> {
+    pub(super) fn inverse(&self) -> Option<[Four; 4]> {
         let rows = self.exact_rows();
         let cofactor = |i: usize, j: usize| {
             let minor = minor(&rows, i, j);
@@ -201,17 +214,16 @@ impl ViewProjection {
     }
 }
 
-/// The point that the projection takes to x = y = w = 0, rounded, and whether z
-/// is positive there: depth is then reversed, near has the larger one.
-fn eye(inverse: &[Four; 4]) -> Result<(DVec3, bool), CameraError> {
+/// The point that the projection takes to x = y = w = 0, and the sign of z there.
+///
+/// Rounded; `None` at infinity. Where z is positive (`true`), depth is reversed: near has
+/// the larger one.
+fn eye_of(inverse: &[Four; 4]) -> (Option<DVec3>, bool) {
     let eye = unprojected(inverse, [0.0, 0.0, 1.0, 0.0]);
     let is_reversed = eye[3].sign() > 0;
     // The same point, with a positive last coordinate.
     let eye = if is_reversed { eye } else { eye.map(|e| -&e) };
-    let eye = about(&eye, &[]).filter(|eye| eye.is_finite());
-    let found = "the matrix has no eye (is it orthographic?)";
-    let eye = eye.ok_or_else(|| CameraError::invalid(found, "a perspective one"))?;
-    Ok((eye, is_reversed))
+    (about(&eye, &[]).filter(|eye| eye.is_finite()), is_reversed)
 }
 
 /// The determinant of what is left without a row and a column.
@@ -228,7 +240,7 @@ fn minor(rows: &[Four; 4], row: usize, column: usize) -> Expansion {
 }
 
 /// The inverse times a point of clip space.
-fn unprojected(inverse: &[Four; 4], clip: [f64; 4]) -> Four {
+pub(super) fn unprojected(inverse: &[Four; 4], clip: [f64; 4]) -> Four {
     [0, 1, 2, 3].map(|i| {
         let parts = inverse[i].iter().zip(clip).filter(|(_, c)| *c != 0.0);
         let parts = parts.map(|(entry, c)| entry * &Expansion::from(c));
@@ -238,7 +250,7 @@ fn unprojected(inverse: &[Four; 4], clip: [f64; 4]) -> Four {
 
 /// A point in homogeneous coordinates as a point about the sum of others;
 /// `None` if it is at infinity or beyond.
-fn about(point: &Four, zero: &[DVec3]) -> Option<DVec3> {
+pub(super) fn about(point: &Four, zero: &[DVec3]) -> Option<DVec3> {
     let [.., scale] = point;
     if scale.sign() <= 0 {
         return None;

@@ -8,6 +8,7 @@ mod matrix;
 mod planes;
 mod pose;
 mod projection;
+mod unprojected;
 
 pub use frame::{Frame, look_at};
 pub use lens::{Lens, LensKind};
@@ -16,6 +17,7 @@ pub use matrix::{FARTHEST, MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention,
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};
 pub use pose::Pose;
 pub use projection::ClipSpace;
+pub use unprojected::Unprojected;
 
 use crate::geometry::VolumeError;
 

@@ -8,7 +8,7 @@ use super::back_ends::{OCCLUSION_ROWS, back_ends};
 use super::error::{FunnelError, check_memory};
 use super::regions::Regions;
 use super::stage::{BackEnd, Chain, NONE, StageKind};
-use crate::camera::PlaneOptions;
+use crate::camera::{CameraError, PlaneOptions};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
 use crate::kernel::Kernel;
@@ -247,13 +247,14 @@ fn views(input: &FunnelInput) -> Result<Vec<View>, FunnelError> {
     let chosen = (0..count).map(|k| k * all.len() / count);
     let views = chosen.map(|index| {
         let place = || input.path.place(index);
-        let volume = all[index].volume(&PlaneOptions::default(), &around);
-        let volume = volume.map_err(|error| WorkloadError {
+        let refused = |error: CameraError| WorkloadError {
             place: place(),
             error: error.into(),
-        })?;
-        let rays = Rays::of(&all[index])
-            .map_err(|error| FunnelError::Refused(format!("{}: {error}", place())))?;
+        };
+        let rays = Rays::of(&all[index]).map_err(refused)?;
+        // Planes and rays of the same numbers, also where a matrix has others.
+        let volume = rays.camera().volume(&PlaneOptions::default(), &around);
+        let volume = volume.map_err(refused)?;
         Ok(View {
             camera: index,
             volume,

@@ -250,10 +250,11 @@ fn flicker(items: usize, truths: [&Truth; 2], answers: [&[ItemId]; 2]) -> u64 {
 
 /// How deep the deepest false negative reaches into the view, in pixels of a view
 /// 1080 pixels high: its depth in world units over the height that the view has
-/// where the item is nearest. World units for a matrix, which has no such height.
+/// where the item is nearest. World units for a matrix without rays.
 fn worst_miss_px(camera: &Camera, scene: &Scene, truth: &Truth, answer: &[ItemId]) -> f64 {
     const PIXELS: f64 = 1080.0;
     let misses = truth.misses(&scene.items, answer);
+    let camera = camera.unprojected().unwrap_or(*camera);
     let in_pixels = misses.into_iter().map(|(id, depth)| {
         let item = &scene.items[id as usize];
         let ahead = |i| {

@@ -22,7 +22,7 @@ pub mod truth;
 pub use guarantee::Guarantee;
 pub use items::{holes_of, surfaces_of};
 pub use level::{Level, LevelMap};
-pub use rays::{NoRays, Ray, Rays, SampleGrid};
+pub use rays::{Ray, Rays, SampleGrid};
 pub use solids::Solids;
 
 #[cfg(test)]

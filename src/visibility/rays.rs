@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use crate::camera::{Camera, LensKind};
+use crate::camera::{Camera, CameraError};
 
 /// An image's samples: one at the centre of each pixel.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -49,11 +49,6 @@ impl Ray {
     }
 }
 
-/// A camera for which no rays can be made.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("the camera is a matrix; expected an eye and a lens, whose rays are known")]
-pub struct NoRays;
-
 /// All rays of a camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays {
@@ -65,23 +60,21 @@ pub struct Rays {
 }
 
 impl Rays {
-    /// The rays of a camera.
+    /// The rays of a camera; a matrix is unprojected.
     ///
     /// # Errors
-    /// A camera that was given as a matrix.
-    pub fn of(camera: &Camera) -> Result<Rays, NoRays> {
-        if matches!(camera.lens.kind(), LensKind::Matrix(_)) {
-            return Err(NoRays);
-        }
+    /// As [`Camera::unprojected`].
+    pub fn of(camera: &Camera) -> Result<Rays, CameraError> {
+        let camera = camera.unprojected()?;
         Ok(Rays {
-            camera: *camera,
+            camera,
             window: camera.lens.window(),
             near: camera.lens.near(),
             far: camera.lens.far().unwrap_or(f64::INFINITY),
         })
     }
 
-    /// The camera that they are of.
+    /// The camera that they are of, with an eye and a lens.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }

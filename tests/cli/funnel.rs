@@ -402,15 +402,6 @@ fn what_cannot_be_is_refused_in_a_line() {
         let done = cullbench(folder.path(), &format!("{LINE} {more}"));
         assert_refused(&done, wanted, more);
     }
-    let matrix = "m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33\n\
-                  1,0,0,0,0,1,0,0,0,0,-1.02,-0.2,0,0,-1,0\n";
-    fs::write(folder.path().join("matrix.csv"), matrix).expect("written");
-    let line = LINE.replace("cameras.csv", "matrix.csv --matrix-convention column-gl");
-    assert_refused(
-        &cullbench(folder.path(), &line),
-        "matrix.csv, line 2 | matrix",
-        "a matrix",
-    );
     fs::write(folder.path().join("empty.csv"), format!("{BOXES}\n")).expect("written");
     let line = LINE.replace("scene.csv", "empty.csv");
     assert_refused(&cullbench(folder.path(), &line), "no items", "no items");

@@ -3,6 +3,10 @@
 
 use std::path::Path;
 
+use cullbench::camera::{Camera, ClipSpace, Lens, look_at};
+use glam::{DMat4, DVec3};
+use serde_json::Value;
+
 use super::process::*;
 use super::{BOXES, EYE_LOOK};
 
@@ -150,7 +154,7 @@ fn every_command_takes_matrices() {
 #[test]
 fn matrices_that_are_no_cameras_are_refused_in_one_line() {
     let good = row(GL, false);
-    let cases: [(String, &str, &str); 9] = [
+    let cases: [(String, &str, &str); 8] = [
         (
             format!("{ENTRIES}\n{good}\n"),
             "",
@@ -180,11 +184,6 @@ fn matrices_that_are_no_cameras_are_refused_in_one_line() {
             format!("{ENTRIES}\n{}1\n", "1,".repeat(15)),
             "column-gl",
             "line 2 | the matrix is singular | expected",
-        ),
-        (
-            format!("{ENTRIES}\n1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1\n"),
-            "column-d3d",
-            "line 2 | no eye | expected a perspective one",
         ),
         (
             format!("{ENTRIES}\n{}\n", good.replacen('1', "1e70", 1)),
@@ -217,4 +216,176 @@ fn matrices_that_are_no_cameras_are_refused_in_one_line() {
         &[planes],
         "m.csv, line 2: | planes of its own | expected --planes frame",
     );
+}
+
+/// Every count of a report of `funnel`, with its place in the document.
+fn counts(folder: &Path, scene: &str, cameras: &str, convention: &str) -> Vec<(String, String)> {
+    fn collect(at: &str, value: &Value, all: &mut Vec<(String, String)>) {
+        let parts: Vec<(String, &Value)> = match value {
+            Value::Object(map) => map.iter().map(|(k, v)| (k.clone(), v)).collect(),
+            Value::Array(list) => list
+                .iter()
+                .enumerate()
+                .map(|(i, v)| (i.to_string(), v))
+                .collect(),
+            value if at.ends_with("_count") => return all.push((at.to_owned(), value.to_string())),
+            _ => return,
+        };
+        for (key, part) in parts {
+            collect(&format!("{at}/{key}"), part, all);
+        }
+    }
+    let line = format!(
+        "funnel --scene {scene} --path {cameras} --matrix-convention {convention} \
+         --structure linear,bvh --samples 48x32 --processes 1 --format json"
+    );
+    let mut all = Vec::new();
+    collect("", &json(&works(folder, &line)), &mut all);
+    all
+}
+
+fn camera(eye: [f64; 3], look: [f64; 3], lens: Lens) -> Camera {
+    let frame = look_at(DVec3::from(eye), DVec3::from(look), DVec3::Z).expect("a frame");
+    Camera { frame, lens }
+}
+
+fn matrix(camera: &Camera, clip: ClipSpace) -> DMat4 {
+    camera.lens.projection(clip) * camera.frame.world_to_eye()
+}
+
+fn csv(matrices: impl Iterator<Item = DMat4>) -> String {
+    let rows = matrices.map(|m| row(m.transpose().to_cols_array_2d(), false) + "\n");
+    format!("{ENTRIES}\n{}", rows.collect::<String>())
+}
+
+/// Eyes inside and far outside, near planes at either end of depth, no far plane.
+#[test]
+fn a_matrix_has_the_funnel_of_its_camera() {
+    let folder = folder(&[]);
+    let write = |name: &str, text: String| {
+        std::fs::write(folder.path().join(name), text).expect("writable");
+    };
+    let perspective = |fovy, near, far| Lens::perspective(fovy, 1.5, near, far).expect("a lens");
+    let near_ortho = perspective(0.1, 2000.0, Some(4000.0));
+    // Its eye lies on the near plane, as that of an orthographic matrix does: masked
+    // buffers compare depths whose rounding depends on the eye.
+    let parallel = Lens::orthographic(9.0, 1.5, 0.0, 200.0).expect("a lens");
+    for (scene, eye, look, away) in [
+        (
+            "rooms:n=150",
+            [3.5, 3.0, 1.5],
+            [9.0, 8.0, 2.0],
+            [-2900.0, 150.0, 200.0],
+        ),
+        (
+            "city:n=150",
+            [-40.0, 3.0, 20.0],
+            [0.0, 0.0, 5.0],
+            [-2900.0, 150.0, 200.0],
+        ),
+    ] {
+        let cameras = [
+            camera(eye, look, perspective(70.0, 0.05, Some(300.0))),
+            camera(eye, look, perspective(70.0, 0.05, None)),
+            camera(away, look, near_ortho),
+            camera(away.map(|x| x * 0.01), look, parallel),
+        ];
+        let of = |eye: [f64; 3]| eye.map(|x| x.to_string()).join(",");
+        let written = [
+            (eye, "70,", "0.05,300"),
+            (eye, "70,", "0.05,inf"),
+            (away, "0.1,", "2000,4000"),
+            (away.map(|x| x * 0.01), ",9", "0,200"),
+        ];
+        let rows = written
+            .map(|(eye, lens, depths)| format!("{},{},{lens},1.5,{depths}\n", of(eye), of(look)));
+        let header = format!("{EYE_LOOK},fovy_deg,ortho_height,aspect,near,far\n");
+        write("eye.csv", header + &rows.concat());
+        let wanted = counts(folder.path(), scene, "eye.csv", "column-gl");
+        let seen = wanted
+            .iter()
+            .filter(|(at, count)| at.ends_with("/truth_count") && count != "0.0");
+        assert!(
+            wanted.len() > 80 && seen.count() > 10,
+            "{scene}: {wanted:?}"
+        );
+        for (clip, convention) in [
+            (ClipSpace::OpenGl, "column-gl"),
+            (ClipSpace::D3d, "column-d3d"),
+            (ClipSpace::ReversedZ, "column-d3d"),
+        ] {
+            // Of an orthographic matrix the near end has the smaller depth.
+            let own = |camera: &Camera| match (clip, camera.lens.is_orthographic()) {
+                (ClipSpace::ReversedZ, true) => ClipSpace::D3d,
+                _ => clip,
+            };
+            write("m.csv", csv(cameras.iter().map(|c| matrix(c, own(c)))));
+            let found = counts(folder.path(), scene, "m.csv", convention);
+            assert_eq!(found, wanted, "{scene} {clip:?}");
+        }
+        // Off-centre, against itself upside down.
+        let lens = Lens::off_axis([-0.02, 0.07, -0.01, 0.04], 0.05, Some(300.0)).expect("a lens");
+        let off_centre = matrix(&camera(eye, look, lens), ClipSpace::OpenGl);
+        let rolled = DMat4::from_scale(DVec3::new(-1.0, -1.0, 1.0)) * off_centre;
+        let [found, wanted] = [off_centre, rolled].map(|matrix| {
+            write("m.csv", csv([matrix].into_iter()));
+            counts(folder.path(), scene, "m.csv", "column-gl")
+        });
+        assert_eq!(found, wanted, "{scene}, off-centre");
+    }
+}
+
+/// Other studies of the same stages.
+#[test]
+fn advise_and_the_stages_of_precision_take_matrices() {
+    let lens = Lens::perspective(70.0, 1.5, 0.05, Some(300.0)).expect("a lens");
+    let camera = camera([3.5, 3.0, 1.5], [9.0, 8.0, 2.0], lens);
+    let text = csv([matrix(&camera, ClipSpace::D3d)].into_iter());
+    let folder = folder(&[("m.csv", text.as_bytes())]);
+    let on = "--scene rooms:n=150 --path m.csv --matrix-convention column-d3d --processes 1";
+    for study in [
+        "precision --stage region",
+        "precision --stage occlusion",
+        "advise",
+    ] {
+        let report = works(folder.path(), &format!("{study} {on} --format json"));
+        assert!(
+            !report.contains("the camera is a matrix"),
+            "{study}: {report}"
+        );
+    }
+}
+
+#[test]
+fn matrices_without_rays_are_refused_where_rays_are_needed() {
+    let lens = Lens::perspective(70.0, 1.5, 0.05, Some(300.0)).expect("a lens");
+    let camera = camera([3.5, 3.0, 1.5], [9.0, 8.0, 2.0], lens);
+    let view = camera.frame.world_to_eye();
+    let mut sheared = camera.lens.projection(ClipSpace::D3d);
+    sheared.y_axis.x = 0.1;
+    let mut oblique = camera.lens.projection(ClipSpace::D3d);
+    oblique.x_axis.z = 0.2;
+    let parallel = Lens::orthographic(9.0, 1.5, 0.5, 200.0).expect("a lens");
+    let folder = folder(&[]);
+    for (projection, wanted) in [
+        (sheared, "line 2: the image of the matrix is sheared by"),
+        (
+            oblique,
+            "line 2: the near plane of the matrix is oblique by",
+        ),
+        (
+            parallel.projection(ClipSpace::ReversedZ),
+            "line 2: the orthographic matrix | ortho_height",
+        ),
+    ] {
+        let text = csv([projection * view].into_iter());
+        std::fs::write(folder.path().join("m.csv"), text).expect("writable");
+        let on = "--scene rooms:n=150 --path m.csv --matrix-convention column-d3d";
+        let funnel = format!("funnel {on}");
+        assert_refused(&cullbench(folder.path(), &funnel), wanted, &funnel);
+        works(
+            folder.path(),
+            &format!("verify {on} --cases 0 --structure bvh"),
+        );
+    }
 }
