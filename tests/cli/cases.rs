@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use super::funnel::{row, rows};
 use super::process::*;
+use super::{BOXES, FULL_CAMERA};
 
 fn cases() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/cases"))
@@ -192,5 +193,40 @@ fn what_planes_return_too_much_is_counted_exactly() {
             counts.len() > 10 && counts.iter().all(|&count| *count == wanted),
             "{counts:?}"
         );
+    }
+}
+
+/// Boxes of which one kind defeats halving, another stacks everything on one place.
+#[test]
+fn a_hundred_thousand_boxes_in_any_arrangement_are_answered_alike() {
+    type Bounds = fn(f64) -> [f64; 6];
+    let arrangements: [(&str, Bounds); 6] = [
+        ("nested", |i| {
+            [-1.0 - i, -1.0 - i, -1.0 - i, 1.0 + i, 1.0 + i, 1.0 + i]
+        }),
+        ("posts", |i| [2.0 * i, 0.0, 0.0, 2.0 * i + 1.0, 1.0, 1.0]),
+        ("collinear", |i| [i, 0.0, 0.0, i, 0.0, 0.0]),
+        ("stairs", |i| [0.0, 0.0, 0.0, 1.0 + i, 1.0 + i, 1.0 + i]),
+        ("coincident", |_| [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
+        ("overlapping", |i| {
+            [i * 1e-3, 0.0, 0.0, 100.0 + i * 1e-3, 100.0, 100.0]
+        }),
+    ];
+    let camera = format!("{FULL_CAMERA}\n-5,-30,4,20,10,0,0,0,1,60,1.5,0.1,inf\n");
+    for (name, bounds) in arrangements {
+        let mut boxes = format!("{BOXES}\n");
+        for i in 0..100_000 {
+            let row = bounds(f64::from(i)).map(|bound| bound.to_string());
+            boxes += &(row.join(",") + "\n");
+        }
+        let folder = folder(&[("b.csv", boxes.as_bytes()), ("c.csv", camera.as_bytes())]);
+        let line = "query --scene b.csv --cameras c.csv --structure all";
+        let rows = super::process::rows(&works(folder.path(), line));
+        assert!(rows.len() > 8, "{name}");
+        for row in &rows {
+            for column in ["visible_count", "visible_id_sum"] {
+                assert_eq!(row[column], rows[0][column], "{name}: {row:?}");
+            }
+        }
     }
 }
