@@ -26,13 +26,9 @@ pub enum FunnelError {
     Refused(String),
 }
 
-/// Steps that need less are taken without a look at the memory, bytes.
-const ANYWHERE: u64 = 64 << 20;
-
 /// Refuses a step that needs more memory than is free; unknown memory is no reason.
 pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), FunnelError> {
-    let available = (needed > ANYWHERE).then(available_bytes).flatten();
-    match available.filter(|available| needed > *available) {
+    match available_bytes().filter(|available| needed > *available) {
         Some(available) => Err(FunnelError::Refused(format!(
             "{step}: about {} needed, {} are free; expected fewer items or views",
             gigabytes(needed),
