@@ -81,11 +81,14 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         }
     });
     if let Some(file) = &args.svg {
-        write_text(file, &funnel_picture::draw(&report)?)?;
+        write_text(file, &funnel_picture::draw(&report, &stages.setting.scene))?;
     }
     if let Some(file) = &args.html {
         let mut blocks = funnel_table::blocks(&report);
-        blocks.push(Block::Picture(funnel_picture::draw(&report)?));
+        blocks.push(Block::Picture(funnel_picture::draw(
+            &report,
+            &stages.setting.scene,
+        )));
         let page = to_html(&format!("cullbench funnel {}", report.scene), &blocks);
         write_text(file, &page)?;
     }

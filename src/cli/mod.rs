@@ -32,6 +32,8 @@ mod list;
 mod merge;
 mod page_plots;
 mod palette;
+mod plan;
+mod plan_cells;
 mod precision;
 mod precision_chart;
 mod precision_conclusions;
@@ -47,7 +49,9 @@ mod run_table;
 mod run_verdict;
 mod scene;
 mod scene_args;
+mod scene_draw;
 mod shared_args;
+mod sheet;
 mod stage_sweep;
 mod stress;
 mod study;
@@ -187,6 +191,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
         Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
+        Command::Scene(SceneCommand::Draw(args)) => scene_draw::draw(registry, &args),
         Command::Env(args) => env::env(&args),
         Command::Worker => worker::worker(registry),
         Command::Completions { shell } => {

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::shared_args::SceneArgs;
-use super::shared_args::TableFormat;
+use super::shared_args::{LensArgs, SceneArgs, TableFormat};
+use super::values;
 
 #[derive(Subcommand, Debug)]
 pub enum SceneCommand {
@@ -15,6 +15,8 @@ pub enum SceneCommand {
     Generate(SceneGenerateArgs),
     /// Write any scene to a file that every command reads
     Convert(SceneConvertArgs),
+    /// Draw a scene from above, with the cells of a structure and the verdicts of a query
+    Draw(SceneDrawArgs),
 }
 
 #[derive(Args, Debug)]
@@ -74,4 +76,41 @@ pub struct SceneConvertArgs {
     pub to: Option<SceneFormat>,
     #[command(flatten)]
     pub scene_args: SceneArgs,
+}
+
+const DRAW_HELP: &str = "\
+Examples:
+  cullbench scene draw freedm-map12 --structure bsp-textbook --depth 3 -o bsp.svg
+  cullbench scene draw city:n=1000 --structure quadtree-textbook --camera street -o tree.svg
+  cullbench scene draw helsinki --camera orbit:frames=8 --frame 3 -o view.svg
+
+Cells that a query rejects are filled, those that it opens have a blue outline.
+Items that lie around others are outlined. Cells of a structure are what its
+queries test: children in blocks of sixteen, but for the textbook forms.";
+
+#[derive(Args, Debug)]
+#[command(after_help = DRAW_HELP)]
+pub struct SceneDrawArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// A structure whose cells are drawn, e.g. quadtree-textbook:leaf=4
+    #[arg(long, value_name = "STRUCTURE")]
+    pub structure: Option<String>,
+    /// A camera path (spec or cameras CSV); one of its cameras is drawn with its query
+    #[arg(long, value_name = "PATH")]
+    pub camera: Option<String>,
+    /// The camera of the path, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "camera")]
+    pub frame: usize,
+    /// Deepest level of cells that is drawn; 0 is the root
+    #[arg(long, value_name = "LEVEL", default_value_t = 3, value_parser = values::whole(0..=1000u32))]
+    pub depth: u32,
+    /// The SVG file to write
+    #[arg(long, short, value_name = "FILE")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
 }

@@ -34,7 +34,7 @@ pub(crate) use counts::Errors;
 pub use fragment_stage::FragmentCounts;
 pub use orders::OrderRow;
 pub use picks::PickRow;
-pub use plan_view::{Fate, PlanView};
+pub use plan_view::Fate;
 pub use report::{FunnelReport, Gain, LevelRow, StageRow};
 #[cfg(test)]
 pub(crate) use stage::BackEnd;

@@ -1,11 +1,10 @@
-//! The first view from above, with the stage that removed each item.
-
-use glam::DVec3;
+//! The first view, with the stage that removed each item.
 
 use super::item_stages::ItemStages;
 use super::stage::{Chain, StageKind};
 use super::truth::Truth;
 use super::world::World;
+use crate::camera::Camera;
 use crate::query::ItemId;
 
 /// The stage that removed an item, or the item's visibility.
@@ -21,19 +20,14 @@ pub enum Fate {
     Lost,
 }
 
-/// Items about the eye of one view, as seen from above.
+/// The first view with the fate of each item.
 #[derive(Clone, Default, Debug)]
 pub struct PlanView {
-    /// The eye.
-    pub eye: [f64; 2],
-    /// Directions of the left and the right edge of the view.
-    pub edges: [[f64; 2]; 2],
-    /// Low and high corner of each item, and its fate; the farthest first.
-    pub items: Vec<([f64; 4], Fate)>,
+    /// Its camera; `None` if there is no view.
+    pub camera: Option<Camera>,
+    /// Fates by item.
+    pub fates: Vec<Fate>,
 }
-
-/// Most items that are drawn: those nearest to the eye.
-const MOST_DRAWN: usize = 4_000;
 
 impl PlanView {
     /// The first view, behind the stages of whole items of a chain.
@@ -46,25 +40,11 @@ impl PlanView {
             (stage, stages.items(&steps, 0))
         });
         let is_visible = |item| visible.binary_search_by_key(&item, |(id, _)| *id).is_ok();
-        let eye = view.rays.camera().frame.eye;
-        let flat = |v: DVec3| [v.x, v.y];
-        let items = world.scene.items.iter().zip(0..);
-        let mut near: Vec<(f64, [f64; 4], ItemId)> = items
-            .filter(|(b, _)| !b.is_empty())
-            .map(|(b, item)| {
-                let (min, max) = b.in_world(world.scene.origin);
-                let nearest = eye.clamp(min, max).with_z(eye.z);
-                (nearest.distance(eye), [min.x, min.y, max.x, max.y], item)
-            })
-            .collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
-        near.truncate(MOST_DRAWN);
-        let drawn = near.into_iter().rev();
+        let items = (0..).take(world.scene.items.len());
         PlanView {
-            eye: flat(eye),
-            edges: [0.0, 1.0].map(|x| flat(view.rays.through(x, 0.5).direction)),
-            items: drawn
-                .map(|(_, plan, item)| (plan, fate(item, &left, is_visible(item))))
+            camera: Some(*view.rays.camera()),
+            fates: items
+                .map(|item| fate(item, &left, is_visible(item)))
                 .collect(),
         }
     }

@@ -7,7 +7,7 @@ use glam::Vec3;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::Info;
+use super::{Info, TreeCell};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::{BASELINE, Isa, Kernel, Work};
 use crate::query::{
@@ -206,6 +206,13 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// does not declare [`Capabilities::refits`](super::Capabilities).
     fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
         false
+    }
+
+    /// Cells of the structure in depth-first order, for `cullbench scene draw`; none from a
+    /// structure without nested cells. A query with a volume of planes must test exactly
+    /// the roots and the cells directly within those that straddle it.
+    fn cells(&self) -> Vec<TreeCell<'_>> {
+        Vec::new()
     }
 
     /// Item ids in the order that ranges passed to [`Sink::accept_range`] refer to.

@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-use super::{MemoryUsage, Query, RegionIndex};
+use super::{MemoryUsage, Query, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::kernel::{BASELINE, Isa, Kernel, Work};
 use crate::query::{
@@ -44,6 +44,8 @@ pub trait DynIndex: Send + Sync {
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// See [`RegionIndex::query_many`]; clears `out` first.
     fn query_many(&self, points: &[Vec3], out: &mut Located);
+    /// See [`RegionIndex::cells`].
+    fn cells(&self) -> Vec<TreeCell<'_>>;
     /// See [`RegionIndex::refit`].
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool;
 
@@ -105,6 +107,10 @@ impl<T: RegionIndex> DynIndex for WithKernel<T> {
         out.clear();
         let index = &self.index;
         self.kernel.run(QueryMany { index, points, out });
+    }
+
+    fn cells(&self) -> Vec<TreeCell<'_>> {
+        self.index.cells()
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `contract`, `info` | [`RegionIndex`] and its input; the declaration [`Info`] |
 //! | `registry`, `erased` | a row per structure; the same structures without their types |
+//! | `cells` | nested cells of a structure, for pictures |
 //! | `linear`, `grid`, `wide/` | the two scans, the uniform grid, the 16-ary implicit tree |
 //! | `tree/` | the packed tree of `bvh`, `bsp`, `octree` and `quadtree`, with its queries |
 //! | `build/` | a builder of packed trees per file: `bvh`, `bsp`, `cells` (octree, quadtree) |
@@ -21,6 +22,7 @@
 mod box_test;
 mod build;
 mod catch_panic;
+mod cells;
 mod centre_bounds;
 mod contract;
 mod erased;
@@ -45,6 +47,9 @@ pub use build::bvh::{Bvh, BvhParams, BvhPreset};
 pub use build::cells::{CellParams, Octree, Quadtree};
 pub(crate) use build::ploc;
 pub use catch_panic::caught;
+pub use cells::TreeCell;
+#[cfg(feature = "cli")]
+pub(crate) use cells::verdicts;
 pub(crate) use contract::check_range;
 pub use contract::{BuildError, FrustumQuery, Input, MemoryUsage, NoParams, Query, RegionIndex};
 pub use erased::{DynIndex, Execution, WithKernel};

@@ -13,6 +13,7 @@ mod compare;
 mod compare_output;
 mod converting;
 mod cullings;
+mod drawing;
 mod drift;
 mod foreign_text;
 mod funnel;

@@ -16,7 +16,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::items::Record;
-use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, check_range};
+use super::{
+    BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell, check_range,
+};
 use crate::geometry::{Aabb, Plane, PlaneMask};
 use crate::kernel::pairs;
 use crate::query::{Containment, Context, ItemId, Predicate, QueryVolume, Recorder, Sink};
@@ -152,6 +154,19 @@ impl Node {
         ControlFlow::Continue(())
     }
 
+    /// Adds the cells of a subtree, the node's own first.
+    fn add_cells<'a>(&'a self, level: u32, cells: &mut Vec<TreeCell<'a>>) {
+        cells.push(TreeCell {
+            level,
+            bounds: self.bounds,
+            half_space: self.half_space,
+            items: &self.ids,
+        });
+        for child in &self.children {
+            child.add_cells(level + 1, cells);
+        }
+    }
+
     /// Adds the memory of a subtree to a sum.
     fn add_memory(&self, sum: &mut MemoryUsage) {
         sum.node_bytes += size_of::<Node>();
@@ -201,6 +216,14 @@ impl<D: Division> RegionIndex for Textbook<D> {
             root.add_memory(&mut sum);
         }
         sum
+    }
+
+    fn cells(&self) -> Vec<TreeCell<'_>> {
+        let mut cells = Vec::new();
+        if let Some(root) = &self.root {
+            root.add_cells(0, &mut cells);
+        }
+        cells
     }
 
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {

@@ -25,7 +25,7 @@ use glam::Vec3;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{BuildError, Info, Input, MemoryUsage, RegionIndex};
+use super::{BuildError, Info, Input, MemoryUsage, RegionIndex, TreeCell};
 use crate::geometry::Aabb;
 use crate::kernel::Isa;
 use crate::query::{Context, ItemId, ManySink, QueryVolume, Recorder, Sink};
@@ -154,6 +154,10 @@ impl<B: TreeBuilder> RegionIndex for Tree<B> {
         let descent = &mut self.descent;
         let fitted = |tree: &PackedTree, node| descent.refit(tree, node);
         self.tree.refit(items, moved, fitted)
+    }
+
+    fn cells(&self) -> Vec<TreeCell<'_>> {
+        self.tree.cells()
     }
 
     fn tree_order(&self) -> Option<&[ItemId]> {

@@ -5,9 +5,9 @@
 
 use super::node::{TreeNode, children, is_leaf};
 use super::wide_nodes::WideNodes;
-use crate::geometry::{Aabb, BoxBlocks};
-use crate::index::MemoryUsage;
+use crate::geometry::{Aabb, BoxBlocks, LANES};
 use crate::index::positions::Positions;
+use crate::index::{MemoryUsage, TreeCell};
 use crate::query::ItemId;
 
 /// A tree packed for queries: 36 bytes per node, 28 per item. Nodes may have
@@ -115,6 +115,44 @@ impl PackedTree {
     /// Levels from the root to the deepest leaf; 0 for no items.
     pub fn depth(&self) -> usize {
         self.depth
+    }
+
+    /// The root, and the lanes of the wide nodes below it.
+    pub fn cells(&self) -> Vec<TreeCell<'_>> {
+        let Some(root) = self.nodes.first() else {
+            return Vec::new();
+        };
+        let cell = |level, bounds, items| TreeCell {
+            level,
+            bounds,
+            half_space: None,
+            items,
+        };
+        let wide = &self.wide_nodes;
+        let is_leaf = wide.blocks.is_empty();
+        let items = if is_leaf { &self.ids[..] } else { &[] };
+        let mut cells = vec![cell(0, root.bounds, items)];
+        let lanes = |at: usize, level: u32| {
+            let lanes = (0..LANES).rev();
+            let held = lanes.filter(move |lane| wide.links[at].lanes >> lane & 1 == 1);
+            held.map(move |lane| (at, lane, level))
+        };
+        // The last entry is the next cell.
+        let mut open = Vec::new();
+        if !is_leaf {
+            open.extend(lanes(0, 1));
+        }
+        while let Some((at, lane, level)) = open.pop() {
+            let (links, bounds) = (&wide.links[at], wide.blocks[at].get(lane));
+            if links.leaves >> lane & 1 == 1 {
+                let items = links.first[lane] as usize..links.end[lane] as usize;
+                cells.push(cell(level, bounds, &self.ids[items]));
+            } else {
+                cells.push(cell(level, bounds, &[]));
+                open.extend(lanes(links.below[lane] as usize, level + 1));
+            }
+        }
+        cells
     }
 
     /// Bytes of nodes and of items, as allocated.

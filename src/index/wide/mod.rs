@@ -21,7 +21,7 @@ use super::frontier::{Frontier, NodeList, is_far, put_back, take};
 use super::items::indexable;
 use super::padded_ids::PaddedIds;
 use super::positions::Positions;
-use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, BoxBlock, LANES};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
@@ -273,6 +273,27 @@ impl Wide {
         }
     }
 
+    /// Adds the lanes of a block above the leaves, each before the block that it bounds.
+    fn add_cells<'a>(&'a self, level: usize, block: usize, cells: &mut Vec<TreeCell<'a>>) {
+        let Level { first, boxes, .. } = self.levels[level];
+        if level == 0 {
+            return;
+        }
+        for lane in block * LANES..boxes.min((block + 1) * LANES) {
+            let items = match level {
+                1 => &self.ids[lane * LANES..self.ids.len().min((lane + 1) * LANES)],
+                _ => &[],
+            };
+            cells.push(TreeCell {
+                level: (self.levels.len() - 1 - level) as u32,
+                bounds: self.blocks[first + block].get(lane % LANES),
+                half_space: None,
+                items,
+            });
+            self.add_cells(level - 1, lane, cells);
+        }
+    }
+
     /// Writes the bounds of a block's boxes to its lane of the level above.
     fn fit(&mut self, level: usize, block: usize) {
         let bounds = self.blocks[self.levels[level].first + block].union();
@@ -343,6 +364,14 @@ impl RegionIndex for Wide {
             }
         }
         true
+    }
+
+    fn cells(&self) -> Vec<TreeCell<'_>> {
+        let mut cells = Vec::new();
+        if let Some(top) = self.levels.len().checked_sub(1) {
+            self.add_cells(top, 0, &mut cells);
+        }
+        cells
     }
 
     fn tree_order(&self) -> Option<&[ItemId]> {

@@ -1,0 +1,335 @@
+//! Drawings from above as SVG: items of a scene in the colours of their classes, cells
+//! of a structure, the view volume; axes in the scene's units, a legend below.
+
+use std::fmt::Write;
+
+use glam::DVec3;
+
+use super::plan_cells::Cells;
+use super::sheet::{Rect, SIDE, Sheet, at, centre, longest, union, united};
+use super::text;
+use crate::camera::Camera;
+use crate::scene::{Regions, Scene};
+
+/// Colour and words of a class of items.
+#[derive(Clone, Copy)]
+pub struct Class {
+    pub colour: &'static str,
+    pub words: &'static str,
+    /// Drawn in any case, however far from the eye.
+    pub is_key: bool,
+}
+
+/// A drawing. Later classes of items are drawn over earlier ones of the same size.
+pub struct Plan<'p> {
+    pub caption: String,
+    pub scene: &'p Scene,
+    pub camera: Option<&'p Camera>,
+    pub classes: &'p [Class],
+    pub class_of: &'p dyn Fn(usize) -> usize,
+    pub cells: Option<Cells<'p>>,
+}
+
+/// Most items that are drawn: those of key classes, then the nearest to the eye.
+const MOST_DRAWN: usize = 10_000;
+/// An item from above.
+struct Drawn {
+    rect: Rect,
+    class: usize,
+    /// It lies around others and would cover them.
+    is_outlined: bool,
+}
+
+impl Plan<'_> {
+    /// The picture.
+    pub fn svg(&self) -> String {
+        let (mut items, mut notes) = self.items();
+        let mut outlines = Vec::new();
+        if let Some(cells) = &self.cells {
+            outlines = cells.outlines(self.scene.origin);
+            notes.extend(cells.notes());
+        }
+        let eye = self.camera.map(|camera| camera.frame.eye);
+        let corners = outlines.iter().flat_map(|outline| &outline.corners);
+        let cells = corners.map(|&corner| at(corner));
+        let sheet = Sheet::over(window(&items, cells, eye));
+        outline_floors(&mut items, &sheet);
+        let mut body = String::new();
+        if let Some(cells) = &self.cells {
+            cells.fill(&outlines, &sheet, &mut body);
+        }
+        self.draw_items(&items, &sheet, &mut body);
+        self.draw_walls(&sheet, &mut body);
+        if let Some(cells) = &self.cells {
+            cells.draw(&outlines, &sheet, &mut body);
+        }
+        if let Some(camera) = self.camera {
+            draw_camera(camera, &sheet, &mut body);
+        }
+        sheet.finished(&self.caption, &body, &self.legend(), &notes)
+    }
+
+    /// The items to draw, and what is not drawn.
+    fn items(&self) -> (Vec<Drawn>, Vec<String>) {
+        let origin = self.scene.origin;
+        let middle = self.scene.world_bounds();
+        let eye = self
+            .camera
+            .map_or(middle.min / 2.0 + middle.max / 2.0, |c| c.frame.eye);
+        let storey = self.camera.and_then(|camera| self.storey(camera));
+        let (mut apart, mut all) = (0, Vec::new());
+        for (item, b) in self.scene.items.iter().enumerate() {
+            if b.is_empty() {
+                continue;
+            }
+            let (min, max) = b.in_world(origin);
+            let class = (self.class_of)(item);
+            let is_key = self.classes[class].is_key;
+            if !is_key && storey.is_some_and(|[low, high]| max.z < low || high < min.z) {
+                apart += 1;
+                continue;
+            }
+            let distance = match is_key {
+                true => -1.0,
+                false => eye.clamp(min, max).distance(eye),
+            };
+            all.push((distance, [min.x, min.y, max.x, max.y], class));
+        }
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let far = all.len().saturating_sub(MOST_DRAWN);
+        all.truncate(MOST_DRAWN);
+        let mut notes = Vec::new();
+        for (count, why) in [(apart, "on other storeys"), (far, "farther from the eye")] {
+            if count > 0 {
+                notes.push(format!("not drawn: {} {why}", text::counted(count, "item")));
+            }
+        }
+        let drawn = all.into_iter().map(|(_, rect, class)| Drawn {
+            rect,
+            class,
+            is_outlined: false,
+        });
+        (drawn.collect(), notes)
+    }
+
+    /// Lowest and highest z of the rooms at the height of the eye.
+    fn storey(&self, camera: &Camera) -> Option<[f64; 2]> {
+        let rooms = self.rooms(camera);
+        let heights = rooms.map(|(min, max)| [min.z, max.z]);
+        heights.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+    }
+
+    /// Rooms at the height of the eye.
+    fn rooms(&self, camera: &Camera) -> impl Iterator<Item = (DVec3, DVec3)> {
+        let z = camera.frame.eye.z;
+        let rooms = match &self.scene.regions {
+            Regions::Tiling(tiling) => &tiling.boxes[..],
+            _ => &[],
+        };
+        let rooms = rooms.iter().map(|room| room.in_world(self.scene.origin));
+        rooms.filter(move |(min, max)| min.z <= z && z <= max.z)
+    }
+
+    /// Draws the items, larger ones first: those that differ less than twice in length
+    /// by class.
+    fn draw_items(&self, items: &[Drawn], sheet: &Sheet, body: &mut String) {
+        let mut order: Vec<_> = items.iter().collect();
+        let size = |item: &Drawn| (longest(item.rect) * sheet.scale).max(1.0).log2() as i32;
+        order.sort_by_key(|item| (!item.is_outlined, -size(item), item.class));
+        for run in order.chunk_by(|a, b| (a.is_outlined, a.class) == (b.is_outlined, b.class)) {
+            let colour = self.classes[run[0].class].colour;
+            let _ = match run[0].is_outlined {
+                true => write!(body, "<path fill=\"none\" stroke=\"{colour}\" d=\""),
+                false => write!(body, "<path fill=\"{colour}\" d=\""),
+            };
+            run.iter().for_each(|item| sheet.push_rect(item.rect, body));
+            body.push_str("\"/>\n");
+        }
+    }
+
+    /// Draws the walls of a map and the rooms of a tiling.
+    fn draw_walls(&self, sheet: &Sheet, body: &mut String) {
+        let mut path = String::new();
+        if let Regions::Bsp(map) = &self.scene.regions {
+            for line in &map.lines {
+                let [a, b] = line.ends.map(|end| sheet.at(end.map(f64::from)));
+                let _ = write!(path, "M{} {}L{} {}", a[0], a[1], b[0], b[1]);
+            }
+        } else if let Some(camera) = self.camera {
+            for (min, max) in self.rooms(camera) {
+                sheet.push_rect([min.x, min.y, max.x, max.y], &mut path);
+            }
+        }
+        if !path.is_empty() {
+            let _ = writeln!(
+                body,
+                "<path fill=\"none\" stroke=\"#707070\" stroke-width=\".6\" d=\"{path}\"/>"
+            );
+        }
+    }
+
+    /// Swatches and words: classes of items with their counts, then those of cells.
+    fn legend(&self) -> Vec<(String, String)> {
+        let mut counts = vec![0; self.classes.len()];
+        (0..self.scene.items.len()).for_each(|item| counts[(self.class_of)(item)] += 1);
+        let total = text::count(self.scene.items.len());
+        let items = self.classes.iter().zip(&counts);
+        let items = items
+            .filter(|(_, count)| **count > 0)
+            .map(|(class, &count)| {
+                let words = format!("{}: {} of {total}", class.words, text::count(count));
+                (format!("fill=\"{}\"", class.colour), words)
+            });
+        let mut legend: Vec<_> = items.collect();
+        if let Some(Cells {
+            cells,
+            classes,
+            class_of,
+            ..
+        }) = &self.cells
+        {
+            let mut counts = vec![0; classes.len()];
+            (0..cells.len()).for_each(|cell| counts[class_of(cell)] += 1);
+            for (class, count) in classes.iter().zip(counts).filter(|(_, count)| *count > 0) {
+                let words = format!("{}: {}", class.words, text::count(count));
+                let fill = if class.is_filled {
+                    class.colour
+                } else {
+                    "#fff"
+                };
+                let swatch = format!(
+                    "fill=\"{fill}\" fill-opacity=\".3\" stroke=\"{}\"",
+                    class.colour
+                );
+                legend.push((swatch, words));
+            }
+        }
+        legend
+    }
+}
+
+/// The part of the plane that is drawn: the items, but for a few that are much larger
+/// than all others together; all cells; the eye if it is near.
+fn window(items: &[Drawn], cells: impl Iterator<Item = Rect>, eye: Option<DVec3>) -> Rect {
+    let bounds = united(items.iter().map(|item| item.rect)).unwrap_or_default();
+    let middles = united(items.iter().map(|item| at(centre(item.rect))));
+    let close = middles
+        .filter(|middles| longest(*middles) > 0.0 && longest(*middles) < longest(bounds) / 3.0);
+    let mut window = cells.fold(close.unwrap_or(bounds), union);
+    if let Some(eye) = eye {
+        let with = union(window, at([eye.x, eye.y]));
+        if longest(with) <= 2.0 * longest(window) {
+            window = with;
+        }
+    }
+    window
+}
+
+/// Marks the items that would cover at least two others or a fiftieth of the drawing.
+fn outline_floors(items: &mut [Drawn], sheet: &Sheet) {
+    let large = |rect: Rect| longest(rect) * sheet.scale > 8.0;
+    let middles: Vec<_> = items
+        .iter()
+        .map(|item| (centre(item.rect), longest(item.rect)))
+        .collect();
+    for item in items.iter_mut().filter(|item| large(item.rect)) {
+        let [x0, y0, x1, y1] = item.rect;
+        let length = longest(item.rect);
+        let covers = |&&([x, y], own): &&([f64; 2], f64)| {
+            own < length && x0 < x && x < x1 && y0 < y && y < y1
+        };
+        let area = (x1 - x0) * (y1 - y0) * sheet.scale * sheet.scale;
+        item.is_outlined =
+            area > SIDE * SIDE / 50.0 || middles.iter().filter(covers).nth(1).is_some();
+    }
+}
+
+/// Draws the edges of the view volume and the eye; without a far plane, edges that leave
+/// the sheet.
+fn draw_camera(camera: &Camera, sheet: &Sheet, body: &mut String) {
+    let Camera { frame, lens } = camera;
+    let beyond = || lens.with_far(Some(2.0 * (lens.near() + SIDE / sheet.scale)));
+    let corners = match lens.far() {
+        None => beyond().ok().and_then(|lens| lens.corners(frame)),
+        Some(_) => lens.corners(frame),
+    };
+    let mut path = String::new();
+    if let Some(corners) = corners {
+        let corners = corners.map(|corner| sheet.at([corner.x, corner.y]));
+        // Bit 0 is right, bit 1 top, bit 2 far.
+        for (from, to) in (0..8).flat_map(|a| [1, 2, 4].map(|bit| (a, a | bit))) {
+            let ([x0, y0], [x1, y1]) = (corners[from], corners[to]);
+            let is_edge = from != to && (from & 4 == 0 || lens.far().is_some());
+            if is_edge && [x0, y0, x1, y1].iter().all(|v| v.is_finite()) {
+                let _ = write!(path, "M{x0} {y0}L{x1} {y1}");
+            }
+        }
+    }
+    let _ = writeln!(body, "<path fill=\"none\" stroke=\"#000\" d=\"{path}\"/>");
+    let [x, y] = sheet.at([frame.eye.x, frame.eye.y]);
+    let _ = writeln!(body, "<circle cx=\"{x}\" cy=\"{y}\" r=\"4\"/>");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::WorldBox;
+
+    #[test]
+    fn a_floor_is_an_outline_and_small_items_lie_over_large_ones() {
+        let flat =
+            |x, y, side| WorldBox::around(DVec3::new(x, y, 0.0), DVec3::new(side, side, 1.0));
+        let boxes = [
+            flat(2.0, 2.0, 0.1),
+            flat(2.0, 2.0, 4.0),
+            flat(0.0, 0.0, 100.0),
+            flat(9.0, 9.0, 0.0),
+        ];
+        let scene = Scene::from_boxes("a<b", &boxes).expect("boxes");
+        let class = |colour| Class {
+            colour,
+            words: "of it",
+            is_key: false,
+        };
+        let plan = Plan {
+            caption: scene.name.clone(),
+            scene: &scene,
+            camera: None,
+            classes: &["#111", "#222"].map(class),
+            class_of: &|item| usize::from(item == 1 || item == 3),
+            cells: None,
+        };
+        let svg = plan.svg();
+        assert!(
+            svg.contains("a&lt;b") && svg.contains(">of it: 2 of 4<"),
+            "{svg}"
+        );
+        let [floor, large, small] = [
+            "fill=\"none\" stroke=\"#111\"",
+            "fill=\"#222\"",
+            "fill=\"#111\"",
+        ]
+        .map(|look| svg.find(&format!("<path {look}")).expect("a path"));
+        assert!(floor < large && large < small, "{svg}");
+        // A point is one pixel.
+        assert!(svg.contains("h1v1h-1z"), "{svg}");
+    }
+
+    #[test]
+    fn a_few_items_beyond_all_others_do_not_shrink_them() {
+        let item = |rect| Drawn {
+            rect,
+            class: 0,
+            is_outlined: false,
+        };
+        let sky = item([-1e6, -1e6, 1e6, 1e6]);
+        let items = [sky, item([0.0, 0.0, 1.0, 1.0]), item([5.0, 3.0, 6.0, 4.0])];
+        assert_eq!(
+            window(&items, std::iter::empty(), None),
+            [0.0, 0.0, 5.5, 3.5]
+        );
+        let eye = |x| Some(DVec3::new(x, 0.0, 0.0));
+        assert_eq!(window(&items[1..2], std::iter::empty(), eye(1.5))[2], 1.5);
+        assert_eq!(window(&items[1..2], std::iter::empty(), eye(90.0))[2], 1.0);
+    }
+}

@@ -1,0 +1,206 @@
+//! `cullbench scene draw`: a scene from above, the cells of a structure, and what a query
+//! did with both.
+
+use std::path::Path;
+
+use super::plan::{Class, Plan};
+use super::plan_cells::{CellClass, Cells};
+use super::scene_args::SceneDrawArgs;
+use super::{Ending, expect_places, load_scene, tell, text, write_text};
+use crate::culling::{CameraView, Culling};
+use crate::geometry::Aabb;
+use crate::index::{DynIndex, Registry, Row, StructureSpec, TreeCell, verdicts};
+use crate::measure::input_of;
+use crate::path;
+use crate::query::Containment;
+use crate::scene::Scene;
+use crate::spec::SpecError;
+
+const fn class(colour: &'static str, words: &'static str, is_key: bool) -> Class {
+    Class {
+        colour,
+        words,
+        is_key,
+    }
+}
+
+/// Items of a scene without a camera.
+const ITEMS: [Class; 1] = [class("#9fb4c4", "items", false)];
+
+/// Items of a scene with a camera.
+const SEEN: [Class; 2] = [
+    class("#c8cdd2", "outside of the frustum", false),
+    class("#009e73", "visible", true),
+];
+
+/// Items by what the query of a structure did with them.
+const VERDICTS: [Class; 4] = [
+    class("#c8cdd2", "outside, rejected with their cell", false),
+    class("#cc79a7", "outside, tested one by one", false),
+    class("#009e73", "visible, tested one by one", true),
+    class("#005c43", "visible, accepted with their cell", true),
+];
+const REJECTED: usize = 0;
+const OUTSIDE: usize = 1;
+const VISIBLE: usize = 2;
+const ACCEPTED: usize = 3;
+
+const fn cells_of(colour: &'static str, words: &'static str, is_filled: bool) -> CellClass {
+    CellClass {
+        colour,
+        words,
+        is_filled,
+    }
+}
+
+/// Cells without a camera.
+const CELLS: [CellClass; 1] = [cells_of("#0072b2", "cells", false)];
+
+/// Cells by the verdict of a query.
+const CELL_VERDICTS: [CellClass; 4] = [
+    cells_of("#b0b0b0", "cells not reached", false),
+    cells_of("#d55e00", "cells rejected, outside", true),
+    cells_of("#009e73", "cells accepted, inside", true),
+    cells_of("#0072b2", "cells opened, across a plane", false),
+];
+
+pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending> {
+    let inputs = [Some(&args.scene), args.camera.as_ref()];
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().map(Path::new).collect();
+    expect_places(&[("--out", Some(&args.out))], &inputs)?;
+    let defaults = args.lens.defaults()?;
+    let structure = args.structure.as_deref();
+    let structure = structure.map(|text| divided(registry, text)).transpose()?;
+    let scene = load_scene(&args.scene, &args.scene_args, structure.iter().len())?;
+    let mut caption = vec![scene.name.clone()];
+    let camera = match &args.camera {
+        None => None,
+        Some(source) => {
+            let path = path::load(source, &scene, &defaults)?;
+            let Some(camera) = path.cameras.get(args.frame) else {
+                anyhow::bail!(
+                    "--frame is {}; expected 0 to {}, the cameras of {}",
+                    args.frame,
+                    path.cameras.len().saturating_sub(1),
+                    path.name
+                );
+            };
+            caption.push(format!("camera {} of {}", args.frame, path.name));
+            Some(*camera)
+        }
+    };
+    let view = |camera| Culling::default().view(camera, &scene.surroundings());
+    let view = camera.as_ref().map(view).transpose()?;
+    let index = structure.as_ref().map(|spec| {
+        caption.push(format!("{}, levels 0 to {}", spec.label, args.depth));
+        spec.build(input_of(&scene, &scene.items))
+    });
+    let index = index.transpose()?;
+    let cells = index.as_ref().map_or(Vec::new(), |index| index.cells());
+    let verdicts = view.as_ref().map(|view| verdicts(&cells, view.as_any()));
+    let class_of = match (&view, &index, &verdicts) {
+        (Some(view), Some(index), Some(verdicts)) => {
+            classes(&scene, view, index.as_ref(), &cells, verdicts)
+        }
+        (Some(view), ..) => {
+            let class = |item: &Aabb| usize::from(view.as_any().sees(item));
+            scene.items.iter().map(class).collect()
+        }
+        _ => vec![0; scene.items.len()],
+    };
+    let class_of_cell = |cell: usize| {
+        let verdict = |verdicts: &Vec<Option<Containment>>| match verdicts[cell] {
+            None => 0,
+            Some(Containment::Outside) => 1,
+            Some(Containment::Inside) => 2,
+            Some(Containment::Straddles) => 3,
+        };
+        verdicts.as_ref().map_or(0, verdict)
+    };
+    let plan = Plan {
+        caption: caption.join("; "),
+        scene: &scene,
+        camera: camera.as_ref(),
+        classes: match (&view, &index) {
+            (None, _) => &ITEMS,
+            (_, None) => &SEEN,
+            _ => &VERDICTS,
+        },
+        class_of: &|item| class_of[item],
+        cells: index.is_some().then(|| Cells {
+            cells: &cells,
+            classes: if view.is_some() {
+                &CELL_VERDICTS
+            } else {
+                &CELLS
+            },
+            class_of: &class_of_cell,
+            depth: args.depth,
+        }),
+    };
+    write_text(&args.out, &plan.svg())?;
+    let mut told = text::counted(scene.items.len(), "item");
+    if index.is_some() {
+        told += &format!(", {}", text::counted(cells.len(), "cell"));
+    }
+    if let Some(verdicts) = verdicts.filter(|_| index.is_some()) {
+        let tested = verdicts.iter().flatten().count();
+        told += &format!(", of which the query tests {}", text::count(tested));
+    }
+    tell(&format!("{}: {told}", args.out.display()));
+    Ok(Ending::Ok)
+}
+
+/// A structure that has cells.
+fn divided(registry: &Registry, text: &str) -> Result<StructureSpec, SpecError> {
+    let spec = registry.structure(text)?;
+    // More boxes than the largest block holds.
+    let boxes: Vec<Aabb> = (0..64)
+        .map(|i| {
+            Aabb::new(
+                glam::Vec3::splat(i as f32),
+                glam::Vec3::splat(i as f32 + 0.5),
+            )
+        })
+        .collect();
+    let has_cells = |row: &&Row| {
+        let spec = registry.structure(row.info.name);
+        let index = spec.ok().and_then(|spec| spec.build(&boxes).ok());
+        index.is_some_and(|index| !index.cells().is_empty())
+    };
+    if has_cells(&&spec.row) {
+        return Ok(spec);
+    }
+    let rows = registry.rows().iter().filter(has_cells);
+    let names: Vec<_> = rows.map(|row| row.info.name).collect();
+    Err(SpecError::new(format_args!(
+        "structure '{}' has no cells to draw; expected one of {}",
+        spec.info().name,
+        names.join(", ")
+    )))
+}
+
+/// Class of each item by what a query did with it.
+fn classes(
+    scene: &Scene,
+    view: &CameraView,
+    index: &dyn DynIndex,
+    cells: &[TreeCell<'_>],
+    verdicts: &[Option<Containment>],
+) -> Vec<usize> {
+    let mut class_of = vec![REJECTED; scene.items.len()];
+    let mut visible = Vec::new();
+    index.query(view.as_any(), &mut visible);
+    for item in visible {
+        class_of[item as usize] = ACCEPTED;
+    }
+    for (cell, verdict) in cells.iter().zip(verdicts) {
+        if *verdict == Some(Containment::Straddles) {
+            for &item in cell.items {
+                let class = &mut class_of[item as usize];
+                *class = if *class == ACCEPTED { VISIBLE } else { OUTSIDE };
+            }
+        }
+    }
+    class_of
+}

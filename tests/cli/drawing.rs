@@ -1,0 +1,124 @@
+//! `scene draw`: its legend has the counts of `query`, and nothing breaks a picture.
+
+use std::fs;
+
+use super::process::*;
+
+/// The counts of the legend behind some words: "33" of "visible: 33 of 2,000".
+fn counted(svg: &str, words: &str) -> u64 {
+    let found = svg.split_once(&format!(">{words}: "));
+    let digits = found.map_or("0", |(_, rest)| rest.split(['<', ' ']).next().unwrap_or(""));
+    digits.replace(',', "").parse().expect("a number")
+}
+
+const REJECTED: &str = "outside, rejected with their cell";
+const OUTSIDE: &str = "outside, tested one by one";
+const VISIBLE: &str = "visible, tested one by one";
+const ACCEPTED: &str = "visible, accepted with their cell";
+
+#[test]
+fn a_drawing_counts_what_a_query_counts() {
+    let folder = folder(&[]);
+    let scene = "city:n=1500";
+    let path = "flythrough:frames=3";
+    for structure in ["quadtree-textbook", "bsp-textbook", "octree", "wide"] {
+        let query = format!("query --scene {scene} --cameras {path} --structure {structure}");
+        let row = rows(&works(folder.path(), &query)).swap_remove(2);
+        let line = format!(
+            "scene draw {scene} --camera {path} --frame 2 --structure {structure} -o x.svg"
+        );
+        let done = cullbench(folder.path(), &line);
+        assert_eq!((done.code, done.out.as_str()), (Some(0), ""), "{done:?}");
+        let tested = format!("of which the query tests {}", row["nodes_tested"]);
+        assert!(done.err.contains(&tested), "{structure}: {}", done.err);
+        let svg = fs::read_to_string(folder.path().join("x.svg")).expect("a picture");
+        let of = |words: &[&str]| {
+            words
+                .iter()
+                .map(|w| counted(&svg, w))
+                .sum::<u64>()
+                .to_string()
+        };
+        assert_eq!(
+            of(&[VISIBLE, ACCEPTED]),
+            row["visible_count"],
+            "{structure}"
+        );
+        assert_eq!(of(&[OUTSIDE, VISIBLE]), row["items_tested"], "{structure}");
+        assert_eq!(of(&[REJECTED, OUTSIDE, VISIBLE, ACCEPTED]), "1500");
+        let cells = [
+            "cells rejected, outside",
+            "cells accepted, inside",
+            "cells opened, across a plane",
+        ];
+        assert_eq!(of(&cells), row["nodes_tested"], "{structure}");
+    }
+}
+
+#[test]
+fn pictures_are_whole_for_any_scene_and_camera() {
+    let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,near,far\n\
+        0,0,1e30,0,0,0,1,inf\n1e20,0,0,0,0,0,1,9\n";
+    let huge = "min_x,min_y,min_z,max_x,max_y,max_z\n-3e37,0,0,3e37,1,1\n0,0,0,0,0,0\n";
+    let far = "min_x,min_y,min_z,max_x,max_y,max_z\n1e300,1e300,0,1e300,1e300,0\n";
+    let none = "min_x,min_y,min_z,max_x,max_y,max_z\n";
+    let files = [
+        ("cameras.csv", cameras),
+        ("huge.csv", huge),
+        ("far.csv", far),
+        ("none.csv", none),
+    ];
+    let folder = folder(&files.map(|(name, text)| (name, text.as_bytes())));
+    for scene in [
+        "huge.csv",
+        "far.csv",
+        "none.csv",
+        "freedm-map12",
+        "rooms:n=300",
+    ] {
+        for more in ["", "--structure bsp-textbook", "--structure wide --depth 0"] {
+            for camera in ["", "--camera cameras.csv", "--camera cameras.csv --frame 1"] {
+                let line = format!("scene draw {scene} {more} {camera} -o x.svg");
+                let done = cullbench(folder.path(), &line);
+                if done.code == Some(2) {
+                    // Planes about some of these eyes do not fit f32.
+                    assert!(
+                        !camera.is_empty() && done.err.lines().count() == 1,
+                        "{done:?}"
+                    );
+                    continue;
+                }
+                assert_eq!(done.code, Some(0), "{line}: {done:?}");
+                let svg = fs::read_to_string(folder.path().join("x.svg")).expect("a picture");
+                assert!(svg.ends_with("</svg>\n"), "{line}");
+                assert!(
+                    !svg.contains("NaN") && !svg.contains("inf\""),
+                    "{line}: {svg}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused() {
+    let folder = folder(&[]);
+    for (line, wanted) in [
+        (
+            "--structure linear -o x.svg",
+            "'linear' has no cells | expected one of bsp, octree",
+        ),
+        ("--structure quadtre -o x.svg", "did you mean 'quadtree'"),
+        (
+            "--camera spin:frames=4 --frame 4 -o x.svg",
+            "--frame is 4; expected 0 to 3",
+        ),
+        ("--frame 1 -o x.svg", "--camera"),
+        ("-o no/such/x.svg", "expected an existing folder for --out"),
+        ("-o .", "a folder; expected a file"),
+    ] {
+        let done = cullbench(folder.path(), &format!("scene draw city:n=50 {line}"));
+        assert_refused(&done, wanted, line);
+    }
+    assert!(contents(folder.path()).is_empty());
+}
