@@ -21,7 +21,7 @@ const FATES: [(Fate, Class); 6] = [
     ),
     row(
         Fate::Removed(StageKind::Occlusion),
-        "#f0b060",
+        "#ecb566",
         "occlusion: behind others",
         false,
     ),

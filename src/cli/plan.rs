@@ -1,5 +1,6 @@
-//! Drawings from above as SVG: items of a scene in the colours of their classes, cells
-//! of a structure, the view volume; axes in the scene's units, a legend below.
+//! Drawings of scenes from above, as SVG.
+//!
+//! Items in the colours of their classes, cells of a structure, the view volume.
 
 use std::fmt::Write;
 
@@ -208,8 +209,10 @@ impl Plan<'_> {
     }
 }
 
-/// The part of the plane that is drawn: the items, but for a few that are much larger
-/// than all others together; all cells; the eye if it is near.
+/// The part of the plane that is drawn.
+///
+/// All cells, the eye if it is near, and the items, but for a few that are much larger
+/// than all others together.
 fn window(items: &[Drawn], cells: impl Iterator<Item = Rect>, eye: Option<DVec3>) -> Rect {
     let bounds = united(items.iter().map(|item| item.rect)).unwrap_or_default();
     let middles = united(items.iter().map(|item| at(centre(item.rect))));
@@ -225,7 +228,7 @@ fn window(items: &[Drawn], cells: impl Iterator<Item = Rect>, eye: Option<DVec3>
     window
 }
 
-/// Marks the items that would cover at least two others or a fiftieth of the drawing.
+/// Marks items that would cover two others or a fiftieth of the drawing.
 fn outline_floors(items: &mut [Drawn], sheet: &Sheet) {
     let large = |rect: Rect| longest(rect) * sheet.scale > 8.0;
     let middles: Vec<_> = items
@@ -244,8 +247,9 @@ fn outline_floors(items: &mut [Drawn], sheet: &Sheet) {
     }
 }
 
-/// Draws the edges of the view volume and the eye; without a far plane, edges that leave
-/// the sheet.
+/// Draws the edges of the view volume and the eye.
+///
+/// Without a far plane the edges leave the sheet.
 fn draw_camera(camera: &Camera, sheet: &Sheet, body: &mut String) {
     let Camera { frame, lens } = camera;
     let beyond = || lens.with_far(Some(2.0 * (lens.near() + SIDE / sheet.scale)));
@@ -282,8 +286,8 @@ mod tests {
         let boxes = [
             flat(2.0, 2.0, 0.1),
             flat(2.0, 2.0, 4.0),
-            flat(0.0, 0.0, 100.0),
-            flat(9.0, 9.0, 0.0),
+            flat(25.0, 25.0, 100.0),
+            flat(49.0, 49.0, 0.0),
         ];
         let scene = Scene::from_boxes("a<b", &boxes).expect("boxes");
         let class = |colour| Class {

@@ -119,7 +119,7 @@ impl Cells<'_> {
         let planes = self.cells.iter().filter(|cell| cell.level <= self.depth);
         let level = planes.filter(|cell| cell.half_space.is_some_and(|side| !is_upright(&side)));
         let level = level.count();
-        let mut notes = Vec::new();
+        let mut notes = vec!["thicker outlines: upper levels".to_owned()];
         if below > 0 {
             notes.push(format!(
                 "not drawn: {} below level {}",
@@ -150,8 +150,10 @@ pub fn corners_of([x0, y0, x1, y1]: Rect) -> [[f64; 2]; 4] {
     [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
 }
 
-/// The part of a polygon in a half-space about an origin; all of it if the plane is not
-/// upright (Sutherland and Hodgman 1974).
+/// The part of a polygon in a half-space about an origin.
+///
+/// All of it if the plane is not upright. By Sutherland and Hodgman 1974, "Reentrant
+/// polygon clipping".
 pub fn cut(polygon: &[[f64; 2]], side: &Plane, origin: DVec3) -> Vec<[f64; 2]> {
     if !is_upright(side) {
         return polygon.to_vec();

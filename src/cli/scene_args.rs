@@ -15,7 +15,7 @@ pub enum SceneCommand {
     Generate(SceneGenerateArgs),
     /// Write any scene to a file that every command reads
     Convert(SceneConvertArgs),
-    /// Draw a scene from above, with the cells of a structure and the verdicts of a query
+    /// Draw a scene from above, with cells of a structure and verdicts of a query
     Draw(SceneDrawArgs),
 }
 

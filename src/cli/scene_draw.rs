@@ -1,5 +1,6 @@
-//! `cullbench scene draw`: a scene from above, the cells of a structure, and what a query
-//! did with both.
+//! `cullbench scene draw`: a scene from above and the cells of a structure.
+//!
+//! With a camera, both in the colours of a query's verdicts.
 
 use std::path::Path;
 
@@ -203,4 +204,67 @@ fn classes(
         }
     }
     class_of
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path::LensDefaults;
+    use crate::query::{AnyVolume, ItemId, QueryCost};
+    use crate::scene;
+
+    /// Costs of a query as the cells show it.
+    ///
+    /// Nodes tested and rejected, items tested and accepted untested.
+    fn shown(cells: &[TreeCell<'_>], volume: AnyVolume<'_>) -> [usize; 4] {
+        let (mut cost, mut inside) = ([0; 4], None);
+        for (cell, verdict) in cells.iter().zip(verdicts(cells, volume)) {
+            inside = inside.filter(|level| *level < cell.level);
+            match verdict {
+                Some(Containment::Inside) => inside = Some(cell.level),
+                Some(Containment::Outside) => cost[1] += 1,
+                Some(Containment::Straddles) => cost[2] += cell.items.len(),
+                None => {}
+            }
+            cost[0] += usize::from(verdict.is_some());
+            cost[3] += inside.map_or(0, |_| cell.items.len());
+        }
+        cost
+    }
+
+    #[test]
+    fn cells_hold_each_item_once_and_show_what_a_query_counts() {
+        let scene = scene::load("city:n=3000", &Default::default()).expect("a scene");
+        let cameras = path::load("flythrough:frames=6", &scene, &LensDefaults::default());
+        let cameras = cameras.expect("a path").cameras;
+        let mut drawn = Vec::new();
+        for spec in Registry::builtin().structures("all").expect("names") {
+            let index = spec.build(&scene.items).expect("a structure");
+            let cells = index.cells();
+            if cells.is_empty() {
+                continue;
+            }
+            drawn.push(spec.info().name);
+            let mut ids: Vec<ItemId> = Vec::new();
+            for cell in &cells {
+                let within = |id: &ItemId| cell.bounds.contains(&scene.items[*id as usize]);
+                assert!(cell.items.iter().all(within), "{}: {cell:?}", spec.label);
+                ids.extend(cell.items);
+            }
+            ids.sort_unstable();
+            assert!(ids.iter().copied().eq(0..3000), "{}", spec.label);
+            for camera in &cameras {
+                let volume = camera.volume(&Default::default(), &scene.surroundings());
+                let volume = volume.expect("a frustum");
+                let (mut seen, mut cost) = (Vec::new(), QueryCost::default());
+                index.query_counted((&volume).into(), &mut seen, &mut cost);
+                let nodes = [cost.nodes_tested, cost.subtrees_rejected];
+                let items = [cost.items_tested, cost.items_accepted_untested];
+                let counted = [nodes, items].concat().into_iter().map(|n| n as usize);
+                let shown = shown(&cells, (&volume).into());
+                assert_eq!(counted.collect::<Vec<_>>(), shown, "{}", spec.label);
+            }
+        }
+        assert!(drawn.len() >= 8, "{drawn:?}");
+    }
 }

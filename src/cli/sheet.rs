@@ -53,8 +53,9 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// A sheet for a window: a little wider, never without extent, at most three times as
-    /// wide as high.
+    /// A sheet for a window, with a margin.
+    ///
+    /// Never without extent, and at most three times as long as wide.
     pub fn over(window: Rect) -> Sheet {
         let [x, y] = centre(window);
         let length = longest(window);

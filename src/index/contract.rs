@@ -208,9 +208,10 @@ pub trait RegionIndex: Sized + Send + Sync {
         false
     }
 
-    /// Cells of the structure in depth-first order, for `cullbench scene draw`; none from a
-    /// structure without nested cells. A query with a volume of planes must test exactly
-    /// the roots and the cells directly within those that straddle it.
+    /// Cells of the structure in depth-first order, for `cullbench scene draw`.
+    ///
+    /// None from a structure without nested cells. A query with a volume of planes must
+    /// test exactly the roots and the cells directly within those that straddle it.
     fn cells(&self) -> Vec<TreeCell<'_>> {
         Vec::new()
     }

@@ -273,7 +273,7 @@ impl Wide {
         }
     }
 
-    /// Adds the lanes of a block above the leaves, each before the block that it bounds.
+    /// Adds the lanes of a block above the leaves, each before its block.
     fn add_cells<'a>(&'a self, level: usize, block: usize, cells: &mut Vec<TreeCell<'a>>) {
         let Level { first, boxes, .. } = self.levels[level];
         if level == 0 {
