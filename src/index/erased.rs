@@ -45,7 +45,9 @@ pub trait DynIndex: Send + Sync {
     /// See [`RegionIndex::query_many`]; clears `out` first.
     fn query_many(&self, points: &[Vec3], out: &mut Located);
     /// See [`RegionIndex::cells`].
-    fn cells(&self) -> Vec<TreeCell<'_>>;
+    fn cells(&self) -> Vec<TreeCell<'_>> {
+        Vec::new()
+    }
     /// See [`RegionIndex::refit`].
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool;
 
