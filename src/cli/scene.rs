@@ -11,7 +11,7 @@ use super::shared_args::TableFormat;
 use super::{Ending, expect_place_for, interrupt, load_scene, print_json, tell, text};
 use crate::measure::SceneInfo;
 use crate::report::write_atomically;
-use crate::scene::{Regions, Scene, write_boxes_csv};
+use crate::scene::{Regions, Scene, UpAxis, write_boxes_csv};
 use crate::spec::SpecError;
 use crate::statistics::{quantile, sorted};
 
@@ -125,6 +125,12 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
         tell(&format!(
             "note: {} not written; boxes CSV has boxes and labels only",
             lost.join(", ")
+        ));
+    }
+    if kept.up != UpAxis::default() {
+        let up = kept.up.name();
+        tell(&format!(
+            "note: the file does not state that {up} is up; expected with it: --up {up}"
         ));
     }
     if kept.origin != origin {

@@ -11,18 +11,20 @@ use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{Effort, Extras, Machine, Protocol};
 use crate::path::LensDefaults;
-use crate::scene::LoadOptions;
+use crate::scene::{LoadOptions, UP_AXES, UpAxis};
 use crate::spec::SpecError;
 use crate::suite::DEFAULT_PATH;
 use crate::threads::MOST_THREADS;
 use clap::{Args, ValueEnum};
-use glam::DVec3;
 
 #[derive(Args, Debug)]
 pub struct SceneArgs {
     /// Leave out items that are not finite boxes, and report their number
     #[arg(long)]
     pub skip_bad_items: bool,
+    /// Up axis of boxes CSV, y or z; other scenes state theirs [default: z]
+    #[arg(long, value_name = "AXIS", value_parser = values::choice("up axis", &UP_AXES))]
+    pub up: Option<UpAxis>,
 }
 
 impl SceneArgs {
@@ -30,6 +32,7 @@ impl SceneArgs {
     pub fn options(&self, structures: usize) -> LoadOptions {
         LoadOptions {
             skip_bad_items: self.skip_bad_items,
+            up: self.up,
             structures: structures as u64,
             per_triangle: 0,
         }
@@ -197,12 +200,12 @@ pub struct LensArgs {
     /// Width / height for cameras without one
     #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero)]
     pub aspect: f64,
-    /// Near plane for cameras without one [default: 0.1 for recorded cameras, far/1000
-    /// for paths]
+    /// Near plane for cameras without one [default: far/1000]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf; beyond 1.7e38 counts as inf [default:
-    /// 1000 for recorded cameras, the scene for paths]
+    /// twice the scene's diagonal for recorded cameras, the far side of the scene for
+    /// paths]
     #[arg(long, value_parser = values::far)]
     pub far: Option<f64>,
     /// Convention of cameras given as matrices (columns m00 to m33: row, column):
@@ -229,7 +232,7 @@ impl LensArgs {
             aspect: self.aspect,
             near: self.near,
             far: self.far.map(|far| Some(far).filter(|far| far.is_finite())),
-            up: DVec3::Z,
+            ..LensDefaults::default()
         })
     }
 }

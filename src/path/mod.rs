@@ -18,8 +18,9 @@ use std::path::Path;
 use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, LensKind, Surroundings};
+use crate::geometry::Aabb;
 use crate::input::{InputError, gigabytes, is_readable, read_file};
-use crate::scene::{self, Scene, SeededRng, WorldBox};
+use crate::scene::{self, Scene, SeededRng, UpAxis, WorldBox};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
@@ -155,8 +156,11 @@ impl PathError {
 }
 
 /// Scene, length and seed of a path.
+///
+/// Coordinates, also of poses, have z up: [`UpAxis::to_z_up`].
 pub(crate) struct Stage<'a> {
     scene: &'a Scene,
+    up: UpAxis,
     bounds: WorldBox,
     count: usize,
     seed: u64,
@@ -181,6 +185,12 @@ impl Pose {
 }
 
 impl Stage<'_> {
+    /// Corners of an item or a room.
+    fn in_world(&self, b: &Aabb) -> (DVec3, DVec3) {
+        let (min, max) = b.in_world(self.scene.origin);
+        (self.up.to_z_up(min), self.up.to_z_up(max))
+    }
+
     fn centre(&self) -> DVec3 {
         self.bounds.min / 2.0 + self.bounds.max / 2.0
     }
@@ -249,16 +259,18 @@ pub fn load_scaled(
         let bytes = read_file(file)?;
         let rows = bytes.iter().filter(|byte| **byte == b'\n').count();
         fits(source, rows as u64)?;
-        return read_cameras_csv(&bytes[..], source, defaults);
+        return read_cameras_csv(&bytes[..], source, &defaults.of_scene(scene));
     }
     let mut spec = Spec::parse(source)?;
     let Some(family) = PATHS.iter().find(|p| p.name == spec.name()) else {
         let known = PATHS.iter().map(|p| p.name);
         return Err(SpecError::unknown("path", spec.name(), known).into());
     };
+    let WorldBox { min, max } = scene.world_bounds();
     let stage = Stage {
         scene,
-        bounds: scene.world_bounds(),
+        up: scene.up,
+        bounds: WorldBox::new(scene.up.to_z_up(min), scene.up.to_z_up(max)),
         count: spec.count("frames", 256, 1_000_000)? as usize,
         seed: spec.whole("seed", 1, u64::MAX)?,
     };
@@ -266,7 +278,7 @@ pub fn load_scaled(
     let poses = (family.frames)(&stage, &mut spec)?;
     let optics = Optics::from_spec(&mut spec, defaults, &stage, &poses)?;
     spec.finish()?;
-    let cameras = optics.cameras(source, &poses)?;
+    let cameras = optics.cameras(source, scene.up, &poses)?;
     if cameras.is_empty() {
         let reason = "no camera in it; expected at least one";
         return Err(PathError::unfit(source, reason));
@@ -357,9 +369,11 @@ impl Optics {
         })
     }
 
-    fn cameras(&self, path: &str, poses: &[Pose]) -> Result<Vec<Camera>, PathError> {
+    fn cameras(&self, path: &str, up: UpAxis, poses: &[Pose]) -> Result<Vec<Camera>, PathError> {
         let camera = |pose: &Pose| -> Result<Camera, CameraError> {
-            let frame = Frame::looking_along(pose.eye, pose.forward, up_for(pose.forward))?;
+            let axes = [pose.eye, pose.forward, up_for(pose.forward)];
+            let [eye, forward, upward] = axes.map(|v| up.from_z_up(v));
+            let frame = Frame::looking_along(eye, forward, upward)?;
             let lens = Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far)?;
             let mut camera = Camera { frame, lens };
             if pose.magnification != 1.0 {

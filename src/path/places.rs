@@ -2,6 +2,7 @@
 //! from. For a Doom map these are its things, at eye height.
 
 use super::{PathError, Pose, Stage};
+use crate::scene::CameraPlace;
 use crate::spec::Spec;
 
 pub(super) fn frames(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
@@ -13,7 +14,9 @@ pub(super) fn frames(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError
         return Err(PathError::unfit("places", reason));
     }
     let places = stage.scene.places.iter();
-    Ok(places
-        .map(|place| Pose::new(place.eye, place.forward))
-        .collect())
+    let pose = |place: &CameraPlace| {
+        let [eye, forward] = [place.eye, place.forward].map(|v| stage.up.to_z_up(v));
+        Pose::new(eye, forward)
+    };
+    Ok(places.map(pose).collect())
 }

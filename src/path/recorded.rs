@@ -6,13 +6,14 @@ use glam::DVec3;
 
 use super::{CameraPath, PathError};
 use crate::camera::{
-    Camera, CameraError, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
+    Camera, CameraError, FARTHEST, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
     MatrixConvention, look_at,
 };
 use crate::input::{InputError, Row, TableReader};
+use crate::scene::{Scene, WorldBox};
 
-/// Lens values for columns that a file does not have, and for generated
-/// paths. `None` leaves the choice to the path.
+/// Values for columns that a file does not have, and lenses of generated paths.
+/// `None` leaves the choice to the path.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LensDefaults {
     /// Full vertical angle of view, 0 < fovy < 180.
@@ -23,8 +24,11 @@ pub struct LensDefaults {
     pub near: Option<f64>,
     /// `Some(None)` is an infinite far plane.
     pub far: Option<Option<f64>>,
-    /// The vector that is up in the image.
+    /// Vector that is up in the image; [`load`](super::load) takes the scene's.
     pub up: DVec3,
+    /// Far plane of recorded cameras without one; [`load`](super::load) takes twice the
+    /// scene's diagonal.
+    pub reach: f64,
     /// How files are to be read whose cameras are matrices.
     pub matrix: Option<MatrixConvention>,
 }
@@ -37,14 +41,28 @@ impl Default for LensDefaults {
             near: None,
             far: None,
             up: DVec3::Z,
+            reach: 1000.0,
             matrix: None,
         }
     }
 }
 
-/// Near and far for files without such columns when the caller has no wish.
-const NEAR: f64 = 0.1;
-const FAR: f64 = 1000.0;
+impl LensDefaults {
+    /// The same with up axis and size of a scene.
+    pub(super) fn of_scene(&self, scene: &Scene) -> LensDefaults {
+        let WorldBox { min, max } = scene.world_bounds();
+        let diagonal = (max - min).length();
+        LensDefaults {
+            up: scene.up.vector(),
+            // A point has no size.
+            reach: if diagonal > 0.0 { 2.0 * diagonal } else { 2.0 }.min(FARTHEST),
+            ..*self
+        }
+    }
+}
+
+/// The far plane in near planes, for cameras without a near plane.
+const FAR_IN_NEARS: f64 = 1000.0;
 
 /// Reads a cameras CSV: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`,
 /// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
@@ -202,19 +220,28 @@ fn eyes<'a>(
         let far = match far {
             Some(column) if is_infinite(column) => None,
             Some(column) => Some(row.finite_number(column)?),
-            None => defaults.far.unwrap_or(Some(FAR)),
+            None => defaults.far.unwrap_or(Some(defaults.reach)),
         };
         let height = height.filter(|column| !row.text(*column).is_empty());
         let height = height.map(|column| row.finite_number(column)).transpose()?;
         // Not read where the lens is orthographic.
         let fovy_deg = number(fovy.filter(|_| height.is_none()), defaults.fovy_deg)?;
         let aspect = number(aspect, defaults.aspect)?;
-        let near = number(near, defaults.near.unwrap_or(NEAR))?;
+        let positive = far.filter(|far| *far > 0.0);
+        let scaled = positive.unwrap_or(defaults.reach) / FAR_IN_NEARS;
+        let near = number(near, defaults.near.unwrap_or(scaled))?;
         let frame = if by_forward {
             Frame::looking_along(eye, target, up)
         } else {
             look_at(eye, target, up)
         };
+        let frame = frame.map_err(|error| match error {
+            CameraError::Invalid { found, .. } if !has_up && found.starts_with("up is") => {
+                let expected = "columns up_x,up_y,up_z, or --up y where y is up";
+                CameraError::Invalid { found, expected }
+            }
+            other => other,
+        });
         Ok(frame.and_then(|frame| {
             let kind = match height {
                 Some(height) => LensKind::Orthographic { height, aspect },

@@ -46,7 +46,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathEr
     if !places.is_empty() {
         // Places of the scene's author need no search.
         let poses = (0..stage.count).map(|_| {
-            let eye = places[rng.below(places.len())].eye;
+            let eye = stage.up.to_z_up(places[rng.below(places.len())].eye);
             Pose::new(eye, level(&mut rng))
         });
         return Ok(poses.collect());
@@ -125,7 +125,7 @@ fn level(rng: &mut SeededRng) -> DVec3 {
 fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
     let (min, max) = match &stage.scene.regions {
         Regions::Tiling(tiling) if !tiling.boxes.is_empty() => {
-            tiling.boxes[rng.below(tiling.boxes.len())].in_world(stage.scene.origin)
+            stage.in_world(&tiling.boxes[rng.below(tiling.boxes.len())])
         }
         _ => (stage.bounds.min, stage.bounds.max),
     };
@@ -146,7 +146,7 @@ fn fill(stage: &Stage, columns: &mut [Column]) {
     by_x.sort_by(|&a, &b| columns[a as usize].x.total_cmp(&columns[b as usize].x));
     let xs: Vec<f64> = by_x.iter().map(|&c| columns[c as usize].x).collect();
     let mut add = |item: usize, is_ground: bool, b: &Aabb| {
-        let (min, max) = b.in_world(stage.scene.origin);
+        let (min, max) = stage.in_world(b);
         let from = xs.partition_point(|&x| x < min.x - CLEARANCE);
         let to = xs.partition_point(|&x| x <= max.x + CLEARANCE);
         for &c in by_x.get(from..to).unwrap_or_default() {
@@ -168,7 +168,7 @@ fn fill(stage: &Stage, columns: &mut [Column]) {
     };
     for item in 0..mesh.items() {
         for [p, q, r] in mesh.of(item) {
-            let [u, v] = [q - p, r - p].map(|edge| edge.truncate().as_dvec2());
+            let [u, v] = [q - p, r - p].map(|edge| stage.up.to_z_up(edge).truncate().as_dvec2());
             let bounds = Aabb::new(p.min(q).min(r), p.max(q).max(r));
             add(item, u.perp_dot(v) > 0.0, &bounds);
         }

@@ -27,6 +27,7 @@ mod source;
 mod surface;
 mod tiling;
 mod uniform;
+mod up;
 mod wad;
 
 use std::sync::Arc;
@@ -55,6 +56,7 @@ pub use source::{LoadOptions, check_fits, is_wad, load, split_map};
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};
 pub use tiling::{Portal, Tiling};
+pub use up::{UP_AXES, UpAxis};
 pub use wad::{WadMap, map_names};
 
 /// A box in world coordinates, as a file or a generator states it.
@@ -163,11 +165,15 @@ impl Regions {
     }
 }
 
-/// Input of every structure. z is up.
+/// Input of every structure.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Its source: a file or a spec such as `city:n=100000,seed=7`.
     pub name: String,
+    /// Axis that points up.
+    pub up: UpAxis,
+    /// Unit of coordinates; `None` where the file does not say.
+    pub unit: Option<&'static str>,
     /// Zero of the local coordinates, in the world.
     pub origin: DVec3,
     /// Item bounds, rounded outward about the origin; the id is the index.
@@ -224,6 +230,8 @@ impl Scene {
             bounds: Aabb::union_of(&items),
             originals: Originals::of(boxes, &items, origin),
             name,
+            up: UpAxis::Z,
+            unit: None,
             origin,
             items,
             surfaces: None,

@@ -11,6 +11,8 @@ pub struct Sample {
     pub summary: &'static str,
     /// SPDX identifier, and whom to name; the texts are in [`NOTICE`].
     pub licence: &'static str,
+    /// Unit of coordinates.
+    pub unit: &'static str,
     /// The file under `datasets/`.
     pub file: &'static str,
     /// Contents of the file.
@@ -25,22 +27,22 @@ pub const NOTICE: &str = concat!(
 );
 
 macro_rules! samples {
-    ($($name:literal $file:literal $licence:literal, $summary:literal;)+) => {
-        rows! { Sample { name, file, licence, summary, bytes }
-            $($name, $file, $licence, $summary, include_bytes!(concat!("../../datasets/", $file));)+
+    ($($name:literal $file:literal $unit:literal $licence:literal, $summary:literal;)+) => {
+        rows! { Sample { name, file, unit, licence, summary, bytes }
+            $($name, $file, $unit, $licence, $summary, include_bytes!(concat!("../../datasets/", $file));)+
         }
     };
 }
 
 /// All of them, in the order of the quick suite.
 pub static SAMPLES: &[Sample] = samples! {
-    "freedm-map12" "freedm_map12.wad" "BSD-3-Clause",
+    "freedm-map12" "freedm_map12.wad" "map units" "BSD-3-Clause",
         "small Doom deathmatch map: linedefs and things, 87 BSP leaves as regions";
-    "freedm-map20" "freedm_map20.wad" "BSD-3-Clause",
+    "freedm-map20" "freedm_map20.wad" "map units" "BSD-3-Clause",
         "large Doom deathmatch map, 825 BSP leaves as regions";
-    "helsinki" "helsinki_boxes.csv" "ODbL-1.0, (c) OpenStreetMap contributors",
+    "helsinki" "helsinki_boxes.csv" "m" "ODbL-1.0, (c) OpenStreetMap contributors",
         "11,065 objects of central Helsinki in metres";
-    "us-counties" "us_counties_boxes.csv" "ISC",
+    "us-counties" "us_counties_boxes.csv" "degrees" "ISC",
         "3,510 flat county boxes in degrees, sizes 1 : 10,000";
 };
 

@@ -43,6 +43,8 @@ impl Scene {
         Ok(Scene {
             labels: self.labels,
             skipped_items: self.skipped_items,
+            up: self.up,
+            unit: self.unit,
             ..Scene::from_boxes(self.name, &boxes)?
         })
     }

@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use super::generate::{Build, COUNT, MOST};
-use super::{FAMILIES, Family, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv, memory};
-use crate::input::{InputError, is_readable, read_file};
+use super::{FAMILIES, Family, MESHES, SAMPLES, Sample, Scene, UpAxis, WadMap, boxes_csv, memory};
+use crate::input::{InputError, is_readable, note, read_file};
 use crate::spec::{Spec, SpecError, nearest};
 
 /// First part of the name of every mesh.
@@ -17,6 +17,8 @@ const MESH_PREFIX: &str = "mesh:";
 pub struct LoadOptions {
     /// Leave out rows that are no finite box, and count them.
     pub skip_bad_items: bool,
+    /// Up axis of formats that do not state it.
+    pub up: Option<UpAxis>,
     /// Structures that will be built over the scene: they need memory as well.
     pub structures: u64,
     /// Bytes that will be needed for each triangle of a mesh, beside the scene.
@@ -37,6 +39,18 @@ pub fn split_map(source: &str) -> (&str, Option<&str>) {
 /// # Errors
 /// One line that names what was found and what was expected.
 pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
+    let scene = read(source, options)?;
+    if let Some(up) = options.up.filter(|up| *up != scene.up) {
+        let (name, own) = (&scene.name, scene.up.name());
+        note(&format!(
+            "{name}: {own} is up by its format; --up {} is for boxes CSV only",
+            up.name()
+        ));
+    }
+    Ok(scene)
+}
+
+fn read(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     let (file, map) = split_map(source);
     if is_readable(Path::new(file)) {
         let bytes = read_file(Path::new(file))?;
@@ -55,7 +69,10 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     let spec = Spec::parse_behind(MESH_PREFIX, source)?;
     if let Some(family) = Family::named(spec.name()) {
         check_generated(source, family, &spec, options)?;
-        return family.generate(source, spec);
+        return Ok(Scene {
+            unit: Some("m"),
+            ..family.generate(source, spec)?
+        });
     }
     if let Some(sample) = Sample::named(spec.name()) {
         spec.finish()?;
@@ -109,7 +126,10 @@ fn parse_bytes(
 ) -> Result<Scene, InputError> {
     let extension = Path::new(file).extension();
     if is_wad(bytes) || map.is_some() || extension.is_some_and(|e| e.eq_ignore_ascii_case("wad")) {
-        return WadMap::read(bytes, file, map)?.into_scene(name);
+        return Ok(Scene {
+            unit: Some("map units"),
+            ..WadMap::read(bytes, file, map)?.into_scene(name)?
+        });
     }
     let rows = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
     let structures = options.structures;
@@ -117,6 +137,7 @@ fn parse_bytes(
     memory::check_fits(name, needed, structures, memory::free_for(rows))?;
     let mut scene = boxes_csv::read_boxes_csv(bytes, file, options.skip_bad_items)?;
     scene.name = name.to_owned();
+    scene.up = options.up.unwrap_or_default();
     Ok(scene)
 }
 
@@ -146,7 +167,10 @@ impl Sample {
     /// The file cannot be read; no sample of this build has that error.
     pub fn load(&self) -> Result<Scene, InputError> {
         let names = [self.file, self.name];
-        parse_bytes(self.bytes, names, None, &LoadOptions::default())
+        Ok(Scene {
+            unit: Some(self.unit),
+            ..parse_bytes(self.bytes, names, None, &LoadOptions::default())?
+        })
     }
 }
 

@@ -310,17 +310,30 @@ fn cameras_may_be_told_in_every_way_of_the_format() {
     assert!(count(&infinite) >= count(&answer(&bare, "")));
 }
 
-/// 60 degrees, 16:9, near 0.1 and far 1000, as the help says: for each one a
-/// box just inside and one just outside.
+/// 60 degrees, 16:9, far twice the diagonal of the scene (here 700) and near a
+/// thousandth of it, as the help says: for each one a box or an eye just inside and one
+/// just outside, in units a thousand times as large too.
 #[test]
 fn the_lens_defaults_are_the_documented_ones() {
-    let scene = format!(
-        "{BOXES}\n0,0.08,0,0,0.09,0\n0,0.11,0,0,0.12,0\n0,990,0,0,999,0\n0,1001,0,0,1002,0\n\
-         0,100,57,0,100,57.5\n0,100,58,0,100,59\n102,100,0,102.5,100,0\n103,100,0,104,100,0\n"
-    );
-    let camera = format!("{EYE_LOOK}\n0,0,0,0,1,0\n");
-    let folder = folder(&[("s.csv", scene.as_bytes()), ("c.csv", camera.as_bytes())]);
-    for row in query(folder.path(), "s.csv", "c.csv", "--ids") {
-        assert_eq!(row["visible_ids"], "1 2 4 6", "{}", row["structure"]);
+    let boxes = "0,1.3,0,0,1.39,0\n0,1.41,0,0,1.5,0\n0,100,57,0,100,57.5\n0,100,58,0,100,59\n\
+                 102,100,0,102.5,100,0\n103,100,0,104,100,0\n\
+                 -96,0,-200,-96,0,-200\n104,600,100,104,600,100\n";
+    let cameras = "0,0,0,0,1,0\n0,-801,0,0,1,0\n0,-799,0,0,1,0\n";
+    let scaled = |text: &str| {
+        let number = |n: &str| (n.parse::<f64>().expect("a number") * 1000.0).to_string();
+        let row = |row: &str| row.split(',').map(number).collect::<Vec<_>>().join(",");
+        text.lines().map(row).collect::<Vec<_>>().join("\n")
+    };
+    for [boxes, cameras] in [[boxes, cameras], [&scaled(boxes), &scaled(cameras)]] {
+        let [boxes, cameras] = [
+            format!("{BOXES}\n{boxes}"),
+            format!("{EYE_LOOK}\n{cameras}"),
+        ];
+        let folder = folder(&[("s.csv", boxes.as_bytes()), ("c.csv", cameras.as_bytes())]);
+        for row in query(folder.path(), "s.csv", "c.csv", "--ids") {
+            let wanted = ["1 2 4 7", "0 1 2 3 4 5 6", "0 1 2 3 4 5 6 7"];
+            let camera = number(&row, "camera") as usize;
+            assert_eq!(row["visible_ids"], wanted[camera], "{}", row["structure"]);
+        }
     }
 }
