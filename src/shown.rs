@@ -3,6 +3,7 @@
 //! which characters are harmless, for every output there is.
 
 use std::borrow::Cow;
+use std::io;
 
 /// Text on one line: line breaks and tabs are spaces, and what would steer the
 /// reader's terminal, turn the direction of the text or be no XML stands there
@@ -52,6 +53,26 @@ pub fn message(text: &str) -> String {
         .map(|word| without_middle(word, [160, 80]))
         .collect();
     without_middle(&words.join(" "), [1200, 400])
+}
+
+/// The end of a message about an error of the file system.
+///
+/// "; expected an existing file"; `what` is a file or a folder. Nothing where the error's own text has an expectation.
+pub fn expected_by(error: &io::Error, what: &str) -> String {
+    use io::ErrorKind::*;
+    if error.to_string().contains("expected") {
+        return String::new();
+    }
+    let expected = match error.kind() {
+        NotFound => format!("an existing {what}"),
+        IsADirectory => "a file".to_owned(),
+        NotADirectory => "folders before the last name".to_owned(),
+        PermissionDenied | ReadOnlyFilesystem => format!("a {what} with permission"),
+        StorageFull | QuotaExceeded => "room on the disk".to_owned(),
+        OutOfMemory => "more free memory".to_owned(),
+        _ => format!("another {what}"),
+    };
+    format!("; expected {expected}")
 }
 
 /// The first and the last characters of a longer text, with the mark of a cut.

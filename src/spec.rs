@@ -110,7 +110,7 @@ impl Spec {
         for pair in rest.split(',').filter(|p| !p.trim().is_empty()) {
             let Some((key, value)) = pair.split_once('=') else {
                 return Err(SpecError(format!(
-                    "in '{text}': '{pair}' is not of the form key=value"
+                    "in '{text}': '{pair}'; expected key=value"
                 )));
             };
             let (key, value) = (key.trim().to_owned(), value.trim().to_owned());

@@ -123,10 +123,10 @@ than the terminal (80 characters in a pipe) are left to --all-columns.
                   comparable groups
   / read          time / time of reading the bounds of all items (bound-read)
   / copy          time / time of copying the answer (bound-memcpy)
-  / replay        time / time of reading and copying what wide does
+  / replay        time / time of reading and copying what wide does (bound-replay)
   locate          time of one region search
   update of 1 %   time of an update after 1 % of the items have moved
-  query after 32  query time after 32 such updates / query time of a fresh build
+  query after 32  query time after 32 updates of 1 % / query time of a fresh build
   repaid after    queries after which the build is repaid against linear
 Structures share a rank if their times do not differ significantly.";
 

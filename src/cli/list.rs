@@ -10,7 +10,7 @@ use super::shared_args::TableFormat;
 use super::{Ending, print_json, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
-use crate::measure::METRICS;
+use crate::measure::{BOUNDS, METRICS};
 use crate::path::{PATH_PARAMS, PATHS};
 use crate::scene::{FAMILIES, MESHES, SAMPLES, SCENE_PARAMS};
 use crate::suite::SUITES;
@@ -171,7 +171,12 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
             let rows = METRICS
                 .iter()
                 .map(|m| row(m.name, &[("unit", m.unit)], m.summary));
-            ("metrics", String::new(), rows.collect())
+            let bounds = BOUNDS
+                .iter()
+                .map(|b| [b.name, b.summary].map(str::to_owned));
+            let bounds = text::entries(&bounds.collect::<Vec<_>>(), text::width());
+            let note = format!("Lower bounds in reports and tables (no structures):\n{bounds}");
+            ("metrics", note, rows.collect())
         }
     })
 }

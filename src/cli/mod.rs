@@ -76,6 +76,7 @@ use crate::index::Registry;
 use crate::input::{hold_files, tell_notes};
 use crate::report::{FolderError, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene};
+use crate::shown::expected_by;
 use clap::{CommandFactory, Parser};
 use interrupt::Interrupted;
 use serde::Serialize;
@@ -168,7 +169,7 @@ fn refused(error: &clap::Error) -> ExitCode {
     match error.print().and_then(|()| io::stdout().flush()) {
         Ok(()) => ExitCode::from(u8::from(error.use_stderr()) * 2),
         Err(unread) if is_broken_pipe(&unread) => ExitCode::SUCCESS,
-        Err(full) => failed(full.to_string()),
+        Err(full) => failed(format!("{full}{}", expected_by(&full, "file"))),
     }
 }
 
@@ -341,7 +342,11 @@ fn told_once(error: &anyhow::Error) -> String {
             text = format!("{text}: {cause}");
         }
     }
-    text
+    let mut of_system = error.chain().filter_map(|cause| cause.downcast_ref());
+    match of_system.next() {
+        Some(error) if !text.contains("expected") => text + &expected_by(error, "file or folder"),
+        _ => text,
+    }
 }
 
 /// Returns true for an error that is or wraps a broken pipe. `io` and `csv` errors
@@ -395,7 +400,8 @@ mod tests {
             .context("b: is full")
             .context("a")
             .unwrap_err();
-        assert_eq!(told_once(&error), "a: b: is full");
+        let expected = "; expected another file or folder";
+        assert_eq!(told_once(&error), format!("a: b: is full{expected}"));
     }
 
     #[test]

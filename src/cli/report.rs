@@ -16,7 +16,7 @@ use super::{
     text, write_text,
 };
 use crate::index::Registry;
-use crate::measure::{METRICS, Status};
+use crate::measure::{BOUNDS, METRICS, Status};
 use crate::report::{
     Comparison, Overall, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
     times_as_fast,
@@ -84,6 +84,9 @@ fn glossary() -> [Block; 2] {
     for (column, metric) in figures {
         let info = METRICS.iter().find(|info| info.name == metric);
         table.add_row([column, info.map_or("", |info| info.summary)]);
+    }
+    for bound in BOUNDS {
+        table.add_row([bound.name, bound.summary]);
     }
     [Block::Heading(2, "Columns".to_owned()), Block::Table(table)]
 }

@@ -40,7 +40,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         return Ok(Ending::Ok);
     }
     let [low, high, origin] = [info.bounds_min, info.bounds_max, info.origin]
-        .map(|v| format!("({}, {}, {})", v[0], v[1], v[2]));
+        .map(|v| format!("({})", v.map(text::short).join(", ")));
     let mut rows = vec![
         ("scene", text::plain(&info.name)),
         ("items", text::count(info.total_count)),
@@ -48,7 +48,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         ("origin", origin),
         (
             "sizes",
-            match sizes {
+            match sizes.map(|size| size.map(text::short)) {
                 [Some(low), Some(middle), Some(high)] => {
                     format!("longest edge min {low}, median {middle}, max {high}")
                 }

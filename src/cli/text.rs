@@ -75,6 +75,15 @@ pub fn significant(value: f64) -> String {
     format!("{value:.*}", digits.clamp(0, 12) as usize)
 }
 
+/// Three significant digits without zeros at the end: 12.5, 9, 0.05.
+pub fn short(value: f64) -> String {
+    let text = significant(value);
+    match text.contains('.') && !text.contains('e') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
 /// A value with its 95 % interval: "4.04 [3.95, 4.16]"; nothing if there is none.
 pub fn estimate(metric: Option<&Metric>) -> String {
     some(metric, |m| {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::shown::expected_by;
 use crate::spec::SpecError;
 
 /// Why a file or text cannot be used: where, what was found, what was expected.
@@ -9,7 +10,7 @@ use crate::spec::SpecError;
 #[non_exhaustive]
 pub enum InputError {
     /// The system refused to read it.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}{}", path.display(), expected_by(source, "file"))]
     Io {
         /// File that was to be read.
         path: PathBuf,

@@ -49,7 +49,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, summary }
     "update_ms", "ms", "CPU time of an update after 1 % of the items have moved (scenes of up to 2 million)";
     "update_ms_10_percent", "ms", "as update_ms, after 10 % have moved";
     "update_ms_100_percent", "ms", "as update_ms, after all have moved";
-    "refitted_over_rebuilt", "1", "time per query after 32 refits, each after 1 % of the items have moved / time per query on a fresh build of the same boxes; only structures that refit";
+    "refitted_over_rebuilt", "1", "time per query after 32 refits, each after 1 % of the items have moved / time per query on a fresh build of the same boxes (query after 32 in tables); only structures that refit";
     "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
     "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
     "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the timed cameras; as query_ns";

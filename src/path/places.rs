@@ -8,7 +8,7 @@ use crate::spec::Spec;
 pub(super) fn frames(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
     if stage.scene.places.is_empty() {
         let reason = format!(
-            "scene '{}' has no camera places of its own",
+            "scene '{}' has no camera places of its own; expected one with places, such as a Doom map",
             stage.scene.name
         );
         return Err(PathError::unfit("places", reason));

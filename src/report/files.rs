@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::SCHEMA_VERSION;
 use crate::json::JsonError;
+use crate::shown::expected_by;
 
 pub(super) const REPORT: &str = "report.json";
 pub(super) const SUMMARY: &str = "summary.csv";
@@ -39,7 +40,8 @@ impl FolderError {
     pub(super) fn io(path: &Path) -> impl Fn(io::Error) -> FolderError + Copy {
         move |source| {
             let source = bare(source);
-            let text = format!("{}: {source}", path.display());
+            let expected = expected_by(&source, "file or folder");
+            let text = format!("{}: {source}{expected}", path.display());
             FolderError {
                 text,
                 source: Some(source),

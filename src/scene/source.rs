@@ -61,7 +61,7 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
         return Err(InputError::Io {
             path: file.into(),
             source: match fs::metadata(file) {
-                Ok(_) => std::io::Error::other("is not a file"),
+                Ok(_) => std::io::ErrorKind::IsADirectory.into(),
                 Err(error) => error,
             },
         });
@@ -206,7 +206,7 @@ mod tests {
         assert!(error("mesh:statue:n=many").contains("n is 'many'; expected"));
         assert!(error("mesh:statue:size=3").contains("unknown parameter"));
         assert!(error("no/such/file.csv").contains("no/such/file.csv: No such file"));
-        assert!(error("datasets/").contains("not a file"));
+        assert!(error("datasets/").contains("a directory; expected a file"));
         assert!(error("datasets/freedm_map12.wad#MAP99").contains("no map 'MAP99'"));
         assert!(error("helsinki:n=3").contains("unknown parameter"));
     }

@@ -43,7 +43,11 @@ fn a_scene_file_that_is_none_is_refused_by_every_command() {
     let cases: Vec<(&str, Option<Vec<u8>>, &str)> = vec![
         ("missing.csv", None, "missing.csv | No such file"),
         ("no/where.csv", None, "no/where.csv | No such file"),
-        ("folder.csv", None, "folder.csv | not a file"),
+        (
+            "folder.csv",
+            None,
+            "folder.csv | a directory; expected a file",
+        ),
         ("empty.csv", Some(vec![]), "line 1 | empty | header"),
         (
             "header.csv",

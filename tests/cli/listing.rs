@@ -44,6 +44,36 @@ fn json_outputs_are_json() {
 }
 
 #[test]
+fn names_in_tables_are_explained() {
+    let here = Path::new(".");
+    let metrics = works(here, "list metrics");
+    let run = works(here, "run --help");
+    for name in [
+        "bound-read",
+        "bound-memcpy",
+        "bound-replay",
+        "query after 32",
+    ] {
+        assert!(metrics.contains(name) && run.contains(name), "{name}");
+    }
+}
+
+/// Three digits for people, all of them for programs.
+#[test]
+fn scenes_are_described_with_three_digits() {
+    let here = Path::new(".");
+    let told = works(here, "scene info city:n=200");
+    for part in [
+        "(-143, -143, 0) to (145, 143, 39.9)\n",
+        "min 1, median 4.2, max 39.9\n",
+    ] {
+        assert!(told.contains(part), "{told}");
+    }
+    let info = json(&works(here, "scene info city:n=200 --format json"));
+    assert_eq!(number(&info, "size_max"), f64::from(39.881_317_f32));
+}
+
+#[test]
 fn help_lists_and_scenes_fit_eighty_columns_of_a_pipe() {
     let fits = |line: &str| {
         let told = works(Path::new("."), line);

@@ -69,6 +69,16 @@ pub fn assert_refused(done: &Done, wanted: &str, what: &str) {
     assert_eq!(done.code, Some(2), "{what}: {done:?}");
     assert_eq!(done.out, "", "{what}");
     let line = done.err.strip_suffix('\n').unwrap_or_default();
+    let kinds = [
+        "expected",
+        "did you mean",
+        "known: ",
+        "available: ",
+        "built in: ",
+        "see --help",
+    ];
+    let is_helpful = kinds.iter().any(|kind| line.contains(kind));
+    assert!(is_helpful, "{what}: no way out of: {line}");
     assert!(
         line.starts_with("error: ") && !line.contains(['\n', '\r']),
         "{what}: not one error line: {:?}",

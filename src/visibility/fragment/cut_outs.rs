@@ -48,7 +48,8 @@ impl CutOuts {
         let share = spec.number("share", 0.2)?;
         if !(share > 0.0 && share <= 1.0) {
             let typed = spec.text("share").unwrap_or_default();
-            let message = format!("in '{text}': share={typed} is not above 0 and at most 1");
+            let message =
+                format!("in '{text}': share={typed}; expected a number above 0 and at most 1");
             return Err(SpecError::new(message));
         }
         let cut_outs = CutOuts {
@@ -104,8 +105,8 @@ mod tests {
         for (text, wanted) in [
             ("fense", "did you mean 'fence'"),
             ("solid", "unknown mask 'solid'"),
-            ("fence:share=0", "share=0 is not above 0"),
-            ("fence:share=1.1", "share=1.1 is not above 0 and at most 1"),
+            ("fence:share=0", "share=0; expected"),
+            ("fence:share=1.1", "share=1.1; expected"),
             ("fence:tile=0", "tile is '0'; expected"),
             ("fence:seed=-1", "seed is '-1'; expected"),
             ("fence:tyle=1", "did you mean 'tile'"),
