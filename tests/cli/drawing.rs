@@ -1,6 +1,7 @@
 //! `scene draw`: its legend has the counts of `query`; pictures are whole.
 
 use std::fs;
+use std::path::Path;
 
 use super::process::*;
 
@@ -121,4 +122,26 @@ fn what_cannot_be_drawn_is_refused() {
         assert_refused(&done, wanted, line);
     }
     assert!(contents(folder.path()).is_empty());
+}
+
+#[test]
+fn pictures_of_the_lectures_are_what_their_commands_draw() {
+    let docs = datasets().with_file_name("docs");
+    let text = fs::read_to_string(docs.join("LECTURES.md")).expect("part of the repository");
+    let folder = folder(&[]);
+    let mut drawn = 0;
+    for line in text.lines().filter(|line| line.contains(" -o lecture-")) {
+        let (_, arguments) = line.split_once("cullbench ").expect("a command");
+        assert_eq!(cullbench(folder.path(), arguments).code, Some(0), "{line}");
+        let name = line.rsplit(' ').next().expect("a file");
+        let read = |from: &Path| fs::read_to_string(from.join(name)).expect("a picture");
+        let picture = read(folder.path());
+        assert!(
+            picture == read(&docs),
+            "docs/{name} is not what `{line}` draws"
+        );
+        assert!(picture.len() < 60_000, "{name}");
+        drawn += 1;
+    }
+    assert_eq!(drawn, 2);
 }
