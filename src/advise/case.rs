@@ -57,6 +57,8 @@ impl<'a> Case<'a> {
             occluders: OccluderChoice::All,
             inner_boxes: None,
             execution: spec.execution,
+            all: true,
+            picks: false,
         };
         Ok(Case {
             index: spec.build(input_of(scene, &scene.items))?,

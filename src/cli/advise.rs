@@ -328,34 +328,31 @@ fn rule_table(advice: &Advice) -> Table {
 
 /// Every structure, test and rule with its times.
 fn show_evidence(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
-    writeln!(out, "\nStructures, all answers checked:")?;
-    writeln!(out, "{}", structure_table(&advice.structure))?;
-    writeln!(
-        out,
-        "\nCulling tests on {}, with {} ns to draw an item that cannot be seen:",
+    let width = text::width();
+    let mut say = |line: &str| writeln!(out, "{}", text::wrapped(line, width));
+    say("\nStructures, all answers checked:")?;
+    say(&structure_table(&advice.structure).fitted(width))?;
+    say(&format!(
+        "Culling tests on {}, with {} ns to draw an item that cannot be seen:",
         advice.test.structure, advice.options.draw_ns
+    ))?;
+    say(&test_table(&advice.test).fitted(width))?;
+    say("What can be left out, measured with and without:")?;
+    say(&omission_table(&advice.omissions).fitted(width))?;
+    say(
+        "A rule leaves out on its side of the threshold; where both sides answer the same, the \
+         clock decides if a paired test over the processes tells them apart. Kept / left out above \
+         1: leaving out is faster.",
     )?;
-    writeln!(out, "{}", test_table(&advice.test))?;
-    writeln!(out, "\nWhat can be left out, measured with and without:")?;
-    writeln!(out, "{}", omission_table(&advice.omissions))?;
-    writeln!(
-        out,
-        "A rule leaves out on its side of the threshold; where both sides answer the same, the clock\n\
-         decides if a paired test over the processes tells them apart. Kept / left out above 1:\n\
-         leaving out is faster."
-    )?;
-    for omission in &advice.omissions {
+    let reasons = advice.omissions.iter().map(|omission| {
         let contradicted = match omission.confirmed {
             Some(false) => " (the rule and what was measured disagree)",
             _ => "",
         };
-        writeln!(
-            out,
-            "  {}: {}{contradicted}",
-            omission.rule, omission.reason
-        )?;
-    }
-    writeln!(out)
+        let reason = format!("{}{contradicted}", omission.reason);
+        [omission.rule.to_owned(), reason]
+    });
+    say(&text::entries(&reasons.collect::<Vec<_>>(), width))
 }
 
 fn ties(names: &[impl AsRef<str>]) -> String {

@@ -150,6 +150,10 @@ pub struct RunArgs {
     /// Show every column and every scene and path, in several tables if need be
     #[arg(long)]
     pub all_columns: bool,
+    /// Explain the time of a structure beside the best other: nodes, items and planes
+    /// tested per query, and time per test
+    #[arg(long, value_name = "STRUCTURE", conflicts_with = "plan")]
+    pub why: Option<String>,
     /// Print the cells as JSON lines instead of measuring them
     #[arg(long, conflicts_with = "resume")]
     pub plan: bool,
@@ -305,6 +309,9 @@ pub struct PrecisionArgs {
     /// Cubes for each ratio of the size sweep; 0 skips all sweeps
     #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = values::whole(0..=usize::MAX))]
     pub cubes: usize,
+    /// Show every table: all points, region search, the sweeps
+    #[arg(long)]
+    pub all: bool,
     /// Also draw false positives against time as an SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
@@ -386,6 +393,9 @@ pub struct DriftArgs {
     /// Largest position error of a spring arm to recommend; the target swings by 1
     #[arg(long, value_name = "ERROR", default_value_t = 1e-3, value_parser = values::above_zero)]
     pub arm_tolerance: f64,
+    /// Show every table: errors by number of steps, orders, limits of stability
+    #[arg(long)]
+    pub all: bool,
     /// Also draw error against time of the spring arms as an SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,

@@ -69,7 +69,7 @@ pub struct CompareArgs {
     /// Exit with 3 where a cell is inconclusive as well
     #[arg(long)]
     pub fail_inconclusive: bool,
-    /// Show unchanged cells as well
+    /// Show unchanged cells and every column as well
     #[arg(long)]
     pub all: bool,
     #[arg(long, value_enum, default_value = "table")]

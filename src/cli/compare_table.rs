@@ -8,12 +8,14 @@ use serde_json::{Value, json};
 
 use super::compare_args::{CompareArgs, Gate};
 use super::document::{Block, folded, to_markdown, to_terminal};
+use super::run_table::short;
 use super::shared_args::TableFormat;
 use super::table::Table;
 use super::{Ending, print_json, text};
+use crate::culling::CullingTest;
 use crate::measure::{CellKey, METRICS};
 use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};
-use crate::shown::number;
+use crate::shown::{number, shortened};
 
 /// Counters in the list; `--all` shows every one.
 const LISTED: usize = 20;
@@ -69,7 +71,7 @@ impl CompareTable {
         }
     }
 
-    /// The verdict, the counts and the worst cell, in a line.
+    /// The verdict, the counts and the worst cell, in a sentence.
     fn summary(&self) -> String {
         let verdict = match self.verdict().1 {
             "ok" => "no regression".to_owned(),
@@ -85,17 +87,21 @@ impl CompareTable {
             format!("; worst: {}{}", name(&row.cell), change.unwrap_or_default())
         });
         let counts = self.counts_line();
-        format!(
-            "cullbench: {verdict}: {counts}{}",
-            worst.unwrap_or_default()
-        )
+        format!("{verdict}: {counts}{}", worst.unwrap_or_default())
     }
 
     /// Prints the comparison in the chosen format.
     pub fn show(&self, args: &CompareArgs) -> io::Result<()> {
         let text = match (args.markdown, args.format) {
-            (true, _) => folded(&self.summary(), &to_markdown(&self.blocks(args.all))),
-            (false, TableFormat::Table) => to_terminal(&self.blocks(args.all), usize::MAX),
+            (true, _) => folded(
+                &format!("cullbench: {}", self.summary()),
+                &to_markdown(&self.blocks(args.all, None)),
+            ),
+            (false, TableFormat::Table) => {
+                let width = text::width();
+                let room = if args.all { usize::MAX } else { width };
+                to_terminal(&self.blocks(args.all, Some(room)), width)
+            }
             (false, TableFormat::Json) => return self.json(),
         };
         io::stdout().lock().write_all(text.as_bytes())
@@ -136,8 +142,8 @@ impl CompareTable {
         print_json(&document)
     }
 
-    /// The document, for every format.
-    fn blocks(&self, all: bool) -> Vec<Block> {
+    /// The document for Markdown, or with a table for a terminal of some `room`.
+    fn blocks(&self, all: bool, room: Option<usize>) -> Vec<Block> {
         let changes = &self.changes;
         let mut lines = vec![
             format!("OLD  {}", self.old.line),
@@ -154,7 +160,11 @@ impl CompareTable {
         let shown = changes.rows.iter().filter(|row| all || row.is_news());
         let rows: Vec<&JudgedRow> = shown.collect();
         if !rows.is_empty() {
-            blocks.push(Block::Table(self.table(&rows)));
+            blocks.push(Block::Table(self.table(&rows, room)));
+            if room.is_some() {
+                blocks.push(Block::Line(String::new()));
+                blocks.extend(reasons(&rows).into_iter().map(Block::Line));
+            }
         }
         let listed = if all { usize::MAX } else { LISTED };
         lines.extend(changes.work_changed.iter().take(listed).map(work_line));
@@ -166,29 +176,43 @@ impl CompareTable {
         lines.extend(lone_lines("OLD", &changes.only_in_old));
         lines.extend(lone_lines("NEW", &changes.only_in_new));
         lines.extend(self.advice());
-        lines.push(self.counts_line());
+        let summary = self.summary();
+        lines.push(match room {
+            // It stands above the fold.
+            None => self.counts_line(),
+            Some(_) => summary[..1].to_uppercase() + &summary[1..],
+        });
         blocks.extend(lines.into_iter().map(Block::Line));
         blocks
     }
 
-    fn table(&self, rows: &[&JudgedRow]) -> Table {
+    /// One row per figure; for a terminal the columns that `room` holds.
+    fn table(&self, rows: &[&JudgedRow], room: Option<usize>) -> Table {
         let (change, processes) = match (self.gate, self.basis) {
             (Gate::Work, _) => ("change", "processes"),
-            (Gate::Time, Basis::Reports) => ("change vs the others [95 %]", "processes"),
+            (Gate::Time, Basis::Reports) if room.is_none() => {
+                ("change vs the others [95 %]", "processes")
+            }
+            (Gate::Time, Basis::Reports) => ("vs the others [95 %]", "processes"),
             (Gate::Time, Basis::Pairs) => ("change [95 %]", "pairs"),
         };
+        let places = match room {
+            None => "scene | path, test | structure",
+            Some(_) => "structure | scene and path",
+        };
         let mut table = Table::of(&format!(
-            "scene | path, test | structure | metric | >old | >new | >{change} | >resolves \
-             | >{processes} | verdict | why"
+            "{places} | metric | >old | >new | >{change} | >resolves | >{processes} | verdict | why"
         ));
         for row in rows {
             let metric = row.metric.unwrap_or_default();
             let judged = row.judgement.as_ref();
             let resolution = judged.and_then(|found| found.resolution);
-            table.add_row([
-                row.cell.group.scene.clone(),
-                question(&row.cell),
-                row.cell.structure.clone(),
+            let (scene, structure) = (&row.cell.group.scene, &row.cell.structure);
+            let places = match room {
+                None => vec![scene.clone(), question(&row.cell), structure.clone()],
+                Some(_) => vec![shortened(structure, 24), place(&row.cell)],
+            };
+            let figures = [
                 metric.to_owned(),
                 text::some(row.old, |value| shown(metric, value)),
                 text::some(row.new, |value| shown(metric, value)),
@@ -202,12 +226,30 @@ impl CompareTable {
                     (Basis::Reports, [old, new]) => format!("{old} vs {new}"),
                 },
                 row.outcome.name().replace('_', " "),
-                reason(row),
-            ]);
+                if room.is_none() {
+                    reason(row)
+                } else {
+                    String::new()
+                },
+            ];
+            table.add_row(places.into_iter().chain(figures));
         }
-        match self.gate {
-            Gate::Time => table,
-            Gate::Work => table.without_empty_columns(),
+        match (self.gate, room) {
+            (_, Some(usize::MAX)) => table.without_empty_columns(),
+            (_, Some(room)) => {
+                let mut first_to_go = vec!["metric", "resolves", processes, "old", "new"];
+                let is_of_metric = |row: &&JudgedRow| row.metric == rows[0].metric;
+                first_to_go.retain(|name| *name != "metric" || rows.iter().all(is_of_metric));
+                let table = table.without_empty_columns().within(room, &first_to_go);
+                let has_old = table.header.iter().any(|name| name == "old");
+                // One value alone says nothing.
+                match has_old {
+                    true => table,
+                    false => table.without("new"),
+                }
+            }
+            (Gate::Time, None) => table,
+            (Gate::Work, None) => table.without_empty_columns(),
         }
     }
 
@@ -279,6 +321,19 @@ pub fn name(cell: &CellKey) -> String {
     )
 }
 
+/// Scene and path in short, with the test and the cache state that are no defaults.
+fn place(cell: &CellKey) -> String {
+    let group = &cell.group;
+    let mut place = format!("{} {}", short(&group.scene), short(&group.path));
+    if group.test != CullingTest::SixPlane.name() {
+        place += &format!(" {}", group.test);
+    }
+    if group.cache != "warm" {
+        place += &format!(" {}", group.cache);
+    }
+    shortened(&place, 30)
+}
+
 /// All of a cell's key that is no default, but for scene and structure.
 fn question(cell: &CellKey) -> String {
     let group = &cell.group;
@@ -347,6 +402,24 @@ pub fn reason(row: &JudgedRow) -> String {
     let parts = became.into_iter().chain(row.reason.clone());
     let told: Vec<String> = parts.filter(|part| !part.is_empty()).collect();
     told.join(", ")
+}
+
+/// Every reason once, with the only cell of it or their number.
+fn reasons(rows: &[&JudgedRow]) -> Vec<String> {
+    let mut found: Vec<(String, Vec<&CellKey>)> = Vec::new();
+    for row in rows {
+        let why = format!("{}: {}", row.outcome.name().replace('_', " "), reason(row));
+        match found.iter_mut().find(|(known, _)| *known == why) {
+            _ if reason(row).is_empty() => {}
+            Some((_, cells)) => cells.push(&row.cell),
+            None => found.push((why, vec![&row.cell])),
+        }
+    }
+    let lines = found.into_iter().map(|(why, cells)| match cells[..] {
+        [one] => format!("{why} ({})", name(one)),
+        _ => format!("{why} ({})", text::counted(cells.len(), "cell")),
+    });
+    lines.collect()
 }
 
 /// A figure with the unit of its metric.

@@ -128,10 +128,12 @@ pub fn folded(line: &str, text: &str) -> String {
 /// The document for a terminal of `width` columns.
 pub fn to_terminal(blocks: &[Block], width: usize) -> String {
     let parts = blocks.iter().map(|block| match block {
-        Block::Heading(_, text) | Block::Line(text) => {
-            text::wrapped(&text::plain(text), width) + "\n"
+        Block::Heading(level, text) => {
+            let gap = if *level > 1 { "\n" } else { "" };
+            format!("{gap}{}\n", text::wrapped(&text::plain(text), width))
         }
-        Block::Table(table) | Block::Heat(table) => format!("{table}\n"),
+        Block::Line(text) => text::wrapped(&text::plain(text), width) + "\n",
+        Block::Table(table) | Block::Heat(table) => format!("\n{}", table.fitted(width)),
         Block::Picture(_) => String::new(),
     });
     parts.collect()

@@ -2,22 +2,20 @@
 //! of the cost of a step of each, and recommendations.
 
 use std::collections::BTreeSet;
-use std::io::{self, Write};
+use std::io::Write;
 
 use super::args::DriftArgs;
+use super::document::{Block, to_terminal};
 use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::Study;
-use super::table::Table;
+use super::table::{Column, Table};
 use super::{Ending, drift_arms, expect_place_for, interrupt, print, text, write_text};
 use crate::drift::{
     self, ArmKind, ArmOptions, DriftOptions, DriftReport, ORBIT_RADIUS, OrbitDrift, Rated,
     Recommendation, RotationDrift, SWING_DEG, TurnDrift,
 };
 use crate::measure::{ProcessTimes, Protocol, Schedule};
-
-/// Most columns of a table.
-const WIDTH: u16 = 100;
 
 /// Rounds of what is timed, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -33,7 +31,7 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let seconds = options.arm.seconds;
     study.announce(
         &format!("{work}, up to {steps:e} steps or {seconds} s each"),
-        "less than a minute",
+        "about half a minute",
     );
     let report = drift::prepare(&options, |job| {
         study.begin(job);
@@ -46,7 +44,8 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let times = study.times("everything, timed", None, job)?;
     report.conclude(&times, schedule.rounds);
     print(args.format, &report, || {
-        show(&report, &mut io::stdout().lock())
+        let shown = to_terminal(&blocks(&report, args.all), text::width());
+        text::terminal().write_all(shown.as_bytes())
     })?;
     if let Some(file) = &args.svg {
         write_text(file, &drift_arms::draw(&report.arm)?)?;
@@ -120,88 +119,147 @@ fn scientific(value: f64) -> String {
     }
 }
 
-fn show(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
-    writeln!(
-        out,
-        "{}, {} in each{}",
+/// Tables and recommendations.
+///
+/// With `all` the errors after each number of steps too.
+fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
+    let (turn, steps) = (report.turn_per_step, steps(report.steps));
+    let times = match report.processes {
+        ..3 => "times without intervals (--processes 10 gives them)",
+        _ => "times with 95 % intervals",
+    };
+    let mut blocks = vec![Block::Line(format!(
+        "Camera updates after {steps} steps: {}, {} in each; {times}.",
         text::counted(report.processes, "process"),
         text::counted(report.rounds, "round"),
-        match report.processes {
-            ..3 => ": times without intervals (--processes 10 gives them)",
-            _ => ": times with 95 % intervals",
-        }
-    )?;
-    show_rotations(report, out)?;
-    show_orbits(report, out)?;
-    drift_arms::show(&report.arm, out)
+    ))];
+    blocks.push(Block::Heading(
+        2,
+        format!(
+            "Camera bases turned by yaw {}, pitch {} and roll {} degrees per step",
+            turn.yaw_deg, turn.pitch_deg, turn.roll_deg
+        ),
+    ));
+    if all {
+        blocks.extend(rotations(report));
+    }
+    let of_bases = rated(&report.rotation_methods, "error", report.tolerance_rad, all);
+    blocks.push(Block::Table(of_bases));
+    let swing = format!("Orbits: an eye carried around by {SWING_DEG:.3} degrees per step");
+    blocks.push(Block::Heading(2, swing));
+    if all {
+        blocks.extend(orbits(report));
+    }
+    let of_orbits = rated(
+        &report.orbit_methods,
+        "error / radius",
+        report.tolerance_rad,
+        all,
+    );
+    blocks.push(Block::Table(of_orbits));
+    blocks.extend(drift_arms::blocks(&report.arm, all));
+    blocks.push(Block::Heading(2, "Conclusions:".to_owned()));
+    let bases = (&report.rotation_methods, &report.recommended_rotation);
+    let eyes = (&report.orbit_methods, &report.recommended_orbit);
+    for (what, (methods, choice)) in [("a camera base", bases), ("an orbit", eyes)] {
+        blocks.push(Block::Line(recommended(what, methods, choice)));
+    }
+    blocks.extend(drift_arms::conclusions(&report.arm).map(Block::Line));
+    if !all {
+        let more = "errors by number of steps, orders, stability: --all";
+        blocks.extend(["", more].map(|line| Block::Line(line.to_owned())));
+    }
+    blocks
 }
 
-fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
-    let turn = report.turn_per_step;
-    writeln!(
-        out,
-        "Camera bases: yaw {}, pitch {} and roll {} degrees per step; the most in the {} steps\n\
-         that end there, a period between two corrections. The orbit has radius {ORBIT_RADIUS};\n\
-         the eye hangs on the base.",
-        turn.yaw_deg, turn.pitch_deg, turn.roll_deg, report.period_steps
-    )?;
+/// Errors of bases after each number of steps.
+fn rotations(report: &DriftReport) -> Vec<Block> {
+    let note = format!(
+        "Each figure is the largest of the {} steps that end there, a period between two \
+         corrections. The orbit has radius {ORBIT_RADIUS}; the eye hangs on the base.",
+        report.period_steps
+    );
     let (all, turns) = (&report.rotation, &report.one_degree_turns);
     let figures: [Figure<RotationDrift>; 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
         ("angular error in rad after", |d| d.angle_error_rad),
-        ("position on orbit off after", |d| d.orbit_position_error),
-        ("radius of orbit off after", |d| d.orbit_radius_error),
+        ("position error on an orbit after", |d| {
+            d.orbit_position_error
+        }),
+        ("radius error of an orbit after", |d| d.orbit_radius_error),
     ];
-    for (title, figure) in figures {
+    let tables = figures.iter().map(|(title, figure)| {
         let of = |d: &RotationDrift| (d.method, d.steps, scientific(figure(d)));
-        writeln!(out, "{}", grid(title, steps, all, of))?;
-    }
-    let title = "in steps of 1 degree: angular error in rad after";
+        Block::Table(grid(title, steps, all, of))
+    });
+    let title = "by 1 degree per step: error in rad after";
     let head = |turns| text::counted(turns as usize, "turn");
     let of = |d: &TurnDrift| (d.method, d.turns, format!("{:.3e}", d.angle_error_rad));
-    writeln!(out, "{}", grid(title, head, turns, of))?;
-    let title = format!("bases after {} steps", steps(report.steps));
-    show_rated(&title, "error", &report.rotation_methods, out)?;
-    recommend("a camera base", &report.recommended_rotation, out)
+    let by_degrees = Block::Table(grid(title, head, turns, of));
+    [Block::Line(note)]
+        .into_iter()
+        .chain(tables)
+        .chain([by_degrees])
+        .collect()
 }
 
 /// Title of a table of errors, and its cell.
 type Figure<T> = (&'static str, fn(&T) -> f64);
 
-fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
-    let swing = format!("an eye carried around by {SWING_DEG:.3} degrees per step");
-    writeln!(out, "Orbits: {swing}")?;
+/// Errors of carried eyes after each number of steps.
+fn orbits(report: &DriftReport) -> impl Iterator<Item = Block> {
     let figures: [Figure<OrbitDrift>; 2] = [
-        ("position off after", |d| d.position_error),
-        ("radius off after", |d| d.radius_error),
+        ("position error after", |d| d.position_error),
+        ("radius error after", |d| d.radius_error),
     ];
-    for (title, figure) in figures {
+    figures.into_iter().map(|(title, figure)| {
         let of = |d: &OrbitDrift| (d.method, d.steps, scientific(figure(d)));
-        writeln!(out, "{}", grid(title, steps, &report.orbit, of))?;
-    }
-    let title = format!("orbits after {} steps", steps(report.steps));
-    show_rated(&title, "error / radius", &report.orbit_methods, out)?;
-    recommend("an orbit", &report.recommended_orbit, out)
+        Block::Table(grid(title, steps, &report.orbit, of))
+    })
 }
 
-fn show_rated(title: &str, error: &str, rated: &[Rated], out: &mut impl Write) -> io::Result<()> {
-    let mut table = Table::new([title, error, "ns/step", "good", ""], &[1]).fit(WIDTH);
-    for row in rated {
-        let default = if row.is_default { " (default)" } else { "" };
-        table.add_row([
-            format!("{}{default}", row.name),
-            row.error.map_or("unstable".to_owned(), scientific),
-            text::some(row.ns_per_step, text::significant)
-                + &text::interval([row.ns_per_step_lower, row.ns_per_step_upper], 1.0),
-            if row.qualifies { "yes" } else { "no" }.to_owned(),
-            row.summary.to_owned(),
-        ]);
-    }
-    writeln!(out, "{table}")
+/// Methods with error and time; with `all` a line about each.
+fn rated(methods: &[Rated], error: &str, tolerance: f64, all: bool) -> Table {
+    let columns: [Column<&Rated>; 5] = [
+        ("method", |row| {
+            let default = if row.is_default { " (default)" } else { "" };
+            format!("{}{default}", row.name)
+        }),
+        (">error", |row| {
+            row.error.map_or("unstable".to_owned(), scientific)
+        }),
+        (">time per step", |row| step_time(row)),
+        ("", |row| {
+            if row.qualifies { "yes" } else { "no" }.to_owned()
+        }),
+        ("", |row| row.summary.to_owned()),
+    ];
+    let shown = if all { columns.len() } else { 4 };
+    let mut table = Table::with(methods, &columns[..shown]);
+    error.clone_into(&mut table.header[1]);
+    table.header[3] = format!("within {tolerance:e}");
+    table
 }
 
-fn recommend(what: &str, choice: &Recommendation, out: &mut impl Write) -> io::Result<()> {
-    let name = choice.name.as_deref().unwrap_or("nothing");
-    let said = format!("Recommended for {what}: {name}, {}.", choice.reason);
-    writeln!(out, "{}\n", text::wrapped(&said, WIDTH.into()))
+fn step_time(row: &Rated) -> String {
+    text::time_plus_minus(
+        row.ns_per_step,
+        [row.ns_per_step_lower, row.ns_per_step_upper],
+    )
+}
+
+/// A recommendation with its figures.
+fn recommended(what: &str, methods: &[Rated], choice: &Recommendation) -> String {
+    let Some(name) = &choice.name else {
+        return format!("Recommended for {what}: nothing, {}.", choice.reason);
+    };
+    let row = methods.iter().find(|row| row.name == name);
+    let figures = text::some(row, |row| {
+        let error = text::some(row.error, scientific);
+        format!(" ({} per step, error {error})", step_time(row))
+    });
+    format!(
+        "Recommended for {what}: {name}{figures}, {}.",
+        choice.reason
+    )
 }

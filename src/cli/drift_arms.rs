@@ -3,46 +3,81 @@
 //! take, and their diagram. Errors and orders are shown at one frame rate; the JSON
 //! has all.
 
-use std::io::{self, Write};
+use std::collections::BTreeMap;
 
 use plotters::prelude::*;
 
 use super::chart::{Area, Axis, Drawn, around, is_drawn, legend, log_log, svg};
+use super::document::Block;
 use super::palette::COLOURS;
 use super::table::{Column, Table};
 use super::text::{self, some};
 use crate::drift::{ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, StabilityLimit};
 
-/// Most columns of a table.
-const WIDTH: u16 = 100;
-
-pub fn show(report: &ArmReport, out: &mut impl Write) -> io::Result<()> {
-    writeln!(
-        out,
-        "Spring arms: critically damped, behind a target that is known where frames end; errors\n\
-         are the largest at the end of a frame in {} s, times are thread CPU time per simulated\n\
-         second.",
-        report.seconds
-    )?;
+/// Method of each arm; with `all` errors, orders and limits of stability as well.
+pub fn blocks(report: &ArmReport, all: bool) -> Vec<Block> {
+    let heading = "Spring arms, critically damped, behind a moving target";
+    let mut blocks = vec![
+        Block::Heading(2, heading.to_owned()),
+        Block::Line(format!(
+            "The target is known where frames end. Errors are the largest at the end of a frame in \
+             {} s, times are thread CPU time per simulated second.",
+            report.seconds
+        )),
+    ];
     for (arm, name, what) in ARMS {
-        if report.points.iter().any(|p| p.setting.arm == arm) {
-            let title = format!("{name} arm: {what}");
-            writeln!(out, "{}", text::wrapped(&title, WIDTH.into()))?;
+        if all && report.points.iter().any(|p| p.setting.arm == arm) {
+            blocks.push(Block::Heading(3, format!("{name} arm: {what}")));
             let title = format!("{name}, {} Hz, within {:e}", rate(report), report.tolerance);
             let cell = |own: &[&ArmPoint]| within(own, report.tolerance);
-            writeln!(out, "{}", by_stiffness(report, arm, &title, cell))?;
+            blocks.push(Block::Table(by_stiffness(report, arm, &title, cell)));
             let title = format!("{name}, observed order");
-            writeln!(out, "{}", by_stiffness(report, arm, &title, orders))?;
+            blocks.push(Block::Table(by_stiffness(report, arm, &title, orders)));
         }
     }
-    writeln!(
-        out,
-        "Orders are the powers of the step by which a method's own error falls from each number\n\
-         of steps to the next; ! is half a power or more below the classical order: steps are not\n\
-         far below 1/omega, or the arm meets the stop."
-    )?;
-    writeln!(out, "{}", stability(&report.stability))?;
-    writeln!(out, "{}", choices(report))
+    if all {
+        blocks.push(Block::Line(
+            "Orders are the powers of the step by which a method's own error falls from each \
+             number of steps to the next; ! is half a power or more below the classical order: \
+             steps are not far below 1/omega, or the arm meets the stop."
+                .to_owned(),
+        ));
+        blocks.push(Block::Table(stability(&report.stability)));
+    }
+    blocks.push(Block::Table(choices(report, all)));
+    blocks
+}
+
+/// Methods to take, each with the number of settings it is the choice of.
+pub fn conclusions(report: &ArmReport) -> impl Iterator<Item = String> {
+    ARMS.iter().filter_map(|(arm, name, _)| {
+        let own = report.choices.iter().filter(|c| c.setting.arm == *arm);
+        let own: Vec<&ArmChoice> = own.collect();
+        let first = own.first()?;
+        let mut methods = BTreeMap::<&str, usize>::new();
+        for choice in &own {
+            *methods
+                .entry(choice.method.unwrap_or("nothing"))
+                .or_default() += 1;
+        }
+        let mut methods: Vec<_> = methods.into_iter().collect();
+        methods.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        let told = match methods[..] {
+            [(method, _)] => format!("{method}, {}", first.choice.reason),
+            _ => {
+                let each = methods
+                    .iter()
+                    .map(|(name, count)| format!("{name} in {count}"));
+                format!(
+                    "{} of {} settings, the cheapest with an error within {:e}",
+                    each.collect::<Vec<_>>().join(", "),
+                    own.len(),
+                    report.tolerance
+                )
+            }
+        };
+        Some(format!("Recommended for a {name} arm: {told}."))
+    })
 }
 
 /// The frame rate in the middle, the one of errors and orders.
@@ -66,7 +101,7 @@ fn by_stiffness(
     let settings: Vec<_> = settings.chunk_by(|a, b| a.setting == b.setting).collect();
     let stiffness = |own: &&[&ArmPoint]| format!("k={:e}", own[0].setting.stiffness);
     let columns = settings.iter().map(stiffness);
-    let mut table = Table::new([title.to_owned()].into_iter().chain(columns), &[]).fit(WIDTH);
+    let mut table = Table::new([title.to_owned()].into_iter().chain(columns), &[]);
     for method in report.methods {
         let cells = settings.iter().map(|all| {
             let own = all.iter().copied().filter(|p| p.method == method.name);
@@ -112,7 +147,7 @@ fn stability(limits: &[StabilityLimit]) -> Table {
     let ratios = ratios.map(|limit| format!("zeta={}", limit.damping_ratio));
     let first = ["stable while omega h <".to_owned()].into_iter();
     let left = ["left per step at 16.7, zeta=1".to_owned()];
-    let mut table = Table::of_numbers(first.chain(ratios).chain(left)).fit(WIDTH);
+    let mut table = Table::of_numbers(first.chain(ratios).chain(left));
     for own in methods {
         let limit = |limit: &StabilityLimit| match limit.limit_omega_h {
             Some(limit) => format!("{limit:.4}"),
@@ -129,8 +164,9 @@ fn stability(limits: &[StabilityLimit]) -> Table {
     table
 }
 
-fn choices(report: &ArmReport) -> Table {
-    let columns: &[Column<&ArmChoice>] = &[
+/// The method of each arm; with `all` the reasons too.
+fn choices(report: &ArmReport, all: bool) -> Table {
+    let columns: [Column<&ArmChoice>; 5] = [
         ("", |choice| {
             let setting = &choice.setting;
             let (arm, k, rate) = (setting.arm.name(), setting.stiffness, setting.rate_hz);
@@ -147,7 +183,8 @@ fn choices(report: &ArmReport) -> Table {
         }),
         ("why", |choice| choice.choice.reason.clone()),
     ];
-    let mut table = Table::with(&report.choices, columns).fit(WIDTH);
+    let shown = if all { columns.len() } else { 4 };
+    let mut table = Table::with(&report.choices, &columns[..shown]);
     table.header[0] = format!("to take within {:e}", report.tolerance);
     table
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::args::EnvArgs;
 use super::shared_args::TableFormat;
 use super::table::Table;
-use super::{Ending, print_json};
+use super::{Ending, print_json, text};
 use crate::measure::{Machine, Source, Toolchain};
 
 pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
@@ -25,7 +25,7 @@ pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
                     table.add_row([format!("{group}.{name}"), plain(value)]);
                 }
             }
-            writeln!(io::stdout(), "{table}")?;
+            write!(io::stdout(), "{}", table.fitted(text::width()))?;
         }
     }
     Ok(Ending::Ok)

@@ -56,7 +56,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let begin = |step: &str| {
         // Refusals come before the first step.
         if !is_begun.replace(true) {
-            study.announce(&work(&input), "minutes");
+            study.announce(&work(&input), "less than a minute");
         }
         study.begin(step);
     };
@@ -76,7 +76,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         FunnelFormat::Json => print_json(&report),
         FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
         FunnelFormat::Table => {
-            let text = to_terminal(&funnel_table::blocks(&report), funnel_table::WIDTH.into());
+            let blocks = funnel_table::blocks(&report, args.all);
+            let text = to_terminal(&blocks, text::width());
             text::terminal().write_all(text.as_bytes())
         }
     });
@@ -84,7 +85,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         write_text(file, &funnel_picture::draw(&report, &stages.setting.scene))?;
     }
     if let Some(file) = &args.html {
-        let mut blocks = funnel_table::blocks(&report);
+        let mut blocks = funnel_table::blocks(&report, true);
         blocks.push(Block::Picture(funnel_picture::draw(
             &report,
             &stages.setting.scene,
@@ -213,6 +214,8 @@ impl Stages {
             claim: self.claim.as_ref(),
             occluders: args.occluders,
             inner_boxes: args.inner_boxes.map(|most| most as usize),
+            all: args.all || args.html.is_some() || args.format != FunnelFormat::Table,
+            picks: !args.no_picks,
             ..plain
         })
     }
@@ -240,6 +243,8 @@ pub fn plain_input<'s>(
         occluders: OccluderChoice::All,
         inner_boxes: None,
         execution: args.kernel.execution()?,
+        all: true,
+        picks: true,
     })
 }
 

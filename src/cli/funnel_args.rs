@@ -13,14 +13,18 @@ use crate::visibility::inscribed::MOST_BOXES;
 use crate::visibility::occlusion::OccluderChoice;
 
 const FUNNEL_HELP: &str = "\
-Columns of the table:
-  in, out      items (triangles in the triangle stage) that the stage receives
-               and passes, per view
+The chain has a back end for each stage; the table says what each is worth:
+  in, out        items (triangles in the triangle stage) that the stage
+                 receives and passes, per view
+  time           CPU time of the stage per view, with half of its 95 % interval
+  worth it from  cost of drawing one item (a triangle, shading a fragment) above
+                 which the stage pays off: its time / what it removes in the end
+
+With --all every other back end of each stage stands beside it:
   truth        received items in front at some sample; received triangles that
                face the eye
   FP, FN       false positives (passed, not visible) and false negatives
                (visible, not passed)
-  time         CPU time of the stage per view, with half of its 95 % interval
   per item     time / number of removed items
 All back ends of a stage receive the output of the chain's previous stage. *
 marks a back end of the chain, ? one without a guarantee. NAME is a value of the
@@ -54,7 +58,7 @@ pub struct FunnelArgs {
     #[command(flatten)]
     pub study: StudyArgs,
     /// Number of cameras to use, evenly spread over the path
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = values::whole(1..=u32::MAX))]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = values::whole(1..=u32::MAX))]
     pub frames: u32,
     /// Columns and rows of samples
     #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]
@@ -90,6 +94,13 @@ pub struct FunnelArgs {
     /// [[0, 1], ..]}
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
+    /// Compare every back end of every stage, depth orders, picking and lower bounds
+    /// too, as --format csv and json and --html do
+    #[arg(long)]
+    pub all: bool,
+    /// Leave picking out of what --all, --format and --html add
+    #[arg(long)]
+    pub no_picks: bool,
     /// Also write tables and picture as one HTML page
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

@@ -5,43 +5,53 @@ use super::document::Block;
 use super::table::{Column, Table};
 use super::text;
 use crate::funnel::{
-    BoundRow, FragmentCounts, FunnelReport, Gain, LevelRow, OrderRow, PickRow, StageRow, Times,
+    BoundRow, FragmentCounts, FunnelReport, Gain, LevelRow, NONE, OrderRow, PickRow, StageKind,
+    StageRow, Times,
 };
+use crate::shown::shortened;
 use crate::visibility::Guarantee;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 use crate::visibility::occlusion::OccluderChoice;
 
-/// Most columns of a line.
-pub const WIDTH: u16 = 100;
-
-pub fn blocks(report: &FunnelReport) -> Vec<Block> {
+/// The chain and what it is worth; with `all` every other back end too.
+pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
+    let views = match report.views {
+        all if all == report.cameras => text::counted(all, "view"),
+        some => format!(
+            "{} of {}",
+            text::count(some),
+            text::counted(report.cameras, "view")
+        ),
+    };
     let mut blocks = vec![
         Block::Heading(1, format!("Funnel of {}, {}", report.scene, report.path)),
         Block::Line(format!(
             "{}; {} of {} x {} samples; {}; figures are means per view.",
             text::counted(report.items, "item"),
-            text::counted(report.views, "view"),
+            views,
             report.samples[0],
             report.samples[1],
             spread(report.processes),
         )),
-        Block::Table(stages(report).fit(WIDTH)),
     ];
-    blocks.extend(saved_load(&report.level).map(Block::Line));
-    blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
-    blocks.extend(report.ground.as_ref().map(ground));
-    blocks.extend(report.solid_blocks.as_ref().map(solid_blocks));
     if let Some(made) = &report.cut_outs {
-        let line = format!(
+        blocks.push(Block::Line(format!(
             "{} of the items are cut out by a mask ({}, tiles of {}): they hide nothing at its \
              holes.",
             made.item_count, made.mask, made.tile
-        );
-        blocks.insert(2, Block::Line(line));
+        )));
     }
     if report.occluders != OccluderChoice::All.to_string() {
         let line = format!("Occluders of hierarchical-z: {}.", report.occluders);
-        blocks.insert(2, Block::Line(line));
+        blocks.push(Block::Line(line));
+    }
+    blocks.push(Block::Table(chain(report)));
+    if all {
+        let heading = "Every back end of every stage".to_owned();
+        blocks.extend([Block::Heading(2, heading), Block::Table(stages(report))]);
+        blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
+        blocks.extend(report.ground.as_ref().map(ground));
+        blocks.extend(report.solid_blocks.as_ref().map(solid_blocks));
     }
     // Not every scene has all of them.
     for (heading, table) in [
@@ -56,29 +66,115 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
             "Lower bounds: the least that must be read or written",
             bounds(report),
         ),
-        (
-            "With and without each stage of the chain, and the draw cost above which it pays off",
-            gains(report),
-        ),
+        ("With and without each stage of the chain", gains(report)),
     ] {
-        if !table.rows.is_empty() {
-            blocks.extend([
-                Block::Heading(2, heading.into()),
-                Block::Table(table.fit(WIDTH)),
-            ]);
+        if !table.rows.is_empty() && (all || heading.contains("mirror")) {
+            blocks.extend([Block::Heading(2, heading.into()), Block::Table(table)]);
         }
     }
-    if report.stages.iter().any(|row| row.fragments.is_some()) {
+    blocks.push(Block::Line(String::new()));
+    if all && report.stages.iter().any(|row| row.fragments.is_some()) {
         let line = "The time of the fragment stage is that of an exact test along the ray of each \
                     sample, on one thread. A GPU does this in hardware.";
         blocks.push(Block::Line(line.into()));
     }
-    blocks.extend(report.left_out.iter().map(|row| {
+    blocks.extend(saved_load(&report.level).map(Block::Line));
+    let left_out = report.left_out.iter();
+    let left_out = left_out.filter(|row| all || ["stages", "mirror"].contains(&row.section));
+    blocks.extend(left_out.map(|row| {
         let (section, name, reason) = (row.section, row.name, &row.reason);
         Block::Line(format!("Left out ({section}, {name}): {reason}."))
     }));
-    blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
+    let told = match all {
+        true => report.conclusions.clone(),
+        false => conclusions(report),
+    };
+    blocks.extend(told.into_iter().map(Block::Line));
     blocks
+}
+
+/// Stages of the chain.
+fn chain(report: &FunnelReport) -> Table {
+    let mut table = Table::of("stage | by | >in | >out | >time | >worth it from");
+    let level = &report.level;
+    if level.map_count > 1 {
+        let [given, left] = [level.input_count, level.output_count].map(|n| n.to_string());
+        let row = ["level", &level.selected, &given, &left, "", ""];
+        table.add_row(row.map(|cell| shortened(cell, 24)));
+    }
+    let is_shown = |row: &&StageRow| row.is_chosen && row.back_end.name != NONE;
+    for row in report.stages.iter().filter(is_shown) {
+        let stage = row.back_end.stage;
+        let worth = match gain(report, stage) {
+            // Another stage does it in its own traversal.
+            None => "in occlusion".to_owned(),
+            Some(gain) => worth(gain),
+        };
+        table.add_row([
+            stage.name().to_owned(),
+            shortened(name(row), 24) + doubt(row.back_end.guarantee),
+            count(row.errors.input_count),
+            count(row.errors.output_count),
+            of_view(&row.times),
+            worth,
+        ]);
+    }
+    table
+}
+
+fn gain(report: &FunnelReport, stage: StageKind) -> Option<&Gain> {
+    report.gains.iter().find(|gain| gain.stage == stage)
+}
+
+/// Cost of drawing from which a stage pays off: "2.0±0.1 us/item".
+fn worth(gain: &Gain) -> String {
+    let unit = gain.unit.trim_end_matches('s');
+    let ends = [gain.break_even_ns_lower, gain.break_even_ns_upper];
+    match (gain.break_even_ns, ends) {
+        (None, _) if gain.removed() <= 0.0 => "never".to_owned(),
+        (None, _) => String::new(),
+        (Some(0.0), _) => "always".to_owned(),
+        // Within noise of saving time as well.
+        (_, [Some(0.0), Some(most)]) => format!("<{}/{unit}", text::time(most)),
+        (ns, _) => format!("{}/{unit}", text::time_plus_minus(ns, ends)),
+    }
+}
+
+/// Sentences on what remains, the worth of each stage, and what was dropped.
+fn conclusions(report: &FunnelReport) -> Vec<String> {
+    let chosen = || report.stages.iter().filter(|row| row.is_chosen);
+    let last = chosen().find(|row| row.back_end.stage == StageKind::Occlusion);
+    let mut told = text::some(last, |row| {
+        format!(
+            "Of {} {} remain to be drawn and {} are in front at some sample, per view.",
+            text::counted(report.items, "item"),
+            count(row.errors.output_count),
+            count(row.errors.truth_count)
+        )
+    });
+    // The depth test costs a GPU nothing to speak of.
+    let gains = report.gains.iter();
+    for gain in gains.filter(|gain| gain.stage != StageKind::Fragment) {
+        let what = format!("{} ({})", gain.stage.name(), gain.back_end);
+        let unit = gain.unit.trim_end_matches('s');
+        told += &match (gain.break_even_ns, gain.break_even_ns_lower) {
+            (None, _) if gain.removed() <= 0.0 => {
+                format!(" Leave out {what}: it removes nothing that the other stages leave.")
+            }
+            (None, _) => String::new(),
+            (Some(0.0), _) => format!(" Use {what}: it saves time as well."),
+            (_, Some(0.0)) => format!(" Use {what}: it takes no more time than it saves."),
+            (Some(ns), _) => format!(
+                " Use {what} if drawing one {unit} takes more than {}.",
+                text::time(ns)
+            ),
+        };
+    }
+    let more = "every other back end, draw orders, picking, lower bounds: --all";
+    let dropped = chosen().filter_map(StageRow::loss);
+    let mirror = report.mirror.as_ref().map(|mirror| mirror.sentence());
+    let sentences = [told].into_iter().chain(dropped).chain(mirror);
+    sentences.chain(["".to_owned(), more.to_owned()]).collect()
 }
 
 /// Line on the load that the selection of a level saves; none for a single level.
@@ -163,7 +259,8 @@ fn stages(report: &FunnelReport) -> Table {
     let mut table = Table::of("stage | by | >in | >out | >truth | >FP | >FN | >time | >per item");
     let level = &report.level;
     let [given, left] = [level.input_count, level.output_count].map(|n| n.to_string());
-    let mut first = vec!["level".to_owned(), level.selected.clone(), given, left];
+    let selected = shortened(&level.selected, 24);
+    let mut first = vec!["level".to_owned(), selected, given, left];
     first.resize(table.header.len(), String::new());
     table.add_row(first);
     table.rows.extend(report.stages.iter().map(stage));
@@ -172,9 +269,13 @@ fn stages(report: &FunnelReport) -> Table {
 
 /// A back end with its marks.
 fn by(row: &StageRow) -> String {
-    let name = row.structure.as_deref().unwrap_or(row.back_end.name);
     let mark = if row.is_chosen { "*" } else { "" };
+    let name = shortened(name(row), 24);
     format!("{name}{mark}{}", doubt(row.back_end.guarantee))
+}
+
+fn name(row: &StageRow) -> &str {
+    row.structure.as_deref().unwrap_or(row.back_end.name)
 }
 
 /// Mark of an unproven back end.
@@ -287,20 +388,14 @@ fn bounds(report: &FunnelReport) -> Table {
 fn gains(report: &FunnelReport) -> Table {
     let columns: &[Column<&Gain>] = &[
         ("stage", |gain| {
-            format!("{} ({})", gain.stage.name(), gain.back_end)
+            let back_end = shortened(&gain.back_end, 24);
+            format!("{} ({back_end})", gain.stage.name())
         }),
         (">time with", |gain| text::some(gain.with_ns, text::time)),
         (">without", |gain| text::some(gain.without_ns, text::time)),
-        ("counted", |gain| gain.unit.to_owned()),
-        (">with", |gain| count(gain.with_count)),
+        (">left with", |gain| count(gain.with_count)),
         (">without", |gain| count(gain.without_count)),
-        (">pays above", |gain| match gain.break_even_ns {
-            None if gain.removed() <= 0.0 => "removes nothing".to_owned(),
-            ns => {
-                let ends = [gain.break_even_ns_lower, gain.break_even_ns_upper];
-                text::time_plus_minus(ns, ends)
-            }
-        }),
+        (">worth it from", |gain| worth(gain)),
     ];
     Table::with(&report.gains, columns)
 }

@@ -47,6 +47,7 @@ mod run_plan;
 mod run_resume;
 mod run_table;
 mod run_verdict;
+mod run_why;
 mod scene;
 mod scene_args;
 mod scene_draw;
@@ -64,6 +65,7 @@ mod text;
 mod usage;
 mod values;
 mod verify;
+mod verify_table;
 mod worker;
 
 use std::collections::BTreeMap;
@@ -209,11 +211,14 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
     }
 }
 
-/// Prints a text as one line on stderr.
+/// Prints a text as one line on stderr, which a terminal gets wrapped.
 ///
 /// Unlike `eprintln!`, does not panic if standard error is closed.
 fn tell(line: &str) {
-    let _ = writeln!(io::stderr(), "{}", text::message(line));
+    let size = console::Term::stderr().size_checked();
+    let width = size.map_or(usize::MAX, |(_, columns)| usize::from(columns.max(1)));
+    let line = text::wrapped(&text::message(line), width);
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Loads a scene for `structures` structures at once, with a note on bad items.

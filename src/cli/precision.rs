@@ -2,13 +2,16 @@
 //! sweeps over item size and ill-conditioned cameras behind it. How it is shown is
 //! in `precision_tables` and `precision_conclusions`.
 
+use std::io::Write;
+
 use super::args::PrecisionArgs;
+use super::document::{Block, to_terminal};
 use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::{Setting, Study};
 use super::{
     Ending, expect_places, interrupt, precision_chart, precision_conclusions, precision_tables,
-    print, stage_sweep, write_text,
+    print, stage_sweep, text, write_text,
 };
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Status};
@@ -67,13 +70,29 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         sweeps,
     };
     let shown = print(args.format, &outcome, || {
-        precision_tables::show(&outcome).and_then(|()| precision_conclusions::show(&outcome))
+        let width = text::width();
+        let room = if args.all { usize::MAX } else { width };
+        let shown = to_terminal(&blocks(&outcome, args.all, room), width);
+        text::terminal().write_all(shown.as_bytes())
     });
     if let Some(file) = &args.svg {
         write_text(file, &precision_chart::draw(&outcome.precision)?)?;
     }
     shown?;
     Ok(Ending::of(!wrong))
+}
+
+/// Tables, then the conclusions.
+fn blocks(outcome: &precision_tables::Outcome, all: bool, room: usize) -> Vec<Block> {
+    let mut blocks = precision_tables::blocks(outcome, all, room);
+    blocks.push(Block::Heading(2, "Conclusions:".to_owned()));
+    let told = precision_conclusions::conclusions(outcome).into_iter();
+    blocks.extend(told.map(|sentence| Block::Line(format!("- {sentence}"))));
+    if !all {
+        let more = "every point, region search and sweeps: --all";
+        blocks.extend(["", more].map(|line| Block::Line(line.to_owned())));
+    }
+    blocks
 }
 
 /// The inputs of the command itself, or of a worker.

@@ -1,24 +1,13 @@
 //! The sentences that `cullbench precision` ends with: what its figures say, from
 //! the figures alone.
 
-use std::io::{self, Write};
-
 use super::precision_tables::{
-    CullingPoint, Outcome, WIDTH, elsewhere, named, numbers, percent, swept, time,
+    CullingPoint, Outcome, elsewhere, named, numbers, percent, swept, time,
 };
 use super::text;
 use crate::precision::{Precision, SWEEPS, SizeRow, SweepRow};
 
-pub fn show(outcome: &Outcome) -> io::Result<()> {
-    let mut out = text::terminal();
-    writeln!(out, "\nConclusions:")?;
-    for sentence in conclusions(outcome) {
-        writeln!(out, "{}", text::wrapped(&format!("- {sentence}"), WIDTH))?;
-    }
-    out.flush()
-}
-
-fn conclusions(outcome: &Outcome) -> Vec<String> {
+pub fn conclusions(outcome: &Outcome) -> Vec<String> {
     let p = &outcome.precision;
     let points = of_points(p).into_iter().chain(of_storage(p));
     let searches = of_regions(p)
@@ -134,24 +123,36 @@ fn of_sizes(rows: &[SizeRow]) -> Option<String> {
     ))
 }
 
-/// Who loses most over each sweep, and whether the default does.
-fn of_sweeps(rows: &[SweepRow]) -> Vec<String> {
-    let of = |(sweep, name, _): &(_, &str, _)| {
+/// Misses of the default over the sweeps, and the most of any over each.
+fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
+    let lost = |row: &SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
+    let default = rows.iter().filter(|row| numbers(&row.names) == "f32 c=8");
+    let errors = default.filter_map(|row| row.errors);
+    let missed: u64 = errors.map(|errors| errors.false_negatives).sum();
+    let worst = SWEEPS.iter().filter_map(|(sweep, name, _)| {
         let own = rows.iter().filter(|row| row.sweep == *sweep);
-        let lost = |row: &&SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
-        let worst = own.clone().max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
-        let default = own.filter(|row| numbers(&row.names) == "f32 c=8");
-        let errors = default.filter_map(|row| row.errors);
-        let default: u64 = errors.map(|errors| errors.false_negatives).sum();
-        if lost(&worst) == 0.0 {
-            return Some(format!("Over {name}, no test misses an item."));
-        }
-        Some(format!(
-            "Over {name} the default misses {default}; most is missed by {} at {}: {} ppm.",
-            numbers(&worst.names),
-            swept(worst.value),
-            text::rate(worst.false_negative_ppm, 1.0)
-        ))
+        let worst = own.max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
+        (lost(worst) > 0.0).then(|| {
+            format!(
+                "{} {} ({}, {} ppm)",
+                name,
+                swept(worst.value),
+                numbers(&worst.names),
+                text::significant(lost(worst))
+            )
+        })
+    });
+    let worst: Vec<String> = worst.collect();
+    let others = match worst.is_empty() {
+        true => "no other numbers do either".to_owned(),
+        false => format!("others miss items, most at {}", worst.join(", ")),
     };
-    SWEEPS.iter().filter_map(of).collect()
+    (!rows.is_empty()).then(|| {
+        let names: Vec<&str> = SWEEPS.iter().map(|sweep| sweep.1).collect();
+        format!(
+            "Over {} the default (six planes, f32 c=8) misses {}; {others}.",
+            names.join(", "),
+            text::counted(missed as usize, "item")
+        )
+    })
 }

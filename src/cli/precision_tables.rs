@@ -1,10 +1,9 @@
 //! Tables of `cullbench precision`: errors and times, the Pareto fronts and the
 //! sweeps. Sentences about them are in `precision_conclusions`.
 
-use std::io::{self, Write};
-
 use serde::Serialize;
 
+use super::document::Block;
 use super::table::{Column, Table};
 use super::text::{self, some};
 use crate::precision::{
@@ -27,87 +26,81 @@ pub struct Outcome {
     pub sweeps: Vec<SweepRow>,
 }
 
-/// Lines and tables are no wider.
-pub const WIDTH: usize = 100;
-
-pub fn show(outcome: &Outcome) -> io::Result<()> {
-    let mut out = text::terminal();
+/// The Pareto front within `room` characters.
+///
+/// With `all` every point, region search and the sweeps too.
+pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
     let p = &outcome.precision;
-    let mut say = |sentence: &str| writeln!(out, "{}", text::wrapped(sentence, WIDTH));
     let visible = p.points.iter().find_map(|point| point.errors.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
-    say(&format!(
+    let head = format!(
         "{}: {}; {}: {}, {} visible in all; {}; {} in each",
-        text::plain(&p.scene),
+        p.scene,
         text::counted(p.items, "item"),
-        text::plain(&p.path),
+        p.path,
         text::counted(p.cameras, "camera"),
         text::count(visible as usize),
         text::over(p.processes, p.twin.as_ref()),
         text::counted(p.rounds, "round")
-    ))?;
-    let fastest = fastest(&p.points);
-    say(&format!(
-        "\nErrors, by test, numbers and planes:\n{}",
-        errors_table(&fastest)
-    ))?;
-    say(
-        "± is the 95 % interval over the cameras; <: none observed, 95 % upper bound 3/n. FP: false \
-         positives, % of the visible items; by source: storage/planes/test, of all cameras. px: how deep \
-         the deepest miss reaches into a view 1080 pixels high. Flicker: items that change between \
-         successive cameras of the path while their truth does not, of the visible. c is the factor \
-         of the conservative epsilon. All structures have the same errors.",
-    )?;
-    say(&format!(
-        "\nTimes, the fastest structure for each:\n{}",
-        times_table(&fastest)
-    ))?;
-    for point in p.points.iter().filter(|p| p.reason.is_some()) {
-        let reason = point.reason.as_deref().unwrap_or_default();
-        say(&format!(
-            "{}: {}: {reason}",
-            named(point),
-            point.status.name()
-        ))?;
+    );
+    let mut blocks = vec![Block::Line(head)];
+    let mut add = |title: String, table: Table, note: &str| {
+        blocks.push(Block::Heading(2, title));
+        blocks.push(Block::Table(table));
+        if !note.is_empty() {
+            blocks.push(Block::Line(note.to_owned()));
+        }
+    };
+    if all {
+        let fastest = fastest(&p.points);
+        let title = "Errors, by test, numbers and planes";
+        add(title.to_owned(), errors_table(&fastest), ERRORS_NOTE);
+        let title = "Times, the fastest structure for each";
+        add(title.to_owned(), times_table(&fastest), "");
     }
-    say(&format!(
-        "\nPareto front, fastest first:\n{}",
-        front_lines(p)
-    ))?;
-    say(
-        "* On the Pareto front: no other point is significantly better in an error, the depth of \
-         misses, memory or time and as good in the rest. Points that do not differ significantly \
-         (intervals paired by camera and by process) share the front.",
-    )?;
-    say(&format!(
-        "\nRegion search, the fastest structure for each:\n{}",
-        regions_table(p)
-    ))?;
-    say(&format!(
-        "\nNumber of cameras after which the order of the points by time is final:\n{}",
-        stability_table(p)
-    ))?;
-    if !outcome.size_sweep.is_empty() {
-        say(&format!(
-            "\nExcess (false positives / visible, %) by cube edge s / depth D of the frustum, fov 60, 16:9:\n{}",
-            sizes_table(&outcome.size_sweep)
-        ))?;
-        say(&sizes_note(&outcome.size_sweep))?;
+    let title = "Pareto front of error, memory and time, fastest first";
+    let front = front_table(p).within(room, &["tie", "B/item", "missed ppm"]);
+    add(title.to_owned(), front, FRONT_NOTE);
+    if all {
+        let title = "Region search, the fastest structure for each";
+        add(title.to_owned(), regions_table(p), "");
+        let title = "Cameras after which the order of the points by time is final";
+        add(title.to_owned(), stability_table(p), "");
+    }
+    if all && !outcome.size_sweep.is_empty() {
+        let title = "False positives / visible, %, by cube edge s / depth D of the frustum";
+        let note = sizes_note(&outcome.size_sweep);
+        add(title.to_owned(), sizes_table(&outcome.size_sweep), &note);
         for (sweep, name, what) in SWEEPS {
             let rows = outcome.sweeps.iter().filter(|row| row.sweep == sweep);
-            say(&sweep_shown(name, what, &rows.collect::<Vec<_>>()))?;
+            let (table, note) = swept_errors(&rows.collect::<Vec<_>>());
+            let title = format!("Missed visible items (ppm) by {name} ({what}), nothing rebased");
+            add(title, table, &note);
         }
     }
-    out.flush()
+    let failed = p.points.iter().filter_map(|point| {
+        let (name, status) = (named(point), point.status.name());
+        Some(format!("{name}: {status}: {}", point.reason.as_ref()?))
+    });
+    blocks.extend(failed.map(Block::Line));
+    blocks
 }
 
+/// Explanation of the errors.
+const ERRORS_NOTE: &str = "± is the 95 % interval over the cameras; <: none observed, 95 % upper \
+     bound 3/n. FP: false positives, % of the visible items; by source: storage/planes/test, of all \
+     cameras. px: how deep the deepest miss reaches into a view 1080 pixels high. Flicker: items \
+     that change between successive cameras of the path while their truth does not, of the visible. \
+     c is the factor of the conservative epsilon. All structures have the same errors.";
+
+/// Meaning of the front.
+const FRONT_NOTE: &str = "No other point is significantly better in an error, the depth of misses, \
+     memory or time and as good in the rest (intervals paired by camera and by process). c: factor \
+     of the conservative epsilon. FP: false positives, % of the visible items; <: none observed, \
+     95 % upper bound.";
+
 pub fn named(point: &CullingPoint) -> String {
-    let (structure, names) = (&point.structure, &point.errors.names);
-    let (test, arithmetic, planes) = (names.test, names.arithmetic, names.planes);
-    format!(
-        "{structure} {test} {arithmetic} {planes} eps {}",
-        names.epsilon
-    )
+    format!("{} with {}", structure(point), culling(point))
 }
 
 /// A culling in short.
@@ -178,11 +171,8 @@ fn times_table(points: &[&CullingPoint]) -> Table {
     let columns: &[Column<&&CullingPoint>] = &[
         ("", |point| mark(point.on_front, point.is_tie).to_owned()),
         ("culling", |point| culling(point)),
-        ("structure", |point| {
-            let name = point.structure.split(':').next();
-            name.unwrap_or_default().to_owned()
-        }),
-        (">query [95 % interval]", |point| time(&point.times)),
+        ("structure", |point| structure(point)),
+        (">query", |point| time(&point.times)),
         (">B/item", |point| {
             format!("{:.1}", point.errors.memory_bytes_per_item)
         }),
@@ -200,23 +190,33 @@ fn mark(on_front: bool, is_tie: bool) -> &'static str {
 }
 
 pub fn time(times: &crate::precision::Times) -> String {
-    text::time_within(times.query_ns, [times.query_ns_lower, times.query_ns_upper])
+    text::time_plus_minus(times.query_ns, [times.query_ns_lower, times.query_ns_upper])
 }
 
-fn front_lines(p: &Precision) -> String {
-    let line = |&i: &usize| {
-        let point = &p.points[i];
-        format!(
-            "* {}: {}, {} B/item, FP {} %, missed {} ppm{}",
-            named(point),
-            some(point.times.query_ns, text::time),
-            text::significant(point.errors.memory_bytes_per_item),
-            percent(point.errors.excess),
-            text::rate(point.errors.false_negative_ppm, 1.0),
-            if point.is_tie { "; tie" } else { "" }
-        )
-    };
-    p.front.iter().map(line).collect::<Vec<_>>().join("\n")
+fn front_table(p: &Precision) -> Table {
+    let columns: &[Column<&CullingPoint>] = &[
+        ("structure", |point| structure(point)),
+        ("culling", |point| culling(point)),
+        (">query", |point| time(&point.times)),
+        (">FP %", |point| percent(point.errors.excess)),
+        (">missed ppm", |point| {
+            text::rate(point.errors.false_negative_ppm, 1.0)
+        }),
+        (">B/item", |point| {
+            format!("{:.1}", point.errors.memory_bytes_per_item)
+        }),
+        ("tie", |point| {
+            if point.is_tie { "tie" } else { "" }.to_owned()
+        }),
+    ];
+    let points = p.front.iter().map(|&i| &p.points[i]);
+    Table::with(points, columns).without_empty_columns()
+}
+
+/// The structure without its parameters.
+fn structure(point: &CullingPoint) -> String {
+    let name = point.structure.split(':').next();
+    name.unwrap_or_default().to_owned()
 }
 
 /// The fastest point of each kind of numbers.
@@ -236,7 +236,7 @@ fn regions_table(p: &Precision) -> Table {
         (">wrong %", |row| percent(row.errors.wrong)),
         (">false", |row| row.errors.false_region_count.to_string()),
         (">missed", |row| row.errors.missed_region_count.to_string()),
-        (">farthest", |row| format!("{:.2e}", row.errors.worst_false)),
+        (">farthest", |row| text::significant(row.errors.worst_false)),
         (">per point", |row| time(&row.times)),
     ];
     Table::with(rows, columns)
@@ -285,7 +285,7 @@ fn sizes_note(rows: &[SizeRow]) -> String {
         Some(format!("{} {ns}", t.test))
     });
     format!(
-        "{} frusta and {} for each ratio; ± bounds the result of another seed (99.999 %), from \
+        "Field of view 60 degrees, 16:9; {} frusta and {} for each ratio; ± bounds the result of another seed (99.999 %), from \
          the spread over the frusta. ns per box in blocks of sixteen: {}.",
         text::count(first.frusta),
         text::counted(first.cubes as usize, "cube"),
@@ -302,11 +302,11 @@ pub fn swept(value: f64) -> String {
     }
 }
 
-/// A sweep as a table of what loses anything, and a line of what does not.
-fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
+/// Table of the cullings that miss anything, and a line on the others.
+fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
     let mut values: Vec<f64> = rows.iter().map(|row| row.value).collect();
     values.dedup();
-    let head = |value: &f64| format!("{value:.4e}").replace(".0000", "");
+    let head = |value: &f64| swept(*value);
     let header = ["six-plane".to_owned()].into_iter();
     let mut table = Table::of_numbers(header.chain(values.iter().map(head)));
     let mut sound = Vec::new();
@@ -337,9 +337,5 @@ fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
             sound.join(", ")
         ),
     };
-    let table = match table.rows.is_empty() {
-        true => String::new(),
-        false => format!("{table}\n"),
-    };
-    format!("\nMissed visible items (ppm) by {name} ({what}), nothing rebased:\n{table}{sound}")
+    (table, sound)
 }

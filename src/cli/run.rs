@@ -18,7 +18,7 @@ use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::{show, show_written};
 use super::study::progress;
-use super::{Ending, baseline, expect_folder, interrupt, tell, text, unread_is_fine};
+use super::{Ending, baseline, expect_folder, interrupt, run_why, tell, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
@@ -38,12 +38,14 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
         let plan = plan(registry, &begun)?;
         plan.check_goes_on(&stream)
             .with_context(|| folder.path().display().to_string())?;
+        check_why(args, &plan)?;
         interrupt::from_now_on_finish();
         let folder = go_on(folder, &stream)?;
         let save = args.save.clone().or(begun.save);
         return Run::new(args, plan, folder, stream)?.all(save);
     }
     let plan = plan(registry, args)?;
+    check_why(args, &plan)?;
     plan.check_inputs()?;
     if plan.plan.scenes.is_empty() {
         bail!("nothing to do: this shard has no scene; expected at most as many shards as paths");
@@ -52,6 +54,22 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     let machine = Machine::capture().by(args.what.kernel.execution()?.kernel);
     let (folder, stream) = create(args, &plan, machine)?;
     Run::new(args, plan, folder, stream)?.all(args.save.clone())
+}
+
+/// Refuses the explanation of a structure that is not measured.
+fn check_why(args: &RunArgs, plan: &RunPlan) -> anyhow::Result<()> {
+    let labels = plan.plan.structures.iter().map(|spec| spec.label.as_str());
+    let is_there = |why: &str| {
+        let mut labels = labels.clone();
+        labels.any(|label| label == why || label.split(':').next() == Some(why))
+    };
+    match &args.why {
+        Some(why) if !is_there(why) => bail!(
+            "--why is '{why}'; expected a structure that is measured: {}",
+            labels.collect::<Vec<_>>().join(", ")
+        ),
+        _ => Ok(()),
+    }
 }
 
 /// The cells as JSON lines, nothing measured.
@@ -74,6 +92,8 @@ struct Run {
     bar: ProgressBar,
     started: Instant,
     all_columns: bool,
+    /// The structure to explain.
+    why: Option<String>,
 }
 
 impl Run {
@@ -95,6 +115,7 @@ impl Run {
             )?,
             started: Instant::now(),
             all_columns: args.all_columns,
+            why: args.why.clone(),
             plan,
             folder,
             stream,
@@ -131,7 +152,10 @@ impl Run {
         }
         let report = self.stream.report();
         // Tables before files: where a file cannot be written, what was measured is seen.
-        let shown = unread_is_fine(show(&report, self.all_columns));
+        let why = |structure: &String| run_why::show(&report, structure);
+        let shown = show(&report, self.all_columns);
+        let shown = shown.and_then(|()| self.why.as_ref().map_or(Ok(()), why));
+        let shown = unread_is_fine(shown);
         self.folder.save(&report)?;
         save_page(self.folder.path(), &page(&report))?;
         let save = save.filter(|_| !stopped);

@@ -98,7 +98,7 @@ pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> 
 }
 
 /// Options that do not change the measurement.
-const NOT_OF_THE_PLAN: [&str; 5] = ["resume", "out", "timeout", "save", "all_columns"];
+const NOT_OF_THE_PLAN: [&str; 6] = ["resume", "out", "timeout", "save", "all_columns", "why"];
 
 /// The recorded options, if those typed now say nothing else.
 fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {

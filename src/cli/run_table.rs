@@ -274,7 +274,7 @@ fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: 
 /// Short names of scenes and paths: "city 100k flythrough 2 %".
 ///
 /// The full ones where two would be the same.
-fn labels(all: &[&Comparison]) -> Vec<String> {
+pub fn labels(all: &[&Comparison]) -> Vec<String> {
     let of = |comparison: &Comparison, show: fn(&str) -> String| {
         let about = comparison.about();
         format!("{} {}", show(&about.scene.name), show(&about.path.name))
@@ -288,7 +288,7 @@ fn labels(all: &[&Comparison]) -> Vec<String> {
 }
 
 /// A file without its folder, a spec without keys and frames: "city 100k".
-fn short(source: &str) -> String {
+pub fn short(source: &str) -> String {
     let Some((name, parameters)) = source.rsplit_once(':').filter(|(_, p)| p.contains('=')) else {
         let file = source.rsplit(['/', '\\']).next();
         return shortened(file.unwrap_or(source), 24);

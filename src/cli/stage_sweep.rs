@@ -105,10 +105,11 @@ pub fn time(
 }
 
 fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
-    writeln!(
-        out,
+    let width = text::width();
+    let mut say = |line: &str| writeln!(out, "{}", text::wrapped(line, width));
+    say(&format!(
         "{}, {}: {} stage, error against run time\n{} with {} random rays each beside {} x {} \
-         samples; {}.",
+         samples; {}.\n",
         sweep.scene,
         sweep.path,
         sweep.stage.name(),
@@ -117,7 +118,7 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         SAMPLES.width,
         SAMPLES.height,
         funnel_table::spread(sweep.processes)
-    )?;
+    ))?;
     let mut table = Table::of(
         "by | >buffer | >out | >FP / visible | >FN / visible | >FN / view | >time / view \
          | >front",
@@ -138,11 +139,11 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
             text::rate(errors.excess, 1.0),
             text::rate(errors.missing, 1.0),
             text::significant(errors.false_negative_count),
-            text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+            text::time_plus_minus(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
             if point.on_front { "*" } else { "" }.to_owned(),
         ]
     }));
-    writeln!(out, "{table}")?;
+    say(&table.fitted(width))?;
     let safe = sweep
         .points
         .iter()
@@ -152,13 +153,12 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         .iter()
         .filter(|p| p.errors.false_negative_count > 0.0)
         .count();
-    writeln!(
-        out,
+    say(&format!(
         "{lossy} of {} points dropped visible items; {} of these have a guarantee. * On the \
          Pareto front: no other point is significantly better in time or an error and as good in \
          the rest.",
         sweep.points.len(),
         safe.filter(|point| point.errors.false_negative_count > 0.0)
             .count()
-    )
+    ))
 }

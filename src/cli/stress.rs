@@ -178,7 +178,8 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
             text::count(section.count(Status::Fail))
         }),
     ];
-    writeln!(out, "{}", Table::with(sections, columns))?;
+    let width = text::width();
+    writeln!(out, "{}", Table::with(sections, columns).fitted(width))?;
     let rows = || sections.iter().flat_map(|section| &section.rows);
     for row in rows().filter(|row| row.status == Status::Fail) {
         writeln!(
@@ -195,8 +196,7 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     let mut tally = Tally::default();
     sections.iter().for_each(|section| tally += section.tally);
     if tally.boxes > 0 {
-        writeln!(
-            out,
+        let line = format!(
             "{} checked at camera level: {} visible, {} of them boundary contacts ({} too close \
              to decide); {} and {}; dropped without the epsilon: {}; refused because sums could \
              overflow: {}",
@@ -208,16 +208,16 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
             text::counted(tally.touch_dropped as usize, "dropped boundary contact"),
             text::count(tally.lost_bare as usize),
             text::count(tally.refused as usize),
-        )?;
+        );
+        writeln!(out, "{}\n", text::wrapped(&line, width))?;
     }
     let count = |status| rows().filter(|row| row.status == status).count();
-    writeln!(
-        out,
+    let line = format!(
         "{} in {seconds:.1} s: {} passed, {} refused as they must be, {} failed{note}",
         text::counted(rows().count(), "check"),
         text::count(count(Status::Pass)),
         text::count(count(Status::Refused)),
         text::count(count(Status::Fail)),
-    )?;
-    Ok(())
+    );
+    writeln!(out, "{}", text::wrapped(&line, width))
 }

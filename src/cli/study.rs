@@ -3,7 +3,7 @@
 //! processes come together.
 
 use std::fmt::Write;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
@@ -19,7 +19,7 @@ use crate::scene::{self, LoadOptions, Scene};
 /// A progress bar of `parts` parts, with a word for them.
 pub fn progress(parts: u64, word: &str) -> ProgressBar {
     // Drawn on stderr, and only if that is a terminal.
-    let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}{{left}}  {{msg}}");
+    let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}{{left}}  {{wide_msg}}");
     let style = ProgressStyle::with_template(&template);
     let left = |state: &ProgressState, out: &mut dyn Write| {
         // Before the first part is done nothing is known.
@@ -74,6 +74,9 @@ impl Setting {
         })
     }
 }
+
+/// Remaining time that is worth a line where there is no progress bar.
+const LONG: Duration = Duration::from_secs(10);
 
 /// A study on its way.
 pub struct Study {
@@ -136,7 +139,15 @@ impl Study {
         job: impl Fn(Timing) -> Job,
     ) -> anyhow::Result<Vec<ProcessTimes>> {
         let mut all = Vec::new();
+        let started = Instant::now();
         for process in 0..self.processes {
+            // A terminal has the bar.
+            let left = started.elapsed() * (self.processes - 1);
+            if process == 1 && self.bar.is_hidden() && left > LONG {
+                let left = HumanDuration(left);
+                let step = format!("at work: {step}: 1 of {} processes done", self.processes);
+                tell(&format!("{step}, {left:#} left"));
+            }
             let timing = Timing {
                 process,
                 lens_scale,

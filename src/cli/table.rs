@@ -1,14 +1,11 @@
 //! A table as rows and columns, and its form on a terminal.
 
-use std::fmt;
+use super::text::{plain, wrapped};
 
-use comfy_table::presets::UTF8_BORDERS_ONLY;
-use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement};
-
-use super::text::plain;
-
-/// Blanks between the columns of a bare table.
+/// Blanks between columns.
 const GAP: usize = 2;
+/// Characters of a line of text in the last column, at least.
+const LEAST_TEXT: usize = 20;
 
 /// A column of rows `R`: its head, with `>` before that of numbers, and its cell of
 /// a row.
@@ -19,8 +16,6 @@ pub struct Table {
     pub header: Vec<String>,
     pub right: Vec<usize>,
     pub rows: Vec<Vec<String>>,
-    /// Columns of the terminal, where the table is to fit into them.
-    width: Option<u16>,
 }
 
 impl Table {
@@ -29,7 +24,6 @@ impl Table {
             header: header.into_iter().map(Into::into).collect(),
             right: right.to_vec(),
             rows: Vec::new(),
-            width: None,
         }
     }
 
@@ -64,14 +58,9 @@ impl Table {
     }
 
     pub fn add_row(&mut self, row: impl IntoIterator<Item = impl Into<String>>) {
-        self.rows.push(row.into_iter().map(Into::into).collect());
-    }
-
-    /// Limits the width: columns move together, and if that is not enough, long cells
-    /// are broken into lines. Names, in the first column, stay whole.
-    pub fn fit(mut self, width: u16) -> Table {
-        self.width = Some(width);
-        self
+        let mut row: Vec<String> = row.into_iter().map(Into::into).collect();
+        row.resize(self.header.len(), String::new());
+        self.rows.push(row);
     }
 
     /// The table without columns that do not fit, for [`Table::bare`].
@@ -80,7 +69,7 @@ impl Table {
     pub fn within(&self, width: usize, first_to_go: &[&str]) -> Table {
         let (widths, mut gone) = (self.widths(), first_to_go.iter());
         let mut left: Vec<usize> = (0..widths.len()).collect();
-        while left.iter().map(|&c| widths[c] + GAP).sum::<usize>() > width + GAP {
+        while left.iter().map(|&c| widths[c] + GAP).sum::<usize>() > width.saturating_add(GAP) {
             let Some(name) = gone.next() else { break };
             left.retain(|&column| self.header[column] != *name);
         }
@@ -113,6 +102,13 @@ impl Table {
             .collect()
     }
 
+    /// The table without a column.
+    pub fn without(&self, name: &str) -> Table {
+        let columns = 0..self.header.len();
+        let left = columns.filter(|&column| self.header[column] != name);
+        self.of_columns(&left.collect::<Vec<_>>())
+    }
+
     fn of_columns(&self, columns: &[usize]) -> Table {
         let chosen = |row: &Vec<String>| columns.iter().map(|&c| row[c].clone()).collect();
         let is_right = |&place: &usize| self.right.contains(&columns[place]);
@@ -120,7 +116,6 @@ impl Table {
             header: chosen(&self.header),
             right: (0..columns.len()).filter(is_right).collect(),
             rows: self.rows.iter().map(chosen).collect(),
-            width: self.width,
         }
     }
 
@@ -152,6 +147,49 @@ impl Table {
         text
     }
 
+    /// The table for a terminal: [`Table::parts`] below each other.
+    ///
+    /// Text in the last column is wrapped, where that is enough instead.
+    pub fn fitted(&self, width: usize) -> String {
+        if let Some(table) = self.wrapped_last(width) {
+            return table.bare();
+        }
+        let parts = self.parts(width).into_iter();
+        let parts = parts.map(|part| part.wrapped_last(width).unwrap_or(part).bare());
+        parts.collect::<Vec<_>>().join("\n")
+    }
+
+    /// The table with text in its last column wrapped.
+    ///
+    /// `None` if that is not needed or does not help.
+    fn wrapped_last(&self, width: usize) -> Option<Table> {
+        let widths = self.widths();
+        let last = widths.len().checked_sub(1)?;
+        let others: usize = widths[..last].iter().map(|own| own + GAP).sum();
+        if others + widths[last] <= width
+            || others + LEAST_TEXT > width
+            || self.right.contains(&last)
+        {
+            return None;
+        }
+        let room = width - others;
+        let mut table = Table::new(self.header.clone(), &self.right);
+        for row in &self.rows {
+            let text: Vec<char> = wrapped(&plain(&row[last]), room).chars().collect();
+            // A word may be longer than a line.
+            let lines = text
+                .split(|c| *c == '\n')
+                .flat_map(|line| line.chunks(room));
+            let lines: Vec<String> = lines.map(String::from_iter).collect();
+            for n in 0..lines.len().max(1) {
+                let own = |cell: &String| if n == 0 { cell.clone() } else { String::new() };
+                let line = lines.get(n).cloned().unwrap_or_default();
+                table.add_row(row[..last].iter().map(own).chain([line]));
+            }
+        }
+        Some(table)
+    }
+
     /// The table without the columns that are empty in every row.
     pub fn without_empty_columns(mut self) -> Table {
         for column in (0..self.header.len()).rev() {
@@ -166,42 +204,6 @@ impl Table {
             }
         }
         self
-    }
-}
-
-impl fmt::Display for Table {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let mut table = comfy_table::Table::new();
-        table
-            .load_style(UTF8_BORDERS_ONLY)
-            .set_content_arrangement(ContentArrangement::Disabled)
-            .set_header(self.header.iter().map(|name| plain(name)));
-        for &column in &self.right {
-            if let Some(column) = table.column_mut(column) {
-                column.set_cell_alignment(CellAlignment::Right);
-            }
-        }
-        for row in &self.rows {
-            table.add_row(row.iter().map(|cell| plain(cell)));
-        }
-        let wide = table.to_string();
-        let is_within = |width: u16| {
-            let mut lines = wide.lines();
-            lines.all(|line| line.chars().count() <= usize::from(width))
-        };
-        let Some(width) = self.width.filter(|width| !is_within(*width)) else {
-            return f.write_str(&wide);
-        };
-        table
-            .set_content_arrangement(ContentArrangement::Dynamic)
-            .set_width(width);
-        for (place, column) in table.column_iter_mut().enumerate() {
-            match place {
-                0 => column.set_constraint(ColumnConstraint::ContentWidth),
-                _ => column.set_padding((0, 1)),
-            };
-        }
-        table.fmt(f)
     }
 }
 
@@ -254,5 +256,21 @@ mod tests {
         let (first, rest) = ("name  one  two\na     1.5  x\n", "name     three\n");
         assert_eq!(parts(23), [first, &format!("{rest}a     33333333\n")]);
         assert_eq!(parts(0).len(), 3);
+    }
+
+    #[test]
+    fn text_in_the_last_column_is_wrapped_before_columns_move() {
+        let mut table = Table::of("name | >time | why");
+        table.add_row(["wide", "7 us", "the fastest of all that are right"]);
+        table.add_row(["bvh", "9 us", ""]);
+        table.add_row(["bsp", "9 us", "0123456789012345678901"]);
+        assert_eq!(
+            table.fitted(32),
+            "name  time  why\nwide  7 us  the fastest of all\n            that are right\nbvh   \
+             9 us\nbsp   9 us  01234567890123456789\n            01\n"
+        );
+        assert_eq!(table.fitted(45), table.bare());
+        // Too narrow for text: a part of its own.
+        assert_eq!(table.fitted(31).matches("name").count(), 2);
     }
 }

@@ -2,18 +2,15 @@
 //! reference scan, then random differential cases. Prints the first
 //! difference of each kind with what is needed to see it again.
 
-use std::io::{self, Write};
 use std::time::Instant;
 
 use anyhow::bail;
 use glam::Vec3;
 use indicatif::ProgressBar;
-use serde::Serialize;
 
 use super::args::VerifyArgs;
-use super::shared_args::TableFormat;
-use super::table::{Column, Table};
-use super::{Ending, interrupt, load_scene, print_json, tell, text, unread_is_fine};
+use super::verify_table::{Check, Outcome, RANDOM, show};
+use super::{Ending, interrupt, load_scene, print, tell, text};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
 use crate::geometry::ConvexVolume;
@@ -26,32 +23,6 @@ use crate::verify::{
     ErrorCount, Fault, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment,
     explain_visibility, points_on_faces, variants,
 };
-
-/// One structure on one scene and path (or on all random cases).
-#[derive(Serialize)]
-pub(super) struct Check {
-    scene: String,
-    path: String,
-    structure: String,
-    volumes: usize,
-    verdicts: u64,
-    status: &'static str,
-    /// The first difference and the command that shows it again.
-    pub(super) difference: Option<String>,
-}
-
-#[derive(Serialize)]
-struct Outcome {
-    ok: bool,
-    verdicts: u64,
-    mismatches: usize,
-    /// True if answers were compared with the cameras as written too.
-    against_cameras: bool,
-    seconds: f64,
-    seed: u64,
-    cases: u64,
-    checks: Vec<Check>,
-}
 
 /// Verdicts of the oracle for each scene and path.
 const MOST_JUDGED: usize = 60_000;
@@ -122,7 +93,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         cases,
         checks,
     };
-    unread_is_fine(show(&outcome, args.format))?;
+    print(args.format, &outcome, || show(&outcome))?;
     if interrupted {
         tell("interrupted: only the cases shown were checked");
     }
@@ -346,7 +317,7 @@ pub(super) fn check(
 
 fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Check> {
     let path = format!("{} from seed {seed}", text::counted(cases as usize, "case"));
-    let of = |structure| Check::new("random", &path, structure);
+    let of = |structure| Check::new(RANDOM, &path, structure);
     let mut checks: Vec<Check> = structures.iter().map(of).collect();
     for case_seed in (0..cases).map(|i| seed.wrapping_add(i)) {
         if interrupt::asked() {
@@ -422,45 +393,6 @@ fn differ(
     let overlaps = |id| Some(format!("{:?} by {:?}", item(id)?, case.region));
     let asked = overlapping.ask(|out| index.visible(&volume, out));
     asked.map_err(|fault| verdict("search by a box: ", &fault, &overlaps))?;
-    Ok(())
-}
-
-fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
-    if format == TableFormat::Json {
-        return print_json(outcome);
-    }
-    let columns: &[Column<&Check>] = &[
-        ("scene", |check| check.scene.clone()),
-        ("path", |check| check.path.clone()),
-        ("structure", |check| check.structure.clone()),
-        (">volumes", |check| text::count(check.volumes)),
-        (">verdicts", |check| text::count(check.verdicts as usize)),
-        ("status", |check| check.status.to_owned()),
-    ];
-    let mut out = text::terminal();
-    writeln!(out, "{}", Table::with(&outcome.checks, columns))?;
-    for check in &outcome.checks {
-        if let Some(difference) = &check.difference {
-            let (structure, scene, path) = (&check.structure, &check.scene, &check.path);
-            let about = text::plain(&format!("{structure} on {scene}, {path}"));
-            writeln!(out, "{about}:\n  {difference}")?;
-        }
-    }
-    writeln!(
-        out,
-        "{} in {:.1} s ({:.1} million/s), {}",
-        text::counted(outcome.verdicts as usize, "verdict"),
-        outcome.seconds,
-        outcome.verdicts as f64 / outcome.seconds / 1e6,
-        text::counted(outcome.mismatches, "mismatch")
-    )?;
-    if !outcome.against_cameras {
-        writeln!(
-            out,
-            "Planes without the full margin may drop visible items: structures were compared with \
-             each other, not with the cameras."
-        )?;
-    }
     Ok(())
 }
 

@@ -13,10 +13,9 @@ use crate::shown::counted;
 /// A sentence for each stage of the chain, and for each back end that lost items.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
-    let lossy = |row: &&StageRow| row.errors.false_negative_count > 0.0;
-    sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
+    sentences.extend(report.stages.iter().filter_map(StageRow::loss));
     sentences.extend(of_stencil(report));
-    sentences.extend(report.mirror.as_ref().map(of_mirror));
+    sentences.extend(report.mirror.as_ref().map(MirrorRow::sentence));
     sentences.extend(report.orders.iter().flat_map(of_order));
     let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
     sentences.extend(report.stages.iter().find(is_last).map(|last| {
@@ -69,20 +68,23 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     ))
 }
 
-fn of_mirror(row: &MirrorRow) -> String {
-    format!(
-        "In item {} as a mirror across {} (in front in {}, at {:.1} samples per view) {:.1} items \
+impl MirrorRow {
+    /// A sentence on the reflected items and what the stencil saves.
+    pub fn sentence(&self) -> String {
+        format!(
+            "In item {} as a mirror across {} (in front in {}, at {:.1} samples per view) {:.1} items \
          are seen; with the stencil, {:.0} samples per view are tested instead of {:.0}, and {} \
          differ.",
-        row.item,
-        row.axis,
-        counted(row.view_count, "view"),
-        row.marked_count,
-        row.shown_count,
-        row.with_stencil.asked_count,
-        row.without_stencil.asked_count,
-        counted(row.wrong_sample_count as usize, "sample")
-    )
+            self.item,
+            self.axis,
+            counted(self.view_count, "view"),
+            self.marked_count,
+            self.shown_count,
+            self.with_stencil.asked_count,
+            self.without_stencil.asked_count,
+            counted(self.wrong_sample_count as usize, "sample")
+        )
+    }
 }
 
 /// Exceptions of an order that is declared exact.
@@ -91,15 +93,4 @@ fn of_order(row: &OrderRow) -> impl Iterator<Item = String> {
         let views = counted(*views, "view");
         format!("Order {} may be wrong in {views}: {reason}.", row.name)
     })
-}
-
-fn of_loss(row: &StageRow) -> String {
-    let errors = &row.errors;
-    format!(
-        "{} {} drops {:.2} visible items per view; the largest covers {} samples.",
-        row.back_end.stage.name(),
-        row.back_end.name,
-        errors.false_negative_count,
-        errors.worst_missing_samples
-    )
 }

@@ -28,6 +28,8 @@ pub struct FunnelReport {
     pub items: usize,
     /// Number of views.
     pub views: usize,
+    /// Number of cameras of the path, of which the views are an even choice.
+    pub cameras: usize,
     /// Columns and rows of samples of a view.
     pub samples: [u32; 2],
     /// Number of timed processes.
@@ -65,6 +67,18 @@ pub struct FunnelReport {
     /// The first view from above.
     #[serde(skip)]
     pub plan_view: PlanView,
+}
+
+impl FunnelReport {
+    /// Returns `true` for a task of the chain or of the chain without a stage.
+    pub(super) fn needs(&self, key: &FunnelKey) -> bool {
+        let chosen = self.stages.iter().filter(|row| row.is_chosen);
+        let of_gains = self.gains.iter().flat_map(|gain| gain.tasks.iter());
+        chosen
+            .filter_map(|row| row.key(&self.chain))
+            .any(|own| own == *key)
+            || of_gains.flatten().any(|own| own == key)
+    }
 }
 
 /// The level stage.
@@ -170,6 +184,20 @@ impl StageRow {
             ns_per_decided: None,
             fragments: None,
         }
+    }
+
+    /// A sentence on the visible items that it drops; `None` if it drops none.
+    pub fn loss(&self) -> Option<String> {
+        let errors = &self.errors;
+        (errors.false_negative_count > 0.0).then(|| {
+            format!(
+                "{} {} drops {:.2} visible items per view; the largest covers {} samples.",
+                self.back_end.stage.name(),
+                self.back_end.name,
+                errors.false_negative_count,
+                errors.worst_missing_samples
+            )
+        })
     }
 
     pub(super) fn key(&self, chain: &Chain) -> Option<FunnelKey> {

@@ -59,17 +59,18 @@ struct Study<'w> {
     items: ItemStages<'w>,
     triangles: TriangleStage,
     fragments: FragmentStage<'w>,
-    orders: Orders,
-    picks: Picks<'w>,
+    orders: Option<Orders>,
+    picks: Option<Picks<'w>>,
 }
 
 impl<'w> Study<'w> {
     /// `None` if stopped.
     fn new(
         world: &'w World<'w>,
-        chain: &'w Chain,
+        input: &FunnelInput<'w>,
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<Study<'w>>, FunnelError> {
+        let chain = input.chain;
         let Some(items) = ItemStages::all(world, chain, stop) else {
             return Ok(None);
         };
@@ -82,8 +83,10 @@ impl<'w> Study<'w> {
         let culled = (&triangles, chain.of(StageKind::Triangle));
         let fragments = FragmentStage::new(world, &items, &steps, culled);
         Ok(Some(Study {
-            orders: Orders::new(world, &items, &steps, fragments.too_much.as_ref()),
-            picks: Picks::new(world),
+            orders: input
+                .all
+                .then(|| Orders::new(world, &items, &steps, fragments.too_much.as_ref())),
+            picks: (input.all && input.picks).then(|| Picks::new(world)),
             world,
             chain,
             steps,
@@ -98,8 +101,8 @@ impl<'w> Study<'w> {
         let mut tasks: Vec<KeyedTask> = self.items.tasks().collect();
         tasks.extend(self.triangles.tasks());
         tasks.extend(self.fragments.tasks());
-        tasks.extend(self.orders.tasks());
-        tasks.extend(self.picks.tasks());
+        tasks.extend(self.orders.iter().flat_map(Orders::tasks));
+        tasks.extend(self.picks.iter().flat_map(Picks::tasks));
         tasks
     }
 
@@ -201,7 +204,7 @@ pub fn prepare(
         return Ok(None);
     };
     begin("every stage, compared with the truth");
-    let Some(study) = Study::new(&world, input.chain, stop)? else {
+    let Some(study) = Study::new(&world, input, stop)? else {
         return Ok(None);
     };
     let Some(mut rows) = study.rows(&truth, stop) else {
@@ -217,7 +220,12 @@ pub fn prepare(
     let mut left_out = Vec::from_iter(left_out_of(input.scene));
     let too_much = study.fragments.too_much.as_ref();
     left_out.extend(too_much.map(|reason| LeftOutRow::new("stages", "fragment", reason)));
-    left_out.extend_from_slice(&study.orders.left_out);
+    left_out.extend(
+        study
+            .orders
+            .iter()
+            .flat_map(|orders| orders.left_out.clone()),
+    );
     let mirror = input.mirror.map_or(Ok(None), |item| {
         mirrored(item, &world, &study.items, &study.steps, stop)
     });
@@ -225,26 +233,38 @@ pub fn prepare(
         left_out.push(LeftOutRow::new("mirror", "all", reason));
         None
     });
-    begin("every order, drawn");
-    let orders = study.orders.drawn(stop).unwrap_or_else(|reason| {
-        left_out.push(LeftOutRow::new("orders", "all", reason));
-        Some(Vec::new())
-    });
+    let mut orders = None;
+    if let Some(all) = &study.orders {
+        begin("every order, drawn");
+        orders = all.drawn(stop).unwrap_or_else(|reason| {
+            left_out.push(LeftOutRow::new("orders", "all", reason));
+            None
+        });
+    }
     if stop() {
         return Ok(None);
     }
-    begin("picking");
-    let picks = study.picks.compared();
-    left_out.extend_from_slice(&study.picks.left_out);
+    let mut picks = Vec::new();
+    if let Some(all) = &study.picks {
+        begin("picking");
+        picks = all.compared();
+        left_out.extend_from_slice(&all.left_out);
+    } else if input.all {
+        left_out.push(LeftOutRow::new("picks", "all", "not asked for: --no-picks"));
+    }
     let z = tested.iter().find(|tested| tested.back_end.name == Z);
     let tallies = z.iter().flat_map(|z| &z.tallies);
     let covered: Vec<u64> = tallies.map(|tally| tally.covered).collect();
-    let bounds = bounds(&world, &study.triangles, &covered);
+    let mut bounds = bounds(&world, &study.triangles, &covered);
+    if !input.all {
+        bounds.clear();
+    }
     let report = FunnelReport {
         scene: input.scene.name.clone(),
         path: input.path.name.clone(),
         items: input.scene.items.len(),
         views: world.views.len(),
+        cameras: input.path.cameras.len(),
         samples: [input.samples.width, input.samples.height],
         processes: 0,
         level: (&Level::of(&input.scene.name, input.scene)?).into(),
@@ -273,6 +293,9 @@ pub fn prepare(
     };
     let mut tasks = study.tasks();
     tasks.extend(bounds.into_iter().map(|bound| bound.task()));
+    if !input.all {
+        tasks.retain(|task| report.needs(&task.key));
+    }
     Ok(Some(Prepared {
         plan: FunnelPlan::new(tasks, world.views.len(), input),
         report,
@@ -289,7 +312,7 @@ pub fn time(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<ProcessTimes>, FunnelError> {
     let world = World::new(input.scene, input, &|_| ())?;
-    let Some(study) = Study::new(&world, input.chain, stop)? else {
+    let Some(study) = Study::new(&world, input, stop)? else {
         return Ok(None);
     };
     let covered = plan.expected(&covered_key()).unwrap_or_default();

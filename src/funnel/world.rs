@@ -57,6 +57,10 @@ pub struct FunnelInput<'a> {
     pub inner_boxes: Option<usize>,
     /// Instruction set of every stage, and threads that compute the truth.
     pub execution: Execution,
+    /// Every back end of every stage, depth orders and lower bounds beside the chain.
+    pub all: bool,
+    /// Picking, if `all`.
+    pub picks: bool,
 }
 
 /// Items as rays meet them.
@@ -109,6 +113,8 @@ pub struct World<'a> {
     pub regions: Option<Regions>,
     /// Structures of the object stage under their labels.
     pub structures: Vec<(String, Box<dyn DynIndex>)>,
+    /// The chain whose back ends are the only ones; `None` for all.
+    only: Option<Chain>,
 }
 
 impl<'a> World<'a> {
@@ -162,6 +168,7 @@ impl<'a> World<'a> {
             choice: input.occluders,
             regions,
             structures,
+            only: (!input.all).then(|| input.chain.clone()),
         })
     }
 
@@ -216,7 +223,11 @@ impl<'a> World<'a> {
             .into_iter()
             .flatten()
             .map(|(label, _)| label.clone());
-        names.chain(labels).collect()
+        let is_wanted = |name: &String| {
+            let only = self.only.as_ref();
+            only.is_none_or(|chain| chain.of(stage) == name)
+        };
+        names.chain(labels).filter(is_wanted).collect()
     }
 
     /// Declaration of a back end.
@@ -385,6 +396,8 @@ mod tests {
             occluders: OccluderChoice::All,
             inner_boxes: None,
             execution: Execution::default(),
+            all: true,
+            picks: true,
         };
         let world = World::new(&scene, &input, &|_| ()).expect("a world");
         let mut found = 0;

@@ -93,20 +93,27 @@ pub fn compare(folder: &Path, options: &str, code: i32) -> String {
     done.out
 }
 
-pub fn last_line(text: &str) -> &str {
-    text.lines().last().unwrap_or_default()
+/// Counts of the last sentence: "1 slower, .. of 10 cells".
+pub fn last_line(text: &str) -> String {
+    let text = unwrapped(text.trim_end());
+    let (_, counts) = text.rsplit_once("egression: ").unwrap_or(("", &text));
+    counts
+        .split("; worst")
+        .next()
+        .unwrap_or_default()
+        .to_owned()
 }
 
 /// Rows of the table with this verdict.
 pub fn rows(text: &str, verdict: &str) -> usize {
-    let rows = text.lines().filter(|line| line.starts_with('│'));
-    let verdict = format!("   {verdict} ");
+    let verdict = format!("  {verdict}  ");
+    let rows = text.lines().map(|line| format!("{line}  "));
     rows.filter(|row| row.contains(&verdict)).count()
 }
 
 pub fn row_with<'t>(text: &'t str, part: &str) -> &'t str {
-    let mut rows = text.lines().filter(|line| line.starts_with('│'));
-    let row = rows.find(|line| line.contains(part));
+    let part = format!("  {part}");
+    let row = text.lines().find(|line| line.contains(&part));
     row.unwrap_or_else(|| panic!("no row with '{part}' in:\n{text}"))
 }
 
@@ -121,13 +128,16 @@ fn a_report_and_itself_are_the_same() {
         "the machine or the program as a whole: NEW takes 100.0 % [",
         "of OLD (10 cells); this comparison cannot tell which",
     ] {
-        assert!(text.contains(wanted), "no '{wanted}' in:\n{text}");
+        assert!(
+            unwrapped(&text).contains(wanted),
+            "no '{wanted}' in:\n{text}"
+        );
     }
     // What stayed the same is counted; --all shows it.
     assert_eq!(rows(&text, "same"), 0, "{text}");
     let all = compare(folder.path(), "--all", 0);
     assert_eq!(rows(&all, "same"), 10, "{all}");
-    assert_eq!(all.matches("10 vs 10 ").count(), 10, "{all}");
+    assert_eq!(all.matches("10 vs 10").count(), 10, "{all}");
     // The folder is as good as the file in it, and every metric is known.
     fs::create_dir(folder.path().join("run")).expect("writable");
     fs::copy(
@@ -147,14 +157,7 @@ fn twice_the_time_is_slower_and_half_of_it_faster() {
     let slower = with_change(|new| scale(bvh(new), "query_ns", 2.0));
     let text = compare(slower.path(), "", 3);
     let row = row_with(&text, "slower");
-    for part in [
-        "uniform:n=300",
-        "orbit:frames=8, six-plane",
-        "bvh",
-        "query_ns",
-        "+100.0 % [+",
-        "10 vs 10",
-    ] {
+    for part in ["uniform 300 orbit", "bvh", "+100.0 % [+"] {
         assert!(row.contains(part), "no '{part}' in: {row}");
     }
     let verdict = "1 slower, 0 inconclusive, 0 faster, 9 same of 10 cells";
@@ -208,7 +211,10 @@ fn one_process_and_few_structures_are_inconclusive() {
         "compare --against BINARY",
         "under three processes on a side",
     ] {
-        assert!(text.contains(wanted), "no '{wanted}' in:\n{text}");
+        assert!(
+            unwrapped(&text).contains(wanted),
+            "no '{wanted}' in:\n{text}"
+        );
     }
     let few = with_change(|new| {
         scale(bvh(new), "query_ns", 3.0);
@@ -219,7 +225,8 @@ fn one_process_and_few_structures_are_inconclusive() {
         last_line(&text).starts_with("0 slower, 4 inconclusive"),
         "{text}"
     );
-    assert!(text.contains("under three other structures"), "{text}");
+    let why = unwrapped(&text);
+    assert!(why.contains("under three other structures"), "{text}");
 }
 
 #[test]
@@ -232,13 +239,11 @@ fn counters_are_compared_exactly() {
     });
     let text = compare(folder.path(), "", 0);
     let name = "work changed: bvh on uniform:n=300, orbit:frames=8, six-plane: ";
-    let lines: Vec<&str> = text
-        .lines()
-        .filter_map(|line| line.strip_prefix(name))
-        .collect();
+    let told = unwrapped(&text);
+    let lines: Vec<&str> = told.split(name).skip(1).collect();
     assert_eq!(lines.len(), 2, "{text}");
     assert!(lines[0].starts_with("planes_tested ") && lines[0].contains(" to 1000000 (+"));
-    assert!(lines[1].starts_with("memory_bytes_per_item ") && lines[1].ends_with("(+100.0 %)"));
+    assert!(lines[1].starts_with("memory_bytes_per_item ") && lines[1].contains(" (+100.0 %) "));
     assert!(last_line(&text).ends_with("10 same of 10 cells"), "{text}");
 }
 
@@ -379,12 +384,9 @@ fn figures_that_no_ratio_can_be_taken_of_are_counted() {
         let text = compare(with_value(value).path(), "", 0);
         let verdict = "0 slower, 1 unmeasured, 0 inconclusive, 0 faster, 9 same of 10 cells";
         assert!(last_line(&text).starts_with(verdict), "{text}");
-        let row = text.lines().find(|line| line.contains("   unmeasured "));
-        let row = row.expect("a row");
-        assert!(
-            row.contains("bvh") && row.contains("have no ratio"),
-            "{row}"
-        );
+        assert!(row_with(&text, "unmeasured").starts_with("bvh"), "{text}");
+        let why = unwrapped(&text);
+        assert!(why.contains("have no ratio (bvh on"), "{text}");
     }
     let null = with_change(|new| bvh(new)["metrics"]["query_ns"]["value"] = json!(null));
     all_refused(&null, &[COMPARE], "new.json | null | expected");
@@ -435,7 +437,10 @@ fn cells_of_one_side_and_other_settings_are_said() {
         "note: NEW was built from a dirty working tree",
         "note: NEW is a run that was not finished",
     ] {
-        assert!(text.contains(wanted), "no '{wanted}' in:\n{text}");
+        assert!(
+            unwrapped(&text).contains(wanted),
+            "no '{wanted}' in:\n{text}"
+        );
     }
     assert!(last_line(&text).contains("9 same of 9 cells"), "{text}");
     // A cell that a report holds twice is two cells.

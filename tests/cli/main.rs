@@ -44,6 +44,8 @@ mod shards;
 #[cfg(unix)]
 mod signals;
 mod stress;
+#[cfg(unix)]
+mod terminal;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_cullbench");
 const BOXES: &str = "min_x,min_y,min_z,max_x,max_y,max_z";

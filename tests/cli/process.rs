@@ -45,17 +45,24 @@ pub fn cullbench(folder: &Path, line: &str) -> Done {
     }
 }
 
-/// Text of stderr without the line about the amount of work.
-pub fn besides_work(err: &str) -> &str {
-    match err.split_once('\n') {
-        Some((first, rest)) if first.starts_with("at work: ") => rest,
-        _ => err,
+/// Text of stderr without the first lines about the amount of work.
+pub fn besides_work(mut err: &str) -> &str {
+    while let Some((first, rest)) = err.split_once('\n')
+        && first.starts_with("at work: ")
+    {
+        err = rest;
     }
+    err
+}
+
+/// Text in one line, as it was before it was wrapped.
+pub fn unwrapped(text: &str) -> String {
+    text.replace('\n', " ")
 }
 
 /// Runs a command that must succeed, and returns its output.
 ///
-/// Nothing but the line about the amount of work may be on stderr.
+/// Nothing but lines about the amount of work may be on stderr.
 pub fn works(folder: &Path, line: &str) -> String {
     let done = cullbench(folder, line);
     let err = besides_work(&done.err);

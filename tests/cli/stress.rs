@@ -88,7 +88,7 @@ fn extremes_are_generated_from_a_seed() {
     let boxes = "151,552 boxes checked at camera level";
     assert!(
         table.contains(boxes)
-            && table.contains("no false negatives and no dropped boundary contacts"),
+            && unwrapped(&table).contains("no false negatives and no dropped boundary contacts"),
         "{table}"
     );
 }

@@ -1,0 +1,189 @@
+//! `run --why STRUCTURE`: tests and time per test beside the best structure's.
+//!
+//! Their two ratios multiply to the ratio of the times.
+
+use std::io::{self, Write};
+
+use super::run_table::{groups, labels};
+use super::run_verdict::times;
+use super::table::Table;
+use super::text::{self, some};
+use crate::report::{Comparison, Report, ReportCell, comparisons};
+use crate::shown::shortened;
+use crate::statistics::geometric_mean;
+
+/// Counters of a query, and their rows.
+const COUNTERS: [(&str, &str); 4] = [
+    ("nodes_tested", "nodes tested"),
+    ("items_tested", "items tested"),
+    ("planes_tested", "planes tested"),
+    ("items_accepted_untested", "items returned untested"),
+];
+
+/// A structure, and beside it the best of the others.
+struct Pair<'r> {
+    own: &'r ReportCell,
+    other: &'r ReportCell,
+}
+
+/// Shows a table and a sentence for each cache state and culling test.
+pub fn show(report: &Report, structure: &str) -> io::Result<()> {
+    let all = comparisons(report);
+    let (mut out, width) = (text::terminal(), text::width());
+    for group in groups(&all) {
+        let pairs = group.iter().map(|comparison| pair(comparison, structure));
+        let pairs: Vec<Result<Pair, String>> = pairs.collect();
+        let (table, sentence) = match &pairs[..] {
+            [Ok(one)] => (of_one(one), one.sentence()),
+            _ => of_many(&labels(&group), &pairs, structure),
+        };
+        if !table.rows.is_empty() {
+            writeln!(out, "\n{}", table.fitted(width))?;
+        }
+        writeln!(out, "{}", text::wrapped(&text::plain(&sentence), width))?;
+    }
+    out.flush()
+}
+
+/// The structure with that label, or without parameters that name.
+fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, String> {
+    let is_own = |cell: &ReportCell| {
+        cell.structure == structure || cell.structure.split(':').next() == Some(structure)
+    };
+    let mut cells = comparison.ranked.iter().map(|ranked| ranked.cell);
+    let Some(own) = cells.find(|cell| is_own(cell)) else {
+        return Err(format!("{structure} was not measured."));
+    };
+    if own.value("query_ns").is_none() {
+        let status = own.status.name();
+        let reason = some(own.reason.as_ref(), |reason| format!(": {reason}"));
+        return Err(format!("{structure} has no times: {status}{reason}."));
+    }
+    let mut others = comparison.sound().filter(|cell| !is_own(cell));
+    let other = others.next();
+    let other = other.ok_or_else(|| "No other structure has a time.".to_owned())?;
+    Ok(Pair { own, other })
+}
+
+impl Pair<'_> {
+    /// Quotient of own and other.
+    fn ratio(&self, of: impl Fn(&ReportCell) -> Option<f64>) -> Option<f64> {
+        let ratio = of(self.own)? / of(self.other)?;
+        ratio.is_finite().then_some(ratio)
+    }
+
+    /// "bvh takes 1.20 x the time of wide, the best: it tests 4.01 x as many .."
+    fn sentence(&self) -> String {
+        let ratios = [query_ns, tests, ns_per_test].map(|of| self.ratio(of));
+        let [Some(time), Some(tests), Some(per_test)] = ratios else {
+            return "A query without tests cannot be explained by their number.".to_owned();
+        };
+        let rank = match time < 1.0 {
+            true => ", the best of the others",
+            false => ", the best",
+        };
+        format!(
+            "{} takes {} the time of {}{rank}: {}.",
+            self.own.structure,
+            times(time),
+            self.other.structure,
+            parts(tests, per_test)
+        )
+    }
+}
+
+fn query_ns(cell: &ReportCell) -> Option<f64> {
+    cell.value("query_ns")
+}
+
+/// Nodes and items tested per query.
+fn tests(cell: &ReportCell) -> Option<f64> {
+    Some(cell.value("nodes_tested")? + cell.value("items_tested")?)
+}
+
+fn ns_per_test(cell: &ReportCell) -> Option<f64> {
+    Some(query_ns(cell)? / tests(cell)?)
+}
+
+/// The two factors of a time, and which of them decides.
+fn parts(tests: f64, per_test: f64) -> String {
+    let decides = match tests.ln().abs() > per_test.ln().abs() {
+        true => "the number of tests decides",
+        false => "the time per test decides",
+    };
+    format!(
+        "it tests {} as many nodes and items, and a test takes {} as long, so {decides}",
+        times(tests),
+        times(per_test)
+    )
+}
+
+fn of_one(pair: &Pair) -> Table {
+    let names = [pair.own, pair.other].map(|cell| shortened(&cell.structure, 24));
+    let [own, other] = names;
+    let mut table = Table::of_numbers(["per query", &own, &other, "ratio"]);
+    let mut row = |name: &str, of: &dyn Fn(&ReportCell) -> Option<f64>, show: fn(f64) -> String| {
+        table.add_row([
+            name.to_owned(),
+            some(of(pair.own), show),
+            some(of(pair.other), show),
+            some(pair.ratio(of), times),
+        ]);
+    };
+    row("time", &query_ns, text::time);
+    for (counter, name) in COUNTERS {
+        row(name, &|cell| cell.value(counter), text::significant);
+    }
+    row("nodes and items tested", &tests, text::significant);
+    row("time per node or item tested", &ns_per_test, text::time);
+    table
+}
+
+/// A row per scene and path, and the geometric means.
+fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -> (Table, String) {
+    let mut table = Table::of("| best other | >time | >tests | >time per test | >nodes | >items");
+    let mut ratios: [Vec<f64>; 3] = Default::default();
+    for (label, pair) in labels.iter().zip(pairs) {
+        let Ok(pair) = pair else { continue };
+        let own = [query_ns, tests, ns_per_test].map(|of| pair.ratio(of));
+        for (all, own) in ratios.iter_mut().zip(own) {
+            all.extend(own);
+        }
+        let counter = |name| pair.ratio(|cell: &ReportCell| cell.value(name));
+        let counters = ["nodes_tested", "items_tested"].map(counter);
+        let figures = own.into_iter().chain(counters);
+        let names = [shortened(label, 28), shortened(&pair.other.structure, 24)];
+        table.add_row(
+            names
+                .into_iter()
+                .chain(figures.map(|ratio| some(ratio, times))),
+        );
+    }
+    let means = ratios.each_ref().map(|all| geometric_mean(all));
+    let failed = pairs.iter().find_map(|pair| pair.as_ref().err());
+    let sentence = match means {
+        [Some(time), Some(tests), Some(per_test)] => format!(
+            "{structure} takes {} the time of the best other structure in the geometric mean: {}.",
+            times(time),
+            parts(tests, per_test)
+        ),
+        _ => failed.cloned().unwrap_or_default(),
+    };
+    (table, sentence)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_larger_factor_decides() {
+        assert_eq!(
+            parts(4.0, 0.5),
+            "it tests 4.00 x as many nodes and items, and a test takes 0.500 x as long, so the \
+             number of tests decides"
+        );
+        assert!(parts(1.1, 3.0).ends_with("so the time per test decides"));
+        assert!(parts(0.2, 3.0).ends_with("so the number of tests decides"));
+    }
+}

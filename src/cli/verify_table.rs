@@ -1,0 +1,105 @@
+//! The table of `cullbench verify`.
+//!
+//! A row per structure, the first differences, and the comparison in a sentence.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use super::table::{Column, Table};
+use super::text;
+use crate::shown::shortened;
+
+/// Scene of the random cases.
+pub(super) const RANDOM: &str = "random";
+
+/// One structure on one scene and path (or on all random cases).
+#[derive(Serialize)]
+pub(super) struct Check {
+    pub(super) scene: String,
+    pub(super) path: String,
+    pub(super) structure: String,
+    pub(super) volumes: usize,
+    pub(super) verdicts: u64,
+    pub(super) status: &'static str,
+    /// The first difference and the command that shows it again.
+    pub(super) difference: Option<String>,
+}
+
+#[derive(Serialize)]
+pub(super) struct Outcome {
+    pub(super) ok: bool,
+    pub(super) verdicts: u64,
+    pub(super) mismatches: usize,
+    /// True if answers were compared with the cameras as written too.
+    pub(super) against_cameras: bool,
+    pub(super) seconds: f64,
+    pub(super) seed: u64,
+    pub(super) cases: u64,
+    pub(super) checks: Vec<Check>,
+}
+
+pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
+    let mut out = text::terminal();
+    let width = text::width();
+    let mut names: Vec<&str> = Vec::new();
+    let all = outcome.checks.iter().map(|check| check.structure.as_str());
+    all.for_each(|name| names.extend((!names.contains(&name)).then_some(name)));
+    let of = |name: &&str| -> Vec<&Check> {
+        let checks = outcome.checks.iter();
+        checks.filter(|check| check.structure == *name).collect()
+    };
+    let columns: &[Column<Vec<&Check>>] = &[
+        ("structure", |own| shortened(&own[0].structure, 30)),
+        (">paths", |own| {
+            let of_paths = own.iter().filter(|check| check.scene != RANDOM);
+            text::count(of_paths.count())
+        }),
+        (">volumes", |own| {
+            text::count(own.iter().map(|check| check.volumes).sum())
+        }),
+        (">verdicts", |own| {
+            let verdicts = own.iter().map(|check| check.verdicts).sum::<u64>();
+            text::count(verdicts as usize)
+        }),
+        ("status", |own| {
+            let mut statuses: Vec<&str> = own.iter().map(|check| check.status).collect();
+            statuses.sort_unstable();
+            statuses.dedup();
+            statuses.join(", ")
+        }),
+    ];
+    let table = Table::with(names.iter().map(of), columns);
+    writeln!(out, "{}", table.fitted(width))?;
+    for check in &outcome.checks {
+        if let Some(difference) = &check.difference {
+            let (structure, scene, path) = (&check.structure, &check.scene, &check.path);
+            let about = text::plain(&format!("{structure} on {scene}, {path}"));
+            writeln!(out, "{about}:\n  {difference}")?;
+        }
+    }
+    let differ = |name: &&&str| of(*name).iter().any(|check| check.difference.is_some());
+    let all = text::counted(names.len(), "structure");
+    let checked = format!(
+        "{} the sets of the reference scan: {} in {:.1} s ({:.1} million/s), {}",
+        match names.iter().filter(differ).count() {
+            0 if names.len() == 1 => format!("{} returns", names[0]),
+            0 => format!("All {all} return"),
+            wrong => format!(
+                "{wrong} of {all} {} not return",
+                if wrong == 1 { "does" } else { "do" }
+            ),
+        },
+        text::counted(outcome.verdicts as usize, "verdict"),
+        outcome.seconds,
+        outcome.verdicts as f64 / outcome.seconds / 1e6,
+        text::counted(outcome.mismatches, "mismatch")
+    );
+    writeln!(out, "{}", text::wrapped(&checked, width))?;
+    if !outcome.against_cameras {
+        let doubt = "Planes without the full margin may drop visible items: structures were \
+                     compared with each other, not with the cameras.";
+        writeln!(out, "{}", text::wrapped(doubt, width))?;
+    }
+    Ok(())
+}
