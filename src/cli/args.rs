@@ -192,13 +192,16 @@ pub struct MergeArgs {
 
 #[derive(Args, Debug)]
 pub struct ReportArgs {
-    /// report.json of a run, or the folder it is in
-    #[arg(value_name = "RUN.json")]
-    pub report: PathBuf,
+    /// report.json of a run, or the folder it is in; several with --history
+    #[arg(value_name = "RUN.json", required = true)]
+    pub reports: Vec<PathBuf>,
+    /// Write one page about all runs: time per query of each structure over the runs
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["markdown", "svg", "html", "bencher"])]
+    pub history: Option<PathBuf>,
     /// Write Markdown to a file [default: to standard output]
     #[arg(long, value_name = "FILE")]
     pub markdown: Option<PathBuf>,
-    /// Write the crossover charts (time against items) into a folder
+    /// Write charts into a folder: speed-ups per scene and path, time against items
     #[arg(long, value_name = "DIR")]
     pub svg: Option<PathBuf>,
     /// Write one self-contained page with charts and tables, as `run` does

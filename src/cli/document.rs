@@ -1,6 +1,7 @@
 //! A document of headings, lines and tables, written as Markdown, as one HTML page
 //! or for a terminal, and the escaping of each.
 
+use super::figure::Figure;
 use super::table::Table;
 use super::{palette, text};
 
@@ -11,8 +12,9 @@ pub enum Block {
     Table(Table),
     /// A table of numbers that HTML shades row by row.
     Heat(Table),
-    /// A picture as SVG, which only HTML can hold.
+    /// A picture as SVG, which only HTML can hold, as can a figure.
     Picture(String),
+    Figure(Figure),
 }
 
 fn markdown_table(table: &Table) -> String {
@@ -114,7 +116,7 @@ pub fn to_markdown(blocks: &[Block]) -> String {
         }
         Block::Line(text) => Some(markdown(text) + "\n"),
         Block::Table(rows) | Block::Heat(rows) => Some(markdown_table(rows)),
-        Block::Picture(_) => None,
+        Block::Picture(_) | Block::Figure(_) => None,
     });
     parts.collect::<Vec<_>>().join("\n")
 }
@@ -134,9 +136,31 @@ pub fn to_terminal(blocks: &[Block], width: usize) -> String {
         }
         Block::Line(text) => text::wrapped(&text::plain(text), width) + "\n",
         Block::Table(table) | Block::Heat(table) => format!("\n{}", table.fitted(width)),
-        Block::Picture(_) => String::new(),
+        Block::Picture(_) | Block::Figure(_) => String::new(),
     });
     parts.collect()
+}
+
+/// A page of what a terminal shows, with its conclusions first and then figures.
+pub fn to_page(
+    title: &str,
+    conclusions: &[String],
+    figures: impl IntoIterator<Item = Block>,
+    mut blocks: Vec<Block>,
+) -> String {
+    blocks.retain(|block| match block {
+        Block::Heading(level, _) => *level > 1,
+        Block::Line(text) => !conclusions.contains(text),
+        _ => true,
+    });
+    while let Some(Block::Heading(..)) = blocks.last() {
+        blocks.pop();
+    }
+    let mut all = vec![Block::Heading(1, title.to_owned())];
+    all.extend(conclusions.iter().cloned().map(Block::Line));
+    all.extend(figures);
+    all.extend(blocks);
+    to_html(title, &all)
 }
 
 /// The document as one page that needs no other file.
@@ -151,14 +175,16 @@ pub fn to_html(title: &str, blocks: &[Block]) -> String {
         Block::Table(rows) => html_table(rows, caption, false),
         Block::Heat(rows) => html_table(rows, caption, true),
         Block::Picture(svg) => format!("<figure>{svg}</figure>\n"),
+        Block::Figure(figure) => format!("<figure>{}</figure>\n", figure.inline()),
     });
     let parts: String = parts.collect();
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/><meta \
-         name=\"viewport\" content=\"width=device-width\"/><title>{}</title>\n<style>{}{}</style>\
+         name=\"viewport\" content=\"width=device-width\"/><title>{}</title>\n<style>{}{}{}</style>\
          </head>\n<body><main>\n{parts}</main>\n<script>{}</script></body>\n</html>\n",
         html(title),
         include_str!("assets/page.css"),
+        include_str!("assets/figure.css"),
         palette::style(),
         include_str!("assets/page.js"),
     )

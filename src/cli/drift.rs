@@ -10,7 +10,9 @@ use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::Study;
 use super::table::{Column, Table};
-use super::{Ending, drift_arms, expect_place_for, interrupt, print, text, write_text};
+use super::{
+    Ending, drift_arms, drift_chart, expect_place_for, interrupt, print, text, write_text,
+};
 use crate::drift::{
     self, ArmKind, ArmOptions, DriftOptions, DriftReport, ORBIT_RADIUS, OrbitDrift, Rated,
     Recommendation, RotationDrift, SWING_DEG, TurnDrift,
@@ -48,7 +50,7 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
         text::terminal().write_all(shown.as_bytes())
     })?;
     if let Some(file) = &args.svg {
-        write_text(file, &drift_arms::draw(&report.arm)?)?;
+        write_text(file, &drift_chart::draw(&report.arm))?;
     }
     Ok(Ending::Ok)
 }

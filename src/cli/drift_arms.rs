@@ -1,15 +1,11 @@
 //! Spring arms in `cullbench drift`: tables of the steps that each method takes to
 //! be precise enough, its observed order, its limit of stability, and which one to
-//! take, and their diagram. Errors and orders are shown at one frame rate; the JSON
+//! take. Errors and orders are shown at one frame rate; the JSON
 //! has all.
 
 use std::collections::BTreeMap;
 
-use plotters::prelude::*;
-
-use super::chart::{Area, Axis, Drawn, around, is_drawn, legend, log_log, svg};
 use super::document::Block;
-use super::palette::COLOURS;
 use super::table::{Column, Table};
 use super::text::{self, some};
 use crate::drift::{ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, StabilityLimit};
@@ -187,53 +183,4 @@ fn choices(report: &ArmReport, all: bool) -> Table {
     let mut table = Table::with(&report.choices, &columns[..shown]);
     table.header[0] = format!("to take within {:e}", report.tolerance);
     table
-}
-
-/// Size of one panel.
-const PANEL: (u32, u32) = (460, 340);
-
-/// Time and error, if the point has both.
-fn position(point: &ArmPoint) -> Option<(f64, f64)> {
-    // A logarithmic axis has no zero.
-    let position = (point.us_per_second?, point.position_error?.max(1e-16));
-    (is_drawn(position.0) && is_drawn(position.1)).then_some(position)
-}
-
-/// The diagram as SVG: a row per arm and stiffness, a column per rate.
-pub fn draw(report: &ArmReport) -> anyhow::Result<String> {
-    let points = &report.points;
-    let settings: Vec<_> = points.chunk_by(|a, b| a.setting == b.setting).collect();
-    let key = |own: &&[ArmPoint]| (own[0].setting.arm, own[0].setting.stiffness);
-    let rows = settings.chunk_by(|a, b| key(a) == key(b)).count().max(1);
-    let columns = settings.len().div_ceil(rows).max(1);
-    let size = (PANEL.0 * columns as u32, PANEL.1 * rows as u32);
-    svg("the diagram", size, |root| {
-        let panels = root.split_evenly((rows, columns));
-        let mut both = panels.iter().zip(settings);
-        both.try_for_each(|(area, own)| panel(area, own))
-    })
-}
-
-fn panel(area: &Area, points: &[ArmPoint]) -> Drawn {
-    let places = || points.iter().filter_map(position);
-    let setting = points[0].setting;
-    let (arm, k, rate) = (setting.arm.name(), setting.stiffness, setting.rate_hz);
-    let caption = format!("{arm} arm, k = {k:e}/s2, {rate} Hz");
-    let times = around(places().map(|p| p.0), 1.5, 1.5);
-    let errors = around(places().map(|p| p.1), 2.0, 2.0);
-    let axes: [Axis; 2] = [
-        ("us of CPU per simulated second", times, &text::significant),
-        ("position error", errors, &|error| format!("{error:.0e}")),
-    ];
-    let mut chart = log_log(area, &caption, axes)?;
-    for (own, colour) in points.chunk_by(|a, b| a.method == b.method).zip(COLOURS) {
-        let places: Vec<(f64, f64)> = own.iter().filter_map(position).collect();
-        let dots = places.iter().map(|&at| Circle::new(at, 3, colour.filled()));
-        chart
-            .draw_series(LineSeries::new(places.clone(), colour))?
-            .label(own[0].method)
-            .legend(move |(x, y)| Circle::new((x, y), 3, colour.filled()));
-        chart.draw_series(dots)?;
-    }
-    legend(&mut chart, SeriesLabelPosition::UpperRight)
 }

@@ -9,15 +9,15 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 
-use super::document::{Block, to_html, to_terminal};
+use super::document::{Block, to_page, to_terminal};
 use super::funnel_args::{FunnelArgs, FunnelFormat};
 use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::shared_args::StudyArgs;
 use super::study::{Setting, Study};
 use super::{
-    Ending, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt, print_json, text,
-    unread_is_fine, write_text,
+    Ending, expect_places, funnel_csv, funnel_figure, funnel_picture, funnel_table, interrupt,
+    print_json, text, unread_is_fine, write_text,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -85,12 +85,11 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         write_text(file, &funnel_picture::draw(&report, &stages.setting.scene))?;
     }
     if let Some(file) = &args.html {
-        let mut blocks = funnel_table::blocks(&report, true);
-        blocks.push(Block::Picture(funnel_picture::draw(
-            &report,
-            &stages.setting.scene,
-        )));
-        let page = to_html(&format!("cullbench funnel {}", report.scene), &blocks);
+        let picture = Block::Picture(funnel_picture::draw(&report, &stages.setting.scene));
+        let figures = [Block::Figure(funnel_figure::chain(&report)), picture];
+        let title = format!("cullbench funnel {}, {}", report.scene, report.path);
+        let blocks = funnel_table::blocks(&report, true);
+        let page = to_page(&title, &report.conclusions, figures, blocks);
         write_text(file, &page)?;
     }
     shown?;

@@ -31,7 +31,7 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
         tell(&format!("note: no shard has {}", merged.missing_named()));
     }
     let report = merged.stream.report();
-    save_page(&args.out, &page(&report))?;
+    save_page(&args.out, &page(&report, &args.out))?;
     unread_is_fine(show(&report, false))?;
     unread_is_fine(close(args, &report))?;
     let failed = report.has_failed();

@@ -1,31 +1,32 @@
 //! Colours of series, and the colour and mark of each structure, the same in every
 //! picture and on every page.
 
-use plotters::style::RGBColor;
+/// Red, green and blue.
+type Rgb = [u8; 3];
 
 /// Colours on white, distinguishable by colour-blind readers and by brightness. The
 /// last is for scans and for what is not to stand out.
-pub const COLOURS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
-    RGBColor(120, 120, 120),
+const COLOURS: [Rgb; 8] = [
+    [0, 114, 178],
+    [213, 94, 0],
+    [0, 158, 115],
+    [204, 121, 167],
+    [86, 180, 233],
+    [230, 159, 0],
+    [0, 0, 0],
+    [120, 120, 120],
 ];
 
 /// The same colours on a dark ground.
-const ON_DARK: [RGBColor; 8] = [
-    RGBColor(78, 165, 224),
-    RGBColor(240, 128, 60),
-    RGBColor(42, 190, 148),
-    RGBColor(221, 150, 190),
-    RGBColor(140, 210, 250),
-    RGBColor(240, 185, 60),
-    RGBColor(240, 240, 240),
-    RGBColor(150, 150, 150),
+const ON_DARK: [Rgb; 8] = [
+    [78, 165, 224],
+    [240, 128, 60],
+    [42, 190, 148],
+    [221, 150, 190],
+    [140, 210, 250],
+    [240, 185, 60],
+    [240, 240, 240],
+    [150, 150, 150],
 ];
 
 /// Colour and mark of a structure.
@@ -73,6 +74,15 @@ const OWN: [(&str, usize, usize); 9] = [
 ];
 
 impl Look {
+    /// The look of series `n` that is no structure.
+    pub fn nth(n: usize) -> Look {
+        Look {
+            colour: n % GREY,
+            shape: n % SHAPES.len(),
+            hollow: n >= GREY,
+        }
+    }
+
     /// The look of a structure by its label. Any other label than those with a look of
     /// their own has a hollow mark that its text decides.
     pub fn of(label: &str) -> Look {
@@ -95,12 +105,19 @@ impl Look {
     }
 }
 
-/// Rules of a style sheet: the class `cN` has colour N, on light or dark grounds.
+/// Rules of a style sheet: the class `cN` has colour N.
+fn rules(colours: [Rgb; 8]) -> String {
+    let rule = |(n, [r, g, b]): (usize, Rgb)| format!(".c{n}{{color:rgb({r},{g},{b})}}");
+    colours.into_iter().enumerate().map(rule).collect()
+}
+
+/// Rules for a light ground.
+pub fn on_light() -> String {
+    rules(COLOURS)
+}
+
+/// Rules for light and dark grounds; print is light.
 pub fn style() -> String {
-    let rules = |colours: [RGBColor; 8]| -> String {
-        let rule = |(n, RGBColor(r, g, b))| format!(".c{n}{{color:rgb({r},{g},{b})}}");
-        colours.into_iter().enumerate().map(rule).collect()
-    };
     let (light, dark) = (rules(COLOURS), rules(ON_DARK));
     format!("{light}@media screen and (prefers-color-scheme:dark){{{dark}}}")
 }

@@ -6,6 +6,7 @@ use std::io::Write;
 
 use super::args::PrecisionArgs;
 use super::document::{Block, to_terminal};
+use super::figure::picture;
 use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::{Setting, Study};
@@ -76,7 +77,10 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         text::terminal().write_all(shown.as_bytes())
     });
     if let Some(file) = &args.svg {
-        write_text(file, &precision_chart::draw(&outcome.precision)?)?;
+        write_text(
+            file,
+            &picture(&precision_chart::figures(&outcome.precision), 1),
+        )?;
     }
     shown?;
     Ok(Ending::of(!wrong))

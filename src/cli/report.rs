@@ -1,25 +1,26 @@
 //! `cullbench report`: the results of a run as Markdown, pictures or one HTML page,
 //! from its report.json.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 
 use super::args::ReportArgs;
 use super::document::{Block, to_html, to_markdown};
 use super::surface_charts::{self, Picture};
 use super::table::{Column, Table};
 use super::{
-    Ending, bencher, expect_folder, expect_places, page_plots, run_table, surface_tables, tell,
-    text, write_text,
+    Ending, bencher, expect_folder, expect_places, history, run_figures, run_table, surface_tables,
+    tell, text, write_text,
 };
 use crate::index::Registry;
 use crate::measure::{BOUNDS, METRICS, Status};
 use crate::report::{
-    Comparison, Overall, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
-    times_as_fast,
+    Comparison, Overall, Ranked, Report, ReportCell, Views, comparisons, growths, read_report,
+    surfaces, times_as_fast, views,
 };
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
@@ -27,42 +28,64 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         ("--markdown", args.markdown.as_deref()),
         ("--html", args.html.as_deref()),
         ("--bencher", args.bencher.as_deref()),
+        ("--history", args.history.as_deref()),
     ];
     // Of a run's folder the report is read.
-    expect_places(&outputs, &[&args.report, &args.report.join("report.json")])?;
+    let inputs = args.reports.iter();
+    let inputs: Vec<PathBuf> = inputs
+        .flat_map(|path| [path.clone(), path.join("report.json")])
+        .collect();
+    expect_places(
+        &outputs,
+        &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>(),
+    )?;
     expect_folder("--svg", args.svg.as_deref())?;
-    let mut report = read_report(&args.report)?;
+    if let Some(path) = &args.history {
+        let reports = args.reports.iter().map(|path| read_report(path));
+        write_text(path, &history::page(reports.collect::<Result<_, _>>()?))?;
+        return Ok(Ending::Ok);
+    }
+    let [path] = &args.reports[..] else {
+        bail!(
+            "{} reports; expected one, or --history FILE",
+            args.reports.len()
+        );
+    };
+    let mut report = read_report(path)?;
     declare(&mut report, registry);
     let pictures = match args.svg.is_some() {
-        true => surface_charts::pictures(&surfaces(comparisons(&report)))?,
+        true => surface_charts::pictures(&report),
         false => Vec::new(),
     };
     if let Some(path) = &args.markdown {
-        write_text(path, &to_markdown(&blocks(&report)))?;
+        write_text(path, &to_markdown(&blocks(&report, &BTreeMap::new())))?;
     }
     if let Some(path) = &args.bencher {
         write_text(path, &bencher::format(&report)?)?;
     }
     match &args.svg {
         Some(folder) if pictures.is_empty() => tell(&format!(
-            "note: no chart in {}; a chart needs a structure that was measured on two sizes of a \
-             scene",
+            "note: no chart in {}; a chart needs a structure with times",
             folder.display()
         )),
         Some(folder) => write_charts(folder, &pictures)?,
         None => {}
     }
-    if let Some(path) = &args.html {
-        write_text(path, &page(&report))?;
+    if let Some(file) = &args.html {
+        let folder = match path.is_dir() {
+            true => Some(path.as_path()),
+            false => path.parent(),
+        };
+        write_text(file, &page(&report, folder.unwrap_or(Path::new(""))))?;
     } else if args.markdown.is_none() && args.svg.is_none() && args.bencher.is_none() {
-        io::stdout().write_all(to_markdown(&blocks(&report)).as_bytes())?;
+        io::stdout().write_all(to_markdown(&blocks(&report, &BTreeMap::new())).as_bytes())?;
     }
     Ok(Ending::Ok)
 }
 
-/// The page of a run.
-pub fn page(report: &Report) -> String {
-    let mut blocks = blocks(report);
+/// The page of a run; `folder` has its stream and samples.
+pub fn page(report: &Report, folder: &Path) -> String {
+    let mut blocks = blocks(report, &views(folder, report));
     blocks.extend(glossary());
     to_html(&title(report), &blocks)
 }
@@ -150,7 +173,7 @@ fn title(report: &Report) -> String {
     format!("cullbench run {}", report.run.id)
 }
 
-fn blocks(report: &Report) -> Vec<Block> {
+fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
     let mut blocks = vec![Block::Heading(1, title(report))];
     let all = comparisons(report);
     for group in run_table::groups(&all) {
@@ -178,7 +201,20 @@ fn blocks(report: &Report) -> Vec<Block> {
             )));
         }
         let base = Overall::of(&[comparison]).base;
-        blocks.extend(of_comparison(comparison, base));
+        let own = views.get(&about.key().group.id());
+        blocks.extend(of_comparison(comparison, base, own));
+        let of_path = |c: &&Comparison| {
+            let other = c.about();
+            let [a, b] = [about, other].map(|cell| (&cell.path.name, &cell.path.cache));
+            other.scene.name == scene && a == b
+        };
+        let tests: Vec<&Comparison> = all.iter().filter(of_path).collect();
+        if tests
+            .last()
+            .is_some_and(|last| std::ptr::eq(*last, comparison))
+        {
+            blocks.extend(run_figures::errors(&tests).map(Block::Figure));
+        }
         let next = all.get(place + 1).map(|next| &next.about().scene.name);
         if next != Some(&about.scene.name) {
             let of_scene = all.iter().filter(|c| c.about().scene.name == scene);
@@ -189,8 +225,8 @@ fn blocks(report: &Report) -> Vec<Block> {
         let heading = format!("Crossover: {}", surface_tables::title(surface));
         blocks.push(Block::Heading(2, heading));
         blocks.extend(surface_tables::of_surface(surface));
-        let figures = page_plots::growth(surface, &surface_tables::class);
-        blocks.extend(figures.into_iter().map(Block::Picture));
+        let figures = run_figures::growth(surface);
+        blocks.extend(figures.into_iter().map(|figure| Block::Figure(figure.1)));
     }
     let growths = growths(report);
     if !growths.is_empty() {
@@ -319,7 +355,7 @@ fn about(report: &Report) -> Vec<String> {
     lines
 }
 
-fn of_comparison(comparison: &Comparison, base: Option<&str>) -> Vec<Block> {
+fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Views>) -> Vec<Block> {
     let about = comparison.about();
     let share = |metric: &str, what: &str| {
         let value = comparison.of_any(metric)?;
@@ -354,8 +390,10 @@ fn of_comparison(comparison: &Comparison, base: Option<&str>) -> Vec<Block> {
     let basis = format!("{}.", text::basis(comparison));
     let mut blocks = vec![Block::Heading(3, heading), Block::Line(basis)];
     blocks.extend(false_positives(comparison).map(Block::Line));
-    let plot = base.and_then(|base| page_plots::speedups(comparison, base));
-    blocks.extend(plot.map(Block::Picture));
+    let plot = base.and_then(|base| run_figures::speedups(comparison, base));
+    let along = views.map(|views| run_figures::along(comparison, views));
+    let figures = plot.into_iter().chain(along.into_iter().flatten());
+    blocks.extend(figures.map(Block::Figure));
     blocks.push(Block::Table(table.without_empty_columns()));
     if !comparison.bounds.is_empty() {
         let meaning = "/ read, / copy: time / time of that lower bound.";

@@ -157,7 +157,7 @@ impl Run {
         let shown = shown.and_then(|()| self.why.as_ref().map_or(Ok(()), why));
         let shown = unread_is_fine(shown);
         self.folder.save(&report)?;
-        save_page(self.folder.path(), &page(&report))?;
+        save_page(self.folder.path(), &page(&report, self.folder.path()))?;
         let save = save.filter(|_| !stopped);
         if let Some(name) = &save {
             baseline::save(name, &report)?;

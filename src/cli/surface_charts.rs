@@ -1,15 +1,10 @@
-//! The pictures of a crossover surface: time against the number of items, both
-//! logarithmic, one line for each structure. It draws what was measured and
-//! decides nothing.
+//! The pictures of a run as files.
+//!
+//! Growth with the number of items, and the speed-ups of each scene and path.
 
-use plotters::prelude::*;
-
-use super::chart::{Area, Axis, Drawn, around, is_drawn, left_out, legend, log_log, svg};
-use super::palette::{COLOURS, Look, SHAPES};
-use super::{surface_tables, text};
-use crate::report::{Place, Surface};
-
-const SIZE: (u32, u32) = (900, 560);
+use super::figure::picture;
+use super::run_figures;
+use crate::report::{Overall, Report, comparisons, surfaces};
 
 /// A picture with a name that fits a file.
 pub struct Picture {
@@ -17,49 +12,39 @@ pub struct Picture {
     pub svg: String,
 }
 
-/// One picture for each class of shares that has at least two sizes.
-pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
+/// A picture for each class of shares that has at least two sizes, and one for each
+/// scene and path that ranks anything.
+pub fn pictures(report: &Report) -> Vec<Picture> {
     let mut pictures: Vec<Picture> = Vec::new();
-    for surface in surfaces {
-        for class in surface.classes() {
-            let mut beyond = 0;
-            let curves: Vec<Curve> = surface
-                .structures()
-                .into_iter()
-                .map(|name| {
-                    let mut points = surface.curve(name, class, "query_ns");
-                    let all = points.len();
-                    points.retain(|&(items, ns)| is_drawn(items as f64) && is_drawn(ns));
-                    beyond += all - points.len();
-                    (name, points)
-                })
-                .filter(|(_, points)| points.len() > 1)
-                .collect();
-            if curves.is_empty() {
-                continue;
-            }
-            let shown = surface_tables::class(class);
-            let caption = format!(
-                "{}: {shown} visible{}{}",
-                surface_tables::title(surface),
-                measured(surface, class),
-                left_out(beyond)
-            );
-            let svg = svg(&caption, SIZE, |root| draw(root, &caption, &curves))?;
-            let name = file_name(
+    let mut add = |words: [&str; 4], figure| {
+        let name = file_name(words, &pictures);
+        let svg = picture(&[figure], 1);
+        pictures.push(Picture { name, svg });
+    };
+    for surface in surfaces(comparisons(report)) {
+        for (shown, figure) in run_figures::growth(&surface) {
+            add(
                 [&surface.world, surface.cache, surface.test, &shown],
-                &pictures,
+                figure,
             );
-            pictures.push(Picture { name, svg });
         }
     }
-    Ok(pictures)
+    for comparison in &comparisons(report) {
+        let about = comparison.about();
+        let base = Overall::of(&[comparison]).base;
+        if let Some(mut figure) = base.and_then(|base| run_figures::speedups(comparison, base)) {
+            let [scene, path] = [&about.scene.name, &about.path.name];
+            figure.caption = format!("{scene}, {path}: {}", figure.caption);
+            add([scene, path, &about.path.cache, &about.test], figure);
+        }
+    }
+    pictures
 }
 
 /// A name of its own, of less than the 255 bytes that file systems take.
-fn file_name([world, cache, test, class]: [&str; 4], taken: &[Picture]) -> String {
-    let world: String = world.chars().take(160).collect();
-    let name = slug(&[&world, cache, test, class].join("-"));
+fn file_name(words: [&str; 4], taken: &[Picture]) -> String {
+    let words = words.map(|word| word.chars().take(70).collect::<String>());
+    let name: String = slug(&words.join("-")).chars().take(200).collect();
     let is_free = |name: &String| taken.iter().all(|picture| picture.name != *name);
     // Two worlds may look the same to a file system.
     let mut names = (1..).map(|n| match n {
@@ -67,24 +52,6 @@ fn file_name([world, cache, test, class]: [&str; 4], taken: &[Picture]) -> Strin
         n => format!("{name}-{n}"),
     });
     names.find(is_free).unwrap_or_default()
-}
-
-type Curve<'s> = (&'s str, Vec<(usize, f64)>);
-
-/// The shares that a class stands for, where it does not say it by itself.
-fn measured(surface: &Surface, class: f64) -> String {
-    let here = || surface.places.iter().filter(|place| place.class == class);
-    if !here().any(Place::is_off_class) {
-        return String::new();
-    }
-    let shares = || here().map(|place| place.share);
-    let least = shares().fold(f64::INFINITY, f64::min);
-    let most = shares().fold(0.0, f64::max);
-    format!(
-        " (measured: {} to {})",
-        text::percent(least),
-        text::percent(most)
-    )
 }
 
 /// Letters, digits and points; a dash for anything else.
@@ -95,47 +62,6 @@ fn slug(words: &str) -> String {
     });
     let name: String = plain.collect::<String>().replace("--", "-");
     name.trim_matches(['-', '.']).to_owned()
-}
-
-fn draw(root: &Area, caption: &str, curves: &[Curve]) -> Drawn {
-    let points = || curves.iter().flat_map(|(_, points)| points.iter());
-    let items = around(points().map(|p| p.0 as f64), 1.3, 1.3);
-    let times = around(points().map(|p| p.1), 1.3, 1.3);
-    let axes: [Axis; 2] = [
-        ("items", items, &|n| text::count(n.round() as usize)),
-        ("mean time per query (thread CPU)", times, &text::time),
-    ];
-    let mut chart = log_log(root, caption, axes)?;
-    for (structure, points) in curves {
-        let look = Look::of(structure);
-        let colour = COLOURS[look.colour];
-        let points: Vec<(f64, f64)> = points.iter().map(|&(n, ns)| (n as f64, ns)).collect();
-        let line = LineSeries::new(points.iter().copied(), colour.stroke_width(2));
-        chart
-            .draw_series(line)?
-            .label(*structure)
-            .legend(move |(x, y)| EmptyElement::at((x + 8, y)) + area(look) + outline(look));
-        let marks = points.iter();
-        chart.draw_series(marks.map(|&at| EmptyElement::at(at) + area(look) + outline(look)))?;
-    }
-    legend(&mut chart, SeriesLabelPosition::UpperLeft)
-}
-
-/// Area of a structure's mark.
-fn area(look: Look) -> Polygon<(i32, i32)> {
-    let colour = if look.hollow {
-        WHITE
-    } else {
-        COLOURS[look.colour]
-    };
-    Polygon::new(SHAPES[look.shape], colour)
-}
-
-/// Outline of a structure's mark.
-fn outline(look: Look) -> PathElement<(i32, i32)> {
-    let corners = SHAPES[look.shape];
-    let outline = corners.iter().chain(&corners[..1]).copied();
-    PathElement::new(outline.collect::<Vec<_>>(), COLOURS[look.colour])
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ mod reading;
 mod setting;
 mod stream;
 mod surface;
+mod views;
 mod writing;
 
 pub use crate::measure::{ReportCell, SamplesRef};
@@ -37,4 +38,5 @@ pub use reading::{read_report, read_stream};
 pub use setting::{Setting, settings};
 pub use stream::{Difference, Header, KeptPart, Line, Stream, dated, utc};
 pub use surface::{Crossing, Place, Surface, surfaces};
+pub use views::{Reading, Views, views};
 pub use writing::{temporary_in, try_folder, try_place, write_atomically};

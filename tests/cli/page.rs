@@ -53,8 +53,13 @@ fn a_run_writes_one_whole_page_with_a_mark_for_each_structure() {
         assert!(!page.contains(outside), "loads something: {outside}");
     }
     let plots = between(&page, "<svg class=\"plot\"", "</figure>");
-    assert_eq!(plots.len(), 4, "scenes and paths");
-    for plot in plots {
+    let (speedups, views): (Vec<&str>, Vec<&str>) = plots
+        .iter()
+        .partition(|plot| plot.contains("aria-label=\"Speed-ups"));
+    assert_eq!((speedups.len(), views.len()), (4, 4), "scenes and paths");
+    let frames = |plot: &&str| between(plot, "points=\"", "\"")[0].split(' ').count() == 8;
+    assert!(views.iter().all(frames), "visible items of 8 views");
+    for plot in speedups {
         let marks: Vec<&str> = between(plot, "<g class=\"s ", "</g>");
         let names: BTreeSet<&str> = marks
             .iter()
@@ -69,6 +74,13 @@ fn a_run_writes_one_whole_page_with_a_mark_for_each_structure() {
                 "{mark}"
             );
         }
+    }
+    works(folder.path(), "report run --svg charts");
+    for (name, picture) in contents(&folder.path().join("charts")) {
+        let picture = String::from_utf8(picture.expect("a file")).expect("UTF-8");
+        assert_well_formed(&picture);
+        let marks = picture.matches("<polygon class=\"mark").count();
+        assert_eq!((marks, picture.contains("var(")), (3, false), "{name}");
     }
     let text = page.find(" in the geometric mean").expect("a conclusion");
     assert!(
@@ -122,4 +134,40 @@ fn what_failed_is_on_the_page_with_its_reason_and_has_no_mark() {
     assert_eq!(page.matches("<polygon class=\"mark").count(), 2);
     assert!(page.contains("Speed-up over "));
     assert!(!page.contains("Speed-up over linear"));
+}
+
+#[test]
+fn a_history_has_the_times_of_all_runs_oldest_first() {
+    let folder = folder(&[]);
+    let run = "run --scene city:n=300 --path orbit:frames=8 --structure linear,bvh --no-bounds \
+        --processes 3 --out old";
+    works(folder.path(), run);
+    let report =
+        json(&fs::read_to_string(folder.path().join("old/report.json")).expect("a report"));
+    let mut new = report.clone();
+    new["run"]["started_at"] = json!("2999-01-01T00:00:00Z");
+    new["source"]["commit"] = json!("fedcba9876543210");
+    new["source"]["dirty"] = json!(false);
+    for cell in new["cells"].as_array_mut().expect("an array") {
+        let ns = &mut cell["metrics"]["query_ns"];
+        for end in ["value", "lower", "upper"] {
+            ns[end] = json!(ns[end].as_f64().expect("a number") * 1000.0);
+        }
+    }
+    fs::write(folder.path().join("new.json"), new.to_string()).expect("writable");
+    works(folder.path(), "report new.json old --history page.html");
+    let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
+    assert_well_formed(&page);
+    assert!(page.contains("of 2 runs, 2 of 2 times took longer and 0 took less time"));
+    assert_eq!(page.matches("1000 x</td>").count(), 2, "last / first");
+    assert!(
+        page.find("fedcba9") > page.find("class=\"tick\""),
+        "the newest is last"
+    );
+    let plots = between(&page, "<svg class=\"plot\"", "</figure>");
+    assert_eq!(plots.len(), 1);
+    assert_eq!(plots[0].matches("<polygon class=\"mark").count(), 4);
+    assert_eq!(plots[0].matches("class=\"interval\"").count(), 4);
+    let wanted = "2 reports; expected one, or --history FILE";
+    all_refused(&folder, &["report old new.json".to_owned()], wanted);
 }

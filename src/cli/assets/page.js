@@ -6,7 +6,7 @@
   const marks = new Map();
   for (const g of all("g[data-s]")) {
     const name = g.dataset.s;
-    if (!marks.has(name)) marks.set(name, g);
+    if (!marks.has(name) && g.querySelector(".mark")) marks.set(name, g);
   }
   const tables = all("table");
   const off = new Set();

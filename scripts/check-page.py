@@ -1,0 +1,240 @@
+#!/usr/bin/env python3
+"""Opens pages of cullbench in a real Chromium and checks them.
+
+usage: check-page.py PAGE.html.. [--shots DIR] [--most-mb N]
+
+For each page, at 390, 1,400 and 1,800 px, light and dark: no error on the console, nothing loaded
+from elsewhere, nothing wider than the window, every figure has marks, texts of a figure stay on
+the page; first paint within a second, and no more than 2 MB. Filter, sorting and the state in the
+hash of the address work. --shots keeps pictures of each. The program is `chromium`, or $CHROMIUM.
+Standard library only.
+"""
+
+import argparse
+import base64
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+WIDTHS = [390, 1400, 1800]
+SCHEMES = ["light", "dark"]
+LONGEST_PAINT_MS = 1000
+
+# Faults of a page as it is shown, as a list of sentences.
+FAULTS = """(() => {
+  const faults = [], all = (s, from = document) => [...from.querySelectorAll(s)];
+  const width = document.scrollingElement.scrollWidth;
+  if (width > innerWidth) faults.push(`${width} px wide in a window of ${innerWidth}`);
+  for (const svg of all("svg.plot")) {
+    const name = svg.getAttribute("aria-label");
+    if (!svg.querySelector(".mark,.bar,.curve")) faults.push(`no mark: ${name}`);
+    for (const text of all("text", svg)) {
+      const box = text.getBoundingClientRect();
+      if (box.left < 0 || box.right > innerWidth + 0.5) faults.push(`cut off: "${text.textContent}" in ${name}`);
+    }
+    const box = svg.parentElement.getBoundingClientRect();
+    for (const mark of all(".mark,.bar", svg)) {
+      const own = mark.getBoundingClientRect();
+      if (own.left < box.left - 1 || own.right > box.right + 1) faults.push(`mark beyond its figure: ${name}`);
+    }
+  }
+  for (const item of all("h1,h2,h3,p,figcaption,button,label")) {
+    const box = item.getBoundingClientRect();
+    // Tables scroll inside themselves.
+    if (box.right > innerWidth + 0.5 && !item.closest(".t")) faults.push(`cut off: ${item.textContent.slice(0, 60)}`);
+  }
+  const shown = getComputedStyle(document.body);
+  const light = (colour) => colour.match(/\\d+/g).slice(0, 3).reduce((sum, part) => sum + Number(part), 0);
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  if ((light(shown.color) > light(shown.backgroundColor)) !== dark) faults.push("colours of the other scheme");
+  const outside = performance.getEntriesByType("resource").map((entry) => entry.name);
+  if (outside.length) faults.push(`loads ${outside}`);
+  return [...new Set(faults)];
+})()"""
+
+PAINT = """new Promise((done) => {
+  const paint = () => performance.getEntriesByName("first-contentful-paint")[0]?.startTime;
+  const look = (left) => (paint() || !left ? done(paint() ?? 1e9) : setTimeout(look, 20, left - 1));
+  look(150);
+})"""
+
+# Filter, sorting and hash, each used as a reader does.
+USE = """(() => {
+  const faults = [], all = (s, from = document) => [...from.querySelectorAll(s)];
+  const expect = (is, what) => is || faults.push(what);
+  const box = document.querySelector("#filter input");
+  if (document.querySelector("g[data-s]")) expect(box, "no filter");
+  if (box) {
+    const name = box.value;
+    const own = all("[data-s]:not(label)").filter((item) => item.dataset.s === name);
+    box.click();
+    expect(own.length && own.every((item) => item.classList.contains("off")), "filter hides nothing");
+    expect(location.hash.includes("off=" + encodeURIComponent(name)), "filter is not in the hash");
+    const other = all("[data-s]:not(label)").find((item) => item.dataset.s !== name);
+    expect(!other || !other.classList.contains("off"), "filter hides the others");
+    box.click();
+    expect(own.every((item) => !item.classList.contains("off")), "filter does not show again");
+    own[0].dispatchEvent(new MouseEvent("mouseover", { bubbles: true }));
+    expect(own[0].classList.contains("hot"), "no emphasis");
+  }
+  const table = all("table").find((table) => table.tBodies[0].rows.length > 2);
+  if (table) {
+    const column = [...table.tHead.rows[0].cells].length - 1;
+    const texts = (column) => [...table.tBodies[0].rows].map((row) => row.cells[column].textContent);
+    const before = texts(0).join();
+    table.tHead.rows[0].cells[0].querySelector("button").click();
+    const up = texts(0);
+    table.tHead.rows[0].cells[0].querySelector("button").click();
+    expect(up.join() !== texts(0).join() || new Set(up).size < 2, "sorting changes nothing");
+    expect(location.hash.includes("sort="), "sorting is not in the hash");
+    expect(table.querySelector("[aria-sort]"), "sorting is not announced");
+  }
+  return faults;
+})()"""
+
+# A page that is opened with a hash has its state.
+STATE = """(() => {
+  const boxes = [...document.querySelectorAll("#filter input")];
+  const faults = [];
+  if (boxes.length && boxes[0].checked) faults.push("the hash is not read: filter");
+  if (document.querySelector("table") && !document.querySelector("[aria-sort]")) faults.push("the hash is not read: sorting");
+  return faults;
+})()"""
+
+
+class Browser:
+    """Chromium by its DevTools protocol over two pipes."""
+
+    def __init__(self, profile):
+        (down, self.send), (self.receive, up) = os.pipe(), os.pipe()
+        program = os.environ.get("CHROMIUM", "chromium")
+        options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
+                   "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank"]
+        line = ["sh", "-c", f'exec "$@" 3<&{down} 4>&{up}', "sh", program, *options]
+        self.process = subprocess.Popen(line, pass_fds=[down, up], stderr=subprocess.DEVNULL)
+        os.close(down)
+        os.close(up)
+        self.rest, self.count, self.events, self.session = b"", 0, [], None
+
+    def read(self):
+        while b"\0" not in self.rest:
+            part = os.read(self.receive, 1 << 20)
+            if not part:
+                sys.exit("check-page: Chromium ended; expected a program that --headless starts")
+            self.rest += part
+        text, self.rest = self.rest.split(b"\0", 1)
+        return json.loads(text)
+
+    def call(self, method, **params):
+        self.count += 1
+        message = {"id": self.count, "method": method, "params": params}
+        if self.session:
+            message["sessionId"] = self.session
+        os.write(self.send, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self.read()
+            if answer.get("id") == self.count:
+                if "error" in answer:
+                    sys.exit(f"check-page: {method}: {answer['error']}")
+                return answer["result"]
+            self.events.append(answer)
+
+    def open(self, url):
+        if self.session:
+            self.session, old = None, self.target
+            self.call("Target.closeTarget", targetId=old)
+        self.target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=self.target, flatten=True)["sessionId"]
+        for domain in ["Page", "Runtime", "Log"]:
+            self.call(f"{domain}.enable")
+        self.url = url
+
+    def show(self, width, scheme, url):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=900,
+                  deviceScaleFactor=1, mobile=width < 600)
+        feature = {"name": "prefers-color-scheme", "value": scheme}
+        self.call("Emulation.setEmulatedMedia", features=[feature])
+        self.events.clear()
+        self.call("Page.navigate", url=url)
+        while not any(event.get("method") == "Page.loadEventFired" for event in self.events):
+            self.events.append(self.read())
+
+    def value(self, code):
+        found = self.call("Runtime.evaluate", expression=code, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in found:
+            return [json.dumps(found["exceptionDetails"])]
+        return found["result"].get("value")
+
+    def complaints(self):
+        self.value("0")
+        kinds = {"Runtime.exceptionThrown", "Log.entryAdded"}
+        for event in self.events:
+            method, params = event.get("method"), event.get("params", {})
+            is_error = method == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning")
+            if method in kinds or is_error:
+                yield f"console: {json.dumps(params)[:300]}"
+
+    def shot(self, file):
+        size = self.call("Page.getLayoutMetrics")["cssContentSize"]
+        clip = {"x": 0, "y": 0, "width": size["width"], "height": min(size["height"], 16000), "scale": 1}
+        found = self.call("Page.captureScreenshot", format="png", clip=clip, captureBeyondViewport=True)
+        file.write_bytes(base64.b64decode(found["data"]))
+
+
+def check(browser, page, shots, most_mb):
+    faults = []
+    size = page.stat().st_size / 1e6
+    if size > most_mb:
+        faults.append(f"{size:.2f} MB; expected at most {most_mb} MB")
+    url = page.resolve().as_uri()
+    paints = []
+    for width in WIDTHS:
+        for scheme in SCHEMES:
+            browser.open(url)
+            browser.show(width, scheme, url)
+            paints.append(browser.value(PAINT))
+            found = list(browser.value(FAULTS)) + list(browser.complaints())
+            faults += [f"{width} px, {scheme}: {fault}" for fault in found]
+            if shots:
+                browser.shot(shots / f"{page.stem}-{width}-{scheme}.png")
+    # The first of a browser pays for its start.
+    paint = sorted(paints)[len(paints) // 2]
+    if paint > LONGEST_PAINT_MS:
+        faults.append(f"first paint after {paint:.0f} ms; expected at most {LONGEST_PAINT_MS} ms")
+    browser.open(url)
+    browser.show(1400, "light", url)
+    faults += browser.value(USE)
+    first = browser.value("document.querySelector('#filter input')?.value ?? ''")
+    off = browser.value(f"encodeURIComponent({json.dumps(first)})")
+    browser.open(url)
+    browser.show(1400, "light", f"{url}#off={off}&sort=0.0.1")
+    faults += browser.value(STATE) + list(browser.complaints())
+    figures = browser.value("document.querySelectorAll('svg.plot').length")
+    print(f"{page}: {size:.2f} MB, {figures} figures, first paint {paint:.0f} ms, {len(faults)} faults")
+    for fault in faults[:40]:
+        print(f"  {fault}")
+    return not faults
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("pages", nargs="+", type=pathlib.Path)
+    parser.add_argument("--shots", type=pathlib.Path)
+    parser.add_argument("--most-mb", type=float, default=2.0)
+    args = parser.parse_args()
+    if args.shots:
+        args.shots.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        browser = Browser(profile)
+        sound = [check(browser, page, args.shots, args.most_mb) for page in args.pages]
+        browser.session = None
+        browser.call("Browser.close")
+        browser.process.wait(20)
+    sys.exit(0 if all(sound) else 1)
+
+
+if __name__ == "__main__":
+    main()

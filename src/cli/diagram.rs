@@ -1,0 +1,309 @@
+//! Diagrams: series of places over two axes, with their names beside the plot.
+
+use super::document::html;
+use super::figure::{Axis, CHARACTER, Figure, LINE, STRONG, class, line, mark};
+use super::palette::Look;
+use super::text;
+use crate::shown::shortened;
+
+/// Most characters of a name beside a plot.
+const NAME: usize = 20;
+/// Usual height of the plot.
+const HEIGHT: f64 = 280.0;
+
+/// A place of a diagram.
+#[derive(Default)]
+pub struct Point {
+    pub at: [f64; 2],
+    /// Intervals of the vertical and of the horizontal value.
+    pub ends: Option<[f64; 2]>,
+    pub wide: Option<[f64; 2]>,
+    /// Text on pointing at it; empty for none.
+    pub note: String,
+    pub is_cross: bool,
+    pub is_large: bool,
+}
+
+/// Places with the look of a structure.
+pub struct Series {
+    pub name: String,
+    pub look: Look,
+    pub is_scan: bool,
+    pub points: Vec<Point>,
+}
+
+/// Joining of the places of a series.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Joined {
+    /// Lines, named at their right ends, with marks.
+    Marked,
+    /// The same without marks.
+    Bare,
+    /// Marks alone, named in a legend.
+    Apart,
+}
+
+/// Series over two axes, the most important first.
+pub struct Diagram<'d> {
+    pub caption: String,
+    pub axes: [Axis<'d>; 2],
+    pub height: f64,
+    pub joined: Joined,
+    pub series: Vec<Series>,
+    /// Corners of a line in front of all series.
+    pub front: Vec<[f64; 2]>,
+    /// Names of heights, beside the plot.
+    pub levels: Vec<(f64, String)>,
+}
+
+impl<'d> Diagram<'d> {
+    /// A diagram of the usual height with neither front nor levels.
+    pub fn of(
+        caption: String,
+        axes: [Axis<'d>; 2],
+        joined: Joined,
+        series: Vec<Series>,
+    ) -> Diagram<'d> {
+        Diagram {
+            caption,
+            axes,
+            height: HEIGHT,
+            joined,
+            series,
+            front: Vec::new(),
+            levels: Vec::new(),
+        }
+    }
+
+    pub fn draw(&self) -> Figure {
+        let [x_axis, y_axis] = &self.axes;
+        let names = self.names();
+        let bottom = self.height.max(LINE * (names.len() + 1) as f64);
+        let y = |value: f64| 10.0 + (self.height - 20.0) * (1.0 - y_axis.along(value));
+        let mut parts = String::new();
+        let (mut left, mut free) = (0, -LINE);
+        for tick in y_axis.all_ticks() {
+            let name = (y_axis.shown)(tick);
+            left = left.max(name.chars().count());
+            parts += &line("grid", [0.0, 100.0], [y(tick), y(tick)]);
+            let y = y(tick) + 4.0;
+            parts += &format!(
+                "<text class=\"y\" x=\"0\" dx=\"-8\" y=\"{y:.1}\">{}</text>\n",
+                html(&name)
+            );
+        }
+        for tick in x_axis.all_ticks() {
+            let x = x_axis.percent(tick);
+            parts += &line("grid", [x, x], [0.0, bottom]);
+            let name = (x_axis.shown)(tick);
+            // Of the narrowest plot.
+            let half = 50.0 * CHARACTER * name.chars().count() as f64 / 200.0;
+            if x - half < free {
+                continue;
+            }
+            free = x + half;
+            parts += &format!(
+                "<text class=\"tick\" x=\"{x:.2}%\" y=\"{:.1}\">{}</text>\n",
+                bottom + LINE,
+                html(&name)
+            );
+        }
+        let mut coloured = 0;
+        let mut named = names.iter();
+        let classes = self.series.iter().map(|series| {
+            let own = class(series.look, series.is_scan, coloured);
+            coloured += usize::from(!series.is_scan);
+            own
+        });
+        let classes: Vec<String> = classes.collect();
+        // The strongest are drawn last, in front of the others.
+        let groups = self.series.iter().zip(&classes).map(|(series, class)| {
+            let name = match self.joined {
+                Joined::Apart => String::new(),
+                _ => named.next().map_or(String::new(), |(name, at)| {
+                    let end = series
+                        .points
+                        .last()
+                        .map_or([100.0, *at], |p| self.place(p, &y));
+                    beside(name, end, *at)
+                }),
+            };
+            self.group(series, class, &y, &name)
+        });
+        let groups: Vec<String> = groups.collect();
+        parts.extend(groups.into_iter().rev());
+        if !self.front.is_empty() {
+            let places = self.front.iter().map(|[a, b]| [x_axis.percent(*a), y(*b)]);
+            parts += &self.curve("front", &places.collect::<Vec<_>>());
+        }
+        let height = bottom + 2.5 * LINE;
+        let mut legend = (String::new(), 0.0);
+        if self.joined == Joined::Apart {
+            for ((value, _), (name, at)) in self.levels.iter().zip(&names) {
+                let name = beside(name, [100.0, y(*value)], *at);
+                parts += &format!("<g class=\"level\">{name}</g>\n");
+            }
+            legend = self.legend(&classes, height);
+        }
+        parts += &format!(
+            "<text class=\"title\" x=\"100%\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\n",
+            bottom + 2.0 * LINE,
+            html(x_axis.title)
+        );
+        let right = names.iter().map(|(name, _)| name.chars().count()).max();
+        Figure {
+            label: self.caption.clone(),
+            caption: self.caption.clone(),
+            margins: [
+                14.0 + CHARACTER * left as f64,
+                right.map_or(12.0, |most| 22.0 + CHARACTER * most as f64),
+            ],
+            height,
+            parts,
+            legend,
+        }
+    }
+
+    /// Lines through places, as one shape that is stretched to the width.
+    fn curve(&self, class: &str, places: &[[f64; 2]]) -> String {
+        let points = places
+            .iter()
+            .map(|[x, y]| format!("{:.0},{y:.0} ", 10.0 * x));
+        let height = self.height;
+        format!(
+            "<svg viewBox=\"0 0 1000 {height}\" preserveAspectRatio=\"none\" width=\"100%\" \
+             height=\"{height}\"><polyline class=\"{class}\" points=\"{}\"/></svg>",
+            points.collect::<String>().trim_end()
+        )
+    }
+
+    fn place(&self, point: &Point, y: &dyn Fn(f64) -> f64) -> [f64; 2] {
+        [self.axes[0].percent(point.at[0]), y(point.at[1])]
+    }
+
+    fn group(&self, series: &Series, class: &str, y: &dyn Fn(f64) -> f64, name: &str) -> String {
+        let places: Vec<[f64; 2]> = series.points.iter().map(|p| self.place(p, y)).collect();
+        let mut shapes = match self.joined {
+            Joined::Apart => String::new(),
+            _ => self.curve("curve", &places),
+        };
+        for (point, place) in series.points.iter().zip(&places) {
+            shapes += &text::some(point.ends, |ends| {
+                line("interval", [place[0]; 2], ends.map(y))
+            });
+            shapes += &text::some(point.wide, |ends| {
+                let ends = ends.map(|end| self.axes[0].percent(end));
+                line("interval", ends, [place[1]; 2])
+            });
+        }
+        for (point, place) in series.points.iter().zip(&places) {
+            if self.joined != Joined::Bare {
+                let kind = match (point.is_cross, point.is_large) {
+                    (true, _) => " cross",
+                    (_, true) => " large",
+                    _ => "",
+                };
+                shapes += &mark(series.look, kind, *place, &point.note);
+            }
+        }
+        format!(
+            "<g class=\"s {class}\" data-s=\"{0}\"><title>{0}</title>{shapes}{name}</g>\n",
+            html(&series.name)
+        )
+    }
+
+    /// Names beside the plot with their heights, at least a line apart.
+    fn names(&self) -> Vec<(String, f64)> {
+        let y = |value: f64| 14.0 + (self.height - 20.0) * (1.0 - self.axes[1].along(value));
+        let ends: Vec<(String, f64)> = match self.joined {
+            Joined::Apart => self
+                .levels
+                .iter()
+                .map(|(v, n)| (n.clone(), y(*v)))
+                .collect(),
+            _ => {
+                let end = |series: &Series| {
+                    let end = series.points.last().map_or(0.0, |point| point.at[1]);
+                    (series.name.clone(), y(end))
+                };
+                self.series.iter().map(end).collect()
+            }
+        };
+        let mut order: Vec<usize> = (0..ends.len()).collect();
+        order.sort_by(|a, b| ends[*b].1.total_cmp(&ends[*a].1));
+        let mut free = self.height.max(LINE * (ends.len() + 1) as f64);
+        let mut placed = vec![0.0; ends.len()];
+        for (n, &i) in order.iter().enumerate() {
+            let above = LINE * (order.len() - 1 - n) as f64 + 10.0;
+            placed[i] = ends[i].1.min(free).max(above);
+            free = placed[i] - LINE;
+        }
+        let named = ends.into_iter().zip(placed);
+        named
+            .map(|((name, _), at)| (shortened(&name, NAME), at))
+            .collect()
+    }
+
+    /// Marks with names below the plot, for pictures; a page has its filter.
+    fn legend(&self, classes: &[String], below: f64) -> (String, f64) {
+        let strong = self.series.iter().zip(classes);
+        let strong = strong.filter(|(_, class)| !class.ends_with("weak"));
+        let mut parts = String::new();
+        for (n, (series, class)) in strong.enumerate() {
+            let (x, y) = (25.0 * (n % 4) as f64, below + LINE * (n / 4) as f64);
+            parts += &format!(
+                "<g class=\"s {class}\">{}<text x=\"{x}%\" dx=\"10\" y=\"{:.1}\">{}</text></g>\n",
+                mark(series.look, "", [x, y], ""),
+                y + 4.0,
+                html(&shortened(&series.name, NAME))
+            );
+        }
+        let lines = self.series.len().min(STRONG + 2).div_ceil(4);
+        (parts, LINE * lines as f64)
+    }
+}
+
+/// A name beside the plot, with a line that leads to it.
+fn beside(name: &str, end: [f64; 2], at: f64) -> String {
+    format!(
+        "{}<text x=\"100%\" dx=\"8\" y=\"{at:.1}\">{}</text>",
+        line("lead", [end[0], 100.0], [end[1], at - 4.0]),
+        html(name)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::figure::picture;
+    use super::*;
+
+    #[test]
+    fn names_beside_a_plot_keep_a_line_between_them() {
+        let shown = |value: f64| value.to_string();
+        let point = |y: f64| Point {
+            at: [1.0, y],
+            ..Point::default()
+        };
+        let series = |n: usize| Series {
+            name: format!("s{n}"),
+            look: Look::nth(n),
+            is_scan: false,
+            points: vec![point(5.0), point(5.0 + 0.01 * n as f64)],
+        };
+        let axes = [
+            Axis::linear("x", 0.0..1.0, &shown),
+            Axis::log("y", [1.0, 10.0].into_iter(), 1.0, &shown),
+        ];
+        let series = (0..25).map(series).collect();
+        let diagram = Diagram::of("<c>".to_owned(), axes, Joined::Marked, series);
+        let mut heights: Vec<f64> = diagram.names().into_iter().map(|name| name.1).collect();
+        heights.sort_by(f64::total_cmp);
+        assert!(heights.windows(2).all(|pair| pair[1] - pair[0] >= LINE));
+        let figure = diagram.draw();
+        let page = figure.inline();
+        assert_eq!(page.matches("<g class=\"s c7 weak\"").count(), 25 - STRONG);
+        assert!(page.contains("&lt;c&gt;") && !page.contains("xmlns"));
+        let picture = picture(&[figure], 1);
+        assert!(picture.starts_with("<svg xmlns") && !picture.contains("var("));
+    }
+}

@@ -1,0 +1,312 @@
+//! Parts of every figure as SVG: axes, marks, and its form on a page or in a file.
+//!
+//! Horizontal places are percentages of the plot, so that text keeps its size on every
+//! width; margins beside the plot are in pixels. Marks carry their figures as `data-`
+//! attributes. The same figure stands on a page or, with its style, in a file of its own.
+
+use std::ops::Range;
+
+use super::document::html;
+use super::palette::{self, Look, SHAPES};
+use super::text;
+use crate::shown::shortened;
+
+/// Series of a figure with a colour; the others are grey.
+pub const STRONG: usize = 8;
+/// Least distance of two lines of text.
+pub const LINE: f64 = 16.0;
+/// Width of a character, px, as far as margins need it.
+pub const CHARACTER: f64 = 6.8;
+/// Widths of a picture with one figure in a row, and of each of several.
+const WIDTHS: [f64; 2] = [900.0, 460.0];
+
+/// Values with a place on a logarithmic axis, far beyond anything measured. Near
+/// the ends of floating point, steps along an axis would never come to its end.
+const DRAWN: Range<f64> = 1e-30..1e30;
+
+/// Returns true for a value with a place on a logarithmic axis.
+pub fn is_drawn(value: f64) -> bool {
+    DRAWN.contains(&value)
+}
+
+/// Note in a caption on points that are not drawn.
+pub fn left_out(count: usize) -> String {
+    match count {
+        0 => String::new(),
+        _ => format!(
+            " ({} beyond the axis left out)",
+            text::counted(count, "point")
+        ),
+    }
+}
+
+/// One axis: its title, range, and the text of a tick.
+pub struct Axis<'t> {
+    pub title: &'t str,
+    values: Range<f64>,
+    is_log: bool,
+    /// Ticks where they are not powers or round numbers.
+    pub ticks: Vec<f64>,
+    pub shown: &'t dyn Fn(f64) -> String,
+}
+
+impl<'t> Axis<'t> {
+    /// A logarithmic axis around all values that have a place on it, wider by `factor`.
+    pub fn log(
+        title: &'t str,
+        values: impl Iterator<Item = f64>,
+        factor: f64,
+        shown: &'t dyn Fn(f64) -> String,
+    ) -> Axis<'t> {
+        let values = values.filter(|value| is_drawn(*value));
+        let (least, most) = values.fold((f64::INFINITY, 0.0f64), |(least, most), value| {
+            (least.min(value), most.max(value))
+        });
+        let values = match least <= most {
+            true => least / factor..most * factor,
+            false => 1.0 / factor..factor,
+        };
+        Axis {
+            title,
+            values,
+            is_log: true,
+            ticks: Vec::new(),
+            shown,
+        }
+    }
+
+    /// An axis with equal steps over a range.
+    pub fn linear(title: &'t str, values: Range<f64>, shown: &'t dyn Fn(f64) -> String) -> Self {
+        let end = values.end.max(values.start + 1.0);
+        Axis {
+            title,
+            values: values.start..end,
+            is_log: false,
+            ticks: Vec::new(),
+            shown,
+        }
+    }
+
+    /// The share of the axis before a value, 0 to 1.
+    pub fn along(&self, value: f64) -> f64 {
+        let Range { start, end } = self.values;
+        let along = match self.is_log {
+            true => (value / start).ln() / (end / start).ln(),
+            false => (value - start) / (end - start),
+        };
+        along.clamp(0.0, 1.0)
+    }
+
+    pub fn percent(&self, value: f64) -> f64 {
+        100.0 * self.along(value)
+    }
+
+    /// At most about seven powers of `base` within the range.
+    pub fn powers(&self, base: f64) -> Vec<f64> {
+        let [first, last] = [self.values.start, self.values.end].map(|v| v.log(base));
+        let step = ((last - first) / 7.0).ceil().max(1.0);
+        let mut power = (first / step).ceil() * step;
+        let mut ticks = Vec::new();
+        while power <= last {
+            ticks.push(base.powf(power));
+            power += step;
+        }
+        ticks
+    }
+
+    /// The given ticks, or powers of ten.
+    ///
+    /// Within less than two decades 1, 2, 5 of each, or equal steps.
+    pub fn all_ticks(&self) -> Vec<f64> {
+        if !self.ticks.is_empty() {
+            return self.ticks.clone();
+        }
+        let Range { start, end } = self.values;
+        let within = |ticks: Vec<f64>| -> Vec<f64> {
+            let inside = ticks.into_iter().filter(|t| (start..=end).contains(t));
+            inside.collect()
+        };
+        if self.is_log {
+            let powers = self.powers(10.0);
+            let below = powers.first().map_or(1.0, |first| first / 10.0);
+            let all = [below].into_iter().chain(powers.clone());
+            let finer = within(
+                all.flat_map(|power| [power, 2.0 * power, 5.0 * power])
+                    .collect(),
+            );
+            match (powers.len(), finer.len()) {
+                (3.., _) => return powers,
+                (_, 3..) => return finer,
+                _ => {}
+            }
+        }
+        let raw = (end - start) / 5.0;
+        let power = 10f64.powf(raw.log10().floor());
+        let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
+        let step = steps.into_iter().find(|step| *step >= raw).unwrap_or(raw);
+        let first = (start / step).ceil();
+        within((0..8).map(|n| (first + f64::from(n)) * step).collect())
+    }
+}
+
+/// The mark of a structure with its note, around `x` in percent and `y` in pixels.
+pub fn mark(look: Look, kind: &str, [x, y]: [f64; 2], note: &str) -> String {
+    let class = if look.hollow { "mark hollow" } else { "mark" };
+    let corners = SHAPES[look.shape].iter().map(|(x, y)| format!("{x},{y} "));
+    let note = match note {
+        "" => String::new(),
+        note => format!("<title>{}</title>", html(note)),
+    };
+    format!(
+        "<svg x=\"{x:.2}%\" y=\"{y:.1}\" overflow=\"visible\"><polygon class=\"{class}{kind}\" \
+         points=\"{}\">{note}</polygon></svg>",
+        corners.collect::<String>().trim_end()
+    )
+}
+
+pub fn line(class: &str, [x1, x2]: [f64; 2], [y1, y2]: [f64; 2]) -> String {
+    format!(
+        "<line class=\"{class}\" x1=\"{x1:.2}%\" x2=\"{x2:.2}%\" y1=\"{y1:.1}\" y2=\"{y2:.1}\"/>"
+    )
+}
+
+/// Colour of the series at a place in the order of importance; scans are grey.
+pub fn class(look: Look, is_scan: bool, place: usize) -> String {
+    match place < STRONG {
+        _ if is_scan => "c7".to_owned(),
+        true => format!("c{}", look.colour),
+        false => "c7 weak".to_owned(),
+    }
+}
+
+/// A drawn figure.
+pub struct Figure {
+    /// Its description for screen readers.
+    pub label: String,
+    pub caption: String,
+    /// Pixels left and right of the plot.
+    pub margins: [f64; 2],
+    pub height: f64,
+    pub parts: String,
+    /// Marks with names for pictures, and its height; a page has its filter.
+    pub legend: (String, f64),
+}
+
+impl Figure {
+    /// The figure as a part of a page.
+    pub fn inline(&self) -> String {
+        let [left, right] = self.margins;
+        format!(
+            "<svg class=\"plot\" role=\"img\" style=\"margin-left:{left:.0}px;width:calc(100% - \
+             {:.0}px)\" height=\"{:.0}\" aria-label=\"{}\">\n{}</svg><figcaption>{}</figcaption>",
+            left + right,
+            self.height,
+            html(&self.label),
+            self.parts,
+            html(&self.caption)
+        )
+    }
+}
+
+/// A picture of several figures, `columns` in a row.
+pub fn picture(figures: &[Figure], columns: usize) -> String {
+    let width = WIDTHS[usize::from(columns > 1)];
+    let (mut parts, mut y) = (String::new(), 12.0);
+    for row in figures.chunks(columns) {
+        let mut height = 0f64;
+        for (column, figure) in row.iter().enumerate() {
+            let x = 12.0 + width * column as f64;
+            let lines = text::wrapped(&shortened(&figure.caption, 400), (width / 7.4) as usize);
+            for (n, line) in lines.lines().enumerate() {
+                let y = y + LINE * (n + 1) as f64;
+                parts += &format!("<text x=\"{x}\" y=\"{y}\">{}</text>\n", html(line));
+            }
+            let caption = LINE * (lines.lines().count() + 1) as f64;
+            let [left, right] = figure.margins;
+            parts += &format!(
+                "<svg x=\"{:.0}\" y=\"{:.0}\" width=\"{:.0}\" height=\"{:.0}\" \
+                 overflow=\"visible\">\n{}{}</svg>\n",
+                x + left,
+                y + caption,
+                width - 24.0 - left - right,
+                figure.height + figure.legend.1,
+                figure.parts,
+                figure.legend.0,
+            );
+            height = height.max(caption + figure.height + figure.legend.1 + 12.0);
+        }
+        y += height;
+    }
+    let width = width * columns.min(figures.len()).max(1) as f64;
+    let style = format!(
+        "{}{}",
+        include_str!("assets/figure.css"),
+        palette::on_light()
+    );
+    // Programs that are no browsers do not resolve variables.
+    let variables = [
+        ("bg", "#fff"),
+        ("fg", "#1b1d21"),
+        ("soft", "#5c636e"),
+        ("rule", "#d8dbe0"),
+    ];
+    let style = variables.iter().fold(style, |style, (name, value)| {
+        style.replace(&format!("var(--{name})"), value)
+    });
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{y:.0}\" \
+         viewBox=\"0 0 {width} {y:.0}\" font-family=\"sans-serif\" color=\"#1b1d21\">\n\
+         <style>{style}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{parts}</svg>\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(values: Range<f64>, is_log: bool) -> Axis<'static> {
+        Axis {
+            title: "",
+            values,
+            is_log,
+            ticks: Vec::new(),
+            shown: &|value| value.to_string(),
+        }
+    }
+
+    #[test]
+    fn ticks_are_few_and_within_the_axis() {
+        assert_eq!(axis(0.4..9.0, true).powers(2.0), [0.5, 1.0, 2.0, 4.0, 8.0]);
+        assert!(axis(1e-30..1e30, true).powers(2.0).len() <= 8);
+        assert_eq!(axis(1.0..100.0, true).percent(10.0), 50.0);
+        assert_eq!(axis(0.5..2e3, true).all_ticks(), [1.0, 10.0, 100.0, 1000.0]);
+        assert_eq!(axis(1.5..30.0, true).all_ticks(), [2.0, 5.0, 10.0, 20.0]);
+        assert_eq!(axis(1.1..1.9, true).all_ticks(), [1.2, 1.4, 1.6, 1.8]);
+        assert_eq!(axis(0.0..31.0, false).all_ticks(), [0.0, 10.0, 20.0, 30.0]);
+    }
+
+    #[test]
+    fn every_axis_has_a_beginning_and_an_end() {
+        let extremes = [
+            1e308,
+            f64::MAX,
+            f64::INFINITY,
+            5e-324,
+            f64::MIN_POSITIVE,
+            0.0,
+            -1.0,
+            f64::NAN,
+        ];
+        let range = |values: &[f64]| {
+            let shown = |value: f64| value.to_string();
+            Axis::log("", values.iter().copied(), 2.0, &shown).values
+        };
+        for value in extremes {
+            assert!(!is_drawn(value), "{value}");
+            assert_eq!(range(&[value, 20.0, 500.0]), 10.0..1000.0, "{value}");
+            assert_eq!(range(&[value]), 0.5..2.0);
+        }
+        assert_eq!(left_out(0), "");
+        assert_eq!(left_out(1), " (1 point beyond the axis left out)");
+    }
+}

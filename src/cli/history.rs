@@ -1,0 +1,201 @@
+//! The page of several runs: time per query of each structure, oldest run first.
+
+use super::diagram::{Diagram, Joined, Point, Series};
+use super::document::{Block, to_html};
+use super::figure::{Axis, is_drawn};
+use super::palette::Look;
+use super::run_figures::ends;
+use super::table::{Column, Table};
+use super::text;
+use crate::measure::{CellKey, GroupKey, Metric};
+use crate::report::{Report, ReportCell, settings};
+
+/// Digits of a commit that name it.
+const COMMIT: usize = 7;
+
+/// Commit, or the day of a run without one.
+fn name(report: &Report) -> String {
+    let (commit, at) = (&report.source.commit, &report.run.started_at);
+    let whole = commit
+        .as_ref()
+        .map_or(at.chars().take(10).collect(), |commit| {
+            commit.chars().take(COMMIT).collect::<String>()
+        });
+    let dirty = report.source.dirty == Some(true);
+    format!("{whole}{}", if dirty { "+" } else { "" })
+}
+
+/// The page; runs are sorted by their start.
+pub fn page(mut reports: Vec<Report>) -> String {
+    reports.sort_by(|a, b| a.run.started_at.cmp(&b.run.started_at));
+    let mut groups: Vec<(GroupKey, Vec<String>)> = Vec::new();
+    for cell in reports.iter().flat_map(|report| &report.cells) {
+        let CellKey { group, structure } = cell.key();
+        let place = groups.iter().position(|row| row.0 == group);
+        let place = place.unwrap_or_else(|| {
+            groups.push((group, Vec::new()));
+            groups.len() - 1
+        });
+        if !groups[place].1.contains(&structure) {
+            groups[place].1.push(structure);
+        }
+    }
+    let mut blocks = Vec::new();
+    let mut changed = [Vec::new(), Vec::new()];
+    let mut compared = 0;
+    for (group, structures) in &groups {
+        let heading = format!(
+            "{}, {}, {}, {}",
+            group.scene, group.path, group.cache, group.test
+        );
+        let cells = |structure: &String| {
+            let key = CellKey {
+                group: group.clone(),
+                structure: structure.clone(),
+            };
+            let found = reports.iter();
+            let found = found.map(|report| report.cells.iter().find(|cell| cell.key() == key));
+            found.collect::<Vec<Option<&ReportCell>>>()
+        };
+        let mut table = Table::of_numbers(
+            ["structure".to_owned()]
+                .into_iter()
+                .chain(reports.iter().map(name))
+                .chain(["last / first".to_owned()]),
+        );
+        let mut series = Vec::new();
+        for structure in structures {
+            let cells = cells(structure);
+            let times = cells.iter().map(|cell| {
+                let sound = cell.filter(|cell| cell.rank.is_some())?;
+                sound
+                    .metrics
+                    .get("query_ns")
+                    .filter(|time| is_drawn(time.value))
+            });
+            let times: Vec<Option<&Metric>> = times.collect();
+            let known: Vec<&Metric> = times.iter().copied().flatten().collect();
+            let mut change = String::new();
+            if let [first, .., last] = known[..] {
+                change = format!("{} x", text::significant(last.value / first.value));
+                compared += 1;
+                let line = || format!("{structure} on {}, {} ({change})", group.scene, group.path);
+                match (ends(first), ends(last)) {
+                    (Some(a), Some(b)) if b[0] > a[1] => changed[0].push(line()),
+                    (Some(a), Some(b)) if b[1] < a[0] => changed[1].push(line()),
+                    _ => {}
+                }
+            }
+            let shown = cells
+                .iter()
+                .zip(&times)
+                .map(|(cell, time)| match (time, cell) {
+                    (Some(time), _) => text::time_with(time),
+                    (None, cell) => text::some(*cell, |cell| cell.status.name().to_owned()),
+                });
+            table.add_row([structure.clone()].into_iter().chain(shown).chain([change]));
+            let point = |(run, time): (usize, &Option<&Metric>)| {
+                let time = (*time)?;
+                Some(Point {
+                    at: [run as f64, time.value],
+                    ends: ends(time),
+                    note: format!(
+                        "{structure}, {}: {}",
+                        name(&reports[run]),
+                        text::time_with(time)
+                    ),
+                    ..Point::default()
+                })
+            };
+            series.push(Series {
+                name: structure.clone(),
+                look: Look::of(structure),
+                is_scan: cells.iter().flatten().any(|cell| cell.is_scan()),
+                points: times.iter().enumerate().filter_map(point).collect(),
+            });
+        }
+        series.retain(|series| !series.points.is_empty());
+        // The fastest of the last run keeps its colour.
+        let last = |series: &Series| series.points.last().map_or([0.0; 2], |p| p.at);
+        series.sort_by(|a, b| {
+            let ([x, ns], [y, other]) = (last(a), last(b));
+            y.total_cmp(&x).then(ns.total_cmp(&other))
+        });
+        blocks.push(Block::Heading(2, heading.clone()));
+        if !series.is_empty() {
+            let commit = |run: f64| reports.get(run as usize).map_or(String::new(), name);
+            let mut x = Axis::linear("run", 0.0..(reports.len() - 1) as f64, &commit);
+            x.ticks = (0..reports.len()).map(|run| run as f64).collect();
+            let points = series.iter().flat_map(|s| s.points.iter());
+            let values = points.flat_map(|p| p.ends.unwrap_or([p.at[1]; 2]));
+            let y = Axis::log("", values.collect::<Vec<_>>().into_iter(), 1.1, &text::time);
+            let caption = format!("{heading}: time per query in each run, 95 % interval");
+            blocks.push(Block::Figure(
+                Diagram::of(caption, [x, y], Joined::Marked, series).draw(),
+            ));
+        }
+        blocks.push(Block::Table(table));
+    }
+    let title = format!(
+        "cullbench history of {}",
+        text::counted(reports.len(), "run")
+    );
+    let mut all = vec![
+        Block::Heading(1, title.clone()),
+        Block::Line(conclusion(&reports, compared, &changed)),
+    ];
+    all.extend(blocks);
+    all.extend([
+        Block::Heading(2, "Runs".to_owned()),
+        Block::Table(runs(&reports)),
+    ]);
+    to_html(&title, &all)
+}
+
+/// Changes from the first to the last run, and what else differs between them.
+fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<String>; 2]) -> String {
+    let listed = |names: &[String]| match names {
+        [] => String::new(),
+        [first, rest @ ..] if rest.len() > 2 => format!(": {first} and {} others", rest.len()),
+        names => format!(": {}", names.join("; ")),
+    };
+    let [first, .., last] = reports else {
+        return "One run; a history has several.".to_owned();
+    };
+    let differ: Vec<String> = (settings(first, last).iter())
+        .map(|setting| setting.what.to_owned())
+        .collect();
+    let note = match differ.is_empty() {
+        true => String::new(),
+        false => format!(
+            " They differ in the {}: not all of a change is the program's own.",
+            differ.join(", ")
+        ),
+    };
+    format!(
+        "From the first to the last of {}, {} of {} took longer and {} took less time (intervals \
+         apart){}{}. compare judges two runs.{note}",
+        text::counted(reports.len(), "run"),
+        slower.len(),
+        text::counted(compared, "time"),
+        faster.len(),
+        listed(slower),
+        listed(faster),
+    )
+}
+
+fn runs(reports: &[Report]) -> Table {
+    let columns: &[Column<&Report>] = &[
+        ("run", |report| name(report)),
+        ("started", |report| report.run.started_at.clone()),
+        ("version", |report| report.source.version.clone()),
+        (">cells", |report| text::count(report.cells.len())),
+        (">processes", |report| report.run.processes.to_string()),
+        ("machine", |report| {
+            let cpu = report.machine.cpu.as_deref().unwrap_or("unknown");
+            format!("{cpu}, {}", text::counted(report.machine.cores, "core"))
+        }),
+        ("command", |report| report.run.command.clone()),
+    ];
+    Table::with(reports, columns)
+}

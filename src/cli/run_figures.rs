@@ -1,0 +1,350 @@
+//! Figures of a run: speed-ups, growth, views along the path, error against time.
+
+use std::collections::BTreeMap;
+
+use super::diagram::{Diagram, Joined, Point, Series};
+use super::error_figure::{Against, Measured};
+use super::figure::{Axis, Figure, is_drawn, left_out};
+use super::figure_rows::{Form, Row, rows};
+use super::palette::Look;
+use super::run_verdict::times;
+use super::{surface_tables, text};
+use crate::measure::Metric;
+use crate::report::{Comparison, Place, Reading, ReportCell, Speedup, Surface, Views};
+use crate::statistics::quantile;
+
+/// Least number of clock readings along a path for a line, and for quantiles.
+const LEAST_READINGS: [usize; 2] = [4, 20];
+
+/// Ends of an interval that have a place on a logarithmic axis.
+pub fn ends(metric: &Metric) -> Option<[f64; 2]> {
+    let ends = metric.lower.zip(metric.upper)?;
+    (is_drawn(ends.0) && is_drawn(ends.1)).then_some(ends.into())
+}
+
+/// Scene and path of a comparison.
+fn of(comparison: &Comparison) -> String {
+    let about = comparison.about();
+    let mut name = format!("{}, {}", about.scene.name, about.path.name);
+    if about.path.cache != "warm" {
+        name += &format!(", {}", about.path.cache);
+    }
+    name
+}
+
+/// Speed-ups over `base`: a dot with its 95 % interval per structure.
+///
+/// The fastest is on top. Lines join the dots of one rank.
+pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
+    let sound = comparison.sound();
+    let all: Vec<(&ReportCell, Speedup)> = sound
+        .filter_map(|cell| Some((cell, comparison.speedup(base, cell)?)))
+        .collect();
+    let drawn: Vec<_> = all.iter().filter(|(_, (r, _))| is_drawn(*r)).collect();
+    drawn.first()?;
+    let shown = |row: &&&(&ReportCell, Speedup)| row.1.1.unwrap_or([row.1.0; 2]);
+    let values = drawn.iter().flat_map(|row| shown(&row));
+    let mut axis = Axis::log("", values.chain([1.0]), 1.2, &ratio_name);
+    axis.ticks = axis.powers(2.0);
+    let row = |(place, (cell, (ratio, ends))): (usize, &&(&ReportCell, Speedup))| {
+        let (time, name) = (cell.metrics.get("query_ns"), &cell.structure);
+        let next = drawn.get(place + 1);
+        Row {
+            name: name.clone(),
+            is_scan: cell.is_scan(),
+            value: *ratio,
+            ends: *ends,
+            inner: None,
+            label: format!("{name} {}", times(*ratio)),
+            note: format!(
+                "{name}: {}, {}",
+                text::time_estimate(time),
+                text::some(*ends, |[low, high]| format!(
+                    "{} [{}, {}]",
+                    times(*ratio),
+                    text::significant(low),
+                    text::significant(high)
+                ))
+            ),
+            data: format!(
+                " data-rank=\"{}\" data-speedup=\"{ratio}\" data-query-ns=\"{}\"",
+                text::some(cell.rank, |rank| rank.to_string()),
+                text::some(time, |time| time.value.to_string()),
+            ),
+            is_tied: next.is_some_and(|next| next.0.rank == cell.rank),
+        }
+    };
+    let structures: Vec<Row> = drawn.iter().enumerate().map(row).collect();
+    let label = format!(
+        "Speed-ups over {base} of {} on {}",
+        text::counted(drawn.len(), "structure"),
+        of(comparison)
+    );
+    let caption = format!(
+        "Speed-up over {base}, 95 % interval; a line joins structures of one rank{}",
+        left_out(all.len() - drawn.len())
+    );
+    let (one, form) = (Some(1.0), Form::Marks);
+    Some(rows([label, caption], &axis, one, form, &structures))
+}
+
+/// "4 x", "1/4 x".
+fn ratio_name(ratio: f64) -> String {
+    match ratio < 1.0 && ratio > 1e-4 {
+        true => format!("1/{} x", (1.0 / ratio).round()),
+        false if (1.0..1e5).contains(&ratio) => {
+            format!("{} x", text::count(ratio.round() as usize))
+        }
+        false => times(ratio),
+    }
+}
+
+/// Time against the number of items, a line per structure, named at its right end.
+///
+/// One figure per class of shares that has at least two sizes; their axes are the same.
+pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
+    let mut beyond = BTreeMap::new();
+    let curve = |class: f64, name: &str| -> (usize, Vec<Point>) {
+        let points = surface.curve(name, class, "query_ns");
+        let is_drawn = |p: &&(usize, f64)| is_drawn(p.0 as f64) && is_drawn(p.1);
+        let point = |&(items, ns): &(usize, f64)| {
+            let here = |place: &&Place| place.class == class && place.items == items;
+            let mut cells = (surface.places.iter().filter(here)).filter_map(|p| p.cell(name));
+            let metric = cells.next().and_then(|cell| cell.metrics.get("query_ns"));
+            Point {
+                at: [items as f64, ns],
+                ends: metric.and_then(ends),
+                note: format!(
+                    "{name}, {}: {}",
+                    text::count(items),
+                    text::time_estimate(metric)
+                ),
+                ..Point::default()
+            }
+        };
+        let drawn: Vec<Point> = points.iter().filter(is_drawn).map(point).collect();
+        (points.len() - drawn.len(), drawn)
+    };
+    let is_scan = |name: &str| {
+        let cells = surface.places.iter().filter_map(|place| place.cell(name));
+        cells.take(1).any(ReportCell::is_scan)
+    };
+    let mut figures = Vec::new();
+    for class in surface.classes() {
+        let mut series = Vec::new();
+        for name in surface.structures() {
+            let (left_out, points) = curve(class, name);
+            *beyond.entry(class.to_bits()).or_insert(0) += left_out;
+            if points.len() > 1 {
+                series.push(Series {
+                    name: name.to_owned(),
+                    look: Look::of(name),
+                    is_scan: is_scan(name),
+                    points,
+                });
+            }
+        }
+        // The fastest at the largest size keeps its colour.
+        let last = |series: &Series| series.points.last().map_or(f64::INFINITY, |p| p.at[1]);
+        series.sort_by(|a, b| last(a).total_cmp(&last(b)));
+        if !series.is_empty() {
+            figures.push((class, series));
+        }
+    }
+    let points = || figures.iter().flat_map(|f| &f.1).flat_map(|s| &s.points);
+    let values = |place: usize| points().map(move |p| p.at[place]).collect::<Vec<_>>();
+    let [items, ns] = [0, 1].map(values);
+    let mut sizes = items.clone();
+    sizes.sort_by(f64::total_cmp);
+    sizes.dedup();
+    let size = |items: f64| text::count(items.round() as usize);
+    let figure = |(class, series)| {
+        let shown = surface_tables::class(class);
+        let caption = format!(
+            "{}: mean time per query against items, {shown} visible{}{}",
+            surface_tables::title(surface),
+            measured(surface, class),
+            left_out(beyond[&class.to_bits()])
+        );
+        let mut x = Axis::log("items", items.iter().copied(), 1.05, &size);
+        x.ticks.clone_from(&sizes);
+        let y = Axis::log("", ns.iter().copied(), 1.1, &text::time);
+        (
+            shown,
+            Diagram::of(caption, [x, y], Joined::Marked, series).draw(),
+        )
+    };
+    figures.into_iter().map(figure).collect()
+}
+
+/// The shares that a class stands for, where it does not say it by itself.
+fn measured(surface: &Surface, class: f64) -> String {
+    let here = || surface.places.iter().filter(|place| place.class == class);
+    if !here().any(Place::is_off_class) {
+        return String::new();
+    }
+    let shares = || here().map(|place| place.share);
+    let least = shares().fold(f64::INFINITY, f64::min);
+    let most = shares().fold(0.0, f64::max);
+    format!(
+        " (measured: {} to {})",
+        text::percent(least),
+        text::percent(most)
+    )
+}
+
+/// Time and visible items along the path, and the distribution of times over it.
+pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
+    let frame = |frame: f64| text::count(frame as usize);
+    let frames = 0.0..views.visible.len().saturating_sub(1) as f64;
+    let x = || Axis::linear("view", frames.clone(), &frame);
+    let (mut series, mut spread, mut queries) = (Vec::new(), Vec::new(), 1);
+    for cell in comparison.sound() {
+        let Some(readings) = views.times.get(&cell.structure) else {
+            continue;
+        };
+        let readings: Vec<_> = readings.iter().filter(|r| is_drawn(r.ns)).collect();
+        let point = |reading: &&Reading| Point {
+            at: [reading.frame, reading.ns],
+            ..Point::default()
+        };
+        if readings.len() >= LEAST_READINGS[0] {
+            queries = readings.iter().map(|r| r.queries).fold(queries, u32::max);
+            series.push(Series {
+                name: cell.structure.clone(),
+                look: Look::of(&cell.structure),
+                is_scan: cell.is_scan(),
+                points: readings.iter().map(point).collect(),
+            });
+        }
+        if readings.len() >= LEAST_READINGS[1] {
+            let mut ns: Vec<f64> = readings.iter().map(|r| r.ns).collect();
+            ns.sort_by(f64::total_cmp);
+            let [low, first, median, third, high] =
+                [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| quantile(&ns, share).unwrap_or(ns[0]));
+            let name = cell.structure.clone();
+            spread.push(Row {
+                label: format!("{name} {}", text::time(median)),
+                note: format!(
+                    "{name}: median {}, half of the views {} to {}, nine tenths {} to {}",
+                    text::time(median),
+                    text::time(first),
+                    text::time(third),
+                    text::time(low),
+                    text::time(high)
+                ),
+                name,
+                is_scan: cell.is_scan(),
+                value: median,
+                ends: Some([low, high]),
+                inner: Some([first, third]),
+                ..Row::default()
+            });
+        }
+    }
+    let mut figures = Vec::new();
+    let (about, each) = (
+        of(comparison),
+        match queries {
+            1 => String::new(),
+            _ => format!(", means of up to {queries} consecutive views"),
+        },
+    );
+    if !series.is_empty() {
+        let points = series.iter().flat_map(|s| s.points.iter().map(|p| p.at[1]));
+        let y = Axis::log("", points, 1.1, &text::time);
+        let caption = format!("{about}: time per query along the path{each}");
+        figures.push(Diagram::of(caption, [x(), y], Joined::Bare, series).draw());
+    }
+    if views.visible.len() >= LEAST_READINGS[0] {
+        let most = views.visible.iter().copied().fold(1, u64::max);
+        let count = |items: f64| text::count(items as usize);
+        let point = |(frame, items): (usize, &u64)| Point {
+            at: [frame as f64, *items as f64],
+            ..Point::default()
+        };
+        let visible = Series {
+            name: "visible items".to_owned(),
+            look: Look::nth(0),
+            is_scan: true,
+            points: views.visible.iter().enumerate().map(point).collect(),
+        };
+        let y = Axis::linear("", 0.0..most as f64, &count);
+        let why = match figures.is_empty() {
+            true => "; single views are too short to be timed each",
+            false => "",
+        };
+        let caption = format!("{about}: visible items along the path{why}");
+        let mut diagram = Diagram::of(caption, [x(), y], Joined::Bare, vec![visible]);
+        diagram.height = 120.0;
+        figures.push(diagram.draw());
+    }
+    if !spread.is_empty() {
+        let values = spread
+            .iter()
+            .flat_map(|row| row.ends.unwrap_or([row.value; 2]));
+        let axis = Axis::log("", values, 1.1, &text::time);
+        let caption = format!(
+            "{about}: distribution over the views{each}; median, middle half, and 5 to 95 %"
+        );
+        let labels = [caption.clone(), caption];
+        figures.push(rows(labels, &axis, None, Form::Marks, &spread));
+    }
+    figures
+}
+
+/// Error against time of comparisons that differ in their tests.
+///
+/// `None` for a single test.
+pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
+    let first = comparisons.first()?;
+    let measured = |comparison: &&Comparison| {
+        let cells: Vec<Measured> = (comparison.sound())
+            .filter_map(|cell| {
+                let (time, error) = (cell.metrics.get("query_ns")?, cell.value("excess")?);
+                Some(Measured {
+                    structure: cell.structure.clone(),
+                    test: cell.test.clone(),
+                    time: time.value,
+                    ends: ends(time),
+                    error: error * 100.0,
+                    on_front: true,
+                    is_cross: false,
+                    note: format!(
+                        "{} {}: {}, {} % false positives",
+                        cell.structure,
+                        cell.test,
+                        text::time_estimate(Some(time)),
+                        text::significant(error * 100.0)
+                    ),
+                })
+            })
+            .collect();
+        cells
+    };
+    let mut points: Vec<Measured> = comparisons.iter().flat_map(measured).collect();
+    if comparisons.len() < 2 || points.is_empty() {
+        return None;
+    }
+    points.sort_by(|a, b| a.time.total_cmp(&b.time));
+    let against = Against {
+        caption: format!("{}: error against run time, by test", of(first)),
+        axes: ["time per query", "false positives, % of visible"],
+        shown: &text::time,
+        none: 1e-4,
+        points,
+    };
+    Some(against.draw())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratios_are_named_briefly() {
+        let names = [0.25, 1.0, 1024.0, 2f64.powi(40), 2f64.powi(-40)].map(ratio_name);
+        assert_eq!(names[..3], ["1/4 x", "1 x", "1,024 x"]);
+        assert!(names.iter().all(|name| name.len() < 22), "{names:?}");
+    }
+}
