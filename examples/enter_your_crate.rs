@@ -1,6 +1,6 @@
 //! A structure of your own crate in the benchmark.
 //!
-//! Tiles of items in slabs along x, and `main_with`, which gives it every command of the program:
+//! Tiles of items in slabs along x, and `main_as`, which gives it every command of the program:
 //! `cargo run --release --example enter_your_crate -- run --structure linear,bvh,tiles`
 //! (or list, verify, query, report, compare). `cargo test --example enter_your_crate`
 //! puts it through the conformance suite.
@@ -78,7 +78,9 @@ impl RegionIndex for Tiles {
 
 /// Public for the project's own test; your crate needs no `pub`.
 pub fn main() -> ExitCode {
-    cullbench::cli::main_with(Registry::builtin().with::<Tiles>())
+    // yours: (env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")); or main_with, without them
+    let program = ("enter_your_crate", "1.2.0");
+    cullbench::cli::main_as(program, Registry::builtin().with::<Tiles>())
 }
 
 #[cfg(test)]

@@ -7,5 +7,6 @@ use cullbench::cli;
 use cullbench::index::Registry;
 
 fn main() -> ExitCode {
-    cli::main_with(Registry::builtin())
+    let program = (env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"));
+    cli::main_as(program, Registry::builtin())
 }

@@ -57,7 +57,8 @@ pub fn message(text: &str) -> String {
 
 /// The end of a message about an error of the file system.
 ///
-/// "; expected an existing file"; `what` is a file or a folder. Nothing where the error's own text has an expectation.
+/// "; expected an existing file"; `what` is a file or a folder. Nothing where the error's
+/// own text has an expectation.
 pub fn expected_by(error: &io::Error, what: &str) -> String {
     use io::ErrorKind::*;
     if error.to_string().contains("expected") {

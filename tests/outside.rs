@@ -44,6 +44,35 @@ fn main() -> ExitCode {
     assert_eq!(row["origin"], "crate enter_your_crate");
     assert!(works("list structures").contains("tiles of 32"));
 
+    // The program speaks of itself, not of this crate.
+    let version = concat!(
+        "enter_your_crate 1.2.0 (cullbench ",
+        env!("CARGO_PKG_VERSION"),
+        ")\n"
+    );
+    assert_eq!(works("--version"), version);
+    for topic in [
+        "",
+        "run ",
+        "locate ",
+        "merge ",
+        "compare ",
+        "scene convert ",
+        "scene draw ",
+    ] {
+        let help = works(&format!("{topic}--help"));
+        let usage = format!("Usage: enter_your_crate {topic}");
+        assert!(
+            help.contains(usage.trim_end()) && !help.contains("cullbench"),
+            "{help}"
+        );
+    }
+    for topic in ["completions bash", "man", "list"] {
+        let text = works(topic).replace("(cullbench ", "(");
+        let is_own = text.contains("enter_your_crate") && !text.contains("cullbench");
+        assert!(is_own, "{topic}: {text}");
+    }
+
     let verified = parsed(&works(
         "verify --scene city:n=500 --path orbit:frames=4 --cases 50 --structure tiles --format json",
     ));
@@ -68,9 +97,15 @@ fn main() -> ExitCode {
     assert_eq!(located.matches(",tiles,").count(), 1, "{located}");
 
     let run = "run --scene city:n=500 --path orbit:frames=4 --structure linear,tiles --no-bounds";
-    works(&format!("{run} --out run"));
+    let said = works(&format!("{run} --out run"));
+    let next = "next    enter_your_crate advise --scene city:n=500 --path orbit:frames=4";
+    assert!(said.contains(next), "{said}");
     let written = std::fs::read_to_string(folder.path().join("run/report.json"));
     let report = parsed(&written.expect("a report"));
+    assert_eq!(
+        report["run"]["command"],
+        format!("enter_your_crate {run} --out run")
+    );
     let cells = report["cells"].as_array().expect("cells");
     let cell = cells.iter().find(|cell| cell["structure"] == "tiles");
     let cell = cell.expect("a cell of its own");

@@ -15,11 +15,12 @@ use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs, TableFormat,
     WhatArgs,
 };
-use super::{text, values};
+use super::{program, text, values};
 
 /// Benchmarks spatial indexes: frustum culling, region search, checked answers
 #[derive(Parser, Debug)]
-#[command(name = "cullbench", version, about, term_width = text::width().min(100), after_help = EXAMPLES)]
+#[command(name = program::name(), bin_name = program::name(), version = program::version())]
+#[command(about, term_width = text::width().min(100), after_help = program::named(EXAMPLES))]
 #[command(mut_subcommands(taking_negative_numbers))]
 pub struct Cli {
     #[command(subcommand)]
@@ -177,7 +178,7 @@ machines of the same kind. It is an error if two shards have the same cell or a
 shard is missing.";
 
 #[derive(Args, Debug)]
-#[command(after_help = MERGE_HELP)]
+#[command(after_help = program::named(MERGE_HELP))]
 pub struct MergeArgs {
     /// Folders of finished shards
     #[arg(value_name = "RUN", required = true)]
@@ -242,7 +243,7 @@ pub struct QueryArgs {
 }
 
 #[derive(Args, Debug)]
-#[command(override_usage = "cullbench locate [OPTIONS] --scene <SCENE> <--points|--boxes> <FILE>")]
+#[command(override_usage = program::named("cullbench locate [OPTIONS] --scene <SCENE> <--points|--boxes> <FILE>"))]
 pub struct LocateArgs {
     /// A scene: boxes CSV, Doom WAD, built-in name or spec
     #[arg(long)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::shared_args::{TableFormat, WhatArgs};
-use super::values;
+use super::{program, values};
 
 const COMPARE_HELP: &str = "\
 Examples:
@@ -32,7 +32,7 @@ pub enum Gate {
 }
 
 #[derive(Args, Debug)]
-#[command(after_help = COMPARE_HELP)]
+#[command(after_help = program::named(COMPARE_HELP))]
 pub struct CompareArgs {
     /// report.json of the older run, or the folder it is in; with --baseline NEW alone
     #[arg(value_name = "OLD.json", required_unless_present_any = ["against", "baseline"])]

@@ -11,7 +11,7 @@ use super::document::{Block, folded, to_markdown, to_terminal};
 use super::run_table::short;
 use super::shared_args::TableFormat;
 use super::table::Table;
-use super::{Ending, print_json, text};
+use super::{Ending, print_json, program, text};
 use crate::culling::CullingTest;
 use crate::measure::{CellKey, METRICS};
 use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};
@@ -94,7 +94,7 @@ impl CompareTable {
     pub fn show(&self, args: &CompareArgs) -> io::Result<()> {
         let text = match (args.markdown, args.format) {
             (true, _) => folded(
-                &format!("cullbench: {}", self.summary()),
+                &format!("{}: {}", program::name(), self.summary()),
                 &to_markdown(&self.blocks(args.all, None)),
             ),
             (false, TableFormat::Table) => {

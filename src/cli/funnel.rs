@@ -17,7 +17,7 @@ use super::shared_args::StudyArgs;
 use super::study::{Setting, Study};
 use super::{
     Ending, expect_places, funnel_csv, funnel_figure, funnel_picture, funnel_table, interrupt,
-    print_json, text, unread_is_fine, write_text,
+    print_json, program, text, unread_is_fine, write_text,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -87,7 +87,12 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     if let Some(file) = &args.html {
         let picture = Block::Picture(funnel_picture::draw(&report, &stages.setting.scene));
         let figures = [Block::Figure(funnel_figure::chain(&report)), picture];
-        let title = format!("cullbench funnel {}, {}", report.scene, report.path);
+        let title = format!(
+            "{} funnel {}, {}",
+            program::name(),
+            report.scene,
+            report.path
+        );
         let blocks = funnel_table::blocks(&report, true);
         let page = to_page(&title, &report.conclusions, figures, blocks);
         write_text(file, &page)?;

@@ -6,7 +6,7 @@ use super::figure::{Axis, is_drawn};
 use super::palette::Look;
 use super::run_figures::ends;
 use super::table::{Column, Table};
-use super::text;
+use super::{program, text};
 use crate::measure::{CellKey, GroupKey, Metric};
 use crate::report::{Report, ReportCell, settings};
 
@@ -137,7 +137,8 @@ pub fn page(mut reports: Vec<Report>) -> String {
         blocks.push(Block::Table(table));
     }
     let title = format!(
-        "cullbench history of {}",
+        "{} history of {}",
+        program::name(),
         text::counted(reports.len(), "run")
     );
     let mut all = vec![

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::args::{ListArgs, ListTopic};
 use super::shared_args::TableFormat;
-use super::{Ending, print_json, text};
+use super::{Ending, print_json, program, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::{BOUNDS, METRICS};
@@ -144,7 +144,8 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, or \
                  a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes have licences of their \
-                 own: `cullbench licences`.\nSuites of `run`:\n{suites}"
+                 own: `{} licences`.\nSuites of `run`:\n{suites}",
+                program::name()
             );
             (
                 "scenes",

@@ -44,6 +44,7 @@ mod precision_chart;
 mod precision_conclusions;
 mod precision_tables;
 mod processes;
+mod program;
 mod protocol;
 mod query;
 mod report;
@@ -138,6 +139,27 @@ impl Ending {
 /// }
 /// ```
 pub fn main_with(registry: Registry) -> ExitCode {
+    program::set(None);
+    start(registry)
+}
+
+/// [`main_with`] under the name and the version of another crate, which help texts,
+/// reports and the commands in messages then have.
+///
+/// ```no_run
+/// use cullbench::{cli, index::Registry};
+///
+/// fn main() -> std::process::ExitCode {
+///     let program = (env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"));
+///     cli::main_as(program, Registry::builtin())
+/// }
+/// ```
+pub fn main_as(program: (&'static str, &'static str), registry: Registry) -> ExitCode {
+    program::set(Some(program));
+    start(registry)
+}
+
+fn start(registry: Registry) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return refused(&error),
@@ -205,7 +227,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Worker => worker::worker(registry),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "cullbench", &mut script);
+            clap_complete::generate(shell, &mut Cli::command(), program::name(), &mut script);
             print_all(&script)
         }
         Command::Man => {

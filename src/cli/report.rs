@@ -13,8 +13,8 @@ use super::document::{Block, to_html, to_markdown};
 use super::surface_charts::{self, Picture};
 use super::table::{Column, Table};
 use super::{
-    Ending, bencher, expect_folder, expect_places, history, run_figures, run_table, surface_tables,
-    tell, text, write_text,
+    Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_table,
+    surface_tables, tell, text, write_text,
 };
 use crate::index::Registry;
 use crate::measure::{BOUNDS, METRICS, Status};
@@ -170,7 +170,7 @@ fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
 }
 
 fn title(report: &Report) -> String {
-    format!("cullbench run {}", report.run.id)
+    format!("{} run {}", program::name(), report.run.id)
 }
 
 fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {

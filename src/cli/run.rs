@@ -355,11 +355,21 @@ fn next(report: &Report, width: usize) -> Option<String> {
     };
     let scene = path.as_ref().map_or("FILE", |_| &scene);
     let mut line = format!("next    {program} {command} --scene {scene}");
-    if let Some(path) = path.filter(|_| first.path.name != DEFAULT_PATH) {
-        let is_within = line.chars().count() + path.chars().count() + 8 <= width;
-        // The shell joins the two lines.
+    let path = path.filter(|_| first.path.name != DEFAULT_PATH);
+    let mut options: Vec<String> = path
+        .map(|path| format!("--path {path}"))
+        .into_iter()
+        .collect();
+    // How files are read.
+    let typed: Vec<&str> = report.run.command.split(' ').collect();
+    let reads = |pair: &&[&str]| ["--matrix-convention", "--up"].contains(&pair[0]);
+    options.extend(typed.windows(2).filter(reads).map(|pair| pair.join(" ")));
+    for option in options.iter().filter(|_| report.run.suite.is_none()) {
+        let last = line.rsplit('\n').next().unwrap_or_default();
+        let is_within = last.chars().count() + option.chars().count() + 1 <= width;
+        // The shell joins the lines.
         let gap = if is_within { " " } else { " \\\n        " };
-        line += &format!("{gap}--path {path}");
+        line += &format!("{gap}{option}");
     }
     let is_within = line.chars().count() + gives.len() + 2 <= width;
     Some(if is_within {

@@ -12,7 +12,7 @@ use clap::{ArgMatches, CommandFactory, Parser};
 
 use super::args::{Cli, Command, RunArgs};
 use super::run_plan::RunPlan;
-use super::{tell, text, usage};
+use super::{program, tell, text, usage};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
     Difference, Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, read_report,
@@ -45,7 +45,9 @@ pub fn create(
     let header = Header::of(&plan.plan, machine, format!("{stamp}-{id}"), now);
     let header = Header {
         run: RunInfo {
-            command: [&["cullbench".to_owned()], &typed[..]].concat().join(" "),
+            command: [&[program::name().to_owned()], &typed[..]]
+                .concat()
+                .join(" "),
             suite: plan.from_suite.then(|| plan.suite.name.to_owned()),
             shard: args.shard.clone(),
             ..header.run
@@ -115,7 +117,7 @@ fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
             before.told(&id)
         );
     }
-    let recorded = Cli::try_parse_from(program().chain(recorded.to_vec()));
+    let recorded = Cli::try_parse_from(first().chain(recorded.to_vec()));
     match recorded.map_err(one_line)?.command {
         Command::Run(args) => Ok(args),
         _ => bail!(NO_RUN),
@@ -150,8 +152,8 @@ fn one_line(error: clap::Error) -> anyhow::Error {
     }
 }
 
-fn program() -> std::iter::Once<String> {
-    std::iter::once("cullbench".to_owned())
+fn first() -> std::iter::Once<String> {
+    std::iter::once(program::name().to_owned())
 }
 
 /// The options of a `run`, as they were typed.
@@ -159,7 +161,7 @@ struct RunOptions(ArgMatches);
 
 impl RunOptions {
     fn recorded(args: &[String]) -> anyhow::Result<RunOptions> {
-        RunOptions::of(program().chain(args.to_vec()))
+        RunOptions::of(first().chain(args.to_vec()))
     }
 
     fn of(

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::shared_args::{LensArgs, SceneArgs, TableFormat};
-use super::values;
+use super::{program, values};
 
 #[derive(Subcommand, Debug)]
 pub enum SceneCommand {
@@ -60,7 +60,7 @@ the same answers, and converting it again writes the same bytes. Regions, camera
 places and the tree of a map are not written.";
 
 #[derive(Args, Debug)]
-#[command(after_help = CONVERT_HELP)]
+#[command(after_help = program::named(CONVERT_HELP))]
 pub struct SceneConvertArgs {
     /// A scene: boxes CSV, Doom WAD, built-in name or spec
     #[arg(value_name = "INPUT")]
@@ -89,7 +89,7 @@ Items that lie around others are outlined. Cells of a structure are what its
 queries test: children in blocks of sixteen, but for the textbook forms.";
 
 #[derive(Args, Debug)]
-#[command(after_help = DRAW_HELP)]
+#[command(after_help = program::named(DRAW_HELP))]
 pub struct SceneDrawArgs {
     /// A scene: boxes CSV, Doom WAD, built-in name or spec
     #[arg(value_name = "SCENE")]

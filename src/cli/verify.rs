@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 
 use super::args::VerifyArgs;
 use super::verify_table::{Check, Outcome, RANDOM, show};
-use super::{Ending, interrupt, load_scene, print, tell, text};
+use super::{Ending, interrupt, load_scene, print, program, tell, text};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
 use crate::geometry::ConvexVolume;
@@ -149,8 +149,9 @@ fn paths(args: &VerifyArgs, scene: &Scene) -> Vec<String> {
 fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
     let (lens, culling) = (&args.lens, &args.culling);
     let mut command = format!(
-        "cullbench verify --scene '{scene}' --path '{path}' --planes {} --epsilon {} \
+        "{} verify --scene '{scene}' --path '{path}' --planes {} --epsilon {} \
          --arithmetic {} --fovy {} --aspect {}",
+        program::name(),
         culling.planes.name(),
         culling.epsilon,
         culling.arithmetic.name(),
@@ -160,6 +161,8 @@ fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
     for (option, plane) in [("near", lens.near), ("far", lens.far)] {
         command += &text::some(plane, |plane| format!(" --{option} {plane}"));
     }
+    let convention = lens.matrix_convention.as_deref();
+    command += &text::some(convention, |name| format!(" --matrix-convention {name}"));
     command
 }
 
@@ -348,10 +351,11 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             if let Err(Verdict { status, reason }) = found {
                 check.status = status.name();
                 check.difference = Some(format!(
-                    "{} volume, {}: {}\n  again: cullbench verify --cases 1 --seed {case_seed}",
+                    "{} volume, {}: {}\n  again: {} verify --cases 1 --seed {case_seed}",
                     VOLUME_KINDS[case.kind],
                     text::counted(case.items.len(), "item"),
-                    reason.unwrap_or_default()
+                    reason.unwrap_or_default(),
+                    program::name()
                 ));
             }
         }

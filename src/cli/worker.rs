@@ -55,9 +55,7 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     for (source, file) in &request.spooled {
         crate::input::stand_in(source, file)?;
     }
-    let typed = ["cullbench".to_owned()]
-        .into_iter()
-        .chain(request.args.clone());
+    let typed = [String::new()].into_iter().chain(request.args.clone());
     match (&request.job, Cli::try_parse_from(typed)?.command) {
         (
             Job::Scene {

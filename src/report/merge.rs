@@ -246,7 +246,8 @@ fn joined(shards: &[&Stream], args: &[String], is_partial: bool) -> Header {
     let begun = begun.cloned().unwrap_or_default();
     header.run.started_at = begun;
     header.run.id = format!("{}-of-{}", header.run.id, shards.len());
-    header.run.command = [&["cullbench".to_owned()], args].concat().join(" ");
+    let program = header.run.command.split(' ').next().unwrap_or_default();
+    header.run.command = [&[program.to_owned()], args].concat().join(" ");
     header.args = args.to_vec();
     let whole = header.whole().to_vec();
     let has = |key: &&GroupKey| headers().any(|h| h.groups.contains(key));
