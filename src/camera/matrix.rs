@@ -21,6 +21,18 @@ named! {
     }
 }
 
+impl MatrixConvention {
+    /// The convention with rows and columns exchanged.
+    pub fn transposed(self) -> MatrixConvention {
+        match self {
+            MatrixConvention::ColumnGl => MatrixConvention::RowGl,
+            MatrixConvention::ColumnD3d => MatrixConvention::RowD3d,
+            MatrixConvention::RowGl => MatrixConvention::ColumnGl,
+            MatrixConvention::RowD3d => MatrixConvention::ColumnD3d,
+        }
+    }
+}
+
 /// The names of the entries: row, then column, as they are written down.
 pub const MATRIX_ENTRIES: [&str; 16] = [
     "m00", "m01", "m02", "m03", "m10", "m11", "m12", "m13", "m20", "m21", "m22", "m23", "m30",
@@ -118,6 +130,24 @@ impl ViewProjection {
     /// The rows for column vectors: clip = rows * (x, y, z, 1).
     pub fn rows(&self) -> &[[f64; 4]; 4] {
         &self.rows
+    }
+
+    /// The convention that it was read by.
+    pub fn convention(&self) -> MatrixConvention {
+        self.convention
+    }
+
+    /// The matrix that the other order of rows and columns makes of the same entries.
+    pub fn transposed(&self) -> Option<ViewProjection> {
+        let is_row = matches!(
+            self.convention,
+            MatrixConvention::RowGl | MatrixConvention::RowD3d
+        );
+        let rows = match is_row {
+            true => [0, 1, 2, 3].map(|i| self.rows.map(|row| row[i])),
+            false => self.rows,
+        };
+        ViewProjection::new(rows, self.convention.transposed()).ok()
     }
 
     /// Returns whether depth begins at 0, and not at -w.

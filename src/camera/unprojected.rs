@@ -84,6 +84,12 @@ impl ViewProjection {
         })
     }
 
+    /// Returns whether the image is not sheared and depth runs along the axis of view.
+    pub fn is_straight(&self) -> bool {
+        let found = self.unprojected();
+        found.is_ok_and(|found| found.shear <= STRAIGHT && found.tilt <= STRAIGHT)
+    }
+
     /// Clip-space depths of the near and the far plane.
     fn depths(&self) -> [f64; 2] {
         let lowest = if self.is_from_zero() { 0.0 } else { -1.0 };

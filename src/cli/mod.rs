@@ -33,6 +33,7 @@ mod funnel_figure;
 mod funnel_picture;
 mod funnel_table;
 mod history;
+mod inputs;
 mod interrupt;
 mod list;
 mod merge;
@@ -82,7 +83,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::index::Registry;
-use crate::input::{hold_files, tell_notes};
+use crate::input::{hold_files, tell_notes, tell_warnings};
 use crate::report::{FolderError, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene};
 use crate::shown::expected_by;
@@ -169,10 +170,14 @@ fn start(registry: Registry) -> ExitCode {
         _ => {
             interrupt::install();
             hold_files(BTreeMap::new());
-            tell_notes(|note| tell(&format!("note: {note}")));
+            tell_notes(tell);
         }
     }
-    match dispatch(&registry, cli.command) {
+    let ending = dispatch(&registry, cli.command);
+    if ending.is_ok() {
+        tell_warnings();
+    }
+    match ending {
         Ok(Ending::Ok) => ExitCode::SUCCESS,
         Ok(Ending::WrongAnswer) => ExitCode::from(1),
         Ok(Ending::Regression) => ExitCode::from(3),

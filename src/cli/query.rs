@@ -11,6 +11,7 @@ use super::args::{LocateArgs, QueryArgs};
 use super::compare_structures::{Row, ask_all, write};
 use super::{Ending, load_scene, tell};
 use crate::index::{DynIndex, Registry};
+use crate::input::tell_warnings;
 use crate::measure::Workload;
 use crate::path::{self, read_points_csv};
 use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
@@ -24,6 +25,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &culling)?;
+    tell_warnings();
     if let Some(doubt) = culling.unproven() {
         tell(&format!("note: {doubt}"));
     }

@@ -352,6 +352,7 @@ fn about(report: &Report) -> Vec<String> {
         format!("{}.", text::conclusion(report)),
     ];
     lines.extend(report.noise.warnings.iter().cloned());
+    lines.extend(report.input_warnings().into_iter().map(str::to_owned));
     lines
 }
 

@@ -7,6 +7,7 @@ use super::args::RunArgs;
 use super::shared_args::WhatArgs;
 use crate::culling::Culling;
 use crate::index::Registry;
+use crate::input::tell_warnings;
 use crate::measure::{GroupKey, Plan, PlannedScene, Workload};
 use crate::path::{self, CameraPath, LensDefaults};
 use crate::report::{KeptPart, Stream};
@@ -171,6 +172,7 @@ impl RunPlan {
                 }
             }
         }
+        tell_warnings();
         Ok(())
     }
 }

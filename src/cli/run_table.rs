@@ -2,11 +2,12 @@
 //!
 //! One scene and path is a row per structure, several are a row each.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::path::Path;
 
 use super::table::{Column, Table};
-use super::{run_verdict, surface_tables, text};
+use super::{inputs, run_verdict, surface_tables, text};
 use crate::measure::Status;
 use crate::report::{Comparison, Overall, Ranked, Report, ReportCell, comparisons, times_as_fast};
 use crate::shown::shortened;
@@ -83,6 +84,9 @@ fn heads(comparison: &Comparison) -> Vec<String> {
         text::counted(scene.total_count, "item"),
         text::counted(scene.region_count, "region")
     );
+    if !scene.up.is_empty() {
+        first += &format!(", {}", inputs::axes(scene));
+    }
     if scene.skipped_items > 0 {
         let bad = text::counted(scene.skipped_items, "bad item");
         first += &format!(", {bad} left out");
@@ -105,7 +109,11 @@ fn heads(comparison: &Comparison) -> Vec<String> {
         (None, sources) => sources.map(|items| format!("false positives {items}")),
     };
     let third: Vec<String> = visible.into_iter().chain(excess).collect();
-    let lines = [first, second, third.join(", ")].into_iter();
+    let lens = path.lens.as_ref().map(inputs::lens).unwrap_or_default();
+    let matrix = path.lens.as_ref().and_then(|lens| lens.matrix.as_ref());
+    let matrix = matrix.map(|matrix| format!("matrices: {}", inputs::matrices(matrix)));
+    let matrix = matrix.unwrap_or_default();
+    let lines = [first, second, lens, matrix, third.join(", ")].into_iter();
     lines.filter(|line| !line.is_empty()).collect()
 }
 
@@ -268,7 +276,13 @@ fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: 
         ),
     };
     let parts: Vec<String> = parts[..shown].iter().map(Table::bare).collect();
-    format!("{}\n* fastest or tied{more}\n\n", parts.join("\n"))
+    let about = || rows.iter().map(|(_, comparison)| comparison.about());
+    let up: BTreeSet<&str> = about().map(|cell| cell.scene.up.as_str()).collect();
+    let up: Vec<&str> = up.into_iter().collect();
+    let lens = inputs::lenses(about().map(|cell| &cell.path));
+    let head = lens.map(|lens| format!("{} up; {lens}\n\n", up.join(" or ")));
+    let head = text::wrapped(&head.unwrap_or_default(), width);
+    format!("{head}{}\n* fastest or tied{more}\n\n", parts.join("\n"))
 }
 
 /// Short names of scenes and paths: "city 100k flythrough 2 %".

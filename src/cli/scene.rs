@@ -8,8 +8,9 @@ use serde_json::json;
 
 use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
 use super::shared_args::TableFormat;
-use super::{Ending, expect_place_for, interrupt, load_scene, print_json, tell, text};
+use super::{Ending, expect_place_for, inputs, interrupt, load_scene, print_json, tell, text};
 use crate::measure::SceneInfo;
+use crate::path::{self, CameraFacts};
 use crate::report::write_atomically;
 use crate::scene::{Regions, Scene, UpAxis, write_boxes_csv};
 use crate::spec::SpecError;
@@ -17,6 +18,11 @@ use crate::statistics::{quantile, sorted};
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.scene_args, 0)?;
+    let defaults = args.lens.defaults()?.of_scene(&scene);
+    let path = args.path.as_ref();
+    let path = path.map(|path| path::load(path, &scene, &defaults));
+    let cameras = path.transpose()?.map_or(Vec::new(), |path| path.cameras);
+    let facts = (!cameras.is_empty()).then(|| CameraFacts::of(&cameras));
     let info = SceneInfo::of(&scene);
     let sizes = sizes(&scene);
     let portals = match &scene.regions {
@@ -25,6 +31,14 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     };
     if args.format == TableFormat::Json {
         let mut value = serde_json::to_value(&info)?;
+        if let (Some(facts), Some(path)) = (&facts, &args.path) {
+            value["cameras"] = json!({
+                "name": path,
+                "camera_count": cameras.len(),
+                "lens": facts,
+                "warnings": path::warnings(&scene, path, &cameras),
+            });
+        }
         value["region_kind"] = json!(scene.regions.kind());
         value["portal_count"] = json!(portals);
         if let Some(surfaces) = &scene.surfaces {
@@ -46,6 +60,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         ("items", text::count(info.total_count)),
         ("bounds", format!("{low} to {high}")),
         ("origin", origin),
+        ("axes", inputs::axes(&info)),
         (
             "sizes",
             match sizes.map(|size| size.map(text::short)) {
@@ -64,6 +79,19 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
             ),
         ),
     ];
+    match (&facts, &args.path) {
+        (Some(facts), Some(path)) => {
+            let views = text::counted(cameras.len(), "camera");
+            let lens = inputs::lens(facts);
+            rows.push(("cameras", text::plain(&format!("{path}: {views}, {lens}"))));
+            let matrix = facts.matrix.as_ref().map(inputs::matrices);
+            rows.extend(matrix.map(|matrix| ("matrices", matrix)));
+        }
+        _ => {
+            let lens = inputs::default_lens(&defaults);
+            rows.push(("cameras", format!("recorded ones without a lens: {lens}")));
+        }
+    }
     if let Some(surfaces) = &scene.surfaces {
         rows.push(("triangles", text::count(surfaces.triangles.len())));
     }

@@ -24,10 +24,15 @@ pub struct SceneInfoArgs {
     /// A scene: boxes CSV, Doom WAD, built-in name or spec
     #[arg(value_name = "SCENE")]
     pub scene: String,
+    /// Cameras to show as used: a path, or a cameras CSV
+    #[arg(long, visible_alias = "cameras", value_name = "PATH")]
+    pub path: Option<String>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
     #[command(flatten)]
     pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
 }
 
 #[derive(Args, Debug)]

@@ -204,8 +204,8 @@ pub struct LensArgs {
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf; beyond 1.7e38 counts as inf [default:
-    /// twice the scene's diagonal for recorded cameras, the far side of the scene for
-    /// paths]
+    /// twice the scene's diagonal for recorded cameras, and at least the far side of the
+    /// scene, as for paths]
     #[arg(long, value_parser = values::far)]
     pub far: Option<f64>,
     /// Convention of cameras given as matrices (columns m00 to m33: row, column):

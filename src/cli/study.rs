@@ -12,6 +12,7 @@ use super::protocol::{Job, Timing};
 use super::shared_args::{SpreadArgs, StudyArgs};
 use super::{load_scene_by, tell, text};
 use crate::index::{Registry, StructureSpec};
+use crate::input::tell_warnings;
 use crate::measure::{ProcessTimes, Protocol};
 use crate::path::{self, CameraPath};
 use crate::scene::{self, LoadOptions, Scene};
@@ -117,7 +118,10 @@ impl Study {
             "at work: {}{work}, timed in {times}; the defaults take {by_default}",
             self.about
         );
-        self.bar.suspend(|| tell(&line));
+        self.bar.suspend(|| {
+            tell_warnings();
+            tell(&line);
+        });
     }
 
     /// Shows the step that begins.

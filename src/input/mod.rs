@@ -10,6 +10,6 @@ mod table;
 pub use error::InputError;
 pub(crate) use error::gigabytes;
 pub use file::{held_files, hold_files, is_readable, pipes, read_file, stand_in};
-pub(crate) use note::note;
-pub use note::tell_notes;
+pub(crate) use note::{note, warn};
+pub use note::{tell_notes, tell_warnings};
 pub use table::{Row, TableReader};

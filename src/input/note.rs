@@ -1,24 +1,54 @@
-//! Notes on ignored or guessed input, shown once each by the program.
+//! Notes and warnings about input, shown once each by the program.
 
 use std::collections::BTreeSet;
+use std::mem;
 use std::sync::{Mutex, PoisonError};
 
-type Told = (fn(&str), BTreeSet<String>);
+/// Receiver of the lines, all lines so far, and warnings that were not told yet.
+type Told = (fn(&str), BTreeSet<String>, Vec<String>);
 
 static LISTENER: Mutex<Option<Told>> = Mutex::new(None);
 
-/// From now on `tell` gets each different note once. Without it notes are dropped.
+/// From now on `tell` gets each different line once. Without it lines are dropped.
 pub fn tell_notes(tell: fn(&str)) {
-    let mut listener = LISTENER.lock().unwrap_or_else(PoisonError::into_inner);
-    *listener = Some((tell, BTreeSet::new()));
+    listening(|listener| *listener = Some((tell, BTreeSet::new(), Vec::new())));
 }
 
 /// One line about an input that is no error.
 pub(crate) fn note(text: &str) {
-    let mut listener = LISTENER.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((tell, told)) = listener.as_mut()
-        && told.insert(text.to_owned())
-    {
-        tell(text);
-    }
+    let note = format!("note: {text}");
+    listening(|listener| {
+        if let Some((tell, told, _)) = listener
+            && told.insert(note.clone())
+        {
+            tell(&note);
+        }
+    });
+}
+
+/// Holds one line about a doubtful input for [`tell_warnings`].
+pub(crate) fn warn(text: &str) {
+    let warning = format!("warning: {text}");
+    listening(|listener| {
+        if let Some((_, told, held)) = listener
+            && told.insert(warning.clone())
+        {
+            held.push(warning);
+        }
+    });
+}
+
+/// Tells all warnings so far.
+///
+/// Called where inputs are known to be sound, so that an error stands alone.
+pub fn tell_warnings() {
+    listening(|listener| {
+        if let Some((tell, _, held)) = listener {
+            mem::take(held).iter().for_each(|warning| tell(warning));
+        }
+    });
+}
+
+fn listening(act: impl FnOnce(&mut Option<Told>)) {
+    act(&mut LISTENER.lock().unwrap_or_else(PoisonError::into_inner));
 }

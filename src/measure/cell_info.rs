@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{GroupKey, Workload};
 use crate::culling::Culling;
-use crate::path;
+use crate::path::{self, CameraFacts};
 use crate::scene::Scene;
 
 /// The scene of a cell.
@@ -19,6 +19,12 @@ pub struct SceneInfo {
     pub total_count: usize,
     /// Number of regions for region search.
     pub region_count: usize,
+    /// Axis that points up, y or z; empty in older reports.
+    #[serde(default)]
+    pub up: String,
+    /// Unit of coordinates; null where the file does not say.
+    #[serde(default)]
+    pub unit: Option<String>,
     /// Scene-local zero in world coordinates.
     pub origin: [f64; 3],
     /// Smallest corner of all items, scene-local.
@@ -47,6 +53,8 @@ impl SceneInfo {
             name: scene.name.clone(),
             total_count: scene.items.len(),
             region_count: scene.regions.boxes(&scene.items).len(),
+            up: scene.up.name().to_owned(),
+            unit: scene.unit.map(str::to_owned),
             origin: scene.origin.to_array(),
             bounds_min: bounds.min.to_array(),
             bounds_max: bounds.max.to_array(),
@@ -76,6 +84,12 @@ pub struct PathInfo {
     /// SHA-256 over the cameras' frames and lenses; null in older reports.
     #[serde(default)]
     pub digest: Option<String>,
+    /// Lenses as used, and how matrices were read; null in older reports.
+    #[serde(default)]
+    pub lens: Option<CameraFacts>,
+    /// Doubts about the cameras, one line each.
+    #[serde(default)]
+    pub warnings: Vec<String>,
 }
 
 impl PathInfo {
@@ -89,6 +103,8 @@ impl PathInfo {
             epsilon: key.epsilon,
             arithmetic: key.arithmetic.clone(),
             digest: None,
+            lens: None,
+            warnings: Vec::new(),
         }
     }
 
@@ -98,6 +114,8 @@ impl PathInfo {
         PathInfo {
             camera_count: workload.cameras.len(),
             digest: Some(path::digest(&workload.cameras)),
+            lens: Some(CameraFacts::of(&workload.cameras)),
+            warnings: path::warnings(workload.scene, path, &workload.cameras),
             ..PathInfo::unknown(&key)
         }
     }

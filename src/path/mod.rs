@@ -3,6 +3,7 @@
 //! Each generated family has a file of its own.
 
 mod calibrate;
+mod facts;
 mod flythrough;
 mod orbit;
 mod outside;
@@ -11,6 +12,7 @@ mod recorded;
 mod spin;
 mod street;
 mod teleport;
+mod warnings;
 mod zoom;
 
 use std::path::Path;
@@ -19,12 +21,14 @@ use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, LensKind, Surroundings};
 use crate::geometry::Aabb;
-use crate::input::{InputError, gigabytes, is_readable, read_file};
+use crate::input::{InputError, gigabytes, is_readable, read_file, warn};
 use crate::scene::{self, Scene, SeededRng, UpAxis, WorldBox};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
+pub use facts::{CameraFacts, MatrixFacts};
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
+pub use warnings::warnings;
 
 /// A named sequence of cameras.
 #[derive(Clone, Debug)]
@@ -247,6 +251,17 @@ pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<Came
 /// # Errors
 /// As [`load`].
 pub fn load_scaled(
+    source: &str,
+    scene: &Scene,
+    defaults: &LensDefaults,
+    scale: Option<f64>,
+) -> Result<CameraPath, PathError> {
+    let path = read(source, scene, defaults, scale)?;
+    path.warnings(scene).iter().for_each(|text| warn(text));
+    Ok(path)
+}
+
+fn read(
     source: &str,
     scene: &Scene,
     defaults: &LensDefaults,

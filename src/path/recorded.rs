@@ -26,8 +26,9 @@ pub struct LensDefaults {
     pub far: Option<Option<f64>>,
     /// Vector that is up in the image; [`load`](super::load) takes the scene's.
     pub up: DVec3,
-    /// Far plane of recorded cameras without one; [`load`](super::load) takes twice the
-    /// scene's diagonal.
+    /// Middle of the scene; set by [`load`](super::load).
+    pub middle: DVec3,
+    /// Twice the scene's diagonal; set by [`load`](super::load).
     pub reach: f64,
     /// How files are to be read whose cameras are matrices.
     pub matrix: Option<MatrixConvention>,
@@ -41,6 +42,7 @@ impl Default for LensDefaults {
             near: None,
             far: None,
             up: DVec3::Z,
+            middle: DVec3::ZERO,
             reach: 1000.0,
             matrix: None,
         }
@@ -48,12 +50,28 @@ impl Default for LensDefaults {
 }
 
 impl LensDefaults {
+    /// Near and far plane of a recorded camera without either.
+    ///
+    /// Far is twice the scene's diagonal, or the far side of the scene from an eye
+    /// farther outside; near is a thousandth of that.
+    pub fn depths(&self, eye: DVec3) -> (f64, Option<f64>) {
+        let side = eye.distance(self.middle) + self.reach / 4.0;
+        let far = self.far.unwrap_or(Some(side.max(self.reach).min(FARTHEST)));
+        (self.near.unwrap_or_else(|| self.near_of(far)), far)
+    }
+
+    /// Near plane of a recorded camera with this far plane.
+    fn near_of(&self, far: Option<f64>) -> f64 {
+        far.filter(|far| *far > 0.0).unwrap_or(self.reach) / FAR_IN_NEARS
+    }
+
     /// The same with up axis and size of a scene.
-    pub(super) fn of_scene(&self, scene: &Scene) -> LensDefaults {
+    pub fn of_scene(&self, scene: &Scene) -> LensDefaults {
         let WorldBox { min, max } = scene.world_bounds();
         let diagonal = (max - min).length();
         LensDefaults {
             up: scene.up.vector(),
+            middle: min / 2.0 + max / 2.0,
             // A point has no size.
             reach: if diagonal > 0.0 { 2.0 * diagonal } else { 2.0 }.min(FARTHEST),
             ..*self
@@ -220,16 +238,14 @@ fn eyes<'a>(
         let far = match far {
             Some(column) if is_infinite(column) => None,
             Some(column) => Some(row.finite_number(column)?),
-            None => defaults.far.unwrap_or(Some(defaults.reach)),
+            None => defaults.depths(eye).1,
         };
         let height = height.filter(|column| !row.text(*column).is_empty());
         let height = height.map(|column| row.finite_number(column)).transpose()?;
         // Not read where the lens is orthographic.
         let fovy_deg = number(fovy.filter(|_| height.is_none()), defaults.fovy_deg)?;
         let aspect = number(aspect, defaults.aspect)?;
-        let positive = far.filter(|far| *far > 0.0);
-        let scaled = positive.unwrap_or(defaults.reach) / FAR_IN_NEARS;
-        let near = number(near, defaults.near.unwrap_or(scaled))?;
+        let near = number(near, defaults.near.unwrap_or_else(|| defaults.near_of(far)))?;
         let frame = if by_forward {
             Frame::looking_along(eye, target, up)
         } else {
@@ -383,15 +399,18 @@ mod tests {
             read_boxes_csv(boxes.as_bytes(), "note-b.csv", false).unwrap();
         }
         let heard = HEARD.lock().unwrap();
-        let heard: Vec<&String> = heard.iter().filter(|n| n.starts_with("note-")).collect();
+        let heard: Vec<&String> = heard
+            .iter()
+            .filter(|n| n.starts_with("note: note-"))
+            .collect();
         assert_eq!(
             heard,
             [
-                "note-c.csv, line 1: columns that are not read: 'fov' (did you mean 'fovy_deg'?), \
+                "note: note-c.csv, line 1: columns that are not read: 'fov' (did you mean 'fovy_deg'?), \
                  'Far' (did you mean 'far'?), 'zfar' (did you mean 'far'?), 'ortho_size' (did you \
                  mean 'ortho_height'?), 'roll' (did you mean 'up_x,up_y,up_z'?), 'size'",
-                "note-p.csv, line 1: columns that are not read: 'X' (did you mean 'x'?)",
-                "note-b.csv: column 'Min_X' is kept as a label beside 'min_x'",
+                "note: note-p.csv, line 1: columns that are not read: 'X' (did you mean 'x'?)",
+                "note: note-b.csv: column 'Min_X' is kept as a label beside 'min_x'",
             ]
         );
     }

@@ -18,6 +18,7 @@ use super::stream::{Header, KeptPart, Line, Stream};
 use super::writing::{locked_temporary_in, replace_atomically, sweep};
 use super::{Report, ReportCell};
 use crate::measure::{METRICS, Part, TaskSamples};
+use crate::path::CameraFacts;
 use crate::shown::shown_field;
 
 /// The folder of a run that is being measured, locked against others.
@@ -344,6 +345,47 @@ const SUMMARY_COLUMNS: [Column; 16] = [
     ("total_count", |cell| cell.scene.total_count.to_string()),
 ];
 
+/// Columns of summary.csv behind those of the metrics.
+const INPUT_COLUMNS: [Column; 13] = [
+    ("up", |cell| cell.scene.up.clone()),
+    ("unit", |cell| text(cell.scene.unit.as_ref())),
+    ("fovy_deg_min", |cell| {
+        text(lens(cell, |l| Some(l.fovy_deg?[0])))
+    }),
+    ("fovy_deg_max", |cell| {
+        text(lens(cell, |l| Some(l.fovy_deg?[1])))
+    }),
+    ("ortho_height_min", |cell| {
+        text(lens(cell, |l| Some(l.ortho_height?[0])))
+    }),
+    ("ortho_height_max", |cell| {
+        text(lens(cell, |l| Some(l.ortho_height?[1])))
+    }),
+    ("aspect_min", |cell| {
+        text(lens(cell, |l| Some(l.aspect?[0])))
+    }),
+    ("aspect_max", |cell| {
+        text(lens(cell, |l| Some(l.aspect?[1])))
+    }),
+    ("near_min", |cell| text(lens(cell, |l| Some(l.near?[0])))),
+    ("near_max", |cell| text(lens(cell, |l| Some(l.near?[1])))),
+    ("far_min", |cell| {
+        text(lens(cell, |l| Some(l.far[0].unwrap_or(f64::INFINITY))))
+    }),
+    ("far_max", |cell| {
+        text(lens(cell, |l| Some(l.far[1].unwrap_or(f64::INFINITY))))
+    }),
+    ("matrix_convention", |cell| {
+        let lens = cell.path.lens.as_ref();
+        text(lens.and_then(|lens| Some(lens.matrix.as_ref()?.convention.as_str())))
+    }),
+];
+
+/// A value of the lenses of a cell.
+fn lens(cell: &ReportCell, of: fn(&CameraFacts) -> Option<f64>) -> Option<f64> {
+    cell.path.lens.as_ref().and_then(of)
+}
+
 /// The metrics whose intervals summary.csv has.
 const WITH_INTERVALS: &[&str] = &[
     "query_ns",
@@ -369,6 +411,7 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
             header.extend(["lower", "upper"].map(|end| format!("{}_{end}", metric.name)));
         }
     }
+    header.extend(INPUT_COLUMNS.map(|(name, _)| name.to_owned()));
     csv.write_record(&header)?;
     for cell in cells {
         let mut row: Vec<String> = SUMMARY_COLUMNS.map(|(_, of)| of(cell)).into();
@@ -379,6 +422,7 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
                 row.extend([found.and_then(|m| m.lower), found.and_then(|m| m.upper)].map(text));
             }
         }
+        row.extend(INPUT_COLUMNS.map(|(_, of)| of(cell)));
         csv.write_record(&row)?;
     }
     csv.flush()

@@ -1,6 +1,8 @@
 //! report.json: one run with everything needed to judge it. Readers ignore
 //! unknown fields; the JSON Schema in docs/ is generated from these types.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use crate::measure::{Machine, PathInfo, ReportCell, Source, Status, Toolchain};
@@ -35,6 +37,13 @@ pub struct Report {
 }
 
 impl Report {
+    /// Doubts about cameras, each once.
+    pub fn input_warnings(&self) -> BTreeSet<&str> {
+        let cells = self.cells.iter();
+        let all = cells.flat_map(|cell| &cell.path.warnings);
+        all.map(String::as_str).collect()
+    }
+
     /// Returns true if an answer is wrong, or if structures were tried and none has
     /// answered (exit code 1).
     pub fn has_failed(&self) -> bool {

@@ -157,3 +157,193 @@ fn every_command_that_reads_a_scene_takes_up() {
         done.err
     );
 }
+
+const MATRIX: &str = "m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33";
+/// From (2, 3, 1) along +y with z up, 90 degrees, from 1 to 9 ahead, depth -1 to 1.
+const GL: &str = "1,0,0,-2,0,0,1,-1,0,1.25,0,-6,0,1,0,-3";
+/// The axis of x leans towards z.
+const SHEARED: &str = "1,0,0.5,-2,0,0,1,-1,0,1.25,0,-6,0,1,0,-3";
+
+#[test]
+fn a_run_says_axes_and_lens_as_used() {
+    let folder = both_axes();
+    let cameras = format!(
+        "{FULL_CAMERA}\n0,-90,0,0,0,0,0,0,1,50,1.5,0.5,\n0,-90,0,0,0,0,0,0,1,60,1.5,0.5,400\n"
+    );
+    std::fs::write(folder.path().join("c.csv"), cameras).expect("writable");
+    let run = "run --scene z.csv --path c.csv --structure linear,bvh --processes 2 --out run";
+    let out = works(folder.path(), run);
+    for wanted in [
+        "z up, no unit stated",
+        "50 to 60 degrees, aspect 1.5, near 0.5, far 400 to infinite",
+    ] {
+        assert!(out.contains(wanted), "{wanted}: {out}");
+    }
+    let file = |name: &str| {
+        let file = folder.path().join("run").join(name);
+        std::fs::read_to_string(file).expect("a file of the run")
+    };
+    let report = json(&file("report.json"));
+    let [scene, path] = ["scene", "path"].map(|of| &array(&report, "cells")[0][of]);
+    assert_eq!((&scene["up"], scene["unit"].is_null()), (&"z".into(), true));
+    let lens = &path["lens"];
+    assert_eq!(lens["fovy_deg"], serde_json::json!([50.0, 60.0]));
+    assert_eq!(lens["far"], serde_json::json!([400.0, null]));
+    assert!(array(path, "warnings").is_empty() && lens["matrix"].is_null());
+    let summary = file("summary.csv");
+    let row = &rows(&summary)[0];
+    for (column, wanted) in [
+        ("up", "z"),
+        ("unit", ""),
+        ("fovy_deg_min", "50"),
+        ("fovy_deg_max", "60"),
+        ("aspect_min", "1.5"),
+        ("near_max", "0.5"),
+        ("far_min", "400"),
+        ("far_max", "inf"),
+        ("matrix_convention", ""),
+    ] {
+        assert_eq!(row[column], wanted, "{column}");
+    }
+    let header = summary.lines().next().expect("a header");
+    assert!(header.ends_with("far_max,matrix_convention"), "{header}");
+    // Several scenes share a line.
+    let many = "run --scene freedm-map12 --scene city:n=300 --path spin:frames=4 --structure \
+                linear,bvh --processes 2 --no-bounds --out many";
+    let out = works(folder.path(), many);
+    assert!(
+        out.contains("z up; 60 degrees, aspect 1.778, near "),
+        "{out}"
+    );
+}
+
+#[test]
+fn matrices_are_said_taken_apart() {
+    let folder = both_axes();
+    std::fs::write(folder.path().join("m.csv"), format!("{MATRIX}\n{GL}\n")).expect("writable");
+    let taken = "column-gl, depth -1 to 1; the first: eye (2, 3, 1), right (1, 0, 0), up (0, 0, \
+                 1), forward (0, 1, 0)";
+    let cameras = "--path m.csv --matrix-convention column-gl";
+    let run = format!("run --scene z.csv {cameras} --structure linear,bvh --processes 2 --out run");
+    for line in [run.as_str(), &format!("scene info z.csv {cameras}")] {
+        let out = works(folder.path(), line);
+        let words: Vec<&str> = out.split_whitespace().collect();
+        let words = words.join(" ");
+        for wanted in [
+            taken,
+            "90 degrees, aspect 1, near 1, far 9",
+            "z up, no unit stated",
+        ] {
+            assert!(words.contains(wanted), "{wanted}: {words}");
+        }
+    }
+    let info = json(&works(
+        folder.path(),
+        &format!("scene info z.csv {cameras} --format json"),
+    ));
+    assert_eq!((&info["up"], info["unit"].is_null()), (&"z".into(), true));
+    let matrix = &info["cameras"]["lens"]["matrix"];
+    assert_eq!(matrix["forward"], serde_json::json!([0.0, 1.0, 0.0]));
+    assert_eq!(matrix["depth"], serde_json::json!([-1.0, 1.0]));
+    // Without cameras: those that state no lens.
+    let info = works(folder.path(), "scene info helsinki --fovy 40 --near 2");
+    let words: Vec<&str> = info.split_whitespace().collect();
+    let words = words.join(" ");
+    assert!(words.contains("axes z up, in m"), "{words}");
+    let lens = "recorded ones without a lens: 40 degrees, aspect 1.778, near 2, far 3879";
+    assert!(words.contains(lens), "{words}");
+}
+
+#[test]
+fn doubtful_cameras_are_one_warning_each_and_recorded() {
+    let folder = both_axes();
+    let camera = |eye: &str, up: &str| format!("{FULL_CAMERA}\n{eye},{up},50,1.5,0.5,4000\n");
+    let from = "0,-90,0,0,0,0";
+    let files = [
+        ("y_up.csv", camera("90,0,0,0,0,0", "0,1,0")),
+        ("rolled.csv", camera(from, "1,0,0.2")),
+        ("down.csv", camera(from, "0,0,-1")),
+        ("far.csv", camera("0,-3000,0,0,0,0", "0,0,1")),
+        ("away.csv", camera("0,-90,0,0,-91,0", "0,0,1")),
+        ("sheared.csv", format!("{MATRIX}\n{GL}\n{SHEARED}\n")),
+        ("gl.csv", format!("{MATRIX}\n{GL}\n")),
+    ];
+    for (name, text) in &files {
+        std::fs::write(folder.path().join(name), text).expect("writable");
+    }
+    for (cameras, wanted) in [
+        (
+            "y_up.csv",
+            "y_up.csv: y is up in 1 of 1 camera, z in z.csv; --up y if it is the scene's",
+        ),
+        ("y_up.csv --up y", ""),
+        (
+            "rolled.csv",
+            "rolled.csv: 1 of 1 camera rolled by more than 45 degrees",
+        ),
+        (
+            "down.csv",
+            "down.csv: 1 of 1 camera rolled by more than 45 degrees",
+        ),
+        (
+            "far.csv",
+            "far.csv: 1 of 1 camera more than 3 scene diagonals outside of z.csv",
+        ),
+        (
+            "away.csv",
+            "away.csv: nothing of z.csv is visible in any of 1 view",
+        ),
+        (
+            "sheared.csv --matrix-convention column-gl",
+            "sheared.csv: 1 of 2 cameras sheared",
+        ),
+        (
+            "gl.csv --matrix-convention row-gl",
+            "gl.csv: 1 of 1 camera read as row-gl sheared, their transposes are not; \
+             --matrix-convention column-gl",
+        ),
+        ("gl.csv --matrix-convention column-gl", ""),
+        ("outside:frames=4", ""),
+    ] {
+        let line = format!("query --scene z.csv --structure linear --cameras {cameras}");
+        let done = cullbench(folder.path(), &line);
+        assert_eq!(done.code, Some(0), "{line}: {}", done.err);
+        let lines: Vec<&str> = done.err.lines().collect();
+        let starts = format!("warning: {wanted}");
+        let is_said = |line: &&&str| line.starts_with(&starts);
+        let (found, all) = (lines.iter().filter(is_said).count(), lines.len());
+        assert_eq!(
+            found,
+            usize::from(!wanted.is_empty()),
+            "{line}: {}",
+            done.err
+        );
+        assert!(
+            all == found || cameras.contains("row-gl"),
+            "{line}: {}",
+            done.err
+        );
+    }
+    // Told once by the run, and recorded in its report and page.
+    let run = "run --scene z.csv --path y_up.csv --structure linear,bvh --processes 2 --out run";
+    let done = cullbench(folder.path(), run);
+    let told = "warning: y_up.csv: y is up in 1 of 1 camera";
+    assert_eq!(
+        (done.code, done.err.matches(told).count()),
+        (Some(0), 1),
+        "{done:?}"
+    );
+    let file = |name: &str| {
+        let file = folder.path().join("run").join(name);
+        std::fs::read_to_string(file).expect("a file of the run")
+    };
+    let report = json(&file("report.json"));
+    let warnings = array(&array(&report, "cells")[0]["path"], "warnings");
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(
+        warnings[0]
+            .as_str()
+            .is_some_and(|text| told.contains(&text[..20]))
+    );
+    assert!(file("report.html").contains("y is up in 1 of 1 camera"));
+}

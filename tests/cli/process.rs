@@ -45,10 +45,10 @@ pub fn cullbench(folder: &Path, line: &str) -> Done {
     }
 }
 
-/// Text of stderr without the first lines about the amount of work.
+/// Text of stderr without first lines about cameras and the amount of work.
 pub fn besides_work(mut err: &str) -> &str {
     while let Some((first, rest)) = err.split_once('\n')
-        && first.starts_with("at work: ")
+        && (first.starts_with("at work: ") || first.starts_with("warning: "))
     {
         err = rest;
     }
@@ -62,7 +62,7 @@ pub fn unwrapped(text: &str) -> String {
 
 /// Runs a command that must succeed, and returns its output.
 ///
-/// Nothing but lines about the amount of work may be on stderr.
+/// Nothing but warnings and lines about the amount of work may be on stderr.
 pub fn works(folder: &Path, line: &str) -> String {
     let done = cullbench(folder, line);
     let err = besides_work(&done.err);

@@ -310,15 +310,16 @@ fn cameras_may_be_told_in_every_way_of_the_format() {
     assert!(count(&infinite) >= count(&answer(&bare, "")));
 }
 
-/// 60 degrees, 16:9, far twice the diagonal of the scene (here 700) and near a
-/// thousandth of it, as the help says: for each one a box or an eye just inside and one
-/// just outside, in units a thousand times as large too.
+/// 60 degrees, 16:9, far twice the scene's diagonal or its far side, near far/1000.
+///
+/// As the help says: a box just inside and one just outside, in units a thousand times as
+/// large too. The diagonal is 700.
 #[test]
 fn the_lens_defaults_are_the_documented_ones() {
     let boxes = "0,1.3,0,0,1.39,0\n0,1.41,0,0,1.5,0\n0,100,57,0,100,57.5\n0,100,58,0,100,59\n\
                  102,100,0,102.5,100,0\n103,100,0,104,100,0\n\
                  -96,0,-200,-96,0,-200\n104,600,100,104,600,100\n";
-    let cameras = "0,0,0,0,1,0\n0,-801,0,0,1,0\n0,-799,0,0,1,0\n";
+    let cameras = "0,0,0,0,1,0\n0,-9000,0,0,1,0\n";
     let scaled = |text: &str| {
         let number = |n: &str| (n.parse::<f64>().expect("a number") * 1000.0).to_string();
         let row = |row: &str| row.split(',').map(number).collect::<Vec<_>>().join(",");
@@ -331,9 +332,16 @@ fn the_lens_defaults_are_the_documented_ones() {
         ];
         let folder = folder(&[("s.csv", boxes.as_bytes()), ("c.csv", cameras.as_bytes())]);
         for row in query(folder.path(), "s.csv", "c.csv", "--ids") {
-            let wanted = ["1 2 4 7", "0 1 2 3 4 5 6", "0 1 2 3 4 5 6 7"];
+            let wanted = ["1 2 4 7", "0 1 2 3 4 5 6 7"];
             let camera = number(&row, "camera") as usize;
             assert_eq!(row["visible_ids"], wanted[camera], "{}", row["structure"]);
         }
+        let info = works(folder.path(), "scene info s.csv --path c.csv --format json");
+        let lens = &json(&info)["cameras"]["lens"];
+        let [near, far] = ["near", "far"].map(|depth| lens[depth][0].as_f64().expect("a number"));
+        assert!(
+            far == 1000.0 * near && (far == 1400.0 || far == 1.4e6),
+            "{lens}"
+        );
     }
 }

@@ -249,7 +249,7 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
         &format!("run --scene none.csv --structure linear,bvh {run} none"),
     );
     assert!(
-        table.contains("none.csv: no items, no regions; nothing is ranked")
+        table.contains("none.csv: no items, no regions, z up, no unit stated; nothing is ranked")
             && table.contains("Nothing is ranked: the scene has no items.")
             && !table.contains("\nnext "),
         "{table}"
@@ -286,7 +286,10 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
         folder.path(),
         &format!("run --scene one.csv --structure linear {run} one"),
     );
-    assert!(table.contains("one.csv: 1 item, 1 region\n"), "{table}");
+    assert!(
+        table.contains("one.csv: 1 item, 1 region, z up, no unit stated\n"),
+        "{table}"
+    );
     assert!(table.contains("\n1 cell in "), "{table}");
     let alone = "per query; no other structure has a time.";
     assert!(table.contains(alone), "{table}");
