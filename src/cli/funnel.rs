@@ -3,21 +3,21 @@
 //! `funnel_table`.
 
 use std::cell::Cell;
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
 
 use super::document::{Block, to_page, to_terminal};
-use super::funnel_args::{FunnelArgs, FunnelFormat};
+use super::funnel_args::FunnelArgs;
 use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
-use super::shared_args::StudyArgs;
+use super::shared_args::{StudyArgs, TableFormat};
 use super::study::{Setting, Study};
 use super::{
-    Ending, expect_places, funnel_csv, funnel_figure, funnel_picture, funnel_table, interrupt,
-    print_json, program, text, unread_is_fine, write_text,
+    Ending, expect_folder, expect_places, funnel_csv, funnel_figure, funnel_picture, funnel_table,
+    interrupt, print, program, text, write_text,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -44,6 +44,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     ];
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     expect_places(&outputs, &inputs)?;
+    expect_folder("--csv", args.csv.as_deref())?;
     if args.mirror.is_some() && args.cut_out.is_some() {
         bail!("--mirror shows whole boxes; expected no --cut-out with it");
     }
@@ -72,15 +73,14 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         );
     }
     let report = prepared.conclude(&times);
-    let shown = unread_is_fine(match args.format {
-        FunnelFormat::Json => print_json(&report),
-        FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
-        FunnelFormat::Table => {
-            let blocks = funnel_table::blocks(&report, args.all);
-            let text = to_terminal(&blocks, text::width());
-            text::terminal().write_all(text.as_bytes())
-        }
+    let shown = print(args.format, &report, || {
+        let blocks = funnel_table::blocks(&report, args.all);
+        let text = to_terminal(&blocks, text::width());
+        text::terminal().write_all(text.as_bytes())
     });
+    if let Some(folder) = &args.csv {
+        funnel_csv::write(&report, folder)?;
+    }
     if let Some(file) = &args.svg {
         write_text(file, &funnel_picture::draw(&report, &stages.setting.scene))?;
     }
@@ -218,7 +218,10 @@ impl Stages {
             claim: self.claim.as_ref(),
             occluders: args.occluders,
             inner_boxes: args.inner_boxes.map(|most| most as usize),
-            all: args.all || args.html.is_some() || args.format != FunnelFormat::Table,
+            all: args.all
+                || args.html.is_some()
+                || args.csv.is_some()
+                || args.format != TableFormat::Table,
             picks: !args.no_picks,
             ..plain
         })

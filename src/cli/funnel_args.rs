@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use super::shared_args::StudyArgs;
+use super::shared_args::{StudyArgs, TableFormat};
 use super::values;
 use crate::query::ItemId;
 use crate::visibility::SampleGrid;
@@ -95,25 +95,21 @@ pub struct FunnelArgs {
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
     /// Compare every back end of every stage, depth orders, picking and lower bounds
-    /// too, as --format csv and json and --html do
+    /// too, as --format json, --csv and --html do
     #[arg(long)]
     pub all: bool,
-    /// Leave picking out of what --all, --format and --html add
+    /// Leave picking out of what --all, --format, --csv and --html add
     #[arg(long)]
     pub no_picks: bool,
     /// Also write tables and picture as one HTML page
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Also write each table as a CSV file (stages.csv, gains.csv, ..) to a folder
+    #[arg(long, value_name = "FOLDER")]
+    pub csv: Option<PathBuf>,
     /// Draw the first view from above, items coloured by the stage that removed them
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     #[arg(long, value_enum, default_value = "table")]
-    pub format: FunnelFormat,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
-pub enum FunnelFormat {
-    Table,
-    Csv,
-    Json,
+    pub format: TableFormat,
 }
