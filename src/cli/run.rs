@@ -366,7 +366,7 @@ fn next(report: &Report, width: usize) -> Option<String> {
     options.extend(typed.windows(2).filter(reads).map(|pair| pair.join(" ")));
     for option in options.iter().filter(|_| report.run.suite.is_none()) {
         let last = line.rsplit('\n').next().unwrap_or_default();
-        let is_within = last.chars().count() + option.chars().count() + 1 <= width;
+        let is_within = last.chars().count() + option.chars().count() < width;
         // The shell joins the lines.
         let gap = if is_within { " " } else { " \\\n        " };
         line += &format!("{gap}{option}");

@@ -271,7 +271,7 @@ fn worst_miss_px(camera: &Camera, scene: &Scene, truth: &Truth, answer: &[ItemId
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Lens, look_at};
+    use crate::camera::{ClipSpace, Lens, MatrixConvention, look_at};
     use crate::scene::WorldBox;
     use glam::DVec3;
 
@@ -296,6 +296,12 @@ mod tests {
         let px = worst_miss_px(&camera, &scene, &truth, &[2]);
         // At the far face, 12 ahead, the view is 12 high: 2 less 0 units deep.
         assert!((100.0..220.0).contains(&px), "{px}");
+        // The same camera as a matrix.
+        let matrix = camera.lens.projection(ClipSpace::D3d) * camera.frame.world_to_eye();
+        let rows = matrix.transpose().to_cols_array_2d();
+        let matrix = Camera::of_matrix(rows, MatrixConvention::ColumnD3d).unwrap();
+        let of_matrix = worst_miss_px(&matrix, &scene, &truth, &[2]);
+        assert!((of_matrix / px - 1.0).abs() < 1e-9, "{of_matrix}");
         // The second changes and is out both times, the first changes as well.
         let count = |a: &[ItemId], b: &[ItemId]| flicker(3, [&truth, &truth], [a, b]);
         assert_eq!(count(&[0, 2], &[0, 2]), 0);
