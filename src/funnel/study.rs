@@ -368,6 +368,6 @@ mod tests {
             "--samples 16384x8192: images need about 60.4 GB, 8.0 GB are free; expected fewer samples"
         );
         assert!(fits(large, Some(61_000_000_000)).is_ok() && fits(large, None).is_ok());
-        // Where little is free, small ones are tried all the same.
+        assert!(fits(SampleGrid::new(320, 180), Some(1)).is_err());
     }
 }
