@@ -18,9 +18,10 @@ use libfuzzer_sys::fuzz_target;
 type Reader = fn(&[u8]);
 
 /// Readers by the name of their corpus.
-const READERS: [(&str, Reader); 11] = [
+const READERS: [(&str, Reader); 12] = [
     ("boxes", tables::boxes),
     ("cameras", tables::cameras),
+    ("gltf", tables::gltf),
     ("points", tables::points),
     ("pvs", tables::pvs),
     ("report", runs::report),

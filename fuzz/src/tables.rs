@@ -5,11 +5,26 @@ use std::fmt::Write;
 use cullbench::camera::{MATRIX_CONVENTIONS, PlaneOptions, Surroundings};
 use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
-use cullbench::scene::{Scene, read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
+use cullbench::scene::{
+    LoadOptions, Scene, read_boxes_csv, read_gltf, read_sought_boxes_csv, write_boxes_csv,
+};
 use cullbench::stress::{Vector, read_vectors, replay};
 use cullbench::visibility::region::Pvs;
 
 use crate::read;
+
+/// Reads glTF whose buffers are within it.
+pub fn gltf(bytes: &[u8]) {
+    let options = LoadOptions::default();
+    if let Some(scene) = read(read_gltf(bytes, "fuzz.gltf", "fuzz", &options)) {
+        let surfaces = scene.surfaces.iter();
+        assert!(
+            surfaces
+                .map(|s| s.items())
+                .all(|items| items == scene.items.len())
+        );
+    }
+}
 
 pub fn boxes(bytes: &[u8]) {
     for skip in [false, true] {

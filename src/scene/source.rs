@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use super::generate::{Build, COUNT, MOST};
+use super::gltf::{is_gltf, read_gltf};
 use super::{FAMILIES, Family, MESHES, SAMPLES, Sample, Scene, UpAxis, WadMap, boxes_csv, memory};
 use crate::input::{InputError, is_readable, note, read_file};
 use crate::spec::{Spec, SpecError, nearest};
@@ -116,8 +117,8 @@ fn check_generated(
     memory::check_fits(source, needed, structures, memory::free_for(n))
 }
 
-/// Reads a WAD, known by its magic, its extension or the map named in it; anything
-/// else as boxes CSV.
+/// Reads a WAD or glTF, known by their beginning or extension (a WAD also by the map
+/// named in it); anything else as boxes CSV.
 fn parse_bytes(
     bytes: &[u8],
     [file, name]: [&str; 2],
@@ -125,11 +126,15 @@ fn parse_bytes(
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
     let extension = Path::new(file).extension();
-    if is_wad(bytes) || map.is_some() || extension.is_some_and(|e| e.eq_ignore_ascii_case("wad")) {
+    let is_named = |name: &str| extension.is_some_and(|e| e.eq_ignore_ascii_case(name));
+    if is_wad(bytes) || map.is_some() || is_named("wad") {
         return Ok(Scene {
             unit: Some("map units"),
             ..WadMap::read(bytes, file, map)?.into_scene(name)?
         });
+    }
+    if is_gltf(bytes) || is_named("gltf") || is_named("glb") {
+        return read_gltf(bytes, file, name, options);
     }
     let rows = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
     let structures = options.structures;

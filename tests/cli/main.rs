@@ -22,6 +22,7 @@ mod funnel_fragments;
 mod funnel_maps;
 mod funnel_options;
 mod gates;
+mod gltf;
 mod inputs;
 mod kernels;
 mod listing;

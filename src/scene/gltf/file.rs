@@ -1,0 +1,215 @@
+//! A glTF file with its buffers: what its indices and accessors refer to.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use gltf::json::accessor::{Accessor, ComponentType};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root, Value};
+
+use crate::input::{InputError, read_file};
+use crate::shown::{message, shortened};
+
+/// A file with all of its buffers.
+pub struct File<'f> {
+    pub name: &'f str,
+    pub root: Root,
+    buffers: Vec<Cow<'f, [u8]>>,
+}
+
+impl<'f> File<'f> {
+    pub fn open(bytes: &'f [u8], name: &'f str) -> Result<File<'f>, InputError> {
+        let error = |found: String| value_error(name, "JSON", found, "glTF 2.0");
+        let (json, mut bin) = match bytes.starts_with(b"glTF") {
+            true => {
+                let glb = gltf::Glb::from_slice(bytes).map_err(|e| InputError::Byte {
+                    file: name.to_owned(),
+                    offset: 0,
+                    found: e.to_string(),
+                    expected: "a GLB of version 2".to_owned(),
+                })?;
+                (glb.json, glb.bin)
+            }
+            false => (Cow::Borrowed(bytes), None),
+        };
+        let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json);
+        let root: Root = serde_json::from_slice(json).map_err(|e| {
+            // In glTF 1.0, what 2.0 numbers has names.
+            let json: Value = serde_json::from_slice(json).unwrap_or_default();
+            error(match json["meshes"].is_object() {
+                true => "glTF 1.0".to_owned(),
+                false => message(&e.to_string()),
+            })
+        })?;
+        if !root.asset.version.starts_with("2.") {
+            let version = shortened(&root.asset.version, 20);
+            return Err(error(format!("glTF of version '{version}'")));
+        }
+        let mut file = File {
+            name,
+            root,
+            buffers: Vec::new(),
+        };
+        for index in 0..file.root.buffers.len() {
+            let buffer = &file.root.buffers[index];
+            let bytes = match &buffer.uri {
+                None => bin.take().unwrap_or_default(),
+                Some(uri) => Cow::Owned(file.linked(index, uri)?),
+            };
+            file.buffers.push(bytes);
+        }
+        Ok(file)
+    }
+
+    fn linked(&self, buffer: usize, uri: &str) -> Result<Vec<u8>, InputError> {
+        let error = |found: String, expected| {
+            Err(self.error(format!("buffers[{buffer}].uri"), found, expected))
+        };
+        match uri.strip_prefix("data:") {
+            Some(data) => match data.split_once(";base64,").map(|(_, d)| STANDARD.decode(d)) {
+                Some(Ok(bytes)) => Ok(bytes),
+                _ => error("bytes that are no base64".to_owned(), "base64 data"),
+            },
+            None if uri.contains("://") => error(
+                format!("'{}'", shortened(uri, 60)),
+                "a file beside this one",
+            ),
+            None => {
+                let beside = Path::new(self.name).parent().unwrap_or(Path::new(""));
+                let path = beside.join(uri.replace("%20", " "));
+                match path.is_file() || !path.exists() {
+                    true => Ok(read_file(&path)?.to_vec()),
+                    false => error(format!("'{}'", shortened(uri, 60)), "a plain file"),
+                }
+            }
+        }
+    }
+
+    pub fn error(&self, place: String, found: impl Into<String>, expected: &str) -> InputError {
+        value_error(self.name, &place, found, expected)
+    }
+
+    pub fn get<'s, T>(
+        &self,
+        all: &'s [T],
+        index: Index<T>,
+        place: &str,
+    ) -> Result<&'s T, InputError> {
+        let index = index.value();
+        all.get(index).ok_or_else(|| {
+            let expected = format!("an index below {}", all.len());
+            self.error(place.to_owned(), format!("index {index}"), &expected)
+        })
+    }
+
+    /// Numbers of an accessor, `width` for each element, normalised where it says so;
+    /// the reason where its bytes are not plain.
+    pub fn values(
+        &self,
+        index: Index<Accessor>,
+        width: usize,
+        place: &str,
+    ) -> Result<Result<Vec<f64>, String>, InputError> {
+        let accessor = self.get(&self.root.accessors, index, place)?;
+        let place = format!("accessors[{}]", index.value());
+        let (Some(kind), Checked::Valid(dimensions)) = (component(accessor), accessor.type_) else {
+            return Err(self.error(place, "no known type", "a type of glTF 2.0"));
+        };
+        if dimensions.multiplicity() != width {
+            let found = format!("elements of {} numbers", dimensions.multiplicity());
+            return Err(self.error(place, found, &format!("{width} numbers")));
+        }
+        let Some(view) = accessor.buffer_view.filter(|_| accessor.sparse.is_none()) else {
+            return Ok(Err("has sparse accessors or none with bytes".to_owned()));
+        };
+        let view = self.get(
+            &self.root.buffer_views,
+            view,
+            &format!("{place}.bufferView"),
+        )?;
+        let extensions = view.extensions.as_ref();
+        if let Some(name) = extensions.and_then(|e| e.others.keys().next()) {
+            return Ok(Err(format!("is compressed ({})", shortened(name, 40))));
+        }
+        let buffer = self.get(
+            &self.buffers,
+            Index::new(view.buffer.value() as u32),
+            &place,
+        )?;
+        let size = kind.size() * width;
+        let stride = view.byte_stride.filter(|_| accessor.count.0 > 1);
+        let stride = stride.map_or(size, |stride| stride.0);
+        let range = |start: u64, length: u64, of: &'_ [u8]| {
+            let end = start.checked_add(length)?;
+            (end <= of.len() as u64).then_some(start as usize..end as usize)
+        };
+        let count = accessor.count.0;
+        let offset = accessor.byte_offset.unwrap_or_default().0;
+        let bytes = range(
+            view.byte_offset.unwrap_or_default().0,
+            view.byte_length.0,
+            buffer,
+        );
+        let needed = (count.saturating_sub(1)).saturating_mul(stride as u64) + size as u64;
+        let bytes = bytes.map(|range| &buffer[range]);
+        let own = bytes.and_then(|bytes| Some(&bytes[range(offset, needed, bytes)?]));
+        let Some(own) = own.filter(|_| stride >= size) else {
+            let found = format!("{count} elements that end behind their buffer");
+            return Err(self.error(place, found, "elements within it"));
+        };
+        let elements = own.chunks(stride).take(count as usize);
+        let numbers = elements.flat_map(|element| element[..size].chunks_exact(kind.size()));
+        Ok(Ok(numbers
+            .map(|bytes| number(bytes, kind, accessor.normalized))
+            .collect()))
+    }
+}
+
+fn value_error(file: &str, place: &str, found: impl Into<String>, expected: &str) -> InputError {
+    InputError::Value {
+        file: file.to_owned(),
+        place: place.to_owned(),
+        found: found.into(),
+        expected: expected.to_owned(),
+    }
+}
+
+pub fn component(accessor: &Accessor) -> Option<ComponentType> {
+    match accessor.component_type {
+        Checked::Valid(kind) => Some(kind.0),
+        Checked::Invalid => None,
+    }
+}
+
+/// A little-endian number; a fraction where it is normalised.
+fn number(bytes: &[u8], kind: ComponentType, is_normalised: bool) -> f64 {
+    let two = || [bytes[0], bytes[1]];
+    let four = || [bytes[0], bytes[1], bytes[2], bytes[3]];
+    let raw = match kind {
+        ComponentType::I8 => f64::from(bytes[0] as i8),
+        ComponentType::U8 => f64::from(bytes[0]),
+        ComponentType::I16 => f64::from(i16::from_le_bytes(two())),
+        ComponentType::U16 => f64::from(u16::from_le_bytes(two())),
+        ComponentType::U32 => f64::from(u32::from_le_bytes(four())),
+        ComponentType::F32 => f64::from(f32::from_le_bytes(four())),
+    };
+    normalised(raw, kind, is_normalised)
+}
+
+/// A component as glTF 2.0, section 3.11 normalises it; f32 as the file's bytes hold it.
+pub fn normalised(raw: f64, kind: ComponentType, is_normalised: bool) -> f64 {
+    let largest = match kind {
+        ComponentType::I8 => 127.0,
+        ComponentType::U8 => 255.0,
+        ComponentType::I16 => 32_767.0,
+        ComponentType::U16 => 65_535.0,
+        ComponentType::F32 => return f64::from(raw as f32),
+        ComponentType::U32 => return raw,
+    };
+    match is_normalised {
+        true => (raw / largest).max(-1.0),
+        false => raw,
+    }
+}

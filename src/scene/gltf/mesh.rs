@@ -1,0 +1,160 @@
+//! Meshes of a glTF file as triangles.
+
+use glam::DVec3;
+use gltf::json::Index;
+use gltf::json::accessor::Accessor;
+use gltf::json::material::AlphaMode;
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+
+use super::file::File;
+use crate::input::InputError;
+use crate::scene::SurfaceKind;
+use crate::shown::shortened;
+
+/// The triangles of a mesh, or why it has none that can be read.
+pub struct Mesh {
+    pub plain: Result<Triangles, String>,
+    pub kind: SurfaceKind,
+    pub two_sided: bool,
+}
+
+#[derive(Default)]
+pub struct Triangles {
+    pub points: Vec<DVec3>,
+    pub corners: Vec<[u32; 3]>,
+}
+
+impl Default for Mesh {
+    /// A mesh of no triangles.
+    fn default() -> Mesh {
+        Mesh {
+            plain: Ok(Triangles::default()),
+            kind: SurfaceKind::Opaque,
+            two_sided: false,
+        }
+    }
+}
+
+impl File<'_> {
+    /// How many numbers the accessors of a mesh state.
+    pub fn numbers(&self, mesh: usize) -> u64 {
+        let count = |index: Index<Accessor>| {
+            let accessor = self.root.accessors.get(index.value());
+            accessor.map_or(0, |accessor| accessor.count.0)
+        };
+        let primitives = self.root.meshes[mesh].primitives.iter();
+        let numbers = primitives.map(|primitive| {
+            let points = positions(primitive).map_or(0, count);
+            let indices = primitive.indices.map_or(0, count);
+            points.saturating_mul(3).saturating_add(indices)
+        });
+        numbers.fold(0, u64::saturating_add)
+    }
+
+    pub fn mesh(&self, index: usize) -> Result<Mesh, InputError> {
+        let mesh = &self.root.meshes[index];
+        let mut all = Ok(Triangles::default());
+        let (mut kind, mut two_sided) = (SurfaceKind::Opaque, false);
+        for (place, primitive) in mesh.primitives.iter().enumerate() {
+            let place = format!("meshes[{index}].primitives[{place}]");
+            if let Some(material) = primitive.material {
+                let material = self.get(&self.root.materials, material, &place)?;
+                two_sided |= material.double_sided;
+                match material.alpha_mode {
+                    Checked::Valid(AlphaMode::Blend) => kind = SurfaceKind::Clear,
+                    Checked::Valid(AlphaMode::Mask) if kind == SurfaceKind::Opaque => {
+                        kind = SurfaceKind::CutOut;
+                    }
+                    _ => {}
+                }
+            }
+            let own = self.primitive(primitive, &place)?;
+            match (&mut all, own) {
+                (Ok(all), Ok(own)) => {
+                    let first = all.points.len() as u32;
+                    all.points.extend(own.points);
+                    let corners = own.corners.into_iter();
+                    all.corners
+                        .extend(corners.map(|c| c.map(|corner| first.saturating_add(corner))));
+                }
+                (Ok(_), Err(reason)) => all = Err(reason),
+                _ => {}
+            }
+        }
+        let plain = all.and_then(|all| match all.corners.is_empty() {
+            true => Err("has no triangles".to_owned()),
+            false => Ok(all),
+        });
+        Ok(Mesh {
+            plain,
+            kind,
+            two_sided,
+        })
+    }
+
+    fn primitive(
+        &self,
+        primitive: &Primitive,
+        place: &str,
+    ) -> Result<Result<Triangles, String>, InputError> {
+        let extensions = primitive.extensions.as_ref();
+        if let Some(name) =
+            extensions.and_then(|e| e.others.keys().find(|n| n.contains("compression")))
+        {
+            return Ok(Err(format!("is compressed ({})", shortened(name, 40))));
+        }
+        let Some(positions) = positions(primitive) else {
+            return Ok(Err("has no positions".to_owned()));
+        };
+        let points = match self.values(positions, 3, place)? {
+            Ok(values) => values
+                .chunks_exact(3)
+                .map(DVec3::from_slice)
+                .collect::<Vec<_>>(),
+            Err(reason) => return Ok(Err(reason)),
+        };
+        let order: Vec<u32> = match primitive.indices {
+            None => (0..points.len() as u32).collect(),
+            Some(indices) => match self.values(indices, 1, place)? {
+                Ok(values) => values.into_iter().map(|v| v as u32).collect(),
+                Err(reason) => return Ok(Err(reason)),
+            },
+        };
+        if let Some(index) = order.iter().find(|&&index| index as usize >= points.len()) {
+            let expected = format!("an index below {}", points.len());
+            return Err(self.error(
+                format!("{place}.indices"),
+                format!("index {index}"),
+                &expected,
+            ));
+        }
+        let corners: Vec<[u32; 3]> = match primitive.mode {
+            Checked::Valid(Mode::Triangles) => {
+                order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+            }
+            Checked::Valid(Mode::TriangleStrip) => order
+                .windows(3)
+                .enumerate()
+                .map(|(i, c)| {
+                    if i % 2 == 0 {
+                        [c[0], c[1], c[2]]
+                    } else {
+                        [c[1], c[0], c[2]]
+                    }
+                })
+                .collect(),
+            Checked::Valid(Mode::TriangleFan) => {
+                let rim = order.get(1..).unwrap_or_default().windows(2);
+                rim.map(|c| [order[0], c[0], c[1]]).collect()
+            }
+            _ => return Ok(Err("has points or lines".to_owned())),
+        };
+        Ok(Ok(Triangles { points, corners }))
+    }
+}
+
+pub fn positions(primitive: &Primitive) -> Option<Index<Accessor>> {
+    let semantic = Checked::Valid(Semantic::Positions);
+    primitive.attributes.get(&semantic).copied()
+}

@@ -1,0 +1,339 @@
+//! glTF 2.0 and GLB: every node with a mesh is an item, in the file's own coordinates.
+//!
+//! Triangles are read where all meshes have plain ones. Compressed meshes, points and
+//! lines have the boxes of their accessors' bounds instead, and then no item of the file
+//! has triangles. Skins and morph targets stay in their rest pose. Source: Khronos
+//! Group, glTF 2.0 Specification, 2021.
+
+mod file;
+mod mesh;
+
+use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
+use gltf::json::{Index, Value};
+
+use self::file::{File, component, normalised};
+use self::mesh::{Mesh, Triangles, positions};
+use super::{
+    CameraPlace, Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory,
+};
+use crate::input::{InputError, note};
+
+/// Bytes of a number of a mesh while it is read: in f64, and as a point or corner.
+const BYTES_PER_NUMBER: u64 = 20;
+/// Most items of a file: instances of few bytes are many.
+const MOST_ITEMS: usize = 1 << 24;
+
+/// Tells glTF by the magic of a GLB, or by the brace that JSON begins with.
+pub fn is_gltf(bytes: &[u8]) -> bool {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    bytes.starts_with(b"glTF") || text.trim_ascii_start().starts_with(b"{")
+}
+
+/// Reads a scene; `file` is the path that other files are named relative to.
+///
+/// # Errors
+/// The first value that is none of glTF 2.0, by its place in the file; a node that is
+/// reached twice; a mesh without triangles and without bounds; a scene that does not fit
+/// into memory.
+pub fn read_gltf(
+    bytes: &[u8],
+    file: &str,
+    name: &str,
+    options: &LoadOptions,
+) -> Result<Scene, InputError> {
+    let file = File::open(bytes, file)?;
+    let (placed, places) = file.placed()?;
+    let mut is_placed = vec![false; file.root.meshes.len()];
+    placed.iter().for_each(|item| is_placed[item.mesh] = true);
+    let numbers = (0..is_placed.len()).filter(|&mesh| is_placed[mesh]);
+    let numbers = numbers
+        .map(|mesh| file.numbers(mesh))
+        .fold(0, u64::saturating_add);
+    let structures = options.structures;
+    let free = memory::free_for(numbers);
+    memory::check_fits(
+        name,
+        numbers.saturating_mul(BYTES_PER_NUMBER),
+        structures,
+        free,
+    )?;
+    let meshes: Vec<Mesh> = (0..is_placed.len())
+        .map(|mesh| match is_placed[mesh] {
+            true => file.mesh(mesh),
+            false => Ok(Mesh::default()),
+        })
+        .collect::<Result<_, _>>()?;
+    let mut labels = Labels::new("name".to_owned());
+    for item in &placed {
+        let node = file.root.nodes[item.node].name.as_deref();
+        labels.push(node.unwrap_or_default().into());
+    }
+    let unplain = placed.iter().find_map(|item| match &meshes[item.mesh] {
+        Mesh { plain: Ok(_), .. } => None,
+        Mesh {
+            plain: Err(reason), ..
+        } => Some((item.mesh, reason)),
+    });
+    let scene = match unplain {
+        None if placed.is_empty() => Scene::from_boxes(name, &[])?,
+        None => file.triangles(&placed, &meshes, name, options)?,
+        Some((mesh, reason)) => {
+            note(&format!(
+                "{}: items are boxes without triangles: meshes[{mesh}] {reason}",
+                file.name
+            ));
+            let boxes: Result<Vec<_>, _> = placed.iter().map(|i| file.bounds(i)).collect();
+            Scene::from_boxes(name, &boxes?)?
+        }
+    };
+    Ok(Scene {
+        up: UpAxis::Y,
+        unit: Some("m"),
+        labels: vec![labels],
+        places,
+        ..scene
+    })
+}
+
+/// A node with a mesh, or one of its instances.
+struct Placed {
+    node: usize,
+    mesh: usize,
+    world: DAffine3,
+}
+
+impl File<'_> {
+    /// Nodes with a mesh and places of cameras, depth first.
+    fn placed(&self) -> Result<(Vec<Placed>, Vec<CameraPlace>), InputError> {
+        let nodes = &self.root.nodes;
+        let roots: Vec<usize> = match self.root.scene.or(match self.root.scenes.is_empty() {
+            true => None,
+            false => Some(Index::new(0)),
+        }) {
+            Some(scene) => {
+                let scene = self.get(&self.root.scenes, scene, "scene")?;
+                scene.nodes.iter().map(|node| node.value()).collect()
+            }
+            None => {
+                let children = nodes.iter().flat_map(|node| node.children.iter().flatten());
+                let mut is_root = vec![true; nodes.len()];
+                for child in children.map(|child| child.value()) {
+                    if let Some(is_root) = is_root.get_mut(child) {
+                        *is_root = false;
+                    }
+                }
+                (0..nodes.len()).filter(|&node| is_root[node]).collect()
+            }
+        };
+        let (mut placed, mut places) = (Vec::new(), Vec::new());
+        let mut reached = vec![false; nodes.len()];
+        let mut open: Vec<(usize, DAffine3)> = roots
+            .iter()
+            .rev()
+            .map(|&root| (root, DAffine3::IDENTITY))
+            .collect();
+        while let Some((index, parent)) = open.pop() {
+            let place = format!("nodes[{index}]");
+            let node = self.get(nodes, Index::new(index as u32), &place)?;
+            if std::mem::replace(&mut reached[index], true) {
+                return Err(self.error(place, "a node that is reached twice", "a tree of nodes"));
+            }
+            let world = parent * self.local(index)?;
+            if let Some(mesh) = node.mesh {
+                self.get(&self.root.meshes, mesh, &format!("{place}.mesh"))?;
+                let mesh = mesh.value();
+                let instances = self.instances(index)?;
+                if placed.len() + instances.len() > MOST_ITEMS {
+                    let found = format!("{} instances", instances.len());
+                    let expected = format!("at most {MOST_ITEMS} items in the file");
+                    return Err(self.error(place, found, &expected));
+                }
+                for instance in instances {
+                    let world = world * instance;
+                    placed.push(Placed {
+                        node: index,
+                        mesh,
+                        world,
+                    });
+                }
+            }
+            if node.camera.is_some() {
+                let forward = world.transform_vector3(DVec3::NEG_Z).normalize_or_zero();
+                let eye = world.translation;
+                if forward != DVec3::ZERO {
+                    places.push(CameraPlace { eye, forward });
+                }
+            }
+            let children = node.children.iter().flatten().rev();
+            open.extend(children.map(|child| (child.value(), world)));
+        }
+        Ok((placed, places))
+    }
+
+    /// Transform of a node relative to its parent.
+    fn local(&self, index: usize) -> Result<DAffine3, InputError> {
+        let node = &self.root.nodes[index];
+        let found = match node.matrix {
+            Some(matrix) => DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from))),
+            None => transform(
+                node.translation.map(|t| t.map(f64::from)),
+                node.rotation.as_ref().map(|r| r.0.map(f64::from)),
+                node.scale.map(|s| s.map(f64::from)),
+            ),
+        };
+        match found.is_finite() {
+            true => Ok(found),
+            false => Err(self.error(
+                format!("nodes[{index}]"),
+                "a transform that is not finite",
+                "finite numbers and a rotation that is not zero",
+            )),
+        }
+    }
+
+    /// Instances of a node by EXT_mesh_gpu_instancing; the node itself without them.
+    fn instances(&self, index: usize) -> Result<Vec<DAffine3>, InputError> {
+        let extensions = self.root.nodes[index].extensions.as_ref();
+        let instancing = extensions.and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
+        let Some(attributes) = instancing.map(|instancing| &instancing["attributes"]) else {
+            return Ok(vec![DAffine3::IDENTITY]);
+        };
+        let place = format!("nodes[{index}].extensions.EXT_mesh_gpu_instancing");
+        let column = |name: &str, width: usize| -> Result<Option<Vec<f64>>, InputError> {
+            let Some(accessor) = attributes[name].as_u64() else {
+                return Ok(None);
+            };
+            let accessor = Index::new(u32::try_from(accessor).unwrap_or(u32::MAX));
+            match self.values(accessor, width, &place)? {
+                Ok(values) => Ok(Some(values)),
+                Err(reason) => Err(self.error(place.clone(), reason, "plain accessors")),
+            }
+        };
+        let [moved, turned, scaled] = [("TRANSLATION", 3), ("ROTATION", 4), ("SCALE", 3)]
+            .map(|(name, width)| column(name, width));
+        let (moved, turned, scaled) = (moved?, turned?, scaled?);
+        let counts = [(&moved, 3), (&turned, 4), (&scaled, 3)];
+        let count = counts
+            .iter()
+            .filter_map(|(all, width)| Some(all.as_ref()?.len() / width));
+        let of = |all: &Option<Vec<f64>>, i: usize| {
+            Some(<[f64; 3]>::try_from(&all.as_ref()?[3 * i..3 * i + 3]).expect("three"))
+        };
+        let all = (0..count.min().unwrap_or(0)).map(|i| {
+            let rotation = turned.as_ref().map(|all| &all[4 * i..4 * i + 4]);
+            let rotation = rotation.map(|r| r.try_into().expect("four"));
+            transform(of(&moved, i), rotation, of(&scaled, i))
+        });
+        Ok(all.collect())
+    }
+
+    /// The scene of all triangles.
+    fn triangles(
+        &self,
+        placed: &[Placed],
+        meshes: &[Mesh],
+        name: &str,
+        options: &LoadOptions,
+    ) -> Result<Scene, InputError> {
+        let plain = |item: &Placed| meshes[item.mesh].plain.as_ref().expect("plain meshes");
+        let count = |of: fn(&Triangles) -> usize| placed.iter().map(|i| of(plain(i)) as u64).sum();
+        let (triangles, points): (u64, u64) =
+            (count(|t| t.corners.len()), count(|t| t.points.len()));
+        let needed = memory::needed_by_triangles(
+            triangles.max(points),
+            options.per_triangle,
+            options.structures,
+        );
+        memory::check_fits(
+            name,
+            needed,
+            options.structures,
+            memory::free_for(triangles.max(points)),
+        )?;
+        if triangles.max(points) > u64::from(u32::MAX) / 4 {
+            let found = format!("{triangles} triangles");
+            return Err(self.error("meshes".to_owned(), found, "at most a billion"));
+        }
+        let world = |item: &'_ Placed| {
+            let place = item.world;
+            plain(item)
+                .points
+                .iter()
+                .map(move |&p| place.transform_point3(p))
+        };
+        let boxes = placed
+            .iter()
+            .map(|item| WorldBox::union_of(world(item).map(|p| WorldBox::new(p, p))));
+        let mut surfaces = Surfaces::about(choose_origin(boxes));
+        let mut local: Vec<Vec3> = Vec::new();
+        for item in placed {
+            let mesh = &meshes[item.mesh];
+            local.clear();
+            local.extend(world(item).map(|p| (p - surfaces.origin).as_vec3()));
+            let corners = &plain(item).corners;
+            match item.world.matrix3.determinant() < 0.0 {
+                false => surfaces.push(mesh.kind, mesh.two_sided, &local, corners),
+                true => {
+                    let turned: Vec<_> = corners.iter().map(|&[a, b, c]| [a, c, b]).collect();
+                    surfaces.push(mesh.kind, mesh.two_sided, &local, &turned);
+                }
+            }
+        }
+        surfaces.into_scene(name)
+    }
+
+    /// World box of the bounds that the accessors of an item state.
+    fn bounds(&self, item: &Placed) -> Result<WorldBox, InputError> {
+        let mut all = WorldBox::union_of([]);
+        for primitive in &self.root.meshes[item.mesh].primitives {
+            let place = format!("meshes[{}]", item.mesh);
+            let missing = |place: String| {
+                self.error(
+                    place,
+                    "no bounds of positions",
+                    "min and max of three numbers",
+                )
+            };
+            let positions = positions(primitive).ok_or_else(|| missing(place.clone()))?;
+            let accessor = self.get(&self.root.accessors, positions, &place)?;
+            let corner = |value: &Option<Value>| -> Option<DVec3> {
+                let numbers = value.as_ref()?.as_array()?.iter();
+                let numbers: Vec<f64> = numbers.map(Value::as_f64).collect::<Option<_>>()?;
+                let corner = <[f64; 3]>::try_from(numbers).ok()?;
+                let kind = component(accessor)?;
+                Some(
+                    corner
+                        .map(|n| normalised(n, kind, accessor.normalized))
+                        .into(),
+                )
+            };
+            let ends = corner(&accessor.min).zip(corner(&accessor.max));
+            let (min, max) =
+                ends.ok_or_else(|| missing(format!("accessors[{}]", positions.value())))?;
+            let corners = (0..8).map(|i| {
+                let pick = |k: usize| if i >> k & 1 == 0 { min[k] } else { max[k] };
+                let p = item
+                    .world
+                    .transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
+                WorldBox::new(p, p)
+            });
+            all = WorldBox::union_of(corners.chain([all]));
+        }
+        Ok(all)
+    }
+}
+
+fn transform(
+    translation: Option<[f64; 3]>,
+    rotation: Option<[f64; 4]>,
+    scale: Option<[f64; 3]>,
+) -> DAffine3 {
+    DAffine3::from_scale_rotation_translation(
+        scale.map_or(DVec3::ONE, DVec3::from),
+        rotation.map_or(DQuat::IDENTITY, |r| DQuat::from_array(r).normalize()),
+        translation.map_or(DVec3::ZERO, DVec3::from),
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,222 @@
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use glam::{DQuat, DVec3};
+use serde_json::{Value, json};
+
+use super::super::{LoadOptions, SeededRng, SurfaceKind, UpAxis};
+use super::*;
+
+/// A tetrahedron, its indices as u16 behind its points.
+const POINTS: [[f32; 3]; 4] = [
+    [0.0, 0.0, 0.0],
+    [1.5, 0.0, 0.0],
+    [0.0, 2.0, 0.0],
+    [0.1, 0.2, 3.0],
+];
+const CORNERS: [[u16; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+
+fn file() -> Value {
+    let points = POINTS.as_flattened().iter().flat_map(|n| n.to_le_bytes());
+    let corners = CORNERS.as_flattened().iter().flat_map(|n| n.to_le_bytes());
+    let bytes: Vec<u8> = points.chain(corners).collect();
+    json!({
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0, 2]}],
+        "nodes": [
+            {"name": "turned", "mesh": 0, "children": [1], "translation": [10, 20, -30],
+             "rotation": [0.1, -0.7, 0.2, 0.6], "scale": [2, 3, -4]},
+            {"mesh": 0, "translation": [5, 0, 0]},
+            {"camera": 0, "translation": [1, 2, 3], "rotation": [0, 1, 0, 0]},
+        ],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "materials": [{"alphaMode": "MASK", "doubleSided": true}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+             "min": [0, 0, 0], "max": [1.5, 2, 3]},
+            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 24},
+        ],
+        "buffers": [{"byteLength": bytes.len(), "uri":
+            format!("data:application/octet-stream;base64,{}", STANDARD.encode(bytes))}],
+    })
+}
+
+fn read(file: &Value) -> Result<Scene, InputError> {
+    let text = file.to_string();
+    assert!(is_gltf(text.as_bytes()));
+    read_gltf(text.as_bytes(), "t.gltf", "t", &LoadOptions::default())
+}
+
+/// The points of both items in the world, by hand.
+fn world() -> [Vec<DVec3>; 2] {
+    let turn = DQuat::from_xyzw(
+        0.1f32.into(),
+        (-0.7f32).into(),
+        0.2f32.into(),
+        0.6f32.into(),
+    );
+    let place = |p: DVec3| {
+        DVec3::new(10.0, 20.0, -30.0) + turn.normalize() * (p * DVec3::new(2.0, 3.0, -4.0))
+    };
+    let points = POINTS.map(|p| DVec3::from(p.map(f64::from)));
+    [DVec3::ZERO, DVec3::X * 5.0].map(|by| points.iter().map(|p| place(*p + by)).collect())
+}
+
+#[test]
+fn items_are_the_boxes_of_the_transformed_triangles() {
+    let scene = read(&file()).unwrap();
+    assert_eq!((scene.up, scene.items.len()), (UpAxis::Y, 2));
+    assert_eq!(scene.labels[0].get(0), "turned");
+    let surfaces = scene.surfaces.as_ref().expect("triangles");
+    assert_eq!(surfaces.triangles.len(), 8);
+    assert_eq!(
+        (surfaces.kinds[0], surfaces.two_sided[0]),
+        (SurfaceKind::CutOut, true)
+    );
+    for (item, points) in world().iter().enumerate() {
+        let all = WorldBox::union_of(points.iter().map(|p| WorldBox::new(*p, *p)));
+        for axis in 0..3 {
+            let b = scene.items[item];
+            let ends = [
+                (b.min[axis], all.min[axis], -1.0),
+                (b.max[axis], all.max[axis], 1.0),
+            ];
+            for (stored, exact, outward) in ends {
+                // The points are rounded to nearest, the box of them is exact.
+                let exact = exact - scene.origin[axis];
+                let off = (f64::from(stored) - exact) * outward;
+                let ulp = f64::from(stored.abs().next_up() - stored.abs());
+                assert!(off.abs() <= ulp, "{item}, {axis}: {stored} for {exact}");
+            }
+        }
+        // A negative scale turns them; they are wound outward again.
+        assert!(surfaces.volume(item) > 0.0);
+    }
+    let [place] = &scene.places[..] else {
+        panic!("one camera");
+    };
+    assert_eq!(
+        (place.eye, place.forward.round()),
+        (DVec3::new(1.0, 2.0, 3.0), DVec3::Z)
+    );
+}
+
+#[test]
+fn compressed_meshes_and_points_have_the_boxes_of_their_bounds() {
+    let mut compressed = file();
+    let draco = json!({"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}});
+    compressed["meshes"][0]["primitives"][0]["extensions"] = draco;
+    let mut points = file();
+    points["meshes"][0]["primitives"][0]["mode"] = json!(0);
+    let whole = read(&file()).unwrap();
+    for file in [compressed, points] {
+        let scene = read(&file).unwrap();
+        assert!(scene.surfaces.is_none());
+        for item in 0..2 {
+            let all = scene.written().nth(item).unwrap();
+            let triangles = whole.written().nth(item).unwrap();
+            let margin = DVec3::splat(1e-5);
+            assert!(all.min.cmple(triangles.min + margin).all());
+            assert!(all.max.cmpge(triangles.max - margin).all());
+        }
+    }
+}
+
+#[test]
+fn instances_are_items() {
+    let mut file = file();
+    let attributes = json!({"TRANSLATION": 0});
+    file["nodes"][1]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
+    assert_eq!(read(&file).unwrap().items.len(), 1 + 4);
+}
+
+#[test]
+fn what_is_wrong_is_named_with_its_place() {
+    let cases: [(&str, Value, &str); 12] = [
+        (
+            "/nodes/1/children",
+            json!([0]),
+            "nodes[0]: a node that is reached twice",
+        ),
+        (
+            "/nodes/0/mesh",
+            json!(7),
+            "nodes[0].mesh: index 7; expected an index below 1",
+        ),
+        (
+            "/nodes/0/rotation",
+            json!([0, 0, 0, 0]),
+            "nodes[0]: a transform that is not finite",
+        ),
+        ("/nodes/0/children", json!([99]), "nodes[99]: index 99"),
+        ("/scene", json!(3), "scene: index 3"),
+        (
+            "/accessors/0/count",
+            json!(5),
+            "accessors[0]: 5 elements that end behind their buffer",
+        ),
+        (
+            "/accessors/0/count",
+            json!(u64::MAX),
+            "expected fewer items",
+        ),
+        ("/accessors/1/count", json!(13), "accessors[1]: 13 elements"),
+        (
+            "/accessors/0/type",
+            json!("VEC2"),
+            "accessors[0]: elements of 2 numbers",
+        ),
+        (
+            "/bufferViews/0/byteOffset",
+            json!(u64::MAX),
+            "accessors[0]: 4 elements",
+        ),
+        (
+            "/buffers/0/uri",
+            json!("data:;base64,???"),
+            "buffers[0].uri: bytes that are no base64",
+        ),
+        (
+            "/asset/version",
+            json!("1.0"),
+            "glTF of version '1.0'; expected glTF 2.0",
+        ),
+    ];
+    for (place, value, wanted) in cases {
+        let mut file = file();
+        match file.pointer_mut(place) {
+            Some(old) => *old = value,
+            None => {
+                let (parent, name) = place.rsplit_once('/').unwrap();
+                file.pointer_mut(parent).unwrap()[name] = value;
+            }
+        }
+        let error = read(&file).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{place}: {error}");
+        assert!(
+            error.contains("expected") && !error.contains('\n'),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn no_damage_ends_in_a_panic() {
+    let text = file().to_string().into_bytes();
+    let mut rng = SeededRng::new(5);
+    for _ in 0..3000 {
+        let mut bytes = text.clone();
+        for _ in 0..1 + rng.below(3) {
+            let at = rng.below(bytes.len());
+            bytes[at] = b"0123456789-e.,[]{}\" "[rng.below(20)];
+        }
+        if let Err(error) = read_gltf(&bytes, "t.gltf", "t", &LoadOptions::default()) {
+            assert!(!error.to_string().contains('\n'), "{error}");
+        }
+    }
+}
