@@ -117,8 +117,9 @@ fn check_generated(
     memory::check_fits(source, needed, structures, memory::free_for(n))
 }
 
-/// Reads a WAD or glTF, known by their beginning or extension (a WAD also by the map
-/// named in it); anything else as boxes CSV.
+/// Reads a WAD or glTF by beginning or extension; anything else as boxes CSV.
+///
+/// A map that is named makes it a WAD.
 fn parse_bytes(
     bytes: &[u8],
     [file, name]: [&str; 2],

@@ -198,7 +198,9 @@ fn number(bytes: &[u8], kind: ComponentType, is_normalised: bool) -> f64 {
     normalised(raw, kind, is_normalised)
 }
 
-/// A component as glTF 2.0, section 3.11 normalises it; f32 as the file's bytes hold it.
+/// A component, normalised where its accessor says so: glTF 2.0, section 3.11.
+///
+/// f32 as the file's bytes hold it.
 pub fn normalised(raw: f64, kind: ComponentType, is_normalised: bool) -> f64 {
     let largest = match kind {
         ComponentType::I8 => 127.0,
