@@ -10,7 +10,7 @@ use super::plan_cells::Cells;
 use super::sheet::{Rect, SIDE, Sheet, at, centre, longest, union, united};
 use super::text;
 use crate::camera::Camera;
-use crate::scene::{Regions, Scene};
+use crate::scene::{Regions, Scene, UpAxis};
 
 /// Colour and words of a class of items.
 #[derive(Clone, Copy)]
@@ -47,10 +47,11 @@ impl Plan<'_> {
         let (mut items, mut notes) = self.items();
         let mut outlines = Vec::new();
         if let Some(cells) = &self.cells {
-            outlines = cells.outlines(self.scene.origin);
-            notes.extend(cells.notes());
+            outlines = cells.outlines(self.scene);
+            notes.extend(cells.notes(self.scene.up));
         }
-        let eye = self.camera.map(|camera| camera.frame.eye);
+        let up = self.scene.up;
+        let eye = self.camera.map(|camera| up.to_z_up(camera.frame.eye));
         let corners = outlines.iter().flat_map(|outline| &outline.corners);
         let cells = corners.map(|&corner| at(corner));
         let sheet = Sheet::over(window(&items, cells, eye));
@@ -65,18 +66,23 @@ impl Plan<'_> {
             cells.draw(&outlines, &sheet, &mut body);
         }
         if let Some(camera) = self.camera {
-            draw_camera(camera, &sheet, &mut body);
+            draw_camera(camera, up, &sheet, &mut body);
         }
-        sheet.finished(&self.caption, &body, &self.legend(), &notes)
+        let axes = match up {
+            UpAxis::Y => ["z", "x"],
+            UpAxis::Z => ["x", "y"],
+        };
+        sheet.finished(&self.caption, axes, &body, &self.legend(), &notes)
     }
 
     /// The items to draw, and what is not drawn.
     fn items(&self) -> (Vec<Drawn>, Vec<String>) {
-        let origin = self.scene.origin;
+        let (origin, up) = (self.scene.origin, self.scene.up);
         let middle = self.scene.world_bounds();
         let eye = self
             .camera
             .map_or(middle.min / 2.0 + middle.max / 2.0, |c| c.frame.eye);
+        let eye = up.to_z_up(eye);
         let storey = self.camera.and_then(|camera| self.storey(camera));
         let (mut apart, mut all) = (0, Vec::new());
         for (item, b) in self.scene.items.iter().enumerate() {
@@ -84,6 +90,7 @@ impl Plan<'_> {
                 continue;
             }
             let (min, max) = b.in_world(origin);
+            let [min, max] = [min, max].map(|corner| up.to_z_up(corner));
             let class = (self.class_of)(item);
             let is_key = self.classes[class].is_key;
             if !is_key && storey.is_some_and(|[low, high]| max.z < low || high < min.z) {
@@ -250,7 +257,7 @@ fn outline_floors(items: &mut [Drawn], sheet: &Sheet) {
 /// Draws the edges of the view volume and the eye.
 ///
 /// Without a far plane the edges leave the sheet.
-fn draw_camera(camera: &Camera, sheet: &Sheet, body: &mut String) {
+fn draw_camera(camera: &Camera, up: UpAxis, sheet: &Sheet, body: &mut String) {
     let Camera { frame, lens } = camera;
     let beyond = || lens.with_far(Some(2.0 * (lens.near() + SIDE / sheet.scale)));
     let corners = match lens.far() {
@@ -259,6 +266,7 @@ fn draw_camera(camera: &Camera, sheet: &Sheet, body: &mut String) {
     };
     let mut path = String::new();
     if let Some(corners) = corners {
+        let corners = corners.map(|corner| up.to_z_up(corner));
         let corners = corners.map(|corner| sheet.at([corner.x, corner.y]));
         // Bit 0 is right, bit 1 top, bit 2 far.
         for (from, to) in (0..8).flat_map(|a| [1, 2, 4].map(|bit| (a, a | bit))) {
@@ -270,7 +278,8 @@ fn draw_camera(camera: &Camera, sheet: &Sheet, body: &mut String) {
         }
     }
     let _ = writeln!(body, "<path fill=\"none\" stroke=\"#000\" d=\"{path}\"/>");
-    let [x, y] = sheet.at([frame.eye.x, frame.eye.y]);
+    let eye = up.to_z_up(frame.eye);
+    let [x, y] = sheet.at([eye.x, eye.y]);
     let _ = writeln!(body, "<circle cx=\"{x}\" cy=\"{y}\" r=\"4\"/>");
 }
 

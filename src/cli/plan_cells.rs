@@ -8,6 +8,7 @@ use super::sheet::{Rect, Sheet};
 use super::text;
 use crate::geometry::{Aabb, Plane};
 use crate::index::TreeCell;
+use crate::scene::{Scene, UpAxis};
 
 /// Look of a group of cells.
 pub struct CellClass {
@@ -37,17 +38,21 @@ pub struct Outline {
 
 impl Cells<'_> {
     /// Outlines of the cells down to the deepest level.
-    pub fn outlines(&self, origin: DVec3) -> Vec<Outline> {
+    pub fn outlines(&self, scene: &Scene) -> Vec<Outline> {
+        let up = scene.up;
+        let origin = up.to_z_up(scene.origin);
         let mut around: Vec<Vec<[f64; 2]>> = Vec::new();
         let mut outlines = Vec::new();
         for (cell, drawn) in self.cells.iter().enumerate() {
             if drawn.level > self.depth {
                 continue;
             }
-            let rect = flat(&drawn.bounds, origin);
+            let bounds = &drawn.bounds;
+            let [min, max] = [bounds.min, bounds.max].map(|corner| up.to_z_up(corner));
+            let rect = flat(&Aabb::new(min, max), origin);
             around.truncate(drawn.level as usize);
             let corners = match (drawn.half_space, around.last()) {
-                (Some(side), Some(parent)) => cut(parent, &side, origin),
+                (Some(side), Some(parent)) => cut(parent, &turned(&side, up), origin),
                 _ => corners_of(rect).into(),
             };
             around.push(corners.clone());
@@ -110,14 +115,17 @@ impl Cells<'_> {
     }
 
     /// Cells and planes that are not drawn.
-    pub fn notes(&self) -> Vec<String> {
+    pub fn notes(&self, up: UpAxis) -> Vec<String> {
         let below = self
             .cells
             .iter()
             .filter(|cell| cell.level > self.depth)
             .count();
         let planes = self.cells.iter().filter(|cell| cell.level <= self.depth);
-        let level = planes.filter(|cell| cell.half_space.is_some_and(|side| !is_upright(&side)));
+        let level = planes.filter(|cell| {
+            cell.half_space
+                .is_some_and(|side| !is_upright(&turned(&side, up)))
+        });
         let level = level.count();
         let mut notes = vec!["thicker outlines: upper levels".to_owned()];
         if below > 0 {
@@ -135,6 +143,11 @@ impl Cells<'_> {
         }
         notes
     }
+}
+
+/// The plane in axes with z up.
+fn turned(plane: &Plane, up: UpAxis) -> Plane {
+    Plane::new(up.to_z_up(plane.normal), plane.d)
 }
 
 pub fn is_upright(plane: &Plane) -> bool {
@@ -197,5 +210,9 @@ mod tests {
             square
         );
         assert!(cut(&[], &half, origin).is_empty());
+        for (up, axis) in [(UpAxis::Y, glam::Vec3::Y), (UpAxis::Z, glam::Vec3::Z)] {
+            assert!(!is_upright(&turned(&Plane::new(axis, 1.0), up)));
+            assert!(is_upright(&turned(&half, up)));
+        }
     }
 }

@@ -102,6 +102,7 @@ impl Sheet {
     pub fn finished(
         &self,
         caption: &str,
+        [across, along]: [&str; 2],
         body: &str,
         legend: &[(String, String)],
         notes: &[String],
@@ -140,8 +141,8 @@ impl Sheet {
         }
         let _ = writeln!(
             svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">x, in units of the scene</text>\n\
-             <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">y</text>",
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{across}, in units of the scene</text>\n\
+             <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{along}</text>",
             LEFT + w / 2.0,
             bottom + 36.0,
             TOP + h / 2.0

@@ -163,6 +163,7 @@ fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
     }
     let convention = lens.matrix_convention.as_deref();
     command += &text::some(convention, |name| format!(" --matrix-convention {name}"));
+    command += &text::some(args.scene_args.up, |up| format!(" --up {}", up.name()));
     command
 }
 

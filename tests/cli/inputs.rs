@@ -131,6 +131,7 @@ fn every_command_that_reads_a_scene_takes_up() {
         "scene info",
         "scene generate",
         "scene convert",
+        "scene draw",
     ] {
         let help = works(folder.path(), &format!("{command} --help"));
         assert!(help.contains("--up <AXIS>"), "{command}");
@@ -346,4 +347,29 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             .is_some_and(|text| told.contains(&text[..20]))
     );
     assert!(file("report.html").contains("y is up in 1 of 1 camera"));
+}
+
+#[test]
+fn drawings_look_along_the_up_axis() {
+    let folder = both_axes();
+    for what in ["", "--structure quadtree --depth 3"] {
+        let [z, y] = ["z.csv", "y.csv --up y"].map(|scene| {
+            let camera = "--camera flythrough:frames=4 --frame 1";
+            let line = format!("scene draw {scene} {what} {camera} --out out.svg");
+            let done = cullbench(folder.path(), &line);
+            assert_eq!(done.code, Some(0), "{line}: {}", done.err);
+            let svg = std::fs::read_to_string(folder.path().join("out.svg")).expect("a picture");
+            // Trees over other axes have their nodes in another order.
+            let mut parts: Vec<String> = svg
+                .replace("y.csv", "z.csv")
+                .replace(">z, in units", ">x, in units")
+                .replace("middle\">x</text>", "middle\">y</text>")
+                .split_inclusive(['M', '"'])
+                .map(|part| part.trim_end_matches('M').to_owned())
+                .collect();
+            parts.sort();
+            parts
+        });
+        assert!(z.len() > 400 && z == y, "{what}");
+    }
 }
