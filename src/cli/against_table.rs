@@ -14,7 +14,7 @@ use super::args::Cli;
 use super::compare_args::{CompareArgs, Gate};
 use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD};
 use super::study::progress;
-use super::{Ending, interrupt, run_plan, text, unread_is_fine};
+use super::{Ending, compare_page, interrupt, run_plan, text};
 use crate::index::Registry;
 use crate::measure::{CellKey, Machine, Status};
 use crate::report::{Changes, JudgedRow, Lone, WORK, work_changes};
@@ -99,8 +99,7 @@ pub fn compare_against(
         settings: Vec::new(),
         changes: changes(&found, threshold, args.gate),
     };
-    unread_is_fine(table.show(args))?;
-    Ok(table.ending())
+    compare_page::show(&table, args)
 }
 
 /// The program of a name, as in a shell: one without a folder is looked up in PATH.

@@ -316,6 +316,9 @@ pub struct PrecisionArgs {
     /// Show every table: all points, region search, the sweeps
     #[arg(long)]
     pub all: bool,
+    /// Also write the figures and all tables as one page
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Also draw false positives against time as an SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
@@ -400,6 +403,9 @@ pub struct DriftArgs {
     /// Show every table: errors by number of steps, orders, limits of stability
     #[arg(long)]
     pub all: bool,
+    /// Also write the figures and all tables as one page
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Also draw error against time of the spring arms as an SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,

@@ -2,12 +2,14 @@
 //! report.json and measures nothing; the verdicts come from `report`, the table
 //! from `compare_table`.
 
+use std::path::{Path, PathBuf};
+
 use anyhow::{bail, ensure};
 use serde_json::json;
 
 use super::compare_args::{CompareArgs, Gate};
 use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD, name, reason};
-use super::{Ending, baseline, text, unread_is_fine};
+use super::{Ending, baseline, compare_page, expect_places, text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
@@ -16,6 +18,12 @@ use crate::report::{
 use crate::spec::SpecError;
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
+    let inputs: Vec<&Path> = [&args.old, &args.new]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    expect_places(&[("--html", args.html.as_deref())], &inputs)?;
     let threshold = args.threshold;
     if let Some(binary) = &args.against {
         return super::against_table::compare_against(registry, args, binary, threshold);
@@ -68,8 +76,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         settings,
         changes,
     };
-    unread_is_fine(table.show(args))?;
-    Ok(table.ending())
+    compare_page::show(&table, args)
 }
 
 /// The metrics of all lists, each once.

@@ -72,6 +72,9 @@ pub struct CompareArgs {
     /// Show unchanged cells and every column as well
     #[arg(long)]
     pub all: bool,
+    /// Also write the changes and the whole table as one page
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
     /// Print Markdown, for a pull request: one line, and the rest folded

@@ -91,7 +91,7 @@ impl CompareTable {
     }
 
     /// Prints the comparison in the chosen format.
-    pub fn show(&self, args: &CompareArgs) -> io::Result<()> {
+    pub fn print(&self, args: &CompareArgs) -> io::Result<()> {
         let text = match (args.markdown, args.format) {
             (true, _) => folded(
                 &format!("{}: {}", program::name(), self.summary()),
@@ -143,7 +143,7 @@ impl CompareTable {
     }
 
     /// The document for Markdown, or with a table for a terminal of some `room`.
-    fn blocks(&self, all: bool, room: Option<usize>) -> Vec<Block> {
+    pub fn blocks(&self, all: bool, room: Option<usize>) -> Vec<Block> {
         let changes = &self.changes;
         let mut lines = vec![
             format!("OLD  {}", self.old.line),

@@ -3,7 +3,7 @@
 
 use super::figure::Figure;
 use super::table::Table;
-use super::{palette, text};
+use super::{palette, program, text};
 
 pub enum Block {
     /// A heading of the first, second or third level.
@@ -141,26 +141,35 @@ pub fn to_terminal(blocks: &[Block], width: usize) -> String {
     parts.collect()
 }
 
-/// A page of what a terminal shows, with its conclusions first and then figures.
+/// A page of what a terminal shows, with figures after its conclusions.
+///
+/// Those are the last `most` lines of the document, behind all tables.
 pub fn to_page(
-    title: &str,
-    conclusions: &[String],
+    about: &str,
+    most: usize,
     figures: impl IntoIterator<Item = Block>,
     mut blocks: Vec<Block>,
 ) -> String {
-    blocks.retain(|block| match block {
-        Block::Heading(level, _) => *level > 1,
-        Block::Line(text) => !conclusions.contains(text),
-        _ => true,
-    });
-    while let Some(Block::Heading(..)) = blocks.last() {
+    let is_line = |block: &Block| matches!(block, Block::Line(_));
+    let lines = blocks.iter().rev().take_while(|block| is_line(block));
+    let mut told = blocks.split_off(blocks.len() - lines.count().min(most));
+    told.retain(|block| !matches!(block, Block::Line(text) if text.is_empty()));
+    for block in &mut told {
+        if let Block::Line(text) = block {
+            *text = text.trim_start_matches("- ").to_owned();
+        }
+    }
+    // The heading of the conclusions, and the title of a terminal.
+    if matches!(blocks.last(), Some(Block::Heading(..))) {
         blocks.pop();
     }
-    let mut all = vec![Block::Heading(1, title.to_owned())];
-    all.extend(conclusions.iter().cloned().map(Block::Line));
+    blocks.retain(|block| !matches!(block, Block::Heading(1, _)));
+    let title = format!("{} {about}", program::name());
+    let mut all = vec![Block::Heading(1, title.clone())];
+    all.extend(told);
     all.extend(figures);
     all.extend(blocks);
-    to_html(title, &all)
+    to_html(&title, &all)
 }
 
 /// The document as one page that needs no other file.

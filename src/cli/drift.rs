@@ -5,14 +5,12 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 use super::args::DriftArgs;
-use super::document::{Block, to_terminal};
+use super::document::{Block, to_page, to_terminal};
 use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::Study;
 use super::table::{Column, Table};
-use super::{
-    Ending, drift_arms, drift_chart, expect_place_for, interrupt, print, text, write_text,
-};
+use super::{Ending, drift_arms, drift_chart, expect_places, interrupt, print, text, write_text};
 use crate::drift::{
     self, ArmKind, ArmOptions, DriftOptions, DriftReport, ORBIT_RADIUS, OrbitDrift, Rated,
     Recommendation, RotationDrift, SWING_DEG, TurnDrift,
@@ -23,7 +21,11 @@ use crate::measure::{ProcessTimes, Protocol, Schedule};
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
-    expect_place_for("--svg", args.svg.as_deref())?;
+    let outputs = [
+        ("--svg", args.svg.as_deref()),
+        ("--html", args.html.as_deref()),
+    ];
+    expect_places(&outputs, &[])?;
     let options = options(args);
     interrupt::from_now_on_finish();
     let jobs = drift::jobs(&options);
@@ -51,6 +53,11 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     })?;
     if let Some(file) = &args.svg {
         write_text(file, &drift_chart::draw(&report.arm))?;
+    }
+    if let Some(file) = &args.html {
+        let figures = drift_chart::figures(&report.arm).into_iter();
+        let (figures, blocks) = (figures.map(Block::Figure), blocks(&report, true));
+        write_text(file, &to_page("drift", usize::MAX, figures, blocks))?;
     }
     Ok(Ending::Ok)
 }

@@ -5,6 +5,9 @@ use super::figure::{Axis, CHARACTER, Figure, LINE, class, line, mark};
 use super::palette::Look;
 use super::text;
 
+/// Width of the plot on the narrowest page, px.
+const NARROWEST: f64 = 330.0;
+
 /// A row of a figure: a value with up to two ranges around it.
 #[derive(Default)]
 pub struct Row {
@@ -50,17 +53,21 @@ pub fn rows(
         let y = bottom + LINE;
         parts += &format!("<text class=\"tick\" x=\"{x:.2}%\" y=\"{y:.1}\">{name}</text>\n");
     }
-    let mut coloured = 0;
+    let mut names: Vec<&str> = Vec::new();
     for (n, row) in rows.iter().enumerate() {
         let (x, look, y0) = (axis.percent(row.value), Look::of(&row.name), y(n));
         if let Some(next) = rows.get(n + 1).filter(|_| row.is_tied) {
             parts += &line("tie", [x, axis.percent(next.value)], [y0, y(n + 1)]);
         }
+        let known = names.iter().position(|name| *name == row.name);
+        let place = known.unwrap_or(names.len());
+        if known.is_none() && !row.is_scan {
+            names.push(&row.name);
+        }
         let class = match form {
-            Form::Marks => class(look, row.is_scan, coloured),
+            Form::Marks => class(look, row.is_scan, place),
             Form::Bars => "c0".to_owned(),
         };
-        coloured += usize::from(!row.is_scan);
         let range = |ends: Option<[f64; 2]>| ends.map(|ends| ends.map(|end| axis.percent(end)));
         let ends = range(row.ends);
         let mut shape = text::some(ends, |ends| line("interval", ends, [y0, y0]));
@@ -72,11 +79,17 @@ pub fn rows(
                 y0 - LINE / 2.0
             ),
         };
-        // A label stands where there is more room.
+        // A label stands where there is room on the narrowest page, or below.
         let [low, high] = ends.unwrap_or([x, x]);
-        let (anchor, at, by) = match x > 50.0 && form == Form::Marks {
-            true => ("end", low, -10),
-            false => ("start", high, 10),
+        let length = CHARACTER * row.label.chars().count() as f64 / NARROWEST * 100.0;
+        let (anchor, at, by, below) = match form {
+            Form::Marks if x > 50.0 && low > length => ("end", low, -10, 4.0),
+            Form::Marks if high + length > 100.0 && low > length => ("end", low, -10, 4.0),
+            Form::Marks if high + length > 100.0 => {
+                let half = (length / 2.0).min(50.0);
+                ("middle", x.clamp(half, 100.0 - half), 0, 15.0)
+            }
+            _ => ("start", high, 10, 4.0),
         };
         let data = match form {
             Form::Marks => format!(" data-s=\"{}\"{}", html(&row.name), row.data),
@@ -86,7 +99,7 @@ pub fn rows(
             "<g class=\"s {class}\"{data}><title>{}</title>{shape}<text x=\"{at:.2}%\" \
              y=\"{:.1}\" dx=\"{by}\" text-anchor=\"{anchor}\">{}</text></g>\n",
             html(&row.note),
-            y0 + 4.0,
+            y0 + below,
             html(&row.label),
         );
     }

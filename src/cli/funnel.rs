@@ -17,7 +17,7 @@ use super::shared_args::{StudyArgs, TableFormat};
 use super::study::{Setting, Study};
 use super::{
     Ending, expect_folder, expect_places, funnel_csv, funnel_figure, funnel_picture, funnel_table,
-    interrupt, print, program, text, write_text,
+    interrupt, print, text, write_text,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -87,14 +87,12 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     if let Some(file) = &args.html {
         let picture = Block::Picture(funnel_picture::draw(&report, &stages.setting.scene));
         let figures = [Block::Figure(funnel_figure::chain(&report)), picture];
-        let title = format!(
-            "{} funnel {}, {}",
-            program::name(),
-            report.scene,
-            report.path
-        );
-        let blocks = funnel_table::blocks(&report, true);
-        let page = to_page(&title, &report.conclusions, figures, blocks);
+        let title = format!("funnel {}, {}", report.scene, report.path);
+        let mut blocks = funnel_table::blocks(&report, true);
+        let told = funnel_table::conclusions(&report);
+        let most = told.len();
+        blocks.extend(told.into_iter().map(Block::Line));
+        let page = to_page(&title, most, figures, blocks);
         write_text(file, &page)?;
     }
     shown?;

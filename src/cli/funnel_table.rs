@@ -141,7 +141,7 @@ fn worth(gain: &Gain) -> String {
 }
 
 /// Sentences on what remains, the worth of each stage, and what was dropped.
-fn conclusions(report: &FunnelReport) -> Vec<String> {
+pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let chosen = || report.stages.iter().filter(|row| row.is_chosen);
     let last = chosen().find(|row| row.back_end.stage == StageKind::Occlusion);
     let mut told = text::some(last, |row| {

@@ -15,6 +15,7 @@ mod baseline;
 mod bencher;
 mod compare;
 mod compare_args;
+mod compare_page;
 mod compare_structures;
 mod compare_table;
 mod diagram;

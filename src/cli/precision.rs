@@ -5,7 +5,7 @@
 use std::io::Write;
 
 use super::args::PrecisionArgs;
-use super::document::{Block, to_terminal};
+use super::document::{Block, to_page, to_terminal};
 use super::figure::picture;
 use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
@@ -26,7 +26,11 @@ const SWEEP_CAMERAS: usize = 200;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<Ending> {
     let inputs = [args.study.scene.as_ref(), args.study.path.as_ref()];
-    expect_places(&[("--svg", args.svg.as_deref())], &inputs)?;
+    let outputs = [
+        ("--svg", args.svg.as_deref()),
+        ("--html", args.html.as_deref()),
+    ];
+    expect_places(&outputs, &inputs)?;
     if let Some(stage) = args.stage {
         return stage_sweep::sweep(registry, args, stage);
     }
@@ -77,10 +81,15 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         text::terminal().write_all(shown.as_bytes())
     });
     if let Some(file) = &args.svg {
-        write_text(
-            file,
-            &picture(&precision_chart::figures(&outcome.precision), 1),
-        )?;
+        let figures = precision_chart::figures(&outcome.precision);
+        write_text(file, &picture(&figures, 1))?;
+    }
+    if let Some(file) = &args.html {
+        let figures = precision_chart::figures(&outcome.precision).into_iter();
+        let title = format!("precision {}, {}", args.study.scene, args.study.path);
+        let blocks = blocks(&outcome, true, usize::MAX);
+        let figures = figures.map(Block::Figure);
+        write_text(file, &to_page(&title, usize::MAX, figures, blocks))?;
     }
     shown?;
     Ok(Ending::of(!wrong))

@@ -52,8 +52,8 @@ pub fn sweep(
     args: &PrecisionArgs,
     stage: StageKind,
 ) -> anyhow::Result<Ending> {
-    if args.svg.is_some() {
-        bail!("--svg draws the frustum's diagram; expected --svg or --stage, not both");
+    if args.svg.is_some() || args.html.is_some() {
+        bail!("--svg and --html draw the frustum's diagram; expected them or --stage, not both");
     }
     let (setting, chain) = setting(registry, args, None)?;
     let scene = &setting.scene;

@@ -171,3 +171,46 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     let wanted = "2 reports; expected one, or --history FILE";
     all_refused(&folder, &["report old new.json".to_owned()], wanted);
 }
+
+/// The conclusion, then figures with marks, then tables.
+#[test]
+fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
+    let folder = folder(&[]);
+    let run = "run --scene city:n=300 --path orbit:frames=4 --structure linear,bvh --no-bounds \
+        --processes 3 --out run";
+    works(folder.path(), run);
+    let small = "--scene city:n=300 --path orbit:frames=4 --structure wide,linear --processes 1";
+    let arms = "--arm linear --stiffness 1e4 --rate 60 --seconds 1 --processes 1";
+    for (line, told, marks) in [
+        (
+            format!("funnel {small} --samples 32x18"),
+            " items remain to be drawn",
+            "class=\"bar\"",
+        ),
+        (
+            format!("precision {small} --cubes 0"),
+            "Fastest point that cannot miss",
+            "class=\"mark",
+        ),
+        (
+            format!("drift --steps 1000 {arms}"),
+            "Recommended for a camera base",
+            "class=\"mark",
+        ),
+        (
+            "compare run run".to_owned(),
+            "No regression: ",
+            "class=\"mark",
+        ),
+    ] {
+        works(folder.path(), &format!("{line} --html page.html"));
+        let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
+        assert_well_formed(&page);
+        let first = between(&page, "</h1>\n<p>", "</p>")[0];
+        assert!(first.contains(told), "{line}: {first}");
+        let [figure, table] = ["<figure>", "<table>"].map(|tag| page.find(tag));
+        assert!(figure.is_some() && figure < table, "{line}");
+        assert!(page.contains(marks), "{line}");
+        assert!(page.contains("svg.plot") && page.contains("aria-sort"));
+    }
+}

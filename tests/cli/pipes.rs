@@ -137,7 +137,9 @@ fn an_output_that_cannot_be_written_is_found_before_the_work() {
     let commands = [
         "scene generate uniform:n=9000000 --out",
         "precision --scene uniform:n=100000 --svg",
+        "precision --scene uniform:n=100000 --html",
         "drift --svg",
+        "drift --html",
         "funnel --scene city:n=10000 --html",
         "funnel --scene city:n=10000 --svg",
         "run --suite full --out",

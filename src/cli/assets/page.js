@@ -77,7 +77,7 @@
 
   if (marks.size) {
     const bar = el("fieldset", "", { id: "filter" });
-    bar.append(el("legend", "Structures"));
+    bar.append(el("legend", "Show"));
     const shape = (g) => {
       const mark = g.querySelector(".mark").cloneNode();
       const svg = document.createElementNS(g.namespaceURI, "svg");
