@@ -184,7 +184,7 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
     for (line, told, marks) in [
         (
             format!("funnel {small} --samples 32x18"),
-            " items remain to be drawn",
+            " remain to be drawn and ",
             "class=\"bar\"",
         ),
         (
