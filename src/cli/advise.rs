@@ -41,6 +41,8 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let processes = args.study.spread.processes;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, processes.into(), &args.study.spread)?;
+    let items = text::counted(setting.scene.items.len(), "item");
+    study.announce(&items, "less than a minute");
     let begin = |step: &str| study.begin(step);
     let mut parts: Vec<Part> = Vec::new();
     for process in 0..processes {

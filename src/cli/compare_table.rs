@@ -20,6 +20,9 @@ use crate::shown::{number, shortened};
 /// Counters in the list; `--all` shows every one.
 const LISTED: usize = 20;
 
+/// Further processes of a run that are worth a try.
+const MOST_MORE: usize = 100;
+
 /// Head of a comparison by `--gate work`.
 pub const WORK_HEAD: &str = "nodes, items and planes tested per query";
 
@@ -291,10 +294,15 @@ impl CompareTable {
         let cells = text::counted(undecided, "inconclusive cell");
         let more = self.changes.more_pairs();
         Some(match (self.basis, more) {
+            (Basis::Reports, Some(more)) if more > MOST_MORE => format!(
+                "{cells}: too noisy to resolve {}: use compare --against BINARY, which runs both \
+                 programs in turns",
+                text::percent(self.changes.threshold)
+            ),
             (Basis::Reports, Some(more)) => format!(
-                "{cells}: about {} more in each run (run --processes) would decide, or compare \
+                "{cells}: about {} in each run (run --processes) would decide, or compare \
                  --against BINARY, which runs both programs in turns",
-                text::counted(more, "process")
+                text::counted(more, "more process")
             ),
             (Basis::Reports, None) => format!(
                 "{cells}: runs with more processes (run --processes 20) may decide, or compare \

@@ -46,6 +46,13 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         blocks.push(Block::Line(line));
     }
     blocks.push(Block::Table(chain(report)));
+    let both = |row: &&StageRow| row.is_chosen && row.back_end.does_object_stage;
+    if let Some(row) = report.stages.iter().find(both) {
+        let name = row.back_end.name;
+        let line =
+            format!("{name} searches a tree of its own: its time includes the object stage.");
+        blocks.extend([Block::Line(String::new()), Block::Line(line)]);
+    }
     if all {
         let heading = "Every back end of every stage".to_owned();
         blocks.extend([Block::Heading(2, heading), Block::Table(stages(report))]);
@@ -98,7 +105,7 @@ fn chain(report: &FunnelReport) -> Table {
     let mut table = Table::of("stage | by | >in | >out | >time | >worth it from");
     let level = &report.level;
     if level.map_count > 1 {
-        let [given, left] = [level.input_count, level.output_count].map(|n| n.to_string());
+        let [given, left] = [level.input_count, level.output_count].map(text::count);
         let row = ["level", &level.selected, &given, &left, "", ""];
         table.add_row(row.map(|cell| shortened(cell, 24)));
     }
@@ -107,8 +114,8 @@ fn chain(report: &FunnelReport) -> Table {
         let stage = row.back_end.stage;
         let worth = match gain(report, stage) {
             // Another stage does it in its own traversal.
-            None => "in occlusion".to_owned(),
-            Some(gain) => worth(gain),
+            None if stage == StageKind::Object => "in occlusion".to_owned(),
+            gain => text::some(gain, worth),
         };
         table.add_row([
             stage.name().to_owned(),
@@ -258,7 +265,7 @@ pub fn spread(processes: usize) -> String {
 fn stages(report: &FunnelReport) -> Table {
     let mut table = Table::of("stage | by | >in | >out | >truth | >FP | >FN | >time | >per item");
     let level = &report.level;
-    let [given, left] = [level.input_count, level.output_count].map(|n| n.to_string());
+    let [given, left] = [level.input_count, level.output_count].map(text::count);
     let selected = shortened(&level.selected, 24);
     let mut first = vec!["level".to_owned(), selected, given, left];
     first.resize(table.header.len(), String::new());
@@ -309,7 +316,7 @@ fn of_view(times: &Times) -> String {
 /// A mean of counts.
 fn count(mean: f64) -> String {
     match mean {
-        mean if mean >= 100.0 || mean.fract() == 0.0 => format!("{mean:.0}"),
+        mean if mean >= 100.0 || mean.fract() == 0.0 => text::count(mean.round() as usize),
         mean => text::significant(mean),
     }
 }

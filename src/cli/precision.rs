@@ -45,6 +45,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     // There are no files yet: Ctrl-C ends the program.
     let going_on = &|| false;
     let prepared = precision::prepare(&input(args, &setting), going_on)?.ok_or(Interrupted)?;
+    let items = text::counted(setting.scene.items.len(), "item");
+    study.announce(&items, "about a minute");
     let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
     if args.cubes > 0 {
         study.begin("the sweep over sizes");

@@ -138,7 +138,7 @@ fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
                 name,
                 swept(worst.value),
                 numbers(&worst.names),
-                text::significant(lost(worst))
+                text::count(lost(worst).round() as usize)
             )
         })
     });

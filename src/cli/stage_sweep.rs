@@ -76,6 +76,8 @@ pub fn sweep(
     let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
     // There are no files yet: Ctrl-C ends the program.
     let prepared = funnel::prepare_sweep(&input, stage, &|| false)?.ok_or(Interrupted)?;
+    let items = text::counted(scene.items.len(), "item");
+    study.announce(&items, "less than a minute");
     interrupt::from_now_on_finish();
     let job = |timing| Job::Sweep(prepared.plan.clone(), timing);
     let lens_scale = setting.path.lens_scale;

@@ -299,6 +299,28 @@ fn tables_fit_and_pictures_are_whole() {
 }
 
 #[test]
+fn the_chain_is_shown_and_the_rest_is_asked_for() {
+    let line = "funnel --scene city:n=200 --samples 32x18 --processes 1 --structure wide";
+    let chain = works(Path::new("."), line);
+    assert!(
+        chain.contains("200 items; 8 of 32 views of 32 x 18 samples"),
+        "{chain}"
+    );
+    let rest = ["hierarchical-z", "Draw orders", "Picking", "Lower bounds"];
+    for name in rest {
+        assert!(!chain.contains(&format!("{name} ")) && !chain.contains(&format!("{name}:")));
+    }
+    let all = works(Path::new("."), &format!("{line} --all --no-picks"));
+    for name in rest {
+        assert_eq!(all.contains(name), name != "Picking", "{name}: {all}");
+    }
+    assert!(
+        all.contains("Left out (picks, all): not asked for: --no-picks."),
+        "{all}"
+    );
+}
+
+#[test]
 fn lower_bounds_are_of_the_back_ends_beside_them() {
     let line = "funnel --scene rooms:n=500 --path street:frames=2 --samples 96x54 --processes 1 \
                 --format json";
