@@ -397,7 +397,7 @@ fn the_advice_fits_eighty_columns_and_the_evidence_is_asked_for() {
         "{all}"
     );
     for name in set(RULES) {
-        assert!(all.contains(&format!("\n  {name}: ")), "{name}");
+        assert!(all.contains(&format!("\n  {name} ")), "{name}: {all}");
     }
 }
 
