@@ -15,6 +15,7 @@ use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs, TableFormat,
     WhatArgs,
 };
+use super::view_args::ViewArgs;
 use super::{program, text, values};
 
 /// Benchmarks spatial indexes: frustum culling, region search, checked answers
@@ -80,6 +81,8 @@ pub enum Command {
     Drift(DriftArgs),
     /// Replay test vectors and generated extremes, and check their declared outcomes
     Stress(StressArgs),
+    /// Write a scene with the verdicts along a path as a page in 3-D
+    View(ViewArgs),
     /// Inspect, generate or convert scenes
     #[command(subcommand)]
     Scene(SceneCommand),

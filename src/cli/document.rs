@@ -186,16 +186,20 @@ pub fn to_html(title: &str, blocks: &[Block]) -> String {
         Block::Picture(svg) => format!("<figure>{svg}</figure>\n"),
         Block::Figure(figure) => format!("<figure>{}</figure>\n", figure.inline()),
     });
-    let parts: String = parts.collect();
+    let body = format!("<main>\n{}</main>\n", parts.collect::<String>());
+    page(title, "", &body, include_str!("assets/page.js"))
+}
+
+/// A page that needs no other file, in the style of all pages.
+pub fn page(title: &str, style: &str, body: &str, script: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/><meta \
-         name=\"viewport\" content=\"width=device-width\"/><title>{}</title>\n<style>{}{}{}</style>\
-         </head>\n<body><main>\n{parts}</main>\n<script>{}</script></body>\n</html>\n",
+         name=\"viewport\" content=\"width=device-width\"/><title>{}</title>\n\
+         <style>{}{}{}{style}</style></head>\n<body>{body}<script>{script}</script></body>\n</html>\n",
         html(title),
         include_str!("assets/page.css"),
         include_str!("assets/figure.css"),
         palette::style(),
-        include_str!("assets/page.js"),
     )
 }
 

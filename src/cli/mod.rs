@@ -75,6 +75,9 @@ mod usage;
 mod values;
 mod verify;
 mod verify_table;
+mod view;
+mod view_args;
+mod view_data;
 mod worker;
 
 use std::collections::BTreeMap;
@@ -229,6 +232,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
         Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
         Command::Scene(SceneCommand::Draw(args)) => scene_draw::draw(registry, &args),
+        Command::View(args) => view::view(registry, &args),
         Command::Env(args) => env::env(&args),
         Command::Worker => worker::worker(registry),
         Command::Completions { shell } => {

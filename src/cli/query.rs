@@ -14,6 +14,7 @@ use crate::index::{DynIndex, Registry};
 use crate::input::tell_warnings;
 use crate::measure::Workload;
 use crate::path::{self, read_points_csv};
+use crate::query::{ItemId, QueryCost};
 use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
 
 /// A column of the answers: its name and its value of a row.
@@ -29,12 +30,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     if let Some(doubt) = culling.unproven() {
         tell(&format!("note: {doubt}"));
     }
-    let ask = |index: &dyn DynIndex, camera: usize, out: &mut _, cost: &mut _| {
-        let view = workload.views[camera].as_any();
-        index.query_counted(view, out, cost);
-        out.clear();
-        index.query(view, out);
-    };
+    let ask = frustum(&workload);
     let columns: [Column; 9] = [
         ("camera", &|row| json!(row.question)),
         ("structure", &|row| json!(row.structure)),
@@ -56,6 +52,18 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         ask_all(&structures, &scene, items, questions, args.ids, ask, each)
     })?;
     Ok(Ending::of(agree))
+}
+
+/// Queries an index with the view of a camera: the cost, then the ids of the plain query.
+pub fn frustum(
+    workload: &Workload,
+) -> impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost) + Sync {
+    |index, camera, out, cost| {
+        let view = workload.views[camera].as_any();
+        index.query_counted(view, out, cost);
+        out.clear();
+        index.query(view, out);
+    }
 }
 
 pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {

@@ -47,6 +47,7 @@ mod signals;
 mod stress;
 #[cfg(unix)]
 mod terminal;
+mod view;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_cullbench");
 const BOXES: &str = "min_x,min_y,min_z,max_x,max_y,max_z";

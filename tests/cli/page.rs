@@ -9,13 +9,13 @@ use serde_json::json;
 use super::process::*;
 
 /// Text between two texts, everywhere.
-fn between<'t>(text: &'t str, begin: &str, end: &str) -> Vec<&'t str> {
+pub fn between<'t>(text: &'t str, begin: &str, end: &str) -> Vec<&'t str> {
     let parts = text.split(begin).skip(1);
     parts.filter_map(|part| part.split(end).next()).collect()
 }
 
 /// Every end tag closes the last element that is open, and none stays open.
-fn assert_well_formed(page: &str) {
+pub fn assert_well_formed(page: &str) {
     let (mut open, mut rest) = (Vec::new(), page);
     while let Some((text, tag)) = rest.split_once('<') {
         assert!(!text.contains('>'), "a bare '>' after {open:?}: {text}");

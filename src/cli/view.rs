@@ -1,0 +1,267 @@
+//! `cullbench view`: a scene in 3-D along a path, with the verdict about every item in
+//! every view, as one page.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+
+use super::compare_structures::{Row, ask_all};
+use super::document::{html, page};
+use super::query::frustum;
+use super::view_args::ViewArgs;
+use super::view_data::{FATES, Fate, Frame, ViewData};
+use super::{Ending, expect_places, load_scene, tell, text, unread_is_fine, write_text};
+use crate::camera::{Camera, LensKind};
+use crate::index::Registry;
+use crate::measure::Workload;
+use crate::oracle::Verdict;
+use crate::path;
+use crate::query::ItemId;
+use crate::scene::Scene;
+use crate::verify::Truth;
+use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
+use crate::visibility::{Rays, SampleGrid, Solids, surfaces_of};
+
+/// Most items that a browser is given to draw.
+const MOST_ITEMS: usize = 2_000_000;
+/// Samples that estimate how many items are in front at all samples.
+const FEW: SampleGrid = SampleGrid::new(16, 9);
+/// Most items in front, summed over the samples of a view.
+const MOST_IN_FRONT: u64 = 1 << 24;
+
+pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
+    let inputs = [&args.scene, &args.path].map(|input| Path::new(input.as_str()));
+    expect_places(&[("--out", Some(&args.out))], &inputs)?;
+    let structures = args.kernel.structures(registry, &args.structure)?;
+    let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
+    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
+    let items = scene.items.len();
+    ensure!(
+        items <= MOST_ITEMS,
+        "{}: {} items; expected at most {} to draw",
+        scene.name,
+        text::count(items),
+        text::count(MOST_ITEMS)
+    );
+    let cameras = path::load(&args.path, &scene, &defaults)?;
+    let (all, most) = (cameras.cameras.len(), args.frames as usize);
+    let cameras = cameras.at_most(most);
+    let workload = Workload::new(&scene, &cameras, &culling)?;
+    if let Some(doubt) = culling.unproven() {
+        tell(&format!("note: {doubt}"));
+    }
+    let (mut data, order) = ViewData::of(&scene, &cameras.name);
+    let mut answers: Vec<Box<[ItemId]>> = Vec::new();
+    let questions = ("camera", workload.views.len());
+    let (ask, boxes) = (frustum(&workload), &workload.items);
+    let mut each = |rows: Vec<Row>| {
+        for row in rows {
+            data.count(&row);
+            if answers.len() == row.question {
+                answers.extend(row.ids);
+            }
+        }
+        Ok(())
+    };
+    let agree = ask_all(&structures, &scene, boxes, questions, true, ask, &mut each)?;
+    let threads = args.kernel.threads;
+    let samples = args.samples.map(|grid| Samples::of(&scene, grid, threads));
+    let mut totals = [0; FATES];
+    for (view, answer) in answers.iter().enumerate() {
+        let camera = &cameras.cameras[view];
+        let front = samples.as_ref().map(|samples| samples.front(camera));
+        let front = front.transpose().with_context(|| cameras.place(view))?;
+        let truth = Truth::of_scene(camera, &scene);
+        let fates = fates(items, answer, truth.as_ref(), front.as_deref());
+        order
+            .iter()
+            .for_each(|&id| totals[fates[id as usize] as usize] += 1);
+        let fates: Vec<Fate> = order.iter().map(|&id| fates[id as usize]).collect();
+        let index = if all > most { view * all / most } else { view };
+        data.frames
+            .push(Frame::of(index, camera, scene.origin, &fates));
+    }
+    data.samples = args
+        .samples
+        .map(|grid| format!("{}x{}", grid.width, grid.height));
+    let told = conclusion(&data, totals, agree);
+    let test = culling.test.name();
+    let about = format!("Test {test}; {}.", lens(&cameras.cameras));
+    let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
+    let body = format!(
+        "<main class=\"view\"><h1>cullbench view {}, {}</h1>\n<p>{}</p>\n{}<p>{}</p>\n</main>\n\
+         <script type=\"application/json\" id=\"data\">{json}</script>\n",
+        html(&data.scene),
+        html(&data.path),
+        html(&told),
+        include_str!("assets/view.html"),
+        html(&about),
+    );
+    let title = format!("cullbench view {}", data.scene);
+    let text = page(
+        &title,
+        include_str!("assets/view.css"),
+        &body,
+        concat!(
+            include_str!("assets/view_data.js"),
+            include_str!("assets/view_gl.js"),
+            include_str!("assets/view.js")
+        ),
+    );
+    write_text(&args.out, &text)?;
+    let megabytes = text::significant(text.len() as f64 / 1e6);
+    let line = format!("{}, {megabytes} MB. {told}", args.out.display());
+    let line = text::wrapped(&text::plain(&line), text::width());
+    unread_is_fine(writeln!(io::stdout(), "{line}"))?;
+    Ok(Ending::of(agree))
+}
+
+/// What became of each item of a view; without a truth, what is returned is visible.
+fn fates(
+    items: usize,
+    answer: &[ItemId],
+    truth: Option<&Truth>,
+    front: Option<&[ItemId]>,
+) -> Vec<Fate> {
+    let mut fates = vec![Fate::Culled; items];
+    let mut in_front = vec![front.is_none(); items];
+    front
+        .unwrap_or_default()
+        .iter()
+        .for_each(|&id| in_front[id as usize] = true);
+    answer
+        .iter()
+        .for_each(|&id| fates[id as usize] = Fate::Visible);
+    let verdicts = truth.map(Truth::verdicts).unwrap_or_default();
+    for (fate, verdict) in fates.iter_mut().zip(verdicts) {
+        *fate = match (*fate, verdict) {
+            (Fate::Visible, Verdict::Out) => Fate::FalsePositive,
+            (Fate::Culled, Verdict::In) => Fate::Lost,
+            (fate, _) => fate,
+        };
+    }
+    for (fate, _) in fates
+        .iter_mut()
+        .zip(in_front)
+        .filter(|(_, is_front)| !is_front)
+    {
+        if *fate == Fate::Visible {
+            *fate = Fate::Hidden;
+        }
+    }
+    fates
+}
+
+/// The result in sentences.
+fn conclusion(data: &ViewData, totals: [usize; FATES], agree: bool) -> String {
+    let views = data.frames.len();
+    let of = |fate: Fate| totals[fate as usize];
+    let mean = |count: usize| match count as f64 / views as f64 {
+        few if few < 100.0 => text::significant(few),
+        many => text::count(many.round() as usize),
+    };
+    let returned = of(Fate::Visible) + of(Fate::FalsePositive) + of(Fate::Hidden);
+    let mut parts = vec![match of(Fate::FalsePositive) {
+        0 => "no false positive".to_owned(),
+        count => format!("{} of them false positives", mean(count)),
+    }];
+    if let Some(samples) = &data.samples {
+        let hidden = mean(of(Fate::Hidden));
+        parts.push(format!(
+            "{hidden} hidden (in front at none of {samples} samples)"
+        ));
+    }
+    parts.push(match of(Fate::Lost) {
+        0 => "no visible item lost".to_owned(),
+        count => format!("{} visible items lost", mean(count)),
+    });
+    let structures = match (data.structures.as_slice(), agree) {
+        ([one], _) => format!("The structure is {}.", one.name),
+        (all, true) => format!("All {} structures return the same sets.", all.len()),
+        (all, false) => {
+            let count = all.len();
+            format!("The {count} structures disagree; the sets are the first one's.")
+        }
+    };
+    format!(
+        "{} of {}: {} of {} returned per view, {}. {structures}",
+        text::counted(views, "view"),
+        data.path,
+        mean(returned),
+        text::counted(data.items, "item"),
+        parts.join(", "),
+    )
+}
+
+/// Lenses of a path, in words.
+fn lens(cameras: &[Camera]) -> String {
+    let range = |of: &dyn Fn(&Camera) -> f64| {
+        let least = cameras.iter().map(of).fold(f64::INFINITY, f64::min);
+        let most = cameras.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+        let [least, most] = [least, most].map(text::significant);
+        if least == most {
+            most
+        } else {
+            format!("{least} to {most}")
+        }
+    };
+    let angle = |camera: &Camera| match *camera.lens.kind() {
+        LensKind::Perspective { fovy_deg, .. } => fovy_deg,
+        _ => f64::NAN,
+    };
+    let is_angled = cameras.iter().all(|camera| angle(camera).is_finite());
+    let angle = match is_angled {
+        true => format!("vertical field of view {} deg, ", range(&angle)),
+        false => String::new(),
+    };
+    let far = |camera: &Camera| camera.lens.far().unwrap_or(f64::INFINITY);
+    format!(
+        "{angle}near {}, far {}",
+        range(&|camera| camera.lens.near()),
+        range(&far)
+    )
+}
+
+/// Surfaces at which rays end, and the samples of a view.
+struct Samples {
+    ends: Box<dyn Fn(&Rays, SampleGrid) -> SampleTruth>,
+    grid: SampleGrid,
+    items: usize,
+}
+
+impl Samples {
+    fn of(scene: &Scene, grid: SampleGrid, threads: usize) -> Samples {
+        let items = scene.items.len();
+        let ends: Box<dyn Fn(&Rays, SampleGrid) -> SampleTruth> = match surfaces_of(scene) {
+            None => {
+                let index = RayIndex::build(&Solids::of(scene));
+                Box::new(move |rays, grid| SampleTruth::of(&index, rays, grid, threads))
+            }
+            Some(surfaces) => {
+                let index = SurfaceIndex::build(&surfaces);
+                Box::new(move |rays, grid| SampleTruth::of(&index, rays, grid, threads))
+            }
+        };
+        Samples { ends, grid, items }
+    }
+
+    /// Items in front at any sample.
+    fn front(&self, camera: &Camera) -> anyhow::Result<Vec<ItemId>> {
+        let rays = Rays::of(camera)?;
+        let few = (self.ends)(&rays, FEW)
+            .samples_of
+            .into_iter()
+            .map(u64::from);
+        let about = few.sum::<u64>() * self.grid.samples() as u64 / FEW.samples() as u64;
+        ensure!(
+            about <= MOST_IN_FRONT,
+            "about {about} front items, summed over the samples; expected at most {MOST_IN_FRONT}: \
+             fewer --samples or fewer items with a common face"
+        );
+        let mut visible = (self.ends)(&rays, self.grid).visible;
+        // Floors and ceilings of a map come behind its items.
+        visible.retain(|&id| (id as usize) < self.items);
+        Ok(visible)
+    }
+}

@@ -1,0 +1,245 @@
+//! Data of the page of `view`: boxes along a Morton curve, and per camera the sets of
+//! items as runs along that curve, which are short there. `assets/view.js` reads them.
+
+use glam::{DMat4, DVec3, DVec4, I64Vec3};
+use obvhs::ploc::morton::morton_encode_u64;
+use serde::Serialize;
+
+use super::compare_structures::Row;
+use crate::camera::{Camera, ClipSpace, LensKind};
+use crate::query::ItemId;
+use crate::scene::Scene;
+
+/// Digits of packed numbers, safe in JSON and HTML.
+const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+
+/// Whole numbers as text: a digit holds five bits, lowest first, and a sixth bit if more
+/// digits of the number follow.
+#[derive(Default)]
+struct Packed(String);
+
+impl Packed {
+    fn push(&mut self, mut number: u64) {
+        loop {
+            let more = u64::from(number > 31) << 5;
+            self.0.push(DIGITS[(number & 31 | more) as usize].into());
+            number >>= 5;
+            if number == 0 {
+                return;
+            }
+        }
+    }
+
+    /// 0, -1, 1, -2, .. as 0, 1, 2, 3, ..
+    fn push_signed(&mut self, number: i64) {
+        self.push((number << 1 ^ number >> 63) as u64);
+    }
+}
+
+/// Members of a set as runs: twice the gap before a run, plus 1 if the run is longer
+/// than 1; then its length less 2.
+fn runs(set: impl Iterator<Item = bool>) -> String {
+    let (mut packed, mut gap, mut run) = (Packed::default(), 0, 0);
+    for is_member in set.chain([false]) {
+        if is_member {
+            run += 1;
+            continue;
+        }
+        if run > 0 {
+            packed.push(2 * gap + u64::from(run > 1));
+            if run > 1 {
+                packed.push(run - 2);
+            }
+            (gap, run) = (0, 0);
+        }
+        gap += 1;
+    }
+    packed.0
+}
+
+/// Kinds of [`Fate`].
+pub const FATES: usize = 5;
+
+/// What became of an item in a view.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Fate {
+    Culled,
+    Visible,
+    FalsePositive,
+    Hidden,
+    Lost,
+}
+
+/// Everything that the page draws.
+#[derive(Serialize)]
+pub struct ViewData {
+    pub scene: String,
+    pub path: String,
+    pub items: usize,
+    /// Steps per axis that corners are rounded to, outward.
+    steps: u32,
+    /// Lowest corner of all items, scene-local.
+    low: [f64; 3],
+    /// Extent of all items.
+    extent: [f64; 3],
+    /// Scene-local zero in world coordinates.
+    origin: [f64; 3],
+    /// Ids of the items in the order of the curve: signed differences.
+    ids: String,
+    /// Per item: signed differences of its lower corner to the one before, and its extents.
+    boxes: String,
+    pub samples: Option<String>,
+    pub frames: Vec<Frame>,
+    pub structures: Vec<Counters>,
+}
+
+/// A view of the path.
+#[derive(Clone, Default, Serialize)]
+pub struct Frame {
+    /// Index in the path.
+    pub camera: usize,
+    /// Scene-local to clip coordinates (depth -1 to 1), column by column.
+    clip: [f64; 16],
+    visible: String,
+    false_positive: String,
+    hidden: String,
+    lost: String,
+}
+
+/// Tests that a structure made, per view.
+#[derive(Default, Serialize)]
+pub struct Counters {
+    pub name: String,
+    pub nodes_tested: Vec<u64>,
+    pub items_tested: Vec<u64>,
+}
+
+impl ViewData {
+    /// Data without views, and the items in the order of the curve.
+    pub fn of(scene: &Scene, path: &str) -> (ViewData, Vec<ItemId>) {
+        // Few items may be far smaller than the scene.
+        let steps: u32 = if scene.items.len() > 20_000 {
+            1 << 16
+        } else {
+            1 << 20
+        };
+        let bounds = match scene.items.is_empty() {
+            true => Default::default(),
+            false => [scene.bounds.min.as_dvec3(), scene.bounds.max.as_dvec3()],
+        };
+        let (low, extent) = (bounds[0], bounds[1] - bounds[0]);
+        let scale = extent.map(|e| if e > 0.0 { f64::from(steps) / e } else { 0.0 });
+        let corners = |item: usize| {
+            let b = &scene.items[item];
+            let [min, max] = [b.min, b.max].map(|corner| (corner.as_dvec3() - low) * scale);
+            (min.floor().as_i64vec3(), max.ceil().as_i64vec3())
+        };
+        let code = |item: usize| {
+            let (min, max) = corners(item);
+            let [x, y, z] = ((min + max) / 2).to_array().map(|c| c as u32);
+            (morton_encode_u64(x, y, z), item)
+        };
+        let mut order: Vec<(u64, usize)> = (0..scene.items.len()).map(code).collect();
+        order.sort_unstable();
+        let (mut ids, mut boxes) = (Packed::default(), Packed::default());
+        let (mut id, mut low_corner) = (0, I64Vec3::ZERO);
+        for &(_, item) in &order {
+            ids.push_signed(item as i64 - id);
+            let (min, max) = corners(item);
+            for difference in (min - low_corner).to_array() {
+                boxes.push_signed(difference);
+            }
+            for side in (max - min).to_array() {
+                boxes.push(side as u64);
+            }
+            (id, low_corner) = (item as i64, min);
+        }
+        let data = ViewData {
+            scene: scene.name.clone(),
+            path: path.to_owned(),
+            items: scene.items.len(),
+            steps,
+            low: low.to_array(),
+            extent: extent.to_array(),
+            origin: scene.origin.to_array(),
+            ids: ids.0,
+            boxes: boxes.0,
+            samples: None,
+            frames: Vec::new(),
+            structures: Vec::new(),
+        };
+        (
+            data,
+            order.into_iter().map(|(_, item)| item as ItemId).collect(),
+        )
+    }
+
+    /// Adds the tests of a structure in its next view.
+    pub fn count(&mut self, row: &Row) {
+        let known = self
+            .structures
+            .iter()
+            .position(|own| own.name == row.structure);
+        let at = known.unwrap_or_else(|| {
+            self.structures.push(Counters {
+                name: row.structure.clone(),
+                ..Counters::default()
+            });
+            self.structures.len() - 1
+        });
+        let counters = &mut self.structures[at];
+        counters.nodes_tested.push(row.cost.nodes_tested);
+        counters.items_tested.push(row.cost.items_tested);
+    }
+}
+
+impl Frame {
+    /// A view with the fates of all items, in the order of the curve.
+    pub fn of(index: usize, camera: &Camera, origin: DVec3, fates: &[Fate]) -> Frame {
+        let set = |fate: Fate| runs(fates.iter().map(|own| *own == fate));
+        Frame {
+            camera: index,
+            clip: clip_matrix(camera, origin).to_cols_array(),
+            visible: set(Fate::Visible),
+            false_positive: set(Fate::FalsePositive),
+            hidden: set(Fate::Hidden),
+            lost: set(Fate::Lost),
+        }
+    }
+}
+
+/// Scene-local to clip coordinates. Depth runs from -1 to 1, or back where a matrix has
+/// it reversed.
+fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
+    let LensKind::Matrix(matrix) = camera.lens.kind() else {
+        let view = camera.frame.relative_to(origin).world_to_eye();
+        return camera.lens.projection(ClipSpace::OpenGl) * view;
+    };
+    let [x, y, mut z, w] = matrix.rows().map(DVec4::from);
+    if matrix.is_from_zero() {
+        z = 2.0 * z - w;
+    }
+    DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_runs_are_packed_as_the_page_reads_them() {
+        let mut packed = Packed::default();
+        [0, 31, 32, 1023, 1024]
+            .into_iter()
+            .for_each(|n| packed.push(n));
+        [0, -1, 1, -2, i64::MIN]
+            .into_iter()
+            .for_each(|n| packed.push_signed(n));
+        assert_eq!(packed.0, "AfgB_fggBABCD________________P");
+        let set = |text: &str| runs(text.bytes().map(|b| b == b'x'));
+        assert_eq!(
+            [set(""), set("..."), set("x"), set("..x.xxx")],
+            ["", "", "A", "ECB".into()]
+        );
+    }
+}

@@ -1,0 +1,269 @@
+//! The page of `view`, taken apart: its sets are those of `query --ids`, its boxes hold
+//! the items, its counters are the query's.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+use super::page::{assert_well_formed, between};
+use super::process::*;
+use super::queries::number;
+
+/// The page that a command writes as view.html.
+fn page(folder: &Path, options: &str) -> String {
+    works(folder, &format!("view {options} -o view.html"));
+    fs::read_to_string(folder.join("view.html")).expect("a page")
+}
+
+fn data(page: &str) -> Value {
+    json(
+        between(
+            page,
+            "<script type=\"application/json\" id=\"data\">",
+            "</script>",
+        )[0],
+    )
+}
+
+/// Packed numbers: five bits per digit, lowest first; the sixth continues.
+fn unpacked(packed: &Value) -> Vec<u64> {
+    const DIGITS: &str = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+    let (mut numbers, mut number, mut shift) = (Vec::new(), 0, 0);
+    for digit in packed.as_str().expect("a text").chars() {
+        let digit = DIGITS.find(digit).expect("a digit") as u64;
+        number |= (digit & 31) << shift;
+        shift += 5;
+        if digit < 32 {
+            numbers.push(number);
+            (number, shift) = (0, 0);
+        }
+    }
+    assert_eq!(shift, 0, "an unfinished number");
+    numbers
+}
+
+fn signed(number: u64) -> i64 {
+    (number >> 1) as i64 ^ -((number & 1) as i64)
+}
+
+/// Ids of the items in the order of the sets.
+fn ids(data: &Value) -> Vec<i64> {
+    let differences = unpacked(&data["ids"]).into_iter().map(signed);
+    let sums = differences.scan(0, |id, difference| {
+        *id += difference;
+        Some(*id)
+    });
+    sums.collect()
+}
+
+/// Members of sets, ascending by id.
+fn members(ids: &[i64], sets: &[&Value]) -> Vec<i64> {
+    let mut found = Vec::new();
+    for set in sets {
+        let mut numbers = unpacked(set).into_iter();
+        let mut at = 0;
+        while let Some(head) = numbers.next() {
+            at += (head / 2) as usize;
+            let length = match head % 2 {
+                0 => 1,
+                _ => numbers.next().expect("a length") as usize + 2,
+            };
+            found.extend(&ids[at..at + length]);
+            at += length;
+        }
+    }
+    found.sort_unstable();
+    found
+}
+
+fn array(value: &Value) -> &[Value] {
+    value.as_array().expect("an array")
+}
+
+#[test]
+fn sets_and_counters_of_every_view_are_those_of_the_query() {
+    let folder = folder(&[]);
+    let cases = [
+        ("city:n=3000", "orbit:frames=12", "--test six-plane"),
+        ("uniform:n=500", "teleport:frames=20", "--test sphere"),
+        ("city:n=900", "street:frames=9,far=inf", "--samples 32x18"),
+        ("freedm-map12", "places", "--test exact"),
+        (
+            "clustered:n=700",
+            "zoom:frames=7",
+            "--epsilon 0 --planes gh-gl-f32",
+        ),
+    ];
+    let mut seen = BTreeSet::new();
+    for (scene, path, options) in cases {
+        let what = format!("--scene {scene} --path {path} --structure wide,bvh");
+        let done = cullbench(
+            folder.path(),
+            &format!("view {what} {options} -o view.html"),
+        );
+        assert_eq!(done.code, Some(0), "{done:?}");
+        let page = fs::read_to_string(folder.path().join("view.html")).expect("a page");
+        let data = data(&page);
+        let ids = ids(&data);
+        assert!(
+            ids.iter()
+                .copied()
+                .collect::<BTreeSet<_>>()
+                .into_iter()
+                .eq(0..ids.len() as i64)
+        );
+        let test = if options.starts_with("--samples") {
+            ""
+        } else {
+            options
+        };
+        let query = cullbench(folder.path(), &format!("query {what} {test} --ids"));
+        let rows = rows(&query.out);
+        let frames = array(&data["frames"]);
+        assert_eq!(rows.len(), 2 * frames.len(), "{scene} {path}");
+        for (n, frame) in frames.iter().enumerate() {
+            assert_eq!(frame["camera"], n);
+            let returned = ["visible", "false_positive", "hidden"].map(|key| &frame[key]);
+            let wanted: Vec<i64> = rows[2 * n]["visible_ids"]
+                .split_whitespace()
+                .map(|id| id.parse().expect("an id"))
+                .collect();
+            assert_eq!(members(&ids, &returned), wanted, "{scene} {path} {n}");
+            for key in ["visible", "false_positive", "hidden", "lost"] {
+                if frame[key] != "" {
+                    seen.insert(key);
+                }
+            }
+            for (own, row) in array(&data["structures"]).iter().zip(&rows[2 * n..]) {
+                assert_eq!(own["name"], row["structure"]);
+                for column in ["nodes_tested", "items_tested"] {
+                    assert_eq!(own[column][n], number(row, column), "{scene} {n} {column}");
+                }
+            }
+        }
+    }
+    assert_eq!(
+        seen,
+        set("false_positive hidden visible"),
+        "cases of too little variety"
+    );
+}
+
+/// Rounded outward to a grid, and no farther than one step of it.
+#[test]
+fn boxes_hold_the_items() {
+    let boxes = "min_x,min_y,min_z,max_x,max_y,max_z\n-3,1e6,0,5,1000001,0\n\
+        0.25,1000000.5,0,0.75,1000002,0\n100,1000003,0,100,1000003,0\n";
+    let folder = folder(&[("s.csv", boxes.as_bytes())]);
+    let page = page(
+        folder.path(),
+        "--scene s.csv --path orbit:frames=2 --structure linear",
+    );
+    let data = data(&page);
+    let (ids, numbers) = (ids(&data), unpacked(&data["boxes"]));
+    let of = |key: &str, k: usize| data[key][k].as_f64().expect("a number");
+    let steps = data["steps"].as_f64().expect("a number");
+    let mut corner = [0; 3];
+    for (id, packed) in ids.into_iter().zip(numbers.chunks(6)) {
+        let line = boxes.lines().nth(id as usize + 1).expect("a box");
+        let wanted: Vec<f64> = line
+            .split(',')
+            .map(|x| x.parse().expect("a number"))
+            .collect();
+        for k in 0..3 {
+            corner[k] += signed(packed[k]);
+            let (step, low) = (of("extent", k) / steps, of("origin", k) + of("low", k));
+            let [min, max] =
+                [corner[k], corner[k] + packed[3 + k] as i64].map(|at| low + at as f64 * step);
+            let slack = step + 1e-9;
+            assert!(
+                (wanted[k] - slack..=wanted[k] + 1e-9).contains(&min),
+                "{line} {min}"
+            );
+            assert!(
+                (wanted[3 + k] - 1e-9..=wanted[3 + k] + slack).contains(&max),
+                "{line} {max}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_page_is_whole_and_small_and_loads_nothing() {
+    let nasty = "a<script><b>.csv";
+    let folder = folder(&[]);
+    works(
+        folder.path(),
+        &format!("scene generate city:n=100000 --out {nasty}"),
+    );
+    let options = format!("--scene {nasty} --path teleport:frames=500 --frames 5 --structure wide");
+    let page = page(folder.path(), &options);
+    let data = data(&page);
+    assert_eq!(data["scene"], nasty);
+    let frames = array(&data["frames"]);
+    let cameras: Vec<&Value> = frames.iter().map(|frame| &frame["camera"]).collect();
+    assert_eq!(cameras, [0, 100, 200, 300, 400]);
+    // With 120 views no more than 3 MB.
+    let views: usize = frames.iter().map(|frame| frame.to_string().len()).sum();
+    assert!(
+        page.len() + views / 5 * 115 < 3_000_000,
+        "{} {views}",
+        page.len()
+    );
+
+    let script = between(&page, "<script>", "</script>")[0].to_owned();
+    let (_, visible) = page.split_once("<body>").expect("a body");
+    assert_well_formed(&page);
+    for outside in ["http", "@import", "url(", " src="] {
+        let found = page
+            .replace("http://www.w3.org/2000/svg", "")
+            .contains(outside);
+        assert!(!found, "loads something: {outside}");
+    }
+    assert!(visible.contains("no visible item lost") && visible.contains("a&lt;script&gt;"));
+    let script_file = folder.path().join("view.js");
+    fs::write(&script_file, script).expect("writable");
+    // Where there is a node.
+    if let Ok(done) = Command::new("node")
+        .arg("--check")
+        .arg(&script_file)
+        .output()
+    {
+        assert!(
+            done.status.success(),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_viewed_is_one_line() {
+    let folder = folder(&[]);
+    for (options, wanted) in [
+        (
+            "--scene city:n=9 -o no/view.html",
+            "no | existing folder for --out",
+        ),
+        (
+            "--scene city:n=9 -o view.html --samples 0x9",
+            "columns x rows",
+        ),
+        (
+            "--scene city:n=2000001 -o view.html",
+            "2,000,001 items | at most 2,000,000",
+        ),
+        ("--scene city:n=9 -o view.html --structure none", "none"),
+        (
+            "--scene city:n=9 --path street:frames=x -o view.html",
+            "frames",
+        ),
+    ] {
+        let done = cullbench(folder.path(), &format!("view {options}"));
+        assert_refused(&done, wanted, options);
+    }
+    assert!(!folder.path().join("view.html").exists());
+}
