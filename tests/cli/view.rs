@@ -195,10 +195,11 @@ fn boxes_hold_the_items() {
 fn a_page_is_whole_and_small_and_loads_nothing() {
     let nasty = "a<script><b>.csv";
     let folder = folder(&[]);
-    works(
+    let made = cullbench(
         folder.path(),
         &format!("scene generate city:n=100000 --out {nasty}"),
     );
+    assert_eq!(made.code, Some(0), "{made:?}");
     let options = format!("--scene {nasty} --path teleport:frames=500 --frames 5 --structure wide");
     let page = page(folder.path(), &options);
     let data = data(&page);
