@@ -76,6 +76,8 @@ pub struct ViewData {
     pub scene: String,
     pub path: String,
     pub items: usize,
+    /// Axis that points up, y or z.
+    up: &'static str,
     /// Steps per axis that corners are rounded to, outward.
     steps: u32,
     /// Lowest corner of all items, scene-local.
@@ -98,7 +100,7 @@ pub struct ViewData {
 pub struct Frame {
     /// Index in the path.
     pub camera: usize,
-    /// Scene-local to clip coordinates (depth -1 to 1), column by column.
+    /// Scene-local to clip coordinates (near depth -1, far depth 1), column by column.
     clip: [f64; 16],
     visible: String,
     false_positive: String,
@@ -158,6 +160,7 @@ impl ViewData {
             scene: scene.name.clone(),
             path: path.to_owned(),
             items: scene.items.len(),
+            up: scene.up.name(),
             steps,
             low: low.to_array(),
             extent: extent.to_array(),
@@ -208,17 +211,19 @@ impl Frame {
     }
 }
 
-/// Scene-local to clip coordinates. Depth runs from -1 to 1, or back where a matrix has
-/// it reversed.
+/// Scene-local to clip coordinates; depth is -1 at the near plane and 1 at the far one.
 fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
     let LensKind::Matrix(matrix) = camera.lens.kind() else {
         let view = camera.frame.relative_to(origin).world_to_eye();
         return camera.lens.projection(ClipSpace::OpenGl) * view;
     };
-    let [x, y, mut z, w] = matrix.rows().map(DVec4::from);
-    if matrix.is_from_zero() {
-        z = 2.0 * z - w;
-    }
+    let [x, y, z, w] = matrix.rows().map(DVec4::from);
+    let lowest = if matrix.is_from_zero() { 0.0 } else { -1.0 };
+    let [near, far] = match matrix.unprojected() {
+        Ok(unprojected) => unprojected.depths,
+        Err(_) => [lowest, 1.0],
+    };
+    let z = (2.0 * z - (near + far) * w) / (far - near);
     DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
 }
 

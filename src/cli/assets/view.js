@@ -1,7 +1,7 @@
 "use strict";
 // A scene of boxes in 3-D along a path of cameras; the state is in the hash of the address.
 (() => {
-  const { data, FATES, frames, fates, decode, boxes, bounds, ids, cameras, mul, apply, inverse, scaled, minus, plus, length, REACH } = scene;
+  const { data, FATES, frames, fates, decode, boxes, bounds, ids, cameras, mul, apply, inverse, scaled, minus, plus, upright, length, REACH } = scene;
   const $ = (id) => document.getElementById(id);
   const el = (tag, text = "", props = {}) => Object.assign(document.createElement(tag), { textContent: text, ...props });
   const count = (n) => Math.round(n).toLocaleString("en");
@@ -61,7 +61,8 @@
   const axes = ({ yaw, pitch }) => {
     const n = [Math.cos(pitch) * Math.cos(yaw), Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch)];
     const u = [-Math.sin(yaw), Math.cos(yaw), 0];
-    return [u, [n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0]], n];
+    const v = [n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0]];
+    return [u, v, n].map(upright);
   };
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   // The whole scene just fits the canvas.
@@ -101,7 +102,9 @@
 
   let picked = -1;
   const REST = 2;
-  const ROUTE = cameras.slice(1).flatMap((to, n) => [...cameras[n].from, ...to.from]);
+  // Steps of a path, not jumps.
+  const isStep = (a, b) => length(minus(a, b)) < 0.1;
+  const ROUTE = cameras.slice(1).flatMap(({ from }, n) => (isStep(cameras[n].from, from) ? [...cameras[n].from, ...from] : []));
   const AROUND = outline([...bounds.map((side) => -side), ...bounds]);
   const draw = (scale) => {
     const ratio = Math.min(devicePixelRatio * scale, 3);
@@ -124,7 +127,7 @@
       stroke(edges, clip, 1, 1, true);
     }
     if (picked >= 0) stroke(outline(boxes.subarray(6 * picked, 6 * picked + 6)), clip, 1, 1);
-    gpu.draw({ ...paint, size, off, clip, eye, small, strokes });
+    gpu.draw({ ...paint, size, off, clip, eye, small, strokes, up: data.up === "y" ? 1 : 2 });
   };
 
   // ---- one picture per change; in motion with as many pixels as 30 pictures a second allow,
@@ -228,7 +231,8 @@
   const name = () => {
     if (picked < 0) return void ($("item").textContent = "");
     const box = [...boxes.subarray(6 * picked, 6 * picked + 6)].map((x, k) => scene.world(x, k % 3));
-    const [low, high] = [box.slice(0, 3), box.slice(3)].map((corner) => corner.map((x) => +x.toPrecision(6)).join(", "));
+    const digits = clamp(5 - Math.floor(Math.log10(Math.max(...data.extent) || 1)), 0, 20);
+    const [low, high] = [box.slice(0, 3), box.slice(3)].map((corner) => corner.map((x) => +x.toFixed(digits)).join(", "));
     $("item").textContent = `item ${ids[picked]}: ${FATES[fates[picked]][2]}; about (${low}) to (${high})`;
   };
   // After a change of the state by the keyboard or a button.
@@ -359,7 +363,7 @@
   FATES.forEach((_, fate) => (KEYS[fate + 1] = () => toggle(fate)));
   document.addEventListener("keydown", (event) => {
     const act = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    const isOwn = event.target.matches("button,summary,input[type=checkbox]") && event.key === " ";
+    const isOwn = event.target.matches?.("button,summary,input[type=checkbox]") && event.key === " ";
     const isSlider = event.target === $("frame") && event.key.length > 1;
     if (!act || isOwn || isSlider || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();

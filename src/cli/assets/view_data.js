@@ -103,6 +103,8 @@ const scene = (() => {
     }
     return [4, 5, 6, 7].flatMap((c) => rows.map((row) => row[c]));
   };
+  // A vector with z up, with the axes of the scene.
+  const upright = ([x, y, z]) => (data.up === "y" ? [y, z, x] : [x, y, z]);
   const scaled = (x, y, z) => [x, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0, 0, 0, 0, 1];
   const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
   const plus = (a, b, by = 1) => [a[0] + b[0] * by, a[1] + b[1] * by, a[2] + b[2] * by];
@@ -112,15 +114,10 @@ const scene = (() => {
   const LOCAL = mul([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...centre, 1], scaled(radius, radius, radius));
   const REACH = 4;
   const cameras = frames.map((frame) => {
-    let clip = mul(frame.clip, LOCAL);
-    let back = inverse(clip);
+    const clip = mul(frame.clip, LOCAL);
+    const back = inverse(clip);
     // The eye, or the direction towards it, in homogeneous coordinates.
-    let eye = apply(back, [0, 0, -1, 0]);
-    if (eye[3] < 0) {
-      clip = mul(scaled(1, 1, -1), clip);
-      back = inverse(clip);
-      eye = apply(back, [0, 0, -1, 0]);
-    }
+    const eye = apply(back, [0, 0, -1, 0]);
     const corners = [];
     let isOpen = false;
     for (const [x, y] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
@@ -139,5 +136,5 @@ const scene = (() => {
     return { clip, eye, from, corners, isOpen, aspect: side(0, 1) / side(0, 3) };
   });
 
-  return { data, FATES, frames, fates, decode, boxes, bounds, ids, cameras, mul, apply, inverse, scaled, minus, plus, length, REACH, world };
+  return { data, FATES, frames, fates, decode, boxes, bounds, ids, cameras, mul, apply, inverse, scaled, minus, plus, upright, length, REACH, world };
 })();

@@ -4,7 +4,7 @@ const painter = (() => {
   const BOX = `#version 300 es
 precision highp float; precision highp int; precision highp usampler2D;
 uniform highp sampler2D corners; uniform usampler2D fates;
-uniform mat4 clip; uniform vec4 eye; uniform vec3 colours[5]; uniform int off;
+uniform mat4 clip; uniform vec4 eye; uniform vec3 colours[5]; uniform int off, up;
 flat out vec3 colour; out vec3 at; flat out int axis;
 // Three sides face the eye: all but one corner, 0. Corners 1, 2 and 4 belong to one side each.
 void main() {
@@ -17,7 +17,7 @@ void main() {
   vec3 side = mix(vec3(-1), vec3(1), greaterThan(eye.xyz - eye.w * centre, vec3(0)));
   at = vec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
   axis = corner >> 1;
-  float shade = axis == 2 ? (side.z > 0. ? 1. : .55) : axis == 1 ? .8 : .66;
+  float shade = axis == up ? (side[up] > 0. ? 1. : .55) : axis == 0 ? .66 : .8;
   colour = colours[fate] * shade;
   gl_Position = clip * vec4(centre + (at * 2. - 1.) * side * (high - low) * .5, 1);
   bool inside = all(greaterThan(eye.xyz, low * eye.w)) && all(lessThan(eye.xyz, high * eye.w)) && eye.w > 0.;
@@ -67,7 +67,7 @@ void main() { result = colour; }`;
     }
     gl.linkProgram(made);
     if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
-    const names = ["corners", "fates", "clip", "eye", "colours", "off", "size", "width", "colour"];
+    const names = ["corners", "fates", "clip", "eye", "colours", "off", "up", "size", "width", "colour"];
     return { made, at: Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(made, name)])) };
   };
   // A texture with rows of 1,024 items; returns the function that fills it.
@@ -116,7 +116,7 @@ void main() { result = colour; }`;
     const update = (fates) => states(fates, rows);
     // Boxes below `small` are drawn with fewer triangles.
     // `strokes`: [corners, matrix, colour with alpha, half the width in pixels, behind boxes?]
-    const draw = ({ size, ground, colours, off, clip, eye, small, strokes }) => {
+    const draw = ({ size, ground, colours, off, clip, eye, small, strokes, up }) => {
       gl.viewport(0, 0, ...size);
       gl.clearColor(...ground, 1);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
@@ -127,6 +127,7 @@ void main() { result = colour; }`;
       gl.uniform4fv(box.at.eye, eye);
       gl.uniform3fv(box.at.colours, colours.flat());
       gl.uniform1i(box.at.off, off);
+      gl.uniform1i(box.at.up, up);
       gl.uniform1i(box.at.fates, 1);
       gl.bindVertexArray(items);
       const large = small > 0 ? edges.findIndex((edge) => -edge < small) : -1;
