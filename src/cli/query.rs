@@ -54,7 +54,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     Ok(Ending::of(agree))
 }
 
-/// Queries an index with the view of a camera: the cost, then the ids of the plain query.
+/// Counts a query with a camera's view, then returns the ids of the plain query.
 pub fn frustum(
     workload: &Workload,
 ) -> impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost) + Sync {

@@ -1,5 +1,6 @@
-//! `cullbench view`: a scene in 3-D along a path, with the verdict about every item in
-//! every view, as one page.
+//! `cullbench view`: one page with a scene in 3-D along a path.
+//!
+//! Items have the colours of their verdicts in each view.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,26 +10,22 @@ use anyhow::{Context, ensure};
 use super::compare_structures::{Row, ask_all};
 use super::document::{html, page};
 use super::query::frustum;
+use super::study::progress;
 use super::view_args::ViewArgs;
 use super::view_data::{FATES, Fate, Frame, ViewData};
 use super::{Ending, expect_places, load_scene, tell, text, unread_is_fine, write_text};
 use crate::camera::{Camera, LensKind};
+use crate::funnel::{RaysEnd, Shape};
 use crate::index::Registry;
 use crate::measure::Workload;
 use crate::oracle::Verdict;
 use crate::path;
 use crate::query::ItemId;
-use crate::scene::Scene;
 use crate::verify::Truth;
-use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
-use crate::visibility::{Rays, SampleGrid, Solids, surfaces_of};
+use crate::visibility::Rays;
 
 /// Most items that a browser is given to draw.
 const MOST_ITEMS: usize = 2_000_000;
-/// Samples that estimate how many items are in front at all samples.
-const FEW: SampleGrid = SampleGrid::new(16, 9);
-/// Most items in front, summed over the samples of a view.
-const MOST_IN_FRONT: u64 = 1 << 24;
 
 pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let inputs = [&args.scene, &args.path].map(|input| Path::new(input.as_str()));
@@ -45,7 +42,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         text::count(MOST_ITEMS)
     );
     let cameras = path::load(&args.path, &scene, &defaults)?;
-    let (all, most) = (cameras.cameras.len(), args.frames as usize);
+    let (all, most) = (cameras.cameras.len(), args.frames);
     let cameras = cameras.at_most(most);
     let workload = Workload::new(&scene, &cameras, &culling)?;
     if let Some(doubt) = culling.unproven() {
@@ -53,9 +50,10 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     }
     let (mut data, order) = ViewData::of(&scene, &cameras.name);
     let mut answers: Vec<Box<[ItemId]>> = Vec::new();
-    let questions = ("camera", workload.views.len());
-    let (ask, boxes) = (frustum(&workload), &workload.items);
+    let (ask, boxes, views) = (frustum(&workload), &workload.items, workload.views.len());
+    let bar = progress((views * (structures.len() + 1)) as u64, " views");
     let mut each = |rows: Vec<Row>| {
+        bar.inc(rows.len() as u64);
         for row in rows {
             data.count(&row);
             if answers.len() == row.question {
@@ -64,14 +62,29 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         }
         Ok(())
     };
-    let agree = ask_all(&structures, &scene, boxes, questions, true, ask, &mut each)?;
+    let agree = ask_all(
+        &structures,
+        &scene,
+        boxes,
+        ("camera", views),
+        true,
+        ask,
+        &mut each,
+    )?;
     let threads = args.kernel.threads;
-    let samples = args.samples.map(|grid| Samples::of(&scene, grid, threads));
+    let surfaces = args
+        .samples
+        .map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
     let mut totals = [0; FATES];
     for (view, answer) in answers.iter().enumerate() {
         let camera = &cameras.cameras[view];
-        let front = samples.as_ref().map(|samples| samples.front(camera));
-        let front = front.transpose().with_context(|| cameras.place(view))?;
+        let front = surfaces.as_ref().map(|(ends, grid)| {
+            let rays = Rays::of(camera)?;
+            let truth = ends.visible(&rays, *grid, threads);
+            Ok(truth.map_err(anyhow::Error::msg)?.visible)
+        });
+        let front: anyhow::Result<_> = front.transpose();
+        let front = front.with_context(|| cameras.place(view))?;
         let truth = Truth::of_scene(camera, &scene);
         let fates = fates(items, answer, truth.as_ref(), front.as_deref());
         order
@@ -79,9 +92,11 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
             .for_each(|&id| totals[fates[id as usize] as usize] += 1);
         let fates: Vec<Fate> = order.iter().map(|&id| fates[id as usize]).collect();
         let index = if all > most { view * all / most } else { view };
+        bar.inc(1);
         data.frames
             .push(Frame::of(index, camera, scene.origin, &fates));
     }
+    bar.finish_and_clear();
     data.samples = args
         .samples
         .map(|grid| format!("{}x{}", grid.width, grid.height));
@@ -117,7 +132,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     Ok(Ending::of(agree))
 }
 
-/// What became of each item of a view; without a truth, what is returned is visible.
+/// Fates of all items of a view; without a truth, returned items are visible.
 fn fates(
     items: usize,
     answer: &[ItemId],
@@ -126,10 +141,11 @@ fn fates(
 ) -> Vec<Fate> {
     let mut fates = vec![Fate::Culled; items];
     let mut in_front = vec![front.is_none(); items];
+    // Floors and ceilings of a map come behind its items.
+    let front = front.unwrap_or_default().iter().map(|&id| id as usize);
     front
-        .unwrap_or_default()
-        .iter()
-        .for_each(|&id| in_front[id as usize] = true);
+        .filter(|&id| id < items)
+        .for_each(|id| in_front[id] = true);
     answer
         .iter()
         .for_each(|&id| fates[id as usize] = Fate::Visible);
@@ -221,47 +237,4 @@ fn lens(cameras: &[Camera]) -> String {
         range(&|camera| camera.lens.near()),
         range(&far)
     )
-}
-
-/// Surfaces at which rays end, and the samples of a view.
-struct Samples {
-    ends: Box<dyn Fn(&Rays, SampleGrid) -> SampleTruth>,
-    grid: SampleGrid,
-    items: usize,
-}
-
-impl Samples {
-    fn of(scene: &Scene, grid: SampleGrid, threads: usize) -> Samples {
-        let items = scene.items.len();
-        let ends: Box<dyn Fn(&Rays, SampleGrid) -> SampleTruth> = match surfaces_of(scene) {
-            None => {
-                let index = RayIndex::build(&Solids::of(scene));
-                Box::new(move |rays, grid| SampleTruth::of(&index, rays, grid, threads))
-            }
-            Some(surfaces) => {
-                let index = SurfaceIndex::build(&surfaces);
-                Box::new(move |rays, grid| SampleTruth::of(&index, rays, grid, threads))
-            }
-        };
-        Samples { ends, grid, items }
-    }
-
-    /// Items in front at any sample.
-    fn front(&self, camera: &Camera) -> anyhow::Result<Vec<ItemId>> {
-        let rays = Rays::of(camera)?;
-        let few = (self.ends)(&rays, FEW)
-            .samples_of
-            .into_iter()
-            .map(u64::from);
-        let about = few.sum::<u64>() * self.grid.samples() as u64 / FEW.samples() as u64;
-        ensure!(
-            about <= MOST_IN_FRONT,
-            "about {about} front items, summed over the samples; expected at most {MOST_IN_FRONT}: \
-             fewer --samples or fewer items with a common face"
-        );
-        let mut visible = (self.ends)(&rays, self.grid).visible;
-        // Floors and ceilings of a map come behind its items.
-        visible.retain(|&id| (id as usize) < self.items);
-        Ok(visible)
-    }
 }

@@ -32,8 +32,8 @@ pub struct ViewArgs {
     #[arg(long, short, value_name = "FILE.html")]
     pub out: PathBuf,
     /// Number of cameras to use, evenly spread over the path
-    #[arg(long, value_name = "N", default_value_t = 256, value_parser = values::whole(1..=u32::MAX))]
-    pub frames: u32,
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = values::whole(1..=10_000usize))]
+    pub frames: usize,
     /// Structures to count the tested nodes of, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "default")]
     pub structure: String,

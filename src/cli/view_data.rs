@@ -1,5 +1,7 @@
-//! Data of the page of `view`: boxes along a Morton curve, and per camera the sets of
-//! items as runs along that curve, which are short there. `assets/view.js` reads them.
+//! Data of the page of `view`.
+//!
+//! Boxes are in the order of a Morton curve, where the runs of a view's sets are few and
+//! long. `assets/view_data.js` reads them.
 
 use glam::{DMat4, DVec3, DVec4, I64Vec3};
 use obvhs::ploc::morton::morton_encode_u64;
@@ -13,8 +15,9 @@ use crate::scene::Scene;
 /// Digits of packed numbers, safe in JSON and HTML.
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
 
-/// Whole numbers as text: a digit holds five bits, lowest first, and a sixth bit if more
-/// digits of the number follow.
+/// Whole numbers as text, five bits per digit, lowest first.
+///
+/// A sixth bit is set if more digits of the number follow.
 #[derive(Default)]
 struct Packed(String);
 
@@ -36,8 +39,9 @@ impl Packed {
     }
 }
 
-/// Members of a set as runs: twice the gap before a run, plus 1 if the run is longer
-/// than 1; then its length less 2.
+/// Members of a set as packed runs.
+///
+/// A run is twice the gap before it, plus 1 if it is longer than 1; then its length less 2.
 fn runs(set: impl Iterator<Item = bool>) -> String {
     let (mut packed, mut gap, mut run) = (Packed::default(), 0, 0);
     for is_member in set.chain([false]) {
@@ -60,7 +64,7 @@ fn runs(set: impl Iterator<Item = bool>) -> String {
 /// Kinds of [`Fate`].
 pub const FATES: usize = 5;
 
-/// What became of an item in a view.
+/// Result for an item in a view.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Fate {
     Culled,
@@ -88,7 +92,7 @@ pub struct ViewData {
     origin: [f64; 3],
     /// Ids of the items in the order of the curve: signed differences.
     ids: String,
-    /// Per item: signed differences of its lower corner to the one before, and its extents.
+    /// Lower corner of each item less the one before, signed, and the extents.
     boxes: String,
     pub samples: Option<String>,
     pub frames: Vec<Frame>,
@@ -211,7 +215,7 @@ impl Frame {
     }
 }
 
-/// Scene-local to clip coordinates; depth is -1 at the near plane and 1 at the far one.
+/// Scene-local to clip coordinates; near depth is -1, far depth 1.
 fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
     let LensKind::Matrix(matrix) = camera.lens.kind() else {
         let view = camera.frame.relative_to(origin).world_to_eye();

@@ -43,9 +43,10 @@ pub use study::{failure, prepare, time};
 pub use sweep::{StageSweep, SweepPoint, prepare_sweep, time_sweep};
 pub use task::{FunnelPlan, Times};
 pub use triangle_stage::BYTES_PER_TRIANGLE;
+pub(crate) use truth::RaysEnd;
 pub use world::FunnelInput;
 
 pub(crate) use back_ends::{OCCLUSION_ROWS, PORTAL_CLIP};
 pub(crate) use error::check_memory;
 pub(crate) use item_stages::Run;
-pub(crate) use world::World;
+pub(crate) use world::{Shape, World};

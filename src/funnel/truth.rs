@@ -30,7 +30,8 @@ pub fn visible(
     threads: usize,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Truth>, FunnelError> {
-    let (rays_end, samples) = (RaysEnd::at(world), world.samples);
+    let rays_end = RaysEnd::at(&world.shape, world.cut_outs.as_ref());
+    let samples = world.samples;
     let items = world.items() as ItemId;
     let mut all = Vec::with_capacity(world.views.len());
     for view in world.views() {
@@ -38,18 +39,9 @@ pub fn visible(
             return Ok(None);
         }
         let rays = world.rays(view);
-        let at_few = rays_end.at_samples(rays, FEW, threads).samples_of;
-        let at_few: u64 = at_few.into_iter().map(u64::from).sum();
-        let in_front = at_few * samples.samples() as u64 / FEW.samples() as u64;
-        let most = most_drawn(samples);
-        if in_front > most {
-            return Err(FunnelError::Refused(format!(
-                "camera {}: about {in_front} front items, summed over the samples; expected at \
-                 most {most}: fewer --samples or fewer items with a common face",
-                world.views[view].camera
-            )));
-        }
-        let truth = rays_end.at_samples(rays, samples, threads);
+        let truth = rays_end.visible(rays, samples, threads).map_err(|error| {
+            FunnelError::Refused(format!("camera {}: {error}", world.views[view].camera))
+        })?;
         let counts = truth.visible.iter().copied().zip(truth.samples_of);
         let mut seen: Vec<(ItemId, u32)> = counts.collect();
         if random_rays > 0 {
@@ -66,19 +58,41 @@ pub fn visible(
 }
 
 /// Surfaces at which rays end: solid boxes, or triangles with the floors of a map.
-enum RaysEnd<'w> {
+pub enum RaysEnd<'w> {
     Boxes(RayIndex, Option<&'w fragment::Holes>),
     Triangles(SurfaceIndex),
 }
 
 impl RaysEnd<'_> {
-    fn at<'w>(world: &'w World) -> RaysEnd<'w> {
-        match &world.shape {
-            Shape::Boxes(solids) => {
-                RaysEnd::Boxes(RayIndex::build(solids), world.cut_outs.as_ref())
-            }
+    /// Surfaces of a scene of this shape, with the holes of its items.
+    pub fn at<'w>(shape: &Shape, holes: Option<&'w fragment::Holes>) -> RaysEnd<'w> {
+        match shape {
+            Shape::Boxes(solids) => RaysEnd::Boxes(RayIndex::build(solids), holes),
             Shape::Triangles(surfaces) => RaysEnd::Triangles(SurfaceIndex::build(surfaces)),
         }
+    }
+
+    /// Items in front at the samples of a view.
+    ///
+    /// # Errors
+    /// Too many items in front at the same samples.
+    pub fn visible(
+        &self,
+        rays: &Rays,
+        samples: SampleGrid,
+        threads: usize,
+    ) -> Result<SampleTruth, String> {
+        let at_few = self.at_samples(rays, FEW, threads).samples_of;
+        let at_few: u64 = at_few.into_iter().map(u64::from).sum();
+        let in_front = at_few * samples.samples() as u64 / FEW.samples() as u64;
+        let most = most_drawn(samples);
+        if in_front > most {
+            return Err(format!(
+                "about {in_front} front items, summed over the samples; expected at most {most}: \
+                 fewer --samples or fewer items with a common face"
+            ));
+        }
+        Ok(self.at_samples(rays, samples, threads))
     }
 
     fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {

@@ -72,6 +72,14 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// Shape of the items of a scene.
+    pub fn of(scene: &Scene) -> Shape {
+        match surfaces_of(scene) {
+            None => Shape::Boxes(Solids::of(scene)),
+            Some(surfaces) => Shape::Triangles(surfaces),
+        }
+    }
+
     /// Solid boxes, if the items are some.
     pub fn boxes(&self) -> Option<&Solids> {
         match self {
@@ -135,10 +143,7 @@ impl<'a> World<'a> {
         let ids = 2 * views.len() * (input.structures.len() + StageKind::ALL.len());
         let needed = (BYTES_PER_ITEM + ids as u64) * scene.items.len() as u64;
         check_memory(&scene.name, needed)?;
-        let mut shape = match surfaces_of(scene) {
-            None => Shape::Boxes(Solids::of(scene)),
-            Some(surfaces) => Shape::Triangles(surfaces),
-        };
+        let mut shape = Shape::of(scene);
         begin("structures");
         let built = input.structures.iter().map(|spec| {
             let index = spec.build(input_of(scene, &scene.items))?;

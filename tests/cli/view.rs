@@ -1,5 +1,4 @@
-//! The page of `view`, taken apart: its sets are those of `query --ids`, its boxes hold
-//! the items, its counters are the query's.
+//! The page of `view`: sets and counters are those of `query --ids`.
 
 use std::collections::BTreeSet;
 use std::fs;
