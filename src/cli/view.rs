@@ -13,13 +13,13 @@ use super::query::frustum;
 use super::study::progress;
 use super::view_args::ViewArgs;
 use super::view_data::{FATES, Fate, Frame, ViewData};
-use super::{Ending, expect_places, load_scene, tell, text, unread_is_fine, write_text};
-use crate::camera::{Camera, LensKind};
+use super::{Ending, expect_places, inputs, load_scene, tell, text, unread_is_fine, write_text};
 use crate::funnel::{RaysEnd, Shape};
 use crate::index::Registry;
-use crate::measure::Workload;
+use crate::input::tell_warnings;
+use crate::measure::{SceneInfo, Workload};
 use crate::oracle::Verdict;
-use crate::path;
+use crate::path::{self, CameraFacts};
 use crate::query::ItemId;
 use crate::verify::Truth;
 use crate::visibility::Rays;
@@ -45,6 +45,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let (all, most) = (cameras.cameras.len(), args.frames);
     let cameras = cameras.at_most(most);
     let workload = Workload::new(&scene, &cameras, &culling)?;
+    tell_warnings();
     if let Some(doubt) = culling.unproven() {
         tell(&format!("note: {doubt}"));
     }
@@ -101,8 +102,15 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         .samples
         .map(|grid| format!("{}x{}", grid.width, grid.height));
     let told = conclusion(&data, totals, agree);
-    let test = culling.test.name();
-    let about = format!("Test {test}; {}.", lens(&cameras.cameras));
+    let facts = CameraFacts::of(&cameras.cameras);
+    let (axes, lens) = (inputs::axes(&SceneInfo::of(&scene)), inputs::lens(&facts));
+    let matrix = text::some(facts.matrix.as_ref(), |matrix| {
+        format!("; matrices: {}", inputs::matrices(matrix))
+    });
+    let about = format!(
+        "Scene: {axes}. Lens: {lens}{matrix}. Test: {}.",
+        culling.test.name()
+    );
     let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
     let body = format!(
         "<main class=\"view\"><h1>cullbench view {}, {}</h1>\n<p>{}</p>\n{}<p>{}</p>\n</main>\n\
@@ -207,34 +215,5 @@ fn conclusion(data: &ViewData, totals: [usize; FATES], agree: bool) -> String {
         mean(returned),
         text::counted(data.items, "item"),
         parts.join(", "),
-    )
-}
-
-/// Lenses of a path, in words.
-fn lens(cameras: &[Camera]) -> String {
-    let range = |of: &dyn Fn(&Camera) -> f64| {
-        let least = cameras.iter().map(of).fold(f64::INFINITY, f64::min);
-        let most = cameras.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
-        let [least, most] = [least, most].map(text::significant);
-        if least == most {
-            most
-        } else {
-            format!("{least} to {most}")
-        }
-    };
-    let angle = |camera: &Camera| match *camera.lens.kind() {
-        LensKind::Perspective { fovy_deg, .. } => fovy_deg,
-        _ => f64::NAN,
-    };
-    let is_angled = cameras.iter().all(|camera| angle(camera).is_finite());
-    let angle = match is_angled {
-        true => format!("vertical field of view {} deg, ", range(&angle)),
-        false => String::new(),
-    };
-    let far = |camera: &Camera| camera.lens.far().unwrap_or(f64::INFINITY);
-    format!(
-        "{angle}near {}, far {}",
-        range(&|camera| camera.lens.near()),
-        range(&far)
     )
 }
