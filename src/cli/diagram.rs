@@ -1,9 +1,9 @@
 //! Diagrams: series of places over two axes, with their names beside the plot.
 
-use super::document::html;
 use super::figure::{Axis, CHARACTER, Figure, LINE, STRONG, class, line, mark};
 use super::palette::Look;
 use super::text;
+use super::text::html;
 use crate::shown::shortened;
 
 /// Most characters of a name beside a plot.

@@ -3,6 +3,7 @@
 
 use super::figure::Figure;
 use super::table::Table;
+use super::text::html;
 use super::{palette, program, text};
 
 pub enum Block {
@@ -91,20 +92,6 @@ fn markdown(text: &str) -> String {
         escape.into_iter().chain([c])
     });
     escaped.collect()
-}
-
-/// Text of an element or an attribute.
-pub fn html(text: &str) -> String {
-    let mut text = text::plain(text).replace('&', "&amp;");
-    for (mark, name) in [
-        ("<", "&lt;"),
-        (">", "&gt;"),
-        ("\"", "&quot;"),
-        ("'", "&#39;"),
-    ] {
-        text = text.replace(mark, name);
-    }
-    text
 }
 
 /// The document as Markdown.

@@ -6,9 +6,9 @@
 
 use std::ops::Range;
 
-use super::document::html;
 use super::palette::{self, Look, SHAPES};
 use super::text;
+use super::text::html;
 use crate::shown::shortened;
 
 /// Series of a figure with a colour; the others are grey.

@@ -1,9 +1,9 @@
 //! Figures of rows: a value each with its interval, as marks or bars over one axis.
 
-use super::document::html;
 use super::figure::{Axis, CHARACTER, Figure, LINE, class, line, mark};
 use super::palette::Look;
 use super::text;
+use super::text::html;
 
 /// Width of the plot on the narrowest page, px.
 const NARROWEST: f64 = 330.0;

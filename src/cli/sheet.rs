@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::document::html;
+use super::text::html;
 
 /// Low and high x and y.
 pub type Rect = [f64; 4];

@@ -271,6 +271,20 @@ pub fn by_source(comparison: &Comparison) -> Option<String> {
 /// Meaning of the figures of [`by_source`].
 pub const BY_SOURCE: &str = "by storage/planes/test";
 
+/// Text of an element or an attribute.
+pub fn html(text: &str) -> String {
+    let mut text = plain(text).replace('&', "&amp;");
+    for (mark, name) in [
+        ("<", "&lt;"),
+        (">", "&gt;"),
+        ("\"", "&quot;"),
+        ("'", "&#39;"),
+    ] {
+        text = text.replace(mark, name);
+    }
+    text
+}
+
 /// A share as a percentage, never rounded up to 100.
 pub fn percent(share: f64) -> String {
     let rounded = format!("{:.2}", share * 100.0);

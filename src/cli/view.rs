@@ -8,9 +8,10 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 
 use super::compare_structures::{Row, ask_all};
-use super::document::{html, page};
+use super::document::page;
 use super::query::frustum;
 use super::study::progress;
+use super::text::html;
 use super::view_args::ViewArgs;
 use super::view_data::{FATES, Fate, Frame, ViewData};
 use super::{Ending, expect_places, inputs, load_scene, tell, text, unread_is_fine, write_text};

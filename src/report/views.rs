@@ -32,6 +32,9 @@ pub struct Views {
     pub times: BTreeMap<String, Vec<Reading>>,
 }
 
+/// Times of each reading, by its first view and the number of views.
+type Readings = BTreeMap<(u32, u32), Vec<f64>>;
+
 /// The columns of samples.csv that matter here.
 #[derive(Deserialize)]
 struct SampleRow {
@@ -54,7 +57,7 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
     let Some((stream, _)) = stream.ok().filter(|s| s.0.header.run.id == report.run.id) else {
         return BTreeMap::new();
     };
-    let mut cells: BTreeMap<[String; 5], BTreeMap<(u32, u32), Vec<f64>>> = BTreeMap::new();
+    let mut cells: BTreeMap<[String; 5], Readings> = BTreeMap::new();
     let samples = csv::Reader::from_path(folder.join(SAMPLES));
     for row in samples.into_iter().flat_map(csv::Reader::into_deserialize) {
         let Ok(row): Result<SampleRow, _> = row else {
@@ -91,7 +94,7 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
                 Some(Reading {
                     frame: (f64::from(frame) + f64::from(*last)) / 2.0,
                     queries,
-                    ns: median(&ns)?,
+                    ns: median(ns)?,
                 })
             };
             Some((
