@@ -17,6 +17,7 @@ mod lumps;
 mod memory;
 mod meshes;
 mod noise;
+mod options;
 mod originals;
 mod rng;
 mod rooms;
@@ -48,12 +49,13 @@ pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS
 pub use gltf::read_gltf;
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
+pub use options::LoadOptions;
 pub use originals::Originals;
 pub use rng::SeededRng;
 pub use samples::{NOTICE, SAMPLES, Sample};
 pub use shape::ItemShape;
 pub use sought::{Sought, SoughtBox};
-pub use source::{LoadOptions, check_fits, is_wad, load, split_map};
+pub use source::{check_fits, is_wad, load, split_map};
 #[cfg(feature = "cli")]
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};

@@ -6,25 +6,15 @@ use std::path::Path;
 
 use super::generate::{Build, COUNT, MOST};
 use super::gltf::{is_gltf, read_gltf};
-use super::{FAMILIES, Family, MESHES, SAMPLES, Sample, Scene, UpAxis, WadMap, boxes_csv, memory};
+use super::{
+    FAMILIES, Family, LoadOptions, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv,
+    memory,
+};
 use crate::input::{InputError, is_readable, note, read_file};
 use crate::spec::{Spec, SpecError, nearest};
 
 /// First part of the name of every mesh.
 const MESH_PREFIX: &str = "mesh:";
-
-/// How to read a scene.
-#[derive(Clone, Copy, Default, Debug)]
-pub struct LoadOptions {
-    /// Leave out rows that are no finite box, and count them.
-    pub skip_bad_items: bool,
-    /// Up axis of formats that do not state it.
-    pub up: Option<UpAxis>,
-    /// Structures that will be built over the scene: they need memory as well.
-    pub structures: u64,
-    /// Bytes that will be needed for each triangle of a mesh, beside the scene.
-    pub per_triangle: u64,
-}
 
 /// The file and the name of a map in `maps.wad#MAP07`; an existing file wins.
 pub fn split_map(source: &str) -> (&str, Option<&str>) {

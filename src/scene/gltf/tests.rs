@@ -1,3 +1,5 @@
+//! A turned tetrahedron twice, whole, compressed and damaged.
+
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{DQuat, DVec3};

@@ -1,0 +1,16 @@
+//! Choices of a user that all readers of scenes share.
+
+use super::UpAxis;
+
+/// How to read a scene.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct LoadOptions {
+    /// Leave out rows that are no finite box, and count them.
+    pub skip_bad_items: bool,
+    /// Up axis of formats that do not state it.
+    pub up: Option<UpAxis>,
+    /// Structures that will be built over the scene: they need memory as well.
+    pub structures: u64,
+    /// Bytes that will be needed for each triangle of a mesh, beside the scene.
+    pub per_triangle: u64,
+}
