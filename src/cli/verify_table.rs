@@ -78,7 +78,7 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
             writeln!(out, "{about}:\n  {difference}")?;
         }
     }
-    let differ = |name: &&&str| of(*name).iter().any(|check| check.difference.is_some());
+    let differ = |name: &&&str| of(name).iter().any(|check| check.difference.is_some());
     let all = text::counted(names.len(), "structure");
     let checked = format!(
         "{} the sets of the reference scan: {} in {:.1} s ({:.1} million/s), {}",
