@@ -7,8 +7,7 @@ use std::path::Path;
 use super::generate::{Build, COUNT, MOST};
 use super::gltf::{is_gltf, read_gltf};
 use super::{
-    FAMILIES, Family, LoadOptions, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv,
-    memory,
+    FAMILIES, Family, LoadOptions, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv, memory,
 };
 use crate::input::{InputError, is_readable, note, read_file};
 use crate::spec::{Spec, SpecError, nearest};
