@@ -295,7 +295,7 @@ impl CompareTable {
         let more = self.changes.more_pairs();
         Some(match (self.basis, more) {
             (Basis::Reports, Some(more)) if more > MOST_MORE => format!(
-                "{cells}: too noisy to resolve {}: use compare --against BINARY, which runs both \
+                "{cells}: too noisy to resolve {}: try compare --against BINARY, which runs both \
                  programs in turns",
                 text::percent(self.changes.threshold)
             ),
