@@ -244,7 +244,7 @@ mod tests {
         [0, -1, 1, -2, i64::MIN]
             .into_iter()
             .for_each(|n| packed.push_signed(n));
-        assert_eq!(packed.0, "AfgB_fggBABCD________________P");
+        assert_eq!(packed.0, "AfgB_fggBABCD____________P");
         let set = |text: &str| runs(text.bytes().map(|b| b == b'x'));
         assert_eq!(
             [set(""), set("..."), set("x"), set("..x.xxx")],

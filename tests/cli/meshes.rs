@@ -101,7 +101,7 @@ fn a_mesh_is_a_scene_of_every_command() {
     assert!(number(&verify, "verdicts") > 1000.0);
     let table = works(
         folder.path(),
-        "funnel --scene mesh:forest:n=5k --path street:frames=2 --samples 32x18 --processes 1",
+        "funnel --scene mesh:forest:n=5k --path street:frames=2 --samples 32x18 --processes 1 --all",
     );
     for word in [
         "Occluders:",
