@@ -248,7 +248,7 @@ mod tests {
         let set = |text: &str| runs(text.bytes().map(|b| b == b'x'));
         assert_eq!(
             [set(""), set("..."), set("x"), set("..x.xxx")],
-            ["", "", "A", "EDB".into()]
+            ["", "", "A", "EDB"]
         );
     }
 }

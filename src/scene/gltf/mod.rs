@@ -66,7 +66,7 @@ pub fn read_gltf(
     let mut labels = Labels::new("name".to_owned());
     for item in &placed {
         let node = file.root.nodes[item.node].name.as_deref();
-        labels.push(node.unwrap_or_default().into());
+        labels.push(node.unwrap_or_default());
     }
     let unplain = placed.iter().find_map(|item| match &meshes[item.mesh] {
         Mesh { plain: Ok(_), .. } => None,
