@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::camera::{Camera, Surroundings};
+use crate::camera::{Camera, FARTHEST, Surroundings};
 use crate::geometry::Aabb;
 use crate::kernel::each;
 use crate::scene::SeededRng;
@@ -38,7 +38,8 @@ const DEEP: f64 = 1e4;
 
 impl Hull {
     fn of(camera: &Camera, around: &Surroundings) -> Option<Hull> {
-        let far = camera.lens.far().unwrap_or(camera.lens.near() * DEEP);
+        let deep = (camera.lens.near() * DEEP).min(FARTHEST);
+        let far = camera.lens.far().unwrap_or(deep);
         let lens = camera.lens.with_far(Some(far)).ok()?;
         let frame = camera.frame.relative_to(around.origin);
         let camera = Camera {
