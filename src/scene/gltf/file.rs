@@ -12,6 +12,22 @@ use gltf::json::{Index, Root, Value};
 use crate::input::{InputError, read_file};
 use crate::shown::{message, shortened};
 
+/// JSON and binary chunk of a GLB of version 2; `None` where they are not within it.
+fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
+    let number = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    let chunk = |at: usize, kind: &[u8]| {
+        let length = number(at)? as usize;
+        let is_kind = bytes.get(at + 4..at + 8)? == kind;
+        bytes.get(at + 8..at + 8 + length).filter(|_| is_kind)
+    };
+    let json = chunk(12, b"JSON").filter(|_| number(4) == Some(2))?;
+    let after = 20 + json.len();
+    match after + 8 <= bytes.len() {
+        true => Some((json, Some(chunk(after, b"BIN\0")?))),
+        false => Some((json, None)),
+    }
+}
+
 /// A file with all of its buffers.
 pub struct File<'f> {
     pub name: &'f str,
@@ -23,18 +39,15 @@ impl<'f> File<'f> {
     pub fn open(bytes: &'f [u8], name: &'f str) -> Result<File<'f>, InputError> {
         let error = |found: String| value_error(name, "JSON", found, "glTF 2.0");
         let (json, mut bin) = match bytes.starts_with(b"glTF") {
-            true => {
-                let glb = gltf::Glb::from_slice(bytes).map_err(|e| InputError::Byte {
-                    file: name.to_owned(),
-                    offset: 0,
-                    found: e.to_string(),
-                    expected: "a GLB of version 2".to_owned(),
-                })?;
-                (glb.json, glb.bin)
-            }
-            false => (Cow::Borrowed(bytes), None),
+            true => glb(bytes).ok_or_else(|| InputError::Byte {
+                file: name.to_owned(),
+                offset: 4,
+                found: "a GLB of another version or with chunks beyond its end".to_owned(),
+                expected: "a GLB of version 2, its first chunk JSON".to_owned(),
+            })?,
+            false => (bytes, None),
         };
-        let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json);
+        let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
         let root: Root = serde_json::from_slice(json).map_err(|e| {
             // In glTF 1.0, what 2.0 numbers has names.
             let json: Value = serde_json::from_slice(json).unwrap_or_default();
@@ -55,7 +68,7 @@ impl<'f> File<'f> {
         for index in 0..file.root.buffers.len() {
             let buffer = &file.root.buffers[index];
             let bytes = match &buffer.uri {
-                None => bin.take().unwrap_or_default(),
+                None => Cow::Borrowed(bin.take().unwrap_or_default()),
                 Some(uri) => Cow::Owned(file.linked(index, uri)?),
             };
             file.buffers.push(bytes);
