@@ -12,7 +12,7 @@ use gltf::json::{Index, Root, Value};
 use crate::input::{InputError, read_file};
 use crate::shown::{message, shortened};
 
-/// JSON and binary chunk of a GLB of version 2; `None` where they are not within it.
+/// JSON and binary chunk of a GLB of version 2; `None` if they are cut off.
 fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
     let number = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
     let chunk = |at: usize, kind: &[u8]| {
