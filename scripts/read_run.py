@@ -12,7 +12,10 @@ import math
 import sys
 from pathlib import Path
 
-import pandas as pd
+try:
+    import pandas as pd
+except ImportError:
+    sys.exit("read_run.py: no pandas; expected it in this Python (pip install pandas matplotlib)")
 
 CELL = ["scene", "path", "cache", "test", "structure"]
 

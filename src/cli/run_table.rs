@@ -271,8 +271,8 @@ fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: 
     let more = match hidden.sum() {
         0 => String::new(),
         hidden => format!(
-            "; {}: --all-columns",
-            text::counted(hidden, "slower structure")
+            "{}: --all-columns\n",
+            text::counted(hidden, "further structure")
         ),
     };
     let parts: Vec<String> = parts[..shown].iter().map(Table::bare).collect();
@@ -282,7 +282,13 @@ fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: 
     let lens = inputs::lenses(about().map(|cell| &cell.path));
     let head = lens.map(|lens| format!("{} up; {lens}\n\n", up.join(" or ")));
     let head = text::wrapped(&head.unwrap_or_default(), width);
-    format!("{head}{}\n* fastest or tied{more}\n\n", parts.join("\n"))
+    let unit = text::some(overall.base, |base| {
+        format!("; {base}: time per query, others: x {base}")
+    });
+    format!(
+        "{head}{}\n* fastest or tied{unit}\n{more}\n",
+        parts.join("\n")
+    )
 }
 
 /// Short names of scenes and paths: "city 100k flythrough 2 %".

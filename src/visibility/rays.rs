@@ -63,7 +63,7 @@ impl Rays {
     /// The rays of a camera; a matrix is unprojected.
     ///
     /// # Errors
-    /// As [`Camera::unprojected`].
+    /// Those of [`Camera::unprojected`].
     pub fn of(camera: &Camera) -> Result<Rays, CameraError> {
         let camera = camera.unprojected()?;
         Ok(Rays {

@@ -312,8 +312,7 @@ fn cameras_may_be_told_in_every_way_of_the_format() {
 
 /// 60 degrees, 16:9, far twice the scene's diagonal or its far side, near far/1000.
 ///
-/// As the help says: a box just inside and one just outside, in units a thousand times as
-/// large too. The diagonal is 700.
+/// A box just inside and one just outside, in units a thousand times as large too. The diagonal is 700.
 #[test]
 fn the_lens_defaults_are_the_documented_ones() {
     let boxes = "0,1.3,0,0,1.39,0\n0,1.41,0,0,1.5,0\n0,100,57,0,100,57.5\n0,100,58,0,100,59\n\

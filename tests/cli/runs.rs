@@ -451,7 +451,7 @@ fn several_paths_have_a_row_each_and_a_geometric_mean() {
     let rows = table_of(&out, "   ");
     assert_eq!(rows.len(), 1 + 4 + 1, "{out}");
     assert!(rows[1].starts_with("uniform 1k orbit 20 %  "), "{out}");
-    assert!(out.contains("slower structures: --all-columns"), "{out}");
+    assert!(out.contains("further structures: --all-columns"), "{out}");
     assert!(out.lines().all(|line| line.chars().count() <= 80), "{out}");
     let all = works(
         folder.path(),

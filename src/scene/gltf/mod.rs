@@ -1,9 +1,9 @@
 //! glTF 2.0 and GLB: every node with a mesh is an item.
 //!
-//! Coordinates are the file's own. Triangles are read where all meshes have plain ones. Compressed meshes, points and
-//! lines have the boxes of their accessors' bounds instead, and then no item of the file
-//! has triangles. Skins and morph targets stay in their rest pose. Source: Khronos
-//! Group, glTF 2.0 Specification, 2021.
+//! Coordinates are the file's own. Triangles are read where all meshes have plain ones.
+//! Compressed meshes, points and lines have the boxes of their accessors' bounds instead,
+//! and then no item of the file has triangles. Skins and morph targets stay in their rest
+//! pose. Source: Khronos Group, glTF 2.0 Specification, 2021.
 
 mod file;
 mod mesh;
