@@ -25,17 +25,6 @@ pub struct Triangles {
     pub corners: Vec<[u32; 3]>,
 }
 
-impl Default for Mesh {
-    /// A mesh of no triangles.
-    fn default() -> Mesh {
-        Mesh {
-            plain: Ok(Triangles::default()),
-            kind: SurfaceKind::Opaque,
-            two_sided: false,
-        }
-    }
-}
-
 impl File<'_> {
     /// How many numbers the accessors of a mesh state.
     pub fn numbers(&self, mesh: usize) -> u64 {

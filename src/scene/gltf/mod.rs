@@ -43,25 +43,13 @@ pub fn read_gltf(
 ) -> Result<Scene, InputError> {
     let file = File::open(bytes, file)?;
     let (placed, places) = file.placed()?;
-    let mut is_placed = vec![false; file.root.meshes.len()];
-    placed.iter().for_each(|item| is_placed[item.mesh] = true);
-    let numbers = (0..is_placed.len()).filter(|&mesh| is_placed[mesh]);
-    let numbers = numbers
-        .map(|mesh| file.numbers(mesh))
-        .fold(0, u64::saturating_add);
-    let structures = options.structures;
-    let free = memory::free_for(numbers);
-    memory::check_fits(
-        name,
-        numbers.saturating_mul(BYTES_PER_NUMBER),
-        structures,
-        free,
-    )?;
-    let meshes: Vec<Mesh> = (0..is_placed.len())
-        .map(|mesh| match is_placed[mesh] {
-            true => file.mesh(mesh),
-            false => Ok(Mesh::default()),
-        })
+    let meshes = 0..file.root.meshes.len();
+    let numbers = meshes.clone().map(|mesh| file.numbers(mesh));
+    let numbers = numbers.fold(0, u64::saturating_add);
+    let needed = numbers.saturating_mul(BYTES_PER_NUMBER);
+    memory::check_fits(name, needed, options.structures, memory::free_for(numbers))?;
+    let meshes: Vec<Mesh> = meshes
+        .map(|mesh| file.mesh(mesh))
         .collect::<Result<_, _>>()?;
     let mut labels = Labels::new("name".to_owned());
     for item in &placed {
