@@ -15,15 +15,18 @@ use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,
     StructureRow, TestChoice, TestRow, TrialPlan,
 };
-use crate::culling::Culling;
 use crate::index::Registry;
-use crate::measure::{Group, Part, Plan, PlannedScene, ProcessTimes, Share, cameras_within};
+use crate::measure::{Effort, Group, Part, Plan, ProcessTimes, Share, cameras_within};
+use crate::report::Experiment;
 use crate::statistics::Estimate;
+use crate::suite::SUITES;
 
 /// Most cameras of a path: every rule holds views of all, some 20 KB per camera.
 const MOST_CAMERAS: usize = 4096;
 /// Rounds of a task, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 25];
+/// Effort of `run --scene`.
+const EFFORT: Effort = SUITES[0].effort;
 
 pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> {
     let options = options(args);
@@ -31,7 +34,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let input = input(&setting, &options);
     if setting.path.cameras.len() < all {
         tell(&format!(
-            "note: {} of {}, evenly spread, are looked at",
+            "note: the rules look at {} of {}, evenly spread",
             text::count(setting.path.cameras.len()),
             text::counted(all, "camera")
         ));
@@ -74,23 +77,21 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     Ok(Ending::of(!advice.found_wrong_answers()))
 }
 
-/// How structures are measured before rules are: as a run does it.
+/// The plan of a run of the scene and path: a structure has the same times there.
 pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
     let study = &args.study;
+    let structures = study.kernel.structures(registry, &study.structure)?;
+    let alone = Experiment::new(&study.scene).path(&study.path);
     Ok(Plan {
-        scenes: vec![PlannedScene {
-            source: study.scene.clone(),
-            paths: vec![study.path.clone()],
-            caches: vec![false],
-        }],
-        structures: study.kernel.structures(registry, &study.structure)?,
-        cullings: vec![Culling::default()],
         lens: study.lens.defaults()?,
-        load: study.scene_args.options(0),
-        most_cameras: MOST_CAMERAS,
-        effort: study.spread.effort(ROUNDS),
-        bounds: false,
+        load: study.scene_args.options(structures.len()),
+        effort: Effort {
+            processes: study.spread.processes,
+            ..EFFORT
+        },
+        bounds: true,
         seed: study.spread.seed,
+        ..alone.structures(structures).plan
     })
 }
 
@@ -106,8 +107,7 @@ fn setting(
     let mut setting = Setting::load(registry, study, &study.path, ROUNDS, timing, held)?;
     let all = setting.path.cameras.len();
     setting.path = setting.path.at_most(MOST_CAMERAS);
-    let pass_ns = study.spread.effort(ROUNDS).pass_ns;
-    setting.protocol.cameras = cameras_within(pass_ns, setting.scene.items.len());
+    setting.protocol.cameras = cameras_within(EFFORT.pass_ns, setting.scene.items.len());
     Ok((setting, all))
 }
 
@@ -477,5 +477,31 @@ fn general(value: f64) -> String {
         0.0 => "0".to_owned(),
         x if (1e-2..1e7).contains(&x) => text::significant(value),
         _ => format!("{value:.2e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::super::args::{Cli, Command};
+    use super::super::run_plan;
+    use super::*;
+
+    #[test]
+    fn structures_are_timed_by_the_plan_of_a_run() {
+        let registry = Registry::builtin();
+        let plan = |command: &str| {
+            let line = format!("x {command} --scene city:n=9 --path spin --processes 3 --seed 7");
+            match Cli::parse_from(line.split(' ')).command {
+                Command::Run(args) => run_plan::plan(&registry, &args).unwrap().plan,
+                Command::Advise(args) => super::plan(&registry, &args).unwrap(),
+                _ => unreachable!("one of two commands"),
+            }
+        };
+        let [run, advise] = ["run", "advise"].map(plan);
+        assert_eq!(run.effort, advise.effort);
+        assert_eq!((run.bounds, run.seed), (advise.bounds, advise.seed));
+        assert_eq!(run.cells(), advise.cells());
     }
 }

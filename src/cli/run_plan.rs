@@ -69,7 +69,6 @@ pub fn plan_of(
         cullings,
         lens: args.lens.defaults()?,
         load: args.scene_args.options(structures.len()),
-        most_cameras: usize::MAX,
         structures,
         effort: suite.effort,
         bounds: !args.no_bounds,

@@ -9,7 +9,7 @@ use crate::camera::{
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, TESTS};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
-use crate::measure::{Effort, Extras, Machine, Protocol};
+use crate::measure::{Machine, Protocol};
 use crate::path::LensDefaults;
 use crate::scene::{LoadOptions, UP_AXES, UpAxis};
 use crate::spec::SpecError;
@@ -153,28 +153,16 @@ pub struct SpreadArgs {
 }
 
 impl SpreadArgs {
-    /// One process's share of a study of `rounds` rounds in a single process.
-    pub fn effort(&self, rounds: [usize; 2]) -> Effort {
+    /// The protocol of one of the processes, with its share of the `rounds` of a study.
+    pub fn protocol(&self, rounds: [usize; 2], process: u32, cameras: usize) -> Protocol {
         let processes = self.processes as usize;
         let [least, most] = rounds;
-        Effort {
-            processes: self.processes,
+        Protocol {
             rounds: [
                 (least / processes).max(LEAST_ROUNDS),
                 (2 * most / processes).clamp(LEAST_ROUNDS, most),
             ],
             task_ns: TASK_NS / f64::from(self.processes),
-            pass_ns: PASS_NS,
-            extras: Extras::RegionSearch,
-        }
-    }
-
-    /// The protocol of one of the processes.
-    pub fn protocol(&self, rounds: [usize; 2], process: u32, cameras: usize) -> Protocol {
-        let effort = self.effort(rounds);
-        Protocol {
-            rounds: effort.rounds,
-            task_ns: effort.task_ns,
             cameras,
             cold: false,
             // Other orders in each process.
@@ -188,8 +176,6 @@ impl SpreadArgs {
 const LEAST_ROUNDS: usize = 3;
 /// CPU time of a task in all processes, ns.
 const TASK_NS: f64 = 150e6;
-/// Time of a plain loop over all items by all timed cameras, ns.
-const PASS_NS: f64 = 20e6;
 
 /// Lens of cameras without their own values.
 #[derive(Args, Debug)]

@@ -77,8 +77,6 @@ pub struct Plan {
     pub lens: LensDefaults,
     /// Options for reading scenes.
     pub load: LoadOptions,
-    /// Most cameras of a path, evenly spread; the others are left out.
-    pub most_cameras: usize,
     /// Processes, rounds and additional measurements.
     pub effort: Effort,
     /// True if lower bounds are timed beside the structures.
@@ -290,7 +288,6 @@ pub fn measure_scene(
         notice(None, &group.path);
         let scale = known.and_then(|known| known.lens_scale);
         let path = path::load_scaled(&group.path, &scene, &plan.lens, scale)?;
-        let path = path.at_most(plan.most_cameras);
         let workload = Workload::new(&scene, &path, &group.culling)?;
         let settings = GroupPlan {
             scene: &info,
@@ -365,7 +362,6 @@ mod tests {
             cullings: vec![sphere, Culling::default()],
             lens: LensDefaults::default(),
             load: LoadOptions::default(),
-            most_cameras: usize::MAX,
             effort: Effort {
                 processes: 1,
                 rounds: [1, 1],

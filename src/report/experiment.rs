@@ -47,7 +47,6 @@ impl Experiment {
                 cullings: vec![Default::default()],
                 lens: Default::default(),
                 load: Default::default(),
-                most_cameras: usize::MAX,
                 effort: Effort {
                     processes: 1,
                     rounds: [3, 40],
