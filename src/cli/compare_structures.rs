@@ -13,7 +13,7 @@ use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{Answer, Verdict, guarded, input_of};
 use crate::query::{ItemId, QueryCost};
-use crate::scene::Scene;
+use crate::scene::{Scene, available_bytes};
 use crate::shown::shown_field;
 use crate::threads::share;
 
@@ -40,7 +40,7 @@ const HELD: usize = 64 << 20;
 /// Answers every question by every structure; false if two structures disagree.
 ///
 /// `each` receives the answers in the order of questions, then of structures, in blocks of
-/// [`HELD`] bytes. Ids (ascending) are kept only with `keep_ids`. Every disagreement is a
+/// [`HELD`] bytes, or an eighth of the free memory. Ids (ascending) are kept only with `keep_ids`. Every disagreement is a
 /// line on standard error.
 pub fn ask_all(
     structures: &[StructureSpec],
@@ -53,6 +53,7 @@ pub fn ask_all(
 ) -> anyhow::Result<bool> {
     let block = (HELD / size_of_val(boxes).max(1)).clamp(1, 1024);
     let (mut from, mut agree) = (0, true);
+    let room = available_bytes().map_or(HELD, |free| HELD.min(free as usize / 8));
     // A single structure is built once; of several there may be memory for one.
     let mut only: Option<Box<dyn DynIndex>> = None;
     while from < questions {
@@ -84,10 +85,10 @@ pub fn ask_all(
                 from + answers.len()
             };
             let mut next = from;
-            while next < end && (!first || held < HELD) {
+            while next < end && (!first || held < room) {
                 let count = (end - next).min(block * spec.execution.threads.max(1));
                 if first {
-                    answers.extend((0..count).map(|_| Vec::new()));
+                    answers.extend((0..count).map(|_| Vec::with_capacity(structures.len())));
                 }
                 let asked = guarded(|| {
                     let rows = answers[next - from..][..count].iter_mut().enumerate();

@@ -10,7 +10,7 @@ use crate::camera::{
     MatrixConvention, look_at,
 };
 use crate::input::{InputError, Row, TableReader};
-use crate::scene::{Scene, WorldBox};
+use crate::scene::{Scene, WorldBox, memory};
 
 /// Values for columns that a file does not have, and lenses of generated paths.
 /// `None` leaves the choice to the path.
@@ -126,6 +126,9 @@ pub fn read_cameras_csv(
 /// Makes the camera of a row, from the columns of one kind of file.
 type CameraReader<'a> = Box<dyn Fn(&Row) -> Result<Result<Camera, CameraError>, InputError> + 'a>;
 
+/// Bytes of a row in what callers make of it, such as views.
+const BESIDE: usize = 64;
+
 /// All rows of a table, of which there must be one.
 fn rows<T>(
     table: &mut TableReader<impl Read>,
@@ -133,8 +136,13 @@ fn rows<T>(
     none: &str,
     read: impl Fn(&Row) -> Result<T, InputError>,
 ) -> Result<Vec<T>, InputError> {
-    let mut found = Vec::new();
+    let mut found: Vec<T> = Vec::new();
     while let Some(row) = table.next_row()? {
+        // How long a pipe is shows as it is read.
+        if found.len() == found.capacity() {
+            let needed = 2 * found.capacity() * (size_of::<T>() + BESIDE);
+            memory::check_fits(file, needed as u64, 0, memory::free_for(found.len() as u64))?;
+        }
         found.push(read(&row?)?);
     }
     if found.is_empty() {

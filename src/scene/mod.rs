@@ -14,7 +14,7 @@ mod generate;
 mod gltf;
 mod labels;
 mod lumps;
-mod memory;
+pub(crate) mod memory;
 mod meshes;
 mod noise;
 mod options;

@@ -60,3 +60,17 @@ fn a_structure_beyond_the_limits_leaves_the_others() {
     let done = limited(here, 527_000, &format!("{line} bvh"));
     assert_refused(&done, "structure 'bvh': | needs about 384 MB", "bvh alone");
 }
+
+#[test]
+fn points_beyond_the_limits_are_one_line_and_fewer_are_answered_within_them() {
+    let points = |count: usize| format!("x,y,z\n{}", "1,2,3\n".repeat(count));
+    let [many, some] = [1_500_000, 150_000].map(points);
+    let files = [("many.csv", many.as_bytes()), ("some.csv", some.as_bytes())];
+    let folder = folder(&files);
+    let line = "locate --scene city:n=100 --structure bvh --points";
+    let done = limited(folder.path(), 180_000, &format!("{line} many.csv"));
+    assert_refused(&done, "many.csv: needs about | MB are free; expected", line);
+    let done = limited(folder.path(), 250_000, &format!("{line} some.csv"));
+    assert_eq!(done.code, Some(0), "{}", done.err);
+    assert_eq!(rows(&done.out).len(), 150_000);
+}
