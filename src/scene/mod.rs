@@ -31,6 +31,7 @@ mod tiling;
 mod uniform;
 mod up;
 mod wad;
+mod zip;
 
 use std::sync::Arc;
 
@@ -55,7 +56,7 @@ pub use rng::SeededRng;
 pub use samples::{NOTICE, SAMPLES, Sample};
 pub use shape::ItemShape;
 pub use sought::{Sought, SoughtBox};
-pub use source::{check_fits, is_wad, load, split_map};
+pub use source::{check_fits, is_wad, load, part_names, read_bytes, split_part};
 #[cfg(feature = "cli")]
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};

@@ -6,8 +6,10 @@ use std::path::Path;
 
 use super::generate::{Build, COUNT, MOST};
 use super::gltf::{is_gltf, read_gltf};
+use super::zip::{self, is_zip};
 use super::{
-    FAMILIES, Family, LoadOptions, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv, memory,
+    FAMILIES, Family, LoadOptions, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv, map_names,
+    memory,
 };
 use crate::input::{InputError, is_readable, note, read_file};
 use crate::spec::{Spec, SpecError, nearest};
@@ -15,16 +17,35 @@ use crate::spec::{Spec, SpecError, nearest};
 /// First part of the name of every mesh.
 const MESH_PREFIX: &str = "mesh:";
 
-/// The file and the name of a map in `maps.wad#MAP07`; an existing file wins.
-pub fn split_map(source: &str) -> (&str, Option<&str>) {
-    match source.rsplit_once('#') {
-        Some((file, map)) if !Path::new(source).exists() => (file, Some(map)),
-        _ => (source, None),
+/// The file and what is named in it, as in `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`;
+/// an existing file wins.
+pub fn split_part(source: &str) -> (&str, Option<&str>) {
+    let cuts = source.match_indices('#').rev();
+    let mut parts = cuts.map(|(at, _)| (&source[..at], Some(&source[at + 1..])));
+    let is_there = |(file, _): &(&str, _)| is_readable(Path::new(file));
+    match Path::new(source).exists() {
+        true => (source, None),
+        false => match parts.clone().find(is_there) {
+            Some(found) => found,
+            None => parts.next().unwrap_or((source, None)),
+        },
+    }
+}
+
+/// Names of the maps of a WAD, or of the scenes in a zip archive; none of other files.
+///
+/// # Errors
+/// A directory that is damaged.
+pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
+    match (is_wad(bytes), is_zip(bytes)) {
+        (true, _) => map_names(bytes, file),
+        (_, true) => zip::scene_names(bytes, file),
+        _ => Ok(Vec::new()),
     }
 }
 
 /// Loads `freedm-map12`, `city:n=100000,seed=7`, `mesh:statue:n=1M`, `boxes.csv`,
-/// `map.wad` or `maps.wad#MAP07`. An existing file wins over a name.
+/// `map.wad`, `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`. An existing file wins over a name.
 ///
 /// # Errors
 /// One line that names what was found and what was expected.
@@ -41,10 +62,10 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
 }
 
 fn read(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
-    let (file, map) = split_map(source);
+    let (file, part) = split_part(source);
     if is_readable(Path::new(file)) {
         let bytes = read_file(Path::new(file))?;
-        return parse_bytes(&bytes, [file, source], map, options);
+        return read_bytes(&bytes, [file, source], part, options);
     }
     let looks_like_a_file = source.contains(['/', '\\', '.']) && !source.contains('=');
     if looks_like_a_file {
@@ -106,15 +127,24 @@ fn check_generated(
     memory::check_fits(source, needed, structures, memory::free_for(n))
 }
 
-/// Reads a WAD or glTF by beginning or extension; anything else as boxes CSV.
+/// Reads a WAD, glTF or an entry of a zip archive by beginning or extension; anything else
+/// as boxes CSV. `name` will be the scene's.
 ///
 /// A map that is named makes it a WAD.
-fn parse_bytes(
+///
+/// # Errors
+/// As [`load`].
+pub fn read_bytes(
     bytes: &[u8],
     [file, name]: [&str; 2],
     map: Option<&str>,
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
+    if is_zip(bytes) {
+        let entry = zip::unpack(bytes, file, map)?;
+        let file = format!("{file}#{}", entry.name);
+        return read_bytes(&entry.bytes, [&file, name], entry.map, options);
+    }
     let extension = Path::new(file).extension();
     let is_named = |name: &str| extension.is_some_and(|e| e.eq_ignore_ascii_case(name));
     if is_wad(bytes) || map.is_some() || is_named("wad") {
@@ -164,7 +194,7 @@ impl Sample {
         let names = [self.file, self.name];
         Ok(Scene {
             unit: Some(self.unit),
-            ..parse_bytes(self.bytes, names, None, &LoadOptions::default())?
+            ..read_bytes(self.bytes, names, None, &LoadOptions::default())?
         })
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::input::{InputError, is_readable, read_file};
-use crate::scene::{Sample, Scene, WadMap, is_wad, map_names, split_map};
+use crate::scene::{LoadOptions, Sample, Scene, part_names, read_bytes, split_part};
 use crate::statistics::{Trimmed, trimmed_mean};
 
 /// Rounds of decoding all maps of a file, so that the time has an interval.
@@ -40,22 +40,19 @@ impl Level {
     /// # Errors
     /// The file cannot be read again.
     pub fn of(source: &str, scene: &Scene) -> Result<Level, InputError> {
-        let (file, selected) = split_map(source);
+        let (file, selected) = split_part(source);
         let bytes: Arc<[u8]> = match (is_readable(Path::new(file)), Sample::named(file)) {
             (true, _) => read_file(Path::new(file))?,
             (false, Some(sample)) => sample.bytes.into(),
             (false, None) => return Ok(Level::alone(scene)),
         };
-        if !is_wad(&bytes) {
-            return Ok(Level::alone(scene));
-        }
         let decode = |name: &str| {
             let begun = Instant::now();
-            let map = WadMap::read(&bytes, file, Some(name)).ok()?;
-            let items = map.into_scene(name).ok()?.items.len();
-            Some((items, begun.elapsed().as_nanos() as f64))
+            let options = LoadOptions::default();
+            let map = read_bytes(&bytes, [file, name], Some(name), &options).ok()?;
+            Some((map.items.len(), begun.elapsed().as_nanos() as f64))
         };
-        let names = map_names(&bytes, file)?;
+        let names = part_names(&bytes, file)?;
         let has_others = names.len() > 1;
         // The first time is of memory that has not been read yet.
         let decoded = names.into_iter().filter_map(|name| {

@@ -1,0 +1,323 @@
+//! Zip archives (zip, pk3), read in place: one entry is unpacked at a time.
+//!
+//! No size is believed before the bytes are there. Source: PKWARE, APPNOTE.TXT 6.3.
+
+use std::fmt::Display;
+
+use miniz_oxide::inflate::decompress_to_vec_with_limit;
+use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive, crc32};
+
+use super::memory;
+use crate::input::InputError;
+use crate::shown::{first_of, plain, shortened};
+
+/// Endings of the names of scenes.
+const SCENES: [&str; 5] = [".bsp", ".wad", ".gltf", ".glb", ".csv"];
+/// Names in a message.
+const MOST_NAMED: usize = 16;
+/// Memory that unpacking takes, in sizes of the entry: it grows by doubling.
+const GROWTH: u64 = 3;
+
+/// Tells an archive by the magic of its first entry, or of its end if it has none.
+pub fn is_zip(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06")
+}
+
+/// An entry as it was packed.
+pub struct Entry<'w> {
+    /// Its name, printable.
+    pub name: String,
+    pub bytes: Vec<u8>,
+    /// The map in it that was asked for, as in `maps.wad#MAP07`.
+    pub map: Option<&'w str>,
+}
+
+/// Names of the entries of an archive that are scenes by their names, in its order.
+pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
+    let archive = open(bytes, file)?;
+    let entries = entries(&archive, file)?.into_iter();
+    let names = entries.map(|(name, _)| name);
+    Ok(names.filter(|name| is_scene(name)).collect())
+}
+
+/// Unpacks the entry of a name, or the only one that is a scene.
+///
+/// # Errors
+/// No such entry, or several; an entry that is encrypted, packed by another method,
+/// too large for the memory, or other bytes than the directory states.
+pub fn unpack<'w>(
+    bytes: &[u8],
+    file: &str,
+    wanted: Option<&'w str>,
+) -> Result<Entry<'w>, InputError> {
+    let archive = open(bytes, file)?;
+    let entries = entries(&archive, file)?;
+    let (name, record, map) = chosen(&entries, file, wanted)?;
+    let damaged = |found: &dyn Display, expected: &str| {
+        let place = format!("entry {}", shortened(name, 80));
+        error(file, &place, found.to_string(), expected)
+    };
+    if record.flags().is_encrypted() {
+        return Err(damaged(&"encrypted", "an entry without a password"));
+    }
+    let stated = record.uncompressed_size_hint();
+    let needed = stated.saturating_mul(GROWTH);
+    let label = format!("{file}#{}", plain(name));
+    memory::check_fits(&label, needed, 0, memory::free_for(stated))?;
+    let packed = archive.get_entry(record.wayfinder());
+    let packed = packed.map_err(|e| damaged(&e, "an entry within the file"))?;
+    let limit = usize::try_from(stated).unwrap_or(usize::MAX);
+    let unpacked = match record.compression_method() {
+        CompressionMethod::STORE => packed.data().to_vec(),
+        CompressionMethod::DEFLATE => decompress_to_vec_with_limit(packed.data(), limit)
+            .map_err(|e| damaged(&e, &format!("{stated} bytes, deflated")))?,
+        method => {
+            let found = format!("packed by method {method}");
+            return Err(damaged(&found, "stored (0) or deflated (8)"));
+        }
+    };
+    let claim = packed.claim_verifier();
+    if unpacked.len() as u64 != stated {
+        let found = format!("{} bytes", unpacked.len());
+        return Err(damaged(&found, &format!("{stated}, as the archive states")));
+    }
+    let found = crc32(&unpacked);
+    if found != claim.crc {
+        let expected = format!("{:08x}, as the archive states", claim.crc);
+        return Err(damaged(&format!("CRC-32 {found:08x}"), &expected));
+    }
+    Ok(Entry {
+        name: plain(name),
+        bytes: unpacked,
+        map,
+    })
+}
+
+type Archive<'a> = ZipSliceArchive<&'a [u8]>;
+
+fn open<'a>(bytes: &'a [u8], file: &str) -> Result<Archive<'a>, InputError> {
+    let archive = ZipArchive::from_slice(bytes);
+    archive.map_err(|e| error(file, "directory", e.to_string(), "a zip archive"))
+}
+
+/// Names and records in the order of the directory, without folders.
+fn entries<'a>(
+    archive: &'a Archive,
+    file: &str,
+) -> Result<Vec<(String, ZipFileHeaderRecord<'a>)>, InputError> {
+    let (mut all, mut records) = (Vec::new(), archive.entries());
+    let damaged = |e: rawzip::Error| error(file, "directory", e.to_string(), "a zip archive");
+    while let Some(record) = records.next_entry().map_err(damaged)? {
+        let path = record.file_path();
+        if !record.is_dir() {
+            let name = String::from_utf8_lossy(path.as_ref()).into_owned();
+            all.push((name, record));
+        }
+    }
+    Ok(all)
+}
+
+fn is_scene(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    SCENES.iter().any(|ending| name.ends_with(ending))
+}
+
+/// The entry of a name in either case, or the only scene, and the map within it. Of
+/// entries of one name the last counts.
+fn chosen<'e, 'r, 'w>(
+    entries: &'e [(String, ZipFileHeaderRecord<'r>)],
+    file: &str,
+    wanted: Option<&'w str>,
+) -> Result<(&'e str, &'e ZipFileHeaderRecord<'r>, Option<&'w str>), InputError> {
+    let named = |wanted: &str| {
+        let mut last_first = entries.iter().rev();
+        last_first.find(|(name, _)| name.eq_ignore_ascii_case(wanted))
+    };
+    let scenes = entries.iter().filter(|(name, _)| is_scene(name));
+    let scenes: Vec<_> = scenes.collect();
+    let names: Vec<String> = scenes.iter().map(|(name, _)| shortened(name, 80)).collect();
+    let listed = first_of(&names, MOST_NAMED);
+    let (found, expected) = match (wanted, &scenes[..]) {
+        (None, [(name, record)]) => return Ok((name, record, None)),
+        (None, []) => (
+            format!("no scene among {} entries", entries.len()),
+            format!("a name that ends in {}", SCENES.join(", ")),
+        ),
+        (None, _) => (
+            format!("{} scenes, {listed}", scenes.len()),
+            format!("one of them by name, as in '{file}#{}'", names[0]),
+        ),
+        (Some(wanted), _) => {
+            let in_entry = wanted.rsplit_once('#');
+            let found = named(wanted).map(|found| (found, None));
+            let found = found.or_else(|| {
+                let (entry, map) = in_entry?;
+                Some((named(entry)?, Some(map)))
+            });
+            if let Some(((name, record), map)) = found {
+                return Ok((name, record, map));
+            }
+            (
+                format!("no '{}' among the scenes {listed}", shortened(wanted, 80)),
+                "the name of an entry".to_owned(),
+            )
+        }
+    };
+    Err(error(file, "directory", found, &expected))
+}
+
+fn error(file: &str, place: &str, found: String, expected: &str) -> InputError {
+    InputError::Value {
+        file: file.to_owned(),
+        place: place.to_owned(),
+        found,
+        expected: expected.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{LoadOptions, part_names, read_bytes};
+    use super::*;
+    use miniz_oxide::deflate::compress_to_vec;
+
+    const MAP12: &[u8] = include_bytes!("../../datasets/freedm_map12.wad");
+    const BOX: &[u8] = b"min_x,min_y,min_z,max_x,max_y,max_z\n0,0,0,1,1,1\n";
+
+    /// An archive: names, contents and methods of its entries.
+    pub fn packed(entries: &[(&str, &[u8], u16)]) -> Vec<u8> {
+        let (mut file, mut directory) = (Vec::new(), Vec::new());
+        for &(name, bytes, method) in entries {
+            let data = match method {
+                8 => compress_to_vec(bytes, 6),
+                _ => bytes.to_vec(),
+            };
+            let mut header = [20u16, 0, method, 0, 33].map(u16::to_le_bytes).concat();
+            let sizes = [crc32(bytes), data.len() as u32, bytes.len() as u32];
+            header.extend(sizes.map(u32::to_le_bytes).concat());
+            header.extend((name.len() as u32).to_le_bytes());
+            directory.extend(b"PK\x01\x02\x14\0");
+            directory.extend(&header);
+            directory.extend([0; 10]);
+            directory.extend((file.len() as u32).to_le_bytes());
+            directory.extend(name.as_bytes());
+            file.extend([b"PK\x03\x04", &header[..], name.as_bytes(), &data].concat());
+        }
+        let count = (entries.len() as u16).to_le_bytes();
+        let place = [directory.len() as u32, file.len() as u32];
+        let place = place.map(u32::to_le_bytes).concat();
+        let end = [b"PK\x05\x06\0\0\0\0", &count[..], &count, &place, &[0; 2]].concat();
+        [file, directory, end].concat()
+    }
+
+    fn read(bytes: &[u8], part: Option<&str>) -> Result<usize, String> {
+        let read = read_bytes(bytes, ["a.zip", "a"], part, &LoadOptions::default());
+        read.map(|scene| scene.items.len())
+            .map_err(|e| e.to_string())
+    }
+
+    #[track_caller]
+    fn refused(bytes: &[u8], part: Option<&str>, wanted: &str) {
+        let error = read(bytes, part).unwrap_err();
+        assert!(
+            error.contains(wanted) && error.contains("; expected "),
+            "{error}"
+        );
+        assert!(
+            error.starts_with("a.zip") && !error.contains('\n'),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn scenes_are_read_by_name_or_as_the_only_one() {
+        let one = packed(&[("readme.txt", b"words", 0), ("in/one.csv", BOX, 8)]);
+        for part in [None, Some("in/one.csv"), Some("IN/One.csv")] {
+            assert_eq!(read(&one, part), Ok(1));
+        }
+        let wad = packed(&[("maps/d.wad", MAP12, 8), ("two.csv", BOX, 0)]);
+        let alone = read(MAP12, None);
+        for part in ["maps/d.wad", "maps/d.wad#map12"] {
+            assert_eq!(read(&wad, Some(part)), alone);
+        }
+        assert_eq!(read(&wad, Some("two.csv")), Ok(1));
+        assert_eq!(
+            part_names(&wad, "a.zip").unwrap(),
+            ["maps/d.wad", "two.csv"]
+        );
+        refused(
+            &wad,
+            None,
+            "2 scenes, maps/d.wad, two.csv; expected one of them by name, as in 'a.zip#maps/d.wad'",
+        );
+        refused(
+            &wad,
+            Some("q.bsp"),
+            "no 'q.bsp' among the scenes maps/d.wad, two.csv",
+        );
+        refused(&wad, Some("maps/d.wad#E1M1"), "no map 'E1M1' among MAP12");
+        refused(
+            &packed(&[("readme.txt", b"", 0)]),
+            None,
+            "no scene among 1 entries",
+        );
+        refused(&packed(&[]), None, "no scene among 0 entries");
+        // The archive in an archive.
+        let outer = packed(&[("inner.pk3", &one, 8)]);
+        assert_eq!(read(&outer, Some("inner.pk3")), Ok(1));
+    }
+
+    #[test]
+    fn damage_is_found_and_sizes_are_not_believed() {
+        let good = packed(&[("one.csv", BOX, 8)]);
+        let entry = good.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
+        let with = |at: usize, bytes: &[u8]| {
+            let mut copy = good.clone();
+            copy[entry + at..][..bytes.len()].copy_from_slice(bytes);
+            copy
+        };
+        refused(&with(8, &[1]), None, "entry one.csv: encrypted");
+        refused(&with(10, &[14]), None, "packed by method 14 (LZMA)");
+        refused(&with(16, &[0; 4]), None, "CRC-32");
+        refused(
+            &with(24, &[9, 0, 0, 0]),
+            None,
+            "limit; expected 9 bytes, deflated",
+        );
+        refused(&with(24, &[99, 0, 0, 0]), None, "48 bytes; expected 99, as");
+        refused(
+            &with(20, &[3, 0, 0, 0]),
+            None,
+            "expected 48 bytes, deflated",
+        );
+        refused(
+            &with(42, &[7, 0, 0, 0]),
+            None,
+            "expected an entry within the file",
+        );
+        refused(&with(0, b"XK"), None, "directory");
+        refused(&good[..good.len() - 9], None, "directory");
+        // A name that steers a terminal.
+        let odd = packed(&[("\x1b[31m\n.csv", b"", 0)]);
+        let error = read(&odd, None).unwrap_err();
+        assert!(!error.contains(char::is_control), "{error:?}");
+        for at in 0..good.len() {
+            for value in [0, 1, 0x7F, 0xFF] {
+                let mut copy = good.clone();
+                copy[at] = value;
+                let _ = read(&copy, None);
+                let _ = read(&copy[..at], None);
+            }
+        }
+    }
+
+    #[test]
+    fn what_memory_does_not_hold_is_not_unpacked() {
+        let mut zip64 = packed(&[("one.csv", BOX, 8)]);
+        let entry = zip64.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
+        zip64[entry + 24..][..4].copy_from_slice(&0xFFFF_FFF0u32.to_le_bytes());
+        let error = read(&zip64, None).unwrap_err();
+        let is_said = error.contains("needs about 12.9 GB") || error.contains("48 bytes;");
+        assert!(is_said, "{error}");
+    }
+}
