@@ -17,8 +17,9 @@ use crate::spec::{Spec, SpecError, nearest};
 /// First part of the name of every mesh.
 const MESH_PREFIX: &str = "mesh:";
 
-/// The file and what is named in it, as in `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`;
-/// an existing file wins.
+/// The file and the name within it of `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`.
+///
+/// An existing file wins.
 pub fn split_part(source: &str) -> (&str, Option<&str>) {
     let cuts = source.match_indices('#').rev();
     let mut parts = cuts.map(|(at, _)| (&source[..at], Some(&source[at + 1..])));
@@ -32,7 +33,7 @@ pub fn split_part(source: &str) -> (&str, Option<&str>) {
     }
 }
 
-/// Names of the maps of a WAD, or of the scenes in a zip archive; none of other files.
+/// Names of the maps of a WAD or the scenes of a zip archive; none of others.
 ///
 /// # Errors
 /// A directory that is damaged.
@@ -127,10 +128,9 @@ fn check_generated(
     memory::check_fits(source, needed, structures, memory::free_for(n))
 }
 
-/// Reads a WAD, glTF or an entry of a zip archive by beginning or extension; anything else
-/// as boxes CSV. `name` will be the scene's.
+/// Reads a file by its beginning or extension; anything else as boxes CSV.
 ///
-/// A map that is named makes it a WAD.
+/// `name` will be the scene's. A map that is named makes it a WAD.
 ///
 /// # Errors
 /// As [`load`].

@@ -28,7 +28,7 @@ pub struct Entry<'w> {
     /// Its name, printable.
     pub name: String,
     pub bytes: Vec<u8>,
-    /// The map in it that was asked for, as in `maps.wad#MAP07`.
+    /// The map in it, if one is named, as in `maps.wad#MAP07`.
     pub map: Option<&'w str>,
 }
 
