@@ -12,6 +12,7 @@ mod recorded;
 mod spin;
 mod street;
 mod teleport;
+mod walk;
 mod warnings;
 mod zoom;
 
@@ -122,6 +123,8 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
     "outside", "the whole scene from outside, from all around", "", outside::frames;
     "street", "eyes outside of every item, above the ground, looking level",
         "height=1.7 (above the ground), near=0.1", street::frames;
+    "walk", "through the doors of rooms or a Doom map at constant height above the floors",
+        "height=1.7 (eyes above the floor; 41 in a Doom map), doors=32 (passed)", walk::frames;
     "places", "the scene's own camera places (the things of a Doom map)", "", places::frames;
 };
 

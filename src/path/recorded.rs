@@ -86,12 +86,13 @@ const FAR_IN_NEARS: f64 = 1000.0;
 /// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
 /// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg` is
 /// not read; empty: perspective). Or view-projection matrices: `m00,m01,..,m33`
-/// (row, column) and nothing of the others. Columns in any order; a note names those
-/// that are not read, but for labels such as `name` and `time_s`.
+/// (row, column) and nothing of the others. Times in `time_s` must ascend; an empty one is
+/// not known. Columns in any order; a note names those that are not read, but for labels
+/// such as `name`.
 ///
 /// # Errors
-/// The line of the first value that is no number or makes no camera; a file
-/// without cameras; matrices without a convention, or beside an eye or a lens; both a
+/// The line of the first value that is no number or makes no camera, or of a time before
+/// the last one; a file without cameras; matrices without a convention, or beside an eye or a lens; both a
 /// place to look at and a direction.
 pub fn read_cameras_csv(
     input: impl Read,
@@ -105,7 +106,16 @@ pub fn read_cameras_csv(
     } else {
         eyes(&table, defaults)?
     };
+    let (clock, mut last) = (table.column("time_s"), f64::NEG_INFINITY);
     let (lines, cameras): (Vec<u64>, Vec<Camera>) = rows(&mut table, file, "no camera", |row| {
+        if let Some(column) = clock.filter(|column| !row.text(*column).is_empty()) {
+            let time = row.finite_number(column)?;
+            if time < last {
+                let found = format!("time_s {time} after {last}");
+                return Err(row.error(found, "times in ascending order".to_owned()));
+            }
+            last = time;
+        }
         let camera = read(row)?.map_err(|error| refused(row, &error))?;
         Ok((row.line(), camera))
     })?
@@ -134,7 +144,7 @@ fn rows<T>(
     table: &mut TableReader<impl Read>,
     file: &str,
     none: &str,
-    read: impl Fn(&Row) -> Result<T, InputError>,
+    mut read: impl FnMut(&Row) -> Result<T, InputError>,
 ) -> Result<Vec<T>, InputError> {
     let mut found: Vec<T> = Vec::new();
     while let Some(row) = table.next_row()? {
@@ -391,6 +401,22 @@ mod tests {
         assert_eq!(both.unwrap_err().to_string(), wanted);
         let wrong = read("x,y,z\n1,2,3\n").unwrap_err().to_string();
         assert!(wrong.contains("no column 'eye_x'"), "{wrong}");
+    }
+
+    #[test]
+    fn cameras_come_in_the_order_of_their_times() {
+        let read = |times: [&str; 3]| {
+            let rows = times.map(|time| format!("{time},0,0,0,1,0,0\n")).concat();
+            read(&format!(
+                "time_s,eye_x,eye_y,eye_z,look_x,look_y,look_z\n{rows}"
+            ))
+        };
+        assert_eq!(read(["-1", "", "0.5"]).unwrap().cameras.len(), 3);
+        assert_eq!(read(["2", "2", "2.5"]).unwrap().cameras.len(), 3);
+        let error = |times| read(times).unwrap_err().to_string();
+        let wanted = "c.csv, line 4: time_s 1 after 2; expected times in ascending order";
+        assert_eq!(error(["0", "2", "1"]), wanted);
+        assert!(error(["0", "now", "1"]).contains("line 3: time_s 'now'"));
     }
 
     #[test]

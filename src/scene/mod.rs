@@ -13,6 +13,7 @@ mod forest;
 mod generate;
 mod gltf;
 mod labels;
+mod layouts;
 mod lumps;
 pub(crate) mod memory;
 mod meshes;

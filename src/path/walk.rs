@@ -1,0 +1,252 @@
+//! A walk through doors at constant eye height: the portals of rooms, the two-sided
+//! linedefs of a Doom map. Furniture and steps are no obstacles.
+
+use glam::{DVec2, DVec3};
+
+use super::{PathError, Pose, Stage};
+use crate::scene::{Regions, SeededRng, Tiling, WadMap};
+use crate::spec::Spec;
+
+/// Doors drawn for each step of the walk.
+const DRAWN: usize = 16;
+/// Least height of an opening that a Doom player fits through, map units.
+const FITTING: f64 = 56.0;
+
+/// A door in the plan of a floor.
+struct Door {
+    at: DVec2,
+    sides: [u32; 2],
+    /// Its line among the walls, if it is one.
+    wall: Option<usize>,
+}
+
+/// Floors joined by doors.
+struct Plan {
+    doors: Vec<Door>,
+    /// Height of the floor of each region.
+    floors: Vec<f64>,
+    /// Doors of each region.
+    exits: Vec<Vec<usize>>,
+    /// Lines that a step must not meet; none where regions are convex.
+    walls: Vec<[DVec2; 2]>,
+}
+
+pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    let (plan, natural) = match &stage.scene.regions {
+        Regions::Tiling(tiling) => (Plan::of_rooms(stage, tiling), 1.7),
+        Regions::Bsp(map) => (Plan::of_map(map), 41.0),
+        _ => (Plan::new(Vec::new(), Vec::new(), Vec::new()), 1.7),
+    };
+    let height = spec.number_between("height", natural, 0.0, 1e6)?;
+    let doors = spec.count("doors", 32, 100_000)? as usize;
+    if plan.doors.is_empty() {
+        let reason = format!(
+            "scene '{}' has no doors; expected rooms or a Doom map (the path 'street' needs none)",
+            stage.scene.name
+        );
+        return Err(PathError::unfit("walk", reason));
+    }
+    let way = plan.way(doors, height, &mut stage.rng());
+    let mut lengths = vec![0.0];
+    lengths.extend(way.windows(2).scan(0.0, |total, step| {
+        *total += step[0].distance(step[1]);
+        Some(*total)
+    }));
+    let at = |length: f64| {
+        let next = lengths.partition_point(|&l| l <= length).min(way.len() - 1);
+        let from = next.saturating_sub(1);
+        let step = lengths[next] - lengths[from];
+        let share = if step > 0.0 {
+            (length - lengths[from]) / step
+        } else {
+            0.0
+        };
+        way[from].lerp(way[next], share.min(1.0))
+    };
+    // Towards the point that is a few steps ahead.
+    let total = lengths[way.len() - 1];
+    let ahead = |eye: DVec3, length: f64| {
+        let along = (at(length + 2.0 * height) - eye).with_z(0.0);
+        (along.length() > 1e-6 * height).then_some(along)
+    };
+    let mut forward = DVec3::X;
+    let poses = stage.turns().map(|turn| {
+        let eye = at(turn * total);
+        forward = ahead(eye, turn * total).unwrap_or(forward);
+        Pose::new(eye, forward)
+    });
+    Ok(poses.collect())
+}
+
+impl Plan {
+    fn new(doors: Vec<Door>, floors: Vec<f64>, walls: Vec<[DVec2; 2]>) -> Plan {
+        let mut exits = vec![Vec::new(); floors.len()];
+        for (i, door) in doors.iter().enumerate() {
+            for side in door.sides {
+                exits[side as usize].push(i);
+            }
+        }
+        Plan {
+            doors,
+            floors,
+            exits,
+            walls,
+        }
+    }
+
+    fn of_rooms(stage: &Stage, tiling: &Tiling) -> Plan {
+        let floors = tiling.boxes.iter().map(|room| stage.in_world(room).0.z);
+        let doors = tiling.portals.iter().map(|portal| {
+            let (min, max) = stage.in_world(&portal.opening);
+            Door {
+                at: (min / 2.0 + max / 2.0).truncate(),
+                sides: portal.between,
+                wall: None,
+            }
+        });
+        Plan::new(doors.collect(), floors.collect(), Vec::new())
+    }
+
+    fn of_map(map: &WadMap) -> Plan {
+        let floors = map.sectors.iter().map(|sector| sector.heights[0]);
+        let ends = |line: usize| {
+            map.lines[line]
+                .ends
+                .map(|end| DVec2::from(end.map(f64::from)))
+        };
+        let doors = map.lines.iter().enumerate().filter_map(|(i, line)| {
+            let sides = [line.sectors[0]?, line.sectors[1]?];
+            let [a, b] = sides.map(|side| map.sectors[side as usize].heights);
+            let opening = a[1].min(b[1]) - a[0].max(b[0]);
+            let [from, to] = ends(i);
+            // A line with an effect may open.
+            let is_way = sides[0] != sides[1] && (opening >= FITTING || line.action != 0);
+            is_way.then_some(Door {
+                at: (from + to) / 2.0,
+                sides,
+                wall: Some(i),
+            })
+        });
+        let walls = (0..map.lines.len()).map(ends).collect();
+        Plan::new(doors.collect(), floors.collect(), walls)
+    }
+
+    /// Corners of a walk through `count` doors, eyes `height` above the floors.
+    fn way(&self, count: usize, height: f64, rng: &mut SeededRng) -> Vec<DVec3> {
+        let mut here = rng.below(self.doors.len());
+        let mut side = self.doors[here].sides[rng.below(2)];
+        let mut way = Vec::with_capacity(2 * count);
+        for _ in 0..count {
+            let eye = |door: usize| {
+                let floor = self.floors[side as usize];
+                self.doors[door].at.extend(floor + height)
+            };
+            way.push(eye(here));
+            let exits = &self.exits[side as usize];
+            let mut drawn = (0..DRAWN).map(|_| exits[rng.below(exits.len())]);
+            // Back through the same door if there is no way on.
+            here = drawn.find(|&next| self.is_free(here, next)).unwrap_or(here);
+            way.push(eye(here));
+            let [a, b] = self.doors[here].sides;
+            side = if side == a { b } else { a };
+        }
+        way
+    }
+
+    /// Tests whether the way between two doors of a region meets no wall.
+    fn is_free(&self, from: usize, to: usize) -> bool {
+        let [a, b] = [from, to].map(|door| &self.doors[door]);
+        let (p, q) = (a.at, b.at);
+        let side = |u: DVec2, v: DVec2, w: DVec2| (v - u).perp_dot(w - u);
+        let meets = |&[u, v]: &[DVec2; 2]| {
+            side(p, q, u) * side(p, q, v) <= 0.0 && side(u, v, p) * side(u, v, q) <= 0.0
+        };
+        // On one line all sides are 0: such walls count as met if they are between.
+        let is_near =
+            |&[u, v]: &[DVec2; 2]| u.min(v).cmple(p.max(q)).all() && p.min(q).cmple(u.max(v)).all();
+        let own = [a.wall, b.wall];
+        let mut walls = self.walls.iter().enumerate();
+        from != to && !walls.any(|(i, w)| !own.contains(&Some(i)) && is_near(w) && meets(w))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use crate::path::{self, LensDefaults};
+    use crate::scene::{self, Regions, Scene};
+
+    fn eyes(scene: &Scene, spec: &str) -> Vec<DVec3> {
+        let path = path::load(spec, scene, &LensDefaults::default()).unwrap();
+        let level = path.cameras.iter().all(|c| c.frame.forward().z == 0.0);
+        assert!(level);
+        path.cameras.iter().map(|c| c.frame.eye).collect()
+    }
+
+    fn rooms_at(scene: &Scene, eye: DVec3) -> Vec<u32> {
+        let local = (eye - scene.origin).as_vec3();
+        scene.regions.holding(local, &scene.items)
+    }
+
+    #[test]
+    fn rooms_are_left_through_doors_at_eye_height() {
+        let scene = scene::load("rooms:n=4000,offset=1e6", &Default::default()).unwrap();
+        let Regions::Tiling(tiling) = &scene.regions else {
+            panic!("no rooms");
+        };
+        let eyes = eyes(&scene, "walk:frames=4000,doors=40");
+        let mut changes = 0;
+        for pair in eyes.windows(2) {
+            let rooms = [rooms_at(&scene, pair[0]), rooms_at(&scene, pair[1])];
+            assert!(rooms.iter().all(|ids| !ids.is_empty()), "{pair:?}");
+            if rooms[0].iter().any(|room| rooms[1].contains(room)) {
+                continue;
+            }
+            changes += 1;
+            let joins = |p: &&scene::Portal| {
+                let between = |[a, b]: [u32; 2]| rooms[0].contains(&a) && rooms[1].contains(&b);
+                let [a, b] = p.between;
+                between([a, b]) || between([b, a])
+            };
+            assert!(tiling.portals.iter().any(|p| joins(&p)), "{pair:?}");
+            let low = |room: u32| tiling.boxes[room as usize].in_world(scene.origin).0.z;
+            let above = pair[1].z - low(rooms[1][0]);
+            assert!((0.0..3.0 + 1e-3).contains(&above), "{above}");
+        }
+        assert!(changes >= 10, "{changes} doors");
+    }
+
+    #[test]
+    fn a_walk_through_a_map_meets_no_solid_line() {
+        for (name, least) in [("freedm-map12", 3), ("freedm-map20", 5)] {
+            let scene = scene::load(name, &Default::default()).unwrap();
+            let Regions::Bsp(map) = &scene.regions else {
+                panic!("no map");
+            };
+            let eyes = eyes(&scene, "walk:frames=512,seed=2");
+            let solid = map.lines.iter().filter(|l| l.sectors.contains(&None));
+            let solid: Vec<[DVec3; 2]> = solid
+                .map(|l| l.ends.map(|[x, y]| DVec3::new(x.into(), y.into(), 0.0)))
+                .collect();
+            let sector = |eye: DVec3| {
+                let leaf = map.tree.descend(eye.truncate()).unwrap();
+                map.leaf_sectors[leaf as usize]
+            };
+            let mut sectors: Vec<u32> = eyes.iter().map(|&eye| sector(eye)).collect();
+            for pair in eyes.windows(2) {
+                let [p, q] = [pair[0].truncate(), pair[1].truncate()];
+                for line in &solid {
+                    let [u, v] = line.map(|end| end.truncate());
+                    let side = |a: glam::DVec2, b: glam::DVec2, c| (b - a).perp_dot(c - a);
+                    let is_cut =
+                        side(p, q, u) * side(p, q, v) < 0.0 && side(u, v, p) * side(u, v, q) < 0.0;
+                    assert!(!is_cut, "{name}: {p} to {q} through {u} to {v}");
+                }
+            }
+            sectors.sort_unstable();
+            sectors.dedup();
+            assert!(sectors.len() >= least, "{name}: {} sectors", sectors.len());
+        }
+    }
+}
