@@ -19,8 +19,9 @@ fn of(boxes: impl Iterator<Item = WorldBox>) -> Result<World, SpecError> {
     })
 }
 
-/// Unit cubes on a spiral over a sphere, as in Bevy's `many_cubes`: from the centre,
-/// every view of one lens shows about as many.
+/// Unit cubes on a spiral over a sphere (Bevy's `many_cubes`).
+///
+/// From the centre every view of one lens shows about as many.
 pub fn shell(spec: &mut Spec, n: usize, _: &mut SeededRng) -> Result<World, SpecError> {
     /// Widens the gaps at the poles (Roberts 2018).
     const POLES: f64 = 0.36;
@@ -54,8 +55,7 @@ pub fn grid3(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
     of(boxes.into_iter())
 }
 
-/// Boxes with edges 1 + 99 X^10, X even in 0..1 per axis, scattered in a cube: many
-/// small ones and a few large.
+/// Boxes with edges 1 + 99 X^10, X even in 0..1 per axis, scattered in a cube.
 pub fn bepu(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
     let natural = 15.625 * libm::cbrt(n.max(1) as f64);
     let side = spec.number_between("side", natural, 0.0, f64::INFINITY)?;
@@ -79,8 +79,9 @@ pub fn corridor(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World,
     }))
 }
 
-/// Rectangles of the plane z = 0 that tile a square: cut again and again across the
-/// longer side, so that neighbours share exact coordinates.
+/// Rectangles of the plane z = 0 that tile a square.
+///
+/// Each cut is across the longer side; neighbours share exact coordinates.
 pub fn tiles2d(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
     let side = spec.number_between("side", 1000.0, 0.0, f64::INFINITY)?;
     let mut boxes = Vec::with_capacity(n);
@@ -113,8 +114,9 @@ pub fn stack(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
     of((0..n).map(|i| places[i % piles]))
 }
 
-/// Unit cubes on whole coordinates, four below each other in each column of a fractal
-/// heightfield: every face is a tie.
+/// Unit cubes on whole coordinates under a fractal surface, four to a column.
+///
+/// Every face is a tie.
 pub fn voxels(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
     const DEEP: usize = 4;
     let relief = spec.number_between("relief", 0.2, -1.0, 10.0)?;
