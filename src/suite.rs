@@ -135,6 +135,25 @@ pub static SUITES: &[Suite] = &[
         structures: "all",
     },
     Suite {
+        name: REAL,
+        summary: "the real scenes: four that come with the program and those that scripts/fetch.py \
+                  has fetched; a minute or two",
+        plan: scenes! { cold: false;
+            "freedm-map12" ["places", "walk:frames=128"];
+            "freedm-map20" ["places", "walk:frames=128"];
+            "helsinki" ["flythrough:frames=128,visible=2%", "street:frames=128"];
+            "us-counties" ["flythrough:frames=128,visible=2%", "outside:frames=128"];
+        },
+        effort: Effort {
+            processes: 10,
+            rounds: [2, 40],
+            task_ns: 2.5e6,
+            pass_ns: 7e6,
+            extras: Extras::All,
+        },
+        structures: "default",
+    },
+    Suite {
         name: "compare",
         summary: "for `compare --against`: a real scene and two generated ones, frustum queries \
                   only; a minute and a half by itself",
@@ -171,6 +190,12 @@ pub static SUITES: &[Suite] = &[
         structures: "default",
     },
 ];
+
+/// The suite that fetched scenes join.
+pub const REAL: &str = "real";
+
+/// The ways through a fetched scene in that suite.
+pub const REAL_PATHS: &[&str] = &["flythrough:frames=128,visible=2%", "outside:frames=64"];
 
 /// The way through a scene when none is named.
 pub const DEFAULT_PATH: &str = "flythrough";

@@ -12,7 +12,7 @@ use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::{BOUNDS, METRICS};
 use crate::path::{PATH_PARAMS, PATHS};
-use crate::scene::{FAMILIES, MESHES, SAMPLES, SCENE_PARAMS};
+use crate::scene::{FAMILIES, FETCHED, MESHES, SAMPLES, SCENE_PARAMS};
 use crate::suite::SUITES;
 
 /// Name, further columns by name, summary.
@@ -137,6 +137,15 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                 let licence = format!("real; {}", s.licence);
                 row(s.name, &[("params", &licence)], s.summary)
             });
+            let fetched = FETCHED.iter().map(|f| {
+                let state = match f.is_there() {
+                    true => "fetched".to_owned(),
+                    false => format!("missing: scripts/fetch.py {}", f.name),
+                };
+                let params = format!("{state}; {}", f.licence);
+                let path = f.path();
+                row(&path.to_string_lossy(), &[("params", &params)], &f.summary)
+            });
             let suites = SUITES
                 .iter()
                 .map(|s| [s.name.to_owned(), s.summary.to_owned()]);
@@ -150,7 +159,11 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
             (
                 "scenes",
                 note,
-                families.chain(meshes).chain(samples).collect(),
+                families
+                    .chain(meshes)
+                    .chain(samples)
+                    .chain(fetched)
+                    .collect(),
             )
         }
         ListTopic::Paths => (

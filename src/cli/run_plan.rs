@@ -7,13 +7,13 @@ use super::args::RunArgs;
 use super::shared_args::WhatArgs;
 use crate::culling::Culling;
 use crate::index::Registry;
-use crate::input::tell_warnings;
+use crate::input::{note, tell_warnings};
 use crate::measure::{GroupKey, Plan, PlannedScene, Workload};
 use crate::path::{self, CameraPath, LensDefaults};
 use crate::report::{KeptPart, Stream};
-use crate::scene::{self, Scene};
+use crate::scene::{self, FETCHED, Scene};
 use crate::spec::SpecError;
-use crate::suite::{DEFAULT_PATH, SUITES, Suite};
+use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES, Suite};
 
 /// A plan with where it comes from.
 pub struct RunPlan {
@@ -157,7 +157,8 @@ impl RunPlan {
         };
         let as_it_comes =
             self.plan.lens == LensDefaults::default() && self.plan.cullings.iter().all(is_plain);
-        if self.from_suite && as_it_comes {
+        let is_built_in = self.from_suite && self.suite.name != REAL;
+        if is_built_in && as_it_comes {
             return Ok(());
         }
         for PlannedScene { source, paths, .. } in &self.plan.scenes {
@@ -213,8 +214,21 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Vec<PlannedScene> {
     let rows = rows.map(|row| scene(row.scene, row.paths, row.cold || args.cold));
     let named = args.scene.iter();
     let named = named.map(|source| scene(source, &[DEFAULT_PATH], args.cold));
-    match args.scene.is_empty() {
-        true => rows.collect(),
-        false => named.collect(),
+    if !args.scene.is_empty() {
+        return named.collect();
     }
+    let mut scenes: Vec<PlannedScene> = rows.collect();
+    if suite.name == REAL {
+        let (there, missing): (Vec<_>, Vec<_>) = FETCHED.iter().partition(|row| row.is_there());
+        let fetched = there.iter().flat_map(|row| row.scenes());
+        scenes.extend(fetched.map(|source| scene(&source, REAL_PATHS, args.cold)));
+        if !missing.is_empty() {
+            let names: Vec<&str> = missing.iter().map(|row| row.name.as_str()).collect();
+            let names = names.join(" ");
+            note(&format!(
+                "left out, as not fetched: {names}; to fetch them: scripts/fetch.py {names}"
+            ));
+        }
+    }
+    scenes
 }
