@@ -42,7 +42,7 @@ impl SceneArgs {
 /// Options of a measurement, shared by `run` and `compare --against`.
 #[derive(Args, Debug)]
 pub struct WhatArgs {
-    /// The scenes, paths and rounds: quick, standard, full, real, compare or growth [default:
+    /// Scenes, paths and rounds: quick, standard, full, real, compare, growth [default:
     /// quick; compare --against: compare]
     #[arg(long, value_name = "SUITE")]
     pub suite: Option<String>,
