@@ -18,10 +18,11 @@ use libfuzzer_sys::fuzz_target;
 type Reader = fn(&[u8]);
 
 /// Readers by the name of their corpus.
-const READERS: [(&str, Reader); 12] = [
+const READERS: [(&str, Reader); 13] = [
     ("boxes", tables::boxes),
     ("cameras", tables::cameras),
     ("gltf", tables::gltf),
+    ("obj", tables::obj),
     ("points", tables::points),
     ("pvs", tables::pvs),
     ("report", runs::report),

@@ -6,7 +6,8 @@ use cullbench::camera::{MATRIX_CONVENTIONS, PlaneOptions, Surroundings};
 use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
 use cullbench::scene::{
-    LoadOptions, Scene, read_boxes_csv, read_gltf, read_sought_boxes_csv, write_boxes_csv,
+    LoadOptions, Scene, read_boxes_csv, read_gltf, read_obj, read_sought_boxes_csv,
+    write_boxes_csv,
 };
 use cullbench::stress::{Vector, read_vectors, replay};
 use cullbench::visibility::region::Pvs;
@@ -24,6 +25,22 @@ pub fn gltf(bytes: &[u8]) {
                 .all(|items| items == scene.items.len())
         );
     }
+}
+
+/// Reads OBJ, and its triangles as items.
+pub fn obj(bytes: &[u8]) {
+    let options = LoadOptions::default();
+    let Some(scene) = read(read_obj(bytes, "fuzz.obj", "fuzz", &options)) else {
+        return;
+    };
+    let surfaces = scene.surfaces.clone().expect("triangles");
+    assert_eq!(surfaces.items(), scene.items.len());
+    for (item, b) in scene.items.iter().enumerate() {
+        let held = surfaces.bounds(item);
+        assert!(b.min.cmple(held.min).all() && b.max.cmpge(held.max).all());
+    }
+    let single = read(scene.by_triangle(&options));
+    assert!(single.is_none_or(|scene| scene.items.len() == surfaces.triangles.len()));
 }
 
 pub fn boxes(bytes: &[u8]) {

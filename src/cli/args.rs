@@ -218,7 +218,7 @@ pub struct ReportArgs {
 
 #[derive(Args, Debug)]
 pub struct QueryArgs {
-    /// A scene: boxes CSV, glTF, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
     #[arg(long)]
     pub scene: String,
     /// Cameras: a cameras CSV or a path spec
@@ -248,7 +248,7 @@ pub struct QueryArgs {
 #[derive(Args, Debug)]
 #[command(override_usage = program::named("cullbench locate [OPTIONS] --scene <SCENE> <--points|--boxes> <FILE>"))]
 pub struct LocateArgs {
-    /// A scene: boxes CSV, glTF, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
     #[arg(long)]
     pub scene: String,
     #[command(flatten)]

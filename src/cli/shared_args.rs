@@ -11,7 +11,7 @@ use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{Machine, Protocol};
 use crate::path::LensDefaults;
-use crate::scene::{LoadOptions, UP_AXES, UpAxis};
+use crate::scene::{ITEM_KINDS, ItemKind, LoadOptions, UP_AXES, UpAxis};
 use crate::spec::SpecError;
 use crate::suite::DEFAULT_PATH;
 use crate::threads::MOST_THREADS;
@@ -22,9 +22,13 @@ pub struct SceneArgs {
     /// Leave out items that are not finite boxes, and report their number
     #[arg(long)]
     pub skip_bad_items: bool,
-    /// Up axis of boxes CSV, y or z; other scenes state theirs [default: z]
+    /// Up axis of boxes CSV and OBJ, y or z; other scenes state theirs [default: z of
+    /// boxes, y of OBJ]
     #[arg(long, value_name = "AXIS", value_parser = values::choice("up axis", &UP_AXES))]
     pub up: Option<UpAxis>,
+    /// Items of scenes with triangles (OBJ, glTF, meshes): objects or triangles
+    #[arg(long, value_name = "KIND", default_value = "objects", value_parser = values::choice("kind of item", &ITEM_KINDS))]
+    pub items: ItemKind,
 }
 
 impl SceneArgs {
@@ -33,6 +37,7 @@ impl SceneArgs {
         LoadOptions {
             skip_bad_items: self.skip_bad_items,
             up: self.up,
+            items: self.items,
             structures: structures as u64,
             per_triangle: 0,
         }
@@ -122,7 +127,7 @@ impl KernelArgs {
 /// The scene, cameras and structures of a study, and its processes.
 #[derive(Args, Debug)]
 pub struct StudyArgs {
-    /// A scene: boxes CSV, glTF, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
     #[arg(long)]
     pub scene: String,
     /// A camera path: a spec or a cameras CSV

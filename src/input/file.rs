@@ -1,9 +1,10 @@
-//! Bytes of a file or a pipe.
+//! Bytes of a file, a pipe or standard input, which is named `-`.
 //!
 //! A pipe can be read only once, so its bytes are kept and read again like a file.
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -18,7 +19,14 @@ static HELD: Mutex<Option<BTreeMap<String, String>>> = Mutex::new(None);
 /// Returns true if there is a file, a pipe or a device of that name.
 pub fn is_readable(path: &Path) -> bool {
     let pipes = PIPES.lock().unwrap_or_else(PoisonError::into_inner);
-    pipes.contains_key(path) || fs::metadata(path).is_ok_and(|found| !found.is_dir())
+    is_stdin(path)
+        || pipes.contains_key(path)
+        || fs::metadata(path).is_ok_and(|found| !found.is_dir())
+}
+
+/// Returns true for the name of standard input.
+fn is_stdin(path: &Path) -> bool {
+    path.as_os_str() == "-"
 }
 
 /// All bytes. Those of a pipe are kept: a command may look at its input before
@@ -35,8 +43,16 @@ pub fn read_file(path: &Path) -> Result<Arc<[u8]>, InputError> {
     if let Some(bytes) = pipes.get(path) {
         return Ok(bytes.clone());
     }
-    let is_file = fs::metadata(path).map_err(io)?.is_file();
-    let bytes = fs::read(path).map_err(io)?;
+    let is_file = !is_stdin(path) && fs::metadata(path).map_err(io)?.is_file();
+    let bytes = match is_stdin(path) {
+        true => {
+            let mut bytes = Vec::new();
+            let read = io::stdin().lock().read_to_end(&mut bytes);
+            read.map(|_| bytes)
+        }
+        false => fs::read(path),
+    };
+    let bytes = bytes.map_err(io)?;
     if is_file {
         expect_same(path, &bytes)?;
     }

@@ -9,6 +9,7 @@ use std::io::{self, Read};
 /// Windows line ends, is a line too early.
 pub(super) struct LineCounter<R> {
     input: R,
+    delimiter: u8,
     offset: u64,
     line: u64,
     last: u8,
@@ -46,9 +47,10 @@ pub(super) struct QuoteFault {
 }
 
 impl<R> LineCounter<R> {
-    pub fn new(input: R) -> Self {
+    pub fn new(input: R, delimiter: u8) -> Self {
         LineCounter {
             input,
+            delimiter,
             offset: 0,
             line: 0,
             last: b'\n',
@@ -85,7 +87,8 @@ impl<R> LineCounter<R> {
         self.quotes = match (self.quotes, byte) {
             (Open, b'"') => Closed,
             (Open, _) | (Closed, b'"') => Open,
-            (_, b',' | b'\n' | b'\r') => FieldStart,
+            (_, b'\n' | b'\r') => FieldStart,
+            (_, byte) if byte == self.delimiter => FieldStart,
             (FieldStart, b'"') => {
                 self.opened = (self.offset, self.line);
                 Open

@@ -12,4 +12,5 @@ pub(crate) use error::gigabytes;
 pub use file::{held_files, hold_files, is_readable, pipes, read_file, stand_in};
 pub(crate) use note::{note, warn};
 pub use note::{tell_notes, tell_warnings};
+pub(crate) use table::finite;
 pub use table::{Row, TableReader};

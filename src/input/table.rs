@@ -1,9 +1,9 @@
-//! Comma-separated files with a header, read row by row with errors that name
+//! Tables of text with a header, separated by commas, semicolons, tabs or bars, read row by row with errors that name
 //! file, line and column. It defines the mechanics that the box, camera and point
 //! readers share; what the columns mean is theirs.
 
 use std::collections::HashSet;
-use std::io::Read;
+use std::io::{Chain, Cursor, Read};
 
 use super::lines::{LineCounter, QuoteFault};
 use super::{InputError, note};
@@ -15,10 +15,14 @@ const LABELS: [&str; 9] = [
     "camera", "comment", "frame", "id", "label", "name", "note", "time", "time_s",
 ];
 
+/// Bytes in which the header is searched for the delimiter.
+const HEAD: u64 = 1 << 16;
+
 /// A CSV file with its header read.
 pub struct TableReader<R> {
     file: String,
-    csv: csv::Reader<LineCounter<R>>,
+    csv: csv::Reader<LineCounter<Chain<Cursor<Vec<u8>>, R>>>,
+    delimiter: u8,
     header: Vec<String>,
     header_line: u64,
     record: csv::ByteRecord,
@@ -38,11 +42,16 @@ impl<R: Read> TableReader<R> {
     /// # Errors
     /// An unreadable or empty file, a column named twice, text that is no
     /// comma-separated UTF-8 with a header.
-    pub fn open(input: R, file: &str) -> Result<Self, InputError> {
+    pub fn open(mut input: R, file: &str) -> Result<Self, InputError> {
+        let mut head = Vec::new();
+        let read = input.by_ref().take(HEAD).read_to_end(&mut head);
+        read.map_err(|error| csv_error(file, error.into()))?;
+        let delimiter = delimiter(&head);
         let mut csv = csv::ReaderBuilder::new()
             .flexible(true)
+            .delimiter(delimiter)
             .trim(csv::Trim::All)
-            .from_reader(LineCounter::new(input));
+            .from_reader(LineCounter::new(Cursor::new(head).chain(input), delimiter));
         let fields = csv
             .byte_headers()
             .map_err(|error| csv_error(file, error))?
@@ -65,15 +74,6 @@ impl<R: Read> TableReader<R> {
         if let Some(fault) = csv.get_ref().fault_before(csv.position().byte()) {
             return Err(quote_error(file, fault));
         }
-        if let [only] = &header[..]
-            && let Some(separator) = only.chars().find(|&c| matches!(c, ';' | '\t' | '|'))
-        {
-            let name = match separator {
-                '\t' => "tabs".to_owned(),
-                other => format!("'{other}'"),
-            };
-            return Err(complain(format!("columns separated by {name}"), "commas"));
-        }
         if header.iter().all(String::is_empty) {
             let found = match header.len() {
                 0 | 1 => "an empty file".to_owned(),
@@ -95,6 +95,7 @@ impl<R: Read> TableReader<R> {
         Ok(TableReader {
             file: file.to_owned(),
             csv,
+            delimiter,
             header,
             header_line,
             record: csv::ByteRecord::new(),
@@ -183,10 +184,17 @@ impl<R: Read> TableReader<R> {
         let (found, wanted) = (self.record.len(), self.header.len());
         Ok(Some(match found == wanted {
             true => Ok(row),
-            false => Err(row.error(
-                counted(found, "field"),
-                format!("{wanted}, as in the header"),
-            )),
+            false => {
+                // Where all are numbers, some of them may be behind a decimal comma.
+                let is_split = self.delimiter == b',' && found > wanted;
+                let is_split = is_split && (0..found).all(|k| row.text(k).parse::<f64>().is_ok());
+                let why = match is_split {
+                    true => ", without decimal commas",
+                    false => "",
+                };
+                let expected = format!("{wanted}, as in the header{why}");
+                Err(row.error(counted(found, "field"), expected))
+            }
         }))
     }
 }
@@ -199,10 +207,9 @@ impl Row<'_> {
 
     /// A finite f64.
     pub fn finite_number(&self, column: usize) -> Result<f64, InputError> {
-        let value = self.text(column).parse::<f64>().ok();
-        value.filter(|v| v.is_finite()).ok_or_else(|| {
+        finite(self.text(column)).map_err(|expected| {
             let (name, text) = (&self.header[column], shortened(self.text(column), 60));
-            self.error(format!("{name} '{text}'"), "a finite number".into())
+            self.error(format!("{name} '{text}'"), expected.to_owned())
         })
     }
 
@@ -214,6 +221,29 @@ impl Row<'_> {
     /// An error at this row.
     pub fn error(&self, found: String, expected: String) -> InputError {
         InputError::line(self.file, self.line, found, expected)
+    }
+}
+
+/// The delimiter of a header, the first line that is not empty: the most frequent one
+/// outside of quotes.
+fn delimiter(head: &[u8]) -> u8 {
+    let mut lines = head.split(|byte| matches!(byte, b'\n' | b'\r'));
+    let header = lines.find(|line| !line.is_empty()).unwrap_or_default();
+    let names = header.split(|byte| *byte == b'"').step_by(2);
+    let count = |one: &u8| names.clone().flatten().filter(|byte| *byte == one).count();
+    // The last of several that are equally frequent.
+    let all = [b'|', b'\t', b';', b','];
+    all.into_iter().max_by_key(count).unwrap_or(b',')
+}
+
+/// A finite f64, or what was expected.
+pub(crate) fn finite(text: &str) -> Result<f64, &'static str> {
+    let number = |text: &str| text.parse::<f64>().ok();
+    let is_comma = || text.contains(',') && number(&text.replacen(',', ".", 1)).is_some();
+    match number(text) {
+        Some(value) if value.is_finite() => Ok(value),
+        None if is_comma() => Err("a decimal point, not a decimal comma"),
+        _ => Err("a finite number"),
     }
 }
 
@@ -302,13 +332,31 @@ mod tests {
         }
     }
 
+    #[test]
+    fn columns_are_separated_by_what_separates_the_header() {
+        for text in [
+            "x,y,z,a;b\n1,2,3,4",
+            "\nx;y;z;\"a,b,c,d\"\n1;2;\"3\";\"4;5\"\n",
+            "x\ty\tz\tkind\r\n1\t2\t\" 3\"\ta b\r\n",
+            "\u{feff}\"x\"|\"y\"|z|\"a \"\"|\"\"\"\n 1 |2|3| ",
+        ] {
+            let mut table = TableReader::open(text.as_bytes(), "t.csv").unwrap();
+            let columns = table.columns(&["x", "y", "z"]).unwrap();
+            assert_eq!(table.header().len(), 4, "{text}");
+            let row = table.next_row().unwrap().unwrap().unwrap();
+            let numbers = columns.map(|column| row.finite_number(column).unwrap());
+            assert_eq!(numbers, [1.0, 2.0, 3.0], "{text}");
+            assert!(table.next_row().unwrap().is_none());
+        }
+    }
+
     /// The error of reading a table of three columns to its end.
     fn told(text: &[u8]) -> String {
         let read = || -> Result<(), InputError> {
             let mut table = TableReader::open(text, "t.csv")?;
-            table.columns(&["x", "y", "z"])?;
+            let columns = table.columns(&["x", "y", "z"])?;
             while let Some(row) = table.next_row()? {
-                row?;
+                row?.finite_number(columns[1])?;
             }
             Ok(())
         };
@@ -368,18 +416,30 @@ mod tests {
             units.flat_map(to).collect::<Vec<u8>>()
         };
         let (little, big) = (utf16(u16::to_le_bytes), utf16(u16::to_be_bytes));
-        let cases: [(&[u8], &str); 9] = [
+        let cases: [(&[u8], &str); 12] = [
             (
                 &little,
                 "line 1: zero bytes, as in UTF-16 text; expected UTF-8",
             ),
             (&little[2..], "UTF-16"),
             (&big, "UTF-16"),
+            (b"x y z\n1 2 3\n", "no column 'x' in 'x y z'"),
             (
-                b"x;y;z\n1;2;3\n",
-                "line 1: columns separated by ';'; expected commas",
+                b"x;y;z\n1;2,5;3\n",
+                "line 2: y '2,5'; expected a decimal point, not a decimal comma",
             ),
-            (b"x\ty\tz\n1\t2\t3\n", "columns separated by tabs"),
+            (
+                b"x,y,z\n1,5,2,3,5\n",
+                "line 2: 5 fields; expected 3, as in the header, without decimal commas",
+            ),
+            (
+                b"x,y,z\n1,2,3,a\n",
+                "line 2: 4 fields; expected 3, as in the header",
+            ),
+            (
+                b"x;y;z\n1;2;3;5\n",
+                "line 2: 4 fields; expected 3, as in the header",
+            ),
             (
                 b"1,0,1\n1,2,3\n",
                 "line 1: data '1,0,1' in place of the header; expected",

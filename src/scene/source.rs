@@ -6,10 +6,11 @@ use std::path::Path;
 
 use super::generate::{Build, COUNT, MOST};
 use super::gltf::{is_gltf, read_gltf};
+use super::obj::{is_obj, read_obj};
 use super::zip::{self, is_zip};
 use super::{
-    FAMILIES, Family, LoadOptions, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv, map_names,
-    memory,
+    FAMILIES, Family, ItemKind, LoadOptions, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv,
+    foreign, map_names, memory,
 };
 use crate::input::{InputError, is_readable, note, read_file};
 use crate::spec::{Spec, SpecError, nearest};
@@ -51,11 +52,14 @@ pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
 /// # Errors
 /// One line that names what was found and what was expected.
 pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
-    let scene = read(source, options)?;
+    let mut scene = read(source, options)?;
+    if options.items == ItemKind::Triangles {
+        scene = scene.by_triangle(options)?;
+    }
     if let Some(up) = options.up.filter(|up| *up != scene.up) {
         let (name, own) = (&scene.name, scene.up.name());
         note(&format!(
-            "{name}: {own} is up by its format; --up {} is for boxes CSV only",
+            "{name}: {own} is up by its format; --up {} is for boxes CSV and OBJ",
             up.name()
         ));
     }
@@ -153,8 +157,12 @@ pub fn read_bytes(
             ..WadMap::read(bytes, file, map)?.into_scene(name)?
         });
     }
+    foreign::refuse(bytes, file)?;
     if is_gltf(bytes) || is_named("gltf") || is_named("glb") {
         return read_gltf(bytes, file, name, options);
+    }
+    if is_obj(bytes) || is_named("obj") {
+        return read_obj(bytes, file, name, options);
     }
     let rows = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
     let structures = options.structures;

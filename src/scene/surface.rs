@@ -7,10 +7,11 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::{Scene, WorldBox};
+use super::{Labels, LoadOptions, Scene, WorldBox, memory};
 use crate::geometry::Aabb;
 use crate::input::InputError;
 use crate::query::ItemId;
+use crate::spec::SpecError;
 
 named! {
     /// Effect of a surface on a ray.
@@ -228,6 +229,50 @@ impl Surfaces {
     pub(crate) fn range(&self, item: usize) -> Range<usize> {
         let range = &self.of_item[item];
         range.start as usize..range.end as usize
+    }
+}
+
+impl Scene {
+    /// The same triangles, an item each, with the labels of the items that they were of.
+    ///
+    /// # Errors
+    /// A scene without triangles, or one that does not fit into memory.
+    pub fn by_triangle(self, options: &LoadOptions) -> Result<Scene, InputError> {
+        let Some(surfaces) = &self.surfaces else {
+            return Err(SpecError::new(format_args!(
+                "{}: no triangles; expected a scene with them for --items triangles",
+                self.name
+            ))
+            .into());
+        };
+        let count = surfaces.triangles.len() as u64;
+        let needed = memory::needed_by_items(count, options.structures)
+            + memory::needed_by_triangles(count, options.per_triangle, 0);
+        memory::check_fits(
+            &self.name,
+            needed,
+            options.structures,
+            memory::free_for(count),
+        )?;
+        let mut single = Surfaces::about(surfaces.origin);
+        let empty = |labels: &Labels| Labels::new(labels.column.clone());
+        let mut labels: Vec<Labels> = self.labels.iter().map(empty).collect();
+        for item in 0..surfaces.items() {
+            for corners in surfaces.of(item) {
+                let (kind, two_sided) = (surfaces.kinds[item], surfaces.two_sided[item]);
+                single.push(kind, two_sided, &corners, &[[0, 1, 2]]);
+                for (own, all) in labels.iter_mut().zip(&self.labels) {
+                    own.push(all.get(item));
+                }
+            }
+        }
+        Ok(Scene {
+            up: self.up,
+            unit: self.unit,
+            labels,
+            places: self.places,
+            ..single.into_scene(self.name)?
+        })
     }
 }
 

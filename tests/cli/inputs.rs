@@ -146,7 +146,7 @@ fn every_command_that_reads_a_scene_takes_up() {
     let line = "query --scene freedm-map12 --cameras places:frames=2 --structure bvh --ids";
     let said = cullbench(folder.path(), &format!("{line} --up y"));
     assert_eq!((said.code, said.out), (Some(0), works(folder.path(), line)));
-    let wanted = "note: freedm-map12: z is up by its format; --up y is for boxes CSV only\n";
+    let wanted = "note: freedm-map12: z is up by its format; --up y is for boxes CSV and OBJ\n";
     assert_eq!(said.err, wanted);
     // Coordinates are not turned.
     let done = cullbench(folder.path(), "scene convert y.csv --up y");

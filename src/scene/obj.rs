@@ -1,0 +1,415 @@
+//! Wavefront OBJ: every object or group with faces is an item.
+//!
+//! Faces become fans of opaque triangles, counter-clockwise as seen from the outside. Boxes
+//! hold the vertices as written. Weights and colours of vertices, normals and texture
+//! coordinates change nothing. Source: Wavefront Technologies, Advanced Visualizer Manual,
+//! appendix B1, "Object Files (.obj)".
+
+use std::collections::BTreeSet;
+use std::iter::once;
+
+use glam::DVec3;
+
+use super::{
+    Labels, LoadOptions, Scene, SurfaceKind, Surfaces, UpAxis, WorldBox, choose_origin, memory,
+};
+use crate::input::{InputError, finite, note};
+use crate::shown::{counted, first_of, shortened};
+
+/// First words of lines whose meaning is known here.
+const KNOWN: [&[u8]; 8] = [b"v", b"f", b"o", b"g", b"vt", b"vn", b"vp", b"s"];
+/// First words of lines that are named as not read.
+const UNREAD: [&[u8]; 4] = [b"mtllib", b"usemtl", b"l", b"p"];
+/// Bytes in memory for a byte of a file while it is read: the corners of a large polygon.
+const BYTES_PER_BYTE: u64 = 12;
+/// Most unread words that are counted.
+const MOST_UNREAD: usize = 100;
+
+/// Tells OBJ by the first word that is no comment.
+pub fn is_obj(bytes: &[u8]) -> bool {
+    let lines = text(bytes).split(|byte| *byte == b'\n');
+    let mut lines = lines.map(|line| line.trim_ascii());
+    let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"));
+    first.is_some_and(|line| {
+        let word = words(line).next().unwrap_or_default();
+        word.len() < line.len() && KNOWN.iter().chain(&UNREAD).any(|known| *known == word)
+    })
+}
+
+/// Reads a scene; y is up unless the options say otherwise.
+///
+/// # Errors
+/// The first line with numbers that are none, or with a vertex that is not there; a file
+/// without faces; a scene that does not fit into memory or into f32.
+pub fn read_obj(
+    bytes: &[u8],
+    file: &str,
+    name: &str,
+    options: &LoadOptions,
+) -> Result<Scene, InputError> {
+    let size = bytes.len() as u64;
+    let fits = |needed, count| {
+        memory::check_fits(name, needed, options.structures, memory::free_for(count))
+    };
+    fits(size.saturating_mul(BYTES_PER_BYTE), size)?;
+    let mut obj = Obj {
+        file,
+        points: Vec::new(),
+        corners: Vec::new(),
+        items: vec![(String::new(), 0)],
+        unread: BTreeSet::new(),
+    };
+    let (mut rest, mut number) = (text(bytes), 1);
+    while !rest.is_empty() {
+        let (line, lines) = first_line(rest);
+        obj.line(line, number)?;
+        (rest, number) = (&rest[line.len()..], number + lines);
+    }
+    let triangles = obj.corners.len() as u64;
+    let number = number.max(2) - 1;
+    if triangles == 0 {
+        let found = "no faces".to_owned();
+        return Err(obj.error(number, found, "at least one line 'f' with three corners"));
+    }
+    if triangles > u64::from(u32::MAX) / 4 || obj.points.len() as u64 > u64::from(u32::MAX) {
+        let found = format!("{triangles} triangles");
+        return Err(obj.error(number, found, "at most a billion"));
+    }
+    fits(
+        memory::needed_by_triangles(triangles, options.per_triangle, options.structures),
+        triangles,
+    )?;
+    if !obj.unread.is_empty() {
+        let unread: Vec<&String> = obj.unread.iter().collect();
+        note(&format!(
+            "{file}: lines that are not read: {}; all surfaces are opaque",
+            first_of(&unread, 8)
+        ));
+    }
+    Ok(Scene {
+        up: options.up.unwrap_or(UpAxis::Y),
+        ..obj.into_scene(name)?
+    })
+}
+
+/// The bytes without a byte order mark.
+fn text(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let words = line.split(|byte| byte.is_ascii_whitespace() || *byte == b'\\');
+    words.filter(|word| !word.is_empty())
+}
+
+/// A line with its end, and with the lines that backslashes at ends add to it; their number.
+fn first_line(text: &[u8]) -> (&[u8], u64) {
+    let (mut end, mut lines) = (0, 0);
+    while let Some(length) = text[end..].iter().position(|byte| *byte == b'\n') {
+        let own = &text[end..=end + length];
+        (end, lines) = (end + own.len(), lines + 1);
+        if text[0] == b'#' || !own.trim_ascii_end().ends_with(b"\\") {
+            return (&text[..end], lines);
+        }
+    }
+    (text, lines + 1)
+}
+
+struct Obj<'f> {
+    file: &'f str,
+    points: Vec<DVec3>,
+    /// Triangles as indices of points.
+    corners: Vec<[u32; 3]>,
+    /// Name and first triangle; the last item may have no triangles yet.
+    items: Vec<(String, usize)>,
+    unread: BTreeSet<String>,
+}
+
+impl Obj<'_> {
+    fn error(&self, line: u64, found: String, expected: &str) -> InputError {
+        InputError::line(self.file, line, found, expected)
+    }
+
+    fn line(&mut self, line: &[u8], number: u64) -> Result<(), InputError> {
+        let mut words = words(line);
+        let Some(word) = words.next().filter(|word| !word.starts_with(b"#")) else {
+            return Ok(());
+        };
+        match word {
+            b"v" => {
+                let mut point = [0.0; 3];
+                for (axis, value) in ["x", "y", "z"].iter().zip(&mut point) {
+                    let word = words.next().unwrap_or_default();
+                    let text = String::from_utf8_lossy(word);
+                    *value = finite(&text).map_err(|expected| {
+                        let found = format!("{axis} '{}'", shortened(&text, 60));
+                        self.error(number, found, expected)
+                    })?;
+                }
+                // Of a weight or a colour.
+                let more = words.count();
+                if more > 4 {
+                    let found = format!("a vertex of {}", counted(3 + more, "number"));
+                    return Err(self.error(number, found, "3 to 7"));
+                }
+                self.points.push(point.into());
+            }
+            b"f" => {
+                let mut corners = words.map(|word| self.corner(word, number));
+                let two = [corners.next(), corners.next()];
+                let [Some(first), Some(second)] = two else {
+                    let found = counted(two.iter().flatten().count(), "corner");
+                    return Err(self.error(number, found, "three or more"));
+                };
+                let (first, mut last) = (first?, second?);
+                let fan = corners.map(|next| {
+                    let next = next?;
+                    Ok([first, std::mem::replace(&mut last, next), next])
+                });
+                let fan: Vec<[u32; 3]> = fan.collect::<Result<_, InputError>>()?;
+                if fan.is_empty() {
+                    return Err(self.error(number, "2 corners".to_owned(), "three or more"));
+                }
+                self.corners.extend(fan);
+            }
+            b"o" | b"g" => {
+                let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;
+                let name = String::from_utf8_lossy(line[start..].trim_ascii()).into_owned();
+                self.items.pop_if(|(_, first)| *first == self.corners.len());
+                self.items.push((name, self.corners.len()));
+            }
+            _ if word.contains(&0) => {
+                let found = "zero bytes, as in UTF-16 text".to_owned();
+                return Err(self.error(number, found, "UTF-8 text"));
+            }
+            _ if KNOWN.contains(&word) || self.unread.len() == MOST_UNREAD => {}
+            _ => {
+                let word = shortened(&String::from_utf8_lossy(word), 20);
+                self.unread.insert(format!("'{word}'"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The point of `7`, `-1` or `7/3/2`.
+    fn corner(&self, word: &[u8], number: u64) -> Result<u32, InputError> {
+        let own = word.split(|byte| *byte == b'/').next().unwrap_or_default();
+        let index = std::str::from_utf8(own).ok();
+        let index = index.and_then(|own| own.parse::<i64>().ok());
+        let count = self.points.len() as i64;
+        let place = index.and_then(|index| index.checked_add(if index < 0 { count } else { -1 }));
+        match place {
+            Some(place) if (0..count).contains(&place) => Ok(place as u32),
+            _ => {
+                let word = shortened(&String::from_utf8_lossy(word), 60);
+                let found = format!("corner '{word}' after {}", counted(count as usize, "point"));
+                let expected = match count {
+                    0 => "vertices before faces".to_owned(),
+                    _ => format!("an index from 1 to {count} or from -{count} to -1"),
+                };
+                Err(self.error(number, found, &expected))
+            }
+        }
+    }
+
+    fn into_scene(mut self, name: &str) -> Result<Scene, InputError> {
+        let end = self.corners.len();
+        self.items.pop_if(|(_, first)| *first == end);
+        let ends = self.items.iter().skip(1).map(|(_, first)| *first);
+        let ranges = self.items.iter().map(|(_, first)| *first);
+        let ranges: Vec<_> = ranges.zip(ends.chain(once(end))).collect();
+        let boxes = ranges.iter().map(|&(first, end)| {
+            let points = self.corners[first..end].iter().flatten();
+            let points = points.map(|&corner| self.points[corner as usize]);
+            WorldBox::union_of(points.map(|p| WorldBox::new(p, p)))
+        });
+        let boxes: Vec<WorldBox> = boxes.collect();
+        let origin = choose_origin(boxes.iter().copied());
+        let scene = Scene::about(name, &boxes, origin)?;
+        let (mut surfaces, mut labels) = (Surfaces::about(origin), Labels::new("name"));
+        // The item that a point was last needed by, from 1, and its number there.
+        let mut known = vec![(0, 0); self.points.len()];
+        let mut local = Vec::new();
+        for (item, &(first, end)) in (1u32..).zip(&ranges) {
+            local.clear();
+            let own = self.corners[first..end].iter().map(|corners| {
+                corners.map(|corner| {
+                    let known = &mut known[corner as usize];
+                    if known.0 != item {
+                        *known = (item, local.len() as u32);
+                        local.push((self.points[corner as usize] - origin).as_vec3());
+                    }
+                    known.1
+                })
+            });
+            let own: Vec<[u32; 3]> = own.collect();
+            surfaces.push(SurfaceKind::Opaque, false, &local, &own);
+            labels.push(&self.items[item as usize - 1].0);
+        }
+        Ok(Scene {
+            surfaces: Some(surfaces.into()),
+            labels: vec![labels],
+            ..scene
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::SeededRng;
+    use super::*;
+
+    /// Two tetrahedra in three groups, one of them empty, with everything that is passed over.
+    const TEXT: &str = "\u{feff}# made by hand \\
+mtllib none.mtl
+o solid
+v 1000000.1 0 0 1.0
+v 1000001.7 +0. -0 0.1 0.2 0.3
+v\t1000000.1 2e0 .5 \r
+v 1000000.1 0 3
+vt 0 0
+vn 0 0 1
+s off
+f 1/1/1 3/-1/-9 2//7
+f 1 2 4
+g empty
+g other  part
+usemtl steel
+f -3 -2 -1
+f 1 4 \\
+  3
+l 1 2 3 4
+g last
+f 1 2 3 4";
+
+    fn read(text: &[u8]) -> Result<Scene, InputError> {
+        read_obj(text, "t.obj", "t", &LoadOptions::default())
+    }
+
+    #[test]
+    fn objects_and_groups_with_faces_are_items_with_boxes_of_their_vertices() {
+        assert!(is_obj(TEXT.as_bytes()));
+        let scene = read(TEXT.as_bytes()).unwrap();
+        let names = [0, 1, 2].map(|item| scene.labels[0].get(item).to_owned());
+        assert_eq!(names, ["solid", "other  part", "last"]);
+        assert_eq!((scene.up, scene.items.len()), (UpAxis::Y, 3));
+        let surfaces = scene.surfaces.as_ref().unwrap();
+        let counts: Vec<u32> = surfaces.of_item.iter().map(|r| r.end - r.start).collect();
+        assert_eq!(counts, [2, 2, 2]);
+        let points = [
+            [0.1, 0.0, 0.0],
+            [1.7, 0.0, 0.0],
+            [0.1, 2.0, 0.5],
+            [0.1, 0.0, 3.0],
+        ];
+        let points = points.map(|[x, y, z]| DVec3::new(1e6 + x, y, z));
+        // As written, so 1000000.1 and not its neighbour by addition.
+        let written = [1_000_000.1, 1_000_001.7];
+        for (item, b) in scene.items.iter().enumerate() {
+            let all = WorldBox::union_of(points.map(|p| WorldBox::new(p, p)));
+            for axis in 0..3 {
+                let exact = match axis {
+                    0 => written,
+                    _ => [all.min[axis], all.max[axis]],
+                };
+                let stored = [b.min[axis], b.max[axis]];
+                for (side, (stored, exact)) in stored.into_iter().zip(exact).enumerate() {
+                    let out =
+                        (f64::from(stored) - (exact - scene.origin[axis])) * [-1.0, 1.0][side];
+                    let ulp = f64::from(stored.abs().next_up() - stored.abs());
+                    assert!(
+                        (0.0..=ulp).contains(&out),
+                        "{item}, {axis}: {stored} for {exact}"
+                    );
+                }
+            }
+            let held = surfaces.bounds(item);
+            assert!(b.min.cmple(held.min).all() && b.max.cmpge(held.max).all());
+        }
+    }
+
+    #[test]
+    fn single_triangles_are_items_of_their_own() {
+        let options = LoadOptions::default();
+        let scene = read(TEXT.as_bytes())
+            .unwrap()
+            .by_triangle(&options)
+            .unwrap();
+        assert_eq!(scene.items.len(), 6);
+        assert_eq!(scene.labels[0].get(3), "other  part");
+        let surfaces = scene.surfaces.as_ref().unwrap();
+        assert!((0..6).all(|item| surfaces.bounds(item) == scene.items[item]));
+        let boxes = Scene::from_boxes("b", &[]).unwrap().by_triangle(&options);
+        let error = boxes.map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains("no triangles; expected"), "{error}");
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_line() {
+        let cases = [
+            ("", "line 1: no faces; expected at least one line 'f'"),
+            ("v 1 2 3\np 1\n", "line 2: no faces"),
+            ("v 1 2\n", "line 1: z ''; expected a finite number"),
+            ("v 1 nan 3\n", "y 'nan'; expected a finite number"),
+            (
+                "#\n\nv 1 2,5 3\n",
+                "line 3: y '2,5'; expected a decimal point",
+            ),
+            (
+                "v 1 2 3 4 5 6 7 8\n",
+                "a vertex of 8 numbers; expected 3 to 7",
+            ),
+            (
+                "v 1 2 3\nf 1 1 2\n",
+                "line 2: corner '2' after 1 point; expected an index from 1",
+            ),
+            ("v 1 2 3\nf 1 1 0\n", "corner '0'"),
+            ("v 1 2 3\nf 1 1 -2/1\n", "corner '-2/1'"),
+            ("v 1 2 3\nf 1 -9223372036854775808 1\n", "corner '-922"),
+            ("f 1 2 3\n", "expected vertices before faces"),
+            ("v 1 2 3\nf 1 \\\n 1\n", "line 2: 2 corners; expected three"),
+            ("v 1 2 3\n\\\nf\n", "line 2: no corners"),
+            ("v 1 2 3\nf 1 1 /\n", "corner '/'"),
+            ("\0v\0 \01\n", "zero bytes, as in UTF-16"),
+            (
+                "v 1e300 2 3\nv -1e300 2 3\nf 1 1 2\n",
+                "expected min <= max within the range of f32",
+            ),
+        ];
+        for (text, wanted) in cases {
+            let error = read(text.as_bytes()).map(|_| ()).unwrap_err().to_string();
+            assert!(error.contains(wanted), "{text:?}: {error}");
+            assert!(error.contains("expected") && !error.contains('\n'));
+        }
+    }
+
+    #[test]
+    fn other_texts_are_no_obj() {
+        for text in [
+            "min_x,min_y\n",
+            "v,w\n1,2\n",
+            "{}",
+            "",
+            "# only",
+            "solid x\n",
+            "v\n",
+        ] {
+            assert!(!is_obj(text.as_bytes()), "{text}");
+        }
+    }
+
+    #[test]
+    fn no_damage_ends_in_a_panic() {
+        let mut rng = SeededRng::new(5);
+        for _ in 0..3000 {
+            let mut bytes = TEXT.as_bytes().to_vec();
+            for _ in 0..1 + rng.below(3) {
+                let at = rng.below(bytes.len());
+                bytes[at] = b"0123456789-e.vfog/\\\n#\0 "[rng.below(23)];
+            }
+            if let Err(error) = read(&bytes) {
+                assert!(!error.to_string().contains('\n'), "{error}");
+            }
+        }
+    }
+}
