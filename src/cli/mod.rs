@@ -82,6 +82,7 @@ mod worker;
 
 use std::collections::BTreeMap;
 use std::error::Error;
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -177,7 +178,7 @@ fn start(registry: Registry) -> ExitCode {
             tell_notes(tell);
         }
     }
-    let ending = dispatch(&registry, cli.command);
+    let ending = one_stdin().and_then(|()| dispatch(&registry, cli.command));
     if ending.is_ok() {
         tell_warnings();
     }
@@ -210,6 +211,14 @@ fn refused(error: &clap::Error) -> ExitCode {
         Err(unread) if is_broken_pipe(&unread) => ExitCode::SUCCESS,
         Err(full) => failed(format!("{full}{}", expected_by(&full, "file"))),
     }
+}
+
+/// Refuses standard input for two options at once.
+fn one_stdin() -> anyhow::Result<()> {
+    let is_stdin = |arg: &OsString| arg == "-" || arg.as_encoded_bytes().ends_with(b"=-");
+    let count = std::env::args_os().filter(is_stdin).count();
+    anyhow::ensure!(count < 2, "'-' {count} times; expected standard input once");
+    Ok(())
 }
 
 /// Runs a command.

@@ -1,17 +1,15 @@
 //! `cullbench query` and `cullbench locate`: one row per camera, point or box, and
 //! structure.
 
-use std::fs::File;
 use std::path::Path;
 
-use anyhow::Context;
 use serde_json::{Value, json};
 
 use super::args::{LocateArgs, QueryArgs};
 use super::compare_structures::{Row, ask_all, write};
 use super::{Ending, load_scene, tell};
 use crate::index::{DynIndex, Registry};
-use crate::input::tell_warnings;
+use crate::input::{read_file, tell_warnings};
 use crate::measure::Workload;
 use crate::path::{self, read_points_csv};
 use crate::query::{ItemId, QueryCost};
@@ -116,19 +114,13 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
 }
 
 fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
-    let (input, name) = open(file)?;
-    let points = read_points_csv(input, &name)?.into_iter();
+    let bytes = read_file(file)?;
+    let points = read_points_csv(&bytes[..], &file.display().to_string())?.into_iter();
     Ok(points.map(|p| scene.sought(p)).collect())
 }
 
 fn boxes(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SoughtBox>> {
-    let (input, name) = open(file)?;
-    let boxes = read_sought_boxes_csv(input, &name)?.into_iter();
+    let bytes = read_file(file)?;
+    let boxes = read_sought_boxes_csv(&bytes[..], &file.display().to_string())?.into_iter();
     Ok(boxes.map(|b| scene.sought_box(b)).collect())
-}
-
-fn open(file: &Path) -> anyhow::Result<(File, String)> {
-    let name = file.display().to_string();
-    let input = File::open(file).with_context(|| name.clone())?;
-    Ok((input, name))
 }
