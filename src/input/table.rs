@@ -1,6 +1,7 @@
-//! Tables of text with a header, separated by commas, semicolons, tabs or bars, read row by row with errors that name
-//! file, line and column. It defines the mechanics that the box, camera and point
-//! readers share; what the columns mean is theirs.
+//! Tables with a header, separated by commas, semicolons, tabs or bars.
+//!
+//! Rows are read one by one with errors that name file, line and column. It defines the
+//! mechanics that the box, camera and point readers share; what the columns mean is theirs.
 
 use std::collections::HashSet;
 use std::io::{Chain, Cursor, Read};
@@ -224,8 +225,7 @@ impl Row<'_> {
     }
 }
 
-/// The delimiter of a header, the first line that is not empty: the most frequent one
-/// outside of quotes.
+/// Most frequent delimiter of the first line that is not empty, outside of quotes.
 fn delimiter(head: &[u8]) -> u8 {
     let mut lines = head.split(|byte| matches!(byte, b'\n' | b'\r'));
     let header = lines.find(|line| !line.is_empty()).unwrap_or_default();

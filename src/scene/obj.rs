@@ -20,7 +20,7 @@ use crate::shown::{counted, first_of, shortened};
 const KNOWN: [&[u8]; 8] = [b"v", b"f", b"o", b"g", b"vt", b"vn", b"vp", b"s"];
 /// First words of lines that are named as not read.
 const UNREAD: [&[u8]; 4] = [b"mtllib", b"usemtl", b"l", b"p"];
-/// Bytes in memory for a byte of a file while it is read: the corners of a large polygon.
+/// Bytes in memory per byte of a file that is one large polygon.
 const BYTES_PER_BYTE: u64 = 12;
 /// Most unread words that are counted.
 const MOST_UNREAD: usize = 100;
@@ -102,7 +102,7 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     words.filter(|word| !word.is_empty())
 }
 
-/// A line with its end, and with the lines that backslashes at ends add to it; their number.
+/// Returns a line with those that backslashes at ends add, and their number.
 fn first_line(text: &[u8]) -> (&[u8], u64) {
     let (mut end, mut lines) = (0, 0);
     while let Some(length) = text[end..].iter().position(|byte| *byte == b'\n') {
@@ -259,7 +259,7 @@ mod tests {
     use super::super::SeededRng;
     use super::*;
 
-    /// Two tetrahedra in three groups, one of them empty, with everything that is passed over.
+    /// Triangles in four groups, one of them empty, and all that is passed over.
     const TEXT: &str = "\u{feff}# made by hand \\
 mtllib none.mtl
 o solid

@@ -144,6 +144,7 @@ pub fn read_bytes(
     map: Option<&str>,
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
+    foreign::refuse(bytes, file)?;
     if is_zip(bytes) {
         let entry = zip::unpack(bytes, file, map)?;
         let file = format!("{file}#{}", entry.name);
@@ -157,7 +158,6 @@ pub fn read_bytes(
             ..WadMap::read(bytes, file, map)?.into_scene(name)?
         });
     }
-    foreign::refuse(bytes, file)?;
     if is_gltf(bytes) || is_named("gltf") || is_named("glb") {
         return read_gltf(bytes, file, name, options);
     }

@@ -233,7 +233,7 @@ impl Surfaces {
 }
 
 impl Scene {
-    /// The same triangles, an item each, with the labels of the items that they were of.
+    /// The same triangles, an item each, with the labels of their items.
     ///
     /// # Errors
     /// A scene without triangles, or one that does not fit into memory.

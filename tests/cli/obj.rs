@@ -1,4 +1,4 @@
-//! OBJ as a scene, other separators of tables, standard input, and formats that are not read.
+//! OBJ as a scene, separators of tables, standard input, unread formats.
 
 use std::fs;
 use std::path::Path;
