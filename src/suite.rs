@@ -195,7 +195,7 @@ pub static SUITES: &[Suite] = &[
 pub const REAL: &str = "real";
 
 /// The ways through a fetched scene in that suite.
-pub const REAL_PATHS: &[&str] = &["flythrough:frames=128,visible=2%", "outside:frames=64"];
+pub const REAL_PATHS: &[&str] = &["flythrough:frames=128", "outside:frames=64"];
 
 /// The way through a scene when none is named.
 pub const DEFAULT_PATH: &str = "flythrough";
