@@ -50,28 +50,38 @@ impl BoxBlock {
         )
     }
 
-    /// The union of the boxes; empty ones add nothing.
+    /// The union of the boxes; empty ones ([`Aabb::EMPTY`]) add nothing.
     pub fn union(&self) -> Aabb {
-        let low = |k: usize| {
-            let row = &self.rows[k];
-            let mut low = row[0];
-            for &x in &row[1..] {
-                low = if x < low { x } else { low };
-            }
-            low
-        };
-        let high = |k: usize| {
-            let row = &self.rows[k];
-            let mut high = row[0];
-            for &x in &row[1..] {
-                high = if x > high { x } else { high };
-            }
-            high
-        };
+        let low = |k: usize| by_halves(&self.rows[k], |a, b| if a < b { a } else { b });
+        let high = |k: usize| by_halves(&self.rows[k], |a, b| if a > b { a } else { b });
         Aabb::new(
             Vec3::new(low(0), low(1), low(2)),
             Vec3::new(high(3), high(4), high(5)),
         )
+    }
+
+    /// The lane whose box is nearest to a point by the sum over axes; of several, the
+    /// first.
+    pub fn nearest(&self, p: Vec3) -> usize {
+        let larger = |a: f32, b: f32| if a > b { a } else { b };
+        let mut away = [0.0; LANES];
+        for axis in 0..3 {
+            let (low, high) = (&self.rows[axis], &self.rows[axis + 3]);
+            for lane in 0..LANES {
+                let beyond = larger(low[lane] - p[axis], p[axis] - high[lane]);
+                away[lane] += larger(beyond, 0.0);
+            }
+        }
+        let least = by_halves(&away, |a, b| if a < b { a } else { b });
+        let mut nearest = [0; LANES];
+        for lane in 0..LANES {
+            nearest[lane] = if away[lane] == least {
+                LANE_BITS[lane]
+            } else {
+                0
+            };
+        }
+        (joined(&nearest).trailing_zeros() as usize).min(LANES - 1)
     }
 
     /// Prefetches the whole block.
@@ -214,6 +224,15 @@ impl BoxBlock {
     }
 }
 
+/// One of the lanes by comparing halves: vectors of 8, 4 and 2, where lane after lane
+/// would be a chain of fifteen.
+#[inline(always)]
+fn by_halves(row: &[f32; LANES], either: impl Fn(f32, f32) -> f32) -> f32 {
+    let eight: [f32; 8] = std::array::from_fn(|i| either(row[i], row[i + 8]));
+    let four: [f32; 4] = std::array::from_fn(|i| either(eight[i], eight[i + 4]));
+    either(either(four[0], four[2]), either(four[1], four[3]))
+}
+
 /// The bit of each lane, as wide as a float: a comparison then selects among
 /// them without leaving the vector.
 const LANE_BITS: [u32; LANES] = {
@@ -310,6 +329,23 @@ impl BoxBlocks {
     /// Replaces the box at an index below [`BoxBlocks::len`].
     pub fn set(&mut self, place: usize, b: &Aabb) {
         self.blocks[place / LANES].set(place % LANES, b);
+    }
+
+    /// Removes the last box, if there is one.
+    pub fn pop(&mut self) {
+        if let Some(last) = self.count.checked_sub(1) {
+            self.set(last, &Aabb::EMPTY);
+            self.count = last;
+            self.blocks.truncate(last.div_ceil(LANES));
+        }
+    }
+
+    /// Prefetches the block of a box, if there is such a box.
+    #[inline(always)]
+    pub fn prefetch(&self, place: usize) {
+        if let Some(block) = self.blocks.get(place / LANES) {
+            block.prefetch();
+        }
     }
 
     /// Gives back the memory beyond the last block.

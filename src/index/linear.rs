@@ -7,6 +7,7 @@ use std::ops::ControlFlow;
 
 use super::items::indexable;
 use super::padded_ids::PaddedIds;
+use super::positions::{ABSENT, Positions};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex};
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, first_lanes, pairs};
@@ -63,9 +64,24 @@ const BLOCKS_PER_CALL: usize = 1024;
 pub struct Linear {
     boxes: BoxBlocks,
     ids: PaddedIds,
+    positions: Positions,
 }
 
 impl Linear {
+    /// Removes the item at a position; the last item takes its place.
+    fn remove(&mut self, position: usize, id: ItemId) {
+        if let Some(last) = self.ids.pop() {
+            let bounds = self.boxes.get(self.ids.len());
+            self.boxes.pop();
+            if last != id {
+                self.boxes.set(position, &bounds);
+                self.ids.set(position, last);
+                self.positions.set(last, position as u32);
+            }
+            self.positions.set(id, ABSENT);
+        }
+    }
+
     /// Tests every block against all planes; `open` is their number.
     #[inline(always)]
     fn scan_all<P: Planes<C::Isa>, C: Context>(
@@ -101,7 +117,8 @@ impl RegionIndex for Linear {
         "scan over blocks of sixteen boxes, O(n)",
         Kind::Scan,
         Origin::Ours,
-    );
+    )
+    .refits();
     type Params = NoParams;
 
     fn build(input: &Input<'_>, _: &NoParams) -> Result<Self, BuildError> {
@@ -110,13 +127,18 @@ impl RegionIndex for Linear {
         let mut boxes = BoxBlocks::with_capacity(ids.len());
         ids.iter().for_each(|&id| boxes.push(&items[id as usize]));
         let ids = ids[..].into();
-        Ok(Linear { boxes, ids })
+        let positions = Positions::default();
+        Ok(Linear {
+            boxes,
+            ids,
+            positions,
+        })
     }
 
     fn memory(&self) -> MemoryUsage {
         MemoryUsage {
             node_bytes: 0,
-            item_bytes: self.boxes.bytes() + self.ids.bytes(),
+            item_bytes: self.boxes.bytes() + self.ids.bytes() + self.positions.bytes(),
         }
     }
 
@@ -142,6 +164,28 @@ impl RegionIndex for Linear {
             return self.scan_all(open, planes, cx);
         }
         self.scan_all(open, UnpreparedPlanes::all(volume), cx)
+    }
+
+    /// O(moved): overwrites their lanes. Items may become or cease to be empty.
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        self.positions.prepare(&self.ids, items.len());
+        for (i, &id) in moved.iter().enumerate() {
+            if let Some(position) = self.positions.ahead(items, moved, i) {
+                self.boxes.prefetch(position);
+            }
+            let bounds = &items[id as usize];
+            match (self.positions.of(id), bounds.is_empty()) {
+                (Some(position), false) => self.boxes.set(position, bounds),
+                (Some(position), true) => self.remove(position, id),
+                (None, false) => {
+                    self.positions.set(id, self.ids.len() as u32);
+                    self.ids.push(id);
+                    self.boxes.push(bounds);
+                }
+                (None, true) => {}
+            }
+        }
+        true
     }
 }
 

@@ -60,4 +60,4 @@ pub use linear::{Linear, LinearScalar};
 pub use registry::{Registry, Row, StructureSpec};
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
 pub use tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
-pub use wide::{BlockOrder, Trace, Wide, WideParams};
+pub use wide::{BlockOrder, Moving, Trace, Wide, WideParams};

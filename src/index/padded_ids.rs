@@ -38,6 +38,29 @@ impl PaddedIds {
         bytemuck::cast_slice(&self.lines)
     }
 
+    /// Replaces the id at an index below the number of ids.
+    #[inline(always)]
+    pub fn set(&mut self, place: usize, id: ItemId) {
+        self.lines[place / LANES].0[place % LANES] = id;
+    }
+
+    /// Appends an id.
+    pub fn push(&mut self, id: ItemId) {
+        if self.len.is_multiple_of(LANES) {
+            self.lines.push(Line::zeroed());
+        }
+        self.len += 1;
+        self.set(self.len - 1, id);
+    }
+
+    /// Removes the last id.
+    pub fn pop(&mut self) -> Option<ItemId> {
+        let last = *self.last()?;
+        self.len -= 1;
+        self.lines.truncate(self.len.div_ceil(LANES));
+        Some(last)
+    }
+
     /// Heap bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.lines[..])

@@ -11,8 +11,8 @@ use serde_json::{Map, Value};
 use super::peers;
 use super::{
     Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, DynIndex, Execution, Info, Input, Linear,
-    LinearScalar, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex, UniformGrid,
-    Wide, WithKernel, caught,
+    LinearScalar, Moving, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex,
+    UniformGrid, Wide, WithKernel, caught,
 };
 use crate::geometry::PlaneTree;
 use crate::json::told;
@@ -120,6 +120,7 @@ impl Registry {
             .with::<Quadtree>()
             .with::<Bvh>()
             .with::<Wide>()
+            .with::<Moving>()
             .with::<UniformGrid>()
             .with::<BspTextbook>()
             .with::<OctreeTextbook>()
@@ -429,7 +430,7 @@ mod tests {
     /// The hint names exactly what the feature brings.
     #[test]
     fn the_names_of_the_peers_are_those_of_their_rows() {
-        let own = 12;
+        let own = 13;
         let peers: Vec<_> = Registry::builtin().rows()[own..]
             .iter()
             .map(|row| row.info.name)

@@ -85,7 +85,7 @@ mod tests {
             seed: 1,
             cache_bytes: 0,
         };
-        for name in ["bvh", "wide", "linear", "bsp"] {
+        for name in ["bvh", "wide", "linear-scalar", "bsp"] {
             let spec = StructureSpec::parse(name).unwrap();
             let found = refitted_ln(&spec, &workload, &protocol);
             assert_eq!(

@@ -10,7 +10,7 @@ use cullbench::geometry::{Aabb, ConvexVolume, Plane};
 use cullbench::index::{Bsp, Bvh, Input, Linear, LinearScalar, Octree, Quadtree};
 use cullbench::index::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook};
 use cullbench::index::{BuildError, DynIndex, MemoryUsage, Registry, StructureSpec};
-use cullbench::index::{Info, Kind, RegionIndex, UniformGrid, Wide};
+use cullbench::index::{Info, Kind, Moving, RegionIndex, UniformGrid, Wide};
 use cullbench::kernel::Isa;
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
@@ -85,6 +85,7 @@ conforms! {
     quadtree: Given<Quadtree>;
     bvh: Given<Bvh>;
     wide: Given<Wide>;
+    moving: Given<Moving>;
     uniform_grid: Given<UniformGrid>;
     bsp_textbook: Given<BspTextbook>;
     octree_textbook: Given<OctreeTextbook>;
@@ -158,6 +159,7 @@ fn the_suite_has_every_structure_of_the_table() {
         Quadtree::INFO.name,
         Bvh::INFO.name,
         Wide::INFO.name,
+        Moving::INFO.name,
         UniformGrid::INFO.name,
         BspTextbook::INFO.name,
         OctreeTextbook::INFO.name,
@@ -246,7 +248,7 @@ fn memory_and_counters_fit_the_items() {
         // the whole scene, but two of its halves.
         let looks = match row.info.name {
             _ if row.info.kind == Kind::Scan => 5000..=5000,
-            "wide" => 1..=16,
+            "wide" | "moving" => 1..=16,
             name if PEERS.contains(&name) => 1..=2,
             _ => 1..=1,
         };

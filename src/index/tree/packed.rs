@@ -6,8 +6,9 @@
 use super::node::{TreeNode, children, is_leaf};
 use super::wide_nodes::WideNodes;
 use crate::geometry::{Aabb, BoxBlocks, LANES};
-use crate::index::positions::Positions;
+use crate::index::positions::{Dirty, Positions};
 use crate::index::{MemoryUsage, TreeCell};
+use crate::kernel::prefetch;
 use crate::query::ItemId;
 
 /// A tree packed for queries: 36 bytes per node, 28 per item. Nodes may have
@@ -25,6 +26,31 @@ pub struct PackedTree {
     /// The nodes again, sixteen to a block, for queries by volumes.
     pub(super) wide_nodes: WideNodes,
     positions: Positions,
+    paths: Paths,
+}
+
+/// The ways from items to the root, computed at the first refit.
+#[derive(Default)]
+struct Paths {
+    /// The leaf of each position.
+    leaves: Vec<u32>,
+    /// The parent of each node; the root's is the root.
+    parents: Vec<u32>,
+}
+
+impl Paths {
+    fn of(nodes: &[TreeNode], items: usize) -> Paths {
+        let (mut leaves, mut parents) = (vec![0; items], vec![0; nodes.len()]);
+        for node in 0..nodes.len() {
+            for child in children(nodes, node) {
+                parents[child] = node as u32;
+            }
+            if is_leaf(nodes, node) {
+                leaves[nodes[node].items()].fill(node as u32);
+            }
+        }
+        Paths { leaves, parents }
+    }
 }
 
 impl PackedTree {
@@ -158,7 +184,10 @@ impl PackedTree {
     /// Bytes of nodes and of items, as allocated.
     pub fn memory(&self) -> MemoryUsage {
         MemoryUsage {
-            node_bytes: size_of_val(&self.nodes[..]) + self.wide_nodes.bytes(),
+            node_bytes: size_of_val(&self.nodes[..])
+                + self.wide_nodes.bytes()
+                + size_of_val(&self.paths.leaves[..])
+                + size_of_val(&self.paths.parents[..]),
             item_bytes: self.boxes.bytes() + size_of_val(&self.ids[..]) + self.positions.bytes(),
         }
     }
@@ -167,28 +196,39 @@ impl PackedTree {
     /// shape: refits the nodes above them. False, with the tree unchanged, if an
     /// item enters or leaves the tree (it is or was empty).
     ///
-    /// Calls `fitted` for every node that changed, children first.
-    /// O(moved * depth), or O(nodes) where that is less.
+    /// Calls `fitted` for every node that changed, children first. O(moved * depth).
     pub fn refit(
         &mut self,
         items: &[Aabb],
         moved: &[ItemId],
         mut fitted: impl FnMut(&PackedTree, usize),
     ) -> bool {
-        let Some(placed) = self.positions.of_moved(&self.ids, items, moved) else {
+        self.positions.prepare(&self.ids, items.len());
+        let stays = |&id: &ItemId| self.positions.of(id).is_none() == items[id as usize].is_empty();
+        if !moved.iter().all(stays) {
             return false;
-        };
-        let mut dirty = vec![false; self.nodes.len()];
-        let all = moved.len() * self.depth.max(1) > self.nodes.len();
-        for (position, bounds) in placed {
-            self.boxes.set(position, &bounds);
-            if !all {
-                self.mark_path(position, &mut dirty);
+        }
+        if self.paths.parents.is_empty() {
+            self.paths = Paths::of(&self.nodes, self.ids.len());
+        }
+        let mut changed = Dirty::none(self.nodes.len());
+        for (i, &id) in moved.iter().enumerate() {
+            if let Some(position) = self.positions.ahead(items, moved, i) {
+                self.boxes.prefetch(position);
+                prefetch(&self.paths.leaves[position]);
+            }
+            let Some(position) = self.positions.of(id) else {
+                continue;
+            };
+            self.boxes.set(position, &items[id as usize]);
+            let mut node = self.paths.leaves[position] as usize;
+            while changed.mark(node) {
+                node = self.paths.parents[node] as usize;
             }
         }
         let mut fits = true;
-        for node in (0..self.nodes.len()).rev() {
-            if all || dirty[node] {
+        for word in (0..changed.words()).rev() {
+            for node in changed.of_word(word).rev() {
                 self.fit(node);
                 fits &= self.wide_nodes.refit(node, &self.nodes[node].bounds);
                 fitted(self, node);
@@ -198,16 +238,6 @@ impl PackedTree {
             self.wide_nodes = WideNodes::new(&self.nodes);
         }
         true
-    }
-
-    /// Marks the nodes from the root to the leaf that holds a position.
-    fn mark_path(&self, position: usize, dirty: &mut [bool]) {
-        let holds = |&node: &usize| self.nodes[node].items().contains(&position);
-        let mut next = (!self.nodes.is_empty()).then_some(0);
-        while let Some(node) = next {
-            dirty[node] = true;
-            next = children(&self.nodes, node).find(holds);
-        }
     }
 
     /// Computes a node's bounds from its children, or a leaf's from its items.

@@ -3,17 +3,19 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::levels::Layer;
+use super::levels::{Layer, occupied};
 use super::single_plane_buckets::{BUCKETS, SinglePlaneBuckets};
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::index::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, pass_run};
 use crate::index::padded_ids::PaddedIds;
-use crate::kernel::{Isa, pairs, prefetch};
+use crate::kernel::{Isa, first_lanes, pairs, prefetch};
 use crate::query::{ItemId, Planes, QueryVolume, Recorder, Sink, Tests};
 
 /// A query in progress.
 pub struct LevelTraversal<'a, I, V, S, R> {
     pub ids: &'a PaddedIds,
+    /// True if some leaves have lanes without an item.
+    pub has_vacant: bool,
     pub isa: I,
     pub volume: &'a V,
     pub sink: &'a mut S,
@@ -155,8 +157,22 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
         inside
     }
 
+    /// Passes the items of a run of lanes, which starts with a leaf.
     #[inline(always)]
-    fn pass_run(&mut self, items: Range<usize>) -> ControlFlow<()> {
+    pub fn pass_run(&mut self, items: Range<usize>) -> ControlFlow<()> {
+        if self.has_vacant {
+            let rows = self.ids.rows();
+            for leaf in items.start / LANES..items.end.div_ceil(LANES) {
+                let here = first_lanes(items.end - leaf * LANES);
+                let lanes = here & occupied(self.isa, &rows[leaf]);
+                self.recorder.subtree_accepted(lanes.count_ones() as usize);
+                if lanes != 0 {
+                    let (ids, first) = (rows.as_flattened(), leaf * LANES);
+                    self.sink.accept_lanes(self.isa, ids, first, lanes)?;
+                }
+            }
+            return ControlFlow::Continue(());
+        }
         pass_run(self.isa, items, self.ids, self.sink, self.recorder)
     }
 }
@@ -222,19 +238,20 @@ impl<I: Isa, T: LeafTest<I>, R: Recorder> Tests<I> for ListedLeaves<'_, '_, T, R
         }
         let at = self.listed[i] as usize;
         let kept = self.test.kept(isa, self.leaves, (i, at), self.recorder);
-        (at, kept & self.leaves.level.lanes(at))
+        (at, kept & self.leaves.lanes(isa, at))
     }
 }
 
 /// Records the test of a leaf.
 #[inline(always)]
-fn record<V: QueryVolume, R: Recorder>(
+fn record<I: Isa, V: QueryVolume, R: Recorder>(
+    isa: I,
     recorder: &mut R,
     volume: &V,
     leaves: &Layer,
     (at, mask): (usize, PlaneMask),
 ) {
-    let items = leaves.level.lanes(at).count_ones();
+    let items = leaves.lanes(isa, at).count_ones();
     recorder.items_tested(items);
     recorder.planes_tested(items * V::planes_open(mask));
     recorder.block_read(leaves.level.first + at, || volume.rows_read(mask));
@@ -250,12 +267,12 @@ impl<I: Isa> LeafTest<I> for WhollyInside {
     #[inline(always)]
     fn kept<R: Recorder>(
         &self,
-        _: I,
+        isa: I,
         leaves: &Layer,
         (_, at): (usize, usize),
         recorder: &mut R,
     ) -> LaneMask {
-        recorder.subtree_accepted(leaves.level.lanes(at).count_ones() as usize);
+        recorder.subtree_accepted(leaves.lanes(isa, at).count_ones() as usize);
         LaneMask::MAX
     }
 }
@@ -281,7 +298,7 @@ impl<I: Isa, V: QueryVolume, P: Planes<I>> LeafTest<I> for SinglePlane<'_, V, P>
         (_, at): (usize, usize),
         recorder: &mut R,
     ) -> LaneMask {
-        record(recorder, self.volume, leaves, (at, self.mask));
+        record(isa, recorder, self.volume, leaves, (at, self.mask));
         self.plane.kept(isa, &leaves.blocks[at])
     }
 }
@@ -307,7 +324,7 @@ impl<I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'_, V> {
         recorder: &mut R,
     ) -> LaneMask {
         let mask = self.masks[i];
-        record(recorder, self.volume, leaves, (at, mask));
+        record(isa, recorder, self.volume, leaves, (at, mask));
         self.volume.kept_lanes(isa, &leaves.blocks[at], mask)
     }
 }

@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use crate::geometry::{BoxBlock, LANES, LaneMask};
-use crate::query::runs;
+use crate::index::positions::ABSENT;
+use crate::kernel::Isa;
+use crate::query::{ItemId, runs};
 
 /// A level's position among the blocks of the tree.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +19,26 @@ pub struct Level {
 }
 
 impl Level {
+    /// The levels of a tree over `boxes` boxes, lowest first; none for no boxes.
+    pub fn over(mut boxes: usize) -> Vec<Level> {
+        let mut levels: Vec<Level> = Vec::new();
+        while boxes > 0 {
+            let (blocks, first) = (boxes.div_ceil(LANES), levels.last().map_or(0, Level::end));
+            levels.push(Level {
+                first,
+                blocks,
+                boxes,
+            });
+            boxes = if blocks > 1 { blocks } else { 0 };
+        }
+        levels
+    }
+
+    /// Index behind its last block.
+    pub fn end(&self) -> usize {
+        self.first + self.blocks
+    }
+
     /// The lanes of a block that hold a box.
     #[inline(always)]
     pub fn lanes(&self, block: usize) -> LaneMask {
@@ -38,9 +60,27 @@ pub struct Layer<'t> {
     pub span: usize,
     /// True if its memory is prefetched.
     pub far: bool,
+    /// Ids of each leaf, of leaves of which some lanes have lost their item.
+    pub vacated: Option<&'t [[ItemId; LANES]]>,
+}
+
+/// The lanes of a row that hold the id of an item.
+#[inline(always)]
+pub fn occupied<I: Isa>(isa: I, row: &[ItemId; LANES]) -> LaneMask {
+    !isa.equal(isa.words(row), ABSENT)
 }
 
 impl Layer<'_> {
+    /// The lanes of a block that hold a box.
+    #[inline(always)]
+    pub fn lanes<I: Isa>(&self, isa: I, block: usize) -> LaneMask {
+        let lanes = self.level.lanes(block);
+        match self.vacated {
+            Some(rows) => lanes & occupied(isa, &rows[block]),
+            None => lanes,
+        }
+    }
+
     /// Positions of the items below some lanes of a block, run by run; there are
     /// `count` items in all.
     #[inline(always)]

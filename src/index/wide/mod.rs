@@ -5,6 +5,8 @@ mod block_order;
 mod level_traversal;
 mod levels;
 mod memory_bound;
+mod moving;
+mod refit;
 mod single_plane_buckets;
 
 use std::cell::Cell;
@@ -20,7 +22,7 @@ use self::single_plane_buckets::SinglePlaneBuckets;
 use super::frontier::{Frontier, NodeList, is_far, put_back, take};
 use super::items::indexable;
 use super::padded_ids::PaddedIds;
-use super::positions::Positions;
+use super::positions::{ABSENT, Positions};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, BoxBlock, LANES};
 use crate::kernel::{Isa, prefetch};
@@ -29,6 +31,7 @@ use crate::threads::share;
 
 pub use self::block_order::BlockOrder;
 pub use self::memory_bound::Trace;
+pub use self::moving::Moving;
 
 /// Parameters: `wide:order=median`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -53,6 +56,8 @@ pub struct Wide {
     ids: PaddedIds,
     /// Lowest level first.
     levels: Vec<Level>,
+    /// Lanes of leaves without an item; their id is [`ABSENT`].
+    vacant: usize,
     positions: Positions,
 }
 
@@ -100,31 +105,23 @@ fn unite(children: &[BoxBlock], parents: &mut [BoxBlock]) {
 }
 
 impl Wide {
-    fn over(items: &[Aabb], ids: &[ItemId], threads: usize) -> Wide {
-        let mut tree = Wide {
+    /// A tree over ids, [`ABSENT`] for a vacant lane; all boxes are empty.
+    fn unfilled(ids: &[ItemId]) -> Wide {
+        let levels = Level::over(ids.len());
+        Wide {
+            blocks: vec![BoxBlock::EMPTY; levels.last().map_or(0, Level::end)],
             ids: ids.into(),
-            ..Wide::default()
-        };
-        let count = tree.ids.len();
-        if count == 0 {
+            levels,
+            vacant: ids.iter().filter(|&&id| id == ABSENT).count(),
+            positions: Positions::default(),
+        }
+    }
+
+    fn over(items: &[Aabb], ids: &[ItemId], threads: usize) -> Wide {
+        let mut tree = Wide::unfilled(ids);
+        if ids.is_empty() {
             return tree;
         }
-        let mut boxes = count;
-        loop {
-            let blocks = boxes.div_ceil(LANES);
-            let first = tree.levels.last().map_or(0, |l: &Level| l.first + l.blocks);
-            tree.levels.push(Level {
-                first,
-                blocks,
-                boxes,
-            });
-            if blocks == 1 {
-                break;
-            }
-            boxes = blocks;
-        }
-        let total = tree.levels.iter().map(|l| l.blocks).sum();
-        tree.blocks = vec![BoxBlock::EMPTY; total];
         let (leaves, inner) = tree.blocks.split_at_mut(tree.levels[0].blocks);
         // Blocks are united while they are still in the cache.
         let parents = inner.chunks_mut(SHARED_BLOCKS / LANES);
@@ -175,6 +172,7 @@ impl Wide {
             level,
             span: 1 << (index * LANES.ilog2() as usize),
             far: is_far(self.ids.len()),
+            vacated: (index == 0 && self.vacant > 0).then(|| self.ids.rows()),
         }
     }
 
@@ -196,10 +194,6 @@ impl Wide {
         };
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        if volume.mask() == 0 {
-            recorder.subtree_accepted(self.ids.len());
-            return sink.accept_range(isa, &self.ids, 0..self.ids.len());
-        }
         let Scratch {
             here,
             below,
@@ -207,14 +201,18 @@ impl Wide {
             buckets,
         } = scratch;
         let (mut here, mut below) = (here, below);
-        here.start(isa, volume.mask());
         let mut traversal = LevelTraversal {
             ids: &self.ids,
+            has_vacant: self.vacant > 0,
             isa,
             volume,
             sink,
             recorder,
         };
+        if volume.mask() == 0 {
+            return traversal.pass_run(0..self.ids.len());
+        }
+        here.start(isa, volume.mask());
         for level in (1..=top).rev() {
             below.clear(here.len());
             let layer = self.layer(level);
@@ -244,7 +242,7 @@ impl Wide {
         };
         let mut open = [(0, 0); MOST_LEVELS];
         let holding = |level: usize, block: usize, recorder: &mut R| {
-            let lanes = self.levels[level].lanes(block);
+            let lanes = self.layer(level).lanes(isa, block);
             if level == 0 {
                 recorder.items_tested(lanes.count_ones());
             } else {
@@ -293,13 +291,6 @@ impl Wide {
             self.add_cells(level - 1, lane, cells);
         }
     }
-
-    /// Writes the bounds of a block's boxes to its lane of the level above.
-    fn fit(&mut self, level: usize, block: usize) {
-        let bounds = self.blocks[self.levels[level].first + block].union();
-        let above = self.levels[level + 1].first + block / LANES;
-        self.blocks[above].set(block % LANES, &bounds);
-    }
 }
 
 impl RegionIndex for Wide {
@@ -345,30 +336,17 @@ impl RegionIndex for Wide {
         flow
     }
 
-    /// O(moved * depth).
+    /// O(moved * depth). Items of the build may become empty and come back.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = self.positions.of_moved(&self.ids, items, moved) else {
-            return false;
-        };
-        let mut touched: Vec<usize> = Vec::with_capacity(placed.len());
-        for (position, bounds) in placed {
-            self.blocks[position / LANES].set(position % LANES, &bounds);
-            touched.push(position / LANES);
-        }
-        for level in 0..self.levels.len().saturating_sub(1) {
-            touched.sort_unstable();
-            touched.dedup();
-            for block in &mut touched {
-                self.fit(level, *block);
-                *block /= LANES;
-            }
-        }
-        true
+        self.take_over(items, moved)
     }
 
     fn cells(&self) -> Vec<TreeCell<'_>> {
         let mut cells = Vec::new();
-        if let Some(top) = self.levels.len().checked_sub(1) {
+        // The slices of a cell cannot leave out vacant lanes.
+        if let Some(top) = self.levels.len().checked_sub(1)
+            && self.vacant == 0
+        {
             self.add_cells(top, 0, &mut cells);
         }
         cells

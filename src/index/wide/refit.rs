@@ -1,0 +1,117 @@
+//! Refit of the wide tree: lanes of moved items are overwritten, then the blocks above
+//! them, level by level.
+
+use super::Wide;
+use crate::geometry::{Aabb, LANES};
+use crate::index::positions::{ABSENT, Dirty};
+use crate::query::ItemId;
+
+impl Wide {
+    /// [`RegionIndex::refit`](crate::index::RegionIndex::refit).
+    pub(super) fn take_over(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        self.positions.prepare(&self.ids, items.len());
+        let enters =
+            |&id: &ItemId| self.positions.of(id).is_none() && !items[id as usize].is_empty();
+        if items.len() > self.ids.len() && moved.iter().any(enters) {
+            return false;
+        }
+        let mut leaves = self.untouched();
+        for (i, &id) in moved.iter().enumerate() {
+            if let Some(position) = self.positions.ahead(items, moved, i) {
+                self.blocks[position / LANES].prefetch();
+            }
+            let Some(position) = self.positions.of(id) else {
+                continue;
+            };
+            let bounds = &items[id as usize];
+            if bounds.is_empty() {
+                self.put(position, ABSENT, &Aabb::EMPTY);
+            } else if self.vacant > 0 {
+                self.put(position, id, bounds);
+            } else {
+                self.blocks[position / LANES].set(position % LANES, bounds);
+            }
+            leaves.mark(position / LANES);
+        }
+        self.fit_above(leaves);
+        true
+    }
+
+    /// No leaf, for [`Wide::fit_above`].
+    pub(super) fn untouched(&self) -> Dirty {
+        Dirty::none(self.levels.first().map_or(0, |leaves| leaves.blocks))
+    }
+
+    /// Sets the item of a lane; no item with the id [`ABSENT`].
+    pub(super) fn put(&mut self, position: usize, id: ItemId, bounds: &Aabb) {
+        let before = self.ids[position];
+        self.vacant = self.vacant + usize::from(id == ABSENT) - usize::from(before == ABSENT);
+        self.ids.set(position, id);
+        self.blocks[position / LANES].set(position % LANES, bounds);
+    }
+
+    /// Fits the blocks above some leaves to the boxes of these leaves.
+    pub(super) fn fit_above(&mut self, mut changed: Dirty) {
+        for pair in self.levels.windows(2) {
+            let (here, above) = (pair[0], pair[1]);
+            let (below, parents) = self.blocks.split_at_mut(above.first);
+            let blocks = &below[here.first..];
+            let mut changed_above = Dirty::none(above.blocks);
+            for word in 0..changed.words() {
+                for block in changed.of_word(word + 1) {
+                    blocks[block].prefetch();
+                }
+                for block in changed.of_word(word) {
+                    let bounds = blocks[block].union();
+                    parents[block / LANES].set(block % LANES, &bounds);
+                    changed_above.mark(block / LANES);
+                }
+            }
+            changed = changed_above;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::index::{Input, RegionIndex, indexable};
+    use glam::Vec3;
+    use rand::{Rng, SeedableRng};
+
+    fn cube(rng: &mut impl Rng) -> Aabb {
+        let mut near = || (rng.next_u32() % 997) as f32;
+        let low = Vec3::new(near(), near(), near());
+        Aabb::new(low, low + Vec3::splat(near() / 50.0))
+    }
+
+    #[test]
+    fn blocks_are_those_of_a_fresh_build_in_the_same_order() {
+        let empty = Aabb::new(Vec3::ONE, Vec3::ZERO);
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
+        for count in [1, 16, 17, 300, 5000] {
+            let mut items: Vec<Aabb> = (0..count).map(|_| cube(&mut rng)).collect();
+            let mut tree = Wide::build(&Input::new(&items), &Default::default()).unwrap();
+            let order = tree.ids.to_vec();
+            for round in 0..12 {
+                let some = |_| rng.next_u32() % count as u32;
+                let moved: Vec<ItemId> = (0..1 + count / (1 + round)).map(some).collect();
+                for &id in &moved {
+                    let gone = round % 3 == 1 && rng.next_u32().is_multiple_of(2);
+                    let moved = cube(&mut rng);
+                    items[id as usize] = if gone { empty } else { moved };
+                }
+                assert!(tree.refit(&items, &moved));
+                let held = indexable(&items).unwrap();
+                let sound = |b: &Aabb| if b.is_empty() { Aabb::EMPTY } else { *b };
+                let sound: Vec<Aabb> = items.iter().map(sound).collect();
+                let fresh = Wide::over(&sound, &order, 1);
+                assert!(tree.blocks == fresh.blocks, "{count} items, round {round}");
+                assert_eq!(tree.ids.len() - tree.vacant, held.len());
+            }
+            // An item that the build did not see.
+            items.push(cube(&mut rng));
+            assert!(!tree.refit(&items, &[count as ItemId]));
+        }
+    }
+}
