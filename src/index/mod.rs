@@ -7,11 +7,12 @@
 //! | `contract`, `info` | [`RegionIndex`] and its input; the declaration [`Info`] |
 //! | `registry`, `erased` | a row per structure; the same structures without their types |
 //! | `cells` | nested cells of a structure, for pictures |
-//! | `linear`, `grid`, `wide/` | the two scans, the uniform grid, the 16-ary implicit tree |
+//! | `linear`, `grid` | the two scans, the uniform grid |
+//! | `wide/` | the 16-ary implicit tree; a pair of them for items that move |
 //! | `tree/` | the packed tree of `bvh`, `bsp`, `octree` and `quadtree`, with its queries |
 //! | `build/` | a builder of packed trees per file: `bvh`, `bsp`, `cells` (octree, quadtree) |
 //! | `textbook/`, `peers/` | plain forms for comparison; structures of other crates |
-//! | `items`, `positions` | for builds: non-empty items; for refits: tree positions of items |
+//! | `items`, `positions` | for builds: non-empty items; for refits: positions, changed nodes |
 //! | `frontier`, `padded_ids` | for queries of trees and blocks: open nodes; rows of ids |
 //! | `box_test`, `centre_bounds` | for the grid, textbook forms and peers: one box at a time |
 //!
