@@ -224,8 +224,9 @@ impl BoxBlock {
     }
 }
 
-/// One of the lanes by comparing halves: vectors of 8, 4 and 2, where lane after lane
-/// would be a chain of fifteen.
+/// One of the lanes by comparing halves: vectors of 8 and 4, then single lanes.
+///
+/// Lane after lane would be a chain of fifteen comparisons.
 #[inline(always)]
 fn by_halves(row: &[f32; LANES], either: impl Fn(f32, f32) -> f32) -> f32 {
     let eight: [f32; 8] = std::array::from_fn(|i| either(row[i], row[i + 8]));

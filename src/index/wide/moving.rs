@@ -31,7 +31,7 @@ const REGION: usize = LANES * LANES;
 /// Updates without a move after which an item rests.
 const REST: u8 = 8;
 
-/// Fewest resting movers that a region is rebuilt for, unless all of its movers rest.
+/// Fewest resting movers that a region is rebuilt for, unless all of them rest.
 const WORTH_REBUILD: usize = LANES;
 
 /// Leaves of movers from which on a region is crowded: it holds twice its items.
@@ -233,7 +233,7 @@ impl Moving {
         }
     }
 
-    /// Rebuilds a region of the still tree with its movers that rest, if it is worth it.
+    /// Rebuilds a region with its movers that rest; false if it is not worth it.
     fn rebuild(&mut self, region: usize, items: &[Aabb]) -> bool {
         let places = region * REGION..self.still.ids.len().min((region + 1) * REGION);
         let movers = self.regions[region].movers as usize;
@@ -285,7 +285,7 @@ impl RegionIndex for Moving {
     .threaded_build();
     type Params = WideParams;
 
-    /// As [`Wide`].
+    /// O(n log n), that of [`Wide`].
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
         let count = input.items.len();
         if count > MOST_ITEMS {

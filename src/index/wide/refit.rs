@@ -1,5 +1,4 @@
-//! Refit of the wide tree: lanes of moved items are overwritten, then the blocks above
-//! them, level by level.
+//! Refit of the wide tree: lanes of moved items, then the blocks above them.
 
 use super::Wide;
 use crate::geometry::{Aabb, LANES};
