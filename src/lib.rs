@@ -94,6 +94,7 @@ pub mod input;
 pub mod json;
 pub mod kernel;
 pub mod measure;
+pub mod motion;
 pub mod oracle;
 pub mod path;
 #[cfg(feature = "cli")]

@@ -106,6 +106,7 @@ pub enum ListTopic {
     Paths,
     Tests,
     Metrics,
+    Motions,
 }
 
 #[derive(Args, Debug)]
@@ -132,6 +133,10 @@ than the terminal (80 characters in a pipe) are left to --all-columns.
   update of 1 %   time of an update after 1 % of the items have moved
   query after 32  query time after 32 updates of 1 % / query time of a fresh build
   repaid after    queries after which the build is repaid against linear
+With --motion: time per frame (update and queries), the worst frame, its parts
+(update, first query, further query), and
+  x after N       query time after N frames / query time of a fresh build
+  false positives of fat bounds (--update fat=M), part of the visible items
 Structures share a rank if their times do not differ significantly.";
 
 #[derive(Args, Debug)]
@@ -139,6 +144,17 @@ Structures share a rank if their times do not differ significantly.";
 pub struct RunArgs {
     #[command(flatten)]
     pub what: WhatArgs,
+    /// Move the items: a spec (see `list motions`) or a motion CSV. Measures frames, an
+    /// update and queries each, in place of still scenes; may be repeated
+    #[arg(long, value_name = "MOTION", conflicts_with = "cold")]
+    pub motion: Vec<String>,
+    /// Queries per frame, along the path
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "motion", value_parser = values::whole(1..=1000usize))]
+    pub views: usize,
+    /// Work of a frame, a row for each: refit, rebuild, every=N (rebuilt in every n-th
+    /// frame), fat=M (bounds enlarged by M item sizes: fewer updates, false positives)
+    #[arg(long, value_name = "LIST", requires = "motion")]
+    pub update: Option<String>,
     /// Folder for the page, the report, the samples and the stream [default: a
     /// new one under results/]
     #[arg(long, value_name = "DIR")]
@@ -224,6 +240,13 @@ pub struct QueryArgs {
     /// Cameras: a cameras CSV or a path spec
     #[arg(long, visible_alias = "path")]
     pub cameras: String,
+    /// Items in motion: a spec (see `list motions`) or a motion CSV
+    #[arg(long)]
+    pub motion: Option<String>,
+    /// Frame of the motion to query, from 1; 0 is the scene as it comes [default: the
+    /// last one]
+    #[arg(long, value_name = "K", requires = "motion")]
+    pub frame: Option<usize>,
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,

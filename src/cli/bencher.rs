@@ -8,7 +8,7 @@ use crate::measure::{Metric, Status};
 use crate::report::Report;
 
 /// Measures of Bencher with their metrics; it has `latency` in ns by itself.
-const MEASURES: [(&str, &str); 7] = [
+const MEASURES: [(&str, &str); 9] = [
     ("latency", "query_ns"),
     ("locate-ns", "locate_ns"),
     ("build-ms", "build_ms"),
@@ -16,6 +16,8 @@ const MEASURES: [(&str, &str); 7] = [
     ("items-tested", "items_tested"),
     ("planes-tested", "planes_tested"),
     ("memory-bytes-per-item", "memory_bytes_per_item"),
+    ("frame-ns", "frame_ns"),
+    ("worst-frame-ns", "worst_frame_ns"),
 ];
 
 /// One benchmark per right cell, named for structure, scene, path and test.

@@ -13,7 +13,8 @@ use super::{Ending, baseline, compare_page, expect_places, text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
-    Changes, JUDGED_METRICS, Lone, Outcome, Report, Setting, WORK, changes, read_report, settings,
+    Changes, JUDGED_METRICS, Lone, Outcome, Report, ReportCell, Setting, WORK, changes,
+    read_report, settings,
 };
 use crate::spec::SpecError;
 
@@ -29,7 +30,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         return super::against_table::compare_against(registry, args, binary, threshold);
     }
     super::against_table::expect_none_of_a_run()?;
-    let metrics = match (args.gate, args.metric.is_empty()) {
+    let mut metrics = match (args.gate, args.metric.is_empty()) {
         (Gate::Time, true) => vec![JUDGED_METRICS[0]],
         (Gate::Time, false) => metrics(&args.metric)?,
         (Gate::Work, is_free) => {
@@ -46,6 +47,10 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         (None, Some(old), Some(new)) => [read_report(old)?, read_report(new)?],
         _ => bail!("two reports, or --against BINARY: expected one of them"),
     };
+    if args.gate == Gate::Time && args.metric.is_empty() {
+        let moving = new.cells.iter().filter(|cell| !cell.path.motion.is_empty());
+        metrics.extend(moving.map(ReportCell::ranked_by).take(1));
+    }
     let changes = changes(&old, &new, threshold, &metrics);
     if changes.cells_in_common == 0 {
         bail!("{}", nothing_in_common(&changes));

@@ -59,8 +59,8 @@ pub struct CompareArgs {
         allow_hyphen_values = true
     )]
     pub threshold: f64,
-    /// Metrics to compare: query_ns, locate_ns, locate_batched_ns, build_ms; may be
-    /// repeated [default: query_ns]
+    /// Metrics to compare: query_ns, locate_ns, locate_batched_ns, build_ms, frame_ns,
+    /// update_ns; may be repeated [default: query_ns, and frame_ns of motions]
     #[arg(long, value_name = "LIST", conflicts_with = "against")]
     pub metric: Vec<String>,
     /// Measure of a regression

@@ -268,6 +268,7 @@ mod tests {
             row,
             params: Value::Null,
             execution: Default::default(),
+            policy: Default::default(),
         }
     }
 

@@ -339,6 +339,9 @@ fn place(cell: &CellKey) -> String {
     if group.cache != "warm" {
         place += &format!(" {}", group.cache);
     }
+    if !group.motion.is_empty() {
+        place += &format!(" {}", short(&group.motion));
+    }
     shortened(&place, 30)
 }
 
@@ -349,7 +352,11 @@ fn question(cell: &CellKey) -> String {
         "warm" => String::new(),
         cache => format!(" ({cache})"),
     };
-    format!("{}, {}{cold}", group.path, group.test)
+    let motion = match group.motion.as_str() {
+        "" => String::new(),
+        motion => format!(", {motion}"),
+    };
+    format!("{}, {}{cold}{motion}", group.path, group.test)
 }
 
 /// "+6.8 % [+5.2, +8.4]" of a ratio new / old.

@@ -68,10 +68,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
             let cells = cells(structure);
             let times = cells.iter().map(|cell| {
                 let sound = cell.filter(|cell| cell.rank.is_some())?;
-                sound
-                    .metrics
-                    .get("query_ns")
-                    .filter(|time| is_drawn(time.value))
+                sound.time().filter(|time| is_drawn(time.value))
             });
             let times: Vec<Option<&Metric>> = times.collect();
             let known: Vec<&Metric> = times.iter().copied().flatten().collect();

@@ -11,6 +11,7 @@ use super::{Ending, print_json, program, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::{BOUNDS, METRICS};
+use crate::motion::{MOTION_PARAMS, MOTIONS};
 use crate::path::{PATH_PARAMS, PATHS};
 use crate::scene::{FAMILIES, FETCHED, MESHES, SAMPLES, SCENE_PARAMS};
 use crate::suite::SUITES;
@@ -191,6 +192,18 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
             let bounds = text::entries(&bounds.collect::<Vec<_>>(), text::width());
             let note = format!("Lower bounds in reports and tables (no structures):\n{bounds}");
             ("metrics", note, rows.collect())
+        }
+        ListTopic::Motions => {
+            let rows = MOTIONS.iter().map(|m| {
+                let params = format!("share={}, step={}", m.share, m.step);
+                row(m.name, &[("params", &params)], m.summary)
+            });
+            let note = format!(
+                "Parameters of every motion: {MOTION_PARAMS}.\nA motion is also a file: a motion \
+                 CSV (time_s,id,min_x,min_y,min_z,max_x,max_y,max_z; a row without bounds removes \
+                 the item)."
+            );
+            ("motions", note, rows.collect())
         }
     })
 }

@@ -8,9 +8,11 @@ use serde_json::{Value, json};
 use super::args::{LocateArgs, QueryArgs};
 use super::compare_structures::{Row, ask_all, write};
 use super::{Ending, load_scene, tell};
+use crate::geometry::Aabb;
 use crate::index::{DynIndex, Registry};
 use crate::input::{read_file, tell_warnings};
 use crate::measure::Workload;
+use crate::motion::Motion;
 use crate::path::{self, read_points_csv};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
@@ -21,8 +23,11 @@ type Column<'c> = (&'c str, &'c dyn Fn(&Row) -> Value);
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
-    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
+    let mut scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
+    if let Some(motion) = &args.motion {
+        scene.items = at_frame(&scene, motion, args.frame)?;
+    }
     let workload = Workload::new(&scene, &cameras, &culling)?;
     tell_warnings();
     if let Some(doubt) = culling.unproven() {
@@ -50,6 +55,23 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         ask_all(&structures, &scene, items, questions, args.ids, ask, each)
     })?;
     Ok(Ending::of(agree))
+}
+
+/// The items of a scene after `frame` frames of a motion, or after all of them.
+fn at_frame(scene: &Scene, motion: &str, frame: Option<usize>) -> anyhow::Result<Vec<Aabb>> {
+    let motion = Motion::load(motion, scene)?;
+    let (frames, name) = (motion.frames(), &motion.name);
+    let wanted = frame.unwrap_or(frames);
+    anyhow::ensure!(
+        wanted <= frames,
+        "--frame is {wanted}; expected at most {frames}, the frames of '{name}'"
+    );
+    let mut items = scene.items.clone();
+    let mut replay = motion.replay();
+    for _ in 0..wanted {
+        replay.advance(&mut items);
+    }
+    Ok(items)
 }
 
 /// Counts a query with a camera's view, then returns the ids of the plain query.

@@ -202,10 +202,15 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
         }
         let base = Overall::of(&[comparison]).base;
         let own = views.get(&about.key().group.id());
+        let own = own.filter(|_| about.path.motion.is_empty());
         blocks.extend(of_comparison(comparison, base, own));
         let of_path = |c: &&Comparison| {
             let other = c.about();
-            let [a, b] = [about, other].map(|cell| (&cell.path.name, &cell.path.cache));
+            let of = |cell: &ReportCell| {
+                let path = &cell.path;
+                [&path.name, &path.cache, &path.motion].map(String::clone)
+            };
+            let [a, b] = [about, other].map(of);
             other.scene.name == scene && a == b
         };
         let tests: Vec<&Comparison> = all.iter().filter(of_path).collect();
@@ -246,16 +251,12 @@ fn matrix(all: &[&Comparison], overall: &Overall, base: &str) -> Table {
     let names = standings.iter().map(|standing| standing.structure);
     let mut table = Table::of_numbers(["scene, path"].into_iter().chain(names));
     for comparison in all {
-        let about = comparison.about();
-        let mut name = format!("{}, {}", about.scene.name, about.path.name);
-        if about.path.cache != "warm" {
-            name += &format!(", {}", about.path.cache);
-        }
         let ratios = standings.iter().map(|standing| {
             let cell = comparison.sound_cell(standing.structure);
             let ratio = cell.and_then(|cell| comparison.speedup(base, cell));
             text::some(ratio, |(ratio, _)| text::significant(ratio))
         });
+        let name = run_figures::of(comparison);
         table.add_row([name].into_iter().chain(ratios));
     }
     let means = standings
@@ -362,8 +363,12 @@ fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Vie
         let value = comparison.of_any(metric)?;
         Some(format!(", {} {what}", text::percent(value)))
     };
+    let motion = match about.path.motion.as_str() {
+        "" => String::new(),
+        motion => format!(", {motion}"),
+    };
     let heading = format!(
-        "{}, {}, {}{}",
+        "{}, {}, {}{motion}{}",
         about.path.name,
         about.path.cache,
         about.test,
@@ -421,10 +426,18 @@ fn false_positives(comparison: &Comparison) -> Option<String> {
 type Figure = (&'static str, &'static str, fn(f64) -> String);
 
 /// Those of the queries of a path.
-const FIGURES: [Figure; 3] = [
+const FIGURES: [Figure; 11] = [
     ("/ read", "times_read", text::significant),
     ("/ copy", "times_memcpy", text::significant),
     ("locate", "locate_ns", text::time),
+    ("frame", "frame_ns", text::time),
+    ("worst frame", "worst_frame_ns", text::time),
+    ("update", "update_ns", text::time),
+    ("further query", "further_query_ns", text::time),
+    ("x after 1", "ageing_1", text::significant),
+    ("x after 10", "ageing_10", text::significant),
+    ("x after 100", "ageing_100", text::significant),
+    ("x after 1000", "ageing_1000", text::significant),
 ];
 
 /// Those of a structure on a scene.

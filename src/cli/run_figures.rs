@@ -22,12 +22,15 @@ pub fn ends(metric: &Metric) -> Option<[f64; 2]> {
     (is_drawn(ends.0) && is_drawn(ends.1)).then_some(ends.into())
 }
 
-/// Scene and path of a comparison.
-fn of(comparison: &Comparison) -> String {
+/// Scene, path and motion of a comparison.
+pub fn of(comparison: &Comparison) -> String {
     let about = comparison.about();
     let mut name = format!("{}, {}", about.scene.name, about.path.name);
     if about.path.cache != "warm" {
         name += &format!(", {}", about.path.cache);
+    }
+    if !about.path.motion.is_empty() {
+        name += &format!(", {}", about.path.motion);
     }
     name
 }
@@ -47,7 +50,7 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     let mut axis = Axis::log("", values.chain([1.0]), 1.2, &ratio_name);
     axis.ticks = axis.powers(2.0);
     let row = |(place, (cell, (ratio, ends))): (usize, &&(&ReportCell, Speedup))| {
-        let (time, name) = (cell.metrics.get("query_ns"), &cell.structure);
+        let (time, name) = (cell.time(), &cell.structure);
         let next = drawn.get(place + 1);
         Row {
             name: name.clone(),

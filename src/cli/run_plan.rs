@@ -6,10 +6,11 @@ use anyhow::bail;
 use super::args::RunArgs;
 use super::shared_args::WhatArgs;
 use crate::culling::Culling;
-use crate::index::Registry;
+use crate::index::{Registry, StructureSpec, UpdatePolicy};
 use crate::input::{note, tell_warnings};
-use crate::measure::{GroupKey, Plan, PlannedScene, Workload};
-use crate::path::{self, CameraPath, LensDefaults};
+use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
+use crate::motion::Motion;
+use crate::path::{self, LensDefaults};
 use crate::report::{KeptPart, Stream};
 use crate::scene::{self, FETCHED, Scene};
 use crate::spec::SpecError;
@@ -31,6 +32,12 @@ pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
     if let Some(processes) = args.processes {
         planned.plan.effort.processes = processes;
     }
+    planned.plan.motions.clone_from(&args.motion);
+    if let Some(list) = &args.update {
+        planned.plan.structures = under_policies(list, &planned.plan.structures)?;
+    }
+    planned.plan.views_per_frame = args.views;
+    planned.check_motions()?;
     if let Some(text) = &args.shard {
         let (i, n) = shard(text)?;
         planned.whole = planned.plan.groups();
@@ -68,6 +75,8 @@ pub fn plan_of(
         scenes: scenes(args, suite),
         cullings,
         lens: args.lens.defaults()?,
+        motions: Vec::new(),
+        views_per_frame: 1,
         load: args.scene_args.options(structures.len()),
         structures,
         effort: suite.effort,
@@ -81,6 +90,41 @@ pub fn plan_of(
         from_suite: args.scene.is_empty() && args.path.is_empty(),
         whole: Vec::new(),
     })
+}
+
+/// The structures under each policy of a comma-separated list, `wide@every=10`.
+///
+/// Labels stay as they are under [`UpdatePolicy::Refit`]. A structure that does not
+/// refit is built again in any case: it appears once beside fat bounds.
+fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSpec>, SpecError> {
+    let mut policies: Vec<UpdatePolicy> = Vec::new();
+    for text in list.split(',').map(str::trim) {
+        let policy = text.parse()?;
+        if policies.contains(&policy) {
+            return Err(SpecError::new(format_args!(
+                "--update '{text}' is named twice; expected each once"
+            )));
+        }
+        policies.push(policy);
+    }
+    let mut all = Vec::new();
+    for spec in specs {
+        let refits = spec.info().capabilities.refits;
+        let mut has_rebuilt = false;
+        for &policy in &policies {
+            let mut own = spec.clone();
+            own.policy = policy;
+            match policy {
+                UpdatePolicy::Fat(_) => own.label += &format!("@{policy}"),
+                _ if !refits && has_rebuilt => continue,
+                _ if !refits => (own.policy, has_rebuilt) = (UpdatePolicy::Refit, true),
+                UpdatePolicy::Refit => (),
+                _ => own.label += &format!("@{policy}"),
+            }
+            all.push(own);
+        }
+    }
+    Ok(all)
 }
 
 /// "2/4": the second of four shares.
@@ -111,6 +155,28 @@ fn check_names(plan: &Plan) -> anyhow::Result<()> {
 }
 
 impl RunPlan {
+    /// Motions are named once and measured with warm caches.
+    fn check_motions(&self) -> anyhow::Result<()> {
+        let motions = &self.plan.motions;
+        for (i, motion) in motions.iter().enumerate() {
+            if motions[..i].contains(motion) {
+                bail!("motion '{motion}' is named twice; expected each once");
+            }
+        }
+        let mut cold = self
+            .plan
+            .scenes
+            .iter()
+            .filter(|scene| scene.caches.contains(&true));
+        if !motions.is_empty() && cold.next().is_some() {
+            bail!(
+                "suite '{}' has cold caches, --motion has none; expected another suite, or --scene",
+                self.suite.name
+            );
+        }
+        Ok(())
+    }
+
     /// Reads every input: a mistake in the last file should not show after an
     /// hour. A suite as it comes is known to be sound.
     pub fn check_inputs(&self) -> anyhow::Result<()> {
@@ -136,10 +202,15 @@ impl RunPlan {
                     let before = known.map(|part| part.scene.digest.clone());
                     same_digest("scene", &scene.name, before, || scene.digest())
                 }
-                Some((name, path)) => {
-                    let mut known = parts.filter(|part| part.key.path == name);
-                    let before = known.find_map(|part| part.path.digest.clone());
-                    same_digest("path", name, before, || path::digest(&path.cameras))
+                Some((name, workload)) => {
+                    let motion = workload.motion.as_ref().map_or("", |motion| &motion.name);
+                    let own = |part: &&Part| part.key.path == name && part.key.motion == motion;
+                    let before = parts.filter(own).find_map(|part| part.path.digest.clone());
+                    let (what, name) = match motion {
+                        "" => ("path", name),
+                        motion => ("path or motion", motion),
+                    };
+                    same_digest(what, name, before, || workload.digest())
                 }
             }
         })
@@ -158,7 +229,7 @@ impl RunPlan {
         let as_it_comes =
             self.plan.lens == LensDefaults::default() && self.plan.cullings.iter().all(is_plain);
         let is_built_in = self.from_suite && self.suite.name != REAL;
-        if is_built_in && as_it_comes {
+        if is_built_in && as_it_comes && self.plan.motions.is_empty() {
             return Ok(());
         }
         for PlannedScene { source, paths, .. } in &self.plan.scenes {
@@ -166,9 +237,16 @@ impl RunPlan {
             look(&scene, None)?;
             for source in paths {
                 let path = path::load(source, &scene, &self.plan.lens)?;
-                look(&scene, Some((source, &path)))?;
                 for culling in &self.plan.cullings {
-                    Workload::new(&scene, &path, culling)?;
+                    let mut workload = Workload::new(&scene, &path, culling)?;
+                    for motion in &self.plan.motions {
+                        let motion = Motion::load(motion, &scene)?;
+                        workload = workload.moved_by(Some(motion), self.plan.views_per_frame);
+                        look(&scene, Some((source, &workload)))?;
+                    }
+                    if workload.motion.is_none() {
+                        look(&scene, Some((source, &workload)))?;
+                    }
                 }
             }
         }
@@ -177,8 +255,8 @@ impl RunPlan {
     }
 }
 
-/// Told of a scene, and then of each of its paths with its name.
-type Look<'l> = &'l dyn Fn(&Scene, Option<(&str, &CameraPath)>) -> anyhow::Result<()>;
+/// Told of a scene, and then of each of its workloads with the name of the path.
+type Look<'l> = &'l dyn Fn(&Scene, Option<(&str, &Workload)>) -> anyhow::Result<()>;
 
 fn same_digest(
     what: &str,
@@ -231,4 +309,33 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Vec<PlannedScene> {
         }
     }
     scenes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn policies_make_rows_and_mistakes_are_named() {
+        let specs = Registry::builtin()
+            .structures("wide,octree-textbook")
+            .unwrap();
+        let labels = |list: &str| -> Result<Vec<String>, String> {
+            let all = under_policies(list, &specs).map_err(|e| e.to_string())?;
+            Ok(all.into_iter().map(|spec| spec.label).collect())
+        };
+        let all = "wide,wide@rebuild,wide@every=10,wide@fat=0.1,octree-textbook,\
+                   octree-textbook@fat=0.1";
+        let found = labels("refit,rebuild,every=10,fat=10%").unwrap();
+        assert_eq!(found.join(","), all);
+        assert_eq!(
+            labels("rebuild").unwrap(),
+            ["wide@rebuild", "octree-textbook"]
+        );
+        for bad in ["", "often", "every", "every=1", "fat=0", "fat=x", "refit=1"] {
+            let error = labels(bad).unwrap_err();
+            assert!(error.contains("expected refit, rebuild"), "{bad}: {error}");
+        }
+        assert!(labels("refit,refit").unwrap_err().contains("named twice"));
+    }
 }

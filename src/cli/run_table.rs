@@ -68,10 +68,10 @@ pub fn conclusion(group: &[&Comparison], overall: &Overall) -> String {
     }
 }
 
-/// Cache state and culling test: times of others are not averaged.
-fn key<'r>(comparison: &Comparison<'r>) -> [&'r str; 2] {
+/// Cache state, culling test and kind of time: times of others are not averaged.
+fn key<'r>(comparison: &Comparison<'r>) -> [&'r str; 3] {
     let about = comparison.about();
-    [&about.path.cache, &about.test]
+    [&about.path.cache, &about.test, about.ranked_by()]
 }
 
 /// Lines above a table: the scene, the queries, and what they return.
@@ -99,6 +99,16 @@ fn heads(comparison: &Comparison) -> Vec<String> {
     if path.cache != "warm" {
         second += &format!(", {}", path.cache);
     }
+    let mut motion = String::new();
+    if let Some(queries) = path.views_per_frame.checked_sub(1) {
+        let checked = comparison.range(|cell| cell.times.cameras_checked);
+        let frames = checked.unwrap_or_default().1 / (queries + 1);
+        let (frames, queries) = (
+            text::counted(frames, "frame"),
+            text::counted(queries + 1, "query"),
+        );
+        motion = format!("{}: {frames}, {queries} each", path.motion);
+    }
     let visible = comparison.of_any("cull_rate").map(|culled| 1.0 - culled);
     let visible = visible.map(|visible| format!("{} of the items are visible", share(visible)));
     let sources = text::by_source(comparison);
@@ -113,7 +123,7 @@ fn heads(comparison: &Comparison) -> Vec<String> {
     let matrix = path.lens.as_ref().and_then(|lens| lens.matrix.as_ref());
     let matrix = matrix.map(|matrix| format!("matrices: {}", inputs::matrices(matrix)));
     let matrix = matrix.unwrap_or_default();
-    let lines = [first, second, lens, matrix, third.join(", ")].into_iter();
+    let lines = [first, second, motion, lens, matrix, third.join(", ")].into_iter();
     lines.filter(|line| !line.is_empty()).collect()
 }
 
@@ -133,15 +143,13 @@ struct Row<'r> {
 }
 
 /// Columns by priority: what does not fit is left to `--all-columns`, and so is all
-/// that stands behind the first [`SHOWN`].
+/// that stands behind the first ones ([`SHOWN`]).
 fn columns<'r>() -> [Column<Row<'r>>; 14] {
     [
         ("structure", |row| row.name.clone()),
-        (">time per query", |row| {
-            match row.cell.metrics.get("query_ns") {
-                None => row.cell.status.name().to_owned(),
-                Some(time) => text::time_with(time),
-            }
+        (">time per query", |row| match row.cell.time() {
+            None => row.cell.status.name().to_owned(),
+            Some(time) => text::time_with(time),
         }),
         (">vs", |row| {
             let ratio = row.base.and_then(|base| times_as_fast(base, row.cell));
@@ -180,8 +188,35 @@ fn columns<'r>() -> [Column<Row<'r>>; 14] {
     ]
 }
 
-/// Number of columns shown by default.
-const SHOWN: usize = 5;
+/// Columns of a motion, likewise.
+fn frame_columns<'r>() -> [Column<Row<'r>>; 14] {
+    let [structure, _, versus, build, bytes, _, speedup, ..] = columns();
+    [
+        structure,
+        (">time per frame", columns()[1].1),
+        versus,
+        (">worst", |row| of(row, "worst_frame_ns", text::time)),
+        (">update", |row| of(row, "update_ns", text::time)),
+        (">query", |row| of(row, "query_ns", text::time)),
+        (">x after 100", |row| {
+            of(row, "ageing_100", text::significant)
+        }),
+        (">false positives", |row| of(row, "excess", text::percent)),
+        (">further query", |row| {
+            of(row, "further_query_ns", text::time)
+        }),
+        (">x after 10", |row| of(row, "ageing_10", text::significant)),
+        (">x after 1000", |row| {
+            of(row, "ageing_1000", text::significant)
+        }),
+        speedup,
+        build,
+        bytes,
+    ]
+}
+
+/// Number of columns shown by default, and of a motion.
+const SHOWN: [usize; 2] = [5, 8];
 
 fn of(row: &Row, metric: &str, show: fn(f64) -> String) -> String {
     text::some(row.cell.value(metric), show)
@@ -207,8 +242,12 @@ fn of_one(comparison: &Comparison, base: Option<&str>, all: bool, width: usize) 
         .iter()
         .filter(|_| all)
         .map(|cell| row("", cell));
-    let columns = columns();
-    let columns = if all { &columns[..] } else { &columns[..SHOWN] };
+    let (queries, frames) = (columns(), frame_columns());
+    let (columns, shown) = match comparison.about().path.motion.is_empty() {
+        true => (&queries[..], SHOWN[0]),
+        false => (&frames[..], SHOWN[1]),
+    };
+    let columns = if all { columns } else { &columns[..shown] };
     let mut table = Table::with(ranked.chain(bounds), columns);
     table.header[2] = text::some(base, |base| format!("vs {}", cell_name(base)));
     let mut lines = heads(comparison);
@@ -246,7 +285,7 @@ fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: 
                 return String::new();
             };
             let is_first = if found.rank == Some(1) { "*" } else { " " };
-            let time = text::some(found.cell.value("query_ns"), text::time);
+            let time = text::some(found.cell.time(), |time| text::time(time.value));
             let shown = match (found.rank, base) {
                 (None, _) => found.cell.status.name().to_owned(),
                 (_, Some(base)) if !of_base(structure) => {
@@ -297,7 +336,15 @@ fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: 
 pub fn labels(all: &[&Comparison]) -> Vec<String> {
     let of = |comparison: &Comparison, show: fn(&str) -> String| {
         let about = comparison.about();
-        format!("{} {}", show(&about.scene.name), show(&about.path.name))
+        let motion = Some(show(&about.path.motion)).filter(|motion| !motion.is_empty());
+        let motion = motion
+            .map(|motion| format!(" {motion}"))
+            .unwrap_or_default();
+        format!(
+            "{} {}{motion}",
+            show(&about.scene.name),
+            show(&about.path.name)
+        )
     };
     let short: Vec<String> = all.iter().map(|c| of(c, short)).collect();
     let is_unique = |label: &String| short.iter().filter(|other| *other == label).count() == 1;

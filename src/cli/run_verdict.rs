@@ -35,6 +35,7 @@ pub fn times(ratio: f64) -> String {
 pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     let mut told = vec![ranking(comparison, base)];
     told.extend(base.and_then(fallback));
+    told.extend(frames(comparison));
     told.extend(repaid(comparison));
     told.extend(checked(&[comparison]));
     told.extend(failed(&[comparison]));
@@ -50,14 +51,18 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
         };
     };
     let names: Vec<&str> = winners.iter().map(|cell| cell.structure.as_str()).collect();
-    let time = text::some(best.value("query_ns"), text::time);
+    let time = text::some(best.time(), |time| text::time(time.value));
+    let per = match best.path.motion.is_empty() {
+        true => "query",
+        false => "frame",
+    };
     let next = comparison.sound().nth(winners.len());
     let lead = |cell: &ReportCell| text::some(times_as_fast(cell, best), times);
     let Some(next) = next else {
         return match names[..] {
-            [one] => format!("{one} takes {time} per query; no other structure has a time."),
+            [one] => format!("{one} takes {time} per {per}; no other structure has a time."),
             _ => format!(
-                "A tie: no test tells {} apart. The fastest takes {time} per query.",
+                "A tie: no test tells {} apart. The fastest takes {time} per {per}.",
                 listed(&names, "and")
             ),
         };
@@ -79,6 +84,22 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
             described(&cell.structure)
         ))
     )
+}
+
+/// Frame time and worst frame of the fastest structure, and of the flat scan.
+fn frames(comparison: &Comparison) -> Option<String> {
+    let of = |cell: &ReportCell| {
+        let worst = text::time(cell.value("worst_frame_ns")?);
+        let frame = text::time(cell.value("frame_ns")?);
+        Some(format!("{frame}, the worst one {worst}"))
+    };
+    let best = comparison.winners().next()?;
+    let own = format!("A frame of {} takes {}", best.structure, of(best)?);
+    let scan = comparison
+        .sound_cell(YARDSTICK)
+        .filter(|scan| *scan != best);
+    let scan = scan.and_then(|scan| Some(format!("; of {}, {}", described(YARDSTICK), of(scan)?)));
+    Some(format!("{own}{}.", scan.unwrap_or_default()))
 }
 
 /// The base of speed-ups, where it is not the usual one.
@@ -126,6 +147,8 @@ fn checked(all: &[&Comparison]) -> Option<String> {
              checked in exact arithmetic.",
             match views {
                 1 => "the only view".to_owned(),
+                _ if all.iter().any(|c| !c.about().path.motion.is_empty()) =>
+                    format!("all {} queries of the frames", text::count(views)),
                 _ => format!("all {} views", text::count(views)),
             },
             were(timed),

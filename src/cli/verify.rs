@@ -191,6 +191,8 @@ fn workloads<'a>(
             points: Vec::new(),
             lens_scale: None,
             sought: Vec::new(),
+            motion: None,
+            views_per_frame: 1,
         };
         all.push(((*kind).to_owned(), workload));
     }
@@ -420,6 +422,7 @@ mod tests {
             row: PANICS,
             params: Value::Null,
             execution: Default::default(),
+            policy: Default::default(),
         };
         let linear = StructureSpec::parse("linear").expect("linear");
         let checks = random_cases(&[spec, linear], 5, 3);

@@ -39,6 +39,7 @@ mod positions;
 mod registry;
 mod textbook;
 mod tree;
+mod update_policy;
 mod wide;
 
 pub use build::bsp::{Bsp, BspParams, PlaneSource};
@@ -61,4 +62,5 @@ pub use linear::{Linear, LinearScalar};
 pub use registry::{Registry, Row, StructureSpec};
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
 pub use tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
+pub use update_policy::UpdatePolicy;
 pub use wide::{BlockOrder, Moving, Trace, Wide, WideParams};

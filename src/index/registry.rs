@@ -12,7 +12,7 @@ use super::peers;
 use super::{
     Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, DynIndex, Execution, Info, Input, Linear,
     LinearScalar, Moving, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex,
-    UniformGrid, Wide, WithKernel, caught,
+    UniformGrid, UpdatePolicy, Wide, WithKernel, caught,
 };
 use crate::geometry::PlaneTree;
 use crate::json::told;
@@ -216,6 +216,7 @@ impl Registry {
             row,
             params,
             execution,
+            policy: UpdatePolicy::default(),
         })
     }
 
@@ -269,6 +270,8 @@ pub struct StructureSpec {
     /// Kernel and threads: the best kernel and one thread unless changed by
     /// [`StructureSpec::by`].
     pub execution: Execution,
+    /// Work of a frame of a motion.
+    pub policy: UpdatePolicy,
 }
 
 impl StructureSpec {

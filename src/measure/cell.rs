@@ -103,6 +103,21 @@ impl ReportCell {
         self.kind == Some(Kind::Scan)
     }
 
+    /// Name of the metric that structures are ranked by.
+    ///
+    /// Time of a query, or of a frame of a motion.
+    pub fn ranked_by(&self) -> &'static str {
+        match self.path.motion.is_empty() {
+            true => "query_ns",
+            false => "frame_ns",
+        }
+    }
+
+    /// The metric of [`ReportCell::ranked_by`], if the cell has it.
+    pub fn time(&self) -> Option<&Metric> {
+        self.metrics.get(self.ranked_by())
+    }
+
     /// A metric's value, if the cell has it.
     pub fn value(&self, metric: &str) -> Option<f64> {
         self.metrics.get(metric).map(|m| m.value)

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{GroupKey, Workload};
 use crate::culling::Culling;
 use crate::path::{self, CameraFacts};
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
 
 /// The scene of a cell.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
@@ -90,6 +90,20 @@ pub struct PathInfo {
     /// Doubts about the cameras, one line each.
     #[serde(default)]
     pub warnings: Vec<String>,
+    /// File name or spec of the motion; absent for a still scene.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub motion: String,
+    /// Number of queries of a frame of the motion; absent for a still scene.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub views_per_frame: usize,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl PathInfo {
@@ -105,15 +119,21 @@ impl PathInfo {
             digest: None,
             lens: None,
             warnings: Vec::new(),
+            motion: key.motion.clone(),
+            views_per_frame: 0,
         }
     }
 
     /// The facts of a workload along the path of this name.
     pub fn of(path: &str, workload: &Workload, cold: bool) -> PathInfo {
-        let key = GroupKey::of(&workload.scene.name, path, cold, &workload.culling);
+        let motion = workload.motion.as_ref();
+        let name = motion.map_or("", |motion| &motion.name);
+        let key = GroupKey::of(&workload.scene.name, path, cold, &workload.culling, name);
+        let views_per_frame = motion.map_or(0, |_| workload.views_per_frame);
         PathInfo {
             camera_count: workload.cameras.len(),
-            digest: Some(path::digest(&workload.cameras)),
+            digest: Some(workload.digest()),
+            views_per_frame,
             lens: Some(CameraFacts::of(&workload.cameras)),
             warnings: path::warnings(workload.scene, path, &workload.cameras),
             ..PathInfo::unknown(&key)
@@ -121,9 +141,23 @@ impl PathInfo {
     }
 }
 
+impl Workload<'_> {
+    /// SHA-256 over the cameras, and over the frames of a motion.
+    pub fn digest(&self) -> String {
+        let cameras = path::digest(&self.cameras);
+        let Some(motion) = &self.motion else {
+            return cameras;
+        };
+        let frames = format!("{cameras} {} {}", motion.digest(), self.views_per_frame);
+        scene::hex(&hmac_sha256::Hash::hash(frames.as_bytes()))
+    }
+}
+
 impl GroupKey {
     /// The key of a scene's queries along a path.
-    pub fn of(scene: &str, path: &str, cold: bool, culling: &Culling) -> GroupKey {
+    ///
+    /// The motion is empty for a still scene.
+    pub fn of(scene: &str, path: &str, cold: bool, culling: &Culling, motion: &str) -> GroupKey {
         GroupKey {
             scene: scene.to_owned(),
             path: path.to_owned(),
@@ -132,6 +166,7 @@ impl GroupKey {
             arithmetic: culling.arithmetic.name().to_owned(),
             planes: culling.planes.method.name().to_owned(),
             epsilon: culling.planes.epsilon,
+            motion: motion.to_owned(),
         }
     }
 
@@ -145,6 +180,7 @@ impl GroupKey {
             arithmetic: path.arithmetic.clone(),
             planes: path.planes.clone(),
             epsilon: path.epsilon,
+            motion: path.motion.clone(),
         }
     }
 }

@@ -19,6 +19,7 @@ use super::{
 use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
 use crate::input::InputError;
+use crate::motion::Motion;
 use crate::path::{self, LensDefaults, PathError};
 use crate::scene::{self, LoadOptions, Scene};
 
@@ -75,6 +76,10 @@ pub struct Plan {
     pub cullings: Vec<Culling>,
     /// Lens of cameras whose path has none.
     pub lens: LensDefaults,
+    /// Files or specs, as [`Motion::load`] takes them; none for still scenes.
+    pub motions: Vec<String>,
+    /// Queries after each frame of a motion.
+    pub views_per_frame: usize,
     /// Options for reading scenes.
     pub load: LoadOptions,
     /// Processes, rounds and additional measurements.
@@ -94,6 +99,8 @@ pub struct SceneGroup {
     pub cold: bool,
     /// Test, arithmetic and planes.
     pub culling: Culling,
+    /// File or spec of the motion; empty for a still scene.
+    pub motion: String,
 }
 
 impl Plan {
@@ -105,14 +112,24 @@ impl Plan {
         let of_spheres = |c: &&Culling| c.test == CullingTest::Sphere;
         let (spheres, boxes): (Vec<&Culling>, Vec<&Culling>) =
             self.cullings.iter().partition(of_spheres);
+        let still = [String::new()];
+        let motions = match self.motions.is_empty() {
+            true => &still[..],
+            false => &self.motions[..],
+        };
         let mut groups = Vec::new();
         for cullings in [boxes, spheres] {
             for path in &scene.paths {
-                for &cold in &scene.caches {
+                for (&cold, motion) in scene
+                    .caches
+                    .iter()
+                    .flat_map(|c| motions.iter().map(move |m| (c, m)))
+                {
                     groups.extend(cullings.iter().map(|&&culling| SceneGroup {
                         path: path.clone(),
                         cold,
                         culling,
+                        motion: motion.clone(),
                     }));
                 }
             }
@@ -122,7 +139,13 @@ impl Plan {
 
     /// The key of a group of a scene.
     pub fn key(&self, scene: &PlannedScene, group: &SceneGroup) -> GroupKey {
-        GroupKey::of(&scene.source, &group.path, group.cold, &group.culling)
+        let SceneGroup {
+            path,
+            cold,
+            culling,
+            motion,
+        } = group;
+        GroupKey::of(&scene.source, path, *cold, culling, motion)
     }
 
     /// Keys of all groups, in the order in which they are measured.
@@ -150,7 +173,9 @@ impl Plan {
     }
 
     fn has_updates(&self, share: &Share) -> bool {
-        share.process.is_multiple_of(UPDATES_EVERY) && self.has_all() && !share.plan_only
+        let is_due = share.process.is_multiple_of(UPDATES_EVERY) && !share.plan_only;
+        // Frames have updates of their own.
+        is_due && self.has_all() && self.motions.is_empty()
     }
 
     /// Shard `i` of `n` (from 1), a smaller plan: every n-th pair of scene and path.
@@ -288,7 +313,12 @@ pub fn measure_scene(
         notice(None, &group.path);
         let scale = known.and_then(|known| known.lens_scale);
         let path = path::load_scaled(&group.path, &scene, &plan.lens, scale)?;
+        let motion = Some(&group.motion).filter(|motion| !motion.is_empty());
+        let motion = motion
+            .map(|motion| Motion::load(motion, &scene))
+            .transpose()?;
         let workload = Workload::new(&scene, &path, &group.culling)?;
+        let workload = workload.moved_by(motion, plan.views_per_frame);
         let settings = GroupPlan {
             scene: &info,
             path: PathInfo::of(&group.path, &workload, group.cold),
@@ -334,145 +364,4 @@ pub fn measure_scene(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::Group;
-    use super::*;
-    use crate::index::Registry;
-
-    fn planned(source: &str, paths: &[&str], caches: &[bool]) -> PlannedScene {
-        PlannedScene {
-            source: source.to_owned(),
-            paths: paths.iter().map(|&path| path.to_owned()).collect(),
-            caches: caches.to_vec(),
-        }
-    }
-
-    fn plan() -> Plan {
-        let sphere = Culling {
-            test: CullingTest::Sphere,
-            ..Culling::default()
-        };
-        Plan {
-            scenes: vec![
-                planned("city:n=100", &["orbit:frames=8", "spin"], &[false, true]),
-                planned("uniform:n=50", &["outside:frames=4"], &[false]),
-                planned("city:n=200", &["orbit:frames=8", "spin", "zoom"], &[true]),
-            ],
-            structures: Registry::builtin().structures("linear,bvh,octree").unwrap(),
-            cullings: vec![sphere, Culling::default()],
-            lens: LensDefaults::default(),
-            load: LoadOptions::default(),
-            effort: Effort {
-                processes: 1,
-                rounds: [1, 1],
-                task_ns: 1e4,
-                pass_ns: 1e4,
-                extras: Extras::All,
-            },
-            bounds: false,
-            seed: 1,
-        }
-    }
-
-    #[test]
-    fn shards_are_the_plan_and_leave_what_is_compared_together() {
-        let whole = plan();
-        let cells = whole.cells();
-        // (2 paths x 2 caches + 1 + 3 paths) x 2 tests x 3 structures.
-        assert_eq!(cells.len(), 8 * 2 * 3);
-        for n in 1..=8 {
-            let shards: Vec<Vec<CellKey>> =
-                (1..=n).map(|i| whole.clone().shard(i, n).cells()).collect();
-            let of_pair = |cell: &CellKey, other: &CellKey| {
-                (&cell.group.scene, &cell.group.path) == (&other.group.scene, &other.group.path)
-            };
-            for cell in &cells {
-                let holding = shards.iter().filter(|shard| shard.contains(cell));
-                let holding: Vec<_> = holding.collect();
-                assert_eq!(holding.len(), 1, "{cell:?} in {n} shards");
-                let together = cells.iter().filter(|other| of_pair(cell, other));
-                assert!(together.clone().all(|other| holding[0].contains(other)));
-            }
-            let sum: usize = shards.iter().map(Vec::len).sum();
-            assert_eq!(sum, cells.len(), "nothing twice in {n} shards");
-        }
-        // Six pairs: the seventh of seven shards has nothing to do.
-        assert!(whole.clone().shard(7, 7).scenes.is_empty());
-    }
-
-    #[test]
-    fn keys_are_told_apart_and_structures_built_twice_at_most() {
-        let plan = plan();
-        let cells = plan.cells();
-        for (n, cell) in cells.iter().enumerate() {
-            assert!(!cells[..n].contains(cell), "{cell:?} comes twice");
-        }
-        for scene in &plan.scenes {
-            let groups = plan.groups_of(scene);
-            let mut spheres = groups.iter().map(|g| g.culling.test == CullingTest::Sphere);
-            let first = spheres.position(|is_sphere| is_sphere);
-            assert!(first.is_some_and(|first| first > 0));
-            assert!(spheres.all(|is_sphere| is_sphere), "boxes after spheres");
-        }
-    }
-
-    #[test]
-    fn one_process_has_the_cells_of_the_plan_in_its_order() {
-        let plan = plan();
-        let mut groups = Vec::new();
-        let all_of = |planned: &PlannedScene| Share::first(plan.groups_of(planned).len());
-        for planned in &plan.scenes {
-            let mut keep = |part: Part, _| groups.push((part.key.clone(), Group::of(&[part])));
-            let share = all_of(planned);
-            let done = measure_scene(&plan, planned, &share, &mut keep, &|_, _| (), &|| false);
-            assert!(done.unwrap());
-        }
-        let found = groups.iter().flat_map(|(key, group)| {
-            group.cells.iter().map(|cell| CellKey {
-                group: key.clone(),
-                structure: cell.structure.clone(),
-            })
-        });
-        assert!(found.eq(plan.cells()));
-        for (_, group) in &groups {
-            assert!(group.twin.as_ref().is_some_and(|(label, _)| label == "bvh"));
-            for cell in &group.cells {
-                assert_eq!(cell.status, super::super::Status::Ok);
-            }
-        }
-        let (first, mut keep) = (&plan.scenes[0], |_, _| {
-            panic!("stopped before the first part")
-        });
-        let stopped = measure_scene(&plan, first, &all_of(first), &mut keep, &|_, _| (), &|| {
-            true
-        });
-        assert!(!stopped.unwrap());
-    }
-
-    #[test]
-    fn what_has_ended_a_process_is_not_built_again() {
-        let mut plan = plan();
-        plan.scenes.truncate(1);
-        let verdict = Verdict::new(super::super::Status::OutOfMemory, "while building");
-        let mut share = Share::first(plan.groups_of(&plan.scenes[0]).len());
-        share.failed.insert("bvh".to_owned(), verdict.clone());
-        let building = std::cell::RefCell::new(Vec::new());
-        let notice = |structure: Option<&str>, step: &str| {
-            if let (Some(structure), "building") = (structure, step) {
-                building.borrow_mut().push(structure.to_owned());
-            }
-        };
-        let mut parts = Vec::new();
-        let mut keep = |part: Part, _| parts.push(part);
-        let done = measure_scene(&plan, &plan.scenes[0], &share, &mut keep, &notice, &|| {
-            false
-        });
-        assert!(done.unwrap());
-        assert!(!building.borrow().contains(&"bvh".to_owned()));
-        for part in &parts {
-            let own = part.subjects.iter().find(|s| s.label == "bvh");
-            assert_eq!(own.map(|s| &s.verdict), Some(&verdict));
-            assert!(part.tasks.iter().all(|t| !t.label.starts_with("bvh")));
-        }
-    }
-}
+mod tests;

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
 use super::count::{Counted, count_pass, judge};
+use super::frames::measure_frames;
 use super::index_under_test::TWIN;
 use super::key::{GroupKey, Pass, TaskKey};
 use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
@@ -80,6 +81,9 @@ pub fn measure_part(
     notice: Notice,
     stop: &dyn Fn() -> bool,
 ) -> Option<(Part, Vec<TaskSamples>)> {
+    if let Some(motion) = &workload.motion {
+        return measure_frames(workload, motion, subjects, plan, notice, stop);
+    }
     let answered = plan.known.filter(|known| !known.visible.is_empty());
     let (mut entries, judged) = match answered {
         None => count(workload, subjects, notice),
@@ -175,10 +179,7 @@ fn tasks_of<'a>(
     answers: &[Answer],
 ) -> Tasks<'a, TaskKey> {
     let mut keyed = Tasks::default();
-    for kind in TaskKind::ALL
-        .into_iter()
-        .filter(|kind| Pass::of(*kind) == pass)
-    {
+    for &kind in pass.tasks() {
         for entry in entries.iter().filter(|entry| entry.runs()) {
             let Ok(built) = &entry.subject.built else {
                 continue;
@@ -353,7 +354,7 @@ fn compare_digests(
 }
 
 /// Metrics of the count pass by name, means per query.
-fn counts(counted: &Counted, items: usize) -> BTreeMap<String, f64> {
+pub(super) fn counts(counted: &Counted, items: usize) -> BTreeMap<String, f64> {
     let [queries, searches] = [0, 1].map(|pass| counted.answers[pass].len() as f64);
     let [visible, found] = [0, 1].map(|pass| {
         let counts = counted.answers[pass].iter().map(|answer| answer.count);

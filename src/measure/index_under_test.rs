@@ -155,7 +155,7 @@ fn build(
 }
 
 /// Verdict of a structure that could not be built.
-fn not_built(error: BuildError) -> Verdict {
+pub(super) fn not_built(error: BuildError) -> Verdict {
     let status = match error {
         BuildError::Panicked { .. } => Status::Panicked,
         BuildError::OutOfMemory { .. } => Status::OutOfMemory,

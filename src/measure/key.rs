@@ -19,6 +19,9 @@ pub struct GroupKey {
     pub planes: String,
     /// Factor c of the planes' epsilon.
     pub epsilon: f64,
+    /// Name of the motion, parameters included; empty for a still scene.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub motion: String,
 }
 
 impl GroupKey {
@@ -55,6 +58,12 @@ named! {
         Locate = "locate",
         /// Region search of all cameras of the path in one batch.
         LocateBatched = "locate_batched",
+        /// Update of the index after the moves of a frame.
+        Update = "update",
+        /// Frustum query after the first one of a frame.
+        Further = "further",
+        /// Update and all queries of a frame.
+        Frame = "frame",
     }
 }
 
@@ -73,8 +82,16 @@ impl Pass {
     /// The pass that times tasks of this kind.
     pub(super) fn of(task: TaskKind) -> Pass {
         match task {
-            TaskKind::Query => Pass::Queries,
             TaskKind::Locate | TaskKind::LocateBatched => Pass::Searches,
+            _ => Pass::Queries,
+        }
+    }
+
+    /// The tasks that this pass times in a still scene.
+    pub(super) fn tasks(self) -> &'static [TaskKind] {
+        match self {
+            Pass::Queries => &[TaskKind::Query],
+            Pass::Searches => &[TaskKind::Locate, TaskKind::LocateBatched],
         }
     }
 

@@ -57,6 +57,15 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, summary }
     "locate_speedup", "1", "as speedup, for region search";
     "comparisons", "bounds", "bounds tested per region search, of nodes and items, mean";
     "regions_found", "regions", "regions that hold the eye, mean over the path";
+    "frame_ns", "ns", "thread CPU time per frame of a motion, update and all queries, mean over the frames; as query_ns, which is then the first query after each update";
+    "update_ns", "ns", "thread CPU time of the update of a frame, mean over the frames; as query_ns";
+    "further_query_ns", "ns", "thread CPU time of a query after the first one of a frame; as query_ns";
+    "worst_frame_ns", "ns", "slowest frame: median of each frame over rounds and processes, then the maximum over the frames, so that an interruption is no worst frame";
+    "ageing_1", "1", "time per query after 1 frame / time per query on a fresh build of the same boxes";
+    "ageing_10", "1", "as ageing_1, after 10 frames";
+    "ageing_100", "1", "as ageing_1, after 100 frames";
+    "ageing_1000", "1", "as ageing_1, after 1,000 frames";
+    "memory_after_bytes_per_item", "bytes", "as memory_bytes_per_item, after the last frame";
 };
 
 /// A value, with its 95 % interval where it was sampled.

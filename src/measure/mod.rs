@@ -23,6 +23,7 @@
 //! | `count`, `answer` | count pass, oracle; digests of answers |
 //! | `task`, `tasks`, `schedule` | one timed task; a keyed list of them; their schedule |
 //! | `timing`, `orders`, `clock`, `cache_flush` | timed pass; order of tasks; clocks; cold caches |
+//! | `frames`, `moving` | groups whose items move: update and queries, frame by frame |
 //! | `update`, `refitted`, `bounds` | updates of moved items; lower bounds |
 //! | `results`, `cell`, `cell_info`, `metrics` | cells of a report from parts |
 //! | `over_processes` | times of a study's tasks over several processes |
@@ -37,11 +38,13 @@ mod clock;
 mod count;
 mod environment;
 mod experiment;
+mod frames;
 mod group;
 mod guarded;
 mod index_under_test;
 mod key;
 mod metrics;
+mod moving;
 mod orders;
 mod over_processes;
 mod process_result;

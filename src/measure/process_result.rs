@@ -67,6 +67,12 @@ pub struct SubjectPart {
     pub update_ms: Vec<f64>,
     /// ln of (query time after many refits / on a fresh build of the same boxes).
     pub refitted_ln: Option<f64>,
+    /// Bytes after the last frame of a motion; the first process only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory_after_bytes: Option<u64>,
+    /// ln of (query time after that many frames / on a fresh build of the same boxes).
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub ageing_ln: BTreeMap<usize, f64>,
     /// Metrics of the count pass, means per query; the first process only.
     pub counts: BTreeMap<String, f64>,
 }
@@ -87,7 +93,7 @@ pub struct TaskPart {
     /// ln of the wall ns per query: interquartile mean over the rounds.
     pub wall_ln_ns: Option<f64>,
     /// CPU ns per query of groups of cameras that are the same for all tasks,
-    /// median over the rounds; empty below twenty of them.
+    /// median over the rounds; empty below twenty of them. Of frames: of each frame.
     pub tail_ns: Vec<f64>,
     /// Ids returned by all queries.
     pub returned: u64,
@@ -134,6 +140,8 @@ impl SubjectPart {
             memory_bytes: None,
             update_ms: Vec::new(),
             refitted_ln: None,
+            memory_after_bytes: None,
+            ageing_ln: BTreeMap::new(),
             counts: BTreeMap::new(),
         }
     }

@@ -3,6 +3,7 @@
 use super::input_of;
 use super::update::{MOST_UPDATED, USUAL_SHARE, move_share};
 use super::{Answer, Protocol, TimedTask, Workload, guarded, timed_rounds};
+use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec};
 
 /// Number of updates before queries are timed.
@@ -33,7 +34,20 @@ pub(super) fn refitted_ln(
         spec.update(&mut refitted, input_of(scene, &items), &moved)
             .ok()?;
     }
-    let rebuilt = spec.build(input_of(scene, &items)).ok()?;
+    over_fresh(refitted.as_ref(), spec, workload, &items, protocol)
+}
+
+/// ln of (query time / query time on a fresh build of the same boxes).
+///
+/// All views of the path, timed side by side; `None` if answers differ.
+pub(super) fn over_fresh(
+    aged: &dyn DynIndex,
+    spec: &StructureSpec,
+    workload: &Workload,
+    items: &[Aabb],
+    protocol: &Protocol,
+) -> Option<f64> {
+    let rebuilt = spec.build(input_of(workload.scene, items)).ok()?;
     let answers = |index: &dyn DynIndex| -> Option<Vec<Answer>> {
         let mut out = Vec::new();
         let of_view = |view: &crate::culling::CameraView| {
@@ -44,10 +58,10 @@ pub(super) fn refitted_ln(
         workload.views.iter().map(of_view).collect()
     };
     let expected = answers(rebuilt.as_ref())?;
-    if answers(refitted.as_ref())? != expected {
+    if answers(aged)? != expected {
         return None;
     }
-    let tasks = [&refitted, &rebuilt].map(|index| {
+    let tasks = [aged, rebuilt.as_ref()].map(|index| {
         let counts = expected.iter().map(|answer| answer.count).collect();
         TimedTask::new(counts, |camera, out| {
             index.query(workload.views[camera].as_any(), out);

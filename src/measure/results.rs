@@ -12,6 +12,7 @@ use super::bounds::{BOUNDS, Bound};
 use super::group::{GroupPlan, LEAST_TAIL, measure_part};
 use super::index_under_test::TWIN;
 use super::metrics::{METRICS, Metrics};
+use super::moving::AGES;
 use super::process_result::{Known, Part, SubjectPart, TaskPart};
 use super::update::MOST_UPDATED;
 use super::{
@@ -31,11 +32,19 @@ const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
 ];
 
 /// Metrics of each task: its time, and its speed-up over the yardstick.
-const TIME_METRICS: [(TaskKind, &str, Option<&str>); 3] = [
+///
+/// The last speed-up counts: that of whole frames where items move.
+const TIME_METRICS: [(TaskKind, &str, Option<&str>); 6] = [
     (TaskKind::Query, "query_ns", Some("speedup")),
     (TaskKind::Locate, "locate_ns", Some("locate_speedup")),
     (TaskKind::LocateBatched, "locate_batched_ns", None),
+    (TaskKind::Update, "update_ns", None),
+    (TaskKind::Further, "further_query_ns", None),
+    (TaskKind::Frame, "frame_ns", Some("speedup")),
 ];
+
+/// Metrics of ageing, in the order of [`AGES`].
+const AGE_METRICS: [&str; AGES.len()] = ["ageing_1", "ageing_10", "ageing_100", "ageing_1000"];
 
 /// Metrics that are quantiles over groups of cameras, each with its quantile.
 const TAIL_METRICS: [(&str, f64); 4] = [
@@ -101,7 +110,7 @@ impl Group {
             .filter(|s| !s.label.ends_with(TWIN))
             .map(|subject| merged.cell(subject))
             .collect();
-        for (i, rank) in merged.ranks(&cells, TaskKind::Query) {
+        for (i, rank) in merged.ranks(&cells, merged.ranked()) {
             cells[i].rank = Some(rank);
         }
         let located = merged.ranks(&cells, TaskKind::Locate).into_iter();
@@ -162,6 +171,14 @@ impl<'p> MergedParts<'p> {
         merged
     }
 
+    /// The task that structures are ranked by.
+    fn ranked(&self) -> TaskKind {
+        match self.parts[0].key.motion.is_empty() {
+            true => TaskKind::Query,
+            false => TaskKind::Frame,
+        }
+    }
+
     fn has_yardstick(&self) -> bool {
         self.reference == Some(YARDSTICK)
     }
@@ -206,8 +223,17 @@ impl<'p> MergedParts<'p> {
 
     /// The frustum queries of a structure in each process.
     fn queries<'l>(&self, label: &'l str) -> impl Iterator<Item = &'p TaskPart> + use<'p, 'l> {
+        self.tasks(label, TaskKind::Query)
+    }
+
+    /// A task of a structure in each process.
+    fn tasks<'l>(
+        &self,
+        label: &'l str,
+        task: TaskKind,
+    ) -> impl Iterator<Item = &'p TaskPart> + use<'p, 'l> {
         let all = self.parts.iter().flat_map(|part| &part.tasks);
-        all.filter(move |t| t.label == label && t.task == TaskKind::Query)
+        all.filter(move |t| t.label == label && t.task == task)
     }
 
     /// Mean number of visible items of the timed cameras.
@@ -286,6 +312,10 @@ impl<'p> MergedParts<'p> {
 
     /// Metrics that this cell lacks though its structure is right, with the reason.
     fn left_out(&self, label: &str) -> Vec<String> {
+        if self.ranked() == TaskKind::Frame {
+            let reason = "build_ms apart, only frames are measured of items that move";
+            return vec![format!("query_ns_p95, locate_ns, excess: {reason}")];
+        }
         let is_large = self.parts[0].scene.total_count > MOST_UPDATED;
         let has_few_groups = |task: &TaskPart| task.tail_ns.len() < LEAST_TAIL;
         let reasons = [
@@ -349,12 +379,20 @@ impl<'p> MergedParts<'p> {
         }
         let refitted: Vec<f64> = self.subjects(label).filter_map(|s| s.refitted_ln).collect();
         metrics.estimate("refitted_over_rebuilt", one_run(&refitted, &refitted));
+        for (age, name) in AGES.iter().zip(AGE_METRICS) {
+            let own = self.subjects(label).filter_map(|s| s.ageing_ln.get(age));
+            let own: Vec<f64> = own.copied().collect();
+            metrics.estimate(name, one_run(&own, &own));
+        }
         let items = self.parts[0].scene.total_count as f64;
         let bytes = self.subjects(label).find_map(|s| s.memory_bytes);
-        metrics.set(
-            "memory_bytes_per_item",
-            bytes.map(|bytes| bytes as f64 / items),
-        );
+        let after = self.subjects(label).find_map(|s| s.memory_after_bytes);
+        for (name, bytes) in [
+            ("memory_bytes_per_item", bytes),
+            ("memory_after_bytes_per_item", after),
+        ] {
+            metrics.set(name, bytes.map(|bytes| bytes as f64 / items));
+        }
     }
 
     fn time_metrics(&self, metrics: &mut Metrics, label: &str) {
@@ -374,15 +412,23 @@ impl<'p> MergedParts<'p> {
         }
         let wall: Vec<f64> = self.queries(label).filter_map(|t| t.wall_ln_ns).collect();
         metrics.estimate("query_wall_ns", one_run(&wall, &wall));
-        let tails: Vec<&[f64]> = self.queries(label).map(|t| &t.tail_ns[..]).collect();
-        let groups = tails.iter().map(|tail| tail.len()).min().unwrap_or(0);
-        if groups >= LEAST_TAIL {
-            let of_group = |g: usize| median(&tails.iter().map(|t| t[g]).collect::<Vec<_>>());
-            let all = sorted((0..groups).filter_map(of_group).collect());
-            for (name, q) in TAIL_METRICS {
-                metrics.set(name, quantile(&all, q));
-            }
+        let all = self.tail(label, TaskKind::Query);
+        for (name, q) in TAIL_METRICS {
+            let is_enough = all.len() >= LEAST_TAIL;
+            metrics.set(name, quantile(&all, q).filter(|_| is_enough));
         }
+        let worst = self.tail(label, TaskKind::Frame).last().copied();
+        metrics.set("worst_frame_ns", worst);
+    }
+
+    /// Times of each group of cameras or each frame, ns, ascending.
+    ///
+    /// Medians over the processes.
+    fn tail(&self, label: &str, task: TaskKind) -> Vec<f64> {
+        let tails: Vec<&[f64]> = self.tasks(label, task).map(|t| &t.tail_ns[..]).collect();
+        let groups = tails.iter().map(|tail| tail.len()).min().unwrap_or(0);
+        let of_group = |g: usize| median(&tails.iter().map(|t| t[g]).collect::<Vec<_>>());
+        sorted((0..groups).filter_map(of_group).collect())
     }
 
     /// Queries after which the build is repaid against the yardstick; `None` if never.
@@ -391,7 +437,8 @@ impl<'p> MergedParts<'p> {
             let build = self.over_processes(label, |s| s.build_ms)?.value * 1e6;
             Some([build, self.ns(label, TaskKind::Query)?.value])
         };
-        let [build, query] = cost(label).filter(|_| self.has_yardstick())?;
+        let is_paid = self.has_yardstick() && self.ranked() == TaskKind::Query;
+        let [build, query] = cost(label).filter(|_| is_paid)?;
         let [linear_build, linear_query] = cost(YARDSTICK)?;
         let (price, gain) = (build - linear_build, linear_query - query);
         (gain > 0.0 && price > 0.0).then(|| (price / gain).ceil())
@@ -399,8 +446,8 @@ impl<'p> MergedParts<'p> {
 
     /// Time of `label` / time of `other`, equal to the ratio of the two shown values.
     fn ratio(&self, label: &str, other: &str) -> Option<Estimate> {
-        let [reference, own] = self.paired(label, TaskKind::Query)?;
-        ratio(reference, own, self.ln_ns(other, TaskKind::Query)?)
+        let [reference, own] = self.paired(label, self.ranked())?;
+        ratio(reference, own, self.ln_ns(other, self.ranked())?)
     }
 
     fn twin(&self) -> Option<(String, Estimate)> {
@@ -413,6 +460,9 @@ impl<'p> MergedParts<'p> {
     fn ranks(&self, cells: &[ReportCell], task: TaskKind) -> Vec<(usize, usize)> {
         let ok = cells.iter().enumerate();
         let ok = ok.filter(|(_, cell)| cell.status == Status::Ok);
+        // Fat bounds answer another question: no rank beside exact ones.
+        let is_exact = |cell: &ReportCell| cell.value("false_positive_count").unwrap_or(0.0) == 0.0;
+        let ok = ok.filter(|(_, c)| c.path.motion.is_empty() || is_exact(c));
         let timed = ok.filter_map(|(i, cell)| {
             let [reference, own] = self.paired(&cell.structure, task)?;
             let relative = own.iter().zip(reference).map(|(own, r)| own - r);

@@ -49,7 +49,13 @@ impl<'a> TimedTask<'a> {
         least_ns: Option<f64>,
     ) -> Self {
         let ask: Ask = match task {
-            TaskKind::Query => {
+            TaskKind::Locate | TaskKind::LocateBatched => {
+                let index = built.regions();
+                Box::new(move |camera, out| {
+                    workload.search(camera, out, |p, out| index.locate(p, out));
+                })
+            }
+            _ => {
                 let index = built.items.as_ref();
                 let ask = move |camera: usize, out: &mut Vec<ItemId>| {
                     index.query(workload.views[camera].as_any(), out);
@@ -58,12 +64,6 @@ impl<'a> TimedTask<'a> {
                     Some(every) => twice_in(every, ask),
                     None => Box::new(ask),
                 }
-            }
-            TaskKind::Locate | TaskKind::LocateBatched => {
-                let index = built.regions();
-                Box::new(move |camera, out| {
-                    workload.search(camera, out, |p, out| index.locate(p, out));
-                })
             }
         };
         let ask_many = (task == TaskKind::LocateBatched).then(|| located_at_once(workload, built));

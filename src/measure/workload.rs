@@ -10,6 +10,7 @@ use crate::camera::Camera;
 use crate::culling::{CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
 use crate::index::Input;
+use crate::motion::Motion;
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{Scene, Sought};
@@ -40,6 +41,10 @@ pub struct Workload<'a> {
     pub points: Vec<Vec3>,
     /// The same eyes in f64 too, for the exact test of what an index returns.
     pub sought: Vec<Sought>,
+    /// New bounds of the items, frame by frame; `None` for a still scene.
+    pub motion: Option<Motion>,
+    /// Number of queries of a frame; the frames go through the views in turns.
+    pub views_per_frame: usize,
 }
 
 /// A camera of a path that has no such view.
@@ -85,7 +90,18 @@ impl<'a> Workload<'a> {
             sought,
             cameras: path.cameras.clone(),
             lens_scale: path.lens_scale,
+            motion: None,
+            views_per_frame: 1,
         })
+    }
+
+    /// Moves the items: `views` queries after each frame.
+    pub fn moved_by(self, motion: Option<Motion>, views: usize) -> Workload<'a> {
+        Workload {
+            motion,
+            views_per_frame: views.max(1),
+            ..self
+        }
     }
 
     /// Region search at the eye of a camera: the answer of `ask`, made exact by

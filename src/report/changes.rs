@@ -138,7 +138,9 @@ struct Candidate {
 fn by_metric(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<JudgedRow> {
     let mut rows = Vec::new();
     let mut candidates: Vec<(usize, Candidate)> = Vec::new();
-    for &pair in pairs {
+    let is_of_frames = ["frame_ns", "update_ns"].contains(&metric);
+    let moves = |pair: &&Pair| !pair.1.path.motion.is_empty();
+    for &pair in pairs.iter().filter(|pair| !is_of_frames || moves(pair)) {
         let value = |cell: &ReportCell| cell.value(metric);
         let values = (value(pair.0), value(pair.1));
         let sound = |value: Option<f64>| value.is_some_and(is_sound);

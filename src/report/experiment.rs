@@ -46,6 +46,8 @@ impl Experiment {
                 structures: Vec::new(),
                 cullings: vec![Default::default()],
                 lens: Default::default(),
+                motions: Vec::new(),
+                views_per_frame: 1,
                 load: Default::default(),
                 effort: Effort {
                     processes: 1,

@@ -109,8 +109,12 @@ impl RunFolder {
         let mut write = || -> Result<Vec<u8>, csv::Error> {
             let mut csv = csv::Writer::from_writer(Vec::new());
             for (label, task, samples) in samples {
-                let names = [&key.scene, &key.path, &key.cache, label, &key.test]
-                    .map(|name| shown_field(name));
+                let path = match key.motion.as_str() {
+                    "" => key.path.clone(),
+                    motion => format!("{} + {motion}", key.path),
+                };
+                let names =
+                    [&key.scene, &path, &key.cache, label, &key.test].map(|name| shown_field(name));
                 for s in samples {
                     let at = (part.process, s.round, s.frame, s.queries);
                     let [cpu_ns, wall_ns] = [s.cpu_ns, s.wall_ns].map(|ns| format!("{ns:.1}"));
@@ -346,7 +350,7 @@ const SUMMARY_COLUMNS: [Column; 16] = [
 ];
 
 /// Columns of summary.csv behind those of the metrics.
-const INPUT_COLUMNS: [Column; 13] = [
+const INPUT_COLUMNS: [Column; 15] = [
     ("up", |cell| cell.scene.up.clone()),
     ("unit", |cell| text(cell.scene.unit.as_ref())),
     ("fovy_deg_min", |cell| {
@@ -378,6 +382,11 @@ const INPUT_COLUMNS: [Column; 13] = [
     ("matrix_convention", |cell| {
         let lens = cell.path.lens.as_ref();
         text(lens.and_then(|lens| Some(lens.matrix.as_ref()?.convention.as_str())))
+    }),
+    ("motion", |cell| shown_field(&cell.path.motion)),
+    ("views_per_frame", |cell| match cell.path.views_per_frame {
+        0 => String::new(),
+        views => views.to_string(),
     }),
 ];
 

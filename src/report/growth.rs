@@ -36,6 +36,7 @@ const LEAST_SIZES: usize = 3;
 /// (about) the same number of visible items by the same kind of path.
 pub fn growths(report: &Report) -> Vec<Growth<'_>> {
     let ok = report.cells.iter().filter(|c| c.status == Status::Ok);
+    let ok = ok.filter(|cell| cell.path.motion.is_empty());
     let points = ok.filter_map(|cell| {
         let (visible, ns) = (cell.value("visible_count")?, cell.value("query_ns")?);
         let point = (cell.scene.total_count, visible, ns);

@@ -12,7 +12,14 @@ use crate::statistics::{Change, Judgement};
 
 /// The metrics with a value per process, which a judgement needs; less is
 /// better. The first is the one that structures are ranked by.
-pub static JUDGED_METRICS: &[&str] = &["query_ns", "locate_ns", "locate_batched_ns", "build_ms"];
+pub static JUDGED_METRICS: &[&str] = &[
+    "query_ns",
+    "locate_ns",
+    "locate_batched_ns",
+    "build_ms",
+    "frame_ns",
+    "update_ns",
+];
 
 /// Counters that do not depend on the machine or the moment: any difference is
 /// a change of the program.

@@ -53,7 +53,9 @@ impl<'r> Overall<'r> {
             ranked().map(|c| c.sound_cell(name)).collect()
         };
         let mean = |name: &str| {
-            let times = cells(name)?.into_iter().map(|cell| cell.value("query_ns"));
+            let times = cells(name)?
+                .into_iter()
+                .map(|cell| Some(cell.time()?.value));
             geometric_mean(&times.collect::<Option<Vec<f64>>>()?)
         };
         let timed = || names.iter().copied().filter_map(|n| Some((n, mean(n)?)));
@@ -80,7 +82,7 @@ impl<'r> Overall<'r> {
 /// Half the interval of the mean logarithm of independent times.
 fn margin(cells: &[&ReportCell]) -> f64 {
     let halves = cells.iter().map(|cell| {
-        let time = cell.metrics.get("query_ns");
+        let time = cell.time();
         let ends = time.and_then(|time| Some((time.lower?, time.upper?)));
         ends.map_or(0.0, |(lower, upper)| (upper / lower).ln() / 2.0)
     });

@@ -22,11 +22,12 @@ pub struct Ranked<'r> {
 }
 
 /// Key of a comparison.
-type Key<'r> = (&'r str, &'r str, &'r str, &'r str);
+type Key<'r> = [&'r str; 5];
 
 fn key(cell: &ReportCell) -> Key<'_> {
     let path = &cell.path;
-    (&cell.scene.name, &path.name, &path.cache, &cell.test)
+    let scene = &cell.scene.name;
+    [scene, &path.name, &path.cache, &cell.test, &path.motion]
 }
 
 /// All comparisons of a report, in the order in which they were measured.
@@ -41,7 +42,10 @@ pub fn comparisons(report: &Report) -> Vec<Comparison<'_>> {
 
 /// Time by which a cell is ranked. Nothing is found faster among no items.
 fn time(cell: &ReportCell) -> Option<f64> {
-    let time = cell.value("query_ns").filter(|ns| ns.is_finite());
+    let time = cell
+        .time()
+        .map(|time| time.value)
+        .filter(|ns| ns.is_finite());
     let time = time.filter(|_| cell.scene.total_count > 0);
     time.filter(|_| cell.status == Status::Ok)
 }
@@ -97,8 +101,8 @@ impl<'r> Comparison<'r> {
             let found = cell.metrics.get("speedup")?;
             return Some((found.value, found.lower.zip(found.upper).map(Into::into)));
         }
-        let base = self.sound_cell(base)?.value("query_ns")?;
-        let own = cell.metrics.get("query_ns")?;
+        let base = self.sound_cell(base)?.time()?.value;
+        let own = cell.time()?;
         let ends = own.upper.zip(own.lower);
         let ends = ends.map(|(most, least)| [base / most, base / least]);
         Some((base / own.value, ends))
@@ -138,7 +142,7 @@ impl<'r> Comparison<'r> {
 /// Time of `base` / time of `cell`, the ratio of the two shown values: how many
 /// times as fast the cell is.
 pub fn times_as_fast(base: &ReportCell, cell: &ReportCell) -> Option<f64> {
-    Some(base.value("query_ns")? / cell.value("query_ns")?)
+    Some(base.time()?.value / cell.time()?.value)
 }
 
 #[cfg(test)]

@@ -73,8 +73,8 @@ pub fn surfaces(comparisons: Vec<Comparison<'_>>) -> Vec<Surface<'_>> {
         let about = comparison.about();
         let share = 1.0 - comparison.of_any("cull_rate")?;
         comparison.winners().next()?;
-        // Nothing is visible: no place on a logarithmic axis.
-        if share.is_nan() || share <= 0.0 {
+        // Nothing is visible: no place on a logarithmic axis. Frames are no queries.
+        if share.is_nan() || share <= 0.0 || !about.path.motion.is_empty() {
             return None;
         }
         let (cache, test) = (about.path.cache.as_str(), about.test.as_str());

@@ -15,13 +15,42 @@ const ITEMS_PER_BLOCK: f64 = 40.0;
 /// Share of the items that are buildings; the rest stands in the streets.
 const BUILDINGS: f64 = 0.25;
 
+/// The blocks of a city along one axis, and the streets between them.
+pub struct Grid {
+    /// Width of a block.
+    pub block: f64,
+    /// Width of a street, which follows each block.
+    pub street: f64,
+    /// Number of blocks.
+    pub blocks: usize,
+    /// Lower end of the first block.
+    pub corner: f64,
+}
+
+impl Grid {
+    /// The grid of a city of `n` items.
+    pub fn of(spec: &mut Spec, n: usize) -> Result<Grid, SpecError> {
+        let block = spec.number_between("block", 80.0, 0.0, f64::INFINITY)?;
+        let street = spec.number_between("street", 16.0, 0.0, f64::INFINITY)?;
+        let blocks = (n as f64 / ITEMS_PER_BLOCK).sqrt().ceil().max(1.0) as usize;
+        Ok(Grid {
+            block,
+            street,
+            blocks,
+            // Centred on zero: the tallest houses stand in the middle.
+            corner: -(blocks as f64) * (block + street) / 2.0,
+        })
+    }
+}
+
 pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
-    let block = spec.number_between("block", 80.0, 0.0, f64::INFINITY)?;
-    let street = spec.number_between("street", 16.0, 0.0, f64::INFINITY)?;
-    let blocks = (n as f64 / ITEMS_PER_BLOCK).sqrt().ceil().max(1.0) as usize;
+    let Grid {
+        block,
+        street,
+        blocks,
+        corner,
+    } = Grid::of(spec, n)?;
     let pitch = block + street;
-    // Centred on zero: the tallest houses stand in the middle.
-    let corner = -(blocks as f64) * pitch / 2.0;
     let boxes = (0..n).map(|_| {
         let cell = DVec3::new(rng.below(blocks) as f64, rng.below(blocks) as f64, 0.0);
         let low = cell * pitch + DVec3::new(corner, corner, 0.0);

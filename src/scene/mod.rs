@@ -49,6 +49,7 @@ use crate::query::ItemId;
 
 pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
+pub(crate) use city::Grid as CityGrid;
 pub use disputes::{Dispute, Linedef};
 pub use fetched::{FETCHED, Fetched};
 pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
@@ -59,6 +60,7 @@ pub use obj::read_obj;
 pub use options::{ITEM_KINDS, ItemKind, LoadOptions};
 pub use originals::Originals;
 pub use rng::SeededRng;
+pub(crate) use rng::mix64;
 pub use samples::{NOTICE, SAMPLES, Sample};
 pub use shape::ItemShape;
 pub use sought::{Sought, SoughtBox};

@@ -19,7 +19,10 @@ fn json_outputs_are_json() {
     let folder = with_good_files(&[]);
     let ask = |line: &str| json(&works(folder.path(), &format!("{line} --format json")));
     let list = ask("list");
-    assert_eq!(keys(&list), set("structures scenes paths tests metrics"));
+    assert_eq!(
+        keys(&list),
+        set("structures scenes paths tests metrics motions")
+    );
     for topic in keys(&list) {
         assert_eq!(ask(&format!("list {topic}")), list[topic]);
         // The table says the same, for people.

@@ -30,6 +30,7 @@ mod matrices;
 #[cfg(target_os = "linux")]
 mod memory;
 mod meshes;
+mod motion;
 mod obj;
 mod page;
 mod pipes;

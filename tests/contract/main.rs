@@ -5,6 +5,7 @@
 
 mod conformance;
 mod kernels;
+mod motions;
 #[cfg(feature = "cli")]
 mod picking;
 mod portable;

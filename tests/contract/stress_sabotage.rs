@@ -150,6 +150,7 @@ fn spec(row: Structure) -> StructureSpec {
         row,
         params: Value::Null,
         execution: Default::default(),
+        policy: Default::default(),
     }
 }
 

@@ -25,6 +25,8 @@ fn subject(label: &str, build_ms: f64) -> SubjectPart {
         memory_bytes: Some(4000),
         update_ms: Vec::new(),
         refitted_ln: None,
+        memory_after_bytes: None,
+        ageing_ln: BTreeMap::new(),
         counts: BTreeMap::new(),
     }
 }
@@ -69,6 +71,7 @@ fn parts(times: &[Times]) -> Vec<Part> {
         arithmetic: "f32".to_owned(),
         planes: "frame".to_owned(),
         epsilon: 8.0,
+        motion: String::new(),
     };
     let processes = times[0].2.len();
     let part = |process: usize| Part {

@@ -1,0 +1,205 @@
+use std::ops::ControlFlow;
+
+use super::*;
+use crate::culling::{Culling, CullingTest};
+use crate::geometry::Aabb;
+use crate::index::{
+    BuildError, Info, Input, Linear, MemoryUsage, NoParams, RegionIndex, Registry, StructureSpec,
+};
+use crate::measure::{Group, PathInfo, SceneInfo, measure_part};
+use crate::path;
+use crate::query::{Context, ItemId, QueryVolume};
+use crate::scene;
+
+/// A part of a motion on a small city, with two queries per frame.
+fn part(specs: &[StructureSpec], motion: &str, test: CullingTest, known: Option<&Known>) -> Part {
+    let scene = scene::load("city:n=300", &Default::default()).unwrap();
+    let way = path::load("orbit:frames=7", &scene, &Default::default()).unwrap();
+    let culling = Culling {
+        test,
+        ..Culling::default()
+    };
+    let motion = Motion::load(motion, &scene).unwrap();
+    let workload = Workload::new(&scene, &way, &culling).unwrap();
+    let workload = workload.moved_by(Some(motion), 2);
+    let build = |spec: &StructureSpec| Subject::build(spec.clone(), false, &scene, test);
+    let subjects: Vec<Subject> = specs.iter().map(build).collect();
+    let info = SceneInfo::of(&scene);
+    let plan = GroupPlan {
+        scene: &info,
+        path: PathInfo::of("orbit:frames=7", &workload, false),
+        process: u32::from(known.is_some()),
+        protocol: Protocol {
+            rounds: [2, 2],
+            task_ns: 1e9,
+            cameras: 8,
+            cold: false,
+            seed: 1,
+            cache_bytes: 0,
+        },
+        bounds: &[],
+        known,
+        plan_only: false,
+        locate: true,
+    };
+    let part = measure_part(&workload, &subjects, plan, &|_, _| (), &|| false);
+    part.unwrap().0
+}
+
+#[test]
+fn frames_are_measured_as_one_thing_and_in_parts() {
+    let specs = Registry::builtin()
+        .structures("linear,wide,octree")
+        .unwrap();
+    let first = part(
+        &specs,
+        "spawn:share=0.2,frames=12",
+        CullingTest::SixPlane,
+        None,
+    );
+    let known = first.known.as_ref().unwrap();
+    assert_eq!(known.visible.len(), 24);
+    let second = part(
+        &specs,
+        "spawn:share=0.2,frames=12",
+        CullingTest::SixPlane,
+        Some(known),
+    );
+    for part in [&first, &second] {
+        assert_eq!(part.contradictions(known), []);
+        assert_eq!(part.tasks.len(), 3 * KINDS.len());
+        assert!(part.tasks.iter().all(|task| task.rounds_ns.len() == 2));
+    }
+    let parts = [first.clone(), second.clone(), second.clone()];
+    let group = Group::of(&parts);
+    for (cell, rank) in group.cells.iter().zip(0_usize..) {
+        assert_eq!(cell.status, Status::Ok, "{:?}", cell.reason);
+        let of = |name: &str| {
+            cell.value(name)
+                .unwrap_or_else(|| panic!("{name} of {rank}"))
+        };
+        let sum = of("update_ns") + of("query_ns") + of("further_query_ns");
+        assert!((of("frame_ns") / sum - 1.0).abs() < 0.5, "{cell:?}");
+        assert!(of("worst_frame_ns") >= 0.9 * of("frame_ns"));
+        assert_eq!(
+            cell.value("ageing_10").is_some(),
+            specs[rank].info().capabilities.refits
+        );
+        assert!(cell.value("ageing_100").is_none());
+        assert!(of("memory_after_bytes_per_item") > 0.0 && of("visible_count") > 0.0);
+        assert_eq!(cell.key().group.motion, "spawn:share=0.2,frames=12");
+        assert_eq!(
+            (cell.ranked_by(), cell.times.cameras_checked),
+            ("frame_ns", 24)
+        );
+    }
+    // Another first process: other answers.
+    let mut other = known.clone();
+    other.visible[5].digest ^= 1;
+    let odd = part(
+        &specs,
+        "spawn:share=0.2,frames=12",
+        CullingTest::SixPlane,
+        Some(&other),
+    );
+    for subject in &odd.subjects {
+        let reason = subject.verdict.reason.as_deref().unwrap_or_default();
+        assert_eq!(subject.verdict.status, Status::Wrong);
+        assert!(
+            reason.starts_with("frame 3, camera 5: another set"),
+            "{reason}"
+        );
+    }
+}
+
+#[test]
+fn spheres_move_as_cubes() {
+    let specs = Registry::builtin().structures("linear,bvh").unwrap();
+    let part = part(
+        &specs,
+        "drift:share=0.5,frames=5",
+        CullingTest::Sphere,
+        None,
+    );
+    for subject in &part.subjects {
+        assert_eq!(subject.verdict, Verdict::ok());
+    }
+}
+
+/// A scan whose refits lose the last mover.
+struct Forgetful(Linear, Vec<Aabb>);
+
+impl RegionIndex for Forgetful {
+    const INFO: Info = Linear::INFO.named("forgetful");
+    type Params = NoParams;
+
+    fn build(input: &Input<'_>, _: &NoParams) -> Result<Self, BuildError> {
+        let linear = Linear::build(input, &Default::default())?;
+        Ok(Forgetful(linear, input.items.to_vec()))
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        self.0.memory()
+    }
+
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, context: &mut C) -> ControlFlow<()> {
+        self.0.query(volume, context)
+    }
+
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        for &id in &moved[..moved.len() - 1] {
+            self.1[id as usize] = items[id as usize];
+        }
+        let built = Linear::build(&Input::new(&self.1), &Default::default());
+        built.map(|linear| self.0 = linear).is_ok()
+    }
+}
+
+#[test]
+fn an_update_that_loses_an_item_is_no_right_answer() {
+    let registry = Registry::builtin().with::<Forgetful>();
+    let specs = registry.structures("linear,forgetful").unwrap();
+    let part = part(
+        &specs,
+        "shuffle:share=0.2,frames=20",
+        CullingTest::SixPlane,
+        None,
+    );
+    let verdicts: Vec<Status> = part.subjects.iter().map(|s| s.verdict.status).collect();
+    assert!(
+        verdicts[0] == Status::Ok && verdicts[1].is_failure(),
+        "{verdicts:?}"
+    );
+    let reason = part.subjects[1]
+        .verdict
+        .reason
+        .as_deref()
+        .unwrap_or_default();
+    assert!(reason.starts_with("frame "), "{reason}");
+    let group = Group::of(&[part]);
+    assert_eq!((group.cells[0].rank, group.cells[1].rank), (Some(1), None));
+}
+
+#[test]
+fn policies_are_right_and_fat_bounds_say_what_they_cost() {
+    let wide = || StructureSpec::parse("wide").unwrap();
+    let policies = ["refit", "rebuild", "every=5", "fat=0.5"];
+    let specs = policies.map(|policy| StructureSpec {
+        label: format!("wide@{policy}"),
+        policy: policy.parse().unwrap(),
+        ..wide()
+    });
+    for motion in ["drift:share=0.3,frames=20", "spawn:share=0.3,frames=20"] {
+        let part = part(&specs, motion, CullingTest::SixPlane, None);
+        assert_eq!(part.contradictions(part.known.as_ref().unwrap()), []);
+        let cells = Group::of(&[part]).cells;
+        let extra = |n: usize| cells[n].value("false_positive_count");
+        assert!(
+            cells.iter().all(|cell| cell.status == Status::Ok),
+            "{cells:?}"
+        );
+        assert!(cells[..3].iter().all(|cell| cell.rank.is_some()));
+        assert_eq!((extra(0), cells[3].rank), (None, None));
+        assert!(extra(3) > Some(0.0) && cells[3].value("excess") > Some(0.0));
+    }
+}

@@ -1,0 +1,348 @@
+//! One structure on its way through the frames of a motion.
+//!
+//! Updates, queries, checks of the answers, and clock readings.
+
+use std::collections::BTreeMap;
+
+use super::clock::Stopwatch;
+use super::index_under_test::not_built;
+use super::process_result::Known;
+use super::refitted::over_fresh;
+use super::{Answer, Protocol, Status, TaskKind, Verdict, Workload, input_of};
+use crate::culling::CameraView;
+use crate::geometry::Aabb;
+use crate::index::{DynIndex, StructureSpec, UpdatePolicy};
+use crate::motion::{Motion, Replay};
+use crate::query::ItemId;
+use crate::statistics::median;
+use crate::verify::{Trial, explain_visibility, scan};
+
+/// Frames after which the query time is compared with that of a fresh build.
+pub(super) const AGES: [usize; 4] = [1, 10, 100, 1000];
+
+/// The queries along one path while items move, and their right answers.
+pub(super) struct Frames<'w> {
+    pub(super) workload: &'w Workload<'w>,
+    pub(super) motion: &'w Motion,
+    /// Answers of all queries, frame by frame.
+    pub(super) right: Vec<Answer>,
+}
+
+impl<'w> Frames<'w> {
+    /// The right answers by the scan, unless they are known.
+    pub(super) fn new(
+        workload: &'w Workload<'w>,
+        motion: &'w Motion,
+        known: Option<&Known>,
+    ) -> Frames<'w> {
+        let mut frames = Frames {
+            workload,
+            motion,
+            right: known.map(|known| known.visible.clone()).unwrap_or_default(),
+        };
+        if known.is_none() {
+            let (mut items, mut replay) = (workload.items.to_vec(), motion.replay());
+            let (mut answers, mut ids) = (Vec::new(), Vec::new());
+            for frame in 0..motion.frames() {
+                advance(&mut replay, workload, &mut items);
+                for (_, view) in frames.views(frame) {
+                    ids.clear();
+                    ids.extend(scan(&items, |b| view.as_any().sees(b)));
+                    answers.push(Answer::of(&ids));
+                }
+            }
+            frames.right = answers;
+        }
+        frames
+    }
+
+    /// Queries of a frame with their numbers; frames repeat the path.
+    pub(super) fn views(
+        &self,
+        frame: usize,
+    ) -> impl Iterator<Item = (usize, &'w CameraView)> + use<'w> {
+        let Workload {
+            views,
+            views_per_frame,
+            ..
+        } = self.workload;
+        let queries = (0..*views_per_frame).map(move |n| frame * views_per_frame + n);
+        queries.map(|query| (query, &views[query % views.len()]))
+    }
+
+    /// Compares an answer with the scan's.
+    pub(super) fn check(
+        &self,
+        moving: &Moving,
+        query: usize,
+        out: &[ItemId],
+    ) -> Result<(), Verdict> {
+        if moving.fat.is_none() && self.right.get(query) == Some(&Answer::of(out)) {
+            return Ok(());
+        }
+        let (views, per_frame) = (&self.workload.views, self.workload.views_per_frame);
+        let camera = query % views.len();
+        let view = views[camera].as_any();
+        let mut trial = Trial::new(moving.items.len());
+        trial.see(moving.held(), view);
+        let place = format!("frame {}, camera {camera}", query / per_frame + 1);
+        Err(match trial.ask(|ids| ids.extend(out)) {
+            Ok(_) if moving.fat.is_some() => return Ok(()),
+            Ok(_) => {
+                let reason = format!("{place}: another set than in the first process of the run");
+                Verdict::new(Status::Wrong, reason)
+            }
+            Err(fault) => {
+                let status = Status::of(&fault);
+                let why = |id: usize| Some(explain_visibility(&moving.held()[id], view));
+                Verdict::new(status, format!("{place}: {}", fault.explained(why)))
+            }
+        })
+    }
+}
+
+/// A structure with its own items, on its way through the frames.
+pub(super) struct Moving<'w> {
+    workload: &'w Workload<'w>,
+    spec: &'w StructureSpec,
+    replay: Replay<'w>,
+    /// Bounds as the culling test has them indexed.
+    items: Vec<Aabb>,
+    moved: Vec<ItemId>,
+    /// Enlarged bounds that the index holds in place of the items'.
+    fat: Option<Fat>,
+    frame: u32,
+    pub(super) index: Box<dyn DynIndex>,
+}
+
+impl<'w> Moving<'w> {
+    pub(super) fn build(frames: &Frames<'w>, spec: &'w StructureSpec) -> Result<Self, Verdict> {
+        let Frames {
+            workload, motion, ..
+        } = *frames;
+        let items = workload.items.to_vec();
+        let fat = match spec.policy {
+            UpdatePolicy::Fat(margin) => Some(Fat::of(&items, margin as f32)),
+            _ => None,
+        };
+        let held = fat.as_ref().map_or(&items, |fat| &fat.boxes);
+        let index = spec.build(input_of(workload.scene, held));
+        Ok(Moving {
+            fat,
+            frame: 0,
+            workload,
+            spec,
+            replay: motion.replay(),
+            moved: Vec::new(),
+            index: index.map_err(not_built)?,
+            items,
+        })
+    }
+
+    /// Takes the moves of the next frame; false after the last one.
+    pub(super) fn take_moves(&mut self) -> bool {
+        self.moved.clear();
+        self.frame += 1;
+        let moved = advance(&mut self.replay, self.workload, &mut self.items);
+        moved.map(|ids| self.moved.extend(ids)).is_some()
+    }
+
+    /// Brings the index up to date.
+    pub(super) fn update(&mut self) -> Result<(), Verdict> {
+        let scene = self.workload.scene;
+        let is_rebuilt = match self.spec.policy {
+            UpdatePolicy::Rebuild => true,
+            UpdatePolicy::Every(frames) => self.frame.is_multiple_of(frames),
+            _ => false,
+        };
+        if is_rebuilt {
+            let built = self.spec.build(input_of(scene, &self.items));
+            self.index = built.map_err(not_built)?;
+            return Ok(());
+        }
+        let (items, moved) = match &mut self.fat {
+            None => (&self.items, &self.moved),
+            Some(fat) => {
+                fat.take(&self.items, &self.moved);
+                (&fat.boxes, &fat.left)
+            }
+        };
+        if moved.is_empty() {
+            return Ok(());
+        }
+        let updated = self
+            .spec
+            .update(&mut self.index, input_of(scene, items), moved);
+        updated.map(|_| ()).map_err(not_built)
+    }
+
+    /// The boxes that the index holds.
+    fn held(&self) -> &[Aabb] {
+        self.fat.as_ref().map_or(&self.items, |fat| &fat.boxes)
+    }
+}
+
+/// Writes the next frame as the culling test has the items; returns the movers.
+fn advance<'r>(
+    replay: &'r mut Replay<'_>,
+    workload: &Workload,
+    items: &mut [Aabb],
+) -> Option<&'r [ItemId]> {
+    let ids = replay.advance(items)?;
+    let boxes: Vec<Aabb> = ids.iter().map(|&id| items[id as usize]).collect();
+    for (&id, b) in ids.iter().zip(&*workload.culling.test.items(&boxes)) {
+        items[id as usize] = *b;
+    }
+    Some(ids)
+}
+
+/// Enlarged bounds, and the items that have left theirs.
+struct Fat {
+    /// Margin on each side, in edge lengths.
+    margin: f32,
+    boxes: Vec<Aabb>,
+    left: Vec<ItemId>,
+}
+
+impl Fat {
+    fn of(items: &[Aabb], margin: f32) -> Fat {
+        Fat {
+            margin,
+            boxes: items.iter().map(|b| enlarged(b, margin)).collect(),
+            left: Vec::new(),
+        }
+    }
+
+    /// Enlarges the bounds of the movers that have left theirs.
+    fn take(&mut self, items: &[Aabb], moved: &[ItemId]) {
+        self.left.clear();
+        for &id in moved {
+            let (b, held) = (&items[id as usize], &mut self.boxes[id as usize]);
+            if b.is_empty() != held.is_empty() || !(b.is_empty() || held.contains(b)) {
+                *held = enlarged(b, self.margin);
+                self.left.push(id);
+            }
+        }
+    }
+}
+
+/// A box with a margin in edge lengths on each side; an empty one as it is.
+fn enlarged(b: &Aabb, margin: f32) -> Aabb {
+    if b.is_empty() {
+        return *b;
+    }
+    let by = b.extent() * margin;
+    let larger = Aabb::new((b.min - by).min(b.min), (b.max + by).max(b.max));
+    if larger.is_finite() { larger } else { *b }
+}
+
+/// CPU ns of update, first query and further queries; wall ns of the frame.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Laps {
+    cpu: [f64; 3],
+    pub(super) wall: f64,
+}
+
+impl Laps {
+    /// CPU ns of a kind; of a further query their mean. Above zero.
+    pub(super) fn of(&self, kind: TaskKind, workload: &Workload) -> f64 {
+        let further = workload.views_per_frame.saturating_sub(1).max(1) as f64;
+        let ns = match kind {
+            TaskKind::Update => self.cpu[0],
+            TaskKind::Query => self.cpu[1],
+            TaskKind::Further => self.cpu[2] / further,
+            _ => self.cpu.iter().sum(),
+        };
+        ns.max(1.0)
+    }
+}
+
+/// Times every frame of one replay; `Ok(None)` if stopped.
+pub(super) fn replay(
+    spec: &StructureSpec,
+    frames: &Frames,
+    lap_ns: f64,
+    compares_sets: bool,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Vec<Laps>>, Verdict> {
+    let mut moving = Moving::build(frames, spec)?;
+    let mut outs = vec![Vec::new(); frames.workload.views_per_frame];
+    let mut all = Vec::with_capacity(frames.motion.frames());
+    for frame in 0.. {
+        if !moving.take_moves() {
+            break;
+        }
+        if stop() {
+            return Ok(None);
+        }
+        outs.iter_mut().for_each(Vec::clear);
+        let watch = Stopwatch::start();
+        moving.update()?;
+        let updated = watch.lap();
+        let mut views = frames.views(frame).zip(&mut outs);
+        if let Some(((_, view), out)) = views.next() {
+            moving.index.query(view.as_any(), out);
+        }
+        let first = watch.lap();
+        for ((_, view), out) in views {
+            moving.index.query(view.as_any(), out);
+        }
+        let end = watch.lap();
+        let further = if outs.len() > 1 {
+            end.cpu_ns - first.cpu_ns - lap_ns
+        } else {
+            0.0
+        };
+        let cpu = [updated.cpu_ns, first.cpu_ns - updated.cpu_ns].map(|ns| (ns - lap_ns).max(0.0));
+        all.push(Laps {
+            cpu: [cpu[0], cpu[1], further.max(0.0)],
+            wall: end.wall_ns,
+        });
+        for ((query, _), out) in frames.views(frame).zip(&outs) {
+            let is_right = frames
+                .right
+                .get(query)
+                .is_some_and(|r| r.count == out.len() as u64);
+            if compares_sets || !is_right {
+                frames.check(&moving, query, out)?;
+            }
+        }
+    }
+    Ok(Some(all))
+}
+
+/// CPU time of reading the clock, ns; it is subtracted from each lap.
+pub(super) fn lap_ns() -> f64 {
+    let watch = Stopwatch::start();
+    let mut gaps = [0.0; 255];
+    for gap in &mut gaps {
+        let before = watch.lap();
+        *gap = watch.lap().cpu_ns - before.cpu_ns;
+    }
+    median(&gaps).unwrap_or(0.0)
+}
+
+/// ln of (query time / query time on a fresh build of the same boxes), by frame.
+pub(super) fn ageing(
+    spec: &StructureSpec,
+    frames: &Frames,
+    protocol: &Protocol,
+    stop: &dyn Fn() -> bool,
+) -> BTreeMap<usize, f64> {
+    let mut ages = BTreeMap::new();
+    let Ok(mut moving) = Moving::build(frames, spec) else {
+        return ages;
+    };
+    let last = AGES.into_iter().rfind(|age| *age <= frames.motion.frames());
+    for frame in 1..=last.unwrap_or(0) {
+        if !moving.take_moves() || moving.update().is_err() || stop() {
+            break;
+        }
+        if AGES.contains(&frame) {
+            let aged = moving.index.as_ref();
+            let found = over_fresh(aged, spec, frames.workload, moving.held(), protocol);
+            ages.extend(found.map(|ln| (frame, ln)));
+        }
+    }
+    ages
+}

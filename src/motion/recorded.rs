@@ -1,0 +1,143 @@
+//! Recorded motions: CSV rows of a time, an item and its new bounds.
+
+use std::io::Read;
+
+use glam::DVec3;
+
+use super::REMOVED;
+use crate::geometry::Aabb;
+use crate::input::{InputError, Row, TableReader};
+use crate::query::ItemId;
+use crate::scene::Scene;
+
+const COLUMNS: [&str; 8] = [
+    "time_s", "id", "min_x", "min_y", "min_z", "max_x", "max_y", "max_z",
+];
+
+/// Frames one after another.
+#[derive(Default, Debug)]
+pub(super) struct Recorded {
+    ids: Vec<ItemId>,
+    boxes: Vec<Aabb>,
+    /// Number of rows up to the end of each frame.
+    ends: Vec<usize>,
+}
+
+impl Recorded {
+    pub(super) fn frames(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Ids, ascending, and their bounds.
+    pub(super) fn frame(&self, n: usize) -> (&[ItemId], &[Aabb]) {
+        let first = n.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let rows = first..self.ends[n];
+        (&self.ids[rows.clone()], &self.boxes[rows])
+    }
+
+    pub(super) fn digest(&self, hash: &mut hmac_sha256::Hash) {
+        self.ends
+            .iter()
+            .for_each(|end| hash.update((*end as u64).to_le_bytes()));
+        for (id, b) in self.ids.iter().zip(&self.boxes) {
+            hash.update(id.to_le_bytes());
+            let bits = b.bits();
+            bits.as_flattened()
+                .iter()
+                .for_each(|v| hash.update(v.to_le_bytes()));
+        }
+    }
+
+    /// Ends a frame of rows, each with its line.
+    fn end_frame(
+        &mut self,
+        rows: &mut Vec<(ItemId, u64, Aabb)>,
+        file: &str,
+    ) -> Result<(), InputError> {
+        rows.sort_by_key(|row| (row.0, row.1));
+        if let Some(twice) = rows.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            let found = format!("item {} twice at one time", twice[1].0);
+            return Err(InputError::line(file, twice[1].1, found, "each item once"));
+        }
+        self.ids.extend(rows.iter().map(|row| row.0));
+        self.boxes.extend(rows.iter().map(|row| row.2));
+        self.ends.push(self.ids.len());
+        rows.clear();
+        Ok(())
+    }
+}
+
+/// Reads a motion CSV: `time_s,id,min_x,..,max_z`.
+///
+/// Rows of one time are a frame; a row without bounds removes the item. Numbers are f64 and are rounded outward to f32 about
+/// the scene's origin.
+///
+/// # Errors
+/// The line of the first value that is no number, no box or no item of the scene; a time
+/// before the last one; an item twice at one time; a file without rows.
+pub(super) fn read_motion_csv(
+    input: impl Read,
+    file: &str,
+    scene: &Scene,
+) -> Result<Recorded, InputError> {
+    let mut table = TableReader::open(input, file)?;
+    let columns = table.columns(&COLUMNS)?;
+    table.note_unread(&COLUMNS, &[]);
+    let (mut recorded, mut rows) = (Recorded::default(), Vec::new());
+    let mut last = None;
+    while let Some(row) = table.next_row()? {
+        let row = row?;
+        let time = row.finite_number(columns[0])?;
+        match last {
+            Some(before) if time < before => {
+                let found = format!("time_s {time} after {before}");
+                return Err(row.error(found, "times in ascending order".to_owned()));
+            }
+            Some(before) if time > before => recorded.end_frame(&mut rows, file)?,
+            _ => (),
+        }
+        last = Some(time);
+        rows.push((
+            item(&row, columns[1], scene)?,
+            row.line(),
+            bounds(&row, &columns, scene)?,
+        ));
+    }
+    if last.is_none() {
+        let expected = "at least one row after the header";
+        return Err(InputError::line(file, 2, "no motion", expected));
+    }
+    recorded.end_frame(&mut rows, file)?;
+    Ok(recorded)
+}
+
+fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
+    let (text, items) = (row.text(column), scene.items.len());
+    let id = text.parse::<ItemId>().ok();
+    id.filter(|id| (*id as usize) < items).ok_or_else(|| {
+        let found = format!("id '{}'", crate::shown::shortened(text, 60));
+        let most = items.saturating_sub(1);
+        row.error(found, format!("an item of '{}', 0 to {most}", scene.name))
+    })
+}
+
+fn bounds(row: &Row, columns: &[usize; 8], scene: &Scene) -> Result<Aabb, InputError> {
+    if columns[2..]
+        .iter()
+        .all(|&column| row.text(column).is_empty())
+    {
+        return Ok(REMOVED);
+    }
+    let mut values = [0.0; 6];
+    for (value, &column) in values.iter_mut().zip(&columns[2..]) {
+        *value = row.finite_number(column)?;
+    }
+    let [min, max] = [&values[..3], &values[3..]].map(DVec3::from_slice);
+    let b = Aabb::rounded_outward(min, max, scene.origin);
+    if b.is_finite() && min.cmple(max).all() {
+        return Ok(b);
+    }
+    let found = format!("a box from {:?} to {:?}", min.to_array(), max.to_array());
+    let expected = "min <= max within the range of f32, or no bounds to remove the item";
+    Err(row.error(found, expected.to_owned()))
+}

@@ -1,0 +1,163 @@
+use super::*;
+use crate::scene;
+
+fn scene(source: &str) -> Scene {
+    scene::load(source, &Default::default()).unwrap()
+}
+
+/// The bounds of all items after each frame.
+fn frames(motion: &Motion, scene: &Scene) -> Vec<(Vec<ItemId>, Vec<Aabb>)> {
+    let (mut items, mut replay) = (scene.items.clone(), motion.replay());
+    let mut all = Vec::new();
+    while let Some(ids) = replay.advance(&mut items) {
+        let ids = ids.to_vec();
+        all.push((ids, items.clone()));
+    }
+    all
+}
+
+#[test]
+fn every_motion_repeats_itself_and_stays_within_the_scene() {
+    for source in ["city:n=400", "uniform:n=50"] {
+        let scene = scene(source);
+        for family in MOTIONS {
+            for same in [true, false] {
+                let spec = format!("{}:share=0.2,step=0.73,frames=30,same={same}", family.name);
+                let motion = match Motion::load(&spec, &scene) {
+                    Err(error) => {
+                        assert_eq!(
+                            (family.name, source),
+                            ("traffic", "uniform:n=50"),
+                            "{error}"
+                        );
+                        continue;
+                    }
+                    Ok(motion) => motion,
+                };
+                let all = frames(&motion, &scene);
+                assert!(all == frames(&motion, &scene), "{spec}");
+                let other = Motion::load(&format!("{spec},seed=2"), &scene).unwrap();
+                assert!(all != frames(&other, &scene), "{spec}");
+                let mut before = &scene.items;
+                for (ids, items) in &all {
+                    assert!(ids.is_sorted_by(|a, b| a < b), "{spec}: {ids:?}");
+                    for (id, b) in items.iter().enumerate() {
+                        assert!(b.is_finite());
+                        assert!(b.is_empty() || scene.bounds.contains(b), "{spec}: {b:?}");
+                        let is_mover = ids.binary_search(&(id as ItemId)).is_ok();
+                        assert!(is_mover || *b == before[id], "{spec}: {id}");
+                    }
+                    before = items;
+                }
+                assert_eq!(same, all[0].0 == all[1].0, "{spec}");
+                assert!(all[29].1 != scene.items, "{spec}");
+                let removed = all.iter().any(|(_, items)| items.contains(&REMOVED));
+                assert_eq!(removed, family.name == "spawn");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_step_is_as_long_as_it_says() {
+    let scene = scene("uniform:n=300");
+    let motion = Motion::load("drift:share=1,step=0.1,frames=1", &scene).unwrap();
+    for (b, start) in frames(&motion, &scene)[0].1.iter().zip(&scene.items) {
+        let step = (b.centre() - start.centre()).length();
+        let wanted = 0.1 * start.extent().max_element();
+        // A reflection makes it shorter.
+        assert!(step <= wanted * 1.001, "{step} {wanted}");
+    }
+    let cars = scene_of_cars();
+    let motion = Motion::load("traffic:share=1,frames=1", &cars).unwrap();
+    for (id, b) in frames(&motion, &cars)[0].1.iter().enumerate() {
+        let step = b.centre() - cars.items[id].centre();
+        assert!(step.x == 0.0 || step.y == 0.0, "{step}");
+    }
+}
+
+fn scene_of_cars() -> Scene {
+    scene("city:n=500,block=60,street=20")
+}
+
+#[test]
+fn wrong_specs_are_refused() {
+    let (some, none) = (scene("uniform:n=50"), scene("uniform:n=0"));
+    for (spec, wanted) in [
+        ("drfit", "did you mean 'drift'"),
+        ("drift:speed=1", "unknown parameter of 'drift': 'speed'"),
+        ("drift:share=0", "share=0; expected above 0, at most 1"),
+        ("drift:share=200%", "share=2; expected above 0"),
+        ("drift:step=-1", "step is '-1'; expected a number between"),
+        ("drift:same=yes", "same=yes; expected true or false"),
+        ("drift:frames=0", "frames is '0'; expected a whole number"),
+        ("traffic", "expected a generated city"),
+    ] {
+        let error = Motion::load(spec, &some).err().unwrap().to_string();
+        assert!(error.contains(wanted), "{spec}: {error}");
+    }
+    let error = Motion::load("shuffle", &none).err().unwrap().to_string();
+    assert!(error.contains("expected a scene with items"), "{error}");
+}
+
+const HEADER: &str = "time_s,id,min_x,min_y,min_z,max_x,max_y,max_z\n";
+
+#[test]
+fn recorded_rows_move_and_remove_items() {
+    let scene = scene("uniform:n=5");
+    let text = format!("{HEADER}0,3,1,2,3,4,5,0.1e2\n0,1,,,,,,\n0.5,1,0,0,0,0.1,1,1\n");
+    let recorded = recorded::read_motion_csv(text.as_bytes(), "m.csv", &scene).unwrap();
+    let motion = Motion {
+        name: "m.csv".to_owned(),
+        frames: recorded.frames(),
+        items: 5,
+        source: Source::Recorded(recorded),
+    };
+    let all = frames(&motion, &scene);
+    assert_eq!(all.len(), 2);
+    assert_eq!((&all[0].0[..], &all[1].0[..]), (&[1, 3][..], &[1][..]));
+    assert_eq!((all[0].1[1], all[0].1[3].max.z), (REMOVED, 10.0));
+    // Outward: 0.1 is not in f32.
+    assert!(f64::from(all[1].1[1].max.x) > 0.1);
+    assert_eq!(all[1].1[0], scene.items[0]);
+}
+
+#[test]
+fn errors_of_a_file_name_the_line() {
+    let scene = scene("uniform:n=5");
+    for (rows, wanted) in [
+        ("", "line 2: no motion; expected at least one row"),
+        (
+            "0,5,0,0,0,1,1,1",
+            "line 2: id '5'; expected an item of 'uniform:n=5', 0 to 4",
+        ),
+        ("0,-1,0,0,0,1,1,1", "line 2: id '-1'"),
+        (
+            "0,1,0,0,,1,1,1",
+            "line 2: min_z ''; expected a finite number",
+        ),
+        ("0,1,0,0,nan,1,1,1", "line 2: min_z 'nan'"),
+        ("x,1,0,0,0,1,1,1", "line 2: time_s 'x'"),
+        ("0,1,2,0,0,1,1,1", "line 2: a box from [2.0, 0.0, 0.0]"),
+        ("0,1,0,0,0,1e300,1,1", "line 2: a box from"),
+        (
+            "1,1,0,0,0,1,1,1\n0,1,0,0,0,1,1,1",
+            "line 3: time_s 0 after 1",
+        ),
+        (
+            "1,1,0,0,0,1,1,1\n1,1,0,0,0,1,1,1",
+            "line 3: item 1 twice at one time",
+        ),
+        ("1,1,0,0", "line 2: 4 fields; expected 8"),
+    ] {
+        let text = format!("{HEADER}{rows}\n");
+        let error = recorded::read_motion_csv(text.as_bytes(), "m.csv", &scene);
+        let error = error.unwrap_err().to_string();
+        assert!(
+            error.starts_with("m.csv, ") && error.contains(wanted),
+            "{rows}: {error}"
+        );
+    }
+    let error = recorded::read_motion_csv(&b"time_s,id\n"[..], "m.csv", &scene).unwrap_err();
+    assert!(error.to_string().contains("no column 'min_x'"), "{error}");
+}

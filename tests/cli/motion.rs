@@ -1,0 +1,149 @@
+//! Items that move: `query --motion`, and motions as an axis of `run`.
+
+use std::fs;
+
+use super::process::*;
+use super::runs::{cells, report};
+use super::{BOXES, EYE_LOOK};
+
+const BOUNDS: &str = "min_x,min_y,min_z,max_x,max_y,max_z";
+
+#[test]
+fn query_shows_the_world_after_a_frame() {
+    let scene = format!("{BOXES}\n0,0,0,1,1,1\n5,0,0,6,1,1\n");
+    let cameras = format!("{EYE_LOOK}\n-9,0.5,0.5,0,0.5,0.5\n");
+    // Item 1 leaves the view, item 0 disappears, item 1 returns.
+    let motion = format!("time_s,id,{BOUNDS}\n0,1,-20,0,0,-19,1,1\n1,0,,,,,,\n2.5,1,5,0,0,6,1,1\n");
+    let folder = folder(&[
+        ("scene.csv", scene.as_bytes()),
+        ("cameras.csv", cameras.as_bytes()),
+        ("motion.csv", motion.as_bytes()),
+    ]);
+    let query = "query --scene scene.csv --cameras cameras.csv --ids";
+    for (options, wanted) in [
+        ("", "0 1"),
+        ("--motion motion.csv --frame 0", "0 1"),
+        ("--motion motion.csv --frame 1", "0"),
+        ("--motion motion.csv --frame 2", ""),
+        ("--motion motion.csv", "1"),
+    ] {
+        let all = rows(&works(folder.path(), &format!("{query} {options}")));
+        assert_eq!(all.len(), structure_names().len());
+        assert!(
+            all.iter().all(|row| row["visible_ids"] == wanted),
+            "{options}"
+        );
+    }
+    let refused = |options: &str, wanted: &str| {
+        let line = format!("{query} {options}");
+        assert_refused(&cullbench(folder.path(), &line), wanted, &line);
+    };
+    refused("--motion motion.csv --frame 4", "--frame is 4 | at most 3");
+    refused(
+        "--motion drfit",
+        "unknown motion 'drfit' | did you mean 'drift'",
+    );
+    refused("--motion none.csv", "none.csv");
+    fs::write(
+        folder.path().join("motion.csv"),
+        format!("time_s,id,{BOUNDS}\n0,7,,,,,,\n"),
+    )
+    .expect("writable");
+    refused("--motion motion.csv", "motion.csv, line 2: id '7' | 0 to 1");
+}
+
+const PLAN: &str = "run --scene city:n=300 --path orbit:frames=4 --structure linear,wide,octree,bvh \
+    --motion spawn:share=0.1,frames=12 --motion swarm:frames=10 --views 2 --processes 3";
+
+#[test]
+fn a_motion_is_an_axis_of_a_run() {
+    let folder = folder(&[]);
+    let at = |name: &str| folder.path().join(name);
+    let told = works(folder.path(), &format!("{PLAN} --out r"));
+    let told = unwrapped(&told);
+    assert!(told.contains("queries of the frames"), "{told}");
+    let whole = report(&at("r"));
+    assert_eq!(cells(&whole).len(), 8);
+    for cell in cells(&whole) {
+        assert_eq!(cell["status"], "ok", "{cell}");
+        let of = |name: &str| number(&cell["metrics"][name], "value");
+        for name in [
+            "frame_ns",
+            "update_ns",
+            "query_ns",
+            "further_query_ns",
+            "speedup",
+        ] {
+            assert!(of(name) > 0.0, "{name} in {cell}");
+        }
+        assert!(of("worst_frame_ns") > 0.0);
+        assert!(cell["structure"] != "wide" || of("ageing_10") > 0.0);
+        assert_eq!(cell["path"]["views_per_frame"], 2);
+    }
+    let summary = rows(&fs::read_to_string(at("r/summary.csv")).expect("summary.csv"));
+    assert_eq!(summary[0]["motion"], "spawn:share=0.1,frames=12");
+    assert_eq!(summary[7]["motion"], "swarm:frames=10");
+    assert!(summary.iter().all(|row| !row["frame_ns"].is_empty()));
+
+    // A run that was cut short continues and has the same cells.
+    fs::create_dir(at("cut")).expect("a folder");
+    let stream = fs::read_to_string(at("r/stream.jsonl")).expect("a stream");
+    let first: Vec<&str> = stream.lines().take(3).collect();
+    fs::write(at("cut/stream.jsonl"), first.join("\n") + "\n").expect("writable");
+    fs::copy(at("r/samples.csv"), at("cut/samples.csv")).expect("a copy");
+    works(folder.path(), "run --resume --out cut");
+    let resumed = report(&at("cut"));
+    for (a, b) in cells(&whole).iter().zip(cells(&resumed)) {
+        assert_eq!((&a["path"], &a["structure"]), (&b["path"], &b["structure"]));
+        assert_eq!(a["metrics"]["visible_count"], b["metrics"]["visible_count"]);
+    }
+    // Shards are pairs of scene and path.
+    works(
+        folder.path(),
+        &format!("{PLAN} --path spin:frames=4 --shard 1/2 --out a"),
+    );
+    works(
+        folder.path(),
+        &format!("{PLAN} --path spin:frames=4 --shard 2/2 --out b"),
+    );
+    works(folder.path(), "merge a b --out both");
+    assert_eq!(cells(&report(&at("both"))).len(), 16);
+
+    let same = works(folder.path(), "compare r r --format json");
+    let compared = json(&same);
+    let of = |metric: &str| {
+        let rows = array(&compared, "rows").iter();
+        rows.filter(|row| row["metric"] == metric).count()
+    };
+    assert_eq!((of("query_ns"), of("frame_ns")), (8, 8), "{same}");
+    let page = fs::read_to_string(at("r/report.html")).expect("a page");
+    assert!(page.contains("swarm:frames=10"), "no motion on the page");
+}
+
+#[test]
+fn motions_that_cannot_be_measured_are_refused() {
+    let folder = folder(&[]);
+    let run = "run --scene uniform:n=50 --path orbit:frames=4 --out r";
+    for (options, wanted) in [
+        ("--motion drift --cold", "--motion | --cold"),
+        ("--views 2", "--motion"),
+        ("--motion drift --views 0", "--views | 1 to 1000"),
+        ("--motion drift --motion drift", "named twice"),
+        ("--motion traffic", "expected a generated city"),
+        ("--motion drift:share=2", "share=2; expected above 0"),
+        ("--suite full --motion drift", "cold caches"),
+    ] {
+        let line = match options.starts_with("--suite") {
+            true => format!("run {options} --out r"),
+            false => format!("{run} {options}"),
+        };
+        let done = cullbench(folder.path(), &line);
+        assert_eq!(done.code, Some(2), "{line}: {done:?}");
+        let err = unwrapped(&done.err);
+        assert!(
+            wanted.split(" | ").all(|part| err.contains(part)),
+            "{line}: {err}"
+        );
+        assert!(!folder.path().join("r").exists());
+    }
+}

@@ -1,0 +1,51 @@
+//! Structures return the sets of the scan in each frame of each motion.
+
+use cullbench::culling::Culling;
+use cullbench::geometry::{ConvexVolume, Plane};
+use cullbench::index::Registry;
+use cullbench::measure::{Workload, input_of};
+use cullbench::motion::{MOTIONS, Motion};
+use cullbench::verify::Trial;
+use cullbench::{path, scene};
+use glam::Vec3;
+
+/// Frames of each motion, with the same movers and with others in each frame.
+const FRAMES: usize = 120;
+
+#[test]
+fn every_structure_is_right_in_every_frame_of_every_motion() {
+    let scene = scene::load("city:n=150", &Default::default()).unwrap();
+    let way = path::load("orbit:frames=11", &scene, &Default::default()).unwrap();
+    let views = Workload::new(&scene, &way, &Culling::default())
+        .unwrap()
+        .views;
+    let everything = ConvexVolume::from_planes(&[Plane::new(Vec3::X, 1e6)]).unwrap();
+    let structures = Registry::builtin().structures("all").unwrap();
+    for family in MOTIONS {
+        for same in [true, false] {
+            let spec = format!("{}:share=0.15,frames={FRAMES},same={same}", family.name);
+            let motion = Motion::load(&spec, &scene).unwrap();
+            for structure in &structures {
+                let mut items = scene.items.clone();
+                let mut index = structure.build(input_of(&scene, &items)).unwrap();
+                let (mut replay, mut trial) = (motion.replay(), Trial::new(items.len()));
+                for frame in 0..FRAMES {
+                    let moved = replay.advance(&mut items).unwrap().to_vec();
+                    let input = input_of(&scene, &items);
+                    structure.update(&mut index, input, &moved).unwrap();
+                    let view = views[frame % views.len()].as_any();
+                    for volume in [view, (&everything).into()] {
+                        trial.see(&items, volume);
+                        let asked = trial.ask(|ids| index.query(volume, ids));
+                        assert!(
+                            asked.is_ok(),
+                            "{} in frame {frame} of {spec}: {asked:?}",
+                            structure.label
+                        );
+                    }
+                }
+                assert!(replay.advance(&mut items).is_none());
+            }
+        }
+    }
+}
