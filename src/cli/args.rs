@@ -234,7 +234,7 @@ pub struct ReportArgs {
 
 #[derive(Args, Debug)]
 pub struct QueryArgs {
-    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(long)]
     pub scene: String,
     /// Cameras: a cameras CSV or a path spec
@@ -271,7 +271,7 @@ pub struct QueryArgs {
 #[derive(Args, Debug)]
 #[command(override_usage = program::named("cullbench locate [OPTIONS] --scene <SCENE> <--points|--boxes> <FILE>"))]
 pub struct LocateArgs {
-    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(long)]
     pub scene: String,
     #[command(flatten)]
@@ -291,7 +291,9 @@ pub struct LocateArgs {
 #[derive(Args, Debug)]
 #[group(required = true, multiple = false)]
 pub struct SoughtArgs {
-    /// Points CSV (x,y,z): find the regions that contain each point
+    /// Points CSV (x,y,z), or places: find the regions that contain each point.
+    ///
+    /// `places` are the camera places of the scene, such as the spawn points of a map
     #[arg(long, value_name = "FILE")]
     pub points: Option<PathBuf>,
     /// Boxes CSV: find the items that overlap each box (closed bounds)

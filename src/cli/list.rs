@@ -153,8 +153,8 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
             let suites = text::entries(&suites.collect::<Vec<_>>(), text::width());
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, \
-                 glTF or GLB, OBJ, or a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes have licences of their \
-                 own: `{} licences`.\nSuites of `run`:\n{suites}",
+                 glTF or GLB, OBJ, a Doom WAD (maps.wad#MAP07 picks a map), a Quake III BSP, or a \
+                 zip or pk3 with one (pak.pk3#maps/q.bsp).\nReal scenes have licences of their own: `{} licences`.\nSuites of `run`:\n{suites}",
                 program::name()
             );
             (

@@ -10,12 +10,16 @@ use super::compare_structures::{Row, ask_all, write};
 use super::{Ending, load_scene, tell};
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, Registry};
-use crate::input::{read_file, tell_warnings};
+use crate::input::{is_readable, read_file, tell_warnings};
 use crate::measure::Workload;
 use crate::motion::Motion;
 use crate::path::{self, read_points_csv};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
+use crate::spec::SpecError;
+
+/// Points that are the camera places of the scene.
+const PLACES: &str = "places";
 
 /// A column of the answers: its name and its value of a row.
 type Column<'c> = (&'c str, &'c dyn Fn(&Row) -> Value);
@@ -136,6 +140,16 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
 }
 
 fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
+    if file == Path::new(PLACES) && !is_readable(file) {
+        let eyes = scene.places.iter().map(|place| scene.sought(place.eye));
+        if scene.places.is_empty() {
+            let place =
+                "no camera places; expected a points CSV, or a scene with places, such as a map";
+            let error = format_args!("--points {PLACES}: scene '{}' has {place}", scene.name);
+            return Err(SpecError::new(error).into());
+        }
+        return Ok(eyes.collect());
+    }
     let bytes = read_file(file)?;
     let points = read_points_csv(&bytes[..], &file.display().to_string())?.into_iter();
     Ok(points.map(|p| scene.sought(p)).collect())

@@ -21,7 +21,7 @@ pub enum SceneCommand {
 
 #[derive(Args, Debug)]
 pub struct SceneInfoArgs {
-    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// Cameras to show as used: a path, or a cameras CSV
@@ -67,7 +67,7 @@ places and the tree of a map are not written.";
 #[derive(Args, Debug)]
 #[command(after_help = program::named(CONVERT_HELP))]
 pub struct SceneConvertArgs {
-    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(value_name = "INPUT")]
     pub scene: String,
     /// The file to write [default: standard output]
@@ -96,7 +96,7 @@ queries test: children in blocks of sixteen, but for the textbook forms.";
 #[derive(Args, Debug)]
 #[command(after_help = program::named(DRAW_HELP))]
 pub struct SceneDrawArgs {
-    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// A structure whose cells are drawn, e.g. quadtree-textbook:leaf=4

@@ -127,7 +127,7 @@ impl KernelArgs {
 /// The scene, cameras and structures of a study, and its processes.
 #[derive(Args, Debug)]
 pub struct StudyArgs {
-    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(long)]
     pub scene: String,
     /// A camera path: a spec or a cameras CSV

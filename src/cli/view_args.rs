@@ -22,7 +22,7 @@ drawing only; the sets of a view are those of `query --ids`.";
 #[derive(Args, Debug)]
 #[command(after_help = VIEW_HELP)]
 pub struct ViewArgs {
-    /// A scene: boxes CSV, glTF, OBJ, Doom WAD, built-in name or spec
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(long)]
     pub scene: String,
     /// A camera path: a spec or a cameras CSV

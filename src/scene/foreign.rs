@@ -8,7 +8,7 @@ const MESH: &str = "glTF or OBJ exported from it, or its boxes as CSV (docs/CAPT
 const POINTS: &str = "its objects as boxes CSV (docs/CAPTURE.md)";
 const TILES: &str = "its tiles as glTF, or their boxes as CSV (docs/CAPTURE.md)";
 const PACKED: &str = "the file that is compressed in it";
-const PICTURE: &str = "boxes CSV, glTF, OBJ or a Doom WAD";
+const PICTURE: &str = "boxes CSV, glTF, OBJ, a Doom WAD or a Quake III map";
 
 /// Name, beginning (none: told by the extension alone), extension, and what to do.
 const FORMATS: [(&str, &[u8], &str, &str); 24] = [

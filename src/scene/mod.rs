@@ -14,6 +14,7 @@ mod foreign;
 mod forest;
 mod generate;
 mod gltf;
+mod ibsp;
 mod labels;
 mod layouts;
 mod lumps;
@@ -54,6 +55,7 @@ pub use disputes::{Dispute, Linedef};
 pub use fetched::{FETCHED, Fetched};
 pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
 pub use gltf::read_gltf;
+pub use ibsp::{LeafChild, LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
 pub use obj::read_obj;
@@ -147,6 +149,10 @@ pub enum Regions {
     /// The leaves of a map's own 2-D BSP tree: every point of the map belongs
     /// to exactly one, whatever its height.
     Bsp(Arc<WadMap>),
+    /// The open leaves of a map's own BSP tree.
+    ///
+    /// A point belongs to one, or to none if it lies in the solid.
+    Leaves(Arc<QuakeMap>),
 }
 
 impl Regions {
@@ -157,6 +163,7 @@ impl Regions {
             Regions::Items => items,
             Regions::Tiling(tiling) => &tiling.boxes,
             Regions::Bsp(map) => &map.tree.boxes,
+            Regions::Leaves(map) => &map.tree.boxes,
         }
     }
 
@@ -174,6 +181,7 @@ impl Regions {
             Regions::Items => "the items' boxes",
             Regions::Tiling(_) => "a tiling of boxes",
             Regions::Bsp(_) => "the leaves of the map's BSP tree",
+            Regions::Leaves(_) => "the open leaves of the map's BSP tree",
         }
     }
 }

@@ -3,11 +3,13 @@
 use super::UpAxis;
 
 named! {
-    /// Parts of a scene with triangles that are its items.
+    /// Parts of a scene that are its items.
     #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
     pub enum ItemKind, ITEM_KINDS {
         #[default] Objects = "objects", "objects, groups and nodes of the file";
         Triangles = "triangles", "single triangles";
+        Surfaces = "surfaces", "surfaces of a Quake III map, without its brushes";
+        Brushes = "brushes", "brushes of a Quake III map, without its surfaces";
     }
 }
 

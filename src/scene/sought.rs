@@ -69,7 +69,7 @@ impl Scene {
     /// Tests whether candidates for a point need [`Scene::refine`].
     pub fn is_refined(&self, p: &Sought) -> bool {
         let is_rounded = |k: usize| side(p.world[k], self.origin[k], p.local[k]) != 0;
-        matches!(self.regions, Regions::Bsp(_))
+        matches!(self.regions, Regions::Bsp(_) | Regions::Leaves(_))
             || self.region_originals().boxes().is_some()
             || (0..3).any(is_rounded)
     }
@@ -90,6 +90,10 @@ impl Scene {
                 let covers = map.tree.covers(at);
                 retain_from(first, found, |region| covers && map.tree.holds(region, at));
             }
+            Regions::Leaves(map) => {
+                let leaf = map.tree.descend(p.world - self.origin);
+                retain_from(first, found, |region| Some(region) == leaf);
+            }
             _ => retain_from(first, found, |id| self.holds(id, p.world)),
         }
     }
@@ -106,6 +110,10 @@ impl Scene {
         if let Regions::Bsp(map) = &self.regions {
             let at = (p.world - self.origin).truncate();
             return map.tree.descend(at).into_iter().collect();
+        }
+        if let Regions::Leaves(map) = &self.regions {
+            let leaf = map.tree.descend(p.world - self.origin);
+            return leaf.into_iter().collect();
         }
         let count = self.regions.boxes(&self.items).len() as ItemId;
         (0..count).filter(|&id| self.holds(id, p.world)).collect()

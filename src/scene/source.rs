@@ -6,11 +6,12 @@ use std::path::Path;
 
 use super::generate::{Build, COUNT, MOST};
 use super::gltf::{is_gltf, read_gltf};
+use super::ibsp::{is_ibsp, read_ibsp};
 use super::obj::{is_obj, read_obj};
 use super::zip::{self, is_zip};
 use super::{
-    FAMILIES, Family, ItemKind, LoadOptions, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv,
-    foreign, map_names, memory,
+    FAMILIES, Family, ItemKind, LoadOptions, MESHES, Regions, SAMPLES, Sample, Scene, WadMap,
+    boxes_csv, foreign, map_names, memory,
 };
 use crate::input::{InputError, is_readable, note, read_file};
 use crate::spec::{Spec, SpecError, nearest};
@@ -55,6 +56,13 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     let mut scene = read(source, options)?;
     if options.items == ItemKind::Triangles {
         scene = scene.by_triangle(options)?;
+    }
+    let is_of_map = matches!(options.items, ItemKind::Surfaces | ItemKind::Brushes);
+    if is_of_map && !matches!(scene.regions, Regions::Leaves(_)) {
+        let items = options.items.name();
+        let expected =
+            format_args!("{source}: no {items}; expected a Quake III map for --items {items}");
+        return Err(SpecError::new(expected).into());
     }
     if let Some(up) = options.up.filter(|up| *up != scene.up) {
         let (name, own) = (&scene.name, scene.up.name());
@@ -152,6 +160,9 @@ pub fn read_bytes(
     }
     let extension = Path::new(file).extension();
     let is_named = |name: &str| extension.is_some_and(|e| e.eq_ignore_ascii_case(name));
+    if map.is_none() && (is_ibsp(bytes) || is_named("bsp")) {
+        return read_ibsp(bytes, file, name, options);
+    }
     if is_wad(bytes) || map.is_some() || is_named("wad") {
         return Ok(Scene {
             unit: Some("map units"),

@@ -12,7 +12,7 @@ use crate::input::InputError;
 use crate::shown::{first_of, plain, shortened};
 
 /// Endings of the names of scenes.
-const SCENES: [&str; 5] = [".bsp", ".wad", ".gltf", ".glb", ".csv"];
+const SCENES: [&str; 6] = [".bsp", ".wad", ".gltf", ".glb", ".obj", ".csv"];
 /// Names in a message.
 const MOST_NAMED: usize = 16;
 /// Memory that unpacking takes, in sizes of the entry: it grows by doubling.

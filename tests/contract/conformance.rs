@@ -177,12 +177,16 @@ fn build(name: &str, items: &[Aabb]) -> Box<dyn DynIndex> {
     spec.build(items).expect(name)
 }
 
+/// A Quake III map of two rooms.
+const MAP: &str = "tests/data/two_rooms.bsp";
+
 #[test]
 fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
     let families = scene::FAMILIES.iter().map(|f| format!("{}:n=2000", f.name));
     let meshes = scene::MESHES.iter().map(|m| format!("{}:n=20000", m.name));
     let samples = scene::SAMPLES.iter().map(|s| s.name.to_owned());
-    for source in families.chain(meshes).chain(samples) {
+    let maps = [MAP.to_owned()];
+    for source in families.chain(meshes).chain(samples).chain(maps) {
         let scene = scene::load(&source, &Default::default()).expect(&source);
         let built: Vec<_> = Registry::builtin()
             .rows()
@@ -259,7 +263,11 @@ fn memory_and_counters_fit_the_items() {
 
 #[test]
 fn a_maps_own_tree_gives_the_reference_set() {
-    let map = scene::load("freedm-map12", &Default::default()).expect("a sample");
+    ["freedm-map12", MAP].map(own_tree_gives_the_reference_set);
+}
+
+fn own_tree_gives_the_reference_set(source: &str) {
+    let map = scene::load(source, &Default::default()).expect("a map");
     let cameras = path::load("teleport:frames=40", &map, &LensDefaults::default()).expect("a path");
     let workload = Workload::new(&map, &cameras, &Culling::default()).expect("volumes");
     for name in ["bsp", "bsp:builder=import", "bsp-textbook"] {

@@ -22,6 +22,7 @@ mod opening;
 mod portal_clip;
 mod portal_rect;
 mod pvs;
+mod quake;
 mod rooms;
 mod row;
 mod search;

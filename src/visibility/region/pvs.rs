@@ -121,14 +121,25 @@ impl Pvs {
                 regions: sectors,
             });
         }
-        let mut pvs = Pvs::alone(sectors);
-        for from in 0..sectors {
-            for to in 0..sectors {
-                let bit = from * sectors + to;
-                if bytes[bit / 8] >> (bit % 8) & 1 == 0 {
-                    pvs.insert(from as u32, to as u32);
-                }
-            }
+        Pvs::of_pairs(sectors, |from, to| {
+            let bit = from as usize * sectors + to as usize;
+            bytes[bit / 8] >> (bit % 8) & 1 == 0
+        })
+    }
+
+    /// All pairs of regions that a table has; each region sees itself.
+    ///
+    /// # Errors
+    /// Too many regions.
+    pub fn of_pairs(regions: usize, sees: impl Fn(u32, u32) -> bool) -> Result<Pvs, PvsError> {
+        if regions > MOST_REGIONS {
+            return Err(PvsError::TooMany(regions));
+        }
+        let mut pvs = Pvs::alone(regions);
+        let all = 0..regions as u32;
+        for from in all.clone() {
+            let seen = all.clone().filter(|&to| sees(from, to));
+            seen.for_each(|to| pvs.insert(from, to));
         }
         Ok(pvs)
     }

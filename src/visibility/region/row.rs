@@ -38,7 +38,7 @@ pub enum Source {
     PortalRect,
     /// A search with clipped openings.
     PortalClip,
-    /// Pairs of regions read from a file.
+    /// Pairs of regions read from a file, or the table of a Quake III map.
     Claim,
     /// The REJECT table of a map.
     Reject,
@@ -55,7 +55,7 @@ pub const BACK_ENDS: &[BackEnd] = rows! { BackEnd { name, source, guarantee, sum
     "portal-clip", Source::PortalClip, Guarantee::Conservative,
         "openings clipped as convex polygons by those before them";
     "stored-pvs", Source::Claim, Guarantee::Unproven,
-        "the row of the eye's region in a set of pairs read from a file";
+        "the row of the eye's region in a set of pairs, the map's own or read from a file";
     "reject", Source::Reject, Guarantee::Unproven,
         "the row of the eye's sector in the map's REJECT table";
     "exact-pvs", Source::Exact, Guarantee::Conservative,
@@ -72,6 +72,7 @@ impl BackEnd {
             (Regions::Tiling(_), Source::Reject) => false,
             (Regions::Tiling(rooms), Source::Exact) => rooms.boxes.len() <= MOST_EXACT_ROOMS,
             (Regions::Tiling(_), _) => true,
+            (Regions::Leaves(_), source) => source == Source::Claim,
             (Regions::Bsp(map), source) => source != Source::Exact && map.disputes().is_empty(),
             _ => false,
         }

@@ -4,6 +4,7 @@ mod doom;
 mod doom_surfaces;
 mod from_eye;
 mod items;
+mod quake;
 mod rooms;
 mod sight;
 mod stress;

@@ -1,0 +1,342 @@
+//! Quake III maps (IBSP of version 46): surfaces and brushes as items, with their
+//! triangles; the open leaves of the map's own BSP tree as regions; spawn points as camera
+//! places.
+//!
+//! Moving parts are where the file has them, and coordinates are its own.
+
+mod faces;
+mod lumps;
+mod tree;
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use self::faces::{PER_PATCH, bounds_of, brush, brush_box, patch};
+use self::lumps::{Lump, lump};
+pub use self::tree::{LeafChild, LeafNode, LeafTree};
+use super::{
+    CameraPlace, ItemKind, Labels, LoadOptions, Regions, Scene, SurfaceKind, Surfaces, WorldBox,
+    memory,
+};
+use crate::geometry::Aabb;
+use crate::input::{InputError, note};
+
+/// Height of a player's eyes above a spawn point, in map units.
+const EYE_HEIGHT: f64 = 26.0;
+/// Shaders: what fills a brush is solid, or lets light through.
+const SOLID: i32 = 1;
+const TRANSLUCENT: i32 = 0x2000_0000;
+/// Shaders: a surface that is not drawn.
+const NO_DRAW: i32 = 0x80;
+/// Most corners of triangles for each vertex; maps have about two.
+const MOST_CORNERS: u64 = 16;
+
+/// A map's tree, and which of its clusters see each other.
+#[derive(Clone, Debug)]
+pub struct QuakeMap {
+    /// Its open leaves are the regions.
+    pub tree: LeafTree,
+    /// How many clusters there are.
+    pub clusters: usize,
+    /// Bytes of a row, and a row of bits for each cluster; `None` where the map has no
+    /// such table.
+    seen: Option<(usize, Vec<u8>)>,
+}
+
+/// Tells a map by its magic.
+pub fn is_ibsp(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"IBSP")
+}
+
+impl QuakeMap {
+    fn read(bytes: &[u8], file: &str) -> Result<QuakeMap, InputError> {
+        let lump = |number| lump(bytes, file, number);
+        let (nodes, leaves, visibility) = (lump(3)?, lump(4)?, lump(16)?);
+        let stated = |at| match visibility.len() {
+            0..8 => None,
+            _ => usize::try_from(visibility.int(0, at)).ok(),
+        };
+        let table = stated(0).zip(stated(4)).filter(|&(count, row_bytes)| {
+            let rows = count.checked_mul(row_bytes);
+            count.div_ceil(8) <= row_bytes && rows.is_some_and(|rows| rows <= visibility.len() - 8)
+        });
+        if table.is_none() && visibility.len() > 0 {
+            let found = format!("visibility of {} bytes", visibility.len());
+            let expected = "a count, bytes of a row, and a row of bits for each cluster";
+            return Err(visibility.error(0, 0, found, expected));
+        }
+        let count = table.map(|(count, _)| count);
+        let tree = LeafTree::read(&nodes, &leaves, &lump(2)?, count)?;
+        let largest = tree
+            .clusters
+            .iter()
+            .max()
+            .map_or(0, |&last| last as usize + 1);
+        Ok(QuakeMap {
+            clusters: count.unwrap_or(largest),
+            seen: table.map(|(count, row_bytes)| {
+                let rows = &visibility.data[8..8 + count * row_bytes];
+                (row_bytes, rows.to_vec())
+            }),
+            tree,
+        })
+    }
+
+    /// The map's table of which cluster sees which.
+    ///
+    /// `None` where it has none: all are seen then.
+    pub fn sees(&self) -> Option<impl Fn(u32, u32) -> bool> {
+        let (row_bytes, rows) = self.seen.as_ref()?;
+        Some(move |from: u32, to: u32| {
+            let at = from as usize * row_bytes + to as usize / 8;
+            rows[at] >> (to % 8) & 1 == 1
+        })
+    }
+}
+
+/// The items of a map while they are read.
+struct Items {
+    boxes: Vec<WorldBox>,
+    kinds: Labels,
+    surfaces: Surfaces,
+}
+
+impl Items {
+    fn push(
+        &mut self,
+        label: &str,
+        kind: SurfaceKind,
+        bounds: &Aabb,
+        (points, triangles): &faces::Faces,
+    ) {
+        self.boxes.push(WorldBox::of(bounds, DVec3::ZERO));
+        self.kinds.push(label);
+        self.surfaces.push(kind, false, points, triangles);
+    }
+}
+
+/// Effect of a shader on light.
+fn kind_of(shaders: &Lump, shader: usize, is_drawn: bool) -> SurfaceKind {
+    let [flags, contents] = [64, 68].map(|at| shaders.int(shader, at));
+    let hides = contents & (SOLID | TRANSLUCENT) == SOLID;
+    match hides && !(is_drawn && flags & NO_DRAW != 0) {
+        true => SurfaceKind::Opaque,
+        false => SurfaceKind::Clear,
+    }
+}
+
+/// Reads a map as a scene: surfaces first, then brushes, in the order of the file.
+///
+/// # Errors
+/// The first value that is none of the format, by its byte.
+pub fn read_ibsp(
+    bytes: &[u8],
+    file: &str,
+    name: &str,
+    options: &LoadOptions,
+) -> Result<Scene, InputError> {
+    let map = QuakeMap::read(bytes, file)?;
+    let lump = |number| lump(bytes, file, number);
+    let (surfaces, brushes, shaders) = (lump(13)?, lump(8)?, lump(1)?);
+    check_counts(
+        &surfaces,
+        [&lump(10)?, &lump(11)?],
+        [&brushes, &lump(9)?],
+        name,
+        options,
+    )?;
+    let mut items = Items {
+        boxes: Vec::new(),
+        kinds: Labels::new("kind"),
+        surfaces: Surfaces::about(DVec3::ZERO),
+    };
+    let mut bare = 0;
+    let all_but = |other| move |_: &usize| options.items != other;
+    for surface in (0..surfaces.len()).filter(all_but(ItemKind::Brushes)) {
+        let shader = surfaces.index(surface, 0, &shaders)?;
+        match faces_of(&surfaces, surface, [&lump(10)?, &lump(11)?])? {
+            Some((label, bounds, faces)) => {
+                items.push(label, kind_of(&shaders, shader, true), &bounds, &faces);
+            }
+            None => bare += 1,
+        }
+    }
+    if bare > 0 {
+        let what = "surfaces without triangles (flares) are no items";
+        note(&format!("{file}: {bare} {what}"));
+    }
+    let (planes, sides) = (lump(2)?, lump(9)?);
+    for at in (0..brushes.len()).filter(all_but(ItemKind::Surfaces)) {
+        let of_brush = brushes.range(at, 0, &sides)?.map(|side| {
+            let plane = sides.index(side, 0, &planes)?;
+            Ok((planes.vector(plane, 0)?, planes.float(plane, 12)?))
+        });
+        let of_brush = of_brush.collect::<Result<Vec<_>, InputError>>()?;
+        let bounds = brush_box(&brushes, at, &of_brush)?;
+        let kind = kind_of(&shaders, brushes.index(at, 8, &shaders)?, false);
+        let label = match kind {
+            SurfaceKind::Opaque => "brush",
+            _ => "volume",
+        };
+        match brush(&of_brush, &bounds) {
+            Some(faces) => items.push(label, kind, &bounds, &faces),
+            None => {
+                items.boxes.push(WorldBox::of(&bounds, DVec3::ZERO));
+                items.kinds.push(label);
+                items.surfaces.push_box(kind, false, &bounds);
+            }
+        }
+    }
+    // Coordinates are f32 in the file: no other origin.
+    let scene = Scene::about(name, &items.boxes, DVec3::ZERO)?;
+    Ok(Scene {
+        unit: Some("map units"),
+        surfaces: Some(Arc::new(items.surfaces)),
+        own_tree: Some(map.tree.plane_tree()),
+        regions: Regions::Leaves(Arc::new(map)),
+        labels: vec![items.kinds],
+        places: places(&String::from_utf8_lossy(lump(0)?.data), file),
+        ..scene
+    })
+}
+
+/// Refuses a map whose surfaces or brushes share their parts.
+///
+/// It would be much larger in memory than in the file.
+fn check_counts(
+    surfaces: &Lump,
+    [vertices, corners]: [&Lump; 2],
+    [brushes, sides]: [&Lump; 2],
+    name: &str,
+    options: &LoadOptions,
+) -> Result<(), InputError> {
+    let (mut points, mut ends, mut faces) = (0u64, 0u64, 0u64);
+    for i in 0..surfaces.len() {
+        points += surfaces.range(i, 12, vertices)?.len() as u64;
+        ends += surfaces.range(i, 20, corners)?.len() as u64;
+    }
+    for i in 0..brushes.len() {
+        faces += brushes.range(i, 0, sides)?.len() as u64;
+    }
+    let most = [
+        vertices.len() as u64,
+        MOST_CORNERS * vertices.len() as u64,
+        sides.len() as u64,
+    ];
+    if [points, ends, faces]
+        .iter()
+        .zip(most)
+        .any(|(&count, most)| count > most)
+    {
+        let found = format!("{points} vertices, {ends} indices and {faces} sides in all");
+        return Err(surfaces.error(0, 0, found, format!("at most {most:?}")));
+    }
+    let items = (surfaces.len() + brushes.len()) as u64;
+    let triangles = ends / 3 + points * PER_PATCH as u64 / 4 + 4 * faces;
+    let needed = memory::needed_by_items(items, options.structures).saturating_add(
+        memory::needed_by_triangles(triangles, options.per_triangle, 0),
+    );
+    memory::check_fits(
+        name,
+        needed,
+        options.structures,
+        memory::free_for(triangles),
+    )
+}
+
+type Surface = (&'static str, Aabb, faces::Faces);
+
+/// Kind, box and triangles of a surface, if it has any.
+fn faces_of(
+    surfaces: &Lump,
+    i: usize,
+    [vertices, corners]: [&Lump; 2],
+) -> Result<Option<Surface>, InputError> {
+    let of_vertex = |vertex| vertices.vector(vertex, 0);
+    let points = surfaces.range(i, 12, vertices)?.map(of_vertex);
+    let points = points.collect::<Result<Vec<Vec3>, _>>()?;
+    let label = match surfaces.int(i, 8) {
+        1 => "polygon",
+        2 => {
+            let sizes = [96, 100].map(|at| usize::try_from(surfaces.int(i, at)).unwrap_or(0));
+            let [width, height] = sizes;
+            let is_patch = sizes.iter().all(|size| size % 2 == 1 && *size >= 3);
+            if !is_patch || width.checked_mul(height) != Some(points.len()) {
+                let found = format!("a patch of {width} x {height} of {} points", points.len());
+                return Err(surfaces.error(i, 96, found, "odd numbers from 3 on"));
+            }
+            return Ok(Some(("patch", bounds_of(&points), patch(&points, width))));
+        }
+        3 => "mesh",
+        4 => return Ok(None),
+        kind => {
+            let found = format!("surface {i} of type {kind}");
+            return Err(surfaces.error(i, 8, found, "1 to 4"));
+        }
+    };
+    let of_corner = |at: usize| match corners.int(at, 0) {
+        corner if (0..points.len() as i64).contains(&corner.into()) => Ok(corner as u32),
+        corner => {
+            let found = format!("vertex {corner} of surface {i}");
+            Err(corners.error(at, 0, found, format!("less than {}", points.len())))
+        }
+    };
+    let order = surfaces.range(i, 20, corners)?.map(of_corner);
+    let order = order.collect::<Result<Vec<u32>, _>>()?;
+    // They turn right, seen from the front.
+    let triangles = order.chunks_exact(3).map(|c| [c[0], c[2], c[1]]);
+    let triangles: Vec<[u32; 3]> = triangles.collect();
+    Ok((!triangles.is_empty()).then(|| (label, bounds_of(&points), (points, triangles))))
+}
+
+/// The places where players begin, looking as they do.
+fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
+    let (mut places, mut bad) = (Vec::new(), 0);
+    for entity in entities.split('}') {
+        let words: Vec<&str> = entity.split('"').skip(1).step_by(2).collect();
+        let value = |key: &str| {
+            let pair = words.chunks_exact(2).find(|pair| pair[0] == key);
+            pair.map(|pair| pair[1])
+        };
+        let class = value("classname").unwrap_or_default();
+        let is_of_team = class.ends_with("spawn") || class.ends_with("player");
+        if !(class.starts_with("info_player_") || class.starts_with("team_CTF_") && is_of_team) {
+            continue;
+        }
+        let numbers = |key: &str| -> Option<Vec<f64>> {
+            let words = value(key)?.split_whitespace();
+            words
+                .map(|word| word.parse::<f32>().ok().map(f64::from))
+                .collect()
+        };
+        let of_three = |key| <[f64; 3]>::try_from(numbers(key)?).ok().map(DVec3::from);
+        let yaw = || numbers("angle")?.first().copied();
+        let angles = of_three("angles").or_else(|| Some(DVec3::Y * yaw()?));
+        let angles = angles.unwrap_or_default();
+        let Some(origin) = of_three("origin").filter(|at| at.is_finite() && angles.is_finite())
+        else {
+            bad += 1;
+            continue;
+        };
+        let [pitch, yaw] = [angles.x, angles.y].map(f64::to_radians);
+        let level = libm::cos(pitch);
+        places.push(CameraPlace {
+            eye: origin + DVec3::Z * EYE_HEIGHT,
+            forward: DVec3::new(
+                libm::cos(yaw) * level,
+                libm::sin(yaw) * level,
+                -libm::sin(pitch),
+            ),
+        });
+    }
+    if bad > 0 {
+        note(&format!(
+            "{file}: {bad} spawn points without a place are left out"
+        ));
+    }
+    places
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,187 @@
+//! The BSP tree of a Quake III map: which open leaf holds a point, exactly.
+
+use glam::{DVec3, Vec3};
+
+use super::lumps::Lump;
+use crate::arithmetic::Expansion;
+use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
+use crate::input::InputError;
+use crate::query::ItemId;
+
+/// Most nodes on the way to a leaf; maps have less than a hundred.
+const MOST_DEEP: u32 = 1 << 12;
+/// Coordinates are less: they are 32-bit numbers.
+const FARTHEST: f64 = 1e10;
+/// Map units by which boxes are grown: map compilers cut their fractions off.
+const GROWTH: f64 = 1.0;
+
+/// End of a branch, or its next node.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum LeafChild {
+    /// Index of a node.
+    Node(u32),
+    /// Index of an open leaf among the open ones.
+    Open(ItemId),
+    /// A leaf within the solid.
+    Solid,
+}
+
+/// A dividing plane.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct LeafNode {
+    /// Points to the front.
+    pub normal: Vec3,
+    /// Distance from zero: points of the plane have `normal . p = distance`.
+    pub distance: f32,
+    /// Front, with the plane itself, then back.
+    pub children: [LeafChild; 2],
+}
+
+/// A tree whose open leaves are the regions of a map.
+#[derive(Clone, Debug)]
+pub struct LeafTree {
+    /// The root is the first.
+    pub nodes: Vec<LeafNode>,
+    /// Boxes of the open leaves, in the order of the file, grown by a map unit.
+    pub boxes: Vec<Aabb>,
+    /// Cluster of each open leaf.
+    pub clusters: Vec<u32>,
+}
+
+impl LeafNode {
+    /// 1, for the back, where `normal . p < distance`; else 0. Exact.
+    pub fn side(&self, p: DVec3) -> usize {
+        let (n, d) = (self.normal.as_dvec3(), f64::from(self.distance));
+        let value = n.dot(p) - d;
+        // Twice the rounding of three products and three sums.
+        let doubt = (n.abs().dot(p.abs()) + d.abs()) * 8.0 * f64::EPSILON;
+        if value.abs() > doubt {
+            return usize::from(value < 0.0);
+        }
+        let products = (0..3).map(|k| Expansion::product(n[k], p[k]));
+        let sum = products.fold(Expansion::from(-d), |sum, product| &sum + &product);
+        usize::from(sum.sign() < 0)
+    }
+}
+
+impl LeafTree {
+    /// Links the tree; `clusters` is their number, where the file states it.
+    pub fn read(
+        nodes: &Lump,
+        leaves: &Lump,
+        planes: &Lump,
+        clusters: Option<usize>,
+    ) -> Result<LeafTree, InputError> {
+        let reached = reached_leaves(nodes, leaves)?;
+        let most = clusters.unwrap_or(usize::MAX).min(leaves.len());
+        let mut tree = LeafTree {
+            nodes: Vec::with_capacity(nodes.len()),
+            boxes: Vec::new(),
+            clusters: Vec::new(),
+        };
+        let mut children = vec![LeafChild::Solid; leaves.len()];
+        for leaf in (0..leaves.len()).filter(|&leaf| reached[leaf]) {
+            let cluster = leaves.int(leaf, 0);
+            let [min, max] = [8, 20].map(|at| leaves.whole(leaf, at).as_dvec3());
+            // Solid, or without any point.
+            if cluster < 0 || min.cmpgt(max).any() {
+                continue;
+            }
+            if cluster as usize >= most {
+                let found = format!("cluster {cluster} in leafs {leaf}");
+                return Err(leaves.error(leaf, 0, found, format!("less than {most}")));
+            }
+            children[leaf] = LeafChild::Open(tree.boxes.len() as ItemId);
+            let grown = Aabb::rounded_outward(min - GROWTH, max + GROWTH, DVec3::ZERO);
+            tree.boxes.push(grown);
+            tree.clusters.push(cluster as u32);
+        }
+        for node in 0..nodes.len() {
+            let plane = nodes.index(node, 0, planes)?;
+            let child = |at| match nodes.int(node, at) {
+                leaf if leaf < 0 => children.get(!leaf as usize).copied(),
+                node => Some(LeafChild::Node(node as u32)),
+            };
+            tree.nodes.push(LeafNode {
+                normal: planes.vector(plane, 0)?,
+                distance: planes.float(plane, 12)?,
+                // Nodes that nothing leads to may lead anywhere.
+                children: [4, 8].map(|at| child(at).unwrap_or(LeafChild::Solid)),
+            });
+        }
+        Ok(tree)
+    }
+
+    /// The open leaf that holds a point, as its box does. O(depth).
+    pub fn descend(&self, p: DVec3) -> Option<ItemId> {
+        if p.abs().max_element() > FARTHEST {
+            return None;
+        }
+        let mut at = LeafChild::Node(0);
+        while let LeafChild::Node(node) = at {
+            let node = &self.nodes[node as usize];
+            at = node.children[node.side(p)];
+        }
+        let LeafChild::Open(leaf) = at else {
+            return None;
+        };
+        let [min, max] = [self.boxes[leaf as usize].min, self.boxes[leaf as usize].max];
+        let holds = p.cmpge(min.as_dvec3()) & p.cmple(max.as_dvec3());
+        holds.all().then_some(leaf)
+    }
+
+    /// The planes, for structures that can use them.
+    pub fn plane_tree(&self) -> PlaneTree {
+        let node = |node: &LeafNode| PlaneTreeNode {
+            plane: Plane::new(node.normal, -node.distance),
+            children: node.children.map(|child| match child {
+                LeafChild::Node(node) => Some(node),
+                _ => None,
+            }),
+        };
+        PlaneTree {
+            nodes: self.nodes.iter().map(node).collect(),
+            root: Some(0),
+        }
+    }
+}
+
+/// Marks the leaves that the first node leads to.
+///
+/// Those of a map's moving parts have no node.
+///
+/// # Errors
+/// Nodes that form no tree, or a very deep one.
+fn reached_leaves(nodes: &Lump, leaves: &Lump) -> Result<Vec<bool>, InputError> {
+    let error = |node, at, found: String| Err(nodes.error(node, at, found, "a BSP tree"));
+    if nodes.len() == 0 {
+        return error(0, 0, "no nodes".to_owned());
+    }
+    let mut reached = [vec![false; nodes.len()], vec![false; leaves.len()]];
+    reached[0][0] = true;
+    let mut open = vec![(0, 1)];
+    while let Some((node, depth)) = open.pop() {
+        if depth > MOST_DEEP {
+            let found = format!("{depth} nodes, one below the other");
+            let expected = format!("at most {MOST_DEEP}");
+            return Err(nodes.error(node, 0, found, expected));
+        }
+        for at in [4, 8] {
+            let child = nodes.int(node, at);
+            let (of, name, index) = match child < 0 {
+                true => (1, "leaf", !child as usize),
+                false => (0, "node", child as usize),
+            };
+            match reached[of].get_mut(index) {
+                Some(fresh) if !*fresh => *fresh = true,
+                Some(_) => return error(node, at, format!("{name} {index} is reached twice")),
+                None => return error(node, at, format!("{name} {index} does not exist")),
+            }
+            if child >= 0 {
+                open.push((index, depth + 1));
+            }
+        }
+    }
+    let [_, leaves] = reached;
+    Ok(leaves)
+}

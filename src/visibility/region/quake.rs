@@ -1,0 +1,117 @@
+//! Quake III maps: clusters of open leaves as regions.
+//!
+//! Their files have no openings between them; what a cluster sees is a table.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::graph::{Ground, RegionGraph};
+use super::id_set::{IdSet, RegionId};
+use super::pvs::Pvs;
+use crate::scene::{LeafChild, LeafNode, QuakeMap, WorldBox};
+use crate::visibility::Ray;
+
+/// Farthest depth at which rays are followed: beyond every map.
+const FARTHEST: f64 = 1e10;
+
+/// Map units by which boxes are grown: map compilers round corners and planes.
+const SLACK: f64 = 0.125;
+
+/// The ground of a map.
+#[derive(Debug)]
+struct LeafGround(Arc<QuakeMap>);
+
+impl LeafGround {
+    fn node(&self, at: u32) -> &LeafNode {
+        &self.0.tree.nodes[at as usize]
+    }
+
+    fn is_in_leaf(&self, b: &WorldBox, leaf: RegionId) -> bool {
+        b.meets(&WorldBox::of(
+            &self.0.tree.boxes[leaf as usize],
+            DVec3::ZERO,
+        ))
+    }
+}
+
+/// Signed distance of a point from the plane of a node, in lengths of its normal.
+fn value(node: &LeafNode, p: DVec3) -> f64 {
+    node.normal.as_dvec3().dot(p) - f64::from(node.distance)
+}
+
+/// Which sides of a node a box may meet, the front first.
+fn sides(node: &LeafNode, b: &WorldBox) -> [bool; 2] {
+    let (centre, half) = ((b.min + b.max) / 2.0, (b.max - b.min) / 2.0 + SLACK);
+    let (at, reach) = (value(node, centre), node.normal.as_dvec3().abs().dot(half));
+    [at + reach >= 0.0, at - reach <= 0.0]
+}
+
+impl Ground for LeafGround {
+    fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
+        let (mut inside, mut open) = (true, vec![LeafChild::Node(0)]);
+        while let Some(at) = open.pop() {
+            match at {
+                LeafChild::Solid => inside = false,
+                LeafChild::Open(leaf) if self.is_in_leaf(b, leaf) => {
+                    out.push(self.0.tree.clusters[leaf as usize]);
+                }
+                LeafChild::Open(_) => {}
+                LeafChild::Node(node) => {
+                    let node = self.node(node);
+                    let met = node.children.into_iter().zip(sides(node, b));
+                    open.extend(met.filter_map(|(child, is_met)| is_met.then_some(child)));
+                }
+            }
+        }
+        inside
+    }
+
+    /// Regions have no parts: all of their items are found here.
+    fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
+        self.regions_at(b, out);
+    }
+
+    fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
+        let far = ray.far.min(FARTHEST);
+        let mut open = vec![(LeafChild::Node(0), ray.near, far)];
+        while let Some((at, near, far)) = open.pop() {
+            match at {
+                LeafChild::Solid => return,
+                LeafChild::Open(leaf) => {
+                    seen.insert(self.0.tree.clusters[leaf as usize]);
+                }
+                LeafChild::Node(node) => {
+                    let node = self.node(node);
+                    let [a, b] = [near, far].map(|depth| value(node, ray.at(depth)));
+                    let first = usize::from(a < 0.0);
+                    let (here, beyond) = (node.children[first], node.children[1 - first]);
+                    if (a < 0.0) == (b < 0.0) {
+                        open.push((here, near, far));
+                    } else {
+                        let at = (near + (far - near) * (a / (a - b))).clamp(near, far);
+                        open.extend([(beyond, at, far), (here, near, at)]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl RegionGraph {
+    /// The clusters of a map.
+    pub fn of_quake(map: &Arc<QuakeMap>) -> RegionGraph {
+        let parts = vec![Vec::new(); map.clusters];
+        RegionGraph::new(&parts, Vec::new(), Arc::new(LeafGround(map.clone())))
+    }
+}
+
+impl Pvs {
+    /// The table of a map, of what its clusters see.
+    ///
+    /// `None` where the map has none, as all are seen then, or where it is too large.
+    pub fn of_quake(map: &QuakeMap) -> Option<Pvs> {
+        let sees = map.sees()?;
+        Pvs::of_pairs(map.clusters, sees).ok()
+    }
+}
