@@ -5,6 +5,7 @@
 //! program to link once; `FUZZ_READER` selects the reader.
 #![no_main]
 
+mod maps;
 mod runs;
 mod specs;
 mod tables;
@@ -18,10 +19,11 @@ use libfuzzer_sys::fuzz_target;
 type Reader = fn(&[u8]);
 
 /// Readers by the name of their corpus.
-const READERS: [(&str, Reader); 13] = [
+const READERS: [(&str, Reader); 15] = [
     ("boxes", tables::boxes),
     ("cameras", tables::cameras),
     ("gltf", tables::gltf),
+    ("ibsp", maps::ibsp),
     ("obj", tables::obj),
     ("points", tables::points),
     ("pvs", tables::pvs),
@@ -32,6 +34,7 @@ const READERS: [(&str, Reader); 13] = [
     ("stream", runs::stream),
     ("vectors", tables::vectors),
     ("wad", wad::wad),
+    ("zip", maps::zip),
 ];
 
 static READER: LazyLock<Reader> = LazyLock::new(|| {

@@ -1,0 +1,70 @@
+//! Quake III maps, and archives with scenes in them.
+
+use cullbench::index::{Input, Registry};
+use cullbench::scene::{LoadOptions, Regions, part_names, read_bytes, read_ibsp};
+use cullbench::visibility::Ray;
+use cullbench::visibility::region::{IdSet, Pvs, RegionGraph};
+
+use crate::read;
+
+/// Most clusters: pairs of more take seconds.
+const MOST: usize = 256;
+
+pub fn ibsp(bytes: &[u8]) {
+    let options = LoadOptions::default();
+    let Some(scene) = read(read_ibsp(bytes, "fuzz.bsp", "fuzz", &options)) else {
+        return;
+    };
+    let surfaces = scene.surfaces.as_ref().expect("triangles");
+    assert_eq!(surfaces.items(), scene.items.len());
+    for (item, b) in scene.items.iter().enumerate() {
+        let held = surfaces.bounds(item);
+        assert!(b.min.cmple(held.min).all() && b.max.cmpge(held.max).all());
+    }
+    let Regions::Leaves(map) = &scene.regions else {
+        panic!("no leaves");
+    };
+    let structures = Registry::builtin().structures("bsp").expect("a structure");
+    let boxes = Input::new(scene.regions.boxes(&scene.items)).own_tree(scene.own_tree.as_ref());
+    let index = read(structures[0].build(boxes));
+    let graph = RegionGraph::of_quake(map);
+    let mut seen = IdSet::default();
+    for place in &scene.places {
+        let sought = scene.sought(place.eye);
+        let wanted = scene.holding(&sought);
+        let mut found = Vec::new();
+        if let Some(index) = &index {
+            scene.search(&sought, &mut found, |p, out| index.locate(p, out));
+            assert_eq!(found, wanted);
+        }
+        let ray = Ray {
+            origin: place.eye,
+            direction: place.forward,
+            near: 0.0,
+            far: f64::INFINITY,
+        };
+        if graph.len() <= MOST {
+            seen.clear(graph.len());
+            graph.ground().follow(&graph, &ray, &mut seen);
+        }
+    }
+    if graph.len() <= MOST {
+        assert!(Pvs::of_quake(map).is_none_or(|pvs| pvs.len() == graph.len()));
+    }
+}
+
+/// Reads the only scene of an archive, and each that it names.
+pub fn zip(bytes: &[u8]) {
+    // Other bytes are read by other readers.
+    if !bytes.starts_with(b"PK") {
+        return;
+    }
+    let load = |part: Option<&str>| {
+        let options = LoadOptions::default();
+        read(read_bytes(bytes, ["fuzz.zip", "fuzz"], part, &options));
+    };
+    load(None);
+    for name in read(part_names(bytes, "fuzz.zip")).unwrap_or_default() {
+        load(Some(&name));
+    }
+}
