@@ -2,6 +2,7 @@
 //!
 //! Each generated family has a file of its own.
 
+mod animation;
 mod calibrate;
 mod facts;
 mod flythrough;
@@ -23,7 +24,7 @@ use glam::DVec3;
 use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, LensKind, Surroundings};
 use crate::geometry::Aabb;
 use crate::input::{InputError, gigabytes, is_readable, read_file, warn};
-use crate::scene::{self, Scene, SeededRng, UpAxis, WorldBox};
+use crate::scene::{self, PlaceView, Scene, SeededRng, UpAxis, WorldBox};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
@@ -125,7 +126,8 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
         "height=1.7 (above the ground), near=0.1", street::frames;
     "walk", "through the doors of rooms or a Doom map at constant height above the floors",
         "height=1.7 (eyes above the floor; 41 in a Doom map), doors=32 (passed)", walk::frames;
-    "places", "the scene's own camera places (the things of a Doom map)", "", places::frames;
+    "places", "the scene's own camera places (things of a Doom map, cameras of glTF)", "", places::frames;
+    "animation", "the camera that the animation of a glTF file moves, at even times", "", animation::frames;
 };
 
 /// Parameters that every generated path takes.
@@ -179,6 +181,7 @@ pub(crate) struct Pose {
     eye: DVec3,
     forward: DVec3,
     magnification: f64,
+    view: Option<PlaceView>,
 }
 
 impl Pose {
@@ -187,6 +190,7 @@ impl Pose {
             eye,
             forward,
             magnification: 1.0,
+            view: None,
         }
     }
 }
@@ -345,6 +349,8 @@ struct Optics {
     near: f64,
     far: Option<f64>,
     visible: Option<f64>,
+    /// True where the path's own parameters state fovy, aspect, near and far.
+    named: [bool; 4],
 }
 
 impl Optics {
@@ -377,6 +383,7 @@ impl Optics {
             )));
         }
         let visible = spec.text("visible");
+        let named = ["fovy", "aspect", "near", "far"].map(|name| spec.text(name).is_some());
         let visible = visible.map(|text| visible_share(spec, &text, stage.scene.items.len()));
         Ok(Optics {
             fovy_deg: spec.number("fovy", defaults.fovy_deg)?,
@@ -384,15 +391,19 @@ impl Optics {
             near: near.unwrap_or(far.unwrap_or(natural) / 1000.0),
             far,
             visible: visible.transpose()?,
+            named,
         })
     }
 
     fn cameras(&self, path: &str, up: UpAxis, poses: &[Pose]) -> Result<Vec<Camera>, PathError> {
         let camera = |pose: &Pose| -> Result<Camera, CameraError> {
-            let axes = [pose.eye, pose.forward, up_for(pose.forward)];
+            let upward = pose
+                .view
+                .map_or_else(|| up_for(pose.forward), |view| view.up);
+            let axes = [pose.eye, pose.forward, upward];
             let [eye, forward, upward] = axes.map(|v| up.from_z_up(v));
             let frame = Frame::looking_along(eye, forward, upward)?;
-            let lens = Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far)?;
+            let lens = self.lens(pose.view)?;
             let mut camera = Camera { frame, lens };
             if pose.magnification != 1.0 {
                 camera.zoom(pose.magnification)?;
@@ -406,6 +417,34 @@ impl Optics {
             })
         });
         numbered.collect()
+    }
+}
+
+impl Optics {
+    /// The lens of a place, where neither parameters nor a share of items replace it.
+    fn lens(&self, own: Option<PlaceView>) -> Result<Lens, CameraError> {
+        let Some(own) = own else {
+            return Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far);
+        };
+        let [fovy, aspect, near, far] = self.named;
+        let aspect = own.aspect.filter(|_| !aspect).unwrap_or(self.aspect);
+        let fovy_deg = own.fovy_deg.filter(|_| !fovy).unwrap_or(self.fovy_deg);
+        let kind = match own.ortho_height.filter(|_| !fovy) {
+            Some(height) => LensKind::Orthographic { height, aspect },
+            None => LensKind::Perspective { fovy_deg, aspect },
+        };
+        let is_scaled = self.visible.is_some();
+        let near = if near || is_scaled {
+            self.near
+        } else {
+            own.near
+        };
+        let far = if far || is_scaled {
+            self.far
+        } else {
+            own.far.filter(|far| *far <= FARTHEST)
+        };
+        Lens::new(kind, near, far)
     }
 }
 

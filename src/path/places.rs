@@ -1,8 +1,9 @@
-//! The scene's own camera places: where its author put something to look
-//! from. For a Doom map these are its things, at eye height.
+//! The scene's own camera places: things of Doom maps, cameras of glTF.
+//!
+//! Roll and lens are the file's, where it states them.
 
 use super::{PathError, Pose, Stage};
-use crate::scene::CameraPlace;
+use crate::scene::{CameraPlace, PlaceView};
 use crate::spec::Spec;
 
 pub(super) fn frames(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
@@ -14,9 +15,17 @@ pub(super) fn frames(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError
         return Err(PathError::unfit("places", reason));
     }
     let places = stage.scene.places.iter();
-    let pose = |place: &CameraPlace| {
-        let [eye, forward] = [place.eye, place.forward].map(|v| stage.up.to_z_up(v));
-        Pose::new(eye, forward)
-    };
-    Ok(places.map(pose).collect())
+    Ok(places.map(|place| pose(stage, place)).collect())
+}
+
+pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
+    let turned = |v| stage.up.to_z_up(v);
+    let view = place.view.map(|view| PlaceView {
+        up: turned(view.up),
+        ..view
+    });
+    Pose {
+        view,
+        ..Pose::new(turned(place.eye), turned(place.forward))
+    }
 }

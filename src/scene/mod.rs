@@ -24,6 +24,7 @@ mod noise;
 mod obj;
 mod options;
 mod originals;
+mod place;
 mod rng;
 mod rooms;
 mod samples;
@@ -54,13 +55,14 @@ pub(crate) use city::Grid as CityGrid;
 pub use disputes::{Dispute, Linedef};
 pub use fetched::{FETCHED, Fetched};
 pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
-pub use gltf::read_gltf;
+pub use gltf::{CameraAnimation, read_gltf};
 pub use ibsp::{LeafChild, LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
 pub use obj::read_obj;
 pub use options::{ITEM_KINDS, ItemKind, LoadOptions};
 pub use originals::Originals;
+pub use place::{CameraPlace, PlaceView};
 pub use rng::SeededRng;
 pub(crate) use rng::mix64;
 pub use samples::{NOTICE, SAMPLES, Sample};
@@ -125,15 +127,6 @@ impl WorldBox {
     pub fn around(centre: DVec3, size: DVec3) -> Self {
         WorldBox::new(centre - size / 2.0, centre + size / 2.0)
     }
-}
-
-/// A place and direction that the scene itself offers to a camera.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct CameraPlace {
-    /// Position in world coordinates.
-    pub eye: DVec3,
-    /// Direction of view.
-    pub forward: DVec3,
 }
 
 /// The regions of a scene, numbered from zero: the targets of region search.
@@ -211,6 +204,8 @@ pub struct Scene {
     pub labels: Vec<Labels>,
     /// Camera places that the scene offers, for the path `places`.
     pub places: Vec<CameraPlace>,
+    /// The camera that an animation of the file moves.
+    pub animation: Option<Arc<CameraAnimation>>,
     /// The partition that the scene's file brings, local coordinates.
     pub own_tree: Option<PlaneTree>,
     /// Items left out on request (`--skip-bad-items`).
@@ -259,6 +254,7 @@ impl Scene {
             regions: Regions::Items,
             labels: Vec::new(),
             places: Vec::new(),
+            animation: None,
             own_tree: None,
             skipped_items: 0,
         })

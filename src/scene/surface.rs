@@ -271,6 +271,7 @@ impl Scene {
             unit: self.unit,
             labels,
             places: self.places,
+            animation: self.animation,
             ..single.into_scene(self.name)?
         })
     }

@@ -188,6 +188,7 @@ impl WadMap {
             places.push(CameraPlace {
                 eye: base + DVec3::Z * EYE_HEIGHT,
                 forward: DVec3::new(libm::cos(angle), libm::sin(angle), 0.0),
+                view: None,
             });
         }
         // Map coordinates are small integers, exact in f32: no other origin.

@@ -92,3 +92,31 @@ fn its_triangles_and_cameras_reach_the_later_stages() {
         ),
     );
 }
+
+#[test]
+fn its_cameras_keep_their_lens_and_its_animation_is_a_path() {
+    let folder = folder(&[]);
+    let animated = turned().replace("turned.gltf", "animated.gltf");
+    let lens = |path: &str| {
+        let line = format!("scene info {animated} --path {path} --format json");
+        json(&works(folder.path(), &line))["cameras"].clone()
+    };
+    for (path, count) in [("places", 1), ("animation:frames=5", 5)] {
+        let cameras = lens(path);
+        assert_eq!(cameras["camera_count"], count);
+        let fovy = cameras["lens"]["fovy_deg"][0].as_f64().expect("degrees");
+        assert!((fovy - 57.29578).abs() < 1e-5, "{fovy}");
+        assert_eq!(cameras["lens"]["aspect"], serde_json::json!([1.5, 1.5]));
+        assert_eq!(cameras["lens"]["far"], serde_json::json!([99.0, 99.0]));
+    }
+    let typed = lens("places:fovy=40,far=50");
+    assert_eq!(typed["lens"]["fovy_deg"][0], 40.0);
+    assert_eq!(typed["lens"]["far"][1], 50.0);
+    let done = cullbench(folder.path(), "query --scene city:n=9 --cameras animation");
+    assert_eq!(done.code, Some(2));
+    assert!(
+        done.err.contains("no animated camera; expected"),
+        "{}",
+        done.err
+    );
+}

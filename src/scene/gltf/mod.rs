@@ -5,12 +5,17 @@
 //! and then no item of the file has triangles. Skins and morph targets stay in their rest
 //! pose. Source: Khronos Group, glTF 2.0 Specification, 2021.
 
+mod animation;
 mod file;
 mod mesh;
 
-use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat4, DVec3, Vec3};
 use gltf::json::{Index, Value};
 
+pub use self::animation::CameraAnimation;
+use self::animation::{place_of, transform};
 use self::file::{File, component, normalised};
 use self::mesh::{Mesh, Triangles, positions};
 use super::{
@@ -42,7 +47,8 @@ pub fn read_gltf(
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
     let file = File::open(bytes, file)?;
-    let (placed, places) = file.placed()?;
+    let (placed, places, order) = file.placed()?;
+    let animation = file.camera_animation(&order)?;
     let meshes = 0..file.root.meshes.len();
     let numbers = meshes.clone().map(|mesh| file.numbers(mesh));
     let numbers = numbers.fold(0, u64::saturating_add);
@@ -79,9 +85,13 @@ pub fn read_gltf(
         unit: Some("m"),
         labels: vec![labels],
         places,
+        animation: animation.map(Arc::new),
         ..scene
     })
 }
+
+/// Nodes with their parents, parents first.
+type Order = Vec<(usize, Option<usize>)>;
 
 /// A node with a mesh, or one of its instances.
 struct Placed {
@@ -91,8 +101,8 @@ struct Placed {
 }
 
 impl File<'_> {
-    /// Nodes with a mesh and places of cameras, depth first.
-    fn placed(&self) -> Result<(Vec<Placed>, Vec<CameraPlace>), InputError> {
+    /// Nodes with a mesh, places of cameras, and all nodes, depth first.
+    fn placed(&self) -> Result<(Vec<Placed>, Vec<CameraPlace>, Order), InputError> {
         let nodes = &self.root.nodes;
         let roots: Vec<usize> = match self.root.scene.or(match self.root.scenes.is_empty() {
             true => None,
@@ -113,19 +123,20 @@ impl File<'_> {
                 (0..nodes.len()).filter(|&node| is_root[node]).collect()
             }
         };
-        let (mut placed, mut places) = (Vec::new(), Vec::new());
+        let (mut placed, mut places, mut order) = (Vec::new(), Vec::new(), Vec::new());
         let mut reached = vec![false; nodes.len()];
-        let mut open: Vec<(usize, DAffine3)> = roots
+        let mut open: Vec<(usize, Option<usize>, DAffine3)> = roots
             .iter()
             .rev()
-            .map(|&root| (root, DAffine3::IDENTITY))
+            .map(|&root| (root, None, DAffine3::IDENTITY))
             .collect();
-        while let Some((index, parent)) = open.pop() {
+        while let Some((index, above, parent)) = open.pop() {
             let place = format!("nodes[{index}]");
             let node = self.get(nodes, Index::new(index as u32), &place)?;
             if std::mem::replace(&mut reached[index], true) {
                 return Err(self.error(place, "a node that is reached twice", "a tree of nodes"));
             }
+            order.push((index, above));
             let world = parent * self.local(index)?;
             if let Some(mesh) = node.mesh {
                 self.get(&self.root.meshes, mesh, &format!("{place}.mesh"))?;
@@ -146,16 +157,12 @@ impl File<'_> {
                 }
             }
             if node.camera.is_some() {
-                let forward = world.transform_vector3(DVec3::NEG_Z).normalize_or_zero();
-                let eye = world.translation;
-                if forward != DVec3::ZERO {
-                    places.push(CameraPlace { eye, forward });
-                }
+                places.extend(place_of(world, self.lens_of(index)?));
             }
             let children = node.children.iter().flatten().rev();
-            open.extend(children.map(|child| (child.value(), world)));
+            open.extend(children.map(|child| (child.value(), Some(index), world)));
         }
-        Ok((placed, places))
+        Ok((placed, places, order))
     }
 
     /// Transform of a node relative to its parent.
@@ -309,18 +316,6 @@ impl File<'_> {
         }
         Ok(all)
     }
-}
-
-fn transform(
-    translation: Option<[f64; 3]>,
-    rotation: Option<[f64; 4]>,
-    scale: Option<[f64; 3]>,
-) -> DAffine3 {
-    DAffine3::from_scale_rotation_translation(
-        scale.map_or(DVec3::ONE, DVec3::from),
-        rotation.map_or(DQuat::IDENTITY, |r| DQuat::from_array(r).normalize()),
-        translation.map_or(DVec3::ZERO, DVec3::from),
-    )
 }
 
 #[cfg(test)]

@@ -108,6 +108,81 @@ fn items_are_the_boxes_of_the_transformed_triangles() {
     );
 }
 
+/// The file with its camera turned by 90 degrees about y, from second 1 to 3.
+fn animated() -> Value {
+    let mut file = file();
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let numbers = [1.0, 3.0, 0.0, 0.0, 0.0, 1.0, 0.0, half, 0.0, half];
+    let bytes: Vec<u8> = numbers.iter().flat_map(|n: &f32| n.to_le_bytes()).collect();
+    let mut push = |place: &str, value: Value| {
+        let all = file[place].as_array_mut().expect("an array");
+        all.push(value);
+    };
+    let uri = format!("data:;base64,{}", STANDARD.encode(bytes));
+    push("buffers", json!({"byteLength": 40, "uri": uri}));
+    push("bufferViews", json!({"buffer": 1, "byteLength": 8}));
+    push(
+        "bufferViews",
+        json!({"buffer": 1, "byteOffset": 8, "byteLength": 32}),
+    );
+    let accessor = |view: u32, kind: &str| json!({"bufferView": view, "componentType": 5126, "count": 2, "type": kind});
+    push("accessors", accessor(2, "SCALAR"));
+    push("accessors", accessor(3, "VEC4"));
+    file["animations"] = json!([{
+        "channels": [{"sampler": 0, "target": {"node": 2, "path": "rotation"}}],
+        "samplers": [{"input": 2, "output": 3}],
+    }]);
+    file
+}
+
+#[test]
+fn cameras_have_their_lens_and_move_as_animated() {
+    let scene = read(&animated()).unwrap();
+    let view = scene.places[0].view.expect("a lens");
+    let wanted = [Some(1f64.to_degrees()), None, None];
+    assert_eq!([view.fovy_deg, view.aspect, view.far], wanted);
+    assert!((view.near - 0.1).abs() < 1e-6 && view.up.distance(DVec3::Y) < 1e-6);
+    let forward = |scene: &Scene, time: f64| {
+        let animation = scene.animation.as_ref().expect("an animation");
+        assert_eq!(animation.seconds, [1.0, 3.0]);
+        let place = animation.at(time).expect("a direction");
+        assert_eq!((place.eye, place.view), (scene.places[0].eye, Some(view)));
+        place.forward
+    };
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let turned = [DVec3::NEG_Z, DVec3::new(-half, 0.0, -half), DVec3::NEG_X];
+    for (time, wanted) in [0.0, 2.0, 9.0].into_iter().zip(turned) {
+        assert!(forward(&scene, time).distance(wanted) < 1e-6, "{time}");
+    }
+    let mut stepped = animated();
+    stepped["animations"][0]["samplers"][0]["interpolation"] = json!("STEP");
+    assert_eq!(forward(&read(&stepped).unwrap(), 2.9), DVec3::NEG_Z);
+    let mut parallel = animated();
+    let lens = json!({"xmag": 3, "ymag": 2, "znear": 0, "zfar": 9});
+    parallel["cameras"] = json!([{"type": "orthographic", "orthographic": lens}]);
+    let view = read(&parallel).unwrap().places[0].view.expect("a lens");
+    let numbers = [view.ortho_height, view.aspect, view.far];
+    assert_eq!(numbers, [Some(4.0), Some(1.5), Some(9.0)]);
+    for (place, value, wanted) in [
+        (
+            "/accessors/2/count",
+            json!(1),
+            "animations[0].channels[0]: 1 times and 2 values",
+        ),
+        (
+            "/animations/0/channels/0/sampler",
+            json!(4),
+            "animations[0].channels[0]: index 4",
+        ),
+        ("/nodes/2/camera", json!(1), "nodes[2].camera: index 1"),
+    ] {
+        let mut file = animated();
+        *file.pointer_mut(place).unwrap() = value;
+        let error = read(&file).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{place}: {error}");
+    }
+}
+
 #[test]
 fn compressed_meshes_and_points_have_the_boxes_of_their_bounds() {
     let mut compressed = file();

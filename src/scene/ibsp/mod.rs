@@ -328,6 +328,7 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
                 libm::sin(yaw) * level,
                 -libm::sin(pitch),
             ),
+            view: None,
         });
     }
     if bad > 0 {

@@ -1,0 +1,251 @@
+//! Cameras of a glTF file: lenses, and the animation that moves one.
+//!
+//! Between keys, translations and scales are interpolated linearly and rotations along the
+//! arc, also for cubic splines.
+
+use std::array;
+use std::collections::HashMap;
+use std::iter::successors;
+
+use glam::{DAffine3, DQuat, DVec3, DVec4};
+use gltf::json::animation::{Channel, Interpolation, Property};
+use gltf::json::camera::Camera;
+use gltf::json::validation::Checked;
+
+use super::file::File;
+use crate::input::InputError;
+use crate::scene::{CameraPlace, PlaceView};
+
+/// The animated camera of a file.
+#[derive(Clone, Debug)]
+pub struct CameraAnimation {
+    /// From the root to the camera.
+    chain: Vec<Motion>,
+    lens: Option<PlaceView>,
+    /// Seconds of the first and of the last key.
+    pub seconds: [f64; 2],
+}
+
+impl CameraAnimation {
+    /// The camera at a time in seconds; `None` where its transform has no direction.
+    pub fn at(&self, time: f64) -> Option<CameraPlace> {
+        let own = self.chain.iter().map(|motion| motion.at(time));
+        let world = own.fold(DAffine3::IDENTITY, |above, own| above * own);
+        place_of(world, self.lens)
+    }
+}
+
+/// Transform of a node over time.
+#[derive(Clone, Debug)]
+struct Motion {
+    still: DAffine3,
+    /// Translation, rotation and scale of the node, and their keys.
+    parts: [(Option<DVec4>, Option<Track>); 3],
+}
+
+#[derive(Clone, Debug)]
+struct Track {
+    times: Vec<f64>,
+    values: Vec<DVec4>,
+    interpolation: Interpolation,
+}
+
+impl Motion {
+    fn at(&self, time: f64) -> DAffine3 {
+        if self.parts.iter().all(|(_, track)| track.is_none()) {
+            return self.still;
+        }
+        let [moved, turned, scaled] = array::from_fn(|part| match &self.parts[part] {
+            (_, Some(track)) => Some(track.at(time, part == 1)),
+            (still, None) => *still,
+        });
+        let three = |value: Option<DVec4>| value.map(|v| v.truncate().to_array());
+        transform(three(moved), turned.map(|v| v.to_array()), three(scaled))
+    }
+}
+
+impl Track {
+    fn at(&self, time: f64, is_rotation: bool) -> DVec4 {
+        let next = self.times.partition_point(|key| *key <= time);
+        let last = next.saturating_sub(1);
+        let (from, Some(to)) = (self.values[last], self.values.get(next)) else {
+            return self.values[last];
+        };
+        if next == 0 || self.interpolation == Interpolation::Step {
+            return from;
+        }
+        let share = (time - self.times[last]) / (self.times[next] - self.times[last]);
+        match is_rotation {
+            false => from.lerp(*to, share),
+            true => {
+                let [from, to] = [from, *to].map(|v| DQuat::from_vec4(v).normalize());
+                from.slerp(to, share).into()
+            }
+        }
+    }
+}
+
+/// A camera with this transform; `None` if it has no direction.
+pub fn place_of(world: DAffine3, lens: Option<PlaceView>) -> Option<CameraPlace> {
+    let [forward, up] =
+        [DVec3::NEG_Z, DVec3::Y].map(|axis| world.transform_vector3(axis).normalize_or_zero());
+    (forward != DVec3::ZERO).then_some(CameraPlace {
+        eye: world.translation,
+        forward,
+        view: lens.map(|lens| PlaceView { up, ..lens }),
+    })
+}
+
+/// An affine transform of the parts that a node states.
+pub fn transform(
+    translation: Option<[f64; 3]>,
+    rotation: Option<[f64; 4]>,
+    scale: Option<[f64; 3]>,
+) -> DAffine3 {
+    DAffine3::from_scale_rotation_translation(
+        scale.map_or(DVec3::ONE, DVec3::from),
+        rotation.map_or(DQuat::IDENTITY, |r| DQuat::from_array(r).normalize()),
+        translation.map_or(DVec3::ZERO, DVec3::from),
+    )
+}
+
+/// The lens of a camera; its up vector is of no meaning.
+fn lens(camera: &Camera) -> Option<PlaceView> {
+    let parallel = camera.orthographic.as_ref().map(|lens| PlaceView {
+        up: DVec3::Y,
+        fovy_deg: None,
+        ortho_height: Some(2.0 * f64::from(lens.ymag)),
+        aspect: Some(f64::from(lens.xmag) / f64::from(lens.ymag)),
+        near: lens.znear.into(),
+        far: Some(lens.zfar.into()),
+    });
+    let perspective = camera.perspective.as_ref().map(|lens| PlaceView {
+        up: DVec3::Y,
+        fovy_deg: Some(f64::from(lens.yfov).to_degrees()),
+        ortho_height: None,
+        aspect: lens.aspect_ratio.map(f64::from),
+        near: lens.znear.into(),
+        far: lens.zfar.map(f64::from),
+    });
+    perspective.or(parallel)
+}
+
+impl File<'_> {
+    /// Lens of the camera of a node, if it states one.
+    pub fn lens_of(&self, node: usize) -> Result<Option<PlaceView>, InputError> {
+        let Some(camera) = self.root.nodes[node].camera else {
+            return Ok(None);
+        };
+        let place = format!("nodes[{node}].camera");
+        Ok(lens(self.get(&self.root.cameras, camera, &place)?))
+    }
+
+    /// The first camera that an animation moves, by its first animation.
+    ///
+    /// `order` has the nodes with their parents, parents first.
+    pub fn camera_animation(
+        &self,
+        order: &[(usize, Option<usize>)],
+    ) -> Result<Option<CameraAnimation>, InputError> {
+        let mut channels: HashMap<usize, Vec<(usize, usize, &Channel)>> = HashMap::new();
+        for (clip, animation) in self.root.animations.iter().enumerate() {
+            for (number, channel) in animation.channels.iter().enumerate() {
+                if part(channel).is_some() {
+                    let own = channels.entry(channel.target.node.value()).or_default();
+                    own.push((clip, number, channel));
+                }
+            }
+        }
+        let mut parents = vec![None; self.root.nodes.len()];
+        let mut moved = vec![false; parents.len()];
+        let camera = order.iter().find(|&&(node, parent)| {
+            parents[node] = parent;
+            moved[node] = channels.contains_key(&node) || parent.is_some_and(|node| moved[node]);
+            moved[node] && self.root.nodes[node].camera.is_some()
+        });
+        let Some(&(camera, _)) = camera else {
+            return Ok(None);
+        };
+        let mut nodes: Vec<usize> = successors(Some(camera), |node| parents[*node]).collect();
+        nodes.reverse();
+        let own = nodes.iter().filter_map(|node| channels.get(node)).flatten();
+        let first = own.map(|(clip, ..)| *clip).min();
+        let (mut chain, mut seconds) = (Vec::new(), [f64::INFINITY, f64::NEG_INFINITY]);
+        for index in nodes {
+            let node = &self.root.nodes[index];
+            let three = |v: [f32; 3]| DVec3::from(v.map(f64::from)).extend(0.0);
+            let mut parts = [
+                (node.translation.map(three), None),
+                (
+                    node.rotation.as_ref().map(|r| r.0.map(f64::from).into()),
+                    None,
+                ),
+                (node.scale.map(three), None),
+            ];
+            for (clip, number, channel) in channels.get(&index).into_iter().flatten() {
+                if let (true, Some(part)) = (Some(*clip) == first, part(channel)) {
+                    let place = format!("animations[{clip}].channels[{number}]");
+                    let track = self.track(*clip, channel, part, &place)?;
+                    let ends = [track.times.first(), track.times.last()];
+                    seconds[0] = seconds[0].min(*ends[0].expect("keys"));
+                    seconds[1] = seconds[1].max(*ends[1].expect("keys"));
+                    parts[part].1 = Some(track);
+                }
+            }
+            let still = self.local(index)?;
+            chain.push(Motion { still, parts });
+        }
+        Ok(Some(CameraAnimation {
+            chain,
+            lens: self.lens_of(camera)?,
+            seconds,
+        }))
+    }
+
+    fn track(
+        &self,
+        clip: usize,
+        channel: &Channel,
+        part: usize,
+        place: &str,
+    ) -> Result<Track, InputError> {
+        let samplers = &self.root.animations[clip].samplers;
+        let sampler = self.get(samplers, channel.sampler, place)?;
+        let numbers = |accessor, width| match self.values(accessor, width, place)? {
+            Ok(values) => Ok(values),
+            Err(reason) => Err(self.error(place.to_owned(), reason, "plain accessors")),
+        };
+        let width = if part == 1 { 4 } else { 3 };
+        let (times, values) = (numbers(sampler.input, 1)?, numbers(sampler.output, width)?);
+        let value = |v: &[f64]| DVec4::new(v[0], v[1], v[2], v.get(3).copied().unwrap_or(0.0));
+        let mut values: Vec<DVec4> = values.chunks_exact(width).map(value).collect();
+        let Checked::Valid(interpolation) = sampler.interpolation else {
+            return Err(self.error(place.to_owned(), "an unknown interpolation", "LINEAR"));
+        };
+        if interpolation == Interpolation::CubicSpline {
+            // Each between its tangents.
+            values = values.into_iter().skip(1).step_by(3).collect();
+        }
+        let ascend = times.is_sorted_by(|a, b| a < b) && times.iter().all(|t| t.is_finite());
+        if !ascend || times.is_empty() || times.len() != values.len() {
+            let found = format!("{} times and {} values", times.len(), values.len());
+            let expected = "ascending times with a value each";
+            return Err(self.error(place.to_owned(), found, expected));
+        }
+        Ok(Track {
+            times,
+            values,
+            interpolation,
+        })
+    }
+}
+
+/// Part of a transform that a channel moves; `None` for weights of morph targets.
+fn part(channel: &Channel) -> Option<usize> {
+    match channel.target.path {
+        Checked::Valid(Property::Translation) => Some(0),
+        Checked::Valid(Property::Rotation) => Some(1),
+        Checked::Valid(Property::Scale) => Some(2),
+        _ => None,
+    }
+}
