@@ -5,8 +5,8 @@
 use glam::Vec3;
 
 use super::aabb::held;
-use super::{Aabb, Ball, BoxCorner, Plane, PlaneF64, SphereMargin};
-use crate::kernel::{Isa, Plain, each, first_lanes, prefetch};
+use super::{Aabb, BoxCorner, Plane, PlaneF64, SphereMargin};
+use crate::kernel::{Isa, each, first_lanes, prefetch};
 
 /// Boxes of one block, and one bit for each of them.
 pub use crate::kernel::{LANES, LaneMask};
@@ -159,36 +159,40 @@ impl BoxBlock {
     /// The lanes whose sphere none of the planes drops: bit for bit
     /// [`Spheres::drops`](super::Spheres::drops), lane by lane.
     #[inline(always)]
-    pub fn admitted_as_spheres<'p>(
+    pub fn admitted_as_spheres<'p, I: Isa>(
         &self,
+        isa: I,
         planes: impl Iterator<Item = (&'p Plane, BoxCorner, &'p SphereMargin)>,
     ) -> LaneMask {
-        // Row by row, like the block itself: centre x, y, z, radius, reach.
-        let mut balls = [[0.0; LANES]; 5];
-        for lane in 0..LANES {
-            let ball = Ball::in_cube(&self.get(lane));
-            let values = ball.centre.to_array().into_iter();
-            let values = values.chain([ball.radius, ball.reach]);
-            for (row, value) in balls.iter_mut().zip(values) {
-                row[lane] = value;
-            }
-        }
-        let [x, y, z, radius, reach] = balls;
-        let mut dropped = [0; LANES];
+        // `Ball::in_cube`, with the same roundings.
+        let times = |x: f32, row: usize| isa.mul(isa.splat(x), isa.load(&self.rows[row]));
+        let centre = |k: usize| {
+            let middle = isa.add(times(0.5, k), times(0.5, k + 3));
+            let least = isa.max(middle, isa.load(&self.rows[k]));
+            isa.min(least, isa.load(&self.rows[k + 3]))
+        };
+        let half = |k: usize| isa.add(times(0.5, k + 3), times(-0.5, k));
+        let farthest = |k: usize| isa.max(times(-1.0, k), isa.load(&self.rows[k + 3]));
+        let [x, y, z] = [centre(0), centre(1), centre(2)];
+        let radius = isa.min(isa.min(half(0), half(1)), half(2));
+        let reach = isa.max(isa.max(farthest(0), farthest(1)), farthest(2));
+        // Cubes cut off at the end of f32 have no sphere.
+        let whole = !isa.at_most(isa.splat(f32::MAX), reach);
+        let mut dropped = 0;
         for (plane, corner, margin) in planes {
-            let far = values_at(Plain, plane, self.corner_rows(corner));
-            for lane in 0..LANES {
-                let ball = Ball {
-                    centre: Vec3::new(x[lane], y[lane], z[lane]),
-                    radius: radius[lane],
-                    reach: reach[lane],
-                };
-                let value = margin.value_at(plane.normal, &ball);
-                let drops = (far[lane] < 0.0) | (f32::MIN..0.0).contains(&value);
-                dropped[lane] |= if drops { LANE_BITS[lane] } else { 0 };
-            }
+            let along = |n: f32, c: I::Floats| isa.mul(isa.splat(n), c);
+            let n = plane.normal;
+            let sum = isa.add(isa.add(along(n.x, x), along(n.y, y)), along(n.z, z));
+            let sum = isa.add(
+                isa.add(sum, isa.splat(margin.d)),
+                along(margin.length, radius),
+            );
+            let value = isa.add(sum, along(margin.slope, reach));
+            let is_number = isa.at_most(isa.splat(f32::MIN), value);
+            let far = values_at(isa, plane, self.corner_rows(corner));
+            dropped |= isa.below_zero(far) | (isa.below_zero(value) & is_number & whole);
         }
-        !joined(&dropped)
+        !dropped
     }
 
     /// The boxes as seen from `eye`: [`Aabb::relative_to`] lane by lane.

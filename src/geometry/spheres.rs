@@ -1,7 +1,7 @@
 //! Culling by bounding spheres.
 //!
 //! An index holds the cube about each sphere. A margin keeps the sphere test on the safe
-//! side of the box test.
+//! side of the box test. `balls` has the same test on blocks of centres and radii.
 
 use glam::Vec3;
 
@@ -79,6 +79,11 @@ pub struct SphereMargin {
     pub slope: f32,
     /// The plane's offset with the rest of the margin.
     pub d: f32,
+    /// Normal and offset divided by the length, rounded.
+    pub unit: [f32; 4],
+    /// Distances from the plane that rounding may get wrong: per unit of reach, for a
+    /// reach of 0, and the largest reach without overflow.
+    pub doubt: [f32; 3],
 }
 
 impl SphereMargin {
@@ -88,6 +93,11 @@ impl SphereMargin {
     /// contradicted, 6 in the sphere's dot product, 3 in `radius * length`, 2
     /// between the centre of the cube and that of the sphere; 15 in all.
     const ROUNDINGS: f64 = 24.0;
+    /// Roundings between the sum over centre and radius for the plane of length 1 and
+    /// both tests of [`Spheres::drops`], of the sum `2 |n|_1 * reach + |d|`: 24 for the
+    /// margin above and 15 for what it covers, 4 from cube to sphere, 12 of the sum itself
+    /// and of the division.
+    const OF_BOTH: f64 = 96.0;
 
     fn of(plane: &Plane) -> SphereMargin {
         const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
@@ -98,10 +108,24 @@ impl SphereMargin {
         let size = normal.abs().element_sum();
         let d = f64::from(plane.d);
         let margin = Self::ROUNDINGS * UNIT_ROUNDOFF;
+        let length = normal.length();
+        let [x, y, z, unit_d] = [normal.x, normal.y, normal.z, d].map(|x| x / length);
+        let (both, tiny) = (Self::OF_BOTH * UNIT_ROUNDOFF, TINY * 64.0 * (1.0 + size));
+        // An eighth leaves room for three terms, each twice.
+        let most = f64::from(f32::MAX / 8.0);
+        let rest = (both * d.abs() + tiny) / length + tiny;
+        let most_reach = ((most - d.abs()) / size).min(most);
+        let overflows = length == 0.0 || unit_d.abs() > most || rest > most;
         SphereMargin {
-            length: round_up(normal.length() * (1.0 + 4.0 * f64::EPSILON)),
+            length: round_up(length * (1.0 + 4.0 * f64::EPSILON)),
             slope: round_up(margin * size),
             d: round_up(d + margin * d.abs() + TINY * (1.0 + size)),
+            unit: [x as f32, y as f32, z as f32, unit_d as f32],
+            doubt: [
+                round_up(both * 2.0 * size / length),
+                round_up(rest),
+                if overflows { -1.0 } else { most_reach as f32 },
+            ],
         }
     }
 

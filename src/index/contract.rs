@@ -103,6 +103,9 @@ pub struct Input<'a> {
     pub own_tree: Option<&'a PlaneTree>,
     /// The threads that the build may use; `None` for the current one.
     pub pool: Option<&'a Pool>,
+    /// True if the items are [cubes about spheres](crate::geometry::sphere_cube), for
+    /// structures that keep spheres beside the bounds. Answers do not depend on it.
+    pub spheres: bool,
 }
 
 impl<'a> Input<'a> {
@@ -112,7 +115,13 @@ impl<'a> Input<'a> {
             items,
             own_tree: None,
             pool: None,
+            spheres: false,
         }
+    }
+
+    /// Declares the items cubes about spheres.
+    pub fn spheres(self, spheres: bool) -> Input<'a> {
+        Input { spheres, ..self }
     }
 
     /// Sets the scene's own partition, if it has one.

@@ -9,7 +9,7 @@ use super::items::indexable;
 use super::padded_ids::PaddedIds;
 use super::positions::{ABSENT, Positions};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex};
-use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
+use crate::geometry::{Aabb, BallBlocks, Balls, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, first_lanes, pairs};
 use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests, UnpreparedPlanes};
 
@@ -65,6 +65,8 @@ pub struct Linear {
     boxes: BoxBlocks,
     ids: PaddedIds,
     positions: Positions,
+    /// Where the items are [spheres](Input::spheres), until one moves.
+    balls: Option<BallBlocks>,
 }
 
 impl Linear {
@@ -88,6 +90,7 @@ impl Linear {
         &self,
         open: u32,
         planes: P,
+        balls: Option<Balls<'_>>,
         cx: &mut C,
     ) -> ControlFlow<()> {
         let isa = cx.isa();
@@ -96,9 +99,14 @@ impl Linear {
         let mut items = self.ids.len();
         for (i, blocks) in self.boxes.blocks().chunks(BLOCKS_PER_CALL).enumerate() {
             let rows = &rows[i * BLOCKS_PER_CALL..][..blocks.len()];
+            let balls = balls.map(|Balls { blocks, doubt }| Balls {
+                blocks: &blocks[i * BLOCKS_PER_CALL..],
+                doubt,
+            });
             let tests = BlockTests {
                 blocks,
                 planes,
+                balls,
                 items,
                 open,
                 recorder: &mut *recorder,
@@ -126,19 +134,22 @@ impl RegionIndex for Linear {
         let ids = indexable(items)?;
         let mut boxes = BoxBlocks::with_capacity(ids.len());
         ids.iter().for_each(|&id| boxes.push(&items[id as usize]));
-        let ids = ids[..].into();
-        let positions = Positions::default();
+        let cubes = || BallBlocks::of(ids.iter().map(|&id| items[id as usize]));
         Ok(Linear {
+            balls: input.spheres.then(cubes),
             boxes,
-            ids,
-            positions,
+            ids: ids[..].into(),
+            positions: Positions::default(),
         })
     }
 
     fn memory(&self) -> MemoryUsage {
         MemoryUsage {
             node_bytes: 0,
-            item_bytes: self.boxes.bytes() + self.ids.bytes() + self.positions.bytes(),
+            item_bytes: self.boxes.bytes()
+                + self.ids.bytes()
+                + self.positions.bytes()
+                + self.balls.as_ref().map_or(0, BallBlocks::bytes),
         }
     }
 
@@ -158,16 +169,18 @@ impl RegionIndex for Linear {
             );
         }
         let open = Q::planes_open(volume.mask());
+        let balls = seen_by(&self.balls, volume);
         if C::Isa::MANY_REGISTERS
             && let Some(planes) = volume.all_planes(cx.isa())
         {
-            return self.scan_all(open, planes, cx);
+            return self.scan_all(open, planes, balls, cx);
         }
-        self.scan_all(open, UnpreparedPlanes::all(volume), cx)
+        self.scan_all(open, UnpreparedPlanes::all(volume), balls, cx)
     }
 
     /// O(moved): overwrites their lanes. Items may become or cease to be empty.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        self.balls = None;
         self.positions.prepare(&self.ids, items.len());
         for (i, &id) in moved.iter().enumerate() {
             if let Some(position) = self.positions.ahead(items, moved, i) {
@@ -189,10 +202,17 @@ impl RegionIndex for Linear {
     }
 }
 
+/// The spheres of a structure for a query, if both have any.
+#[inline(always)]
+pub fn seen_by<'t, Q: QueryVolume>(balls: &'t Option<BallBlocks>, volume: &Q) -> Option<Balls<'t>> {
+    balls.as_ref()?.seen_by(volume.as_spheres()?)
+}
+
 /// The tests of consecutive blocks against all planes, run by the sink.
 struct BlockTests<'a, P, R> {
     blocks: &'a [BoxBlock],
     planes: P,
+    balls: Option<Balls<'a>>,
     /// Number of items in these blocks and the following ones.
     items: usize,
     /// Number of open planes.
@@ -216,6 +236,12 @@ impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for BlockTests<'_, P, R> {
         self.recorder.items_tested(lanes.count_ones());
         let tests = lanes.count_ones() * self.open;
         self.recorder.planes_tested(tests);
+        if P::SPHERES
+            && let Some(balls) = &self.balls
+        {
+            let block = (i, &self.blocks[i]);
+            return (i, self.planes.kept_balls(isa, balls, block) & lanes);
+        }
         if !P::IN_FOURS {
             return (i, self.planes.kept(isa, &self.blocks[i]) & lanes);
         }

@@ -124,7 +124,8 @@ fn build(
     let items = test.items(&scene.items);
     let build = || {
         let watch = Stopwatch::start();
-        let built = spec.build(input_of(scene, &items));
+        let spheres = test == CullingTest::Sphere;
+        let built = spec.build(input_of(scene, &items).spheres(spheres));
         // This thread's CPU time says nothing about what others did for it.
         let lap = watch.lap();
         let alone = spec.execution.threads <= 1;

@@ -134,7 +134,7 @@ impl<'a> Indexes<'a> {
     fn new(spec: &'a StructureSpec, scene: &Scene) -> Result<Indexes<'a>, BuildError> {
         let over = |test: CullingTest| {
             let items = test.items(&scene.items);
-            spec.build(input_of(scene, &items))
+            spec.build(input_of(scene, &items).spheres(test == CullingTest::Sphere))
         };
         let regions = scene.regions.boxes(&scene.items);
         let others = !std::ptr::eq(regions, &scene.items[..]);

@@ -1,6 +1,6 @@
 //! Planes of a volume prepared for many blocks: coefficients in registers.
 
-use crate::geometry::{BoxBlock, BroadcastPlane, BroadcastPlanes, LaneMask};
+use crate::geometry::{BallPlanes, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes, LaneMask};
 use crate::kernel::Isa;
 
 /// Planes of a volume, prepared for many blocks without other open planes.
@@ -10,6 +10,15 @@ pub trait Planes<I: Isa>: Copy {
 
     /// True if four blocks at once are faster than one after another.
     const IN_FOURS: bool;
+
+    /// [`QueryVolume::SPHERES`](super::QueryVolume::SPHERES).
+    const SPHERES: bool = false;
+
+    /// [`QueryVolume::kept_balls`](super::QueryVolume::kept_balls).
+    #[inline(always)]
+    fn kept_balls(&self, isa: I, _balls: &Balls, (_, block): (usize, &BoxBlock)) -> LaneMask {
+        self.kept(isa, block)
+    }
 
     /// [`QueryVolume::kept_of_four`](super::QueryVolume::kept_of_four).
     #[inline(always)]
@@ -45,6 +54,24 @@ impl<I: Isa> Planes<I> for BroadcastPlanes<I> {
     #[inline(always)]
     fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
         self.admitted(isa, block)
+    }
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock) {
+        block.prefetch();
+    }
+}
+
+impl<I: Isa, const N: usize> Planes<I> for BallPlanes<'_, I, N> {
+    const IN_FOURS: bool = false;
+    const SPHERES: bool = true;
+
+    #[inline(always)]
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.kept_boxes(isa, block)
+    }
+    #[inline(always)]
+    fn kept_balls(&self, isa: I, balls: &Balls, block: (usize, &BoxBlock)) -> LaneMask {
+        self.kept(isa, balls, block)
     }
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock) {

@@ -5,8 +5,8 @@
 use glam::Vec3;
 
 use crate::geometry::{
-    ALL_ROWS, Aabb, BoxBlock, BroadcastPlane, BroadcastPlanes, ConvexVolume, ConvexVolumeF64,
-    LANES, LaneMask, PlaneMask, PlaneRows, RelativeVolume, RowMask, Spheres,
+    ALL_ROWS, Aabb, BallPlanes, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes, ConvexVolume,
+    ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, RelativeVolume, RowMask, Spheres,
 };
 
 use super::planes::Planes;
@@ -21,6 +21,15 @@ pub trait QueryVolume: Predicate {
     /// True if the volume is a point, for structures that search for points by other
     /// means than bounds: [`QueryVolume::as_point`].
     const IS_POINT: bool = false;
+
+    /// True if [`QueryVolume::as_spheres`] returns spheres.
+    const SPHERES: bool = false;
+
+    /// The volume, if it sees items as spheres.
+    #[inline(always)]
+    fn as_spheres(&self) -> Option<&Spheres> {
+        None
+    }
 
     /// The point, if the volume is one.
     #[inline(always)]
@@ -37,6 +46,19 @@ pub trait QueryVolume: Predicate {
         (0..LANES).fold(0, |kept_lanes, lane| {
             kept_lanes | LaneMask::from(kept(lane)) << lane
         })
+    }
+
+    /// [`QueryVolume::kept_lanes`] of a block with that index, whose spheres are in
+    /// `balls`.
+    #[inline(always)]
+    fn kept_balls<I: Isa>(
+        &self,
+        isa: I,
+        _balls: &Balls,
+        (_, block): (usize, &BoxBlock),
+        mask: PlaneMask,
+    ) -> LaneMask {
+        self.kept_lanes(isa, block, mask)
     }
 
     /// The plane of that bit, prepared for many blocks:
@@ -141,6 +163,12 @@ impl<'v, V: QueryVolume> UnpreparedPlanes<'v, V> {
 
 impl<I: Isa, V: QueryVolume> Planes<I> for UnpreparedPlanes<'_, V> {
     const IN_FOURS: bool = true;
+    const SPHERES: bool = V::SPHERES;
+
+    #[inline(always)]
+    fn kept_balls(&self, isa: I, balls: &Balls, block: (usize, &BoxBlock)) -> LaneMask {
+        self.view.kept_balls(isa, balls, block, self.mask)
+    }
 
     #[inline(always)]
     fn kept_of_four(&self, isa: I, blocks: &[BoxBlock; 4]) -> [LaneMask; 4] {
@@ -210,12 +238,42 @@ impl QueryVolume for ConvexVolume {
 }
 
 impl QueryVolume for Spheres {
+    const SPHERES: bool = true;
+
     #[inline(always)]
-    fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        block.admitted_as_spheres(Bits(mask).map(|index| {
-            let (plane, margin) = self.plane_of_bit(index);
-            (plane, self.planes().p_vertex_of_bit(index), margin)
-        }))
+    fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        self.kept_boxes(isa, block, mask)
+    }
+    #[inline(always)]
+    fn as_spheres(&self) -> Option<&Spheres> {
+        Some(self)
+    }
+    #[inline(always)]
+    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> impl Planes<I> {
+        BallPlanes::one(isa, self, plane)
+    }
+    #[inline(always)]
+    fn all_planes<I: Isa>(&self, isa: I) -> Option<impl Planes<I>> {
+        BallPlanes::<I, 6>::new(isa, self, self.mask())
+    }
+    #[inline(always)]
+    fn sorted_lanes<I: Isa>(
+        &self,
+        isa: I,
+        block: &BoxBlock,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        block.sorted_by(isa, self.planes(), mask)
+    }
+    #[inline(always)]
+    fn kept_balls<I: Isa>(
+        &self,
+        isa: I,
+        balls: &Balls,
+        block: (usize, &BoxBlock),
+        mask: PlaneMask,
+    ) -> LaneMask {
+        self.kept_balls(isa, balls, block, mask)
     }
 }
 

@@ -182,6 +182,9 @@ const WORTH_BUCKETS: usize = 48;
 
 /// The test of one leaf after another.
 trait LeafTest<I: Isa> {
+    /// True if the test reads spheres where there are any.
+    const SPHERES: bool = false;
+
     /// Prefetches the rows of the i-th leaf that its test reads.
     fn prefetch(&self, block: &BoxBlock, i: usize);
 
@@ -215,7 +218,10 @@ impl<T, R> ListedLeaves<'_, '_, T, R> {
         if let Some(&leaf) = self.listed.get(i)
             && let Some(block) = self.leaves.blocks.get(leaf as usize)
         {
-            self.test.prefetch(block, i);
+            match self.leaves.balls {
+                Some(balls) if T::SPHERES => balls.blocks[leaf as usize].prefetch(),
+                _ => self.test.prefetch(block, i),
+            }
             if let Some(row) = self.ids.get(leaf as usize) {
                 prefetch(row);
             }
@@ -285,6 +291,8 @@ struct SinglePlane<'a, V, P> {
 }
 
 impl<I: Isa, V: QueryVolume, P: Planes<I>> LeafTest<I> for SinglePlane<'_, V, P> {
+    const SPHERES: bool = V::SPHERES;
+
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock, _: usize) {
         self.plane.prefetch(block);
@@ -299,7 +307,12 @@ impl<I: Isa, V: QueryVolume, P: Planes<I>> LeafTest<I> for SinglePlane<'_, V, P>
         recorder: &mut R,
     ) -> LaneMask {
         record(isa, recorder, self.volume, leaves, (at, self.mask));
-        self.plane.kept(isa, &leaves.blocks[at])
+        match &leaves.balls {
+            Some(balls) if V::SPHERES => {
+                (self.plane).kept_balls(isa, balls, (at, &leaves.blocks[at]))
+            }
+            _ => self.plane.kept(isa, &leaves.blocks[at]),
+        }
     }
 }
 
@@ -310,6 +323,8 @@ struct OpenPlanes<'a, V> {
 }
 
 impl<I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'_, V> {
+    const SPHERES: bool = V::SPHERES;
+
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock, i: usize) {
         self.volume.prefetch(block, self.masks[i]);
@@ -325,6 +340,10 @@ impl<I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'_, V> {
     ) -> LaneMask {
         let mask = self.masks[i];
         record(isa, recorder, self.volume, leaves, (at, mask));
-        self.volume.kept_lanes(isa, &leaves.blocks[at], mask)
+        let block = (at, &leaves.blocks[at]);
+        match &leaves.balls {
+            Some(balls) if V::SPHERES => self.volume.kept_balls(isa, balls, block, mask),
+            _ => self.volume.kept_lanes(isa, block.1, mask),
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::geometry::{BoxBlock, LANES, LaneMask};
+use crate::geometry::{Balls, BoxBlock, LANES, LaneMask};
 use crate::index::positions::ABSENT;
 use crate::kernel::Isa;
 use crate::query::{ItemId, runs};
@@ -62,6 +62,8 @@ pub struct Layer<'t> {
     pub far: bool,
     /// Ids of each leaf, of leaves of which some lanes have lost their item.
     pub vacated: Option<&'t [[ItemId; LANES]]>,
+    /// Spheres of its items, for a query of spheres.
+    pub balls: Option<Balls<'t>>,
 }
 
 /// The lanes of a row that hold the id of an item.

@@ -21,10 +21,11 @@ use self::levels::{Layer, Level};
 use self::single_plane_buckets::SinglePlaneBuckets;
 use super::frontier::{Frontier, NodeList, is_far, put_back, take};
 use super::items::indexable;
+use super::linear::seen_by;
 use super::padded_ids::PaddedIds;
 use super::positions::{ABSENT, Positions};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
-use crate::geometry::{Aabb, BoxBlock, LANES};
+use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
@@ -59,6 +60,9 @@ pub struct Wide {
     /// Lanes of leaves without an item; their id is [`ABSENT`].
     vacant: usize,
     positions: Positions,
+    /// Spheres of the leaves, where the items are [spheres](Input::spheres), until one
+    /// moves.
+    balls: Option<BallBlocks>,
 }
 
 /// The memory of a traversal: frontiers, kept between queries.
@@ -114,6 +118,7 @@ impl Wide {
             levels,
             vacant: ids.iter().filter(|&&id| id == ABSENT).count(),
             positions: Positions::default(),
+            balls: None,
         }
     }
 
@@ -173,6 +178,7 @@ impl Wide {
             span: 1 << (index * LANES.ilog2() as usize),
             far: is_far(self.ids.len()),
             vacated: (index == 0 && self.vacant > 0).then(|| self.ids.rows()),
+            balls: None,
         }
     }
 
@@ -194,6 +200,10 @@ impl Wide {
         };
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
+        let leaves = Layer {
+            balls: seen_by(&self.balls, volume),
+            ..self.layer(0)
+        };
         let Scratch {
             here,
             below,
@@ -218,13 +228,13 @@ impl Wide {
             let layer = self.layer(level);
             if level == 1 {
                 whole.clear(here.len());
-                traversal.sort_last_level(&layer, &self.layer(0), here, below, whole)?;
+                traversal.sort_last_level(&layer, &leaves, here, below, whole)?;
             } else {
                 traversal.sort_level(&layer, here, below)?;
             }
             std::mem::swap(&mut here, &mut below);
         }
-        traversal.test_leaves(&self.layer(0), here, buckets)
+        traversal.test_leaves(&leaves, here, buckets)
     }
 
     /// Region search: descends from the root, one block at a time.
@@ -309,14 +319,21 @@ impl RegionIndex for Wide {
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
         let threads = input.threads();
         let ids = block_ordered(input.items, indexable(input.items)?, params.order, threads);
-        Ok(Wide::over(input.items, &ids, threads))
+        let cubes = || BallBlocks::of(ids.iter().map(|&id| input.items[id as usize]));
+        Ok(Wide {
+            balls: input.spheres.then(cubes),
+            ..Wide::over(input.items, &ids, threads)
+        })
     }
 
     fn memory(&self) -> MemoryUsage {
         let leaves = self.levels.first().map_or(0, |l| l.blocks);
         MemoryUsage {
             node_bytes: (self.blocks.len() - leaves) * size_of::<BoxBlock>(),
-            item_bytes: leaves * size_of::<BoxBlock>() + self.ids.bytes() + self.positions.bytes(),
+            item_bytes: leaves * size_of::<BoxBlock>()
+                + self.ids.bytes()
+                + self.positions.bytes()
+                + self.balls.as_ref().map_or(0, BallBlocks::bytes),
         }
     }
 
@@ -338,6 +355,7 @@ impl RegionIndex for Wide {
 
     /// O(moved * depth). Items of the build may become empty and come back.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        self.balls = None;
         self.take_over(items, moved)
     }
 

@@ -8,7 +8,7 @@ use super::findings::{Built, Findings, SCALAR, Tally};
 use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::Aabb;
-use crate::index::StructureSpec;
+use crate::index::{Input, StructureSpec};
 use crate::oracle::{Judgement, Oracle, Pose, Verdict};
 use crate::query::AnyVolume;
 use crate::stress::margin::slack;
@@ -88,8 +88,9 @@ impl Case {
         let share = share.min(self.items.len());
         let cubes = CullingTest::Sphere.items(&self.items);
         let items = &self.items[..];
-        let boxes = (items, found.built(structures, &items[..share]));
-        let spheres = (&cubes[..], found.built(structures, &cubes[..share]));
+        let boxes = (items, found.built(structures, Input::new(&items[..share])));
+        let input = Input::new(&cubes[..share]).spheres(true);
+        let spheres = (&cubes[..], found.built(structures, input));
         for (arithmetic, arithmetic_name, _) in ARITHMETICS {
             for (test, test_name, _) in TESTS {
                 let is_f32 = arithmetic == Arithmetic::F32;

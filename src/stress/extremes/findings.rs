@@ -2,7 +2,7 @@
 //! the scalar loop.
 
 use crate::geometry::Aabb;
-use crate::index::{DynIndex, StructureSpec};
+use crate::index::{DynIndex, Input, StructureSpec};
 use crate::query::{AnyVolume, ItemId};
 use crate::stress::{Level, Row, Status};
 use crate::verify::{self, Trial};
@@ -125,10 +125,10 @@ impl Findings {
     }
 
     /// Builds all structures. A build that fails is a fault.
-    pub fn built<'s>(&mut self, structures: &'s [StructureSpec], items: &[Aabb]) -> Built<'s> {
+    pub fn built<'s>(&mut self, structures: &'s [StructureSpec], input: Input<'_>) -> Built<'s> {
         let mut built = Vec::with_capacity(structures.len());
         for spec in structures {
-            match spec.build(items) {
+            match spec.build(input) {
                 Ok(index) => built.push((spec.label.as_str(), index)),
                 Err(error) => self.fault([&spec.label, "build"], None, "built", error.to_string()),
             }

@@ -8,7 +8,7 @@ use super::findings::{Findings, SCALAR};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, Plane, RelativeVolume, Spheres, sphere_cube,
 };
-use crate::index::StructureSpec;
+use crate::index::{Input, StructureSpec};
 use crate::oracle::{Oracle, Verdict};
 use crate::query::AnyVolume;
 use crate::scene::SeededRng;
@@ -114,8 +114,12 @@ impl PlanesCase {
         // Offsets about the point may be beyond f32.
         let relative = RelativeVolume::about(self.point, &self.volume).ok();
         let cubes: Vec<Aabb> = self.items.iter().map(sphere_cube).collect();
-        let boxes = (&self.items, found.built(structures, &self.items));
-        let cubes = (&cubes, found.built(structures, &cubes));
+        let boxes = (
+            &self.items,
+            found.built(structures, Input::new(&self.items)),
+        );
+        let input = Input::new(&cubes).spheres(true);
+        let cubes = (&cubes, found.built(structures, input));
         let views: [(&str, Option<AnyVolume>, _); 5] = [
             ("six-plane", Some((&self.volume).into()), &boxes),
             ("six-plane f64", Some((&wide).into()), &boxes),

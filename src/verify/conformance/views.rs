@@ -27,11 +27,15 @@ fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize)
     let items = &asked.items;
     let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
     let index_of_cubes: T = build(&cubes)?;
+    let input = Input::new(&cubes).spheres(true);
+    let of_spheres = T::build(&input, &T::Params::default()).map_err(|e| e.to_string())?;
     for volume in asked.volumes.iter().step_by(step).take(most) {
         let wide =
             ConvexVolumeF64::from_planes(&finer(volume)).map_err(|error| error.to_string())?;
         right("planes", index, items, volume)?;
-        right("spheres", &index_of_cubes, &cubes, &Spheres::new(volume))?;
+        let spheres = Spheres::new(volume);
+        right("spheres", &index_of_cubes, &cubes, &spheres)?;
+        right("spheres in blocks", &of_spheres, &cubes, &spheres)?;
         right("f64 planes", index, items, &wide)?;
         let eye = items.first().map_or(Vec3::ONE, |b| b.max);
         // A plane may leave f32 on its way to the eye.
