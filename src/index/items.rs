@@ -43,7 +43,7 @@ pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
 
 /// An item during a build: bounds and id together, so that a level of the build is
 /// one pass over memory.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Record {
     /// Bounds of the item.
     pub bounds: Aabb,

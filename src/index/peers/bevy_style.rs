@@ -7,10 +7,12 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::placed;
+use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
-use crate::query::{Recorder, Sink};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
+use crate::query::{ItemId, Recorder, Sink};
 
 /// The components of an entity that the system reads and writes.
 struct Entity {
@@ -37,7 +39,9 @@ impl BoxTested for PeerBevyStyle {
         "a stand-in for Bevy's visibility system: flags and bounds of every entity, one by one",
         Kind::Scan,
         Origin::StandIn("Bevy"),
-    );
+    )
+    .refits();
+    type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let entity = |item| Entity {
@@ -50,6 +54,17 @@ impl BoxTested for PeerBevyStyle {
         let mut entities = Vec::with_capacity(items.len());
         entities.extend(items.into_iter().map(entity));
         Ok(PeerBevyStyle { entities })
+    }
+
+    /// Overwrites the bounds.
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        let Some(placed) = placed(&self.entities, |e| e.item.id, items, moved) else {
+            return false;
+        };
+        for (at, bounds) in placed {
+            self.entities[at].item.bounds = bounds;
+        }
+        true
     }
 
     fn used(&self) -> MemoryUsage {

@@ -8,11 +8,12 @@ use ::bvh::bvh::{Bvh, BvhNode};
 use glam::Vec3;
 use nalgebra::Point3;
 
+use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
-use crate::query::{Recorder, Sink};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
+use crate::query::{ItemId, Recorder, Sink};
 
 /// An item with its node, which the crate writes.
 #[derive(Clone, Copy)]
@@ -106,6 +107,7 @@ fn scaled_tree(shapes: &mut [Shape]) -> Bvh<f32, 3> {
 pub struct PeerBvh {
     tree: Bvh<f32, 3>,
     shapes: Vec<Shape>,
+    scaled: bool,
 }
 
 impl BoxTested for PeerBvh {
@@ -114,17 +116,45 @@ impl BoxTested for PeerBvh {
         "crate bvh, queried through Bvh::traverse",
         Kind::Tree,
         Origin::Crate("bvh"),
-    );
+    )
+    .refits();
+    type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let scene = Aabb::union_of(items.iter().map(|item| &item.bounds));
         let shapes = items.into_iter().map(|item| Shape { item, node: 0 });
         let mut shapes: Vec<Shape> = shapes.collect();
-        let tree = match scene.reach().max_element() > LARGEST {
+        let scaled = scene.reach().max_element() > LARGEST;
+        let tree = match scaled {
             true => scaled_tree(&mut shapes),
             false => Bvh::build(&mut shapes),
         };
-        Ok(PeerBvh { tree, shapes })
+        Ok(PeerBvh {
+            tree,
+            shapes,
+            scaled,
+        })
+    }
+
+    /// `Bvh::update_shapes`, which removes and adds shape by shape; a build where most
+    /// shapes have moved, or where areas overflow.
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        let Some(placed) = placed(&self.shapes, |s| s.item.id, items, moved) else {
+            return false;
+        };
+        let overflows = |(_, b): &(usize, Aabb)| b.reach().max_element() > LARGEST;
+        let builds = placed.len() * 2 > self.shapes.len();
+        let builds = builds || self.scaled || placed.iter().any(overflows);
+        let changed: Vec<usize> = placed.iter().map(|(at, _)| *at).collect();
+        for (at, bounds) in placed {
+            self.shapes[at].item.bounds = bounds;
+        }
+        if builds {
+            let built = Self::of(self.shapes.iter().map(|s| s.item).collect());
+            return built.map(|built| *self = built).is_ok();
+        }
+        self.tree.update_shapes(&changed, &mut self.shapes);
+        true
     }
 
     fn used(&self) -> MemoryUsage {
@@ -159,7 +189,7 @@ impl BoxTested for PeerBvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::{FrustumQuery, Input, NoParams, RegionIndex};
+    use crate::index::{FrustumQuery, Input, RegionIndex};
 
     /// Left to the crate, nothing is found where areas overflow, and where
     /// widths do there is no tree.

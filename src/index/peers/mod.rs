@@ -13,12 +13,39 @@ mod rstar;
 
 use super::BuildError;
 use super::items::Record;
+use crate::geometry::Aabb;
+use crate::query::ItemId;
 
 pub use bevy_style::PeerBevyStyle;
 pub use bvh::PeerBvh;
-pub use obvhs::PeerObvhs;
-pub use parry3d::PeerParry3d;
+pub use obvhs::{ObvhsParams, ObvhsUpdate, PeerObvhs};
+pub use parry3d::{Parry3dParams, Parry3dUpdate, PeerParry3d};
 pub use rstar::PeerRstar;
+
+/// Moved items by their index in a list ascending by id, with their new bounds; empty items
+/// have none. `None` if an item becomes or ceases to be empty. O(moved * log n).
+fn placed<T>(
+    held: &[T],
+    id_of: impl Fn(&T) -> ItemId,
+    items: &[Aabb],
+    moved: &[ItemId],
+) -> Option<Vec<(usize, Aabb)>> {
+    let mut placed = Vec::with_capacity(moved.len());
+    for &id in moved {
+        // Where no item is empty, the index is the id.
+        let at = match held.get(id as usize) {
+            Some(own) if id_of(own) == id => Ok(id as usize),
+            _ => held.binary_search_by_key(&id, &id_of),
+        };
+        let bounds = items[id as usize];
+        match at {
+            Ok(at) if !bounds.is_empty() => placed.push((at, bounds)),
+            Err(_) if bounds.is_empty() => {}
+            _ => return None,
+        }
+    }
+    Some(placed)
+}
 
 /// Most items with the same bounds for a builder of quadratic time.
 const MOST_ALIKE: usize = 50_000;
@@ -39,5 +66,68 @@ fn refuse_stacks(structure: &'static str, items: &[Record]) -> Result<(), BuildE
             ),
         }),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{ConvexVolume, Plane};
+    use crate::index::{DynIndex, StructureSpec};
+    use glam::Vec3;
+
+    fn sorted(index: &dyn DynIndex, volume: &ConvexVolume) -> Vec<ItemId> {
+        let mut ids = Vec::new();
+        index.visible(volume, &mut ids);
+        ids.sort_unstable();
+        ids
+    }
+
+    /// Few and many items step, jump, grow and shrink, frame after frame.
+    #[test]
+    fn every_update_call_gives_the_sets_of_a_scan() {
+        let halves = [Vec3::X, -Vec3::Y, Vec3::new(0.5, 0.7, -0.3)];
+        let volumes = halves.map(|n| {
+            let slab = [Plane::new(n, 3.0), Plane::new(-n, 9.0)];
+            ConvexVolume::from_planes(&slab).expect("two planes")
+        });
+        for text in [
+            "peer-obvhs",
+            "peer-obvhs:update=move",
+            "peer-parry3d",
+            "peer-parry3d:update=optimize",
+            "peer-parry3d:update=reinsert",
+            "peer-rstar",
+            "peer-bvh",
+            "peer-bevy-style",
+        ] {
+            let spec = StructureSpec::parse(text).expect("a structure");
+            assert!(spec.info().capabilities.refits, "{text}");
+            let at = |i: u32| Vec3::new((i % 11) as f32, (i / 11 % 9) as f32, (i / 99) as f32);
+            let items = (0..900).map(|i| Aabb::around(at(i) * 2.0 - 9.0, Vec3::splat(0.4)));
+            let mut items: Vec<Aabb> = items.collect();
+            items[7] = Aabb::new(Vec3::ONE, Vec3::ZERO);
+            let mut index = spec.build(&items).expect("sound items");
+            for frame in 0..40_u32 {
+                let step = [300, 29, 4, 1][frame as usize % 4];
+                let moved: Vec<u32> = (frame % 5..900).step_by(step).filter(|i| *i != 7).collect();
+                for &id in &moved {
+                    let turn = (id * 7 + frame * 13) as f32;
+                    let by = Vec3::new(turn.sin(), (turn * 1.7).cos(), (turn * 0.3).sin());
+                    let far = if id % 10 == 0 { 6.0 } else { 0.3 };
+                    let half = Vec3::splat(0.1 + (turn * 0.9).cos().abs());
+                    let b = &mut items[id as usize];
+                    *b = Aabb::around(b.centre() + by * far, half);
+                }
+                assert!(index.refit(&items, &moved), "{text} frame {frame}");
+                for volume in &volumes {
+                    let seen = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));
+                    let wanted: Vec<ItemId> = seen.map(|(_, id)| id).collect();
+                    assert_eq!(sorted(&*index, volume), wanted, "{text} frame {frame}");
+                }
+            }
+            items[8] = Aabb::new(Vec3::ONE, Vec3::ZERO);
+            assert!(!index.refit(&items, &[8]), "{text}");
+        }
     }
 }

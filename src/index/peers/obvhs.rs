@@ -7,14 +7,38 @@ use std::ops::ControlFlow;
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
+use serde::{Deserialize, Serialize};
 
 use super::refuse_stacks;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
+use crate::index::positions::Positions;
 use crate::index::tree::stack::Stack;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
 use crate::query::{ItemId, Recorder, Sink};
+
+/// Parameters: `peer-obvhs:update=move`.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ObvhsParams {
+    /// The crate's calls of an update.
+    pub update: ObvhsUpdate,
+}
+
+/// Calls of the crate after items have moved.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObvhsUpdate {
+    /// `refit_from` for each leaf, or `refit_all` from one moved item in sixteen on.
+    #[default]
+    Refit,
+    /// `move_primitive`; leaves of several items are refitted.
+    Move,
+}
+
+/// An update refits all nodes from one moved item in as many on.
+const ALL_SHARE: usize = 16;
 
 /// The crate's tree by its medium preset; items in the order of its primitives.
 #[derive(Default)]
@@ -23,6 +47,8 @@ pub struct PeerObvhs {
     /// Empty where every leaf is one item, whose bounds are then the leaf's.
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
+    positions: Positions,
+    update: ObvhsUpdate,
 }
 
 #[inline(always)]
@@ -61,7 +87,9 @@ impl BoxTested for PeerObvhs {
         "crate obvhs, medium build, its own nodes traversed",
         Kind::Tree,
         Origin::Crate("obvhs"),
-    );
+    )
+    .refits();
+    type Params = ObvhsParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         refuse_stacks(Self::ABOUT.name, &items)?;
@@ -82,7 +110,45 @@ impl BoxTested for PeerObvhs {
             },
             ids: bvh.primitive_indices.iter().map(|p| of(p).id).collect(),
             bvh,
+            ..PeerObvhs::default()
         })
+    }
+
+    fn with(self, ObvhsParams { update }: ObvhsParams) -> Self {
+        PeerObvhs { update, ..self }
+    }
+
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        let Some(placed) = self.positions.of_moved(&self.ids, items, moved) else {
+            return false;
+        };
+        self.bvh.init_primitives_to_nodes_if_uninit();
+        let all = placed.len() * ALL_SHARE >= self.ids.len();
+        let moves = self.update == ObvhsUpdate::Move && self.boxes.is_empty();
+        for (place, b) in placed {
+            let primitive = self.bvh.primitive_indices[place];
+            let mut bounds = obvhs::aabb::Aabb::new(b.min.into(), b.max.into());
+            if moves {
+                self.bvh.move_primitive(bounds, primitive);
+                continue;
+            }
+            let node = self.bvh.primitives_to_nodes[primitive as usize] as usize;
+            if let Some(old) = self.boxes.get_mut(place) {
+                *old = b;
+                let first = self.bvh.nodes[node].first_index as usize;
+                let count = self.bvh.nodes[node].prim_count as usize;
+                let all = Aabb::union_of(&self.boxes[first..first + count]);
+                bounds = obvhs::aabb::Aabb::new(all.min.into(), all.max.into());
+            }
+            self.bvh.nodes[node].set_aabb(bounds);
+            if !all {
+                self.bvh.refit_from(node);
+            }
+        }
+        if all && !moves {
+            self.bvh.refit_all();
+        }
+        true
     }
 
     fn used(&self) -> MemoryUsage {
@@ -99,7 +165,10 @@ impl BoxTested for PeerObvhs {
         MemoryUsage {
             node_bytes: bvh.nodes.capacity() * size_of::<Bvh2Node>() - leaves
                 + places.iter().map(|list| list.capacity() * 4).sum::<usize>(),
-            item_bytes: leaves + size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
+            item_bytes: leaves
+                + size_of_val(&self.boxes[..])
+                + size_of_val(&self.ids[..])
+                + self.positions.bytes(),
         }
     }
 

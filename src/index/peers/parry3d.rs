@@ -5,13 +5,37 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 use parry3d::bounding_volume::Aabb as ParryAabb;
-use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace, TraversalAction};
+use serde::{Deserialize, Serialize};
 
+use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::query::{ItemId, Recorder, Sink};
+
+/// Parameters: `peer-parry3d:update=reinsert`.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Parry3dParams {
+    /// The crate's calls of an update.
+    pub update: Parry3dUpdate,
+}
+
+/// Calls of the crate after items have moved.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Parry3dUpdate {
+    /// `insert_or_update_partially`, then `refit_partial`, or `refit` from one moved item in
+    /// sixteen on.
+    #[default]
+    Refit,
+    /// The same, then `optimize_incremental`.
+    Optimize,
+    /// `reinsert_or_update_with_change_detection`.
+    Reinsert,
+}
 
 /// The crate's tree by its binned builder, whose leaves are indices of items.
 ///
@@ -19,7 +43,17 @@ use crate::query::{ItemId, Recorder, Sink};
 pub struct PeerParry3d {
     bvh: Bvh,
     ids: Vec<ItemId>,
+    update: Parry3dUpdate,
+    workspace: BvhWorkspace,
 }
+
+fn crate_box(b: &Aabb) -> ParryAabb {
+    let vector = |v: Vec3| parry3d::math::Vector::new(v.x, v.y, v.z);
+    ParryAabb::new(vector(b.min), vector(b.max))
+}
+
+/// An update refits all nodes from one moved item in as many on.
+const ALL_SHARE: usize = 16;
 
 #[inline(always)]
 fn bounds_of(node: &BvhNode) -> Aabb {
@@ -33,16 +67,51 @@ impl BoxTested for PeerParry3d {
         "crate parry3d, binned build, queried through traverse_indexed, whole subtrees accepted",
         Kind::Tree,
         Origin::Crate("parry3d"),
-    );
+    )
+    .refits();
+    type Params = Parry3dParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
-        let vector = |v: Vec3| parry3d::math::Vector::new(v.x, v.y, v.z);
-        let leaf = |item: &Record| ParryAabb::new(vector(item.bounds.min), vector(item.bounds.max));
-        let leaves: Vec<ParryAabb> = items.iter().map(leaf).collect();
+        let leaves: Vec<ParryAabb> = items.iter().map(|item| crate_box(&item.bounds)).collect();
         Ok(PeerParry3d {
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves),
             ids: items.iter().map(|item| item.id).collect(),
+            update: Parry3dUpdate::default(),
+            workspace: BvhWorkspace::default(),
         })
+    }
+
+    fn with(self, Parry3dParams { update }: Parry3dParams) -> Self {
+        PeerParry3d { update, ..self }
+    }
+
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        let Some(placed) = placed(&self.ids, |id| *id, items, moved) else {
+            return false;
+        };
+        for (leaf, bounds) in &placed {
+            let (leaf, bounds) = (*leaf as u32, crate_box(bounds));
+            // A leaf that holds the new bounds would keep its old ones.
+            let holds = || (self.bvh.leaf_node(leaf)).is_some_and(|n| n.contains_aabb(&bounds));
+            if self.update == Parry3dUpdate::Reinsert && !holds() {
+                (self.bvh).reinsert_or_update_with_change_detection(bounds, leaf, 0.0);
+            } else {
+                self.bvh.insert_or_update_partially(bounds, leaf, 0.0);
+            }
+        }
+        if self.update == Parry3dUpdate::Reinsert {
+            return true;
+        }
+        if placed.len() * ALL_SHARE < self.ids.len() {
+            let leaves: Vec<u32> = placed.iter().map(|(leaf, _)| *leaf as u32).collect();
+            self.bvh.refit_partial(&[], &leaves);
+        } else {
+            self.bvh.refit(&mut self.workspace);
+        }
+        if self.update == Parry3dUpdate::Optimize {
+            self.bvh.optimize_incremental(&mut self.workspace);
+        }
+        true
     }
 
     fn used(&self) -> MemoryUsage {

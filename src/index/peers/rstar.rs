@@ -5,11 +5,12 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 
+use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
-use crate::query::{Recorder, Sink};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
+use crate::query::{ItemId, Recorder, Sink};
 
 impl RTreeObject for Record {
     type Envelope = AABB<[f32; 3]>;
@@ -38,7 +39,14 @@ fn slots(node: &ParentNode<Record>) -> usize {
 }
 
 /// The crate's tree, with the items in its leaves.
-pub struct PeerRstar(RTree<Record>);
+pub struct PeerRstar {
+    tree: RTree<Record>,
+    /// The same items by ascending id, by which moved ones are found.
+    items: Vec<Record>,
+}
+
+/// An update bulk-loads from one moved item in as many on.
+const BULK_SHARE: usize = 4;
 
 impl BoxTested for PeerRstar {
     const ABOUT: Info = Info::new(
@@ -46,18 +54,44 @@ impl BoxTested for PeerRstar {
         "crate rstar, bulk-loaded, its nodes traversed from the root, whole subtrees accepted",
         Kind::Tree,
         Origin::Crate("rstar"),
-    );
+    )
+    .refits();
+    type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
-        Ok(PeerRstar(RTree::bulk_load(items)))
+        let tree = RTree::bulk_load(items.clone());
+        Ok(PeerRstar { tree, items })
+    }
+
+    /// `remove` and `insert`, item by item; `bulk_load` from a quarter moved on.
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        let Some(placed) = placed(&self.items, |item| item.id, items, moved) else {
+            return false;
+        };
+        let bulk = placed.len() * BULK_SHARE > self.items.len();
+        for (at, bounds) in placed {
+            let item = &mut self.items[at];
+            let old = std::mem::replace(&mut item.bounds, bounds);
+            if !bulk {
+                self.tree.remove(&Record {
+                    bounds: old,
+                    ..*item
+                });
+                self.tree.insert(*item);
+            }
+        }
+        if bulk {
+            self.tree = RTree::bulk_load(self.items.clone());
+        }
+        true
     }
 
     fn used(&self) -> MemoryUsage {
         let slot = size_of::<RTreeNode<Record>>();
-        let item_bytes = self.0.size() * slot;
+        let item_bytes = self.tree.size() * slot;
         MemoryUsage {
-            node_bytes: (slots(self.0.root()) * slot).saturating_sub(item_bytes),
-            item_bytes,
+            node_bytes: (slots(self.tree.root()) * slot).saturating_sub(item_bytes),
+            item_bytes: item_bytes + size_of_val(&self.items[..]),
         }
     }
 
@@ -71,7 +105,7 @@ impl BoxTested for PeerRstar {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         let tally = Tally::new(recorder);
-        let root = self.0.root();
+        let root = self.tree.root();
         tally.node(test);
         if root.children().is_empty() || test.rejects(&bounds_of(&root.envelope())) {
             return ControlFlow::Continue(());

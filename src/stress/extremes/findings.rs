@@ -1,7 +1,6 @@
 //! Faults of one generated case, and the queries that compare structures with
 //! the scalar loop.
 
-use crate::geometry::Aabb;
 use crate::index::{DynIndex, Input, StructureSpec};
 use crate::query::{AnyVolume, ItemId};
 use crate::stress::{Level, Row, Status};
