@@ -3,6 +3,8 @@
 //! Four rows decide nearly every item by one sum per plane. Items within the rounding
 //! errors of a plane get the test of [`Spheres::drops`], so the sets are the same.
 
+use glam::DVec4;
+
 use super::{Aabb, Ball, BoxBlock, LANES, LaneMask, PlaneMask, Spheres};
 use crate::kernel::{Isa, prefetch};
 
@@ -77,18 +79,8 @@ impl BallBlocks {
 /// A plane of length 1 in vectors: normal and offset.
 type Unit<I> = [<I as Isa>::Floats; 4];
 
-/// Planes of a sphere test in vectors, for many blocks; the first one comes again where
-/// there are fewer than `N`.
-#[derive(Clone, Copy)]
-pub struct BallPlanes<'a, I: Isa, const N: usize> {
-    spheres: &'a Spheres,
-    mask: PlaneMask,
-    planes: [Unit<I>; N],
-}
-
 #[inline(always)]
-fn unit<I: Isa>(isa: I, spheres: &Spheres, plane: u32) -> Unit<I> {
-    let [x, y, z, d] = spheres.plane_of_bit(plane).1.unit;
+fn splat<I: Isa>(isa: I, [x, y, z, d]: [f32; 4]) -> Unit<I> {
     [isa.splat(x), isa.splat(y), isa.splat(z), isa.splat(d)]
 }
 
@@ -99,58 +91,132 @@ fn distances<I: Isa>(isa: I, [a, b, c, d]: Unit<I>, [x, y, z]: [I::Floats; 3]) -
     isa.add(isa.add(sum, isa.mul(c, z)), d)
 }
 
-impl<'a, I: Isa, const N: usize> BallPlanes<'a, I, N> {
-    /// The planes of a mask; `None` if it has none, or more than `N`.
+/// One plane of a sphere test in vectors, for many blocks.
+#[derive(Clone, Copy)]
+pub struct BallPlane<'a, I: Isa> {
+    spheres: &'a Spheres,
+    index: u32,
+    plane: Unit<I>,
+}
+
+impl<'a, I: Isa> BallPlane<'a, I> {
+    /// The plane of that bit.
     #[inline(always)]
-    pub fn new(isa: I, spheres: &'a Spheres, mask: PlaneMask) -> Option<Self> {
-        if mask == 0 || mask.count_ones() as usize > N {
-            return None;
-        }
-        let mut planes = [unit(isa, spheres, mask.trailing_zeros()); N];
-        let mut left = mask;
-        for plane in &mut planes {
-            if left != 0 {
-                *plane = unit(isa, spheres, left.trailing_zeros());
-                left &= left - 1;
-            }
-        }
-        Some(BallPlanes {
+    pub fn new(isa: I, spheres: &'a Spheres, index: u32) -> Self {
+        let plane = splat(isa, spheres.plane_of_bit(index).1.unit);
+        BallPlane {
             spheres,
-            mask,
-            planes,
-        })
+            index,
+            plane,
+        }
     }
 
-    /// The sphere test from bounds alone.
+    /// [`Spheres::kept_boxes`] for this plane alone.
     #[inline(always)]
     pub fn kept_boxes(&self, isa: I, block: &BoxBlock) -> LaneMask {
-        self.spheres.kept_boxes(isa, block, self.mask)
+        self.spheres.kept_boxes(isa, block, 1 << self.index)
     }
 
-    /// [`Spheres::kept_balls`].
+    /// [`Spheres::kept_balls`] for this plane alone.
     #[inline(always)]
-    pub fn kept(&self, isa: I, balls: &Balls, (at, block): (usize, &BoxBlock)) -> LaneMask {
+    pub fn kept_balls(&self, isa: I, balls: &Balls, (at, block): (usize, &BoxBlock)) -> LaneMask {
         let (centres, radii) = balls.load(isa, at);
-        let mut least = distances(isa, self.planes[0], centres);
-        for &plane in &self.planes[1..] {
-            least = isa.min(distances(isa, plane, centres), least);
-        }
-        balls.decide(isa, isa.add(least, radii), || {
-            (self.spheres, self.mask, block)
-        })
+        let farthest = isa.add(distances(isa, self.plane, centres), radii);
+        let question = || (self.spheres, 1 << self.index, block);
+        decide(isa, farthest, balls.doubt, question)
     }
 }
 
-impl<'a, I: Isa> BallPlanes<'a, I, 1> {
-    /// The plane of that bit.
+/// The six planes of a view frustum in vectors, for many blocks: three sums in place of six.
+///
+/// The lesser of the distances from two planes is `s - |t|`, where s and t are half the sum
+/// and half the difference of both. For the planes of a symmetric frustum, s of each pair of
+/// sides is linear in t of near and far plane.
+#[derive(Clone, Copy)]
+pub struct BallFrustum<'a, I: Isa> {
+    spheres: &'a Spheres,
+    depth: Unit<I>,
+    half_depth: I::Floats,
+    /// Factor of the depth, offset, and t, of each pair of sides.
+    sides: [([I::Floats; 2], Unit<I>); 2],
+}
+
+impl<'a, I: Isa> BallFrustum<'a, I> {
+    /// Largest part of s that is not linear in the depth, per unit of coordinates: with
+    /// the roundings of the sums, less than half of [`Spheres::doubt`].
+    const RESIDUAL: f64 = 3e-6;
+
+    /// `None` for other planes than those of a symmetric frustum with a far plane.
     #[inline(always)]
-    pub fn one(isa: I, spheres: &'a Spheres, plane: u32) -> Self {
-        BallPlanes {
-            spheres,
-            mask: 1 << plane,
-            planes: [unit(isa, spheres, plane)],
+    pub fn new(isa: I, spheres: &'a Spheres) -> Option<Self> {
+        if spheres.planes().mask() != 0b11_1111 {
+            return None;
         }
+        let plane = |index: u32| {
+            let [x, y, z, d] = spheres.plane_of_bit(index).1.unit;
+            DVec4::new(x.into(), y.into(), z.into(), d.into())
+        };
+        let halves = |pair: u32| {
+            let (a, b) = (plane(2 * pair), plane(2 * pair + 1));
+            ((a + b) * 0.5, (a - b) * 0.5)
+        };
+        let vector = |t: DVec4| splat(isa, t.as_vec4().to_array());
+        let (still, depth) = halves(2);
+        let mut residual = still.truncate().length();
+        let axis = depth.truncate();
+        let mut side = |pair: u32| {
+            let (s, t) = halves(pair);
+            let factor = s.truncate().dot(axis) / axis.length_squared();
+            let rest = s - depth * factor;
+            residual = residual.max(rest.truncate().length());
+            let linear = [isa.splat(factor as f32), isa.splat(rest.w as f32)];
+            (linear, vector(t))
+        };
+        let sides = [side(0), side(1)];
+        (residual <= Self::RESIDUAL).then(|| BallFrustum {
+            spheres,
+            depth: vector(depth),
+            half_depth: isa.splat(still.w as f32),
+            sides,
+        })
     }
+
+    /// [`Spheres::kept_boxes`] for all planes.
+    #[inline(always)]
+    pub fn kept_boxes(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.spheres.kept_boxes(isa, block, 0b11_1111)
+    }
+
+    /// [`Spheres::kept_balls`] for all planes.
+    #[inline(always)]
+    pub fn kept_balls(&self, isa: I, balls: &Balls, (at, block): (usize, &BoxBlock)) -> LaneMask {
+        let (centres, radii) = balls.load(isa, at);
+        let depth = distances(isa, self.depth, centres);
+        let mut least = isa.sub_abs(self.half_depth, depth);
+        for ([factor, rest], t) in self.sides {
+            let s = isa.add(isa.mul(factor, depth), rest);
+            least = isa.min(isa.sub_abs(s, distances(isa, t, centres)), least);
+        }
+        let question = || (self.spheres, 0b11_1111, block);
+        decide(isa, isa.add(least, radii), 2.0 * balls.doubt, question)
+    }
+}
+
+/// The lanes that are kept, by the distances of their farthest points.
+#[inline(always)]
+fn decide<'s, I: Isa>(
+    isa: I,
+    farthest: I::Floats,
+    doubt: f32,
+    question: impl FnOnce() -> (&'s Spheres, PlaneMask, &'s BoxBlock),
+) -> LaneMask {
+    let above = |least: f32| isa.kept(isa.keep(isa.keep_all(), farthest, isa.splat(least)));
+    let (possible, sure) = (above(-doubt), above(doubt));
+    if possible == sure {
+        return sure;
+    }
+    let (spheres, mask, block) = question();
+    sure | spheres.settled(block, mask, possible & !sure)
 }
 
 impl Balls<'_> {
@@ -158,23 +224,6 @@ impl Balls<'_> {
     fn load<I: Isa>(&self, isa: I, at: usize) -> ([I::Floats; 3], I::Floats) {
         let [x, y, z, radius] = &self.blocks[at].rows;
         ([isa.load(x), isa.load(y), isa.load(z)], isa.load(radius))
-    }
-
-    /// The lanes that are kept, by the distances of their farthest points.
-    #[inline(always)]
-    fn decide<'s, I: Isa>(
-        &self,
-        isa: I,
-        farthest: I::Floats,
-        question: impl FnOnce() -> (&'s Spheres, PlaneMask, &'s BoxBlock),
-    ) -> LaneMask {
-        let above = |least: f32| isa.kept(isa.keep(isa.keep_all(), farthest, isa.splat(least)));
-        let (possible, sure) = (above(-self.doubt), above(self.doubt));
-        if possible == sure {
-            return sure;
-        }
-        let (spheres, mask, block) = question();
-        sure | spheres.settled(block, mask, possible & !sure)
     }
 }
 
@@ -224,14 +273,19 @@ impl Spheres {
             return LaneMask::MAX;
         }
         let (centres, radii) = balls.load(isa, at);
-        let of = |plane: u32| distances(isa, unit(isa, self, plane), centres);
+        let of = |index: u32| {
+            let plane = splat(isa, self.plane_of_bit(index).1.unit);
+            distances(isa, plane, centres)
+        };
         let mut least = of(mask.trailing_zeros());
         let mut left = mask & (mask - 1);
         while left != 0 {
             least = isa.min(of(left.trailing_zeros()), least);
             left &= left - 1;
         }
-        balls.decide(isa, isa.add(least, radii), || (self, mask, block))
+        decide(isa, isa.add(least, radii), balls.doubt, || {
+            (self, mask, block)
+        })
     }
 
     /// Those of the lanes that no plane of the mask drops, one by one.
@@ -252,7 +306,7 @@ mod tests {
     use crate::geometry::arbitrary::{any_box, number, vector};
     use crate::geometry::{ConvexVolume, Plane, sphere_cube};
     use crate::kernel::{BASELINE, Plain};
-    use glam::Vec3;
+    use glam::{EulerRot, Quat, Vec3};
     use proptest::prelude::*;
 
     fn bits(lanes: impl Iterator<Item = bool>) -> LaneMask {
@@ -262,8 +316,8 @@ mod tests {
     }
 
     /// Compares blocks of spheres and blocks of bounds with the scalar test; `None` where
-    /// sums over spheres would overflow.
-    fn check(boxes: &[Aabb; LANES], planes: &[Plane], mask: PlaneMask) -> Option<()> {
+    /// sums over spheres would overflow, else whether the planes are those of a frustum.
+    fn check(boxes: &[Aabb; LANES], planes: &[Plane], mask: PlaneMask) -> Option<bool> {
         let spheres = Spheres::new(&ConvexVolume::from_planes(planes).unwrap());
         let mask = mask & spheres.planes().mask();
         let all = BallBlocks::of(boxes.iter().copied());
@@ -283,10 +337,12 @@ mod tests {
         let balls = all.seen_by(&spheres)?;
         let found = spheres.kept_balls(BASELINE, &balls, (0, &block), mask);
         assert_eq!(found, wanted, "{boxes:?} {planes:?}");
-        if let Some(planes) = BallPlanes::<_, 6>::new(Plain, &spheres, mask) {
-            assert_eq!(planes.kept(Plain, &balls, (0, &block)), wanted, "{boxes:?}");
+        let frustum = BallFrustum::new(BASELINE, &spheres).filter(|_| mask == 0b11_1111);
+        if let Some(frustum) = &frustum {
+            let found = frustum.kept_balls(BASELINE, &balls, (0, &block));
+            assert_eq!(found, wanted, "{boxes:?} {planes:?}");
         }
-        Some(())
+        Some(frustum.is_some())
     }
 
     #[test]
@@ -296,7 +352,7 @@ mod tests {
         assert_eq!(check(&[far; LANES], &plane, 1), None);
         assert_eq!(
             check(&[Aabb::around(Vec3::ONE, Vec3::ONE); LANES], &plane, 1),
-            Some(())
+            Some(false)
         );
         let endless = [Plane::new(Vec3::ZERO, -1.0)];
         assert_eq!(check(&[Aabb::EMPTY; LANES], &endless, 1), None);
@@ -323,6 +379,40 @@ mod tests {
                 Plane::new(*normal, if *ulps % 3 == 0 || !touches.is_finite() { *d } else { touches })
             });
             check(&boxes, &touching.collect::<Vec<_>>(), mask);
+        }
+
+        #[test]
+        fn three_sums_decide_as_six(
+            turn in prop::array::uniform3(-3f32..3.0),
+            eye in prop::array::uniform3(-1e3f32..1e3),
+            fov in prop::array::uniform2(0.1f32..1.5),
+            scale in -10i32..10,
+            spheres in prop::collection::vec(
+                (prop::array::uniform3(-1f32..1.0), 0f32..0.2, -2e-6f32..2e-6), LANES),
+        ) {
+            let scale = 4f32.powi(scale);
+            let turn = Quat::from_euler(EulerRot::XYZ, turn[0], turn[1], turn[2]);
+            let [u, v, w] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| turn * axis);
+            let eye = Vec3::from_array(eye) * scale;
+            let through = |n: Vec3, p: Vec3| Plane::new(n, -n.dot(p));
+            let sides = [(u, fov[0]), (-u, fov[0]), (v, fov[1]), (-v, fov[1])];
+            let planes = sides.map(|(n, angle)| {
+                through(n * angle.cos() + w * angle.sin(), eye)
+            });
+            let [near, far] = [1.0, 300.0].map(|distance| eye + w * distance * scale);
+            let planes = [&planes[..], &[through(w, near), through(-w, far)]].concat();
+            // Each sphere touches a plane but for some roundings.
+            let boxes = spheres.iter().enumerate().map(|(lane, (at, size, off))| {
+                let at = eye + Vec3::from_array(*at) * 400.0 * scale;
+                let cube = sphere_cube(&Aabb::around(at, Vec3::splat(size * 100.0 * scale)));
+                let (plane, ball) = (planes[lane % 6], Ball::in_cube(&cube));
+                let by = plane.value_at(ball.centre) + ball.radius + off * ball.reach;
+                let by = plane.normal * -by;
+                Aabb::new(cube.min + by, cube.max + by)
+            });
+            let boxes: Vec<Aabb> = boxes.collect();
+            let is_frustum = check(&boxes.try_into().unwrap(), &planes, 0b11_1111);
+            prop_assert_eq!(is_frustum, Some(true));
         }
     }
 }

@@ -17,7 +17,7 @@ mod relative_volume;
 mod spheres;
 
 pub use aabb::Aabb;
-pub use balls::{BallBlock, BallBlocks, BallPlanes, Balls};
+pub use balls::{BallBlock, BallBlocks, BallFrustum, BallPlane, Balls};
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, ROWS, blocks_of, xor_of_bits};
 pub use broadcast::{BroadcastPlane, BroadcastPlanes};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};

@@ -62,6 +62,8 @@ pub trait Isa: Copy {
     /// `a` where `a > b`, else `b`: of a NaN and a number in this order, the
     /// number.
     fn max(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// `a - |b|`, rounded once.
+    fn sub_abs(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// The lanes where `a < 0`.
     fn below_zero(self, a: Self::Floats) -> LaneMask;
     /// All lanes.
@@ -148,6 +150,7 @@ mod tests {
                 isa.mul(a, isa.splat(self.b[3])),
                 isa.min(a, b),
                 isa.max(a, b),
+                isa.sub_abs(a, b),
                 at,
                 behind,
             ];

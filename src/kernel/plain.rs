@@ -71,6 +71,10 @@ impl Isa for Plain {
         lanes(|lane| if a[lane] > b[lane] { a[lane] } else { b[lane] })
     }
     #[inline(always)]
+    fn sub_abs(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+        lanes(|lane| a[lane] - b[lane].abs())
+    }
+    #[inline(always)]
     fn below_zero(self, a: [f32; LANES]) -> LaneMask {
         lanes_where(|lane| a[lane] < 0.0)
     }

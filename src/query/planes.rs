@@ -1,6 +1,8 @@
 //! Planes of a volume prepared for many blocks: coefficients in registers.
 
-use crate::geometry::{BallPlanes, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes, LaneMask};
+use crate::geometry::{
+    BallFrustum, BallPlane, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes, LaneMask,
+};
 use crate::kernel::Isa;
 
 /// Planes of a volume, prepared for many blocks without other open planes.
@@ -61,7 +63,7 @@ impl<I: Isa> Planes<I> for BroadcastPlanes<I> {
     }
 }
 
-impl<I: Isa, const N: usize> Planes<I> for BallPlanes<'_, I, N> {
+impl<I: Isa> Planes<I> for BallPlane<'_, I> {
     const IN_FOURS: bool = false;
     const SPHERES: bool = true;
 
@@ -71,7 +73,25 @@ impl<I: Isa, const N: usize> Planes<I> for BallPlanes<'_, I, N> {
     }
     #[inline(always)]
     fn kept_balls(&self, isa: I, balls: &Balls, block: (usize, &BoxBlock)) -> LaneMask {
-        self.kept(isa, balls, block)
+        self.kept_balls(isa, balls, block)
+    }
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock) {
+        block.prefetch();
+    }
+}
+
+impl<I: Isa> Planes<I> for BallFrustum<'_, I> {
+    const IN_FOURS: bool = false;
+    const SPHERES: bool = true;
+
+    #[inline(always)]
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.kept_boxes(isa, block)
+    }
+    #[inline(always)]
+    fn kept_balls(&self, isa: I, balls: &Balls, block: (usize, &BoxBlock)) -> LaneMask {
+        self.kept_balls(isa, balls, block)
     }
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock) {

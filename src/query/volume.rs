@@ -5,8 +5,9 @@
 use glam::Vec3;
 
 use crate::geometry::{
-    ALL_ROWS, Aabb, BallPlanes, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes, ConvexVolume,
-    ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, RelativeVolume, RowMask, Spheres,
+    ALL_ROWS, Aabb, BallFrustum, BallPlane, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes,
+    ConvexVolume, ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, RelativeVolume, RowMask,
+    Spheres,
 };
 
 use super::planes::Planes;
@@ -250,11 +251,11 @@ impl QueryVolume for Spheres {
     }
     #[inline(always)]
     fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> impl Planes<I> {
-        BallPlanes::one(isa, self, plane)
+        BallPlane::new(isa, self, plane)
     }
     #[inline(always)]
     fn all_planes<I: Isa>(&self, isa: I) -> Option<impl Planes<I>> {
-        BallPlanes::<I, 6>::new(isa, self, self.mask())
+        BallFrustum::new(isa, self)
     }
     #[inline(always)]
     fn sorted_lanes<I: Isa>(

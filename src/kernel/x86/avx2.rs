@@ -94,6 +94,12 @@ impl Isa for Avx2 {
         each!(2, |i| unsafe { _mm256_max_ps(a[i], b[i]) })
     }
     #[inline(always)]
+    fn sub_abs(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe {
+            _mm256_sub_ps(a[i], _mm256_andnot_ps(_mm256_set1_ps(-0.0), b[i]))
+        })
+    }
+    #[inline(always)]
     fn below_zero(self, a: [__m256; 2]) -> LaneMask {
         signs_256(each!(2, |i| unsafe {
             _mm256_cmp_ps::<_CMP_LT_OQ>(a[i], _mm256_setzero_ps())

@@ -90,6 +90,10 @@ impl Isa for Avx512 {
         unsafe { _mm512_max_ps(a, b) }
     }
     #[inline(always)]
+    fn sub_abs(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_sub_ps(a, _mm512_abs_ps(b)) }
+    }
+    #[inline(always)]
     fn below_zero(self, a: __m512) -> LaneMask {
         unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, _mm512_setzero_ps()) }
     }

@@ -97,6 +97,12 @@ impl Isa for Sse2 {
         each!(4, |i| unsafe { _mm_max_ps(a[i], b[i]) })
     }
     #[inline(always)]
+    fn sub_abs(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe {
+            _mm_sub_ps(a[i], _mm_andnot_ps(_mm_set1_ps(-0.0), b[i]))
+        })
+    }
+    #[inline(always)]
     fn below_zero(self, a: [__m128; 4]) -> LaneMask {
         let below = each!(4, |i| unsafe { _mm_cmplt_ps(a[i], _mm_setzero_ps()) });
         signs_128(below)
