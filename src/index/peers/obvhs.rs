@@ -119,9 +119,16 @@ impl BoxTested for PeerObvhs {
     }
 
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = self.positions.of_moved(&self.ids, items, moved) else {
+        self.positions.prepare(&self.ids, items.len());
+        let place_of = |&id: &ItemId| self.positions.of(id).map(|at| (at, items[id as usize]));
+        let is_empty = |id: &ItemId| items[*id as usize].is_empty();
+        if moved
+            .iter()
+            .any(|id| place_of(id).is_none() != is_empty(id))
+        {
             return false;
-        };
+        }
+        let placed: Vec<(usize, Aabb)> = moved.iter().filter_map(place_of).collect();
         self.bvh.init_primitives_to_nodes_if_uninit();
         let all = placed.len() * ALL_SHARE >= self.ids.len();
         let moves = self.update == ObvhsUpdate::Move && self.boxes.is_empty();
