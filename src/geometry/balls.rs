@@ -127,7 +127,7 @@ impl<'a, I: Isa> BallPlane<'a, I> {
     }
 }
 
-/// The six planes of a view frustum in vectors, for many blocks: three sums in place of six.
+/// The six planes of a view frustum in vectors: three sums in place of six.
 ///
 /// The lesser of the distances from two planes is `s - |t|`, where s and t are half the sum
 /// and half the difference of both. For the planes of a symmetric frustum, s of each pair of
@@ -228,7 +228,8 @@ impl Balls<'_> {
 }
 
 impl Spheres {
-    /// Distance from any plane up to which a sum over centre and radius decides nothing;
+    /// Distance from any plane up to which a sum decides nothing.
+    ///
     /// `None` where numbers overflow. `reach` bounds all coordinates of the items.
     #[inline(always)]
     pub fn doubt(&self, reach: f32) -> Option<f32> {
@@ -315,8 +316,9 @@ mod tests {
         })
     }
 
-    /// Compares blocks of spheres and blocks of bounds with the scalar test; `None` where
-    /// sums over spheres would overflow, else whether the planes are those of a frustum.
+    /// Compares blocks of spheres and blocks of bounds with the scalar test.
+    ///
+    /// `None` where sums over spheres would overflow, else true for a frustum's planes.
     fn check(boxes: &[Aabb; LANES], planes: &[Plane], mask: PlaneMask) -> Option<bool> {
         let spheres = Spheres::new(&ConvexVolume::from_planes(planes).unwrap());
         let mask = mask & spheres.planes().mask();

@@ -65,7 +65,7 @@ pub struct Linear {
     boxes: BoxBlocks,
     ids: PaddedIds,
     positions: Positions,
-    /// Where the items are [spheres](Input::spheres), until one moves.
+    /// Spheres of the items, if they are [spheres](Input::spheres), until one moves.
     balls: Option<BallBlocks>,
 }
 

@@ -22,8 +22,9 @@ pub use obvhs::{ObvhsParams, ObvhsUpdate, PeerObvhs};
 pub use parry3d::{Parry3dParams, Parry3dUpdate, PeerParry3d};
 pub use rstar::PeerRstar;
 
-/// Moved items by their index in a list ascending by id, with their new bounds; empty items
-/// have none. `None` if an item becomes or ceases to be empty. O(moved * log n).
+/// Moved items by their index in a list ascending by id, with their new bounds.
+///
+/// Empty items have none; `None` if one becomes or ceases to be empty. O(moved * log n).
 fn placed<T>(
     held: &[T],
     id_of: impl Fn(&T) -> ItemId,

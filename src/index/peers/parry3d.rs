@@ -27,8 +27,9 @@ pub struct Parry3dParams {
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Parry3dUpdate {
-    /// `insert_or_update_partially`, then `refit_partial`, or `refit` from one moved item in
-    /// sixteen on.
+    /// `insert_or_update_partially`, then `refit_partial`.
+    ///
+    /// `refit` in its place from one moved item in sixteen on.
     #[default]
     Refit,
     /// The same, then `optimize_incremental`.
