@@ -30,27 +30,35 @@ def cullbench(*arguments):
     return done.stdout
 
 
+# Runs and their options; the second takes every triangle for an item.
+PATHS = ["--path", "flythrough:frames=128", "--path", "outside:frames=64"]
+RUNS = {"real": ["--suite", "real"],
+        "triangles": ["--scene", f"{FOLDER}sponza.obj", "--scene", f"{FOLDER}kitchen.obj", *PATHS]}
+TRIANGLES = ["--items", "triangles"]
+KEYS = ["total_count", "region_count", "bounds_min", "bounds_max", "origin", "size_min", "size_max",
+        "unit"]
+
+
 def measure():
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "run"
-        cullbench("run", "--suite", "real", "--no-bounds", "--out", str(out))
-        RESULTS.mkdir(exist_ok=True)
-        shutil.copy(out / "summary.csv", RESULTS)
-        with open(out / "report.json", "rb") as report, \
-                gzip.GzipFile(RESULTS / "report.json.gz", "wb", mtime=0) as packed:
-            shutil.copyfileobj(report, packed)
-    names = dict.fromkeys(row["scene"] for row in rows())
-    keys = ["total_count", "region_count", "bounds_min", "bounds_max", "origin", "size_min",
-            "size_max", "unit"]
+    RESULTS.mkdir(exist_ok=True)
     scenes = {}
-    for name in names:
-        info = json.loads(cullbench("scene", "info", name, "--format", "json"))
-        scenes[name] = {key: info[key] for key in keys}
+    for run, arguments in RUNS.items():
+        more = TRIANGLES if run == "triangles" else []
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "run"
+            cullbench("run", *arguments, *more, "--no-bounds", "--out", str(out))
+            shutil.copy(out / "summary.csv", RESULTS / f"{run}.csv")
+            with open(out / "report.json", "rb") as report, \
+                    gzip.GzipFile(RESULTS / f"{run}.json.gz", "wb", mtime=0) as packed:
+                shutil.copyfileobj(report, packed)
+        for name in dict.fromkeys(row["scene"] for row in rows(run)):
+            info = json.loads(cullbench("scene", "info", name, "--format", "json", *more))
+            scenes.setdefault(run, {})[name] = {key: info[key] for key in KEYS}
     (RESULTS / "scenes.json").write_text(json.dumps(scenes, indent=1) + "\n")
 
 
-def rows():
-    with open(RESULTS / "summary.csv", newline="") as table:
+def rows(run):
+    with open(RESULTS / f"{run}.csv", newline="") as table:
         return [row for row in csv.DictReader(table) if row["status"] == "ok"]
 
 
@@ -76,34 +84,41 @@ def best(cells, metric):
     return min(cells, key=lambda c: float(c[metric]), default=None)
 
 
+def fastest(cells):
+    """The cell of the first rank, `wide` if it shares it, and its label."""
+    tied = sorted((c for c in cells if c["rank"] == "1"), key=lambda c: float(c["query_ns"]))
+    first = next((c for c in tied if c["structure"] == "wide"), tied[0])
+    return first, first["structure"] + (f" ({len(tied)} tied)" if len(tied) > 1 else "")
+
+
 def size_ratio(info):
     low, high = info["size_min"], info["size_max"]
     # Points become boxes of one step of f32.
     return "points" if high <= 4 * step(info) else f"1 : {number(high / low)}" if low else "from 0"
 
 
-def table(scenes):
-    cells = rows()
+def table(run, scenes):
+    cells = rows(run)
     lines = []
     for name, info in scenes.items():
         own = [c for c in cells if c["scene"] == name]
-        paths = dict.fromkeys(c["path"] for c in own)
-        for path in paths:
+        extent = [b - a for a, b in zip(info["bounds_min"], info["bounds_max"])]
+        shown = [name.replace(FOLDER, "") + (", triangles" if run == "triangles" else ""),
+                 f"{info['total_count']:,}", " x ".join(number(e) for e in extent),
+                 size_ratio(info), f"{step(info):.1e}"]
+        for path in list(dict.fromkeys(c["path"] for c in own))[:2]:
             here = [c for c in own if c["path"] == path and c["cache"] == "warm"]
             linear = next(c for c in here if c["structure"] == "linear")
-            first = best(here, "query_ns")
-            found = best(here, "locate_ns")
-            extent = [b - a for a, b in zip(info["bounds_min"], info["bounds_max"])]
-            is_first = path == next(iter(paths))
-            shown = [name.replace(FOLDER, ""), f"{info['total_count']:,}",
-                     " x ".join(number(e) for e in extent), size_ratio(info), f"{step(info):.1e}"]
+            first, label = fastest(here)
             ratio = float(linear["query_ns"]) / float(first["query_ns"])
-            regions = f"{info['region_count']:,}: {found['structure']} {time(float(found['locate_ns']))}" \
-                if found else ""
-            lines.append("| " + " | ".join([
-                *(shown if is_first else [""] * len(shown)), path.split(":")[0],
-                f"{100 * float(linear['cull_rate']):.0f} %", first["structure"],
-                time(float(first["query_ns"])), f"{ratio:.2f} x", regions]) + " |")
+            culled = 100 * float(linear["cull_rate"])
+            shown.append(f"{path.split(':')[0]}, {culled:.0f} % culled: {label} "
+                         f"{time(float(first['query_ns']))}, {ratio:.3g} x")
+        inside = own[0]["path"]
+        found = best([c for c in own if c["path"] == inside], "locate_ns")
+        shown.append(f"{info['region_count']:,}: {found['structure']} "
+                     f"{time(float(found['locate_ns']))}" if found else "")
+        lines.append("| " + " | ".join(shown) + " |")
     return "\n".join(lines)
 
 
@@ -113,13 +128,14 @@ Written by `scripts/worlds.py` from [results/worlds](../results/worlds) (`run --
 {date}, {processes} processes). Fetch the scenes with `scripts/fetch.py`; licences are in
 [datasets](../datasets/README.md) and `scripts/fetch.py --list`.
 
-*Sizes* compares the shortest longest edge of an item with the longest; *f32 step* is the spacing
-of f32 at the farthest coordinate, in the scene's unit; *culled* is the share of items outside of
-the view; *speed-up* is over the SIMD scan `linear`; *regions* are their number and the fastest
-structure that finds the region of the eye.
+*Sizes*: shortest to longest, of the items' longest edges. *f32 step*: spacing of f32 at the
+farthest coordinate, in the scene's unit. For two paths: share of items outside of the view, the
+fastest structure, its time per query, and its speed-up over the SIMD scan `linear`. *Regions*:
+their number, and the structure that finds that of the eye first along the first path. `moving` is `wide` with a second
+tree for what moves.
 
-| scene | items | extent | sizes | f32 step | path | culled | fastest | time per query | speed-up | regions |
-|---|---|---|---|---|---|---|---|---|---|---|
+| scene | items | extent | sizes | f32 step | first path | second path | regions |
+|---|---|---|---|---|---|---|---|
 """
 
 
@@ -127,12 +143,13 @@ def main():
     if len(sys.argv) > 1:
         measure()
     scenes = json.loads((RESULTS / "scenes.json").read_text())
-    with gzip.open(RESULTS / "report.json.gz") as packed:
+    with gzip.open(RESULTS / "real.json.gz") as packed:
         report = json.load(packed)
     head = HEAD.format(cpu=report["machine"]["cpu"], date=report["run"]["started_at"][:10],
                        processes=report["cells"][0]["times"]["processes"])
     notes = PAGE.read_text().partition("\n## ")[2] if PAGE.exists() else "What surprised\n"
-    PAGE.write_text(head + table(scenes) + "\n\n## " + notes)
+    tables = "\n".join(table(run, scenes[run]) for run in scenes)
+    PAGE.write_text(head + tables + "\n\n## " + notes)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,9 @@ pub struct Fetched {
     file: String,
     /// SPDX identifier, and whom to name.
     pub licence: String,
-    /// Scenes in the file for the suite `real`: `.` the file itself, `#MAP01` a map.
+    /// Scenes in the file for the suite `real`; perhaps none.
+    ///
+    /// `.` is the file itself, `#MAP01` a map in it.
     scenes: String,
     /// One line for `cullbench list`.
     pub summary: String,
@@ -59,7 +61,11 @@ mod tests {
         let lines = include_str!("../../datasets/fetch.csv").lines().count();
         assert_eq!(FETCHED.len(), lines - 1);
         for row in &*FETCHED {
-            assert!(!row.scenes().is_empty() && !row.licence.is_empty());
+            assert!(
+                !row.licence.is_empty() && !row.summary.is_empty(),
+                "{}",
+                row.name
+            );
         }
         let freedm = FETCHED[0].scenes();
         assert_eq!(freedm[0], "datasets/fetched/freedm.wad#MAP01");
