@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::bounds::BOUNDS;
-use super::group::{GroupPlan, measure_part};
+use super::frames::measure_queries_or_frames;
+use super::group::GroupPlan;
 use super::key::{CellKey, GroupKey};
 use super::process_result::{Known, Part, TaskSamples};
 use super::progress::Notice;
@@ -342,8 +343,8 @@ pub fn measure_scene(
             locate: plan.effort.extras != Extras::Nothing,
         };
         let protocol = settings.protocol;
-        let Some((mut part, samples)) = measure_part(&workload, subjects, settings, notice, stop)
-        else {
+        let measured = measure_queries_or_frames(&workload, subjects, settings, notice, stop);
+        let Some((mut part, samples)) = measured else {
             return Ok(false);
         };
         // In the first group of each scene only.

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use super::clock::Stopwatch;
-use super::group::{GroupPlan, counts};
+use super::group::{GroupPlan, counts, measure_part};
 use super::moving::{Frames, Laps, Moving, ageing, lap_ns, replay};
 use super::orders::Orders;
 use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
@@ -47,8 +47,24 @@ struct Entry<'a> {
     rounds: Vec<Vec<Laps>>,
 }
 
-/// Measures a group in this process; `None` if stopped.
-pub(super) fn measure_frames(
+/// Measures a group in this process, [`measure_part`] for a still scene.
+///
+/// `None` if stopped.
+pub(super) fn measure_queries_or_frames(
+    workload: &Workload,
+    subjects: &[Subject],
+    plan: GroupPlan<'_>,
+    notice: Notice,
+    stop: &dyn Fn() -> bool,
+) -> Option<(Part, Vec<TaskSamples>)> {
+    match &workload.motion {
+        None => measure_part(workload, subjects, plan, notice, stop),
+        Some(motion) => measure_frames(workload, motion, subjects, plan, notice, stop),
+    }
+}
+
+/// Measures a group whose items move; `None` if stopped.
+fn measure_frames(
     workload: &Workload,
     motion: &Motion,
     subjects: &[Subject],

@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
 use super::count::{Counted, count_pass, judge};
-use super::frames::measure_frames;
 use super::index_under_test::TWIN;
 use super::key::{GroupKey, Pass, TaskKey};
 use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
@@ -81,9 +80,6 @@ pub fn measure_part(
     notice: Notice,
     stop: &dyn Fn() -> bool,
 ) -> Option<(Part, Vec<TaskSamples>)> {
-    if let Some(motion) = &workload.motion {
-        return measure_frames(workload, motion, subjects, plan, notice, stop);
-    }
     let answered = plan.known.filter(|known| !known.visible.is_empty());
     let (mut entries, judged) = match answered {
         None => count(workload, subjects, notice),

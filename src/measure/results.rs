@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use super::bounds::{BOUNDS, Bound};
-use super::group::{GroupPlan, LEAST_TAIL, measure_part};
+use super::frames::measure_queries_or_frames;
+use super::group::{GroupPlan, LEAST_TAIL};
 use super::index_under_test::TWIN;
 use super::metrics::{METRICS, Metrics};
 use super::moving::AGES;
@@ -93,7 +94,7 @@ pub fn measure_group(
         plan_only: false,
         locate: true,
     };
-    let (part, _) = measure_part(workload, subjects, plan, &|_, _| (), stop)?;
+    let (part, _) = measure_queries_or_frames(workload, subjects, plan, &|_, _| (), stop)?;
     Some(Group::of(&[part]))
 }
 
@@ -313,8 +314,8 @@ impl<'p> MergedParts<'p> {
     /// Metrics that this cell lacks though its structure is right, with the reason.
     fn left_out(&self, label: &str) -> Vec<String> {
         if self.ranked() == TaskKind::Frame {
-            let reason = "build_ms apart, only frames are measured of items that move";
-            return vec![format!("query_ns_p95, locate_ns, excess: {reason}")];
+            let left_out = "query_ns_p95, locate_ns, excess: not measured of items that move";
+            return vec![left_out.to_owned()];
         }
         let is_large = self.parts[0].scene.total_count > MOST_UPDATED;
         let has_few_groups = |task: &TaskPart| task.tail_ns.len() < LEAST_TAIL;

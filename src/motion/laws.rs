@@ -5,13 +5,15 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::REMOVED;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::{CityGrid, Scene, UpAxis, mix64};
 use crate::spec::Spec;
+
+/// Bounds of an item that is not there: empty, and finite as every index expects.
+pub const REMOVED: Aabb = Aabb::new(Vec3::ONE, Vec3::NEG_ONE);
 
 /// Bounds of an item after a number of moves; `None` for an item that cannot move.
 pub(super) type Law = fn(&World, ItemId, u32) -> Option<Aabb>;

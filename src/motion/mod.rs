@@ -8,19 +8,15 @@ mod recorded;
 
 use std::path::Path;
 
-use glam::Vec3;
-
 use crate::geometry::Aabb;
 use crate::input::{InputError, is_readable, read_file};
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, hex};
 use crate::spec::{Spec, SpecError};
 
+pub use laws::REMOVED;
 use laws::{Law, World};
 use recorded::Recorded;
-
-/// Bounds of an item that is not there: empty, and finite as every index expects.
-pub const REMOVED: Aabb = Aabb::new(Vec3::ONE, Vec3::NEG_ONE);
 
 /// A kind of motion.
 #[non_exhaustive]

@@ -4,7 +4,7 @@ use std::io::Read;
 
 use glam::DVec3;
 
-use super::REMOVED;
+use super::laws::REMOVED;
 use crate::geometry::Aabb;
 use crate::input::{InputError, Row, TableReader};
 use crate::query::ItemId;

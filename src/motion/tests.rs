@@ -1,3 +1,5 @@
+//! Laws stay within the scene and repeat themselves; files are read or refused.
+
 use super::*;
 use crate::scene;
 

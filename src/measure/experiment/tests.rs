@@ -1,3 +1,5 @@
+//! Shards, keys, and the share of one process.
+
 use super::super::Group;
 use super::*;
 use crate::index::Registry;

@@ -1,3 +1,5 @@
+//! Frames as a whole and in parts, wrong updates, policies.
+
 use std::ops::ControlFlow;
 
 use super::*;
@@ -6,7 +8,7 @@ use crate::geometry::Aabb;
 use crate::index::{
     BuildError, Info, Input, Linear, MemoryUsage, NoParams, RegionIndex, Registry, StructureSpec,
 };
-use crate::measure::{Group, PathInfo, SceneInfo, measure_part};
+use crate::measure::{Group, PathInfo, SceneInfo};
 use crate::path;
 use crate::query::{Context, ItemId, QueryVolume};
 use crate::scene;
@@ -42,7 +44,7 @@ fn part(specs: &[StructureSpec], motion: &str, test: CullingTest, known: Option<
         plan_only: false,
         locate: true,
     };
-    let part = measure_part(&workload, &subjects, plan, &|_, _| (), &|| false);
+    let part = measure_queries_or_frames(&workload, &subjects, plan, &|_, _| (), &|| false);
     part.unwrap().0
 }
 
