@@ -33,7 +33,6 @@ const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
 ];
 
 /// Metrics of each task: its time, and its speed-up over the yardstick.
-///
 /// The last speed-up counts: that of whole frames where items move.
 const TIME_METRICS: [(TaskKind, &str, Option<&str>); 6] = [
     (TaskKind::Query, "query_ns", Some("speedup")),
