@@ -147,11 +147,8 @@ fn main() -> ExitCode {
                     cameras: if only_test { 8 } else { cameras_within(1e9, n) },
                     ..protocol
                 };
-                let timed = timed_rounds(workload.views.len(), &[task], &protocol, &|| false);
-                let timed: Timed = timed
-                    .expect("not stopped")
-                    .remove(0)
-                    .expect("as many ids as a scan finds");
+                let mut timed = timed_rounds(workload.views.len(), &[task], &protocol);
+                let timed: Timed = timed.remove(0).expect("as many ids as a scan finds");
                 let ns = timed.ns().unwrap_or(f64::NAN);
                 let count = expected[which].iter().sum::<u64>() / expected[which].len() as u64;
                 cells += &format!(" {count} | {:.2} |", ns / 1e3);

@@ -19,7 +19,7 @@ pub use options::{AdviseError, AdviseOptions};
 use crate::culling::{Culling, CullingTest};
 use crate::funnel::check_memory;
 use crate::index::StructureSpec;
-use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, Workload, timed};
+use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, Workload, timed_to_end};
 use crate::path::CameraPath;
 use crate::scene::Scene;
 use crate::statistics::Estimate;
@@ -132,25 +132,21 @@ impl<'a> AdviseInput<'a> {
 /// Runs every rule with and without its feature on the fastest tree.
 ///
 /// Compares both sides with each other and with the exact truth, and plans their times.
-/// `None` if stopped.
 ///
 /// # Errors
 /// A camera without a view, a scene that a structure of the rules refuses.
 pub fn prepare(
     input: &AdviseInput,
     mut structure: StructureChoice,
-    stop: &dyn Fn() -> bool,
     progress: &dyn Fn(&str),
-) -> Result<Option<Prepared>, AdviseError> {
+) -> Result<Prepared, AdviseError> {
     let AdviseInput { scene, path, .. } = *input;
     let workload = input.workload()?;
     let specs = structure.tree_and_scan(input.structures)?;
     structure.note_kinds(input.structures);
     let structures = specs.each_ref().map(|spec| spec.label.clone());
     let case = Case::new(&workload, path, specs, input.options, input.protocol)?;
-    let Some(mut entered) = Entered::new(&case, stop, progress)? else {
-        return Ok(None);
-    };
+    let mut entered = Entered::new(&case, progress)?;
     progress("answers, checked");
     let answered = entered.trials.answered();
     let drafts = entered.rules.iter_mut().flat_map(|(_, draft)| draft);
@@ -158,7 +154,7 @@ pub fn prepare(
         .flat_map(|draft| &mut draft.sides)
         .for_each(|sides| entered.trials.compare(sides));
     let tasks = entered.trials.tasks(&answered.counts);
-    Ok(Some(Prepared {
+    Ok(Prepared {
         plan: TrialPlan {
             structures,
             schedule: Schedule::new(path.cameras.len(), &tasks, input.protocol),
@@ -181,18 +177,14 @@ pub fn prepare(
         rules: entered.rules,
         twin: entered.twin,
         answered,
-    }))
+    })
 }
 
-/// Times of one process; `None` if stopped.
+/// Times of one process.
 ///
 /// # Errors
 /// As [`prepare`]; another scene than planned.
-pub fn time(
-    input: &AdviseInput,
-    plan: &TrialPlan,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<ProcessTimes>, AdviseError> {
+pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, AdviseError> {
     let workload = input.workload()?;
     let [tree, scan] = &plan.structures;
     let specs = [tree, scan].map(|label| choice::planned(input.structures, label));
@@ -204,9 +196,7 @@ pub fn time(
         input.options,
         input.protocol,
     )?;
-    let Some(entered) = Entered::new(&case, stop, &|_| ())? else {
-        return Ok(None);
-    };
+    let entered = Entered::new(&case, &|_| ())?;
     let (found, planned) = (entered.trials.len(), plan.expected.len());
     let cameras = plan.expected.iter().map(Vec::len);
     if found != planned || cameras.min() != Some(input.path.cameras.len()) {
@@ -217,11 +207,10 @@ pub fn time(
     }
     let once_ns = entered.trials.once_ns.clone();
     let tasks = entered.trials.tasks(&plan.expected);
-    let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
-    Ok(timed.map(|timed| ProcessTimes {
+    Ok(ProcessTimes {
         once_ns,
-        ..ProcessTimes::of(&timed)
-    }))
+        ..ProcessTimes::of(&timed_to_end(&tasks, &plan.schedule, input.protocol))
+    })
 }
 
 impl Prepared {
@@ -252,18 +241,10 @@ struct Entered<'c> {
 }
 
 impl<'c> Entered<'c> {
-    /// `None` if stopped.
-    fn new(
-        case: &'c Case<'c>,
-        stop: &dyn Fn() -> bool,
-        progress: &dyn Fn(&str),
-    ) -> Result<Option<Self>, AdviseError> {
+    fn new(case: &'c Case<'c>, progress: &dyn Fn(&str)) -> Result<Self, AdviseError> {
         let mut trials = Trials::new(case);
         let mut rules = Vec::with_capacity(RULES.len());
         for rule in RULES {
-            if stop() {
-                return Ok(None);
-            }
             progress(rule.name);
             let draft = match (rule.prepare)(&mut trials) {
                 Err(Unfit::Failed(error)) => return Err(error),
@@ -272,11 +253,11 @@ impl<'c> Entered<'c> {
             };
             rules.push((rule, draft));
         }
-        Ok(Some(Entered {
+        Ok(Entered {
             tests: choice::enter_tests(&mut trials)?,
             twin: trials.add_base(),
             trials,
             rules,
-        }))
+        })
     }
 }

@@ -4,13 +4,12 @@
 use std::io::{self, Write};
 
 use super::args::AdviseArgs;
-use super::interrupt::Interrupted;
 use super::processes::Said;
 use super::protocol::{Job, Timing};
 use super::study::{Setting, Study};
 use super::table::{Column, Table};
 use super::text::some;
-use super::{Ending, interrupt, print, tell, text};
+use super::{Ending, print, tell, text};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,
     StructureRow, TestChoice, TestRow, TrialPlan,
@@ -40,7 +39,6 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
         ));
     }
     input.check()?;
-    interrupt::from_now_on_finish();
     let processes = args.study.spread.processes;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, processes.into(), &args.study.spread)?;
@@ -67,8 +65,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
         study.advance();
     }
     let choice = StructureChoice::of(&Group::of(&parts));
-    let prepared = advise::prepare(&input, choice, &interrupt::asked, &begin)?;
-    let prepared = prepared.ok_or(Interrupted)?;
+    let prepared = advise::prepare(&input, choice, &begin)?;
     let trials = |timing| Job::Trials(prepared.plan.clone(), timing);
     let step = "with and without every rule";
     let times = study.times(step, setting.path.lens_scale, trials)?;
@@ -127,14 +124,9 @@ pub fn time(
     args: &AdviseArgs,
     trials: &TrialPlan,
     timing: &Timing,
-    stop: &dyn Fn() -> bool,
-) -> anyhow::Result<Option<ProcessTimes>> {
+) -> anyhow::Result<ProcessTimes> {
     let (setting, _) = setting(registry, args, Some(timing))?;
-    Ok(advise::time(
-        &input(&setting, &options(args)),
-        trials,
-        stop,
-    )?)
+    Ok(advise::time(&input(&setting, &options(args)), trials)?)
 }
 
 fn options(args: &AdviseArgs) -> AdviseOptions {

@@ -6,11 +6,10 @@ use std::io::Write;
 
 use super::args::DriftArgs;
 use super::document::{Block, to_page, to_terminal};
-use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::Study;
 use super::table::{Column, Table};
-use super::{Ending, drift_arms, drift_chart, expect_places, interrupt, print, text, write_text};
+use super::{Ending, drift_arms, drift_chart, expect_places, print, text, write_text};
 use crate::drift::{
     self, ArmKind, ArmOptions, DriftOptions, DriftReport, ORBIT_RADIUS, OrbitDrift, Rated,
     Recommendation, RotationDrift, SWING_DEG, TurnDrift,
@@ -27,7 +26,6 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     ];
     expect_places(&outputs, &[])?;
     let options = options(args);
-    interrupt::from_now_on_finish();
     let jobs = drift::jobs(&options);
     let study = Study::new(String::new(), jobs as u64, &args.spread)?;
     let work = text::counted(jobs, "study");
@@ -37,12 +35,10 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
         &format!("{work}, up to {steps:e} steps or {seconds} s each"),
         "about half a minute",
     );
-    let report = drift::prepare(&options, |job| {
+    let mut report = drift::prepare(&options, |job| {
         study.begin(job);
         study.advance();
-        interrupt::asked()
     });
-    let mut report = report.ok_or(Interrupted)?;
     let schedule = drift::plan(&options, &protocol(args, 0));
     let job = |timing| Job::Drift(schedule.clone(), timing);
     let times = study.times("everything, timed", None, job)?;
@@ -89,13 +85,8 @@ fn protocol(args: &DriftArgs, process: u32) -> Protocol {
 }
 
 /// Times everything in one process.
-pub fn time(
-    args: &DriftArgs,
-    plan: &Schedule,
-    timing: &Timing,
-    stop: &dyn Fn() -> bool,
-) -> Option<ProcessTimes> {
-    drift::time(&options(args), plan, &protocol(args, timing.process), stop)
+pub fn time(args: &DriftArgs, plan: &Schedule, timing: &Timing) -> ProcessTimes {
+    drift::time(&options(args), plan, &protocol(args, timing.process))
 }
 
 /// A table of one figure: a row per method, a column per number of steps or turns.

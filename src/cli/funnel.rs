@@ -11,13 +11,12 @@ use anyhow::{Context, bail};
 
 use super::document::{Block, to_page, to_terminal};
 use super::funnel_args::FunnelArgs;
-use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::shared_args::{StudyArgs, TableFormat};
 use super::study::{Setting, Study};
 use super::{
     Ending, expect_folder, expect_places, funnel_csv, funnel_figure, funnel_picture, funnel_table,
-    interrupt, print, text, write_text,
+    print, text, write_text,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -49,7 +48,6 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         bail!("--mirror shows whole boxes; expected no --cut-out with it");
     }
     let stages = Stages::of(registry, args, None)?;
-    interrupt::from_now_on_finish();
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 1, &args.study.spread)?;
     let input = stages.input(args)?;
@@ -61,7 +59,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         }
         study.begin(step);
     };
-    let prepared = funnel::prepare(&input, &begin, &interrupt::asked)?.ok_or(Interrupted)?;
+    let prepared = funnel::prepare(&input, &begin)?;
     study.advance();
     let job = |timing| Job::Funnel(prepared.plan.clone(), timing);
     let lens_scale = stages.setting.path.lens_scale;
@@ -259,10 +257,9 @@ pub fn time(
     args: &FunnelArgs,
     plan: &FunnelPlan,
     timing: &Timing,
-    stop: &dyn Fn() -> bool,
-) -> anyhow::Result<Option<ProcessTimes>> {
+) -> anyhow::Result<ProcessTimes> {
     let stages = Stages::of(registry, args, Some(timing))?;
-    Ok(funnel::time(&stages.input(args)?, plan, stop)?)
+    Ok(funnel::time(&stages.input(args)?, plan)?)
 }
 
 #[cfg(test)]

@@ -7,12 +7,11 @@ use std::io::Write;
 use super::args::PrecisionArgs;
 use super::document::{Block, to_page, to_terminal};
 use super::figure::picture;
-use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::{Setting, Study};
 use super::{
-    Ending, expect_places, interrupt, precision_chart, precision_conclusions, precision_tables,
-    print, stage_sweep, text, write_text,
+    Ending, expect_places, precision_chart, precision_conclusions, precision_tables, print,
+    stage_sweep, text, write_text,
 };
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Status};
@@ -42,27 +41,22 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         spread,
     )?;
     study.begin("every point, checked");
-    // There are no files yet: Ctrl-C ends the program.
-    let going_on = &|| false;
-    let prepared = precision::prepare(&input(args, &setting), going_on)?.ok_or(Interrupted)?;
+    let prepared = precision::prepare(&input(args, &setting))?;
     let items = text::counted(setting.scene.items.len(), "item");
     study.announce(&items, "about a minute");
     let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
     if args.cubes > 0 {
         study.begin("the sweep over sizes");
-        let rows = size_sweep(args.cubes, spread.seed, going_on)?;
-        sizes = rows.unwrap_or_default();
+        sizes = size_sweep(args.cubes, spread.seed)?;
         let cameras = args
             .cubes
             .div_ceil(CUBES_PER_CAMERA)
             .clamp(2, SWEEP_CAMERAS);
         for (which, name, _) in SWEEPS {
             study.begin(&format!("the sweep over {name}"));
-            let rows = sweep(which, cameras, spread.seed, going_on);
-            sweeps.extend(rows.unwrap_or_default());
+            sweeps.extend(sweep(which, cameras, spread.seed));
         }
     }
-    interrupt::from_now_on_finish();
     let points = |timing| Job::Points(prepared.plan.clone(), timing);
     let times = study.times("every point, timed", setting.path.lens_scale, points)?;
     let precision = prepared.conclude(&times);
@@ -143,8 +137,7 @@ pub fn time(
     args: &PrecisionArgs,
     plan: &PointPlan,
     timing: &Timing,
-    stop: &dyn Fn() -> bool,
-) -> anyhow::Result<Option<ProcessTimes>> {
+) -> anyhow::Result<ProcessTimes> {
     let setting = setting(registry, args, Some(timing))?;
-    Ok(precision::time(&input(args, &setting), plan, stop)?)
+    Ok(precision::time(&input(args, &setting), plan)?)
 }

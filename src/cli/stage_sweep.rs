@@ -7,11 +7,10 @@ use anyhow::bail;
 
 use super::args::PrecisionArgs;
 use super::funnel::plain_input;
-use super::interrupt::Interrupted;
 use super::protocol::{Job, Timing};
 use super::study::{Setting, Study};
 use super::table::Table;
-use super::{Ending, funnel_table, interrupt, print, text};
+use super::{Ending, funnel_table, print, text};
 use crate::funnel::{self, Chain, FunnelPlan, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
 use crate::measure::ProcessTimes;
@@ -74,11 +73,9 @@ pub fn sweep(
     let study = Study::new(about, 0, &args.study.spread)?;
     study.begin("every point, judged");
     let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
-    // There are no files yet: Ctrl-C ends the program.
-    let prepared = funnel::prepare_sweep(&input, stage, &|| false)?.ok_or(Interrupted)?;
+    let prepared = funnel::prepare_sweep(&input, stage)?;
     let items = text::counted(scene.items.len(), "item");
     study.announce(&items, "less than a minute");
-    interrupt::from_now_on_finish();
     let job = |timing| Job::Sweep(prepared.plan.clone(), timing);
     let lens_scale = setting.path.lens_scale;
     let times = study.times("every point, timed", lens_scale, job)?;
@@ -96,14 +93,13 @@ pub fn time(
     args: &PrecisionArgs,
     plan: &FunnelPlan,
     timing: &Timing,
-    stop: &dyn Fn() -> bool,
-) -> anyhow::Result<Option<ProcessTimes>> {
+) -> anyhow::Result<ProcessTimes> {
     let Some(stage) = args.stage else {
         bail!("a sweep without a stage");
     };
     let (setting, chain) = setting(registry, args, Some(timing))?;
     let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
-    Ok(funnel::time_sweep(&input, stage, plan, stop)?)
+    Ok(funnel::time_sweep(&input, stage, plan)?)
 }
 
 fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {

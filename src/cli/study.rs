@@ -10,7 +10,7 @@ use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
 use super::shared_args::{SpreadArgs, StudyArgs};
-use super::{load_scene_by, tell, text};
+use super::{interrupt, load_scene_by, tell, text};
 use crate::index::{Registry, StructureSpec};
 use crate::input::tell_warnings;
 use crate::measure::{ProcessTimes, Protocol};
@@ -136,12 +136,15 @@ impl Study {
     }
 
     /// The times of all processes, one after the other.
+    ///
+    /// From now on Ctrl-C stops the work at the next safe place; before it ends the program.
     pub fn times(
         self,
         step: &str,
         lens_scale: Option<f64>,
         job: impl Fn(Timing) -> Job,
     ) -> anyhow::Result<Vec<ProcessTimes>> {
+        interrupt::from_now_on_finish();
         let mut all = Vec::new();
         let started = Instant::now();
         for process in 0..self.processes {

@@ -86,10 +86,9 @@ fn missed(camera: Camera) -> [bool; 4] {
         most_cameras: 1,
         protocol: &protocol,
     };
-    let prepared = precision::prepare(&input, &|| false);
-    let prepared = prepared.expect("no refusal").expect("not stopped");
-    let times = precision::time(&input, &prepared.plan, &|| false);
-    let measured = prepared.conclude(&[times.expect("no refusal").expect("not stopped")]);
+    let prepared = precision::prepare(&input).expect("no refusal");
+    let times = precision::time(&input, &prepared.plan);
+    let measured = prepared.conclude(&[times.expect("no refusal")]);
     let by_precision = measured.points.iter().any(|point| {
         let is_default = point.errors.names.test == "six-plane"
             && point.errors.names.arithmetic == "f32"

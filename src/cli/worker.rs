@@ -56,42 +56,47 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
         crate::input::stand_in(source, file)?;
     }
     let typed = [String::new()].into_iter().chain(request.args.clone());
-    match (&request.job, Cli::try_parse_from(typed)?.command) {
-        (
-            Job::Scene {
-                scene,
-                share,
-                samples,
-            },
-            command,
-        ) => {
-            let plan = match command {
-                Command::Run(args) => run_plan::plan(registry, &args)?.plan,
-                Command::Advise(args) => advise::plan(registry, &args)?,
-                _ => anyhow::bail!(OTHER),
-            };
-            here.scene(&plan, *scene, share, *samples)?;
-        }
-        (Job::Trials(plan, timing), Command::Advise(args)) => {
-            here.times(&|stop| advise::time(registry, &args, plan, timing, stop))?;
-        }
-        (Job::Points(plan, timing), Command::Precision(args)) => {
-            here.times(&|stop| precision::time(registry, &args, plan, timing, stop))?;
-        }
-        (Job::Sweep(plan, timing), Command::Precision(args)) => {
-            here.times(&|stop| stage_sweep::time(registry, &args, plan, timing, stop))?;
-        }
-        (Job::Funnel(plan, timing), Command::Funnel(args)) => {
-            here.times(&|stop| funnel::time(registry, &args, plan, timing, stop))?;
-        }
-        (Job::Drift(plan, timing), Command::Drift(args)) => {
-            here.times(&|stop| Ok(drift::time(&args, plan, timing, stop)))?;
-        }
-        _ => anyhow::bail!(OTHER),
+    let command = Cli::try_parse_from(typed)?.command;
+    if let Job::Scene {
+        scene,
+        share,
+        samples,
+    } = &request.job
+    {
+        let plan = match command {
+            Command::Run(args) => run_plan::plan(registry, &args)?.plan,
+            Command::Advise(args) => advise::plan(registry, &args)?,
+            _ => anyhow::bail!(OTHER),
+        };
+        here.scene(&plan, *scene, share, *samples)?;
+    } else {
+        here.at.set(None, TIMING);
+        here.tell(&here.at.message());
+        here.tell(&Message::Times(times(registry, &request.job, &command)?));
     }
     match here.failed.into_inner() {
         Some(error) => Err(error.into()),
         None => Ok(()),
+    }
+}
+
+/// Times of one process of a study.
+fn times(registry: &Registry, job: &Job, command: &Command) -> anyhow::Result<ProcessTimes> {
+    match (job, command) {
+        (Job::Trials(plan, timing), Command::Advise(args)) => {
+            advise::time(registry, args, plan, timing)
+        }
+        (Job::Points(plan, timing), Command::Precision(args)) => {
+            precision::time(registry, args, plan, timing)
+        }
+        (Job::Sweep(plan, timing), Command::Precision(args)) => {
+            stage_sweep::time(registry, args, plan, timing)
+        }
+        (Job::Funnel(plan, timing), Command::Funnel(args)) => {
+            funnel::time(registry, args, plan, timing)
+        }
+        (Job::Drift(plan, timing), Command::Drift(args)) => Ok(drift::time(args, plan, timing)),
+        _ => anyhow::bail!(OTHER),
     }
 }
 
@@ -177,18 +182,7 @@ impl Here {
         measure_scene(plan, planned, share, &mut keep, &notice, &|| self.stop())?;
         Ok(())
     }
-
-    fn times(&self, time: TimeAll) -> anyhow::Result<()> {
-        self.notice(None, TIMING);
-        if let Some(times) = time(&|| self.stop())? {
-            self.tell(&Message::Times(times));
-        }
-        Ok(())
-    }
 }
-
-/// Times everything unless it is stopped.
-type TimeAll<'t> = &'t dyn Fn(&dyn Fn() -> bool) -> anyhow::Result<Option<ProcessTimes>>;
 
 /// Ends this process with its parent: standard input has nothing after the request,
 /// so its end is that of the parent.

@@ -23,7 +23,9 @@ pub use rated::{Rated, Recommendation};
 pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 pub use stability::StabilityLimit;
 
-use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
+use crate::measure::{
+    OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed_rounds, timed_to_end,
+};
 use exact::larger;
 use orbit::{CARRIERS, SWING};
 use rated::{per_unit, rated};
@@ -112,12 +114,8 @@ fn looks(most: u64) -> Vec<u64> {
 
 /// Finds all errors: a report without times.
 ///
-/// `progress` gets each job's name before it starts, and ends the work early by
-/// returning true.
-pub fn prepare(
-    options: &DriftOptions,
-    mut progress: impl FnMut(&str) -> bool,
-) -> Option<DriftReport> {
+/// `begin` gets each job's name before it starts.
+pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
     let looks = looks(options.steps);
     let moments = moments(&looks);
     let mut report = DriftReport {
@@ -127,21 +125,20 @@ pub fn prepare(
         period_steps: PERIOD,
         ..DriftReport::default()
     };
-    let mut goes_on = |job: &str| (!progress(job)).then_some(());
     for method in METHODS {
-        goes_on(method.name)?;
+        begin(method.name);
         report.rotation.extend(method.drift(&moments));
         let turns = method.turn_drift(&TURNS);
         report.one_degree_turns.extend(turns);
     }
     for carrier in CARRIERS {
-        goes_on(carrier.name)?;
+        begin(carrier.name);
         report.orbit.extend(orbit::drift(carrier, &looks));
     }
     let mut points = Vec::new();
     for setting in arm_study::settings(&options.arm) {
         let (arm, k) = (setting.arm.name(), setting.stiffness);
-        goes_on(&format!("{arm} arm, k = {k:e}"))?;
+        begin(&format!("{arm} arm, k = {k:e}"));
         points.extend(arm_study::errors(setting, options.arm.seconds));
     }
     report.arm = ArmReport {
@@ -152,7 +149,7 @@ pub fn prepare(
         stability: stability::limits(),
         choices: Vec::new(),
     };
-    Some(report)
+    report
 }
 
 /// All timed tasks: bases, eyes, arms.
@@ -169,15 +166,9 @@ pub fn plan(options: &DriftOptions, protocol: &Protocol) -> Schedule {
     Schedule::new(QUERIES, &tasks(options), protocol)
 }
 
-/// Times the planned tasks in this process; `None` if stopped.
-pub fn time(
-    options: &DriftOptions,
-    schedule: &Schedule,
-    protocol: &Protocol,
-    stop: &dyn Fn() -> bool,
-) -> Option<ProcessTimes> {
-    let timed = timed(&tasks(options), schedule, protocol, &|_| stop());
-    timed.map(|timed| ProcessTimes::of(&timed))
+/// Times the planned tasks in this process.
+pub fn time(options: &DriftOptions, schedule: &Schedule, protocol: &Protocol) -> ProcessTimes {
+    ProcessTimes::of(&timed_to_end(&tasks(options), schedule, protocol))
 }
 
 impl DriftReport {
@@ -222,8 +213,8 @@ pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
     let methods: Vec<&Method> = names.iter().filter_map(of).collect();
     let moments = moments(&[steps]);
     let tasks: Vec<TimedTask> = methods.iter().map(|m| walking(m.walk, STEADY)).collect();
-    let timed = crate::measure::timed_rounds(QUERIES, &tasks, &protocol, &|| false);
-    let times = OverProcesses::of(&[ProcessTimes::of(&timed.unwrap_or_default())]);
+    let timed = timed_rounds(QUERIES, &tasks, &protocol);
+    let times = OverProcesses::of(&[ProcessTimes::of(&timed)]);
     let row = |(task, method): (usize, &&Method)| {
         let [ns, ..] = per_unit(&times, task, QUERY_STEPS as f64);
         (frame_error(&method.drift(&moments)), ns.unwrap_or(f64::NAN))

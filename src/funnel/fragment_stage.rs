@@ -195,22 +195,13 @@ impl<'w> FragmentStage<'w> {
         })
     }
 
-    /// Counts of no test and of every test; `None` if stopped.
-    pub fn tested(
-        &self,
-        stages: &ItemStages,
-        steps: &[Step],
-        truth: &Truth,
-        stop: &dyn Fn() -> bool,
-    ) -> Option<Vec<Tested>> {
+    /// Counts of no test and of every test.
+    pub fn tested(&self, stages: &ItemStages, steps: &[Step], truth: &Truth) -> Vec<Tested> {
         let world = self.world;
         let none = world.back_end(StageKind::Fragment, NONE);
         let tested = std::iter::once(none).chain(self.tests()).map(|back_end| {
             let (mut counts, mut tallies) = (Vec::new(), Vec::new());
             for view in world.views() {
-                if stop() {
-                    return None;
-                }
                 let given = stages.items(steps, view);
                 let mut output = Vec::new();
                 match back_end.name {
@@ -219,11 +210,11 @@ impl<'w> FragmentStage<'w> {
                 }
                 counts.push(count_items(given, world.items(), &output, &truth[view]));
             }
-            Some(Tested {
+            Tested {
                 back_end,
                 counts,
                 tallies,
-            })
+            }
         });
         tested.collect()
     }

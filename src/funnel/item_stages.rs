@@ -101,47 +101,39 @@ impl<'w> ItemStages<'w> {
         ItemStages { world, left }
     }
 
-    /// Runs a chain and all that differ from it in one stage; `None` if stopped.
-    pub fn all(
-        world: &'w World<'w>,
-        chain: &Chain,
-        stop: &dyn Fn() -> bool,
-    ) -> Option<ItemStages<'w>> {
+    /// Runs a chain and all that differ from it in one stage.
+    pub fn all(world: &'w World<'w>, chain: &Chain) -> ItemStages<'w> {
         let mut all = ItemStages::new(world);
-        all.run(&chain.steps(), stop)?;
+        all.run(&chain.steps());
         for stage in StageKind::OF_ITEMS {
             for name in world.names(stage) {
-                all.run(&chain.steps_with(stage, &name), stop)?;
+                all.run(&chain.steps_with(stage, &name));
             }
             if world.is_separate(chain, stage) {
-                all.run(&chain.clone().with(stage, NONE).steps(), stop)?;
+                all.run(&chain.clone().with(stage, NONE).steps());
             }
         }
-        Some(all)
+        all
     }
 
     /// Runs stages one after the other, those that were run before only once.
-    pub fn run(&mut self, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<()> {
+    pub fn run(&mut self, steps: &[Step]) {
         let Some(((stage, name), before)) = steps.split_last() else {
-            return Some(());
+            return;
         };
         if self.left.iter().any(|(own, _)| own == steps) {
-            return Some(());
+            return;
         }
-        self.run(before, stop)?;
+        self.run(before);
         let run = self.world.run(*stage, name);
-        let mut output = Vec::with_capacity(self.world.views.len());
-        for view in self.world.views() {
-            if stop() {
-                return None;
-            }
+        let output = self.world.views().map(|view| {
             let mut ids = Vec::new();
             run(view, self.items(before, view), &mut ids);
             ids.sort_unstable();
-            output.push(ids);
-        }
+            ids
+        });
+        let output = output.collect();
         self.left.push((steps.to_vec(), output));
-        Some(())
     }
 
     /// Items of each view behind some steps; `None` for all items, without steps.

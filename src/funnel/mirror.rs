@@ -38,8 +38,7 @@ pub struct MirrorRow {
 
 /// The mirror in every view, behind the items that `steps` leave.
 ///
-/// It shows every other item of the scene. `None` if stopped, without views or for
-/// triangles.
+/// It shows every other item of the scene. `None` without views or for triangles.
 ///
 /// # Errors
 /// Items that cover too many samples.
@@ -48,7 +47,6 @@ pub fn mirrored(
     world: &World,
     stages: &ItemStages,
     steps: &[Step],
-    stop: &dyn Fn() -> bool,
 ) -> Result<Option<MirrorRow>, String> {
     let Some(solids) = world.shape.boxes() else {
         return Ok(None);
@@ -60,9 +58,6 @@ pub fn mirrored(
     let (mut with, mut without) = (Vec::new(), Vec::new());
     let (mut views, mut marked, mut shown, mut wrong) = (0, 0, 0, 0);
     for view in world.views() {
-        if stop() {
-            return Ok(None);
-        }
         let rays = world.rays(view);
         let Some(face) = face_towards(rays.camera(), own, axis) else {
             with.push(Default::default());

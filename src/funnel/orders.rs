@@ -193,21 +193,16 @@ impl Orders {
         })
     }
 
-    /// Draws every view in every order; `None` if stopped.
+    /// Draws every view in every order.
     ///
     /// # Errors
     /// Too many items behind each other.
-    pub fn drawn(&self, stop: &dyn Fn() -> bool) -> Result<Option<Vec<OrderRow>>, TooManyPairs> {
+    pub fn drawn(&self) -> Result<Vec<OrderRow>, TooManyPairs> {
         let mut rows: Vec<OrderRow> = self.rows.iter().map(|row| OrderRow::new(row)).collect();
         // Processes that only time need no tree of the triangles.
         let index = self.triangles.as_deref().map(SurfaceIndex::build);
         for left in &self.views {
-            if stop() {
-                return Ok(None);
-            }
-            let Some(counts) = self.counted(left, index.as_ref(), stop) else {
-                return Ok(None);
-            };
+            let counts = self.counted(left, index.as_ref());
             for ((row, order), (tally, errors)) in rows.iter_mut().zip(&left.orders).zip(counts) {
                 row.add(&tally, &errors?, self.views.len() as f64);
                 if let Some(reason) = order.exception(left.rays.camera()) {
@@ -219,16 +214,15 @@ impl Orders {
             let covered = Some(row.covered_count).filter(|count| *count > 0.0);
             row.overdraw = covered.map(|covered| row.shaded_count / covered);
         }
-        Ok(Some(rows))
+        Ok(rows)
     }
 
-    /// Fragments and errors of each order of a view; `None` if stopped.
+    /// Fragments and errors of each order of a view.
     fn counted(
         &self,
         left: &Left,
         index: Option<&SurfaceIndex>,
-        stop: &dyn Fn() -> bool,
-    ) -> Option<Vec<(Tally, Result<OrderErrors, TooManyPairs>)>> {
+    ) -> Vec<(Tally, Result<OrderErrors, TooManyPairs>)> {
         let (rays, samples, items) = (&left.rays, self.samples, &left.items);
         let sorted = left.orders.iter().enumerate().map(|(index, order)| {
             let mut pieces = Vec::new();
@@ -237,9 +231,7 @@ impl Orders {
         });
         let sorted: Vec<(&dyn DepthOrder, Vec<Piece>)> = sorted.collect();
         if let (Some(index), Some(all)) = (index, &self.triangles) {
-            return Some(draw_surfaces(
-                rays, samples, index, all.origin, items, &sorted,
-            ));
+            return draw_surfaces(rays, samples, index, all.origin, items, &sorted);
         }
         let canvas = Canvas::of(rays, samples);
         let tests = Tests {
@@ -249,7 +241,7 @@ impl Orders {
         let counts = sorted.iter().map(|(_, pieces)| {
             let tally = draw(&canvas, &left.boxes, pieces, &tests).tally;
             let errors = order_errors(&canvas, &left.boxes, pieces, &tests);
-            (!stop()).then_some((tally, errors))
+            (tally, errors)
         });
         counts.collect()
     }

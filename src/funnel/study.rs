@@ -64,16 +64,9 @@ struct Study<'w> {
 }
 
 impl<'w> Study<'w> {
-    /// `None` if stopped.
-    fn new(
-        world: &'w World<'w>,
-        input: &FunnelInput<'w>,
-        stop: &dyn Fn() -> bool,
-    ) -> Result<Option<Study<'w>>, FunnelError> {
+    fn new(world: &'w World<'w>, input: &FunnelInput<'w>) -> Result<Study<'w>, FunnelError> {
         let chain = input.chain;
-        let Some(items) = ItemStages::all(world, chain, stop) else {
-            return Ok(None);
-        };
+        let items = ItemStages::all(world, chain);
         let steps = chain.steps();
         if world.shape.boxes().is_some() {
             let left = items.mean_count(&steps) * world.views.len() as f64;
@@ -82,7 +75,7 @@ impl<'w> Study<'w> {
         let triangles = TriangleStage::new(world, &items, &steps);
         let culled = (&triangles, chain.of(StageKind::Triangle));
         let fragments = FragmentStage::new(world, &items, &steps, culled);
-        Ok(Some(Study {
+        Ok(Study {
             orders: input
                 .all
                 .then(|| Orders::new(world, &items, &steps, fragments.too_much.as_ref())),
@@ -93,7 +86,7 @@ impl<'w> Study<'w> {
             items,
             triangles,
             fragments,
-        }))
+        })
     }
 
     /// Every task but the bounds.
@@ -106,14 +99,11 @@ impl<'w> Study<'w> {
         tasks
     }
 
-    /// Rows of all stages before the fragment stage; `None` if stopped.
-    fn rows(&self, truth: &Truth, stop: &dyn Fn() -> bool) -> Option<Vec<StageRow>> {
+    /// Rows of all stages before the fragment stage.
+    fn rows(&self, truth: &Truth) -> Vec<StageRow> {
         let mut rows = Vec::new();
         for stage in [&StageKind::OF_ITEMS[..], &[StageKind::Triangle]].concat() {
             for name in self.world.names(stage) {
-                if stop() {
-                    return None;
-                }
                 let counts = match stage {
                     StageKind::Triangle => self.triangles.counts(&name),
                     _ => {
@@ -131,7 +121,7 @@ impl<'w> Study<'w> {
                 ));
             }
         }
-        Some(rows)
+        rows
     }
 
     /// Row of a test of the fragment stage.
@@ -187,35 +177,20 @@ pub struct Prepared {
     report: FunnelReport,
 }
 
-/// Compares all back ends with the truth and plans their times; `None` if stopped.
+/// Compares all back ends with the truth and plans their times.
 /// `begin` gets the name of each step before it starts.
 ///
 /// # Errors
 /// A camera, a structure, a back end or an image that is refused.
-pub fn prepare(
-    input: &FunnelInput,
-    begin: &dyn Fn(&str),
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<Prepared>, FunnelError> {
+pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, FunnelError> {
     fits(input.samples, available_bytes())?;
     let world = World::new(input.scene, input, begin)?;
     begin("truth");
-    let Some(truth) = visible(&world, 0, input.execution.threads, stop)? else {
-        return Ok(None);
-    };
+    let truth = visible(&world, 0, input.execution.threads)?;
     begin("every stage, compared with the truth");
-    let Some(study) = Study::new(&world, input, stop)? else {
-        return Ok(None);
-    };
-    let Some(mut rows) = study.rows(&truth, stop) else {
-        return Ok(None);
-    };
-    let Some(tested) = study
-        .fragments
-        .tested(&study.items, &study.steps, &truth, stop)
-    else {
-        return Ok(None);
-    };
+    let study = Study::new(&world, input)?;
+    let mut rows = study.rows(&truth);
+    let tested = study.fragments.tested(&study.items, &study.steps, &truth);
     rows.extend(tested.iter().map(|tested| study.test_row(tested)));
     let mut left_out = Vec::from_iter(left_out_of(input.scene));
     let too_much = study.fragments.too_much.as_ref();
@@ -227,22 +202,19 @@ pub fn prepare(
             .flat_map(|orders| orders.left_out.clone()),
     );
     let mirror = input.mirror.map_or(Ok(None), |item| {
-        mirrored(item, &world, &study.items, &study.steps, stop)
+        mirrored(item, &world, &study.items, &study.steps)
     });
     let mirror = mirror.unwrap_or_else(|reason| {
         left_out.push(LeftOutRow::new("mirror", "all", reason));
         None
     });
-    let mut orders = None;
+    let mut orders = Vec::new();
     if let Some(all) = &study.orders {
         begin("every order, drawn");
-        orders = all.drawn(stop).unwrap_or_else(|reason| {
+        orders = all.drawn().unwrap_or_else(|reason| {
             left_out.push(LeftOutRow::new("orders", "all", reason));
-            None
+            Vec::new()
         });
-    }
-    if stop() {
-        return Ok(None);
     }
     let mut picks = Vec::new();
     if let Some(all) = &study.picks {
@@ -284,7 +256,7 @@ pub fn prepare(
             .map(|ground| ground.row.clone()),
         solid_blocks: world.hiders.blocks.clone(),
         mirror,
-        orders: orders.unwrap_or_default(),
+        orders,
         picks,
         left_out,
         bounds: bounds.iter().map(|bound| bound.row.clone()).collect(),
@@ -296,30 +268,24 @@ pub fn prepare(
     if !input.all {
         tasks.retain(|task| report.needs(&task.key));
     }
-    Ok(Some(Prepared {
+    Ok(Prepared {
         plan: FunnelPlan::new(tasks, world.views.len(), input),
         report,
-    }))
+    })
 }
 
-/// Times of one process; `None` if stopped.
+/// Times of one process.
 ///
 /// # Errors
 /// As [`prepare`].
-pub fn time(
-    input: &FunnelInput,
-    plan: &FunnelPlan,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<ProcessTimes>, FunnelError> {
+pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes, FunnelError> {
     let world = World::new(input.scene, input, &|_| ())?;
-    let Some(study) = Study::new(&world, input, stop)? else {
-        return Ok(None);
-    };
+    let study = Study::new(&world, input)?;
     let covered = plan.expected(&covered_key()).unwrap_or_default();
     let bounds = bounds(&world, &study.triangles, covered).into_iter();
     let mut tasks = study.tasks();
     tasks.extend(bounds.map(|bound| bound.task()));
-    Ok(plan.time(tasks, input, stop))
+    Ok(plan.time(tasks, input))
 }
 
 impl Prepared {

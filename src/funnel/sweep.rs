@@ -110,28 +110,22 @@ struct Swept<'w> {
 }
 
 impl<'w> Swept<'w> {
-    /// `None` if stopped.
-    fn new(
-        world: &'w World<'w>,
-        chain: &Chain,
-        stage: StageKind,
-        stop: &dyn Fn() -> bool,
-    ) -> Option<Swept<'w>> {
+    fn new(world: &'w World<'w>, chain: &Chain, stage: StageKind) -> Swept<'w> {
         let steps = match stage {
             StageKind::Region => Vec::new(),
             StageKind::Triangle => chain.steps(),
             _ => Chain::empty().steps_with(StageKind::Object, chain.of(StageKind::Object)),
         };
         let mut items = ItemStages::new(world);
-        items.run(&steps, stop)?;
+        items.run(&steps);
         let is_of_triangles = stage == StageKind::Triangle;
-        Some(Swept {
+        Swept {
             triangles: is_of_triangles.then(|| TriangleStage::new(world, &items, &steps)),
             world,
             stage,
             items,
             steps,
-        })
+        }
     }
 
     /// Every point without errors and times, with its task.
@@ -187,37 +181,25 @@ impl<'w> Swept<'w> {
     }
 }
 
-/// Compares all points of a stage with the truth; `None` if stopped.
+/// Compares all points of a stage with the truth.
 ///
 /// # Errors
 /// As [`prepare`](super::prepare).
-pub fn prepare_sweep(
-    input: &FunnelInput,
-    stage: StageKind,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<PreparedSweep>, FunnelError> {
+pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSweep, FunnelError> {
     let world = World::new(input.scene, input, &|_| ())?;
-    let Some(swept) = Swept::new(&world, input.chain, stage, stop) else {
-        return Ok(None);
-    };
+    let swept = Swept::new(&world, input.chain, stage);
     // The side of a triangle needs no rays.
     let (rays, truth) = match stage {
-        StageKind::Triangle => (0, Some(Truth::new())),
-        _ => (RAYS, visible(&world, RAYS, input.execution.threads, stop)?),
-    };
-    let Some(truth) = truth else {
-        return Ok(None);
+        StageKind::Triangle => (0, Truth::new()),
+        _ => (RAYS, visible(&world, RAYS, input.execution.threads)?),
     };
     let (mut points, mut tasks) = (Vec::new(), Vec::new());
     for (mut point, task) in swept.points() {
-        if stop() {
-            return Ok(None);
-        }
         point.errors = Errors::of(&swept.counts(&point.back_end, &task.ask, &truth));
         points.push(point);
         tasks.push(task);
     }
-    Ok(Some(PreparedSweep {
+    Ok(PreparedSweep {
         plan: FunnelPlan::new(tasks, world.views.len(), input),
         sweep: StageSweep {
             scene: input.scene.name.clone(),
@@ -228,10 +210,10 @@ pub fn prepare_sweep(
             processes: 0,
             points,
         },
-    }))
+    })
 }
 
-/// Times of one process; `None` if stopped.
+/// Times of one process.
 ///
 /// # Errors
 /// As [`prepare_sweep`].
@@ -239,14 +221,11 @@ pub fn time_sweep(
     input: &FunnelInput,
     stage: StageKind,
     plan: &FunnelPlan,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<ProcessTimes>, FunnelError> {
+) -> Result<ProcessTimes, FunnelError> {
     let world = World::new(input.scene, input, &|_| ())?;
-    let Some(swept) = Swept::new(&world, input.chain, stage, stop) else {
-        return Ok(None);
-    };
+    let swept = Swept::new(&world, input.chain, stage);
     let tasks = swept.points().into_iter().map(|(_, task)| task);
-    Ok(plan.time(tasks.collect(), input, stop))
+    Ok(plan.time(tasks.collect(), input))
 }
 
 impl PreparedSweep {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::stage::{Chain, NONE, StageKind, Step};
 use super::world::FunnelInput;
-use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
+use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed_to_end};
 use crate::statistics::Estimate;
 
 named! {
@@ -95,15 +95,10 @@ impl FunnelPlan {
         }
     }
 
-    /// Times of one process; `None` if stopped.
+    /// Times of one process.
     ///
     /// A planned task that this process does not have fails by its counts.
-    pub fn time(
-        &self,
-        tasks: Vec<KeyedTask>,
-        input: &FunnelInput,
-        stop: &dyn Fn() -> bool,
-    ) -> Option<ProcessTimes> {
+    pub fn time(&self, tasks: Vec<KeyedTask>, input: &FunnelInput) -> ProcessTimes {
         let tasks = tasks.into_iter().map(|task| (task.key, task.ask));
         let mut asks: HashMap<FunnelKey, Ask> = tasks.collect();
         let planned = self.tasks.iter().map(|(key, expected)| {
@@ -111,8 +106,7 @@ impl FunnelPlan {
             TimedTask::new(expected.clone(), ask)
         });
         let planned: Vec<TimedTask> = planned.collect();
-        let timed = timed(&planned, &self.schedule, input.protocol, &|_| stop())?;
-        Some(ProcessTimes::of(&timed))
+        ProcessTimes::of(&timed_to_end(&planned, &self.schedule, input.protocol))
     }
 
     /// Expected numbers of ids of a task, by view.

@@ -19,25 +19,16 @@ pub type Truth = Vec<Vec<(ItemId, u32)>>;
 
 /// Visible items at the samples of every view and along random rays.
 ///
-/// Items that only some of the `random_rays` rays meet count as one sample each. `None` if
-/// stopped.
+/// Items that only some of the `random_rays` rays meet count as one sample each.
 ///
 /// # Errors
 /// Too many items in front at the same samples.
-pub fn visible(
-    world: &World,
-    random_rays: usize,
-    threads: usize,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<Truth>, FunnelError> {
+pub fn visible(world: &World, random_rays: usize, threads: usize) -> Result<Truth, FunnelError> {
     let rays_end = RaysEnd::at(&world.shape, world.cut_outs.as_ref());
     let samples = world.samples;
     let items = world.items() as ItemId;
     let mut all = Vec::with_capacity(world.views.len());
     for view in world.views() {
-        if stop() {
-            return Ok(None);
-        }
         let rays = world.rays(view);
         let truth = rays_end.visible(rays, samples, threads).map_err(|error| {
             FunnelError::Refused(format!("camera {}: {error}", world.views[view].camera))
@@ -54,7 +45,7 @@ pub fn visible(
         seen.retain(|(item, _)| *item < items);
         all.push(seen);
     }
-    Ok(Some(all))
+    Ok(all)
 }
 
 /// Surfaces at which rays end: solid boxes, or triangles with the floors of a map.

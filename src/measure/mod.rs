@@ -86,7 +86,7 @@ pub use results::{Group, YARDSTICK, measure_group};
 pub use schedule::{CLOCK_NS, Protocol, Schedule, TaskPlan, cameras_within};
 pub use task::{Ask, AskMany, TimedTask};
 pub use tasks::{KeyedSchedule, Tasks};
-pub use timing::{Sample, Timed, timed, timed_rounds};
+pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
 pub use update::{UPDATE_SHARES, move_share};
 pub use workload::{Workload, WorkloadError, input_of};
 

@@ -72,7 +72,7 @@ pub(super) fn over_fresh(
         cameras: protocol.cameras.min(CAMERAS),
         ..*protocol
     };
-    let timed = timed_rounds(workload.views.len(), &tasks, &few, &|| false)?;
+    let timed = timed_rounds(workload.views.len(), &tasks, &few);
     match &timed[..] {
         [Ok(refitted), Ok(rebuilt)] => refitted.over(rebuilt).map(f64::ln),
         _ => None,

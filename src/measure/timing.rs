@@ -86,19 +86,22 @@ impl Timed {
 
 /// Makes a schedule for `count` cameras and times the tasks by it, in one process.
 ///
-/// [`Schedule::new`], then [`timed`]; `None` if stopped.
+/// [`Schedule::new`], then [`timed_to_end`].
 pub fn timed_rounds(
     count: usize,
     tasks: &[TimedTask],
     protocol: &Protocol,
-    stop: &dyn Fn() -> bool,
-) -> Option<Vec<Result<Timed, Verdict>>> {
-    timed(
-        tasks,
-        &Schedule::new(count, tasks, protocol),
-        protocol,
-        &|_| stop(),
-    )
+) -> Vec<Result<Timed, Verdict>> {
+    timed_to_end(tasks, &Schedule::new(count, tasks, protocol), protocol)
+}
+
+/// As [`timed`], without a stop.
+pub fn timed_to_end(
+    tasks: &[TimedTask],
+    schedule: &Schedule,
+    protocol: &Protocol,
+) -> Vec<Result<Timed, Verdict>> {
+    timed(tasks, schedule, protocol, &|_| false).unwrap_or_default()
 }
 
 /// Times the tasks by a schedule; returns the samples or the failure of each task.
@@ -260,7 +263,7 @@ mod tests {
                 task(|_| 0, vec![0; 40]),
             ];
             let protocol = Protocol { cold, ..protocol() };
-            for timed in timed_rounds(40, &all, &protocol, &|| false).unwrap() {
+            for timed in timed_rounds(40, &all, &protocol) {
                 let timed = timed.unwrap();
                 assert_eq!(timed.rounds().count(), 3);
                 for round in 0..3 {
@@ -279,7 +282,7 @@ mod tests {
             ask_many: Some(Box::new(|cameras| cameras.len() as u64)),
             ..task(|_| 1, vec![1; 40])
         };
-        let timed = timed_rounds(40, &[many], &protocol(), &|| false).unwrap();
+        let timed = timed_rounds(40, &[many], &protocol());
         let timed = timed.into_iter().next().unwrap().unwrap();
         assert_eq!((timed.samples.len(), timed.samples[0].queries), (3, 40));
     }
@@ -290,7 +293,7 @@ mod tests {
         let mut schedule = Schedule::new(40, &all, &protocol());
         schedule.rounds = 6;
         schedule.tasks[1].every = 3;
-        let found = timed(&all, &schedule, &protocol(), &|_| false).unwrap();
+        let found = timed_to_end(&all, &schedule, &protocol());
         let rounds = |i: usize| found[i].as_ref().unwrap().rounds().count();
         assert_eq!((rounds(0), rounds(1)), (6, 2));
     }
@@ -301,7 +304,7 @@ mod tests {
         let right = task(|c| c as u64, expected.clone());
         expected[20] += 1;
         let all = [right, task(|c| c as u64, expected)];
-        let found = timed_rounds(40, &all, &protocol(), &|| false).unwrap();
+        let found = timed_rounds(40, &all, &protocol());
         assert!(found[0].is_ok());
         assert_eq!(found[1].as_ref().unwrap_err().status, Status::Wrong);
     }
@@ -315,7 +318,7 @@ mod tests {
         // In the pass itself, and before it, when its cost is found.
         for at in [39, 0] {
             let all = [panics(40), panics(at)];
-            let found = timed_rounds(40, &all, &protocol(), &|| false).unwrap();
+            let found = timed_rounds(40, &all, &protocol());
             assert_eq!(found[0].as_ref().unwrap().rounds().count(), 3);
             let verdict = found[1].as_ref().unwrap_err();
             assert_eq!(verdict.status, Status::Panicked);
@@ -353,6 +356,7 @@ mod tests {
     #[test]
     fn a_pass_that_is_stopped_has_no_samples() {
         let all = [task(|_| 0, vec![0; 40])];
-        assert!(timed_rounds(40, &all, &protocol(), &|| true).is_none());
+        let schedule = Schedule::new(40, &all, &protocol());
+        assert!(timed(&all, &schedule, &protocol(), &|_| true).is_none());
     }
 }

@@ -14,7 +14,8 @@ use crate::camera::{PLANE_METHODS, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{
-    OverProcesses, ProcessTimes, Protocol, Schedule, Status, TimedTask, Verdict, input_of, timed,
+    OverProcesses, ProcessTimes, Protocol, Schedule, Status, TimedTask, Verdict, input_of,
+    timed_to_end,
 };
 use crate::path::CameraPath;
 use crate::query::ItemId;
@@ -268,7 +269,7 @@ impl<'a> Built<'a> {
     }
 }
 
-/// Checks and judges all points, and plans how they are timed; `None` if stopped.
+/// Checks and judges all points, and plans how they are timed.
 /// [`time`] and [`Prepared::conclude`] follow.
 ///
 /// Every answer is compared with the plain loop before it is timed, and the
@@ -278,10 +279,7 @@ impl<'a> Built<'a> {
 ///
 /// # Errors
 /// A structure that refuses the scene.
-pub fn prepare(
-    input: &PrecisionInput,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<Prepared>, BuildError> {
+pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
     let scene = input.scene;
     let items = scene.items.len();
     let shots = Shots::of(input.path, input.most_cameras);
@@ -291,9 +289,6 @@ pub fn prepare(
     let (mut points, mut region_points) = (Vec::new(), Vec::new());
     let (mut tasks, mut twin) = (Vec::new(), None);
     for (index, way) in built.ways().into_iter().enumerate() {
-        if stop() {
-            return Ok(None);
-        }
         let (is_sound, expected) = match way {
             Way::Culling(indexes, judged) => {
                 let test = judged.culling.test;
@@ -329,7 +324,7 @@ pub fn prepare(
     }
     tasks.extend(twin);
     let schedule = Schedule::new(cameras, &built.tasks(&tasks), input.protocol);
-    Ok(Some(Prepared {
+    Ok(Prepared {
         precision: Precision {
             scene: scene.name.clone(),
             path: input.path.name.clone(),
@@ -344,34 +339,28 @@ pub fn prepare(
             stability: Vec::new(),
         },
         plan: PointPlan { tasks, schedule },
-    }))
+    })
 }
 
-/// Times the planned tasks in this process; `None` if stopped.
+/// Times the planned tasks in this process.
 ///
 /// # Errors
 /// A structure that refuses the scene.
 ///
 /// # Panics
 /// If the scene is not the one that was planned for.
-pub fn time(
-    input: &PrecisionInput,
-    plan: &PointPlan,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<ProcessTimes>, BuildError> {
+pub fn time(input: &PrecisionInput, plan: &PointPlan) -> Result<ProcessTimes, BuildError> {
     let shots = Shots::of(input.path, input.most_cameras);
     let cameras = shots.cameras.len();
     let built = Built::new(input, &shots, None)?;
     let tasks = built.tasks(&plan.tasks);
-    let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
-    Ok(timed.map(|timed| {
-        let laps = timed.iter().map(|timed| timed.as_ref().ok());
-        let laps = laps.map(|timed| timed.map(|timed| by_camera(timed, cameras)));
-        ProcessTimes {
-            by_camera: laps.map(Option::unwrap_or_default).collect(),
-            ..ProcessTimes::of(&timed)
-        }
-    }))
+    let timed = timed_to_end(&tasks, &plan.schedule, input.protocol);
+    let laps = timed.iter().map(|timed| timed.as_ref().ok());
+    let laps = laps.map(|timed| timed.map(|timed| by_camera(timed, cameras)));
+    Ok(ProcessTimes {
+        by_camera: laps.map(Option::unwrap_or_default).collect(),
+        ..ProcessTimes::of(&timed)
+    })
 }
 
 impl Prepared {
