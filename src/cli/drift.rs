@@ -228,7 +228,9 @@ fn rated(methods: &[Rated], error: &str, tolerance: f64, all: bool) -> Table {
         (">error", |row| {
             row.error.map_or("unstable".to_owned(), scientific)
         }),
-        (">time per step", |row| step_time(row)),
+        (">time per step", |row| {
+            text::time_plus_minus(row.time_per_step)
+        }),
         ("", |row| {
             if row.qualifies { "yes" } else { "no" }.to_owned()
         }),
@@ -241,13 +243,6 @@ fn rated(methods: &[Rated], error: &str, tolerance: f64, all: bool) -> Table {
     table
 }
 
-fn step_time(row: &Rated) -> String {
-    text::time_plus_minus(
-        row.ns_per_step,
-        [row.ns_per_step_lower, row.ns_per_step_upper],
-    )
-}
-
 /// A recommendation with its figures.
 fn recommended(what: &str, methods: &[Rated], choice: &Recommendation) -> String {
     let Some(name) = &choice.name else {
@@ -256,7 +251,8 @@ fn recommended(what: &str, methods: &[Rated], choice: &Recommendation) -> String
     let row = methods.iter().find(|row| row.name == name);
     let figures = text::some(row, |row| {
         let error = text::some(row.error, scientific);
-        format!(" ({} per step, error {error})", step_time(row))
+        let time = text::time_plus_minus(row.time_per_step);
+        format!(" ({time} per step, error {error})")
     });
     format!(
         "Recommended for {what}: {name}{figures}, {}.",

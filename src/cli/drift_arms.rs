@@ -111,10 +111,10 @@ fn by_stiffness(
 /// "x4: 1.2e-4, 3.21 us" of the cheapest that is precise enough, or the nearest.
 fn within(points: &[&ArmPoint], tolerance: f64) -> String {
     let stable = || points.iter().filter_map(|p| Some((p.position_error?, *p)));
-    let time = |point: &ArmPoint| point.us_per_second.unwrap_or(f64::INFINITY);
+    let time = |point: &ArmPoint| point.us_per_second.map_or(f64::INFINITY, |us| us.value);
     let good = stable().filter(|(error, _)| *error <= tolerance);
     if let Some((error, point)) = good.min_by(|a, b| time(a.1).total_cmp(&time(b.1))) {
-        let time = point.us_per_second.map(|us| text::time(us * 1e3));
+        let time = point.us_per_second.map(|us| text::time(us.value * 1e3));
         return format!(
             "x{}: {error:.1e}, {}",
             point.substeps,

@@ -11,7 +11,10 @@ use crate::drift::{ArmPoint, ArmReport};
 /// Time and error, if the point has both.
 fn at(point: &ArmPoint) -> Option<[f64; 2]> {
     // A logarithmic axis has no zero.
-    let at = [point.us_per_second? * 1e3, point.position_error?.max(1e-16)];
+    let at = [
+        point.us_per_second?.value * 1e3,
+        point.position_error?.max(1e-16),
+    ];
     at.iter().all(|value| is_drawn(*value)).then_some(at)
 }
 
@@ -25,8 +28,8 @@ pub fn figures(report: &ArmReport) -> Vec<Figure> {
         let series = methods.map(|own| {
             let nth = report.methods.iter().position(|m| m.name == own[0].method);
             let point = |point: &ArmPoint| {
-                let us = [point.us_per_second_lower, point.us_per_second_upper];
-                let wide = us[0].zip(us[1]).map(|(low, high)| [low * 1e3, high * 1e3]);
+                let wide = point.us_per_second.and_then(|us| us.lower.zip(us.upper));
+                let wide = wide.map(|(low, high)| [low * 1e3, high * 1e3]);
                 Some(Point {
                     at: at(point)?,
                     wide,

@@ -265,7 +265,7 @@ pub fn time(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::funnel::{BackEnd, Errors, Times};
+    use crate::funnel::{BackEnd, Errors};
 
     fn row(stage: StageKind, guarantee: Guarantee, false_negative_count: f64) -> StageRow {
         StageRow {
@@ -283,7 +283,7 @@ mod tests {
                 false_negative_count,
                 ..Errors::of(&[])
             },
-            times: Times::default(),
+            time: None,
             ns_per_removed: None,
             ns_per_decided: None,
             fragments: None,

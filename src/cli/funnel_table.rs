@@ -6,7 +6,7 @@ use super::table::{Column, Table};
 use super::text;
 use crate::funnel::{
     BoundRow, FragmentCounts, FunnelReport, Gain, LevelRow, NONE, OrderRow, PickRow, StageKind,
-    StageRow, Times,
+    StageRow,
 };
 use crate::shown::shortened;
 use crate::visibility::Guarantee;
@@ -122,7 +122,7 @@ fn chain(report: &FunnelReport) -> Table {
             shortened(name(row), 24) + doubt(row.back_end.guarantee),
             count(row.errors.input_count),
             count(row.errors.output_count),
-            of_view(&row.times),
+            text::time_plus_minus(row.time),
             worth,
         ]);
     }
@@ -136,14 +136,15 @@ fn gain(report: &FunnelReport, stage: StageKind) -> Option<&Gain> {
 /// Cost of drawing from which a stage pays off: "2.0±0.1 us/item".
 fn worth(gain: &Gain) -> String {
     let unit = gain.unit.trim_end_matches('s');
-    let ends = [gain.break_even_ns_lower, gain.break_even_ns_upper];
-    match (gain.break_even_ns, ends) {
-        (None, _) if gain.removed() <= 0.0 => "never".to_owned(),
-        (None, _) => String::new(),
-        (Some(0.0), _) => "always".to_owned(),
+    let Some(ns) = gain.break_even else {
+        let never = gain.removed() <= 0.0;
+        return if never { "never" } else { "" }.to_owned();
+    };
+    match (ns.value, ns.lower, ns.upper) {
+        (0.0, ..) => "always".to_owned(),
         // Within noise of saving time as well.
-        (_, [Some(0.0), Some(most)]) => format!("<{}/{unit}", text::time(most)),
-        (ns, _) => format!("{}/{unit}", text::time_plus_minus(ns, ends)),
+        (_, Some(0.0), Some(most)) => format!("<{}/{unit}", text::time(most)),
+        _ => format!("{}/{unit}", text::time_plus_minus(Some(ns))),
     }
 }
 
@@ -164,7 +165,8 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     for gain in gains.filter(|gain| gain.stage != StageKind::Fragment) {
         let what = format!("{} ({})", gain.stage.name(), gain.back_end);
         let unit = gain.unit.trim_end_matches('s');
-        told += &match (gain.break_even_ns, gain.break_even_ns_lower) {
+        let ns = gain.break_even;
+        told += &match (ns.map(|ns| ns.value), ns.and_then(|ns| ns.lower)) {
             (None, _) if gain.removed() <= 0.0 => {
                 format!(" Leave out {what}: it removes nothing that the other stages leave.")
             }
@@ -186,12 +188,13 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
 
 /// Line on the load that the selection of a level saves; none for a single level.
 fn saved_load(level: &LevelRow) -> Option<String> {
-    let [lower, upper] = [level.saved_load_ns_lower?, level.saved_load_ns_upper?];
+    let time = level.saved_load?;
+    let [lower, upper] = [time.lower?, time.upper?];
     let others = text::counted(level.map_count - 1, "other map");
     Some(match lower > 0.0 {
         true => format!(
             "Decoding the {others} of the file takes {} of wall time, which the level stage saves.",
-            text::time_plus_minus(level.saved_load_ns, [Some(lower), Some(upper)])
+            text::time_plus_minus(Some(time))
         ),
         false => format!(
             "Decoding the {others} of the file takes less than {} of wall time: what the level \
@@ -303,14 +306,9 @@ fn stage(row: &StageRow) -> Vec<String> {
         count(errors.truth_count),
         count(errors.false_positive_count),
         count(errors.false_negative_count),
-        of_view(&row.times),
+        text::time_plus_minus(row.time),
         text::some(row.ns_per_removed, text::time),
     ]
-}
-
-/// A time with half of its interval.
-fn of_view(times: &Times) -> String {
-    text::time_plus_minus(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper])
 }
 
 /// A mean of counts.
@@ -364,7 +362,7 @@ fn orders(report: &FunnelReport) -> Table {
         (">pairs", |row| count(row.pair_count)),
         (">wrong", |row| count(row.wrong_pair_count)),
         (">wrong samples", |row| count(row.wrong_sample_count)),
-        (">time", |row| of_view(&row.times)),
+        (">time", |row| text::time_plus_minus(row.time)),
     ];
     Table::with(&report.orders, columns)
 }
@@ -386,8 +384,10 @@ fn bounds(report: &FunnelReport) -> Table {
     let columns: &[Column<&BoundRow>] = &[
         ("bound", |row| row.name.to_owned()),
         ("of", |row| row.back_end.to_owned()),
-        (">time", |row| of_view(&row.times)),
-        (">ratio", |row| text::some(row.ratio, text::significant)),
+        (">time", |row| text::time_plus_minus(row.time)),
+        (">ratio", |row| {
+            text::some(row.ratio, |ratio| text::significant(ratio.value))
+        }),
     ];
     Table::with(&report.bounds, columns)
 }

@@ -6,11 +6,12 @@ use super::error_figure::{Against, Measured};
 use super::figure::{Figure, is_drawn};
 use super::precision_tables::{CullingPoint, named, percent};
 use super::text;
-use crate::precision::{Point, Precision, RegionErrors, Times};
+use crate::precision::{Point, Precision, RegionErrors};
+use crate::statistics::Estimate;
 
 /// Ends of the interval of a time.
-fn ends(times: &Times) -> Option<[f64; 2]> {
-    let ends = times.query_ns_lower.zip(times.query_ns_upper)?;
+fn ends(time: Option<Estimate>) -> Option<[f64; 2]> {
+    let ends = time?.lower.zip(time?.upper)?;
     (is_drawn(ends.0) && is_drawn(ends.1)).then_some(ends.into())
 }
 
@@ -23,15 +24,15 @@ fn of(point: &CullingPoint) -> Option<Measured> {
     Some(Measured {
         structure: point.structure.clone(),
         test: point.errors.names.test.to_owned(),
-        time: point.times.query_ns?,
-        ends: ends(&point.times),
+        time: point.query_ns()?,
+        ends: ends(point.time),
         error: point.errors.excess?.value * 100.0,
         on_front: point.on_front,
         is_cross: missed > 0,
         note: format!(
             "{}: {}, false positives {} %, {missed} missed",
             named(point),
-            text::some(point.times.query_ns, text::time),
+            text::some(point.query_ns(), text::time),
             percent(point.errors.excess)
         ),
     })
@@ -41,8 +42,8 @@ fn of_region(point: &Point<RegionErrors>) -> Option<Measured> {
     Some(Measured {
         structure: point.structure.clone(),
         test: point.errors.numbers.to_owned(),
-        time: point.times.query_ns?,
-        ends: ends(&point.times),
+        time: point.query_ns()?,
+        ends: ends(point.time),
         error: point.errors.wrong?.value * 100.0,
         on_front: point.on_front,
         is_cross: point.errors.missed_region_count > 0,

@@ -1,9 +1,7 @@
 //! The sentences that `cullbench precision` ends with: what its figures say, from
 //! the figures alone.
 
-use super::precision_tables::{
-    CullingPoint, Outcome, elsewhere, named, numbers, percent, swept, time,
-};
+use super::precision_tables::{CullingPoint, Outcome, elsewhere, named, numbers, percent, swept};
 use super::text;
 use crate::precision::{Precision, SWEEPS, SizeRow, SweepRow};
 
@@ -22,7 +20,7 @@ pub fn conclusions(outcome: &Outcome) -> Vec<String> {
 /// No visible item missed, and a time.
 fn is_sound(point: &&CullingPoint) -> bool {
     let errors = point.errors.counts.unwrap_or_default();
-    point.times.query_ns.is_some() && errors.false_negatives + errors.touch_dropped == 0
+    point.time.is_some() && errors.false_negatives + errors.touch_dropped == 0
 }
 
 fn missed(point: &CullingPoint) -> u64 {
@@ -30,7 +28,7 @@ fn missed(point: &CullingPoint) -> u64 {
 }
 
 fn ratio(a: &CullingPoint, b: &CullingPoint) -> String {
-    let both = a.times.query_ns.zip(b.times.query_ns);
+    let both = a.query_ns().zip(b.query_ns());
     text::significant(both.map_or(f64::NAN, |(a, b)| a / b))
 }
 
@@ -44,7 +42,7 @@ fn of_points(p: &Precision) -> Vec<String> {
     let mut all = vec![format!(
         "Fastest point that cannot miss an item: {} at {}, false positives {} %.",
         named(fastest),
-        time(&fastest.times),
+        text::time_plus_minus(fastest.time),
         percent(fastest.errors.excess)
     )];
     let extra = |point: &CullingPoint| point.errors.counts.map(|errors| errors.false_positives);
@@ -80,7 +78,7 @@ fn of_storage(p: &Precision) -> Option<String> {
         named(least),
         text::significant(memory(&least)),
         percent(least.errors.excess),
-        text::some(least.times.query_ns, text::time)
+        text::some(least.query_ns(), text::time)
     ))
 }
 
@@ -91,8 +89,8 @@ fn of_regions(p: &Precision) -> Option<String> {
     };
     let (plain, checked) = (of("f32").next()?, of("f32 + check").next()?);
     let mut same = of("f32 + check").filter(|point| point.structure == plain.structure);
-    let cost = same.next().and_then(|point| point.times.query_ns);
-    let cost = cost.zip(plain.times.query_ns);
+    let cost = same.next().and_then(|point| point.query_ns());
+    let cost = cost.zip(plain.query_ns());
     Some(format!(
         "Region search in f32 is wrong for {} % of {} (farthest {} outside); an exact test of the \
          hits leaves {} wrong and takes {} times as long on {}.",

@@ -172,7 +172,7 @@ fn times_table(points: &[&CullingPoint]) -> Table {
         ("", |point| mark(point.on_front, point.is_tie).to_owned()),
         ("culling", |point| culling(point)),
         ("structure", |point| structure(point)),
-        (">query", |point| time(&point.times)),
+        (">query", |point| text::time_plus_minus(point.time)),
         (">B/item", |point| {
             format!("{:.1}", point.errors.memory_bytes_per_item)
         }),
@@ -189,15 +189,11 @@ fn mark(on_front: bool, is_tie: bool) -> &'static str {
     }
 }
 
-pub fn time(times: &crate::precision::Times) -> String {
-    text::time_plus_minus(times.query_ns, [times.query_ns_lower, times.query_ns_upper])
-}
-
 fn front_table(p: &Precision) -> Table {
     let columns: &[Column<&CullingPoint>] = &[
         ("structure", |point| structure(point)),
         ("culling", |point| culling(point)),
-        (">query", |point| time(&point.times)),
+        (">query", |point| text::time_plus_minus(point.time)),
         (">FP %", |point| percent(point.errors.excess)),
         (">missed ppm", |point| {
             text::rate(point.errors.false_negative_ppm, 1.0)
@@ -237,7 +233,7 @@ fn regions_table(p: &Precision) -> Table {
         (">false", |row| row.errors.false_region_count.to_string()),
         (">missed", |row| row.errors.missed_region_count.to_string()),
         (">farthest", |row| text::significant(row.errors.worst_false)),
-        (">per point", |row| time(&row.times)),
+        (">per point", |row| text::time_plus_minus(row.time)),
     ];
     Table::with(rows, columns)
 }

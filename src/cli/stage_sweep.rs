@@ -122,7 +122,7 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
          | >front",
     );
     table.rows.extend(sweep.points.iter().map(|point| {
-        let (errors, times) = (&point.errors, &point.times);
+        let errors = &point.errors;
         vec![
             format!(
                 "{}{}",
@@ -137,7 +137,7 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
             text::rate(errors.excess, 1.0),
             text::rate(errors.missing, 1.0),
             text::significant(errors.false_negative_count),
-            text::time_plus_minus(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+            text::time_plus_minus(point.time),
             if point.on_front { "*" } else { "" }.to_owned(),
         ]
     }));

@@ -107,12 +107,13 @@ pub fn time_within(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
 }
 
 /// A time with a margin on both sides: "1.30±0.38 us".
-pub fn time_plus_minus(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
+pub fn time_plus_minus(ns: Option<Estimate>) -> String {
     some(ns, |ns| {
-        let (size, name) = unit(ns);
-        let of = |end: Option<f64>| Some((end? - ns).abs() / size);
-        let margin = of(ends[0]).zip(of(ends[1])).map(|(a, b)| f64::max(a, b));
-        format!("{} {name}", plus_minus(ns / size, margin))
+        let (size, name) = unit(ns.value);
+        let of = |end: Option<f64>| Some((end? - ns.value).abs() / size);
+        let margin = of(ns.lower).zip(of(ns.upper));
+        let margin = margin.map(|(a, b)| f64::max(a, b));
+        format!("{} {name}", plus_minus(ns.value / size, margin))
     })
 }
 
@@ -328,10 +329,17 @@ mod tests {
 
     #[test]
     fn a_time_has_the_larger_half_of_its_interval() {
-        let shown = |ends| time_plus_minus(Some(1301.0), ends);
+        let shown = |[lower, upper]: [Option<f64>; 2]| {
+            let value = 1301.0;
+            time_plus_minus(Some(Estimate {
+                value,
+                lower,
+                upper,
+            }))
+        };
         assert_eq!(shown([Some(1201.0), Some(1681.0)]), "1.3±0.4 us");
         assert_eq!(shown([Some(1300.0), None]), "1.30 us");
-        assert_eq!(time_plus_minus(None, [None, None]), "");
+        assert_eq!(time_plus_minus(None), "");
     }
 
     #[test]

@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::arm::{ArmKind, Chase, EXACT, METHODS, Method, State, rk4, rk4_of_sine};
 use super::exact::linear_way;
-use super::rated::{Candidate, Recommendation, per_unit, recommended, small_margin};
+use super::rated::{Candidate, Recommendation, recommended, small_margin};
 use super::stability;
 use super::walk::task;
 use crate::measure::{OverProcesses, TimedTask};
+use crate::statistics::{Estimate, flat};
 
 /// Scope of the study.
 #[derive(Clone, Debug)]
@@ -63,11 +64,8 @@ pub struct ArmPoint {
     /// Half a power or more below the classical order.
     pub order_reduced: bool,
     /// Thread CPU time per simulated second, with its 95 % interval.
-    pub us_per_second: Option<f64>,
-    /// Lower end of the interval.
-    pub us_per_second_lower: Option<f64>,
-    /// Upper end of the interval.
-    pub us_per_second_upper: Option<f64>,
+    #[serde(flatten, serialize_with = "flat::us_per_second")]
+    pub us_per_second: Option<Estimate>,
 }
 
 /// The method to take for an arm at a frame rate.
@@ -170,8 +168,6 @@ pub fn errors(setting: Setting, seconds: f64) -> Vec<ArmPoint> {
             observed_order: order,
             order_reduced: order.is_some_and(|order| order < f64::from(method.order) - REDUCED_BY),
             us_per_second: None,
-            us_per_second_lower: None,
-            us_per_second_upper: None,
         });
     }
     points
@@ -218,11 +214,7 @@ pub fn conclude(
                 error,
                 ln_ns: ln_ns.map(|ns| ns - seconds.ln()).collect(),
             });
-            [
-                point.us_per_second,
-                point.us_per_second_lower,
-                point.us_per_second_upper,
-            ] = per_unit(times, task, 1e3 * seconds);
+            point.us_per_second = times.ns(task).map(|ns| ns.per(1e3 * seconds));
         }
     }
     let rule = format!("an error within {tolerance:e}");
@@ -239,7 +231,7 @@ pub fn conclude(
         setting,
         method: taken.map(|point| point.method),
         position_error: taken.and_then(|point| point.position_error),
-        us_per_second: taken.and_then(|point| point.us_per_second),
+        us_per_second: taken.and_then(|point| Some(point.us_per_second?.value)),
         choice,
     })
 }

@@ -28,7 +28,7 @@ use crate::measure::{
 };
 use exact::larger;
 use orbit::{CARRIERS, SWING};
-use rated::{per_unit, rated};
+use rated::rated;
 use rotation::{METHODS, Method, STEADY, moments};
 use walk::{QUERIES, QUERY_STEPS, walking};
 
@@ -216,7 +216,7 @@ pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
     let timed = timed_rounds(QUERIES, &tasks, &protocol);
     let times = OverProcesses::of(&[ProcessTimes::of(&timed)]);
     let row = |(task, method): (usize, &&Method)| {
-        let [ns, ..] = per_unit(&times, task, QUERY_STEPS as f64);
+        let ns = times.ns(task).map(|ns| ns.per(QUERY_STEPS as f64).value);
         (frame_error(&method.drift(&moments)), ns.unwrap_or(f64::NAN))
     };
     methods.iter().enumerate().map(row).collect()

@@ -6,7 +6,7 @@ use super::orbit;
 use super::rotation::{self, Method};
 use super::walk::QUERY_STEPS;
 use crate::measure::OverProcesses;
-use crate::statistics::{ALPHA, ranks};
+use crate::statistics::{ALPHA, Estimate, flat, ranks};
 
 /// A way to turn or carry as a point of error against time.
 #[derive(Debug, Serialize)]
@@ -21,11 +21,8 @@ pub struct Rated {
     /// orthogonality, of an eye the distance in radii. `None` if it is not finite.
     pub error: Option<f64>,
     /// Thread CPU time with its 95 % interval, which needs three processes.
-    pub ns_per_step: Option<f64>,
-    /// Lower end of the interval.
-    pub ns_per_step_lower: Option<f64>,
-    /// Upper end of the interval.
-    pub ns_per_step_upper: Option<f64>,
+    #[serde(flatten, serialize_with = "flat::ns_per_step")]
+    pub time_per_step: Option<Estimate>,
     /// Good enough to be recommended.
     pub qualifies: bool,
 }
@@ -50,12 +47,6 @@ pub struct Candidate {
     pub ln_ns: Vec<f64>,
 }
 
-/// Value and interval of a task's time per unit, in ns.
-pub fn per_unit(times: &OverProcesses, task: usize, units: f64) -> [Option<f64>; 3] {
-    let found = times.ns(task).map(|ns| ns.per(units));
-    found.map_or([None; 3], |ns| [Some(ns.value), ns.lower, ns.upper])
-}
-
 /// Rates methods by their errors and the times of the tasks from `first` on, and
 /// recommends one within a tolerance after `steps` steps.
 pub fn rated<'m>(
@@ -72,15 +63,12 @@ pub fn rated<'m>(
             error,
             ln_ns: times.ln_ns(task),
         }));
-        let ns = per_unit(times, task, QUERY_STEPS as f64);
         all.push(Rated {
             name,
             summary: method.summary,
             is_default: [rotation::TOOLKIT, orbit::TOOLKIT].contains(&name),
             error,
-            ns_per_step: ns[0],
-            ns_per_step_lower: ns[1],
-            ns_per_step_upper: ns[2],
+            time_per_step: times.ns(task).map(|ns| ns.per(QUERY_STEPS as f64)),
             qualifies: error.is_some_and(|error| error <= tolerance),
         });
     }

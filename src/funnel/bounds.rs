@@ -10,11 +10,12 @@ use serde::Serialize;
 
 use super::back_ends::{MASKED_INNER, PORTAL_CLIP, Z};
 use super::stage::{Chain, StageKind};
-use super::task::{FunnelKey, KeyedTask, KeyedTimes, Times, ends};
+use super::task::{FunnelKey, KeyedTask, KeyedTimes};
 use super::triangle_stage::TriangleStage;
 use super::world::{View, World};
 use crate::measure::Ask;
 use crate::query::ItemId;
+use crate::statistics::{Estimate, flat};
 use crate::visibility::occlusion::{self, FrameTrace, MaskedInner, OccluderScene, OcclusionBuffer};
 use crate::visibility::region::{Opening, RegionId, RegionRow, Scratch};
 use crate::visibility::triangle::SafeCones;
@@ -29,14 +30,11 @@ pub struct BoundRow {
     /// The reads and writes that are timed.
     pub name: &'static str,
     /// Thread CPU time of a view.
-    #[serde(flatten)]
-    pub times: Times,
+    #[serde(flatten, serialize_with = "flat::stage_ns")]
+    pub time: Option<Estimate>,
     /// Time of the back end / time of this; null where the back end has none.
-    pub ratio: Option<f64>,
-    /// Lower end of its 95 % interval.
-    pub ratio_lower: Option<f64>,
-    /// Upper end of its 95 % interval.
-    pub ratio_upper: Option<f64>,
+    #[serde(flatten, serialize_with = "flat::ratio")]
+    pub ratio: Option<Estimate>,
 }
 
 impl BoundRow {
@@ -46,10 +44,9 @@ impl BoundRow {
 
     pub(super) fn set(&mut self, chain: &Chain, times: &KeyedTimes) {
         let own = self.key();
-        self.times = Times::of(times.ns(&own));
+        self.time = times.ns(&own);
         let bounded = FunnelKey::of_stage(chain, self.stage, self.back_end);
-        let ratio = bounded.and_then(|bounded| times.ratio(&bounded, &own));
-        [self.ratio, self.ratio_lower, self.ratio_upper] = ends(ratio);
+        self.ratio = bounded.and_then(|bounded| times.ratio(&bounded, &own));
     }
 }
 
@@ -70,10 +67,8 @@ impl<'w> Bound<'w> {
                 stage,
                 back_end,
                 name,
-                times: Times::default(),
+                time: None,
                 ratio: None,
-                ratio_lower: None,
-                ratio_upper: None,
             },
             ask: Box::new(ask),
         }

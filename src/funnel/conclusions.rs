@@ -33,7 +33,7 @@ fn of_gain(gain: &Gain) -> String {
     if removed <= 0.0 {
         return format!("{what} removes nothing that the other stages leave: skip it.");
     }
-    match gain.break_even_ns {
+    match gain.break_even.map(|ns| ns.value) {
         Some(0.0) => format!("{what} removes {removed:.1} {unit} per view and saves time as well."),
         Some(ns) => format!(
             "{what} removes {removed:.1} {unit} per view and pays off if {} one of them takes \

@@ -41,7 +41,7 @@ pub(crate) use stage::BackEnd;
 pub use stage::{Chain, NONE, StageKind};
 pub use study::{failure, prepare, time};
 pub use sweep::{StageSweep, SweepPoint, prepare_sweep, time_sweep};
-pub use task::{FunnelPlan, Times};
+pub use task::FunnelPlan;
 pub use triangle_stage::BYTES_PER_TRIANGLE;
 pub(crate) use truth::RaysEnd;
 pub use world::FunnelInput;

@@ -13,10 +13,11 @@ use serde::Serialize;
 use super::error::{LeftOutRow, fits_drawing};
 use super::item_stages::ItemStages;
 use super::stage::Step;
-use super::task::{FunnelKey, KeyedTask, Times};
+use super::task::{FunnelKey, KeyedTask};
 use super::world::World;
 use crate::query::ItemId;
 use crate::scene::Surfaces;
+use crate::statistics::{Estimate, flat};
 use crate::visibility::fragment::order::{self, ORDERS};
 use crate::visibility::fragment::{
     self, Canvas, DepthOrder, OrderErrors, Part, Piece, Screen, Tally, Tests, ToOrder,
@@ -53,8 +54,8 @@ pub struct OrderRow {
     /// Reasons for which the guarantee does not hold, with the number of views.
     pub exceptions: BTreeMap<&'static str, usize>,
     /// Thread CPU time of sorting the items of a view.
-    #[serde(flatten)]
-    pub times: Times,
+    #[serde(flatten, serialize_with = "flat::stage_ns")]
+    pub time: Option<Estimate>,
 }
 
 /// Items of a view, and every order prepared for them.
@@ -262,7 +263,7 @@ impl OrderRow {
             cyclic_count: 0.0,
             guarantee: row.guarantee,
             exceptions: BTreeMap::new(),
-            times: Times::default(),
+            time: None,
         }
     }
 

@@ -10,10 +10,11 @@ use std::rc::Rc;
 use serde::Serialize;
 
 use super::error::LeftOutRow;
-use super::task::{FunnelKey, KeyedTask, PickQuestion, Times};
+use super::task::{FunnelKey, KeyedTask, PickQuestion};
 use super::world::{Shape, World};
 use crate::index::caught;
 use crate::query::ItemId;
+use crate::statistics::{Estimate, flat};
 use crate::visibility::pick::{BACK_ENDS, BackEnd, CursorRectangle, NotBuilt, Pick};
 use crate::visibility::truth::{Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
@@ -43,8 +44,8 @@ pub struct PickRow {
     /// Cursors for which the answer is not the exact one.
     pub wrong_count: usize,
     /// Thread CPU time of all cursors of a view.
-    #[serde(flatten)]
-    pub times: Times,
+    #[serde(flatten, serialize_with = "flat::stage_ns")]
+    pub time: Option<Estimate>,
     /// The same per cursor.
     pub ns_per_ray: Option<f64>,
 }
@@ -54,9 +55,9 @@ impl PickRow {
         FunnelKey::Pick(self.question, self.name.clone())
     }
 
-    pub(super) fn set(&mut self, times: Times) {
-        self.times = times;
-        self.ns_per_ray = times.stage_ns.map(|ns| ns / CURSORS.samples() as f64);
+    pub(super) fn set(&mut self, time: Option<Estimate>) {
+        self.time = time;
+        self.ns_per_ray = time.map(|time| time.value / CURSORS.samples() as f64);
     }
 }
 
@@ -111,7 +112,7 @@ impl<'w> Picks<'w> {
             guarantee,
             ray_count: 0,
             wrong_count: 0,
-            times: Times::default(),
+            time: None,
             ns_per_ray: None,
         };
         self.pickers.push((row, answer));

@@ -11,8 +11,8 @@ use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
 use super::stage::{BackEnd, Chain, StageKind};
-use super::task::{FunnelKey, KeyedTimes, Times};
-use crate::statistics::{ALPHA, trimmed_mean};
+use super::task::{FunnelKey, KeyedTimes};
+use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
 use crate::visibility::Level;
 use crate::visibility::fragment::{CutOuts, Holes};
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
@@ -93,25 +93,21 @@ pub struct LevelRow {
     /// Items of the selected map.
     pub output_count: usize,
     /// Wall time of decoding the other maps; null without others.
-    pub saved_load_ns: Option<f64>,
-    /// Lower end of its 95 % interval.
-    pub saved_load_ns_lower: Option<f64>,
-    /// Upper end of its 95 % interval.
-    pub saved_load_ns_upper: Option<f64>,
+    #[serde(flatten, serialize_with = "flat::saved_load_ns")]
+    pub saved_load: Option<Estimate>,
 }
 
 impl From<&Level> for LevelRow {
     fn from(level: &Level) -> LevelRow {
-        let saved = level.saved_ns();
-        let interval = saved.map(|saved| saved.interval(1.0 - ALPHA));
         LevelRow {
             map_count: level.maps.len(),
             selected: level.maps[level.selected].name.clone(),
             input_count: level.items(),
             output_count: level.selected_items(),
-            saved_load_ns: saved.map(|saved| saved.mean),
-            saved_load_ns_lower: interval.map(|(lower, _)| lower.max(0.0)),
-            saved_load_ns_upper: interval.map(|(_, upper)| upper),
+            saved_load: level.saved_ns().map(|saved| {
+                let (lower, upper) = saved.interval(1.0 - ALPHA);
+                Estimate::within(saved.mean, [lower.max(0.0), upper])
+            }),
         }
     }
 }
@@ -160,8 +156,8 @@ pub struct StageRow {
     #[serde(flatten)]
     pub errors: Errors,
     /// Thread CPU time of a view.
-    #[serde(flatten)]
-    pub times: Times,
+    #[serde(flatten, serialize_with = "flat::stage_ns")]
+    pub time: Option<Estimate>,
     /// Time / removed candidates: drawing one must cost more for the stage to pay.
     pub ns_per_removed: Option<f64>,
     /// Time / candidates.
@@ -179,7 +175,7 @@ impl StageRow {
             unit: back_end.stage.unit(),
             back_end,
             errors,
-            times: Times::default(),
+            time: None,
             ns_per_removed: None,
             ns_per_decided: None,
             fragments: None,
@@ -212,7 +208,7 @@ impl StageRow {
         let per = |count: f64| (count > 0.0).then(|| found.value / count);
         self.ns_per_removed = per(self.errors.input_count - self.errors.output_count);
         self.ns_per_decided = per(self.errors.input_count);
-        self.times = Times::of(Some(found));
+        self.time = Some(found);
     }
 }
 
@@ -236,11 +232,8 @@ pub struct Gain {
     /// Extra time / removed candidates, the least draw cost for which the stage pays.
     ///
     /// 0 if it saves time as well; null if it removes nothing or has no time.
-    pub break_even_ns: Option<f64>,
-    /// Lower end of its 95 % interval.
-    pub break_even_ns_lower: Option<f64>,
-    /// Upper end of its 95 % interval.
-    pub break_even_ns_upper: Option<f64>,
+    #[serde(flatten, serialize_with = "flat::break_even_ns")]
+    pub break_even: Option<Estimate>,
     /// Tasks with the stage, and without it.
     #[serde(skip)]
     pub(super) tasks: [Vec<FunnelKey>; 2],
@@ -262,9 +255,7 @@ impl Gain {
             without_ns: None,
             with_count,
             without_count,
-            break_even_ns: None,
-            break_even_ns_lower: None,
-            break_even_ns_upper: None,
+            break_even: None,
             tasks,
         }
     }
@@ -282,9 +273,11 @@ impl Gain {
             let costs = with.iter().zip(&without).map(|(a, b)| (a - b) / removed);
             let costs: Vec<f64> = costs.collect();
             let interval = trimmed_mean(&costs).map(|cost| cost.interval(1.0 - ALPHA));
-            self.break_even_ns = centre(&costs).map(|ns| ns.max(0.0));
-            self.break_even_ns_lower = interval.map(|(lower, _)| lower.max(0.0));
-            self.break_even_ns_upper = interval.map(|(_, upper)| upper.max(0.0));
+            self.break_even = centre(&costs).map(|ns| Estimate {
+                value: ns.max(0.0),
+                lower: interval.map(|(lower, _)| lower.max(0.0)),
+                upper: interval.map(|(_, upper)| upper.max(0.0)),
+            });
         }
     }
 }

@@ -15,7 +15,7 @@ use super::picks::Picks;
 use super::plan_view::PlanView;
 use super::report::{CutOutRow, FunnelReport, Gain, StageRow};
 use super::stage::{Chain, NONE, StageKind, Step};
-use super::task::{FunnelKey, FunnelPlan, KeyedTask, Times};
+use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Truth, visible};
 use super::world::{FunnelInput, World};
@@ -304,10 +304,10 @@ impl Prepared {
             .iter_mut()
             .for_each(|row| row.set(chain, &times));
         for row in &mut report.picks {
-            row.set(Times::of(times.ns(&row.key())));
+            row.set(times.ns(&row.key()));
         }
         for row in &mut report.orders {
-            row.times = Times::of(times.ns(&FunnelKey::Order(row.name.to_owned())));
+            row.time = times.ns(&FunnelKey::Order(row.name.to_owned()));
         }
         report.gains.iter_mut().for_each(|gain| gain.set(&times));
         report.conclusions = conclusions(&report);

@@ -11,13 +11,13 @@ use super::counts::{Errors, ViewCounts, count_items};
 use super::error::FunnelError;
 use super::item_stages::{ItemStages, Run};
 use super::stage::{BackEnd, Chain, NONE, StageKind, Step};
-use super::task::{FunnelKey, FunnelPlan, KeyedTask, Times};
+use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Truth, visible};
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, ProcessTimes};
 use crate::query::ItemId;
-use crate::statistics::dominance;
+use crate::statistics::{Estimate, dominance, flat};
 use crate::visibility::SampleGrid;
 
 /// Columns of the buffers; there are 9 rows for 16 of them.
@@ -37,8 +37,8 @@ pub struct SweepPoint {
     #[serde(flatten)]
     pub errors: Errors,
     /// Thread CPU time of a view.
-    #[serde(flatten)]
-    pub times: Times,
+    #[serde(flatten, serialize_with = "flat::stage_ns")]
+    pub time: Option<Estimate>,
     /// `true` for a point of the Pareto front of time and both errors.
     ///
     /// No other point is at least as good in all three and shown to be better in one.
@@ -51,7 +51,7 @@ impl SweepPoint {
             back_end,
             buffer,
             errors: Errors::of(&[]),
-            times: Times::default(),
+            time: None,
             on_front: false,
         }
     }
@@ -67,7 +67,7 @@ impl SweepPoint {
     /// Time, false negatives, false positives.
     fn figures(&self) -> Option<[f64; 3]> {
         let errors = &self.errors;
-        let ns = self.times.stage_ns?;
+        let ns = self.time?.value;
         Some([ns, errors.false_negative_count, errors.false_positive_count])
     }
 }
@@ -235,7 +235,7 @@ impl PreparedSweep {
         let mut sweep = self.sweep;
         sweep.processes = processes.len();
         for point in &mut sweep.points {
-            point.times = Times::of(times.ns(&point.key()));
+            point.time = times.ns(&point.key());
         }
         let all = sweep.points.iter().enumerate();
         let (timed, values): (Vec<usize>, Vec<[f64; 3]>) =

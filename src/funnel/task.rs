@@ -166,35 +166,3 @@ impl KeyedTimes {
         sums.unwrap_or_default()
     }
 }
-
-/// A time with its interval; null where there is none.
-#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize)]
-pub struct Times {
-    /// Mean over the views, ns.
-    pub stage_ns: Option<f64>,
-    /// Lower end of the 95 % interval.
-    pub stage_ns_lower: Option<f64>,
-    /// Upper end of the 95 % interval.
-    pub stage_ns_upper: Option<f64>,
-}
-
-impl Times {
-    /// Fields of an estimate.
-    pub fn of(found: Option<Estimate>) -> Times {
-        let [stage_ns, stage_ns_lower, stage_ns_upper] = ends(found);
-        Times {
-            stage_ns,
-            stage_ns_lower,
-            stage_ns_upper,
-        }
-    }
-}
-
-/// Value, lower and upper end of an estimate.
-pub fn ends(found: Option<Estimate>) -> [Option<f64>; 3] {
-    [
-        found.map(|found| found.value),
-        found.and_then(|found| found.lower),
-        found.and_then(|found| found.upper),
-    ]
-}

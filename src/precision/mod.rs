@@ -12,7 +12,7 @@ mod stability;
 mod sweeps;
 
 pub use judged::{CullingErrors, Names};
-pub use point::{Point, Times};
+pub use point::Point;
 pub use points::{PointPlan, Precision, PrecisionInput, prepare, time};
 pub use region_search::RegionErrors;
 pub use size_sweep::{SIZE_RATIOS, SizeRow, size_sweep};

@@ -4,21 +4,7 @@
 use serde::Serialize;
 
 use crate::measure::{OverProcesses, Status, Verdict};
-use crate::statistics::{ALPHA, dominance, shows_less};
-
-/// Thread CPU time, over the processes as in a run; null where it has none.
-#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize)]
-pub struct Times {
-    /// Time of a query.
-    pub query_ns: Option<f64>,
-    /// Lower end of the 95 % interval of `query_ns`.
-    pub query_ns_lower: Option<f64>,
-    /// Upper end of the 95 % interval of `query_ns`.
-    pub query_ns_upper: Option<f64>,
-    /// Its place among the tasks that were timed, if it has a time.
-    #[serde(skip)]
-    task: Option<usize>,
-}
+use crate::statistics::{ALPHA, Estimate, dominance, flat, shows_less};
 
 /// A kind of error or cost; less is better.
 #[derive(Clone, PartialEq, Debug)]
@@ -69,9 +55,9 @@ pub struct Point<E> {
     pub status: Status,
     /// Why, where the status is not ok.
     pub reason: Option<String>,
-    /// Mean over the cameras.
-    #[serde(flatten)]
-    pub times: Times,
+    /// Thread CPU time of a query, mean over the cameras.
+    #[serde(flatten, serialize_with = "flat::query_ns")]
+    pub time: Option<Estimate>,
     /// Index of a point of the front that is no worse in anything and better in
     /// something, where the samples show that it is dominated.
     pub dominated_by: Option<usize>,
@@ -81,6 +67,9 @@ pub struct Point<E> {
     pub on_front: bool,
     #[serde(skip)]
     dimensions: Vec<Dimension>,
+    /// Its place among the tasks that were timed, if it has a time.
+    #[serde(skip)]
+    task: Option<usize>,
 }
 
 impl<E> Point<E> {
@@ -91,11 +80,12 @@ impl<E> Point<E> {
             errors,
             status: Status::Ok,
             reason: None,
-            times: Times::default(),
+            time: None,
             dominated_by: None,
             is_tie: false,
             on_front: false,
             dimensions,
+            task: None,
         }
     }
 
@@ -113,21 +103,19 @@ impl<E> Point<E> {
         if let Some(wrong) = times.failure(task) {
             (self.status, self.reason) = (wrong.status, wrong.reason.clone());
         }
-        let Some(found) = times.ns(task).map(|ns| ns.per(per)) else {
-            return;
-        };
-        self.times = Times {
-            query_ns: Some(found.value),
-            query_ns_lower: found.lower,
-            query_ns_upper: found.upper,
-            task: Some(task),
-        };
+        self.time = times.ns(task).map(|ns| ns.per(per));
+        self.task = self.time.map(|_| task);
+    }
+
+    /// Time of a query, ns.
+    pub fn query_ns(&self) -> Option<f64> {
+        Some(self.time?.value)
     }
 
     /// Values of which less is better: the dimensions and time.
     fn values(&self) -> Vec<f64> {
         let dimensions = self.dimensions.iter().map(|d| d.value);
-        dimensions.chain(self.times.query_ns).collect()
+        dimensions.chain(self.query_ns()).collect()
     }
 }
 
@@ -138,9 +126,9 @@ pub(super) fn conclude<E>(points: &mut [Point<E>], times: &OverProcesses) {
 }
 
 fn sort_and_mark<E>(points: &mut [Point<E>], is_faster: &dyn Fn(usize, usize) -> bool) {
-    let order = |p: &Point<E>| p.times.query_ns.unwrap_or(f64::INFINITY);
+    let order = |p: &Point<E>| p.query_ns().unwrap_or(f64::INFINITY);
     points.sort_by(|a, b| order(a).total_cmp(&order(b)));
-    let timed = points.partition_point(|p| p.times.query_ns.is_some());
+    let timed = points.partition_point(|p| p.time.is_some());
     let values: Vec<Vec<f64>> = points[..timed].iter().map(Point::values).collect();
     let is_less = |a: usize, b: usize, k: usize| {
         let (a, b) = (&points[a], &points[b]);
@@ -148,7 +136,7 @@ fn sort_and_mark<E>(points: &mut [Point<E>], is_faster: &dyn Fn(usize, usize) ->
             (Some(a), Some(b)) if a.by_camera.is_empty() && b.by_camera.is_empty() => true,
             (Some(a), Some(b)) => shows_less(&a.by_camera, &b.by_camera, ALPHA),
             _ => {
-                let both = a.times.task.zip(b.times.task);
+                let both = a.task.zip(b.task);
                 both.is_some_and(|(a, b)| is_faster(a, b))
             }
         }
@@ -176,8 +164,8 @@ mod tests {
         });
         dimensions.push(Dimension::fixed(memory));
         let mut point = Point::new("linear", (), dimensions);
-        point.times.query_ns = ns;
-        point.times.task = ns.map(|ns| ns as usize);
+        point.time = ns.map(|ns| Estimate::within(ns, [f64::NAN; 2]));
+        point.task = ns.map(|ns| ns as usize);
         point
     }
 

@@ -381,7 +381,7 @@ impl Prepared {
             } else if let Some(point) = precision.points.get_mut(way) {
                 culled.push(task);
                 point.time(&times, task, 1.0);
-                let ns = point.times.query_ns;
+                let ns = point.query_ns();
                 point.errors.ns_per_item = ns.map(|ns| ns / precision.items as f64);
             } else {
                 let point = &mut precision.region_points[way - precision.points.len()];

@@ -2,6 +2,7 @@
 //! Pure functions of numbers; each names its source. Nothing else in the crate
 //! computes an interval.
 
+pub mod flat;
 mod front;
 mod holm;
 mod judgement;

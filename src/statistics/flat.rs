@@ -1,0 +1,24 @@
+//! An estimate as three fields of a row: its value, and `_lower` and `_upper` behind the
+//! name for the ends of its 95 % interval; null where there is none. For
+//! `#[serde(flatten, serialize_with)]`.
+
+use serde::Serializer;
+use serde::ser::SerializeStruct;
+
+use super::Estimate;
+
+macro_rules! fields {
+    ($($name:ident)*) => {$(
+        #[expect(missing_docs, reason = "the name of the field")]
+        pub fn $name<S: Serializer>(found: &Option<Estimate>, out: S) -> Result<S::Ok, S::Error> {
+            let mut fields = out.serialize_struct(stringify!($name), 3)?;
+            fields.serialize_field(stringify!($name), &found.map(|found| found.value))?;
+            let [lower, upper] = found.map_or([None; 2], |found| [found.lower, found.upper]);
+            fields.serialize_field(concat!(stringify!($name), "_lower"), &lower)?;
+            fields.serialize_field(concat!(stringify!($name), "_upper"), &upper)?;
+            fields.end()
+        }
+    )*};
+}
+
+fields! { break_even_ns ns_per_step query_ns ratio saved_load_ns stage_ns us_per_second }
