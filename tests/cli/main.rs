@@ -42,6 +42,7 @@ mod readers;
 mod region_search;
 mod reports;
 mod resume;
+mod run_tables;
 mod runs;
 mod shards;
 #[cfg(unix)]

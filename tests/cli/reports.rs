@@ -6,7 +6,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use super::process::*;
-use super::runs::prose;
+use super::run_tables::prose;
 
 /// A run over three sizes, with a fixed count and a share, small and quick.
 const RUN: &str = "run --scene uniform:n=300 --scene uniform:n=900 --scene uniform:n=2700 \

@@ -1,0 +1,190 @@
+//! Images through holes, stencils and mirrors, and the rectangles that hold them.
+
+use super::*;
+use crate::visibility::Ray;
+use crate::visibility::truth::SolidBox;
+
+#[test]
+fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
+    let solids = Solids::of(&load("city:n=400", &Default::default()).unwrap());
+    let index = RayIndex::build(&solids);
+    let mut surfaces = Holes::default();
+    for item in 0..solids.boxes.len() as ItemId {
+        if let Some(&mask) = [Mask::Fence, Mask::Foliage].get(item as usize % 3) {
+            surfaces.set(item, Surface { mask, tile: 4.0 });
+        }
+    }
+    let (mut through, mut clear) = (0, 0);
+    for camera in cameras(&solids, 6) {
+        let rays = Rays::of(&camera).unwrap();
+        let canvas = Canvas::of(&rays, GRID);
+        let tests = Tests {
+            surfaces: Some(&surfaces),
+            stencil: None,
+        };
+        let drawn = draw(&canvas, &solids, &all(&solids), &tests);
+        clear += drawn.tally.clear;
+        let solid = draw(&canvas, &solids, &all(&solids), &Tests::default());
+        let opaque =
+            |body: &SolidBox, probe: &_, at: &_| surfaces.opaque(body.item, &body.b, probe, at);
+        let truth = SampleTruth::of_opaque(&index, &opaque, &rays, GRID, 1);
+        assert_eq!(drawn.depth.visible(&canvas), truth.visible);
+        let (ids, solid) = (drawn.depth.ids(), solid.depth.ids());
+        assert_eq!(ids, truth.front);
+        for (sample, &id) in ids.iter().enumerate() {
+            let probe = canvas.probe(sample);
+            let mut along = index.all_along(probe.ray());
+            along.sort_by(|a, b| probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0)));
+            let opaque =
+                |item: ItemId, at| surfaces.opaque(item, &solids.boxes[item as usize], probe, at);
+            let first = along.iter().find(|(item, at)| opaque(*item, at));
+            assert_eq!(id, first.map_or(NO_ITEM, |first| first.0));
+            through += usize::from(id != solid[sample] && id != NO_ITEM);
+        }
+    }
+    assert!(
+        through > 100 && clear > 500,
+        "the premise: {through} {clear}"
+    );
+}
+
+/// A portal in a wall: the pass beyond it draws on its samples alone, and there
+/// just what the whole view has beyond the wall.
+#[test]
+fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
+    let wall = |y: [f64; 2], z: [f64; 2]| {
+        WorldBox::new(DVec3::new(10.0, y[0], z[0]), DVec3::new(10.5, y[1], z[1]))
+    };
+    let mut boxes = vec![
+        wall([-20.0, -1.0], [-20.0, 20.0]),
+        wall([1.0, 20.0], [-20.0, 20.0]),
+        wall([-1.0, 1.0], [2.0, 20.0]),
+        wall([-1.0, 1.0], [-20.0, 0.0]),
+        // A pillar before the portal.
+        WorldBox::new(DVec3::new(7.0, 0.0, 0.0), DVec3::new(7.5, 0.5, 3.0)),
+    ];
+    let mut rng = SeededRng::new(3);
+    let first_beyond = boxes.len();
+    for _ in 0..200 {
+        let at = DVec3::new(12.0, -15.0, -15.0) + rng.point() * 30.0;
+        boxes.push(WorldBox::around(at, rng.point() * 2.0));
+    }
+    let solids = judge::solids(&boxes);
+    let frame = Frame::looking_along(DVec3::new(0.0, 0.3, 1.0), DVec3::X, DVec3::Z).unwrap();
+    let lens = Lens::perspective(60.0, 1.5, 0.5, None).unwrap();
+    let canvas = Canvas::of(&Rays::of(&Camera { frame, lens }).unwrap(), GRID);
+    let pieces = all(&solids);
+    let (room, beyond) = pieces.split_at(first_beyond);
+    let walls = draw(&canvas, &solids, room, &Tests::default());
+    let portal = wall([-1.0, 1.0], [0.0, 2.0]);
+    let portal = WorldBox::new(portal.min, DVec3::new(10.0, portal.max.y, portal.max.z));
+    let stencil = walls.depth.stencil(&canvas, &[portal]);
+    assert!((5..400).contains(&stencil.count()), "{}", stencil.count());
+    let tests = Tests {
+        stencil: Some(&stencil),
+        surfaces: None,
+    };
+    let (masked, open) = (
+        draw(&canvas, &solids, beyond, &tests),
+        draw(&canvas, &solids, beyond, &Tests::default()),
+    );
+    let mut behind = 0;
+    for sample in 0..GRID.samples() {
+        let (masked, open) = (masked.depth.front(sample), open.depth.front(sample));
+        assert_eq!(masked, open.filter(|_| stencil.holds(sample)));
+        // Marked is what sees the portal, and no wall or pillar before it.
+        let ray = canvas.probe(sample).ray();
+        let entry = |b: &WorldBox| judge::entry(ray, b);
+        let before = |portal: &judge::Depth| {
+            let room = boxes[..first_beyond].iter().filter_map(entry);
+            room.filter(|depth| judge::order(depth, portal).is_lt())
+                .count()
+        };
+        let sees = entry(&portal).is_some_and(|portal| before(&portal) == 0);
+        assert_eq!(stencil.holds(sample), sees);
+        behind += usize::from(!sees && entry(&portal).is_some());
+    }
+    assert!(behind > 3, "the premise: {behind}");
+    let (with, without) = (masked.tally, open.tally);
+    assert_eq!(with.asked + with.kept_out, without.asked);
+    assert!(with.fragments > 0 && with.fragments * 4 < without.fragments);
+}
+
+/// A mirror shows the same as reflected boxes behind it.
+#[test]
+fn a_mirror_shows_reflected_boxes_behind_its_plane() {
+    let mut rng = SeededRng::new(14);
+    let mut reflected_hits = 0;
+    for axis in 0..3 {
+        let boxes = apart(&mut rng, 30);
+        let (solids, at) = (judge::solids(&boxes), 14.0);
+        let reflect = |b: &WorldBox| {
+            let mut reflected = *b;
+            reflected.min[axis] = 2.0 * at - b.max[axis];
+            reflected.max[axis] = 2.0 * at - b.min[axis];
+            reflected
+        };
+        let reflected = judge::solids(&boxes.iter().map(reflect).collect::<Vec<_>>());
+        let mut eye = DVec3::new(1.5, -2.5, 3.5);
+        eye[axis] = -20.0;
+        let mut forward = DVec3::new(0.1, 0.2, -0.1);
+        forward[axis] = 1.0;
+        let up = if axis == 2 { DVec3::X } else { DVec3::Z };
+        let frame = Frame::looking_along(eye, forward, up).unwrap();
+        let lens = Lens::perspective(60.0, 1.5, 0.5, None).unwrap();
+        let canvas = Canvas::of(&Rays::of(&Camera { frame, lens }).unwrap(), GRID);
+        let mut mirror = WorldBox::new(DVec3::splat(-9.0), DVec3::splat(9.0));
+        (mirror.min[axis], mirror.max[axis]) = (at, at);
+        let nothing = DepthBuffer::new(GRID.samples());
+        let stencil = nothing.stencil(&canvas, &[mirror]);
+        let tests = Tests {
+            stencil: Some(&stencil),
+            surfaces: None,
+        };
+        let drawn = draw(&canvas.mirrored(axis, at), &solids, &all(&solids), &tests);
+        for (sample, &id) in drawn.depth.ids().iter().enumerate() {
+            let probe = canvas.probe(sample);
+            let plane = (at - eye[axis]) / probe.ray().direction[axis];
+            let beyond = Ray {
+                near: plane,
+                ..*probe.ray()
+            };
+            let wanted = judge::front(&beyond, &reflected.boxes);
+            let wanted = wanted.first().copied().filter(|_| stencil.holds(sample));
+            assert_eq!(
+                id,
+                wanted.unwrap_or(NO_ITEM),
+                "axis {axis}, sample {sample}"
+            );
+            reflected_hits += usize::from(id != NO_ITEM);
+        }
+    }
+    assert!(reflected_hits > 100, "the premise: {reflected_hits}");
+}
+
+#[test]
+fn screen_rectangles_hold_every_sample_that_meets_the_box() {
+    let mut rng = SeededRng::new(30);
+    let grid = SampleGrid::new(16, 12);
+    let (mut met, mut held) = (0, 0);
+    for _ in 0..400 {
+        let solids = judge::solids(&judge::ties(&mut rng, 12));
+        let rays = Rays::of(&judge::camera(&mut rng)).unwrap();
+        let canvas = Canvas::of(&rays, grid);
+        for b in &solids.boxes {
+            let rectangle = canvas.screen().rectangle(b);
+            held += rectangle.as_ref().map_or(0, Rectangle::samples);
+            for sample in 0..grid.samples() {
+                let probe = canvas.probe(sample);
+                if probe.enter(b, f64::INFINITY).is_some() {
+                    let (column, row) = (sample as u32 % 16, sample as u32 / 16);
+                    let holds =
+                        |r: &Rectangle| r.columns.contains(&column) && r.rows.contains(&row);
+                    assert!(rectangle.as_ref().is_some_and(holds), "{b:?} {rays:?}");
+                    met += 1;
+                }
+            }
+        }
+    }
+    assert!(met > 5000 && held < 8 * met, "the premise: {met} of {held}");
+}
