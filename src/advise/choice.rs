@@ -9,7 +9,7 @@ use super::trials::{Answered, Trials};
 use crate::culling::{Culling, CullingTest, TESTS};
 use crate::index::{BuildError, Execution, Kind, StructureSpec};
 use crate::measure::{Group, Metric, OverProcesses, ReportCell};
-use crate::statistics::{ALPHA, Rate, rate, shows_less_in_sum};
+use crate::statistics::{ALPHA, Estimate, Rate, flat, rate, shows_less_in_sum};
 use crate::verify::ErrorCount;
 
 /// Which structure, and all that took part.
@@ -43,11 +43,8 @@ pub struct StructureRow {
     /// Why, where the status is not ok.
     pub reason: Option<String>,
     /// CPU time per frustum query, ns.
-    pub query_ns: Option<f64>,
-    /// Lower end of its 95 % interval.
-    pub query_ns_lower: Option<f64>,
-    /// Upper end of its 95 % interval.
-    pub query_ns_upper: Option<f64>,
+    #[serde(flatten, serialize_with = "flat::query_ns")]
+    pub query_ns: Option<Estimate>,
     /// Time of `linear` / time of this; above 1 is faster.
     pub speedup: Option<f64>,
     /// Time of one build, ms.
@@ -64,15 +61,12 @@ pub struct StructureRow {
 
 impl StructureRow {
     fn of(cell: &ReportCell) -> StructureRow {
-        let metric = |name: &str| -> Option<&Metric> { cell.metrics.get(name) };
-        let value = |name: &str| metric(name).map(|m| m.value);
+        let value = |name: &str| cell.metrics.get(name).map(|m| m.value);
         StructureRow {
             structure: cell.structure.clone(),
             status: cell.status.name(),
             reason: cell.reason.clone(),
-            query_ns: value("query_ns"),
-            query_ns_lower: metric("query_ns").and_then(|m| m.lower),
-            query_ns_upper: metric("query_ns").and_then(|m| m.upper),
+            query_ns: cell.metrics.get("query_ns").map(Metric::estimate),
             speedup: value("speedup"),
             build_ms: value("build_ms"),
             memory_bytes_per_item: value("memory_bytes_per_item"),
@@ -81,13 +75,18 @@ impl StructureRow {
             is_failure: cell.status.is_failure(),
         }
     }
+
+    /// CPU time per frustum query, ns.
+    pub fn ns(&self) -> Option<f64> {
+        Some(self.query_ns?.value)
+    }
 }
 
 impl StructureChoice {
     /// From what a run measures of all structures on one scene and path.
     pub fn of(group: &Group) -> StructureChoice {
         let mut rows: Vec<StructureRow> = group.cells.iter().map(StructureRow::of).collect();
-        rows.sort_by(|a, b| or_last(a.query_ns).total_cmp(&or_last(b.query_ns)));
+        rows.sort_by(|a, b| or_last(a.ns()).total_cmp(&or_last(b.ns())));
         let rank = |row: &StructureRow| {
             let mut cells = group.cells.iter();
             cells.find(|cell| cell.structure == row.structure)?.rank
@@ -96,7 +95,7 @@ impl StructureChoice {
             let mut ranks = group.located.iter();
             Some(ranks.find(|(structure, _)| *structure == row.structure)?.1)
         };
-        let mut first = first_ranked(&rows, rank, |row| row.query_ns).into_iter();
+        let mut first = first_ranked(&rows, rank, StructureRow::ns).into_iter();
         let mut first_located = first_ranked(&rows, located, |row| row.locate_ns).into_iter();
         StructureChoice {
             name: first.next(),
@@ -204,11 +203,8 @@ pub struct TestRow {
     /// Name of the test.
     pub test: &'static str,
     /// CPU time per frustum query, ns.
-    pub query_ns: Option<f64>,
-    /// Lower end of its 95 % interval.
-    pub query_ns_lower: Option<f64>,
-    /// Upper end of its 95 % interval.
-    pub query_ns_upper: Option<f64>,
+    #[serde(flatten, serialize_with = "flat::query_ns")]
+    pub query_ns: Option<Estimate>,
     /// False positives / visible items, by judged camera.
     pub excess: Option<Rate>,
     /// Visible items that were not returned, in millionths.
@@ -275,9 +271,7 @@ impl TestChoice {
             let drawn = extra.map(|extra| extra * draw_ns);
             TestRow {
                 test: test.name(),
-                query_ns: query.map(|q| q.value),
-                query_ns_lower: query.and_then(|q| q.lower),
-                query_ns_upper: query.and_then(|q| q.upper),
+                query_ns: query,
                 excess: rate_of(|e| e.false_positives),
                 false_negative_ppm: rate_of(|e| e.false_negatives).map(|share| share.per(1e6)),
                 false_positives_per_query: extra,
@@ -342,9 +336,7 @@ mod tests {
         let off = |n: usize| 1.0 + 0.01 * ((n * test.len()) % 7) as f64 - 0.03;
         TestRow {
             test,
-            query_ns: Some(query),
-            query_ns_lower: None,
-            query_ns_upper: None,
+            query_ns: Some(Estimate::within(query, [f64::NAN; 2])),
             excess: None,
             false_negative_ppm: rate(&[[0.0, 1e6]]),
             false_positives_per_query: Some(drawn),
@@ -359,9 +351,7 @@ mod tests {
             structure: structure.to_owned(),
             status: "ok",
             reason: None,
-            query_ns,
-            query_ns_lower: None,
-            query_ns_upper: None,
+            query_ns: query_ns.map(|ns| Estimate::within(ns, [f64::NAN; 2])),
             speedup: None,
             build_ms: None,
             memory_bytes_per_item: None,

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::statistics::{Estimate, flat};
 use crate::verify::ErrorCount;
 
 /// A feature that may be left out, with the decision.
@@ -120,12 +121,9 @@ pub struct Check {
     pub kept_ns: f64,
     /// The same without the feature.
     pub left_out_ns: f64,
-    /// Time with it / time without: above 1, leaving out is faster. NaN without times.
-    pub ratio: f64,
-    /// Lower end of the 95 % interval over the processes.
-    pub ratio_lower: f64,
-    /// Upper end of the interval.
-    pub ratio_upper: f64,
+    /// Time with it / time without: above 1, leaving out is faster. `None` without times.
+    #[serde(flatten, serialize_with = "flat::ratio")]
+    pub ratio: Option<Estimate>,
     /// `true` if every camera got the same set from both.
     pub same_answers: bool,
     /// `true` if both sets must be the same.
@@ -205,9 +203,7 @@ pub(super) fn check(ratio: f64, pays: Option<bool>) -> Check {
         on: "wide".to_owned(),
         kept_ns: ratio * 100.0,
         left_out_ns: 100.0,
-        ratio,
-        ratio_lower: f64::NAN,
-        ratio_upper: f64::NAN,
+        ratio: Some(Estimate::within(ratio, [f64::NAN; 2])),
         same_answers: true,
         same_expected: true,
         kept_excess: None,

@@ -60,7 +60,7 @@ impl Facts<'_> {
     /// Share of the time that leaving out saves in the first check.
     pub fn saving(&self) -> Option<f64> {
         let check = self.checks.first()?;
-        Some(1.0 - 1.0 / check.ratio).filter(|saving| saving.is_finite())
+        Some(1.0 - 1.0 / check.ratio?.value).filter(|saving: &f64| saving.is_finite())
     }
 }
 

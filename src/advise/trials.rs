@@ -11,7 +11,6 @@ use crate::culling::CameraView;
 use crate::index::DynIndex;
 use crate::measure::{Ask, OverProcesses, TimedTask};
 use crate::query::ItemId;
-use crate::statistics::Estimate;
 use crate::verify::{ErrorCount, Trial};
 
 /// The task that all others are compared with: the fastest tree, six planes, f32.
@@ -193,8 +192,6 @@ impl Sides {
     pub fn check(self, answered: &Answered, times: &OverProcesses) -> Check {
         let (kept, left_out) = (self.kept, self.left_out);
         let ns = |task| times.ns(task).map_or(f64::NAN, |found| found.value);
-        let ratio = times.ratio(kept, left_out);
-        let ratio = |part: fn(&Estimate) -> f64| ratio.as_ref().map_or(f64::NAN, part);
         let errors = [kept, left_out].map(|task| answered.errors(task));
         let excess = |errors: &Option<ErrorCount>| errors.as_ref().and_then(ErrorCount::excess);
         let missed = |errors: &Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
@@ -204,9 +201,7 @@ impl Sides {
             on: self.on,
             kept_ns: ns(kept),
             left_out_ns: ns(left_out),
-            ratio: ratio(|r| r.value),
-            ratio_lower: ratio(|r| r.lower.unwrap_or(f64::NAN)),
-            ratio_upper: ratio(|r| r.upper.unwrap_or(f64::NAN)),
+            ratio: times.ratio(kept, left_out),
             same_answers: self.same_answers,
             same_expected: self.same_expected,
             kept_excess: excess(&errors[0]),

@@ -17,7 +17,6 @@ use crate::advise::{
 use crate::index::Registry;
 use crate::measure::{Effort, Group, Part, Plan, ProcessTimes, Share, cameras_within};
 use crate::report::Experiment;
-use crate::statistics::Estimate;
 use crate::suite::SUITES;
 
 /// Most cameras of a path: every rule holds views of all, some 20 KB per camera.
@@ -222,7 +221,7 @@ fn taken(advice: &Advice) -> String {
         row.query_ns.is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
     });
     let faster = next.and_then(|next| {
-        let times = text::significant(next.query_ns? / row?.query_ns?);
+        let times = text::significant(next.ns()? / row?.ns()?);
         Some(format!("{times} x {}, the next", next.structure))
     });
     let linear = row.and_then(|row| row.speedup).filter(|_| !choice.is_scan);
@@ -361,7 +360,7 @@ fn structure_table(choice: &StructureChoice) -> Table {
     let columns: &[Column<&StructureRow>] = &[
         ("structure", |row| row.structure.clone()),
         (">query [95 % interval]", |row| {
-            text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper])
+            some(row.query_ns, text::time_within)
         }),
         (">speed-up", |row| some(row.speedup, text::significant)),
         (">build", |row| {
@@ -386,7 +385,7 @@ fn test_table(choice: &TestChoice) -> Table {
         }),
         ("test", |(_, row)| row.test.to_owned()),
         (">query [95 % interval]", |(_, row)| {
-            text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper])
+            some(row.query_ns, text::time_within)
         }),
         (">false positives %", |(_, row)| {
             text::rate(row.excess, 100.0)
@@ -448,10 +447,7 @@ fn check_cells(check: &Check) -> [String; 6] {
         check.on.clone(),
         text::time(check.kept_ns),
         text::time(check.left_out_ns),
-        text::within(&Estimate::within(
-            check.ratio,
-            [check.ratio_lower, check.ratio_upper],
-        )),
+        check.ratio.map_or("NaN".to_owned(), text::within),
         some(both, |(kept, left_out)| format!("{kept} / {left_out}")),
         match (check.same_answers, check.is_wrong(), missed) {
             (_, true, _) => "WRONG: not the same",

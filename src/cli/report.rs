@@ -454,9 +454,13 @@ fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String
     let mut row = vec![
         cell.structure.clone(),
         rank,
-        text::time_estimate(cell.metrics.get("query_ns")),
+        text::some(cell.metrics.get("query_ns"), |ns| {
+            text::time_within(ns.estimate())
+        }),
         text::some(cell.value("query_ns_p95"), text::time),
-        text::estimate(cell.metrics.get("speedup")),
+        text::some(cell.metrics.get("speedup"), |found| {
+            text::within(found.estimate())
+        }),
     ];
     row.extend(peer.map(|peer| {
         let is_sound = cell.status == Status::Ok;

@@ -61,7 +61,7 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
             label: format!("{name} {}", times(*ratio)),
             note: format!(
                 "{name}: {}, {}",
-                text::time_estimate(time),
+                text::some(time, |ns| text::time_within(ns.estimate())),
                 text::some(*ends, |[low, high]| format!(
                     "{} [{}, {}]",
                     times(*ratio),
@@ -120,7 +120,7 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
                 note: format!(
                     "{name}, {}: {}",
                     text::count(items),
-                    text::time_estimate(metric)
+                    text::some(metric, |ns| text::time_within(ns.estimate()))
                 ),
                 ..Point::default()
             }
@@ -317,7 +317,7 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
                         "{} {}: {}, {} % false positives",
                         cell.structure,
                         cell.test,
-                        text::time_estimate(Some(time)),
+                        text::time_within(time.estimate()),
                         text::significant(error * 100.0)
                     ),
                 })

@@ -164,7 +164,9 @@ fn columns<'r>() -> [Column<Row<'r>>; 14] {
         }),
         (">p95", |row| of(row, "query_ns_p95", text::time)),
         (">speed-up [95 %]", |row| {
-            text::estimate(row.cell.metrics.get("speedup"))
+            text::some(row.cell.metrics.get("speedup"), |found| {
+                text::within(found.estimate())
+            })
         }),
         (">/ read", |row| of(row, "times_read", text::significant)),
         (">/ copy", |row| of(row, "times_memcpy", text::significant)),

@@ -84,26 +84,14 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// A value with its 95 % interval: "4.04 [3.95, 4.16]"; nothing if there is none.
-pub fn estimate(metric: Option<&Metric>) -> String {
-    some(metric, |m| {
-        significant(m.value) + &interval([m.lower, m.upper], 1.0)
-    })
-}
-
-/// An estimate with its interval, which may be NaN.
-pub fn within(found: &Estimate) -> String {
+/// A value with its 95 % interval: "4.04 [3.95, 4.16]".
+pub fn within(found: Estimate) -> String {
     significant(found.value) + &interval([found.lower, found.upper], 1.0)
 }
 
-/// A time with its 95 % interval in the same unit: "1.81 us [1.75, 1.90]".
-pub fn time_estimate(metric: Option<&Metric>) -> String {
-    some(metric, |m| time_within(Some(m.value), [m.lower, m.upper]))
-}
-
-/// A time in ns with the ends of its interval; nothing if there is none.
-pub fn time_within(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
-    some(ns, |ns| time(ns) + &interval(ends, unit(ns).0))
+/// A time in ns with its 95 % interval in the same unit: "1.81 us [1.75, 1.90]".
+pub fn time_within(ns: Estimate) -> String {
+    time(ns.value) + &interval([ns.lower, ns.upper], unit(ns.value).0)
 }
 
 /// A time with a margin on both sides: "1.30±0.38 us".
@@ -225,7 +213,7 @@ pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
 pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     let count = counted(processes, "process");
     match twin.filter(|twin| twin.lower.is_some()) {
-        Some(twin) => format!("{count} (a twin took {} times as long)", within(twin)),
+        Some(twin) => format!("{count} (a twin took {} times as long)", within(*twin)),
         None => format!("{count}: times without intervals, no ties (--processes 10 gives both)"),
     }
 }
@@ -394,14 +382,13 @@ mod tests {
             upper: Some(1_900_000.0),
             unit: "ns".to_owned(),
         };
-        assert_eq!(time_estimate(Some(&metric)), "1.81 us [0.990, 1900]");
-        assert_eq!(estimate(Some(&metric)), "1810 [990, 1900000]");
+        assert_eq!(time_within(metric.estimate()), "1.81 us [0.990, 1900]");
+        assert_eq!(within(metric.estimate()), "1810 [990, 1900000]");
         let bare = Metric {
             lower: None,
             ..metric
         };
-        assert_eq!(time_estimate(Some(&bare)), "1.81 us");
-        assert_eq!(time_estimate(None), "");
+        assert_eq!(time_within(bare.estimate()), "1.81 us");
     }
 
     #[test]

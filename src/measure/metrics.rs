@@ -82,6 +82,17 @@ pub struct Metric {
     pub unit: String,
 }
 
+impl Metric {
+    /// Value and interval.
+    pub fn estimate(&self) -> Estimate {
+        Estimate {
+            value: self.value,
+            lower: self.lower,
+            upper: self.upper,
+        }
+    }
+}
+
 /// The metrics of a cell while they are collected.
 #[derive(Default)]
 pub(super) struct Metrics(pub(super) BTreeMap<String, Metric>);
