@@ -121,7 +121,9 @@ pub struct Check {
     pub kept_ns: f64,
     /// The same without the feature.
     pub left_out_ns: f64,
-    /// Time with it / time without: above 1, leaving out is faster. `None` without times.
+    /// Time with it / time without: above 1, leaving out is faster.
+    ///
+    /// `None` without times.
     #[serde(flatten, serialize_with = "flat::ratio")]
     pub ratio: Option<Estimate>,
     /// `true` if every camera got the same set from both.

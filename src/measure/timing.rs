@@ -95,7 +95,7 @@ pub fn timed_rounds(
     timed_to_end(tasks, &Schedule::new(count, tasks, protocol), protocol)
 }
 
-/// As [`timed`], without a stop.
+/// [`timed`] without a stop.
 pub fn timed_to_end(
     tasks: &[TimedTask],
     schedule: &Schedule,

@@ -1,6 +1,7 @@
-//! An estimate as three fields of a row: its value, and `_lower` and `_upper` behind the
-//! name for the ends of its 95 % interval; null where there is none. For
-//! `#[serde(flatten, serialize_with)]`.
+//! Estimates as three fields of a row, for `#[serde(flatten, serialize_with)]`.
+//!
+//! The value, and `_lower` and `_upper` behind its name for the ends of the 95 % interval;
+//! null where there is none.
 
 use serde::Serializer;
 use serde::ser::SerializeStruct;

@@ -1,4 +1,4 @@
-//! What is pinned.
+//! Digests of questions and answers.
 
 /// Scene, path, and the first 64 bits of the SHA-256 of questions and of answers.
 ///
