@@ -303,8 +303,8 @@ pub struct SoughtArgs {
 
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
-    /// A scene (file or spec); may be repeated [default: small ones of every family and
-    /// the real ones]
+    /// A scene (file or spec; maps.wad#* for all of a file); may be repeated [default:
+    /// small ones of every family and the real ones]
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<String>,
     /// A camera path (spec or cameras CSV); may be repeated [default: several]

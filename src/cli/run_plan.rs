@@ -7,12 +7,12 @@ use super::args::RunArgs;
 use super::shared_args::WhatArgs;
 use crate::culling::Culling;
 use crate::index::{Registry, StructureSpec, UpdatePolicy};
-use crate::input::{note, tell_warnings};
+use crate::input::{InputError, note, tell_warnings};
 use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
 use crate::motion::Motion;
 use crate::path::{self, LensDefaults};
 use crate::report::{KeptPart, Stream};
-use crate::scene::{self, FETCHED, Scene};
+use crate::scene::{self, FETCHED, Scene, every_part};
 use crate::spec::SpecError;
 use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES, Suite};
 
@@ -72,7 +72,7 @@ pub fn plan_of(
     }
     let structures = args.kernel.structures(registry, &structures)?;
     let plan = Plan {
-        scenes: scenes(args, suite),
+        scenes: scenes(args, suite)?,
         cullings,
         lens: args.lens.defaults()?,
         motions: Vec::new(),
@@ -279,7 +279,7 @@ fn same_digest(
     Ok(())
 }
 
-fn scenes(args: &WhatArgs, suite: &Suite) -> Vec<PlannedScene> {
+fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputError> {
     let scene = |source: &str, paths: &[&str], cold: bool| PlannedScene {
         source: source.to_owned(),
         paths: match args.path.is_empty() {
@@ -290,10 +290,13 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Vec<PlannedScene> {
     };
     let rows = suite.plan.iter();
     let rows = rows.map(|row| scene(row.scene, row.paths, row.cold || args.cold));
-    let named = args.scene.iter();
-    let named = named.map(|source| scene(source, &[DEFAULT_PATH], args.cold));
     if !args.scene.is_empty() {
-        return named.collect();
+        let named = args.scene.iter().map(|source| every_part(source));
+        let named: Vec<_> = named.collect::<Result<_, _>>()?;
+        let named = named.iter().flatten();
+        return Ok(named
+            .map(|source| scene(source, &[DEFAULT_PATH], args.cold))
+            .collect());
     }
     let mut scenes: Vec<PlannedScene> = rows.collect();
     if suite.name == REAL {
@@ -308,7 +311,7 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Vec<PlannedScene> {
             ));
         }
     }
-    scenes
+    Ok(scenes)
 }
 
 #[cfg(test)]

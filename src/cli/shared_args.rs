@@ -26,7 +26,8 @@ pub struct SceneArgs {
     /// boxes, y of OBJ]
     #[arg(long, value_name = "AXIS", value_parser = values::choice("up axis", &UP_AXES))]
     pub up: Option<UpAxis>,
-    /// Items of scenes with triangles (OBJ, glTF, meshes): objects or triangles
+    /// Items of scenes with triangles (OBJ, glTF, meshes): objects or triangles; of
+    /// Quake III maps also surfaces or brushes alone
     #[arg(long, value_name = "KIND", default_value = "objects", value_parser = values::choice("kind of item", &ITEM_KINDS))]
     pub items: ItemKind,
 }
@@ -51,7 +52,8 @@ pub struct WhatArgs {
     /// quick; compare --against: compare]
     #[arg(long, value_name = "SUITE")]
     pub suite: Option<String>,
-    /// A scene (file or spec) instead of the suite's; may be repeated
+    /// A scene (file or spec) instead of the suite's; may be repeated; maps.wad#* and
+    /// pak.pk3#* are all of a file
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<String>,
     /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated

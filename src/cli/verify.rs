@@ -18,7 +18,7 @@ use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
 use crate::measure::{Status, Subject, Verdict, Workload, count_pass, guarded, judge};
 use crate::path::{self, CameraPath};
 use crate::query::Located;
-use crate::scene::{FAMILIES, Regions, SAMPLES, Scene};
+use crate::scene::{FAMILIES, Regions, SAMPLES, Scene, every_part};
 use crate::verify::{
     ErrorCount, Fault, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment,
     explain_visibility, points_on_faces, variants,
@@ -46,7 +46,10 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     let scenes = match (&args.scene[..], args.cases) {
         ([], Some(_)) if !by_hand => Vec::new(),
         ([], _) => default_scenes(),
-        (named, _) => named.to_vec(),
+        (named, _) => {
+            let parts = named.iter().map(|source| every_part(source));
+            parts.collect::<Result<Vec<_>, _>>()?.concat()
+        }
     };
     if scenes.is_empty() && cases == 0 {
         bail!("nothing to verify: no scene and --cases 0; expected one or the other");

@@ -68,7 +68,7 @@ pub(crate) use rng::mix64;
 pub use samples::{NOTICE, SAMPLES, Sample};
 pub use shape::ItemShape;
 pub use sought::{Sought, SoughtBox};
-pub use source::{check_fits, is_wad, load, part_names, read_bytes, split_part};
+pub use source::{check_fits, every_part, is_wad, load, part_names, read_bytes, split_part};
 #[cfg(feature = "cli")]
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};

@@ -35,6 +35,22 @@ pub fn split_part(source: &str) -> (&str, Option<&str>) {
     }
 }
 
+/// The scenes of `maps.wad#*` or `pak.pk3#*`, one by one; of others the source.
+///
+/// # Errors
+/// A file that cannot be read, or a directory that is damaged.
+pub fn every_part(source: &str) -> Result<Vec<String>, InputError> {
+    let (file, part) = split_part(source);
+    let names = match part {
+        Some("*") => part_names(&read_file(Path::new(file))?, file)?,
+        _ => Vec::new(),
+    };
+    Ok(match names.is_empty() {
+        true => vec![source.to_owned()],
+        false => names.iter().map(|name| format!("{file}#{name}")).collect(),
+    })
+}
+
 /// Names of the maps of a WAD or the scenes of a zip archive; none of others.
 ///
 /// # Errors
@@ -56,6 +72,12 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     let mut scene = read(source, options)?;
     if options.items == ItemKind::Triangles {
         scene = scene.by_triangle(options)?;
+    }
+    if let Regions::Leaves(map) = &scene.regions
+        && map.bare > 0
+    {
+        let what = "surfaces without triangles (flares) are no items";
+        note(&format!("{source}: {} {what}", map.bare));
     }
     let is_of_map = matches!(options.items, ItemKind::Surfaces | ItemKind::Brushes);
     if is_of_map && !matches!(scene.regions, Regions::Leaves(_)) {
@@ -241,6 +263,17 @@ mod tests {
             assert_eq!(scene.name, source);
             assert!(!scene.items.is_empty());
         }
+    }
+
+    #[test]
+    fn every_part_of_a_file_is_named() {
+        let all = |source: &str| every_part(source).unwrap();
+        let map = ["datasets/freedm_map12.wad#MAP12"];
+        assert_eq!(all("datasets/freedm_map12.wad#*"), map);
+        for source in ["datasets/freedm_map12.wad", "city:n=9", "none.wad#MAP01"] {
+            assert_eq!(all(source), [source]);
+        }
+        assert!(every_part("none.wad#*").is_err());
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::shown::{first_of, plain, shortened};
 /// Endings of the names of scenes.
 const SCENES: [&str; 6] = [".bsp", ".wad", ".gltf", ".glb", ".obj", ".csv"];
 /// Names in a message.
-const MOST_NAMED: usize = 16;
+const MOST_NAMED: usize = 32;
 /// Memory that unpacking takes, in sizes of the entry: it grows by doubling.
 const GROWTH: u64 = 3;
 

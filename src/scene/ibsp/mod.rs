@@ -39,6 +39,8 @@ pub struct QuakeMap {
     pub tree: LeafTree,
     /// How many clusters there are.
     pub clusters: usize,
+    /// Surfaces without triangles, which are no items: flares.
+    pub bare: usize,
     /// Bytes of a row, and a row of bits for each cluster; `None` where the map has no
     /// such table.
     seen: Option<(usize, Vec<u8>)>,
@@ -75,6 +77,7 @@ impl QuakeMap {
             .map_or(0, |&last| last as usize + 1);
         Ok(QuakeMap {
             clusters: count.unwrap_or(largest),
+            bare: 0,
             seen: table.map(|(count, row_bytes)| {
                 let rows = &visibility.data[8..8 + count * row_bytes];
                 (row_bytes, rows.to_vec())
@@ -136,7 +139,7 @@ pub fn read_ibsp(
     name: &str,
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
-    let map = QuakeMap::read(bytes, file)?;
+    let mut map = QuakeMap::read(bytes, file)?;
     let lump = |number| lump(bytes, file, number);
     let (surfaces, brushes, shaders) = (lump(13)?, lump(8)?, lump(1)?);
     check_counts(
@@ -151,7 +154,6 @@ pub fn read_ibsp(
         kinds: Labels::new("kind"),
         surfaces: Surfaces::about(DVec3::ZERO),
     };
-    let mut bare = 0;
     let all_but = |other| move |_: &usize| options.items != other;
     for surface in (0..surfaces.len()).filter(all_but(ItemKind::Brushes)) {
         let shader = surfaces.index(surface, 0, &shaders)?;
@@ -159,12 +161,8 @@ pub fn read_ibsp(
             Some((label, bounds, faces)) => {
                 items.push(label, kind_of(&shaders, shader, true), &bounds, &faces);
             }
-            None => bare += 1,
+            None => map.bare += 1,
         }
-    }
-    if bare > 0 {
-        let what = "surfaces without triangles (flares) are no items";
-        note(&format!("{file}: {bare} {what}"));
     }
     let (planes, sides) = (lump(2)?, lump(9)?);
     for at in (0..brushes.len()).filter(all_but(ItemKind::Surfaces)) {

@@ -73,6 +73,21 @@ fn surfaces_brushes_leaves_and_places_are_read() {
 }
 
 #[test]
+fn surfaces_or_brushes_alone_are_items_on_request() {
+    for (items, count) in [(ItemKind::Surfaces, 5), (ItemKind::Brushes, 13)] {
+        let options = LoadOptions {
+            items,
+            ..LoadOptions::default()
+        };
+        let scene = read_ibsp(MAP, "in.bsp", "in", &options).unwrap();
+        assert_eq!((scene.items.len(), map_of(&scene).clusters), (count, 3));
+        let error = super::super::load("city:n=9", &options).unwrap_err();
+        let wanted = format!("no {}; expected a Quake III map", items.name());
+        assert!(error.to_string().contains(&wanted), "{error}");
+    }
+}
+
+#[test]
 fn each_spawn_point_lies_in_an_open_leaf_and_its_box() {
     let scene = read(MAP).unwrap();
     let found = |p: DVec3| scene.holding(&scene.sought(p));

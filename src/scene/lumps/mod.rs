@@ -36,7 +36,7 @@ const NODE_KINDS: [(&str, &str); 9] = [
 const OWN_NODES: &str = "nodes in Doom's own format, as node builders (ZDBSP, ZenNode) write them \
                          unless told otherwise";
 /// Maps that a message names.
-const MOST_NAMED: usize = 8;
+const MOST_NAMED: usize = 32;
 
 /// A file's directory.
 pub struct Wad<'a> {
