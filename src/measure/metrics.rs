@@ -28,7 +28,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, summary }
     "query_ns_max", "ns", "slowest group of cameras";
     "query_wall_ns", "ns", "as query_ns, wall time";
     "ns_per_visible", "ns", "query_ns / visible items of a timed camera, mean; interval scaled likewise";
-    "speedup", "1", "time of linear / time of this structure: above 1 is faster; the ratio of the two query_ns";
+    "speedup", "1", "time of linear / time of this structure: above 1 is faster; the ratio of the two query_ns, of motions that of the two frame_ns";
     "times_read", "1", "time of this structure / time of reading all item bounds once \
                         (bound-read); a tree can be below 1";
     "times_memcpy", "1", "time of this structure / time of copying as many ids (bound-memcpy)";

@@ -121,6 +121,22 @@ fn a_motion_is_an_axis_of_a_run() {
 }
 
 #[test]
+fn a_run_does_not_continue_with_another_motion() {
+    let rows = |x: u32| format!("time_s,id,{BOUNDS}\n0,1,{x},0,0,9,1,1\n");
+    let folder = folder(&[("motion.csv", rows(1).as_bytes())]);
+    let line = "run --scene uniform:n=50 --path orbit:frames=4 --structure linear \
+        --motion motion.csv --processes 1 --out r";
+    works(folder.path(), line);
+    fs::write(folder.path().join("motion.csv"), rows(2)).expect("writable");
+    let done = cullbench(folder.path(), "run --resume --out r");
+    assert_refused(
+        &done,
+        "motion 'motion.csv' has changed | expected the same",
+        line,
+    );
+}
+
+#[test]
 fn motions_that_cannot_be_measured_are_refused() {
     let folder = folder(&[]);
     let run = "run --scene uniform:n=50 --path orbit:frames=4 --out r";
