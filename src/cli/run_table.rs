@@ -324,7 +324,9 @@ fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: 
     let head = lens.map(|lens| format!("{} up; {lens}\n\n", up.join(" or ")));
     let head = text::wrapped(&head.unwrap_or_default(), width);
     let unit = text::some(overall.base, |base| {
-        format!("; {base}: time per query, others: x {base}")
+        let moves = about().any(|cell| !cell.path.motion.is_empty());
+        let per = if moves { "frame" } else { "query" };
+        format!("; {base}: time per {per}, others: x {base}")
     });
     format!(
         "{head}{}\n* fastest or tied{unit}\n{more}\n",

@@ -61,7 +61,9 @@ fn a_motion_is_an_axis_of_a_run() {
     let at = |name: &str| folder.path().join(name);
     let told = works(folder.path(), &format!("{PLAN} --out r"));
     let told = unwrapped(&told);
-    assert!(told.contains("queries of the frames"), "{told}");
+    for part in ["queries of the frames", "linear: time per frame"] {
+        assert!(told.contains(part), "{told}");
+    }
     let whole = report(&at("r"));
     assert_eq!(cells(&whole).len(), 8);
     for cell in cells(&whole) {
