@@ -76,6 +76,35 @@ pub fn expected_by(error: &io::Error, what: &str) -> String {
     format!("; expected {expected}")
 }
 
+/// Nanoseconds with three significant digits and a fitting unit.
+pub fn time(ns: f64) -> String {
+    let (size, name) = unit(ns);
+    format!("{} {name}", significant(ns / size))
+}
+
+/// The unit that fits a time, in ns, and its name.
+pub fn unit(ns: f64) -> (f64, &'static str) {
+    match ns {
+        n if n < 1e3 => (1.0, "ns"),
+        n if n < 1e6 => (1e3, "us"),
+        n if n < 1e9 => (1e6, "ms"),
+        _ => (1e9, "s"),
+    }
+}
+
+/// Three significant digits: 0.0123, 1.23, 12.3, 123, 12345; an exponent only
+/// where the number would be longer than anything measured.
+pub fn significant(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    if !(1e-9..1e15).contains(&value.abs()) {
+        return format!("{value:.2e}");
+    }
+    let digits = 2 - value.abs().log10().floor() as i32;
+    format!("{value:.*}", digits.clamp(0, 12) as usize)
+}
+
 /// The first and the last characters of a longer text, with the mark of a cut.
 fn without_middle(text: &str, [first, last]: [usize; 2]) -> String {
     let count = text.chars().count();

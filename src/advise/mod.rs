@@ -55,6 +55,8 @@ pub struct Advice {
     pub test: TestChoice,
     /// One omission per rule.
     pub omissions: Vec<Omission>,
+    /// Warnings about the cameras in the scene.
+    pub warnings: Vec<String>,
 }
 
 impl Advice {
@@ -172,6 +174,7 @@ pub fn prepare(
             test: TestChoice::untimed(&case.spec.label),
             structure,
             omissions: Vec::new(),
+            warnings: path.warnings(scene),
         },
         tests: entered.tests,
         rules: entered.rules,

@@ -86,15 +86,6 @@ pub enum Decision {
 }
 
 impl Decision {
-    /// Name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Decision::LeaveOut => "leave out",
-            Decision::Keep => "keep",
-            Decision::NotApplicable => "not applicable",
-        }
-    }
-
     pub(super) fn of(leave_out: bool) -> Decision {
         match leave_out {
             true => Decision::LeaveOut,
@@ -190,7 +181,7 @@ impl Omission {
             if check.loses() || check.is_wrong() {
                 leave_out = false;
                 self.reason
-                    .push_str("; left out, something that is seen would be missed");
+                    .push_str("; without it, something visible would be missed");
                 self.note = "without, items are missed".to_owned();
             }
         }

@@ -228,8 +228,8 @@ impl Camera {
             }
             _ if is_matrix => {
                 return Err(CameraError::invalid(
-                    "the camera is a matrix, which has planes of its own",
-                    "--planes frame",
+                    "the camera is a matrix, whose own rows are its planes (in f64)",
+                    "--planes frame, which takes these, or cameras by eye and lens",
                 ));
             }
             PlaneMethod::FrameF32 => return Ok(from_frame_f32(frame, lens)),

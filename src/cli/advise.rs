@@ -17,6 +17,7 @@ use crate::advise::{
 use crate::index::Registry;
 use crate::measure::{Effort, Group, Part, Plan, ProcessTimes, Share, cameras_within};
 use crate::report::Experiment;
+use crate::statistics::Estimate;
 use crate::suite::SUITES;
 
 /// Most cameras of a path: every rule holds views of all, some 20 KB per camera.
@@ -141,71 +142,58 @@ fn options(args: &AdviseArgs) -> AdviseOptions {
 /// The advice, and before it the evidence where it is wanted.
 fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
     let mut out = text::terminal();
-    let say =
-        |out: &mut dyn Write, line: &str| writeln!(out, "{}", text::wrapped(line, text::width()));
-    let head = format!(
+    let width = text::width();
+    let mut say = |line: &str| writeln!(out, "{}", text::wrapped(line, width));
+    say(&format!(
         "{}: {}; {}: {}\n{}\n",
         text::plain(&advice.scene),
         text::counted(advice.items, "item"),
         text::plain(&advice.path),
         text::counted(advice.cameras, "camera"),
         text::over(advice.processes, advice.twin.as_ref())
-    );
-    say(&mut out, &head)?;
-    if all_columns {
-        show_evidence(&mut out, advice)?;
+    ))?;
+    for line in evidence(advice, width).iter().filter(|_| all_columns) {
+        say(line)?;
     }
     for row in &advice.structure.rows {
         if let Some(reason) = &row.reason {
-            say(
-                &mut out,
-                &format!("{}: {}: {reason}", row.structure, row.status),
-            )?;
+            say(&format!("{}: {}: {reason}", row.structure, row.status))?;
         }
     }
-    say(&mut out, &(taken(advice) + "\n"))?;
-    write!(
-        out,
-        "{}",
-        rule_table(advice)
-            .within(text::width(), &["gain", "cost", ""])
-            .bare()
-    )?;
-    let rules = || advice.omissions.iter();
-    let reasons: Vec<String> = rules()
-        .filter_map(|omission| {
-            Some(format!(
-                "{} ({})",
-                omission.feature,
-                not_for(advice, omission)?
-            ))
-        })
-        .collect();
-    if !reasons.is_empty() {
-        say(&mut out, &format!("Does not apply: {}", reasons.join(", ")))?;
-    }
-    let wrong = rules().filter(|rule| rule.checks.iter().any(Check::is_wrong));
-    for omission in wrong {
-        say(
-            &mut out,
-            &format!(
-                "WRONG: {}: answers with and without differ",
-                omission.feature
-            ),
-        )?;
-    }
+    say(&(taken(advice) + "\n"))?;
+    let rules = rule_table(advice).within(width, &["gain", "cost", ""]);
+    say(rules.bare().trim_end())?;
+    let named = |rule: &Omission| Some(format!("{} ({})", rule.feature, not_for(advice, rule)?));
+    let listed = |is_in: &dyn Fn(&Omission) -> Option<String>| {
+        let names: Vec<String> = advice.omissions.iter().filter_map(is_in).collect();
+        names.join(", ")
+    };
+    let wrong = |rule: &Omission| rule.checks.iter().any(Check::is_wrong);
     let contradicted =
-        rules().filter(|rule| rule.confirmed == Some(false) && not_for(advice, rule).is_none());
-    let contradicted: Vec<&str> = contradicted.map(|rule| rule.feature).collect();
-    if !contradicted.is_empty() {
-        let names = contradicted.join(", ");
-        say(
-            &mut out,
-            &format!("\nPredicted otherwise, decided as measured: {names}"),
-        )?;
+        |rule: &Omission| rule.confirmed == Some(false) && not_for(advice, rule).is_none();
+    let name = |is_so: bool, rule: &Omission| is_so.then(|| rule.feature.to_owned());
+    let pays_from = |rule: &Omission| name(rule.note.contains("pays from"), rule);
+    for (what, names) in [
+        ("Does not apply: ", listed(&named)),
+        (
+            "Pays from: over views of the whole path; funnel times 8 of them, or --frames: ",
+            listed(&pays_from),
+        ),
+        (
+            "WRONG: answers with and without differ: ",
+            listed(&|rule| name(wrong(rule), rule)),
+        ),
+        (
+            "\nPredicted otherwise, decided as measured: ",
+            listed(&|rule| name(contradicted(rule), rule)),
+        ),
+    ] {
+        if !names.is_empty() {
+            say(&(what.to_owned() + &names))?;
+        }
     }
     if !all_columns {
-        say(&mut out, "\nevidence: --all-columns")?;
+        say("\nevidence: --all-columns")?;
     }
     out.flush()
 }
@@ -319,33 +307,31 @@ fn rule_table(advice: &Advice) -> Table {
     table
 }
 
-/// Every structure, test and rule with its times.
-fn show_evidence(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
-    let width = text::width();
-    let mut say = |line: &str| writeln!(out, "{}", text::wrapped(line, width));
-    say("\nStructures, all answers checked:")?;
-    say(&structure_table(&advice.structure).fitted(width))?;
-    say(&format!(
-        "Culling tests on {}, with {} ns to draw an item that cannot be seen:",
-        advice.test.structure, advice.options.draw_ns
-    ))?;
-    say(&test_table(&advice.test).fitted(width))?;
-    say("What can be left out, measured with and without:")?;
-    say(&omission_table(&advice.omissions).fitted(width))?;
-    say(
-        "A rule leaves out on its side of the threshold; where both sides answer the same, the \
-         clock decides if a paired test over the processes tells them apart. Kept / left out above \
-         1: leaving out is faster.",
-    )?;
-    let reasons = advice.omissions.iter().map(|omission| {
-        let contradicted = match omission.confirmed {
-            Some(false) => " (the rule and what was measured disagree)",
+/// Every structure, test and feature with its times.
+fn evidence(advice: &Advice, width: usize) -> Vec<String> {
+    let reasons = advice.omissions.iter().map(|feature| {
+        let contradicted = match feature.confirmed {
+            Some(false) => " (predicted otherwise)",
             _ => "",
         };
-        let reason = format!("{}{contradicted}", omission.reason);
-        [omission.rule.to_owned(), reason]
+        let reason = format!("{}{contradicted}", feature.reason);
+        [feature.feature.to_owned(), reason]
     });
-    say(&text::entries(&reasons.collect::<Vec<_>>(), width))
+    vec![
+        "Structures, all answers checked:".to_owned(),
+        structure_table(&advice.structure).fitted(width),
+        format!(
+            "Culling tests on {}, with {} ns to draw an item that cannot be seen:",
+            advice.test.structure, advice.options.draw_ns
+        ),
+        test_table(&advice.test).fitted(width),
+        "Features, measured with and without:".to_owned(),
+        feature_table(&advice.omissions).fitted(width),
+        "The statistic decides; where both sides answer the same, the clock does if a paired test \
+         over the processes tells them apart."
+            .to_owned(),
+        text::entries(&reasons.collect::<Vec<_>>(), width),
+    ]
 }
 
 fn ties(names: &[impl AsRef<str>]) -> String {
@@ -407,48 +393,73 @@ fn test_table(choice: &TestChoice) -> Table {
     )
 }
 
-fn omission_table(omissions: &[Omission]) -> Table {
+/// Every feature with what decides on it, in the words of [`rule_table`].
+fn feature_table(features: &[Omission]) -> Table {
     let mut table = Table::of(
-        "rule | decision | >statistic | >threshold | >saving | measured on | >kept | >left out \
-         | >kept / left out | >false positives % kept / left out | answers",
+        "feature | needed | >statistic | >needed if | measured on | >with | >without \
+         | >with / without | >false positives % with / without | answers",
     );
-    for omission in omissions {
-        let side = match omission.left_out_if {
-            LeftOutIf::AtMost => "<=",
-            LeftOutIf::AtLeast => ">=",
+    for feature in features {
+        let side = match (feature.left_out_if, feature.is_saving) {
+            (LeftOutIf::AtMost, false) => ">",
+            (LeftOutIf::AtLeast, false) => "<",
+            (LeftOutIf::AtMost, true) => "<=",
+            (LeftOutIf::AtLeast, true) => ">=",
         };
-        let mut cells = vec![
-            omission.rule.to_owned(),
-            omission.decision.name().to_owned(),
-            some(omission.statistic, general),
-            some(omission.threshold, |t| format!("{side} {}", general(t))),
-            some(omission.saving, text::percent),
+        let needed = match feature.is_needed() {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "does not apply",
+        };
+        let mut own = vec![
+            feature.feature.to_owned(),
+            needed.to_owned(),
+            some(feature.statistic, general),
+            some(feature.threshold, |t| format!("{side} {}", general(t))),
         ];
-        let mut checks = omission.checks.iter();
-        cells.extend(checks.next().map(check_cells).into_iter().flatten());
-        table.add_row(cells);
-        for check in checks {
-            let cells = vec![String::new(); 5].into_iter();
-            table.add_row(cells.chain(check_cells(check)));
+        if feature.checks.is_empty() {
+            table.add_row(own.clone());
+        }
+        for check in &feature.checks {
+            table.add_row(own.drain(..).chain(check_cells(check, feature.is_saving)));
+            own = vec![String::new(); 4];
         }
     }
     table
 }
 
-fn check_cells(check: &Check) -> [String; 6] {
-    let excess = |share: Option<f64>| share.map(|s| format!("{:.3}", s * 100.0));
-    let both = excess(check.kept_excess).zip(excess(check.left_out_excess));
+/// Both sides of a check.
+///
+/// The side that leaves out has the feature if that `is_saving`.
+fn check_cells(check: &Check, is_saving: bool) -> [String; 6] {
+    let mut ns = [check.kept_ns, check.left_out_ns];
+    let mut excess = [check.kept_excess, check.left_out_excess];
+    let mut ratio = check.ratio;
+    if is_saving {
+        ns.reverse();
+        excess.reverse();
+        ratio = ratio.map(|ratio| Estimate {
+            value: ratio.value.recip(),
+            lower: ratio.upper.map(f64::recip),
+            upper: ratio.lower.map(f64::recip),
+        });
+    }
+    let shown = excess.map(|share| share.map(|share| format!("{:.3}", share * 100.0)));
     let missed = [
         check.kept_false_negative_ppm,
         check.left_out_false_negative_ppm,
     ];
     let missed = missed.into_iter().flatten().any(|ppm| ppm > 0.0);
+    let [with, without] = ns.map(text::time);
+    let [with_extra, without_extra] = shown;
     [
         check.on.clone(),
-        text::time(check.kept_ns),
-        text::time(check.left_out_ns),
-        check.ratio.map_or("NaN".to_owned(), text::within),
-        some(both, |(kept, left_out)| format!("{kept} / {left_out}")),
+        with,
+        without,
+        ratio.map_or("NaN".to_owned(), text::within),
+        some(with_extra.zip(without_extra), |(with, without)| {
+            format!("{with} / {without}")
+        }),
         match (check.same_answers, check.is_wrong(), missed) {
             (_, true, _) => "WRONG: not the same",
             (_, _, true) => "some missed",

@@ -16,7 +16,7 @@ use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD};
 use super::study::progress;
 use super::{Ending, compare_page, interrupt, run_plan, text};
 use crate::index::Registry;
-use crate::measure::{CellKey, Machine, Status};
+use crate::measure::{CellKey, Machine, Plan, Status};
 use crate::report::{Changes, JudgedRow, Lone, WORK, work_changes};
 use crate::scene;
 
@@ -78,6 +78,10 @@ pub fn compare_against(
             load.cores
         )
     };
+    let left_out = match args.what.structure.is_empty() {
+        true => left_out(registry, &plan.plan)?,
+        false => None,
+    };
     let [old, new] = sides;
     let table = CompareTable {
         old,
@@ -95,11 +99,24 @@ pub fn compare_against(
             ),
             Gate::Work => WORK_HEAD.to_owned(),
         },
-        notes: busy.map(note).into_iter().collect(),
+        notes: busy.map(note).into_iter().chain(left_out).collect(),
         settings: Vec::new(),
         changes: changes(&found, threshold, args.gate),
     };
     compare_page::show(&table, args)
+}
+
+/// Line on the default structures of a run that a comparison lacks.
+fn left_out(registry: &Registry, plan: &Plan) -> anyhow::Result<Option<String>> {
+    let all = registry.structures("default")?.into_iter();
+    let names = all.map(|spec| spec.label);
+    let is_in = |name: &String| plan.structures.iter().any(|spec| spec.label == *name);
+    let names: Vec<String> = names.filter(|name| !is_in(name)).collect();
+    let note = || {
+        let names = names.join(", ");
+        format!("not compared by default: {names} (--structure default takes all)")
+    };
+    Ok((!names.is_empty()).then(note))
 }
 
 /// The program of a name, as in a shell: one without a folder is looked up in PATH.

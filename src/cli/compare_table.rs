@@ -14,7 +14,9 @@ use super::table::Table;
 use super::{Ending, print_json, program, text};
 use crate::culling::CullingTest;
 use crate::measure::{CellKey, METRICS};
-use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};
+use crate::report::{
+    Changes, CommonShift, FEW_OTHERS, JudgedRow, Lone, Outcome, Setting, WORK, WorkChange,
+};
 use crate::shown::{number, shortened};
 
 /// Counters in the list; `--all` shows every one.
@@ -170,8 +172,15 @@ impl CompareTable {
             }
         }
         let listed = if all { usize::MAX } else { LISTED };
-        lines.extend(changes.work_changed.iter().take(listed).map(work_line));
-        let more = changes.work_changed.len().saturating_sub(listed);
+        let most = 1.0 + changes.threshold;
+        let is_listed = |work: &&WorkChange| {
+            // Counters of the gate have rows.
+            let is_beyond = work.new > work.old * most || work.old > work.new * most;
+            all || self.gate == Gate::Time || (is_beyond && !WORK.contains(&work.counter))
+        };
+        let work: Vec<_> = changes.work_changed.iter().filter(is_listed).collect();
+        lines.extend(work.iter().take(listed).map(|work| work_line(work)));
+        let more = work.len().saturating_sub(listed);
         if more > 0 {
             let more = text::counted(more, "further counter");
             lines.push(format!("work changed: {more} (--all lists them)"));
@@ -293,7 +302,13 @@ impl CompareTable {
         }
         let cells = text::counted(undecided, "inconclusive cell");
         let more = self.changes.more_pairs();
+        let mut rows = self.changes.rows.iter();
+        let lacks_others = rows.any(|row| row.reason.as_deref() == Some(FEW_OTHERS));
         Some(match (self.basis, more) {
+            (Basis::Reports, None) if lacks_others => format!(
+                "{cells}: runs with the same four structures or more would decide (run \
+                 --structure), or compare --against BINARY"
+            ),
             (Basis::Reports, Some(more)) if more > MOST_MORE => format!(
                 "{cells}: too noisy to resolve {}: try compare --against BINARY, which runs both \
                  programs in turns",

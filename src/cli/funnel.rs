@@ -86,11 +86,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         let picture = Block::Picture(funnel_picture::draw(&report, &stages.setting.scene));
         let figures = [Block::Figure(funnel_figure::chain(&report)), picture];
         let title = format!("funnel {}, {}", report.scene, report.path);
-        let mut blocks = funnel_table::blocks(&report, true);
-        let told = funnel_table::conclusions(&report);
-        let most = told.len();
-        blocks.extend(told.into_iter().map(Block::Line));
-        let page = to_page(&title, most, figures, blocks);
+        let blocks = funnel_table::blocks(&report, true);
+        let page = to_page(&title, report.conclusions.len(), figures, blocks);
         write_text(file, &page)?;
     }
     shown?;

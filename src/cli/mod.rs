@@ -232,9 +232,11 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Query(args) => query::query(registry, &args),
         Command::Locate(args) => query::locate(registry, &args),
         Command::Verify(args) => verify::verify(registry, &args),
-        Command::Precision(args) => precision::precision(registry, &args),
-        Command::Advise(args) => advise::advise(registry, &args),
-        Command::Funnel(args) => funnel::funnel(registry, &args),
+        Command::Precision(args) => {
+            study::or_left_out(args.format, precision::precision(registry, &args))
+        }
+        Command::Advise(args) => study::or_left_out(args.format, advise::advise(registry, &args)),
+        Command::Funnel(args) => study::or_left_out(args.format, funnel::funnel(registry, &args)),
         Command::Drift(args) => drift::drift(&args),
         Command::Stress(args) => stress::stress(registry, &args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),

@@ -68,9 +68,10 @@ impl Plan<'_> {
         if let Some(camera) = self.camera {
             draw_camera(camera, up, &sheet, &mut body);
         }
+        let unit = self.scene.unit.unwrap_or("units of the scene");
         let axes = match up {
-            UpAxis::Y => ["z", "x"],
-            UpAxis::Z => ["x", "y"],
+            UpAxis::Y => ["z", "x", unit],
+            UpAxis::Z => ["x", "y", unit],
         };
         sheet.finished(&self.caption, axes, &body, &self.legend(), &notes)
     }

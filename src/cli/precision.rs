@@ -67,6 +67,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     let outcome = precision_tables::Outcome {
         precision,
         seed: spread.seed,
+        warnings: setting.path.warnings(&setting.scene),
         size_sweep: sizes,
         sweeps,
     };

@@ -110,7 +110,7 @@ fn of_sizes(rows: &[SizeRow]) -> Option<String> {
     };
     let (first, last) = (rows.first()?, rows.last()?);
     Some(format!(
-        "Six planes return {} % false positives at s/D = {} and {} % at {}; the exact test with \
+        "Six planes return {} % false positives where a cube's edge is {} of the frustum's depth, and {} % at {}; the exact test with \
          epsilon {} and {} %.",
         of(first, "six-plane"),
         first.size_over_depth,

@@ -24,6 +24,7 @@ pub struct Outcome {
     pub seed: u64,
     pub size_sweep: Vec<SizeRow>,
     pub sweeps: Vec<SweepRow>,
+    pub warnings: Vec<String>,
 }
 
 /// The Pareto front within `room` characters.
@@ -59,7 +60,7 @@ pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
         add(title.to_owned(), times_table(&fastest), "");
     }
     let title = "Pareto front of error, memory and time, fastest first";
-    let front = front_table(p).within(room, &["tie", "B/item", "missed ppm"]);
+    let front = front_table(p).within(room, &["tie", "B/item", "FN ppm"]);
     add(title.to_owned(), front, FRONT_NOTE);
     if all {
         let title = "Region search, the fastest structure for each";
@@ -96,8 +97,8 @@ const ERRORS_NOTE: &str = "± is the 95 % interval over the cameras; <: none obs
 /// Meaning of the front.
 const FRONT_NOTE: &str = "No other point is significantly better in an error, the depth of misses, \
      memory or time and as good in the rest (intervals paired by camera and by process). c: factor \
-     of the conservative epsilon. FP: false positives, % of the visible items; <: none observed, \
-     95 % upper bound.";
+     of the conservative epsilon. FP: false positives, % of the visible items; FN: visible items \
+     missed, millionths; <: none observed, 95 % upper bound.";
 
 pub fn named(point: &CullingPoint) -> String {
     format!("{} with {}", structure(point), culling(point))
@@ -156,7 +157,7 @@ fn errors_table(points: &[&CullingPoint]) -> Table {
         (">by source", |point| {
             some(point.errors.counts.as_ref(), by_source)
         }),
-        (">missed ppm", |point| {
+        (">FN ppm", |point| {
             text::rate(point.errors.false_negative_ppm, 1.0)
         }),
         (">px", |point| {
@@ -195,7 +196,7 @@ fn front_table(p: &Precision) -> Table {
         ("culling", |point| culling(point)),
         (">query", |point| text::time_plus_minus(point.time)),
         (">FP %", |point| percent(point.errors.excess)),
-        (">missed ppm", |point| {
+        (">FN ppm", |point| {
             text::rate(point.errors.false_negative_ppm, 1.0)
         }),
         (">B/item", |point| {

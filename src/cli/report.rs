@@ -96,14 +96,10 @@ fn glossary() -> [Block; 2] {
     for (column, meaning) in MEANINGS {
         table.add_row([*column, *meaning]);
     }
-    let figures = FIGURES.iter().chain(&BUILDS).map(|row| (row.0, row.1));
-    let figures = [
-        ("query", "query_ns"),
-        ("p95", "query_ns_p95"),
-        ("speed-up vs linear", "speedup"),
-    ]
-    .into_iter()
-    .chain(figures);
+    let figures = run_table::FIGURES.iter().map(|figure| (figure.0, figure.1));
+    let figures = [("speed-up vs linear", "speedup")]
+        .into_iter()
+        .chain(figures);
     for (column, metric) in figures {
         let info = METRICS.iter().find(|info| info.name == metric);
         table.add_row([column, info.map_or("", |info| info.summary)]);
@@ -272,7 +268,7 @@ fn builds(comparisons: &[&Comparison]) -> Vec<Block> {
         let about = comparison.about();
         format!("break-even, {}, {}", about.path.name, about.test)
     });
-    let heads = BUILDS.iter().map(|row| row.0.to_owned());
+    let heads = BUILDS.map(str::to_owned);
     let mut table = Table::of_numbers(
         ["structure".to_owned()]
             .into_iter()
@@ -280,8 +276,7 @@ fn builds(comparisons: &[&Comparison]) -> Vec<Block> {
             .chain(paths),
     );
     for Ranked { cell, .. } in comparisons.iter().take(1).flat_map(|c| &c.ranked) {
-        let figures = BUILDS.iter();
-        let figures = figures.map(|(_, metric, show)| text::some(cell.value(metric), show));
+        let figures = run_table::figures(cell, &BUILDS);
         let queries = comparisons.iter().map(|comparison| {
             let own = comparison.sound_cell(&cell.structure);
             let queries = own.and_then(|own| own.value("break_even_queries"));
@@ -383,8 +378,7 @@ fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Vie
         "speed-up vs linear [95 %]",
     ];
     let of_peer = peer.map(|_| "speed-up vs fastest peer");
-    let figures = FIGURES.map(|(head, ..)| head);
-    let header = header.into_iter().chain(of_peer).chain(figures);
+    let header = header.into_iter().chain(of_peer).chain(OF_PATH);
     let mut table = Table::of_numbers(header.chain(["status"]));
     for Ranked { rank, cell } in &comparison.ranked {
         let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
@@ -422,33 +416,23 @@ fn false_positives(comparison: &Comparison) -> Option<String> {
     Some(format!("False positives: {told}."))
 }
 
-/// A column of single figures: head, metric and form.
-type Figure = (&'static str, &'static str, fn(f64) -> String);
-
-/// Those of the queries of a path.
-const FIGURES: [Figure; 11] = [
-    ("/ read", "times_read", text::significant),
-    ("/ copy", "times_memcpy", text::significant),
-    ("locate", "locate_ns", text::time),
-    ("frame", "frame_ns", text::time),
-    ("worst frame", "worst_frame_ns", text::time),
-    ("update", "update_ns", text::time),
-    ("further query", "further_query_ns", text::time),
-    ("x after 1", "ageing_1", text::significant),
-    ("x after 10", "ageing_10", text::significant),
-    ("x after 100", "ageing_100", text::significant),
-    ("x after 1000", "ageing_1000", text::significant),
+/// Figures of the queries or the motion of a path.
+const OF_PATH: [&str; 11] = [
+    "/ read",
+    "/ copy",
+    "locate",
+    "frame",
+    "worst",
+    "update",
+    "further query",
+    "x after 1",
+    "x after 10",
+    "x after 100",
+    "x after 1000",
 ];
 
-/// Those of a structure on a scene.
-const BUILDS: [Figure; 4] = [
-    ("build", "build_ms", |ms| text::time(ms * 1e6)),
-    ("update of 1 %", "update_ms", |ms| text::time(ms * 1e6)),
-    ("query after 32", "refitted_over_rebuilt", text::significant),
-    ("bytes per item", "memory_bytes_per_item", |b| {
-        format!("{b:.1}")
-    }),
-];
+/// Figures of a structure on a scene.
+const BUILDS: [&str; 4] = ["build", "update of 1 %", "query after 32", "bytes/item"];
 
 fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String> {
     let mut row = vec![
@@ -467,7 +451,7 @@ fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String
         let ratio = times_as_fast(peer, cell).filter(|_| is_sound);
         text::some(ratio, text::significant)
     }));
-    row.extend(FIGURES.map(|(_, metric, show)| text::some(cell.value(metric), show)));
+    row.extend(run_table::figures(cell, &OF_PATH));
     row.push(cell.status.name().to_owned());
     row
 }

@@ -342,6 +342,17 @@ impl Run {
     }
 }
 
+/// Options that decide how files are read.
+const READS: [&str; 7] = [
+    "--up",
+    "--skip-bad-items",
+    "--matrix-convention",
+    "--fovy",
+    "--aspect",
+    "--near",
+    "--far",
+];
+
 /// The command that a reader will want next, with what it gives if that fits into
 /// `width` characters; `None` where nothing is ranked.
 fn next(report: &Report, width: usize) -> Option<String> {
@@ -360,10 +371,19 @@ fn next(report: &Report, width: usize) -> Option<String> {
         .map(|path| format!("--path {path}"))
         .into_iter()
         .collect();
-    // How files are read.
     let typed: Vec<&str> = report.run.command.split(' ').collect();
-    let reads = |pair: &&[&str]| ["--matrix-convention", "--up"].contains(&pair[0]);
-    options.extend(typed.windows(2).filter(reads).map(|pair| pair.join(" ")));
+    for (n, word) in typed.iter().enumerate() {
+        let mut option = (*word).to_owned();
+        if !READS.contains(&word.split('=').next()?) {
+            continue;
+        }
+        if let Some(value) = typed.get(n + 1).filter(|next| !next.starts_with('-'))
+            && !word.contains('=')
+        {
+            option += &format!(" {value}");
+        }
+        options.push(option);
+    }
     for option in options.iter().filter(|_| report.run.suite.is_none()) {
         let last = line.rsplit('\n').next().unwrap_or_default();
         let is_within = last.chars().count() + option.chars().count() < width;

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::table::{Column, Table};
+use super::table::Table;
 use super::{inputs, run_verdict, surface_tables, text};
 use crate::measure::Status;
 use crate::report::{Comparison, Overall, Ranked, Report, ReportCell, comparisons, times_as_fast};
@@ -15,9 +15,13 @@ use crate::spec::parse_number;
 
 /// Shows the tables and conclusions of each cache state and culling test.
 pub fn show(report: &Report, all_columns: bool) -> io::Result<()> {
-    let all = comparisons(report);
-    let width = text::width();
     let mut out = text::terminal();
+    write(&mut out, report, all_columns, text::width())?;
+    out.flush()
+}
+
+fn write(out: &mut impl Write, report: &Report, all_columns: bool, width: usize) -> io::Result<()> {
+    let all = comparisons(report);
     for group in groups(&all) {
         let overall = Overall::of(&group);
         writeln!(out)?;
@@ -38,8 +42,7 @@ pub fn show(report: &Report, all_columns: bool) -> io::Result<()> {
             writeln!(out, "{}", text::wrapped(&line, width))?;
         }
     }
-    surface_tables::show(&mut out, report, width)?;
-    out.flush()
+    surface_tables::show(out, report, width)
 }
 
 /// Comparisons of one cache state and culling test each.
@@ -135,123 +138,110 @@ fn share(share: f64) -> String {
     }
 }
 
-/// A row of the table of one scene and path.
-struct Row<'r> {
-    name: String,
-    cell: &'r ReportCell,
-    base: Option<&'r ReportCell>,
+/// A column of single figures: head, metric and form.
+pub type Figure = (&'static str, &'static str, fn(f64) -> String);
+
+/// All of them, by their names for [`figures`].
+pub const FIGURES: [Figure; 20] = [
+    ("build", "build_ms", |ms| text::time(ms * 1e6)),
+    ("bytes/item", "memory_bytes_per_item", |b| format!("{b:.1}")),
+    ("p95", "query_ns_p95", text::time),
+    ("/ read", "times_read", text::significant),
+    ("/ copy", "times_memcpy", text::significant),
+    ("/ replay", "times_replay", text::significant),
+    ("locate", "locate_ns", text::time),
+    ("update of 1 %", "update_ms", |ms| text::time(ms * 1e6)),
+    ("query after 32", "refitted_over_rebuilt", text::significant),
+    ("repaid after", "break_even_queries", |n| {
+        text::count(n as usize)
+    }),
+    ("query", "query_ns", text::time),
+    ("frame", "frame_ns", text::time),
+    ("worst", "worst_frame_ns", text::time),
+    ("update", "update_ns", text::time),
+    ("further query", "further_query_ns", text::time),
+    ("false positives", "excess", text::percent),
+    ("x after 1", "ageing_1", text::significant),
+    ("x after 10", "ageing_10", text::significant),
+    ("x after 100", "ageing_100", text::significant),
+    ("x after 1000", "ageing_1000", text::significant),
+];
+
+/// The figures of a cell, by the names of their columns.
+pub fn figures(cell: &ReportCell, names: &[&str]) -> Vec<String> {
+    let row = |name: &&str| FIGURES.iter().find(|figure| figure.0 == *name);
+    let shown = |(_, metric, show): &Figure| text::some(cell.value(metric), show);
+    names
+        .iter()
+        .map(|name| text::some(row(name), shown))
+        .collect()
 }
 
-/// Columns by priority: what does not fit is left to `--all-columns`, and so is all
-/// that stands behind the first ones ([`SHOWN`]).
-fn columns<'r>() -> [Column<Row<'r>>; 14] {
-    [
-        ("structure", |row| row.name.clone()),
-        (">time per query", |row| match row.cell.time() {
-            None => row.cell.status.name().to_owned(),
-            Some(time) => text::time_with(time),
-        }),
-        (">vs", |row| {
-            let ratio = row.base.and_then(|base| times_as_fast(base, row.cell));
-            let ratio = ratio.filter(|_| matches!(row.cell.status, Status::Ok));
-            text::some(ratio, |ratio| format!("{} x", text::significant(ratio)))
-        }),
-        (">build", |row| {
-            of(row, "build_ms", |ms| text::time(ms * 1e6))
-        }),
-        (">bytes/item", |row| {
-            of(row, "memory_bytes_per_item", |bytes| format!("{bytes:.1}"))
-        }),
-        (">p95", |row| of(row, "query_ns_p95", text::time)),
-        (">speed-up [95 %]", |row| {
-            text::some(row.cell.metrics.get("speedup"), |found| {
-                text::within(found.estimate())
-            })
-        }),
-        (">/ read", |row| of(row, "times_read", text::significant)),
-        (">/ copy", |row| of(row, "times_memcpy", text::significant)),
-        (">/ replay", |row| {
-            of(row, "times_replay", text::significant)
-        }),
-        (">locate", |row| of(row, "locate_ns", text::time)),
-        (">update of 1 %", |row| {
-            of(row, "update_ms", |ms| text::time(ms * 1e6))
-        }),
-        (">query after 32", |row| {
-            of(row, "refitted_over_rebuilt", |ratio| {
-                format!("x {}", text::significant(ratio))
-            })
-        }),
-        (">repaid after", |row| {
-            of(row, "break_even_queries", |queries| {
-                text::count(queries as usize)
-            })
-        }),
-    ]
-}
+/// Figures of queries by priority.
+///
+/// All but the first two, and those that do not fit, are left to `--all-columns`.
+const OF_QUERIES: &[&str] = &[
+    "build",
+    "bytes/item",
+    "p95",
+    "/ read",
+    "/ copy",
+    "/ replay",
+    "locate",
+    "update of 1 %",
+    "query after 32",
+    "repaid after",
+];
 
-/// Columns of a motion, likewise.
-fn frame_columns<'r>() -> [Column<Row<'r>>; 14] {
-    let [structure, _, versus, build, bytes, _, speedup, ..] = columns();
-    [
-        structure,
-        (">time per frame", columns()[1].1),
-        versus,
-        (">worst", |row| of(row, "worst_frame_ns", text::time)),
-        (">update", |row| of(row, "update_ns", text::time)),
-        (">query", |row| of(row, "query_ns", text::time)),
-        (">x after 100", |row| {
-            of(row, "ageing_100", text::significant)
-        }),
-        (">false positives", |row| of(row, "excess", text::percent)),
-        (">further query", |row| {
-            of(row, "further_query_ns", text::time)
-        }),
-        (">x after 10", |row| of(row, "ageing_10", text::significant)),
-        (">x after 1000", |row| {
-            of(row, "ageing_1000", text::significant)
-        }),
-        speedup,
-        build,
-        bytes,
-    ]
-}
-
-/// Number of columns shown by default, and of a motion.
-const SHOWN: [usize; 2] = [5, 8];
-
-fn of(row: &Row, metric: &str, show: fn(f64) -> String) -> String {
-    text::some(row.cell.value(metric), show)
-}
+/// Figures of a motion, likewise but for the first five.
+const OF_FRAMES: &[&str] = &[
+    "worst",
+    "update",
+    "query",
+    "x after 100",
+    "false positives",
+    "further query",
+    "x after 10",
+    "x after 1000",
+    "build",
+    "bytes/item",
+];
 
 /// Head and table of one scene and path.
 fn of_one(comparison: &Comparison, base: Option<&str>, all: bool, width: usize) -> String {
     let base = base.and_then(|base| comparison.sound_cell(base));
-    let row = |rank: &str, cell| Row {
-        name: format!("{rank:>2} {}", shortened(&cell_name(cell), width / 2)),
-        cell,
-        base,
+    let (time, names, shown) = match comparison.about().path.motion.is_empty() {
+        true => ("time per query", OF_QUERIES, 2),
+        false => ("time per frame", OF_FRAMES, 5),
     };
-    let ranked = comparison
-        .ranked
-        .iter()
-        .map(|Ranked { rank, cell }| match rank {
-            Some(rank) => row(&rank.to_string(), cell),
-            None => row("-", cell),
-        });
-    let bounds = comparison
-        .bounds
-        .iter()
-        .filter(|_| all)
-        .map(|cell| row("", cell));
-    let (queries, frames) = (columns(), frame_columns());
-    let (columns, shown) = match comparison.about().path.motion.is_empty() {
-        true => (&queries[..], SHOWN[0]),
-        false => (&frames[..], SHOWN[1]),
+    let names = if all { names } else { &names[..shown] };
+    let of_base = text::some(base, |base| format!("vs {}", cell_name(base)));
+    let head = ["structure", time, &of_base].into_iter();
+    let head = head.chain(names.iter().copied()).chain(["speed-up [95 %]"]);
+    let mut table = Table::of_numbers(head);
+    let mut add = |rank: String, cell: &ReportCell| {
+        let time = match cell.time() {
+            None => cell.status.name().to_owned(),
+            Some(time) => text::time_with(time),
+        };
+        let ratio = base.and_then(|base| times_as_fast(base, cell));
+        let ratio = ratio.filter(|_| cell.status == Status::Ok);
+        let row = [
+            format!("{rank:>2} {}", shortened(&cell_name(cell), width / 2)),
+            time,
+            text::some(ratio, |ratio| format!("{} x", text::significant(ratio))),
+        ];
+        let speedup = cell.metrics.get("speedup").filter(|_| all);
+        let row = row.into_iter().chain(figures(cell, names));
+        let speedup = text::some(speedup, |found| text::within(found.estimate()));
+        table.add_row(row.chain([speedup]));
     };
-    let columns = if all { columns } else { &columns[..shown] };
-    let mut table = Table::with(ranked.chain(bounds), columns);
-    table.header[2] = text::some(base, |base| format!("vs {}", cell_name(base)));
+    for Ranked { rank, cell } in &comparison.ranked {
+        add(rank.map_or("-".to_owned(), |rank| rank.to_string()), cell);
+    }
+    for cell in comparison.bounds.iter().filter(|_| all) {
+        add(String::new(), cell);
+    }
     let mut lines = heads(comparison);
     if all {
         lines.push(text::basis(comparison));
@@ -419,4 +409,25 @@ pub fn show_written(out: &mut impl Write, folder: &Path) -> io::Result<()> {
         out,
         "        report.json, summary.csv, samples.csv, stream.jsonl"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::read_report;
+
+    #[test]
+    fn the_quick_suite_fits_sixty_lines() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/results/reference/report.json");
+        let mut told = Vec::new();
+        let report = read_report(file.as_ref()).unwrap();
+        write(&mut told, &report, false, 80).unwrap();
+        let told = String::from_utf8(told).unwrap();
+        // Basis, warnings, files and the next command are below.
+        assert!((20..=48).contains(&told.lines().count()), "{told}");
+        assert!(
+            told.lines().all(|line| line.chars().count() <= 80),
+            "{told}"
+        );
+    }
 }

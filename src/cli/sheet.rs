@@ -102,7 +102,7 @@ impl Sheet {
     pub fn finished(
         &self,
         caption: &str,
-        [across, along]: [&str; 2],
+        [across, along, unit]: [&str; 3],
         body: &str,
         legend: &[(String, String)],
         notes: &[String],
@@ -141,7 +141,7 @@ impl Sheet {
         }
         let _ = writeln!(
             svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{across}, in units of the scene</text>\n\
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{across}, in {unit}</text>\n\
              <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{along}</text>",
             LEFT + w / 2.0,
             bottom + 36.0,

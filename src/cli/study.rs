@@ -2,18 +2,19 @@
 //! `funnel`, `precision`): their inputs, their progress bar, and how the times of all
 //! processes come together.
 
-use std::fmt::Write;
+use std::io::{self, Write as _};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
+use serde_json::json;
 
 use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
-use super::shared_args::{SpreadArgs, StudyArgs};
-use super::{interrupt, load_scene_by, tell, text};
+use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
+use super::{Ending, interrupt, load_scene_by, print, tell, text};
 use crate::index::{Registry, StructureSpec};
 use crate::input::tell_warnings;
-use crate::measure::{ProcessTimes, Protocol};
+use crate::measure::{NO_ITEMS, ProcessTimes, Protocol, Status};
 use crate::path::{self, CameraPath};
 use crate::scene::{self, LoadOptions, Scene};
 
@@ -22,7 +23,7 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
     // Drawn on stderr, and only if that is a terminal.
     let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}{{left}}  {{wide_msg}}");
     let style = ProgressStyle::with_template(&template);
-    let left = |state: &ProgressState, out: &mut dyn Write| {
+    let left = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
         // Before the first part is done nothing is known.
         if state.pos() > 0 {
             let _ = write!(out, ", {:#} left", HumanDuration(state.eta()));
@@ -60,11 +61,9 @@ impl Setting {
             None => load_scene_by(&args.scene, &held(structures.len()))?,
             Some(_) => scene::load(&args.scene, &args.scene_args.options(0))?,
         };
-        anyhow::ensure!(
-            !scene.items.is_empty(),
-            "scene '{}' has no items; expected at least one",
-            scene.name
-        );
+        if scene.items.is_empty() {
+            return Err(LeftOut(scene.name).into());
+        }
         let lens_scale = timing.and_then(|timing| timing.lens_scale);
         let process = timing.map_or(0, |timing| timing.process);
         Ok(Setting {
@@ -74,6 +73,25 @@ impl Setting {
             scene,
         })
     }
+}
+
+/// A scene without items, which is no failure: a run leaves it out too.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}: left out: {NO_ITEMS}")]
+pub struct LeftOut(String);
+
+/// The ending of a study; prints why nothing was measured.
+pub fn or_left_out(format: TableFormat, ended: anyhow::Result<Ending>) -> anyhow::Result<Ending> {
+    let error = match ended {
+        Err(error) => error,
+        ended => return ended,
+    };
+    let left_out = error.downcast::<LeftOut>()?;
+    let LeftOut(scene) = &left_out;
+    let document = json!({ "scene": scene, "status": Status::LeftOut, "reason": NO_ITEMS });
+    let line = text::plain(&left_out.to_string());
+    print(format, &document, || writeln!(io::stdout(), "{line}"))?;
+    Ok(Ending::Ok)
 }
 
 /// Remaining time that is worth a line where there is no progress bar.

@@ -5,7 +5,7 @@ use std::iter::repeat;
 
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
-pub use crate::shown::{count, counted, lines, message, plain};
+pub use crate::shown::{count, counted, lines, message, plain, significant, time, unit};
 use crate::statistics::{Estimate, Rate};
 
 /// A figure as text; nothing if there is none.
@@ -44,35 +44,6 @@ pub fn conclusion(report: &Report) -> String {
         all => format!("; A/A check: {hold} of {all} intervals contain 1"),
     };
     format!("95 % intervals over {over}{few}{check}")
-}
-
-/// Nanoseconds with three significant digits and a fitting unit.
-pub fn time(ns: f64) -> String {
-    let (size, name) = unit(ns);
-    format!("{} {name}", significant(ns / size))
-}
-
-/// The unit that fits a time, in ns.
-fn unit(ns: f64) -> (f64, &'static str) {
-    match ns {
-        n if n < 1e3 => (1.0, "ns"),
-        n if n < 1e6 => (1e3, "us"),
-        n if n < 1e9 => (1e6, "ms"),
-        _ => (1e9, "s"),
-    }
-}
-
-/// Three significant digits: 0.0123, 1.23, 12.3, 123, 12345; an exponent only
-/// where the number would be longer than anything measured.
-pub fn significant(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return value.to_string();
-    }
-    if !(1e-9..1e15).contains(&value.abs()) {
-        return format!("{value:.2e}");
-    }
-    let digits = 2 - value.abs().log10().floor() as i32;
-    format!("{value:.*}", digits.clamp(0, 12) as usize)
 }
 
 /// Three significant digits without zeros at the end: 12.5, 9, 0.05.

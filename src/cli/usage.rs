@@ -5,7 +5,7 @@ use std::error::Error;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-use crate::spec::SpecError;
+use crate::spec::{SpecError, nearest};
 
 /// Message of one of our own parsers about a value.
 fn value(error: &clap::Error) -> Option<String> {
@@ -49,7 +49,11 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
         let similar = tip.filter(|tip| tip.contains("similar"));
         let values = line.strip_prefix("[possible values: ");
         if let Some((_, names)) = similar.and_then(|tip| tip.split_once(": ")) {
-            expected.get_or_insert(format!("; did you mean {names}?"));
+            // Those of clap need not be alike.
+            let word = found.split('\'').nth(1).unwrap_or_default();
+            if let Some(name) = nearest(word, names.split('\'').skip(1).step_by(2)) {
+                expected.get_or_insert(format!("; did you mean '{name}'?"));
+            }
         } else if let Some(tip) = tip {
             expected.get_or_insert(format!("; {tip}"));
         } else if let Some(values) = values {

@@ -8,42 +8,50 @@ use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::report::{FunnelReport, Gain, StageRow};
 use super::stage::StageKind;
-use crate::shown::counted;
+use crate::shown::{counted, significant, time};
 
-/// A sentence for each stage of the chain, and for each back end that lost items.
+/// Remaining items and the worth of each stage in a paragraph, then sentences.
+///
+/// The sentences are on back ends that lost items, the stencil, a mirror and orders.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
-    let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
+    let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
+    let last = report.stages.iter().find(is_last).map(|last| {
+        format!(
+            "Of {} {} remain to be drawn and {} are in front at some sample, per view.",
+            counted(report.items, "item"),
+            significant(last.errors.output_count),
+            significant(last.errors.truth_count)
+        )
+    });
+    let gains = report.gains.iter().filter_map(of_gain);
+    let told: Vec<String> = last.into_iter().chain(gains).collect();
+    let mut sentences = vec![told.join(" ")];
     sentences.extend(report.stages.iter().filter_map(StageRow::loss));
     sentences.extend(of_stencil(report));
     sentences.extend(report.mirror.as_ref().map(MirrorRow::sentence));
     sentences.extend(report.orders.iter().flat_map(of_order));
-    let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
-    sentences.extend(report.stages.iter().find(is_last).map(|last| {
-        format!(
-            "Of {} items, {:.1} remain and {:.1} are in front at some sample, per view.",
-            report.items, last.errors.output_count, last.errors.truth_count
-        )
-    }));
     sentences
 }
 
-fn of_gain(gain: &Gain) -> String {
+/// A sentence on a stage.
+///
+/// None on the depth test, which costs a GPU next to nothing.
+fn of_gain(gain: &Gain) -> Option<String> {
     let what = format!("{} ({})", gain.stage.name(), gain.back_end);
-    let (removed, unit) = (gain.removed(), gain.unit);
-    if removed <= 0.0 {
-        return format!("{what} removes nothing that the other stages leave: skip it.");
-    }
-    match gain.break_even.map(|ns| ns.value) {
-        Some(0.0) => format!("{what} removes {removed:.1} {unit} per view and saves time as well."),
-        Some(ns) => format!(
-            "{what} removes {removed:.1} {unit} per view and pays off if {} one of them takes \
-             more than {ns:.1} ns.",
-            match gain.stage {
-                StageKind::Fragment => "shading",
-                _ => "drawing",
-            }
-        ),
-        None => format!("{what} removes {removed:.1} {unit} per view."),
+    let unit = gain.unit.trim_end_matches('s');
+    let ns = gain.break_even;
+    match (ns.map(|ns| ns.value), ns.and_then(|ns| ns.lower)) {
+        _ if gain.stage == StageKind::Fragment => None,
+        (None, _) if gain.removed() <= 0.0 => Some(format!(
+            "{what} is not needed: it removes nothing that the other stages leave."
+        )),
+        (None, _) => None,
+        (Some(0.0), _) => Some(format!("Use {what}: it saves time as well.")),
+        (_, Some(0.0)) => Some(format!("Use {what}: it takes no more time than it saves.")),
+        (Some(ns), _) => Some(format!(
+            "Use {what} if drawing one {unit} takes more than {}.",
+            time(ns)
+        )),
     }
 }
 

@@ -64,6 +64,8 @@ pub struct FunnelReport {
     pub gains: Vec<Gain>,
     /// Conclusions, a sentence each.
     pub conclusions: Vec<String>,
+    /// Warnings about the cameras in the scene.
+    pub warnings: Vec<String>,
     /// The first view from above.
     #[serde(skip)]
     pub plan_view: PlanView,

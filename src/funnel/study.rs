@@ -261,6 +261,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, Fu
         left_out,
         bounds: bounds.iter().map(|bound| bound.row.clone()).collect(),
         conclusions: Vec::new(),
+        warnings: input.path.warnings(input.scene),
         plan_view: PlanView::of(&world, &study.items, input.chain, &truth),
     };
     let mut tasks = study.tasks();

@@ -89,6 +89,8 @@ pub struct StageSweep {
     pub processes: usize,
     /// In the order of the table of back ends, small buffers first.
     pub points: Vec<SweepPoint>,
+    /// Warnings about the cameras in the scene.
+    pub warnings: Vec<String>,
 }
 
 /// A compared sweep before its times.
@@ -209,6 +211,7 @@ pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSw
             rays_per_view: rays,
             processes: 0,
             points,
+            warnings: input.path.warnings(input.scene),
         },
     })
 }

@@ -20,6 +20,8 @@ use crate::statistics::{interquartile_mean, median};
 
 /// Most verdicts of the oracle per group; one takes about 50 ns.
 const MOST_JUDGED: usize = 400_000;
+/// Reason of what is left out of a scene without items.
+pub const NO_ITEMS: &str = "the scene has no items: there is nothing to time";
 /// Fewest groups of cameras for quantiles of the query time.
 pub(super) const LEAST_TAIL: usize = 20;
 
@@ -265,10 +267,7 @@ fn count<'a>(
     // All right answers are the same set, and so are its errors.
     let of_all = match &judged.errors {
         // Among no items nothing is found faster.
-        _ if workload.scene.items.is_empty() => {
-            let reason = "the scene has no items: there is nothing to time";
-            Some(Verdict::new(Status::LeftOut, reason))
-        }
+        _ if workload.scene.items.is_empty() => Some(Verdict::new(Status::LeftOut, NO_ITEMS)),
         errors if errors.false_negatives > 0 => {
             let reason = format!(
                 "{} of {} visible items are missed at camera level, the deepest by {:e}",

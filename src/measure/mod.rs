@@ -74,7 +74,7 @@ pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
     Effort, ExperimentError, Extras, Plan, PlannedScene, SceneGroup, Share, measure_scene,
 };
-pub use group::{GroupPlan, measure_part};
+pub use group::{GroupPlan, NO_ITEMS, measure_part};
 pub use guarded::guarded;
 pub use index_under_test::{Built, Subject};
 pub use key::{CellKey, GroupKey, TaskKey, TaskKind};

@@ -14,6 +14,8 @@ use crate::statistics::{Judgement, judge_unpaired, median, trimmed_mean};
 /// Fewer other structures cannot tell which of them moved: the median of three
 /// stays where it is when one of them moves, that of two does not.
 const LEAST_OTHERS: usize = 3;
+/// Reason of a cell that has fewer others.
+pub const FEW_OTHERS: &str = "under three other structures in both reports to compare with";
 /// Fewer processes have no interval.
 const LEAST_PROCESSES: usize = 3;
 
@@ -249,8 +251,7 @@ fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
     if processes[0].min(processes[1]) < LEAST_PROCESSES {
         return Some("under three processes on a side".to_owned());
     }
-    let reason = "under three other structures in both reports to compare with";
-    (!has_others).then(|| reason.to_owned())
+    (!has_others).then(|| FEW_OTHERS.to_owned())
 }
 
 /// Per process, the mean over the groups of the median over the structures, by

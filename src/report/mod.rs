@@ -21,7 +21,7 @@ mod views;
 mod writing;
 
 pub use crate::measure::{ReportCell, SamplesRef};
-pub use changes::changes;
+pub use changes::{FEW_OTHERS, changes};
 pub use experiment::Experiment;
 pub use files::{FolderError, bare};
 pub use folder::{RunFolder, StoppedRun, save_page, save_report};

@@ -227,6 +227,10 @@ fn one_process_and_few_structures_are_inconclusive() {
     );
     let why = unwrapped(&text);
     assert!(why.contains("under three other structures"), "{text}");
+    assert!(
+        why.contains("the same four structures or more would decide"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -427,9 +427,6 @@ fn what_cannot_be_is_refused_in_a_line() {
         let done = cullbench(folder.path(), &format!("{LINE} {more}"));
         assert_refused(&done, wanted, more);
     }
-    fs::write(folder.path().join("empty.csv"), format!("{BOXES}\n")).expect("written");
-    let line = LINE.replace("scene.csv", "empty.csv");
-    assert_refused(&cullbench(folder.path(), &line), "no items", "no items");
     assert_refused(
         &cullbench(folder.path(), "funnel --scene freedm-map12 --cut-out fence"),
         "freedm-map12 | walls | solid boxes | --cut-out",

@@ -36,7 +36,8 @@ fn work_beyond_the_threshold_is_a_regression() {
     for absent in ["slower", "NEW takes", "different machines", "processes"] {
         assert!(!text.contains(absent), "'{absent}' in:\n{text}");
     }
-    compare(more.path(), "--gate work --threshold 11%", 0);
+    let text = compare(more.path(), "--gate work --threshold 11%", 0);
+    assert!(!text.contains("work changed"), "{text}");
     compare(more.path(), "--gate work --threshold 0", 3);
     let done = json(&compare(more.path(), "--gate work --format json", 3));
     assert_eq!(done["verdict"], "regression");
@@ -213,6 +214,11 @@ fn two_programs_are_compared_by_their_counters_alone() {
     let verdict = "0 more work, 0 less work, 6 same of 6 figures of 2 cells";
     assert_eq!(last_line(&text), verdict, "{text}");
     assert!(text.contains("nodes, items and planes tested per query, threshold 0.00 %"));
+    assert!(!text.contains("not compared"), "{text}");
+    let line = line.replace(" --structure linear,bvh", "");
+    let text = works(folder.path(), &format!("{line} {}", super::PROGRAM));
+    let told = "note: not compared by default: linear-scalar, uniform-grid (--structure default";
+    assert!(text.contains(told), "{text}");
 }
 
 #[test]

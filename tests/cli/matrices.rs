@@ -128,10 +128,10 @@ fn every_command_takes_matrices() {
     let on = "--scene boxes.csv --path m.csv --matrix-convention column-d3d";
     let run = works(
         folder.path(),
-        &format!("run {on} --structure linear,bvh --processes 2 --out run"),
+        &format!("run {on} --up=z --structure linear,bvh --processes 2 --out run"),
     );
     assert!(run.contains("0 wrong"), "{run}");
-    let next = "advise --scene boxes.csv --path m.csv --matrix-convention column-d3d";
+    let next = "advise --scene boxes.csv --path m.csv --matrix-convention column-d3d --up=z";
     let joined = run.replace(" \\\n       ", "");
     assert!(joined.contains(next), "{run}");
     let verified = works(
@@ -217,7 +217,7 @@ fn matrices_that_are_no_cameras_are_refused_in_one_line() {
     all_refused(
         &folder,
         &[planes],
-        "m.csv, line 2: | planes of its own | expected --planes frame",
+        "m.csv, line 2: | own rows are its planes | expected --planes frame, which takes these, or",
     );
 }
 

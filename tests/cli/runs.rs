@@ -277,12 +277,19 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
         &["compare none none"],
         "nothing can be judged: of 2 cells in common",
     );
-    let precision = "precision --scene none.csv --path outside:frames=1";
-    all_refused(
-        &folder,
-        &[precision],
-        "none.csv | no items | expected at least one",
-    );
+    for study in [
+        "precision",
+        "precision --stage triangle",
+        "advise",
+        "funnel",
+    ] {
+        let line = format!("{study} --scene none.csv --path outside:frames=1");
+        let told = works(folder.path(), &line);
+        let left_out = "none.csv: left out: the scene has no items: there is nothing to time\n";
+        assert_eq!(told, left_out, "{study}");
+        let document = json(&works(folder.path(), &format!("{line} --format json")));
+        assert_eq!(document["status"], "left_out", "{study}");
+    }
     let table = works(
         folder.path(),
         &format!("run --scene one.csv --structure linear {run} one"),
