@@ -2,7 +2,7 @@
 //! items. It defines the block kernels; each lane computes exactly what
 //! [`Plane::excludes`] computes for one box.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::aabb::held;
 use super::{Aabb, BoxCorner, Plane, PlaneF64, SphereMargin};
@@ -52,8 +52,8 @@ impl BoxBlock {
 
     /// The union of the boxes; empty ones ([`Aabb::EMPTY`]) add nothing.
     pub fn union(&self) -> Aabb {
-        let low = |k: usize| by_halves(&self.rows[k], |a, b| if a < b { a } else { b });
-        let high = |k: usize| by_halves(&self.rows[k], |a, b| if a > b { a } else { b });
+        let low = |k: usize| halved(&self.rows[k], Vec4::min).min_element();
+        let high = |k: usize| halved(&self.rows[k], Vec4::max).max_element();
         Aabb::new(
             Vec3::new(low(0), low(1), low(2)),
             Vec3::new(high(3), high(4), high(5)),
@@ -72,7 +72,7 @@ impl BoxBlock {
                 away[lane] += larger(beyond, 0.0);
             }
         }
-        let least = by_halves(&away, |a, b| if a < b { a } else { b });
+        let least = halved(&away, Vec4::min).min_element();
         let mut nearest = [0; LANES];
         for lane in 0..LANES {
             nearest[lane] = if away[lane] == least {
@@ -228,14 +228,13 @@ impl BoxBlock {
     }
 }
 
-/// One of the lanes by comparing halves: vectors of 8 and 4, then single lanes.
+/// The least or the greatest of every fourth lane.
 ///
 /// Lane after lane would be a chain of fifteen comparisons.
 #[inline(always)]
-fn by_halves(row: &[f32; LANES], either: impl Fn(f32, f32) -> f32) -> f32 {
-    let eight: [f32; 8] = std::array::from_fn(|i| either(row[i], row[i + 8]));
-    let four: [f32; 4] = std::array::from_fn(|i| either(eight[i], eight[i + 4]));
-    either(either(four[0], four[2]), either(four[1], four[3]))
+fn halved(row: &[f32; LANES], either: impl Fn(Vec4, Vec4) -> Vec4) -> Vec4 {
+    let four = |i: usize| Vec4::new(row[i], row[i + 1], row[i + 2], row[i + 3]);
+    either(either(four(0), four(4)), either(four(8), four(12)))
 }
 
 /// The bit of each lane, as wide as a float: a comparison then selects among

@@ -247,10 +247,14 @@ impl Moving {
             }
             leaf = self.leaves[leaf].before as usize;
         }
+        let is_worth = |resting: usize| resting > 0 && resting >= movers.min(WORTH_REBUILD);
+        if !is_worth(resting.len()) {
+            return false;
+        }
         let here = self.still.ids.get(places.clone()).unwrap_or_default();
         let mut ids: Vec<ItemId> = here.iter().copied().filter(|&id| id != ABSENT).collect();
         resting.truncate(here.len() - ids.len());
-        if resting.is_empty() || resting.len() < movers.min(WORTH_REBUILD) {
+        if !is_worth(resting.len()) {
             return false;
         }
         for &id in &resting {
