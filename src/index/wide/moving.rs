@@ -220,10 +220,10 @@ impl Moving {
     }
 
     /// Returns resting movers to the still tree, in a few regions: a rebuilt one for
-    /// every 128 moved items, so that it costs no more than they do.
+    /// every 512 moved items, so that it costs less than they do.
     fn settle(&mut self, items: &[Aabb], moved: usize) {
-        let mut rebuilds = moved / 128 + 1;
-        for _ in 0..(moved / 16 + 16).min(self.regions.len()) {
+        let mut rebuilds = moved / 512 + 1;
+        for _ in 0..(moved / 64 + 16).min(self.regions.len()) {
             let region = self.next;
             self.next = (region + 1) % self.regions.len();
             rebuilds -= usize::from(self.rebuild(region, items));
