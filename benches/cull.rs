@@ -127,8 +127,8 @@ fn update(c: &mut Criterion) {
     group.finish();
 }
 
-/// Queries of the whole path after updates, each of which swaps 1 % of the items with
-/// others: what moves jumps, and the scene as a whole stays the same.
+/// Queries of the whole path after updates, each of which swaps items, 1 % of all:
+/// they jump, and the scene as a whole stays the same.
 fn aged(c: &mut Criterion) {
     let mut group = c.benchmark_group("aged");
     group.sample_size(10);
