@@ -1,6 +1,7 @@
 //! Distribution of work over threads, and the limit of their number.
 //!
-//! Measured work runs on one thread. Callers define jobs and the order of results.
+//! Builds share work among threads that they start; queries among [`Workers`], which stay.
+//! Callers define jobs and the order of results.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -70,6 +71,50 @@ pub fn share<J: Send>(
     });
 }
 
+/// Threads that stay between queries. The thread that shares work is one of them.
+pub struct Workers {
+    others: rayon::ThreadPool,
+    threads: usize,
+}
+
+impl Workers {
+    /// At least 1, at most [`MOST_THREADS`] threads.
+    ///
+    /// # Errors
+    /// The system gives no more threads.
+    pub fn new(threads: usize) -> Result<Workers, rayon::ThreadPoolBuildError> {
+        let threads = threads.clamp(1, MOST_THREADS);
+        let others = rayon::ThreadPoolBuilder::new().num_threads((threads - 1).max(1));
+        let others = others.build()?;
+        Ok(Workers { others, threads })
+    }
+
+    /// Number of threads.
+    pub fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// [`share`] among these threads, which start within microseconds.
+    ///
+    /// # Panics
+    /// If a job does.
+    pub fn share<J: Send>(&self, jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) {
+        let jobs = Mutex::new(jobs.fuse());
+        let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let work_off = || {
+            while let Some(job) = next() {
+                work(job);
+            }
+        };
+        self.others.in_place_scope(|scope| {
+            for _ in 1..self.threads {
+                scope.spawn(|_| work_off());
+            }
+            work_off();
+        });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,6 +127,9 @@ mod tests {
             let mut done = [0; 100];
             share(threads, done.iter_mut(), |job| *job += 1);
             assert_eq!(done, [1; 100], "{threads}");
+            let workers = Workers::new(threads.min(5)).unwrap();
+            workers.share(done.iter_mut(), |job| *job += 1);
+            assert_eq!(done, [2; 100], "{threads}");
         }
     }
 

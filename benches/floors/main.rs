@@ -125,6 +125,7 @@ fn harness_overhead(only_test: bool, turns: usize) -> u32 {
             })
             .collect();
         let tasks = [TimedTask {
+            all_threads: false,
             ask: Box::new(see),
             ask_many: None,
             expected,

@@ -37,9 +37,37 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     told.extend(base.and_then(fallback));
     told.extend(frames(comparison));
     told.extend(repaid(comparison));
+    told.extend(shared(comparison));
     told.extend(checked(&[comparison]));
     told.extend(failed(&[comparison]));
     told.join(" ")
+}
+
+/// Wall times where threads share a query, or the views of all cameras.
+fn shared(comparison: &Comparison) -> Option<String> {
+    let wall = |cell: &ReportCell, name: &str| cell.metrics.get(name).map(|m| m.value);
+    let told = comparison.sound().filter_map(|cell| {
+        let label = &cell.structure;
+        let own = label
+            .rsplit_once("threads=")
+            .map(|(alone, _)| &alone[..alone.len() - 1]);
+        let (what, shared) = match own {
+            Some(_) => ("", wall(cell, "query_wall_ns")?),
+            None => (" with shared views", wall(cell, "views_wall_ns")?),
+        };
+        let alone = own.map_or(Some(cell), |own| {
+            comparison.sound().find(|c| c.structure == own)
+        });
+        let gain = wall(alone?, "query_wall_ns")? / shared;
+        Some(format!(
+            "{label}{what} {} ({})",
+            text::time(shared),
+            times(gain)
+        ))
+    });
+    let told: Vec<String> = told.collect();
+    let ranked = "CPU time of all threads ranks; wall time per view, and one thread's / it:";
+    (!told.is_empty()).then(|| format!("{ranked} {}.", told.join(", ")))
 }
 
 fn ranking(comparison: &Comparison, base: Option<&str>) -> String {

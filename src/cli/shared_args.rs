@@ -95,9 +95,11 @@ pub struct KernelArgs {
     /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
     #[arg(long = "kernel", value_name = "NAME", value_parser = values::kernel)]
     pub name: Option<Kernel>,
-    /// Threads per build; query and locate divide cameras and points among them
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(1..=MOST_THREADS))]
-    pub threads: usize,
+    /// Threads per build; query and locate divide cameras and points among them. With a
+    /// list, such as 1,2,4, structures with the parameter 'threads' are entered for each
+    #[arg(long, value_name = "N,..", default_value = "1", value_delimiter = ',',
+        value_parser = values::whole(1..=MOST_THREADS))]
+    pub threads: Vec<usize>,
 }
 
 impl KernelArgs {
@@ -108,8 +110,28 @@ impl KernelArgs {
         list: &str,
     ) -> Result<Vec<StructureSpec>, SpecError> {
         let execution = self.execution()?;
-        let specs = registry.structures(list)?.into_iter();
-        Ok(specs.map(|spec| spec.by(execution)).collect())
+        let mut specs: Vec<StructureSpec> = Vec::new();
+        for spec in registry.structures(list)? {
+            let join = if spec.label.contains(':') { ',' } else { ':' };
+            let shared = self
+                .threads
+                .iter()
+                .filter(|n| **n > 1 && self.threads.len() > 1);
+            let labels = shared.map(|n| format!("{}{join}threads={n}", spec.label));
+            // A structure without the parameter is entered once.
+            let shared = labels.filter_map(|label| registry.structure(&label).ok());
+            for spec in [spec.clone()].into_iter().chain(shared) {
+                if specs.iter().all(|entered| entered.label != spec.label) {
+                    specs.push(spec);
+                }
+            }
+        }
+        Ok(specs.into_iter().map(|spec| spec.by(execution)).collect())
+    }
+
+    /// The largest number of threads.
+    pub fn most_threads(&self) -> usize {
+        self.threads.iter().copied().max().unwrap_or(1)
     }
 
     /// Fails if this machine lacks the instruction set.
@@ -121,7 +143,7 @@ impl KernelArgs {
         })?;
         Ok(Execution {
             kernel,
-            threads: self.threads,
+            threads: self.most_threads(),
         })
     }
 }

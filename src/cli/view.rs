@@ -73,7 +73,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         ask,
         &mut each,
     )?;
-    let threads = args.kernel.threads;
+    let threads = args.kernel.most_threads();
     let surfaces = args
         .samples
         .map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));

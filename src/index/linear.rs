@@ -3,15 +3,22 @@
 //! `linear-scalar` is the textbook loop. `linear` gives the same answer from blocks of
 //! sixteen boxes and is the reference of every speed-up.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
+
+use serde::{Deserialize, Serialize};
 
 use super::items::indexable;
 use super::padded_ids::PaddedIds;
 use super::positions::{ABSENT, Positions};
+use super::shared_query::{QueryInParts, QueryThreads, in_parts};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex};
 use crate::geometry::{Aabb, BallBlocks, Balls, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, first_lanes, pairs};
-use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests, UnpreparedPlanes};
+use crate::query::{
+    Context, ItemId, NoRecorder, Planes, QueryContext, QueryVolume, Recorder, Sink, Tests,
+    UnpreparedPlanes,
+};
+use crate::threads::Workers;
 
 /// The plain loop over an array of boxes, which ends the test of a box at the first
 /// plane that excludes it. O(n) per query.
@@ -67,6 +74,16 @@ pub struct Linear {
     positions: Positions,
     /// Spheres of the items, if they are [spheres](Input::spheres), until one moves.
     balls: Option<BallBlocks>,
+    workers: Option<Workers>,
+}
+
+/// Parameters: `linear:threads=2`.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LinearParams {
+    /// Threads per frustum query, which share the blocks.
+    #[serde(skip_serializing_if = "QueryThreads::is_one")]
+    pub threads: QueryThreads,
 }
 
 impl Linear {
@@ -84,10 +101,11 @@ impl Linear {
         }
     }
 
-    /// Tests every block against all planes; `open` is their number.
+    /// Tests a range of blocks against all planes; `open` is their number.
     #[inline(always)]
     fn scan_all<P: Planes<C::Isa>, C: Context>(
         &self,
+        range: Range<usize>,
         open: u32,
         planes: P,
         balls: Option<Balls<'_>>,
@@ -95,27 +113,60 @@ impl Linear {
     ) -> ControlFlow<()> {
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        let rows = self.ids.rows();
-        let mut items = self.ids.len();
-        for (i, blocks) in self.boxes.blocks().chunks(BLOCKS_PER_CALL).enumerate() {
-            let rows = &rows[i * BLOCKS_PER_CALL..][..blocks.len()];
+        for first in range.clone().step_by(BLOCKS_PER_CALL) {
+            let here = first..range.end.min(first + BLOCKS_PER_CALL);
             let balls = balls.map(|Balls { blocks, doubt }| Balls {
-                blocks: &blocks[i * BLOCKS_PER_CALL..],
+                blocks: &blocks[here.clone()],
                 doubt,
             });
             let tests = BlockTests {
-                blocks,
+                blocks: &self.boxes.blocks()[here.clone()],
                 planes,
                 balls,
-                items,
+                items: self.ids.len() - first * LANES,
                 open,
                 recorder: &mut *recorder,
                 four: [0; 4],
             };
-            sink.accept_tested(isa, rows, tests)?;
-            items -= items.min(BLOCKS_PER_CALL * LANES);
+            sink.accept_tested(isa, &self.ids.rows()[here], tests)?;
         }
         ControlFlow::Continue(())
+    }
+
+    /// Tests a range of blocks, on this thread.
+    #[inline(always)]
+    fn scan<Q: QueryVolume, C: Context>(
+        &self,
+        range: Range<usize>,
+        volume: &Q,
+        cx: &mut C,
+    ) -> ControlFlow<()> {
+        let open = Q::planes_open(volume.mask());
+        let balls = seen_by(&self.balls, volume);
+        if C::Isa::MANY_REGISTERS
+            && let Some(planes) = volume.all_planes(cx.isa())
+        {
+            return self.scan_all(range, open, planes, balls, cx);
+        }
+        self.scan_all(range, open, UnpreparedPlanes::all(volume), balls, cx)
+    }
+}
+
+/// A scan in parts of [`BLOCKS_PER_CALL`] blocks.
+struct SharedScan<'a, Q> {
+    scan: &'a Linear,
+    volume: &'a Q,
+}
+
+impl<I: Isa, Q: QueryVolume> QueryInParts<I> for SharedScan<'_, Q> {
+    #[inline(always)]
+    fn part(&self, isa: I, index: usize, ids: &mut Vec<ItemId>) {
+        let first = index * BLOCKS_PER_CALL;
+        let end = (first + BLOCKS_PER_CALL).min(self.scan.boxes.blocks().len());
+        let recorder = &mut NoRecorder;
+        let mut cx = QueryContext::new(isa, ids, recorder);
+        // A Vec never breaks off.
+        let _ = self.scan.scan(first..end, self.volume, &mut cx);
     }
 }
 
@@ -127,9 +178,9 @@ impl RegionIndex for Linear {
         Origin::Ours,
     )
     .refits();
-    type Params = NoParams;
+    type Params = LinearParams;
 
-    fn build(input: &Input<'_>, _: &NoParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &LinearParams) -> Result<Self, BuildError> {
         let items = input.items;
         let ids = indexable(items)?;
         let mut boxes = BoxBlocks::with_capacity(ids.len());
@@ -140,6 +191,7 @@ impl RegionIndex for Linear {
             boxes,
             ids: ids[..].into(),
             positions: Positions::default(),
+            workers: params.threads.workers(Self::INFO.name)?,
         })
     }
 
@@ -168,14 +220,15 @@ impl RegionIndex for Linear {
                 recorder,
             );
         }
-        let open = Q::planes_open(volume.mask());
-        let balls = seen_by(&self.balls, volume);
-        if C::Isa::MANY_REGISTERS
-            && let Some(planes) = volume.all_planes(cx.isa())
+        let blocks = self.boxes.blocks().len();
+        // What is counted is not shared: one recorder, one thread.
+        if size_of::<C::Recorder>() == 0
+            && let Some(workers) = &self.workers
         {
-            return self.scan_all(open, planes, balls, cx);
+            let work = SharedScan { scan: self, volume };
+            return in_parts(workers, blocks.div_ceil(BLOCKS_PER_CALL), &work, cx);
         }
-        self.scan_all(open, UnpreparedPlanes::all(volume), balls, cx)
+        self.scan(0..blocks, volume, cx)
     }
 
     /// O(moved): overwrites their lanes. Items may become or cease to be empty.
@@ -309,7 +362,7 @@ mod tests {
         ] {
             let low = (0..count).map(|i| Vec3::X * (i % 100) as f32);
             let items: Vec<Aabb> = low.map(|low| Aabb::new(low, low + Vec3::ONE)).collect();
-            let scan = Linear::build(&Input::new(&items), &NoParams::default()).unwrap();
+            let scan = Linear::build(&Input::new(&items), &LinearParams::default()).unwrap();
             for volume in &volumes {
                 let (found, cost) = scan.counted(volume);
                 let seen = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));

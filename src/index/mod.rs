@@ -14,6 +14,7 @@
 //! | `textbook/`, `peers/` | plain forms for comparison; structures of other crates |
 //! | `items`, `positions` | for builds: non-empty items; for refits: positions, changed nodes |
 //! | `frontier`, `padded_ids` | for queries of trees and blocks: open nodes; rows of ids |
+//! | `shared_query` | one query shared among threads |
 //! | `box_test`, `centre_bounds` | for the grid, textbook forms and peers: one box at a time |
 //!
 //! To add a structure, write a file beside this one and a row in [`Registry::builtin`], or
@@ -37,6 +38,7 @@ mod padded_ids;
 pub mod peers;
 mod positions;
 mod registry;
+mod shared_query;
 mod textbook;
 mod tree;
 mod update_policy;
@@ -58,8 +60,9 @@ pub use erased::{DynIndex, Execution, WithKernel};
 pub use grid::UniformGrid;
 pub use info::{Capabilities, Info, Kind, Origin};
 pub use items::{Record, indexable};
-pub use linear::{Linear, LinearScalar};
+pub use linear::{Linear, LinearParams, LinearScalar};
 pub use registry::{Registry, Row, StructureSpec};
+pub use shared_query::QueryThreads;
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
 pub use tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
 pub use update_policy::UpdatePolicy;

@@ -289,6 +289,11 @@ impl StructureSpec {
         StructureSpec { execution, ..self }
     }
 
+    /// Threads that share one query: the parameter `threads`, 1 without it.
+    pub fn query_threads(&self) -> usize {
+        self.params["threads"].as_u64().unwrap_or(1) as usize
+    }
+
     /// The structure's declaration.
     pub fn info(&self) -> &Info {
         &self.row.info
@@ -380,7 +385,7 @@ mod tests {
             ("bvh:preset=best", "preset=\"best\"; expected one of 'fast"),
             ("bvh,bvh", "named twice"),
             ("", "no structure"),
-            ("linear:leaf=3", "a field 'leaf'; expected none"),
+            ("linear-scalar:leaf=3", "a field 'leaf'; expected none"),
         ] {
             let error = Registry::builtin()
                 .structures(text)

@@ -17,7 +17,7 @@ pub fn first_lanes(count: usize) -> LaneMask {
 /// Every operation rounds once, to nearest, lane by lane; code written with these
 /// operations has bit-identical results on every instruction set. A value of such a type
 /// is the proof that the processor supports the instructions.
-pub trait Isa: Copy {
+pub trait Isa: Copy + Send + Sync {
     /// True if the registers hold the coefficients of six planes and a block.
     const MANY_REGISTERS: bool = false;
 

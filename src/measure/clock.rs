@@ -3,12 +3,12 @@
 
 use std::time::Instant;
 
-use cpu_time::ThreadTime;
+use cpu_time::{ProcessTime, ThreadTime};
 
 /// Time between two readings, in nanoseconds.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct Lap {
-    /// CPU time of this thread.
+    /// CPU time of this thread, or of all threads.
     pub cpu_ns: f64,
     /// Wall time, other programs included.
     pub wall_ns: f64,
@@ -18,6 +18,7 @@ pub struct Lap {
 /// that ranks.
 pub struct Stopwatch {
     wall: Instant,
+    process: Option<ProcessTime>,
     cpu: ThreadTime,
 }
 
@@ -25,9 +26,16 @@ impl Stopwatch {
     /// Starts both clocks.
     #[inline]
     pub fn start() -> Self {
+        Stopwatch::start_for(false)
+    }
+
+    /// Starts both clocks; the CPU clock of all threads for work that threads share.
+    #[inline]
+    pub fn start_for(all_threads: bool) -> Self {
         let wall = Instant::now();
         Stopwatch {
             wall,
+            process: all_threads.then(ProcessTime::now),
             cpu: ThreadTime::now(),
         }
     }
@@ -35,7 +43,10 @@ impl Stopwatch {
     /// The time since [`Stopwatch::start`].
     #[inline]
     pub fn lap(&self) -> Lap {
-        let cpu = self.cpu.elapsed();
+        let cpu = match &self.process {
+            Some(process) => process.elapsed(),
+            None => self.cpu.elapsed(),
+        };
         let wall = self.wall.elapsed();
         Lap {
             cpu_ns: cpu.as_nanos() as f64,

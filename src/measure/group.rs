@@ -125,8 +125,11 @@ pub fn measure_part(
             true => Vec::new(),
             false => timed(keyed.tasks(), &schedule, &plan.protocol, &turn)?,
         };
+        let alone = keyed.keys().iter().zip(&schedule.tasks);
+        let alone = alone.filter(|((_, kind), _)| *kind != TaskKind::Views);
+        let largest = alone.map(|(_, task)| task.batch).max().unwrap_or(1) as usize;
         for (key, result) in keyed.keys().iter().zip(timed) {
-            tasks.push(task_part(key, &result, &schedule));
+            tasks.push(task_part(key, &result, &schedule, largest));
             let mut own = entries.iter_mut().filter(|e| e.subject.label() == key.0);
             if let (Err(verdict), Some(entry)) = (&result, own.next()) {
                 entry.verdict = verdict.clone();
@@ -183,8 +186,12 @@ fn tasks_of<'a>(
                 continue;
             };
             let least_ns = entry.counted.as_ref().map(|c| c.least_ns(pass));
-            let label = &entry.subject.spec.label;
-            let task = TimedTask::of(kind, label, workload, built, answers, least_ns);
+            let spec = &entry.subject.spec;
+            // Views are shared where builds are, unless each is shared already.
+            if kind == TaskKind::Views && (spec.execution.threads < 2 || spec.query_threads() > 1) {
+                continue;
+            }
+            let task = TimedTask::of(kind, spec, workload, built, answers, least_ns);
             keyed.push((entry.subject.label(), kind), task);
         }
     }
@@ -215,11 +222,17 @@ fn add_bounds<'a>(
 }
 
 /// The times of a task, from its samples.
-fn task_part(key: &TaskKey, result: &Result<Timed, Verdict>, schedule: &Schedule) -> TaskPart {
+///
+/// `largest` is the largest batch of all tasks that do not share views.
+fn task_part(
+    key: &TaskKey,
+    result: &Result<Timed, Verdict>,
+    schedule: &Schedule,
+    largest: usize,
+) -> TaskPart {
     let nothing = Timed::default();
     let timed = result.as_ref().unwrap_or(&nothing);
     let wall = timed.round_means(|s| s.wall_ns).into_iter().map(f64::ln);
-    let largest = schedule.tasks.iter().map(|t| t.batch).max().unwrap_or(1) as usize;
     let has_tail =
         key.1 == TaskKind::Query && schedule.cameras.len().div_ceil(largest) >= LEAST_TAIL;
     TaskPart {

@@ -58,6 +58,8 @@ named! {
         Locate = "locate",
         /// Region search of all cameras of the path in one batch.
         LocateBatched = "locate_batched",
+        /// Frustum queries of all cameras, shared among threads.
+        Views = "views",
         /// Update of the index after the moves of a frame.
         Update = "update",
         /// Frustum query after the first one of a frame.
@@ -90,7 +92,7 @@ impl Pass {
     /// The tasks that this pass times in a still scene.
     pub(super) fn tasks(self) -> &'static [TaskKind] {
         match self {
-            Pass::Queries => &[TaskKind::Query],
+            Pass::Queries => &[TaskKind::Query, TaskKind::Views],
             Pass::Searches => &[TaskKind::Locate, TaskKind::LocateBatched],
         }
     }

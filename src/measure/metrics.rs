@@ -57,6 +57,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, summary }
     "locate_speedup", "1", "as speedup, for region search";
     "comparisons", "bounds", "bounds tested per region search, of nodes and items, mean";
     "regions_found", "regions", "regions that hold the eye, mean over the path";
+    "views_wall_ns", "ns", "wall time per view where threads share the views of all timed cameras (--threads above 1)";
     "frame_ns", "ns", "thread CPU time per frame of a motion, update and all queries, mean over the frames; as query_ns, which is then the first query after each update";
     "update_ns", "ns", "thread CPU time of the update of a frame, mean over the frames; as query_ns";
     "further_query_ns", "ns", "thread CPU time of a query after the first one of a frame; as query_ns";

@@ -276,7 +276,7 @@ pub(super) fn replay(
             return Ok(None);
         }
         outs.iter_mut().for_each(Vec::clear);
-        let watch = Stopwatch::start();
+        let watch = Stopwatch::start_for(moving.spec.query_threads() > 1);
         moving.update()?;
         let updated = watch.lap();
         let mut views = frames.views(frame).zip(&mut outs);

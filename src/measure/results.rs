@@ -410,8 +410,15 @@ impl<'p> MergedParts<'p> {
                 metrics.estimate(faster, speedup(reference, own));
             }
         }
-        let wall: Vec<f64> = self.queries(label).filter_map(|t| t.wall_ln_ns).collect();
-        metrics.estimate("query_wall_ns", one_run(&wall, &wall));
+        let walls = [
+            (TaskKind::Query, "query_wall_ns"),
+            (TaskKind::Views, "views_wall_ns"),
+        ];
+        for (task, name) in walls {
+            let wall = self.tasks(label, task).filter_map(|t| t.wall_ln_ns);
+            let wall: Vec<f64> = wall.collect();
+            metrics.estimate(name, one_run(&wall, &wall));
+        }
         let all = self.tail(label, TaskKind::Query);
         for (name, q) in TAIL_METRICS {
             let is_enough = all.len() >= LEAST_TAIL;

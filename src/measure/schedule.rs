@@ -231,6 +231,7 @@ mod tests {
                 while watch.lap().cpu_ns < ns as f64 {}
             }),
             ask_many: None,
+            all_threads: false,
             expected: vec![0; 40],
             least_ns: Some(1e5),
         };

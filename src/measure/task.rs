@@ -4,9 +4,12 @@
 //! with [`TimedTask::new`].
 
 use std::cell::{Cell, RefCell};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use super::{Answer, Built, TaskKind, Workload};
+use crate::index::StructureSpec;
 use crate::query::{ItemId, Located};
+use crate::threads::Workers;
 
 /// Answers the query of the camera with this index: appends ids to an empty output.
 pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
@@ -20,6 +23,8 @@ pub struct TimedTask<'a> {
     pub ask: Ask<'a>,
     /// Answers all queries of a pass in one batch; used instead of `ask` if present.
     pub ask_many: Option<AskMany<'a>>,
+    /// True if threads share a query: the CPU time of all threads counts.
+    pub all_threads: bool,
     /// Number of ids that each query must return.
     pub expected: Vec<u64>,
     /// Lower bound of the time of a query, ns; `None` where nothing was counted.
@@ -34,6 +39,7 @@ impl<'a> TimedTask<'a> {
         TimedTask {
             ask: Box::new(ask),
             ask_many: None,
+            all_threads: false,
             expected,
             least_ns: None,
         }
@@ -42,7 +48,7 @@ impl<'a> TimedTask<'a> {
     /// The task that a structure answers queries of a kind on a workload.
     pub(super) fn of(
         task: TaskKind,
-        label: &str,
+        spec: &StructureSpec,
         workload: &'a Workload,
         built: &'a Built,
         answers: &[Answer],
@@ -60,15 +66,20 @@ impl<'a> TimedTask<'a> {
                 let ask = move |camera: usize, out: &mut Vec<ItemId>| {
                     index.query(workload.views[camera].as_any(), out);
                 };
-                match slowed(label) {
+                match slowed(&spec.label) {
                     Some(every) => twice_in(every, ask),
                     None => Box::new(ask),
                 }
             }
         };
-        let ask_many = (task == TaskKind::LocateBatched).then(|| located_at_once(workload, built));
+        let ask_many = match task {
+            TaskKind::LocateBatched => Some(located_at_once(workload, built)),
+            TaskKind::Views => seen_at_once(workload, built, spec.execution.threads),
+            _ => None,
+        };
         TimedTask {
             ask,
+            all_threads: spec.query_threads() > 1 || task == TaskKind::Views,
             ask_many,
             expected: answers.iter().map(|a| a.count).collect(),
             least_ns,
@@ -118,6 +129,35 @@ fn twice_in<'a>(every: usize, ask: impl Fn(usize, &mut Vec<ItemId>) + 'a) -> Ask
         ask(camera, out);
     })
 }
+
+/// Frustum queries of several cameras, shared among threads.
+///
+/// `None` if the system gives no threads. A thread answers one camera after another into its own list.
+fn seen_at_once<'a>(
+    workload: &'a Workload,
+    built: &'a Built,
+    threads: usize,
+) -> Option<AskMany<'a>> {
+    let workers = Workers::new(threads).ok()?;
+    let (index, lists) = (built.items.as_ref(), RefCell::new(Vec::new()));
+    Some(Box::new(move |cameras| {
+        let lists: &mut Vec<Vec<ItemId>> = &mut lists.borrow_mut();
+        lists.resize_with(threads * SHARES, Vec::new);
+        let returned = AtomicU64::new(0);
+        let shares = cameras.chunks(cameras.len().div_ceil(lists.len()).max(1));
+        workers.share(shares.zip(lists), |(cameras, out)| {
+            for &camera in cameras {
+                out.clear();
+                index.query(workload.views[camera as usize].as_any(), out);
+                returned.fetch_add(std::hint::black_box(&*out).len() as u64, Relaxed);
+            }
+        });
+        returned.into_inner()
+    }))
+}
+
+/// Shares of cameras per thread, so that a thread that was interrupted gets fewer.
+const SHARES: usize = 8;
 
 /// Region search at the eyes of several cameras in one call.
 ///

@@ -194,7 +194,7 @@ impl TaskTimer<'_, '_> {
         };
         let own = &self.tasks[task];
         let queried = &self.cameras[first..(first + batch).min(self.cameras.len())];
-        let watch = Stopwatch::start();
+        let watch = Stopwatch::start_for(own.all_threads);
         let returned = own.ask_all(queried, out);
         let lap = watch.lap();
         let queries = queried.len() as f64;
@@ -250,6 +250,7 @@ mod tests {
         TimedTask {
             ask: Box::new(move |camera, out| out.extend((0..count(camera)).map(|id| id as ItemId))),
             ask_many: None,
+            all_threads: false,
             expected,
             least_ns: Some(1e4),
         }

@@ -30,7 +30,7 @@ pub enum Containment {
 /// Then a tree may skip what is excluded, accept what is contained and leave
 /// decided planes out, and still returns exactly `{ i : volume.sees(items[i]) }`,
 /// bit for bit, as a scan does.
-pub trait Predicate: Sized {
+pub trait Predicate: Sized + Sync {
     /// Bits of the planes that constrain anything: the initial mask of a query.
     fn mask(&self) -> PlaneMask;
 

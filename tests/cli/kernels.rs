@@ -98,3 +98,40 @@ fn threads_change_no_byte_and_a_number_that_is_none_is_refused() {
         assert_refused(&done, &format!("--threads is '{bad}'; expected"), &line);
     }
 }
+
+#[test]
+fn a_list_of_threads_enters_structures_that_share_a_query() {
+    let here = folder(&[]);
+    let line = "run --scene uniform:n=40000 --path orbit:frames=6 --structure linear,bvh \
+                --threads 1,2 --processes 2 --out o";
+    works(here.path(), line);
+    let report = std::fs::read_to_string(here.path().join("o/report.json")).expect("a report");
+    let report = json(&report);
+    let cells = report["cells"].as_array().expect("an array");
+    let names = |cell: &serde_json::Value| cell["structure"].as_str().map(str::to_owned);
+    let mut entered: Vec<String> = cells.iter().filter_map(names).collect();
+    entered.sort();
+    assert_eq!(entered, ["bvh", "linear", "linear:threads=2"]);
+    for cell in cells {
+        assert_eq!(cell["status"], "ok", "{cell}");
+        let is_shared = cell["structure"] == "linear:threads=2";
+        assert!(cell["metrics"]["query_wall_ns"]["value"].is_number());
+        assert_eq!(
+            cell["metrics"]["views_wall_ns"].is_null(),
+            is_shared,
+            "{cell}"
+        );
+    }
+    let done = cullbench(here.path(), &format!("{line} --resume"));
+    assert_eq!(done.code, Some(0));
+    let query = "query --scene uniform:n=40000 --cameras orbit:frames=3 --structure linear";
+    let both = works(here.path(), &format!("{query} --ids --threads 1,2"));
+    let rows: Vec<&str> = both.lines().skip(1).collect();
+    let ids = |name: &str| -> Vec<&str> {
+        let own = rows.iter().filter(|row| row.contains(name));
+        own.map(|row| row.rsplit(',').next().unwrap_or_default())
+            .collect()
+    };
+    assert_eq!(rows.len(), 6);
+    assert_eq!(ids(",linear,"), ids(",linear:threads=2,"));
+}

@@ -1,0 +1,144 @@
+//! One query shared among threads, in parts with lists of their own.
+//!
+//! Lists are passed to the sink in order, so answers do not depend on which thread is faster.
+
+use std::cell::Cell;
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use super::frontier::{put_back, take};
+use super::{BuildError, check_range};
+use crate::kernel::{Isa, Piece};
+use crate::query::{Context, ItemId};
+use crate::threads::{MOST_THREADS, Workers};
+
+/// Threads per query, a parameter of structures that share one.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct QueryThreads(usize);
+
+impl Default for QueryThreads {
+    fn default() -> Self {
+        QueryThreads(1)
+    }
+}
+
+impl QueryThreads {
+    /// Returns true for one thread, the default.
+    pub fn is_one(&self) -> bool {
+        self.0 == 1
+    }
+
+    /// The threads of a structure; `None` for one.
+    ///
+    /// # Errors
+    /// A number out of range, or one that the system does not give.
+    pub fn workers(self, structure: &'static str) -> Result<Option<Workers>, BuildError> {
+        check_range(
+            structure,
+            "threads",
+            self.0 as f64,
+            1.0,
+            MOST_THREADS as f64,
+        )?;
+        let refused = |error| BuildError::Refused {
+            structure,
+            reason: format!("{} threads: {error}", self.0),
+        };
+        let more = !self.is_one();
+        more.then(|| Workers::new(self.0).map_err(refused))
+            .transpose()
+    }
+}
+
+thread_local! {
+    static PARTS: Cell<Option<Box<Vec<Vec<ItemId>>>>> = const { Cell::new(None) };
+}
+
+/// A query in parts, each answered into its own list.
+pub trait QueryInParts<I>: Sync {
+    /// Appends the ids of one part. Mark it `#[inline(always)]`.
+    fn part(&self, isa: I, index: usize, ids: &mut Vec<ItemId>);
+}
+
+/// One part, compiled for the query's instruction set.
+struct OnePart<'a, W> {
+    work: &'a W,
+    index: usize,
+    ids: &'a mut Vec<ItemId>,
+}
+
+impl<I: Isa, W: QueryInParts<I>> Piece<I> for OnePart<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, isa: I) {
+        self.work.part(isa, self.index, self.ids);
+    }
+}
+
+/// Answers the parts of a query on the threads; ids go to the sink in order.
+pub fn in_parts<C: Context>(
+    workers: &Workers,
+    parts: usize,
+    work: &impl QueryInParts<C::Isa>,
+    cx: &mut C,
+) -> ControlFlow<()> {
+    let isa = cx.isa();
+    let mut lists = take(&PARTS);
+    if lists.len() < parts {
+        lists.resize_with(parts, Vec::new);
+    }
+    workers.share(lists[..parts].iter_mut().enumerate(), |(index, ids)| {
+        ids.clear();
+        isa.apart(OnePart { work, index, ids });
+    });
+    let flow = lists[..parts].iter().try_for_each(|ids| cx.accept(ids));
+    put_back(&PARTS, lists);
+    flow
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::geometry::{Aabb, ConvexVolume, Plane, Spheres, sphere_cube};
+    use crate::index::{Input, StructureSpec};
+    use glam::Vec3;
+
+    #[test]
+    fn threads_do_not_change_an_answer_or_its_order() {
+        let normal = Vec3::new(0.6, -0.5, 0.3);
+        let planes = [Plane::new(normal, -9.0), Plane::new(-normal, 14.0)];
+        let volume = ConvexVolume::from_planes(&planes).unwrap();
+        let spheres = Spheres::new(&volume);
+        for count in [0, 15, 16_384, 16_385, 50_001] {
+            let at = |i: u32| Vec3::new((i % 37) as f32, (i / 37 % 41) as f32, (i / 1517) as f32);
+            let items = (0..count).map(|i| Aabb::around(at(i), Vec3::splat(0.3)));
+            let items: Vec<Aabb> = items.collect();
+            let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
+            let answers = |threads: usize| {
+                let spec = StructureSpec::parse(&format!("linear:threads={threads}")).unwrap();
+                assert_eq!(spec.query_threads(), threads);
+                let (mut seen, mut in_balls) = (Vec::new(), Vec::new());
+                spec.build(&items)
+                    .unwrap()
+                    .query((&volume).into(), &mut seen);
+                let balls = spec.build(Input::new(&cubes).spheres(true)).unwrap();
+                balls.query((&spheres).into(), &mut in_balls);
+                (seen, in_balls)
+            };
+            let alone = answers(1);
+            assert!(count < 16_384 || !alone.0.is_empty() && alone.0.len() <= alone.1.len());
+            for threads in [2, 3, 8] {
+                assert_eq!(answers(threads), alone, "{count} items, {threads} threads");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_of_threads_are_checked() {
+        for text in ["linear:threads=0", "linear:threads=1000", "bvh:threads=2"] {
+            assert!(StructureSpec::parse(text).is_err(), "{text}");
+        }
+    }
+}
