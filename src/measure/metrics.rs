@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::TaskKind;
 use crate::statistics::Estimate;
 
 /// One metric of the list; the unit is part of its name where it has one.
@@ -68,6 +69,12 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, summary }
     "ageing_1000", "1", "as ageing_1, after 1,000 frames";
     "memory_after_bytes_per_item", "bytes", "as memory_bytes_per_item, after the last frame";
 };
+
+/// Metrics of wall time, each with its task.
+pub(super) const WALL_METRICS: [(&str, TaskKind); 2] = [
+    ("query_wall_ns", TaskKind::Query),
+    ("views_wall_ns", TaskKind::Views),
+];
 
 /// A value, with its 95 % interval where it was sampled.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]

@@ -12,7 +12,7 @@ use super::bounds::{BOUNDS, Bound};
 use super::frames::measure_queries_or_frames;
 use super::group::{GroupPlan, LEAST_TAIL};
 use super::index_under_test::TWIN;
-use super::metrics::{METRICS, Metrics};
+use super::metrics::{METRICS, Metrics, WALL_METRICS};
 use super::moving::AGES;
 use super::process_result::{Known, Part, SubjectPart, TaskPart};
 use super::update::MOST_UPDATED;
@@ -410,27 +410,21 @@ impl<'p> MergedParts<'p> {
                 metrics.estimate(faster, speedup(reference, own));
             }
         }
-        let walls = [
-            (TaskKind::Query, "query_wall_ns"),
-            (TaskKind::Views, "views_wall_ns"),
-        ];
-        for (task, name) in walls {
-            let wall = self.tasks(label, task).filter_map(|t| t.wall_ln_ns);
-            let wall: Vec<f64> = wall.collect();
+        for (name, task) in WALL_METRICS {
+            let tasks = self.tasks(label, task);
+            let wall: Vec<f64> = tasks.filter_map(|t| t.wall_ln_ns).collect();
             metrics.estimate(name, one_run(&wall, &wall));
         }
         let all = self.tail(label, TaskKind::Query);
+        let all = &all[..if all.len() < LEAST_TAIL { 0 } else { all.len() }];
         for (name, q) in TAIL_METRICS {
-            let is_enough = all.len() >= LEAST_TAIL;
-            metrics.set(name, quantile(&all, q).filter(|_| is_enough));
+            metrics.set(name, quantile(all, q));
         }
         let worst = self.tail(label, TaskKind::Frame).last().copied();
         metrics.set("worst_frame_ns", worst);
     }
 
-    /// Times of each group of cameras or each frame, ns, ascending.
-    ///
-    /// Medians over the processes.
+    /// Median times of each group of cameras or each frame, ns, ascending.
     fn tail(&self, label: &str, task: TaskKind) -> Vec<f64> {
         let tails: Vec<&[f64]> = self.tasks(label, task).map(|t| &t.tail_ns[..]).collect();
         let groups = tails.iter().map(|tail| tail.len()).min().unwrap_or(0);
