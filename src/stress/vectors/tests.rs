@@ -1,3 +1,5 @@
+//! Vectors as they are read and answered.
+
 use super::*;
 
 #[test]
