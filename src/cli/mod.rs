@@ -60,6 +60,7 @@ mod run_why;
 mod scene;
 mod scene_args;
 mod scene_draw;
+mod scene_facts;
 mod shared_args;
 mod sheet;
 mod stage_sweep;

@@ -4,9 +4,10 @@
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
+use super::scene_facts::{SceneFacts, people};
 use super::shared_args::TableFormat;
 use super::{Ending, expect_place_for, inputs, interrupt, load_scene, print_json, tell, text};
 use crate::measure::SceneInfo;
@@ -14,17 +15,16 @@ use crate::path::{self, CameraFacts};
 use crate::report::write_atomically;
 use crate::scene::{Regions, Scene, UpAxis, write_boxes_csv};
 use crate::spec::SpecError;
-use crate::statistics::{quantile, sorted};
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
-    let scene = load_scene(&args.scene, &args.scene_args, 0)?;
+    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let defaults = args.lens.defaults()?.of_scene(&scene);
     let path = args.path.as_ref();
     let path = path.map(|path| path::load(path, &scene, &defaults));
     let cameras = path.transpose()?.map_or(Vec::new(), |path| path.cameras);
     let facts = (!cameras.is_empty()).then(|| CameraFacts::of(&cameras));
     let info = SceneInfo::of(&scene);
-    let sizes = sizes(&scene);
+    let figures = SceneFacts::of(&scene)?;
     let portals = match &scene.regions {
         Regions::Tiling(tiling) => tiling.portals.len(),
         _ => 0,
@@ -45,8 +45,11 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
             value["triangle_count"] = json!(surfaces.triangles.len());
         }
         value["camera_place_count"] = json!(scene.places.len());
-        [value["size_min"], value["size_median"], value["size_max"]] =
-            sizes.map(|size| json!(size));
+        if let (Some(all), Value::Object(own)) =
+            (value.as_object_mut(), serde_json::to_value(&figures)?)
+        {
+            all.extend(own);
+        }
         for labels in &scene.labels {
             value["labels"][&labels.column] = labels.histogram().into_iter().collect();
         }
@@ -57,28 +60,17 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         .map(|v| format!("({})", v.map(text::short).join(", ")));
     let mut rows = vec![
         ("scene", text::plain(&info.name)),
-        ("items", text::count(info.total_count)),
+        ("items", people(info.total_count)),
         ("bounds", format!("{low} to {high}")),
         ("origin", origin),
         ("axes", inputs::axes(&info)),
         (
-            "sizes",
-            match sizes.map(|size| size.map(text::short)) {
-                [Some(low), Some(middle), Some(high)] => {
-                    format!("longest edge min {low}, median {middle}, max {high}")
-                }
-                _ => "no items".to_owned(),
-            },
-        ),
-        (
             "regions",
-            format!(
-                "{}: {}",
-                text::count(info.region_count),
-                scene.regions.kind()
-            ),
+            format!("{}: {}", people(info.region_count), scene.regions.kind()),
         ),
     ];
+    let at = rows.len() - 1;
+    rows.splice(at..at, figures.rows(&scene));
     match (&facts, &args.path) {
         (Some(facts), Some(path)) => {
             let views = text::counted(cameras.len(), "camera");
@@ -93,7 +85,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         }
     }
     if let Some(surfaces) = &scene.surfaces {
-        rows.push(("triangles", text::count(surfaces.triangles.len())));
+        rows.push(("triangles", people(surfaces.triangles.len())));
     }
     if portals > 0 {
         rows.push(("portals", text::count(portals)));
@@ -124,16 +116,6 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     let entries = text::entries(&rows.collect::<Vec<_>>(), text::width());
     write!(io::stdout(), "{entries}")?;
     Ok(Ending::Ok)
-}
-
-/// Smallest, median and largest longest edge of the items.
-fn sizes(scene: &Scene) -> [Option<f64>; 3] {
-    let edges = scene
-        .items
-        .iter()
-        .map(|b| f64::from(b.extent().max_element()));
-    let edges = sorted(edges.collect());
-    [0.0, 0.5, 1.0].map(|q| quantile(&edges, q))
 }
 
 pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {

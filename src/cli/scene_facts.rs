@@ -1,0 +1,322 @@
+//! Figures of a scene's boxes: sizes, flatness, overlap, copies, loss by f32.
+
+use serde::Serialize;
+
+use super::text;
+use crate::index::{Bvh, FrustumQuery, Input, RegionIndex};
+use crate::scene::Scene;
+use crate::statistics::{quantile, sorted};
+
+/// Edge of a flat item along its thinnest axis, as a share of its longest edge.
+const FLAT: f32 = 0.01;
+/// Most items whose neighbours are counted.
+const SAMPLE: usize = 1000;
+/// Neighbours after which no other item is sampled.
+const MOST_NEIGHBOURS: usize = 10_000_000;
+/// Steps of the histogram of sizes.
+const STEPS: usize = 12;
+const BARS: [char; 9] = ['·', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+/// Figures of the items; sizes are longest edges in units of the scene.
+#[derive(Serialize)]
+pub struct SceneFacts {
+    /// Edges of the box about all items.
+    extent: [f64; 3],
+    size_min: Option<f64>,
+    size_median: Option<f64>,
+    size_p99: Option<f64>,
+    size_max: Option<f64>,
+    /// Steps of equal ratio from the smallest size above zero to the largest.
+    size_histogram: Vec<SizeStep>,
+    /// Items whose longest edge is zero.
+    point_count: usize,
+    /// Items that are flat along x, y and z, points excluded.
+    flat_counts: [usize; 3],
+    /// Items with the bounds of an item before them.
+    coincident_count: usize,
+    /// Mean number of other items that an item meets, of a sample.
+    overlap_mean: Option<f64>,
+    /// Share of items that meet another one, of the sample.
+    overlap_share: Option<f64>,
+    overlap_sample_count: usize,
+    /// Farthest that f32 moves a bound outward, per axis.
+    f32_loss: [f64; 3],
+    /// Distance of f32 numbers at the farthest bound in world coordinates, per axis.
+    f32_step_unmoved: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct SizeStep {
+    from: f64,
+    to: f64,
+    count: usize,
+}
+
+impl SceneFacts {
+    pub fn of(scene: &Scene) -> anyhow::Result<SceneFacts> {
+        let edges = scene.items.iter().map(|b| b.extent().max_element().into());
+        let edges = sorted(edges.collect());
+        let [size_min, size_median, size_p99, size_max] =
+            [0.0, 0.5, 0.99, 1.0].map(|q| quantile(&edges, q));
+        let mut flat_counts = [0; 3];
+        for extent in scene.items.iter().map(|b| b.extent()) {
+            for (axis, count) in flat_counts.iter_mut().enumerate() {
+                let longest = extent.max_element();
+                *count += usize::from(longest > 0.0 && extent[axis] < FLAT * longest);
+            }
+        }
+        let mut bits: Vec<_> = scene.items.iter().map(|b| b.bits()).collect();
+        bits.sort_unstable();
+        bits.dedup();
+        let mut f32_loss = [0.0f64; 3];
+        for (b, written) in scene.items.iter().zip(scene.written()) {
+            for (axis, loss) in f32_loss.iter_mut().enumerate() {
+                let low = written.min[axis] - scene.origin[axis] - f64::from(b.min[axis]);
+                let high = f64::from(b.max[axis]) - (written.max[axis] - scene.origin[axis]);
+                *loss = loss.max(low).max(high);
+            }
+        }
+        let bounds = scene.world_bounds();
+        let step = |axis: usize| {
+            let farthest = bounds.min[axis].abs().max(bounds.max[axis].abs()) as f32;
+            f64::from(farthest.next_up() - farthest)
+        };
+        let (mut sampled, mut meeting, mut others) = (0, 0, 0);
+        if !scene.items.is_empty() {
+            let tree = Bvh::build(&Input::new(&scene.items), &Default::default())?;
+            let stride = scene.items.len().div_ceil(SAMPLE);
+            for b in scene.items.iter().step_by(stride) {
+                let mut met = 0;
+                tree.each_visible(b, |_| met += 1);
+                let own = usize::from(met > 0);
+                (sampled, others) = (sampled + 1, others + met - own);
+                meeting += usize::from(met > own);
+                if others > MOST_NEIGHBOURS {
+                    break;
+                }
+            }
+        }
+        let of_sample = |count: usize| (sampled > 0).then(|| count as f64 / sampled as f64);
+        Ok(SceneFacts {
+            extent: (bounds.max - bounds.min).to_array(),
+            size_min,
+            size_median,
+            size_p99,
+            size_max,
+            point_count: edges.partition_point(|edge| *edge <= 0.0),
+            size_histogram: histogram(&edges),
+            flat_counts,
+            coincident_count: scene.items.len() - bits.len(),
+            overlap_mean: of_sample(others),
+            overlap_share: of_sample(meeting),
+            overlap_sample_count: sampled,
+            f32_loss,
+            f32_step_unmoved: [0, 1, 2].map(step),
+        })
+    }
+
+    /// The figures for people, a name and a text each.
+    pub fn rows(&self, scene: &Scene) -> Vec<(&'static str, String)> {
+        let length = |value: f64| length(value, scene.unit);
+        let count = scene.items.len();
+        let three = |values: [f64; 3]| values.map(length).join(", ");
+        let mut rows = vec![("extent", self.extent.map(length).join(" x "))];
+        let sizes = [
+            self.size_min,
+            self.size_median,
+            self.size_p99,
+            self.size_max,
+        ];
+        let [Some(least), Some(median), Some(p99), Some(most)] = sizes.map(|s| s.map(length))
+        else {
+            rows.push(("sizes", "no items".to_owned()));
+            return rows;
+        };
+        rows.push((
+            "sizes",
+            format!("longest edge min {least}, median {median}, p99 {p99}, max {most}"),
+        ));
+        if let [first, .., last] = &self.size_histogram[..] {
+            let most = self.size_histogram.iter().map(|step| step.count).max();
+            let bar = |step: &SizeStep| {
+                BARS[(step.count * (BARS.len() - 1)).div_ceil(most.unwrap_or(1).max(1))]
+            };
+            let bars: String = self.size_histogram.iter().map(bar).collect();
+            let [from, to] = [first.from, last.to].map(length);
+            let factor = text::short(first.to / first.from);
+            let points = match self.point_count {
+                0 => String::new(),
+                points => format!("; {} of size 0", people(points)),
+            };
+            rows.push((
+                "",
+                format!("{from} |{bars}| {to}, steps of x{factor}{points}"),
+            ));
+        }
+        let axes = ["x", "y", "z"].into_iter().zip(self.flat_counts);
+        let flat = axes.filter(|(_, flat)| *flat > 0);
+        let flat: Vec<String> = flat
+            .map(|(axis, flat)| {
+                format!("{} along {axis}", text::percent(flat as f64 / count as f64))
+            })
+            .collect();
+        rows.push((
+            "flat",
+            match flat.is_empty() {
+                true => "no items thinner than 1 % of their longest edge".to_owned(),
+                false => format!("{} (below 1 % of the longest edge)", flat.join(", ")),
+            },
+        ));
+        if let (Some(mean), Some(share)) = (self.overlap_mean, self.overlap_share) {
+            let of = match self.overlap_sample_count < count {
+                true => format!(" (of {} sampled)", people(self.overlap_sample_count)),
+                false => String::new(),
+            };
+            let (share, mean) = (text::percent(share), text::short(mean));
+            rows.push((
+                "overlap",
+                format!("{share} meet other items, {mean} on average{of}"),
+            ));
+        }
+        rows.push((
+            "copies",
+            match self.coincident_count {
+                0 => "no two items have the same bounds".to_owned(),
+                copies => format!("{} with the bounds of another item", people(copies)),
+            },
+        ));
+        rows.push((
+            "f32",
+            format!(
+                "bounds grow by at most {} (x, y, z); f32 steps in world coordinates are {}",
+                three(self.f32_loss),
+                three(self.f32_step_unmoved)
+            ),
+        ));
+        rows
+    }
+}
+
+/// Counts per step of equal ratio; empty where all sizes are one.
+fn histogram(edges: &[f64]) -> Vec<SizeStep> {
+    let above_zero = &edges[edges.partition_point(|edge| *edge <= 0.0)..];
+    let (Some(&least), Some(&most)) = (above_zero.first(), above_zero.last()) else {
+        return Vec::new();
+    };
+    if least == most {
+        return Vec::new();
+    }
+    let end = |step: usize| match step {
+        0 => least,
+        STEPS => most,
+        _ => least * libm::pow(most / least, step as f64 / STEPS as f64),
+    };
+    // Each step has its lower end, the last one both.
+    let below = |step: usize| match step {
+        STEPS => above_zero.len(),
+        _ => above_zero.partition_point(|edge| *edge < end(step)),
+    };
+    let step = |step: usize| SizeStep {
+        from: end(step),
+        to: end(step + 1),
+        count: below(step + 1) - below(step),
+    };
+    (0..STEPS).map(step).collect()
+}
+
+/// A count for people: 11,065 or 1.2 million.
+pub fn people(count: usize) -> String {
+    match count {
+        0..1_000_000 => text::count(count),
+        _ => format!("{} million", text::short(count as f64 / 1e6)),
+    }
+}
+
+/// A length for people: 3.4 km, 12 m, 5 mm, 64 map units, or 64 without a unit.
+fn length(value: f64, unit: Option<&str>) -> String {
+    let (scale, unit) = match unit {
+        None if value > 0.0 && value < 1e-3 => return format!("{value:.2e}"),
+        None => return text::short(value),
+        Some("m") => match value.abs() {
+            v if v >= 1000.0 => (1e-3, "km"),
+            v if v >= 0.1 || v == 0.0 => (1.0, "m"),
+            v if v >= 1e-3 => (1e3, "mm"),
+            _ => (1e6, "um"),
+        },
+        Some(unit) if value > 0.0 && value < 1e-3 => return format!("{value:.2e} {unit}"),
+        Some(unit) => (1.0, unit),
+    };
+    format!("{} {unit}", text::short(value * scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{WorldBox, load};
+    use glam::DVec3;
+
+    fn scene(boxes: &[[f64; 2]]) -> Scene {
+        let one = |&[low, size]: &[f64; 2]| {
+            let min = DVec3::new(low, 0.0, 0.0);
+            WorldBox::new(min, min + DVec3::new(size, size, 0.0))
+        };
+        let boxes: Vec<WorldBox> = boxes.iter().map(one).collect();
+        Scene::from_boxes("test", &boxes).expect("boxes")
+    }
+
+    #[test]
+    fn figures_are_those_of_a_count_by_hand() {
+        // Two copies that meet the third, a fourth apart, and a point.
+        let scene = scene(&[
+            [0.0, 2.0],
+            [0.0, 2.0],
+            [1.5, 4.5],
+            [90.1, 32.0],
+            [50.0, 0.0],
+        ]);
+        let facts = SceneFacts::of(&scene).unwrap();
+        assert_eq!(facts.extent[1..], [32.0, 0.0]);
+        assert_eq!((facts.point_count, facts.coincident_count), (1, 1));
+        assert_eq!(facts.flat_counts, [0, 0, 4]);
+        assert_eq!(facts.overlap_sample_count, 5);
+        let overlap = (facts.overlap_mean, facts.overlap_share);
+        assert_eq!(overlap, (Some(1.2), Some(0.6)));
+        assert_eq!((facts.size_min, facts.size_median), (Some(0.0), Some(2.0)));
+        let counts: Vec<usize> = facts.size_histogram.iter().map(|step| step.count).collect();
+        assert_eq!(counts, [2, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1]);
+        let step = f64::from(122f32.next_up() - 122.0);
+        assert!(facts.f32_loss[0] > 0.0 && facts.f32_loss[0] <= step);
+        assert_eq!(facts.f32_loss[1..], [0.0, 0.0]);
+        assert_eq!(facts.f32_step_unmoved[0], step);
+    }
+
+    #[test]
+    fn scenes_of_any_size_have_figures() {
+        for source in [
+            "uniform:n=0",
+            "uniform:n=1",
+            "city:n=3000,offset=1e7",
+            "us-counties",
+        ] {
+            let scene = load(source, &Default::default()).unwrap();
+            let facts = SceneFacts::of(&scene).unwrap();
+            assert!(facts.overlap_sample_count <= SAMPLE && !facts.rows(&scene).is_empty());
+            let above_zero = scene.items.len() - facts.point_count;
+            let counted: usize = facts.size_histogram.iter().map(|step| step.count).sum();
+            assert!(
+                counted == above_zero || counted == 0 && above_zero < 2,
+                "{source}"
+            );
+        }
+    }
+
+    #[test]
+    fn numbers_are_those_that_people_say() {
+        let told = [0.0, 3400.0, 12.34, 0.005, 1e-6].map(|v| length(v, Some("m")));
+        assert_eq!(told, ["0 m", "3.4 km", "12.3 m", "5 mm", "1 um"]);
+        assert_eq!(length(64.0, Some("map units")), "64 map units");
+        assert_eq!(length(7.63e-6, None), "7.63e-6");
+        let told = [11_065, 1_234_567].map(people);
+        assert_eq!(told, ["11,065", "1.23 million"]);
+    }
+}
