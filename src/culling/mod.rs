@@ -96,9 +96,9 @@ pub enum CameraView {
     /// Planes in f32.
     Volume(ConvexVolume),
     /// Planes and a sphere per box, in f32.
-    Spheres(Spheres),
+    Spheres(Box<Spheres>),
     /// Planes in f64.
-    Wide(ConvexVolumeF64),
+    Wide(Box<ConvexVolumeF64>),
     /// Planes in f32 about the eye.
     Relative(RelativeVolume),
 }
@@ -108,8 +108,8 @@ impl CameraView {
     pub fn as_any(&self) -> AnyVolume<'_> {
         match self {
             CameraView::Volume(view) => view.into(),
-            CameraView::Spheres(view) => view.into(),
-            CameraView::Wide(view) => view.into(),
+            CameraView::Spheres(view) => view.as_ref().into(),
+            CameraView::Wide(view) => view.as_ref().into(),
             CameraView::Relative(view) => view.into(),
         }
     }
@@ -133,7 +133,7 @@ impl Culling {
                 let mut planes = camera.convex_volume_f64(around)?.planes().to_vec();
                 planes.extend(about_scene);
                 let volume = ConvexVolumeF64::from_planes(&planes).map_err(CameraError::from)?;
-                Ok(CameraView::Wide(volume))
+                Ok(CameraView::Wide(Box::new(volume)))
             }
             Arithmetic::F32Relative => {
                 let volume = camera.relative_volume(&more, self.planes.epsilon, around)?;
@@ -190,7 +190,7 @@ impl Culling {
                 // The cubes about the items' spheres are what is indexed.
                 let reach = around.reach.as_dvec3();
                 check_sums(&volume, reach + reach.length())?;
-                CameraView::Spheres(Spheres::new(&volume))
+                CameraView::Spheres(Box::new(Spheres::new(&volume)))
             }
             _ => CameraView::Volume(volume),
         })

@@ -52,8 +52,12 @@ impl QueryThreads {
     }
 }
 
+/// A list of ids per part, kept from query to query.
+#[derive(Default)]
+struct Lists(Vec<Vec<ItemId>>);
+
 thread_local! {
-    static PARTS: Cell<Option<Box<Vec<Vec<ItemId>>>>> = const { Cell::new(None) };
+    static PARTS: Cell<Option<Box<Lists>>> = const { Cell::new(None) };
 }
 
 /// A query in parts, each answered into its own list.
@@ -87,14 +91,14 @@ pub fn in_parts<C: Context>(
 ) -> ControlFlow<()> {
     let isa = cx.isa();
     let mut lists = take(&PARTS);
-    if lists.len() < parts {
-        lists.resize_with(parts, Vec::new);
+    if lists.0.len() < parts {
+        lists.0.resize_with(parts, Vec::new);
     }
-    workers.share(lists[..parts].iter_mut().enumerate(), |(index, ids)| {
+    workers.share(lists.0[..parts].iter_mut().enumerate(), |(index, ids)| {
         ids.clear();
         isa.apart(OnePart { work, index, ids });
     });
-    let flow = lists[..parts].iter().try_for_each(|ids| cx.accept(ids));
+    let flow = lists.0[..parts].iter().try_for_each(|ids| cx.accept(ids));
     put_back(&PARTS, lists);
     flow
 }

@@ -370,7 +370,7 @@ f 1 2 3 4";
             ("v 1 2 3\nf 1 \\\n 1\n", "line 2: 2 corners; expected three"),
             ("v 1 2 3\n\\\nf\n", "line 2: no corners"),
             ("v 1 2 3\nf 1 1 /\n", "corner '/'"),
-            ("\0v\0 \01\n", "zero bytes, as in UTF-16"),
+            ("\0v\0 \x001\n", "zero bytes, as in UTF-16"),
             (
                 "v 1e300 2 3\nv -1e300 2 3\nf 1 1 2\n",
                 "expected min <= max within the range of f32",
