@@ -202,6 +202,14 @@ impl<'a, I: Isa> BallFrustum<'a, I> {
     }
 }
 
+/// The lanes whose distance is not below the least.
+///
+/// No closure: one that is called twice is compiled apart, without the instruction set.
+#[inline(always)]
+fn above<I: Isa>(isa: I, distances: I::Floats, least: f32) -> LaneMask {
+    isa.kept(isa.keep(isa.keep_all(), distances, isa.splat(least)))
+}
+
 /// The lanes that are kept, by the distances of their farthest points.
 #[inline(always)]
 fn decide<'s, I: Isa>(
@@ -210,8 +218,8 @@ fn decide<'s, I: Isa>(
     doubt: f32,
     question: impl FnOnce() -> (&'s Spheres, PlaneMask, &'s BoxBlock),
 ) -> LaneMask {
-    let above = |least: f32| isa.kept(isa.keep(isa.keep_all(), farthest, isa.splat(least)));
-    let (possible, sure) = (above(-doubt), above(doubt));
+    let possible = above(isa, farthest, -doubt);
+    let sure = above(isa, farthest, doubt);
     if possible == sure {
         return sure;
     }
@@ -270,18 +278,12 @@ impl Spheres {
         (at, block): (usize, &BoxBlock),
         mask: PlaneMask,
     ) -> LaneMask {
-        if mask == 0 {
-            return LaneMask::MAX;
-        }
         let (centres, radii) = balls.load(isa, at);
-        let of = |index: u32| {
-            let plane = splat(isa, self.plane_of_bit(index).1.unit);
-            distances(isa, plane, centres)
-        };
-        let mut least = of(mask.trailing_zeros());
-        let mut left = mask & (mask - 1);
+        let mut least = isa.splat(f32::MAX);
+        let mut left = mask;
         while left != 0 {
-            least = isa.min(of(left.trailing_zeros()), least);
+            let plane = splat(isa, self.plane_of_bit(left.trailing_zeros()).1.unit);
+            least = isa.min(distances(isa, plane, centres), least);
             left &= left - 1;
         }
         decide(isa, isa.add(least, radii), balls.doubt, || {
