@@ -17,7 +17,7 @@ use super::Ending;
 use super::args::{Cli, Command};
 use super::protocol::{Job, Message, PROTOCOL, Request};
 use super::{advise, drift, funnel, precision, run_plan, stage_sweep};
-use crate::index::Registry;
+use crate::index::{Registry, StructureSpec};
 use crate::measure::{Part, Plan, ProcessTimes, Share, TIMING, TaskSamples, measure_scene};
 
 /// Error of a request whose job and arguments do not match.
@@ -49,7 +49,6 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     let here = Here::default();
     // Before the processor is chosen: it may wake up on another one.
     here.at.clone().tell_of_turns();
-    stay_on(request.cpu);
     let _held = vary_layout(request.layout);
     crate::input::hold_files(request.files.clone());
     for (source, file) in &request.spooled {
@@ -68,8 +67,15 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
             Command::Advise(args) => advise::plan(registry, &args)?,
             _ => anyhow::bail!(OTHER),
         };
+        // Threads that are started later stay where this one does.
+        let on_threads =
+            |spec: &StructureSpec| spec.query_threads() > 1 || spec.execution.threads > 1;
+        if !plan.structures.iter().any(on_threads) {
+            stay_on(request.cpu);
+        }
         here.scene(&plan, *scene, share, *samples)?;
     } else {
+        stay_on(request.cpu);
         here.at.set(None, TIMING);
         here.tell(&here.at.message());
         here.tell(&Message::Times(times(registry, &request.job, &command)?));
