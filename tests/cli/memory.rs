@@ -52,12 +52,12 @@ fn a_scene_beyond_the_limits_of_the_process_is_one_line() {
 fn a_structure_beyond_the_limits_leaves_the_others() {
     let line = "query --scene uniform:n=1500000 --cameras spin:frames=1 --structure";
     let here = Path::new(".");
-    let done = limited(here, 527_000, &format!("{line} linear,bvh"));
+    let done = limited(here, 470_000, &format!("{line} linear,bvh"));
     assert_eq!(done.code, Some(0), "{done:?}");
     let told = "left out: 'bvh' needs about 384 MB for 1500000 items, more than";
     assert!(done.err.starts_with(told), "{}", done.err);
     assert_eq!(rows(&done.out).len(), 1, "{}", done.out);
-    let done = limited(here, 527_000, &format!("{line} bvh"));
+    let done = limited(here, 470_000, &format!("{line} bvh"));
     assert_refused(&done, "structure 'bvh': | needs about 384 MB", "bvh alone");
 }
 
