@@ -186,7 +186,7 @@ pub fn prepare(
 /// Times of one process.
 ///
 /// # Errors
-/// As [`prepare`]; another scene than planned.
+/// The errors of [`prepare`], and a scene other than the planned one.
 pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, AdviseError> {
     let workload = input.workload()?;
     let [tree, scan] = &plan.structures;

@@ -235,7 +235,7 @@ impl Camera {
     /// moving it does not change what is visible.
     ///
     /// # Errors
-    /// As [`ViewProjection::new`].
+    /// The errors of [`ViewProjection::new`].
     pub fn of_matrix(
         entries: [[f64; 4]; 4],
         convention: MatrixConvention,

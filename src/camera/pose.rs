@@ -57,7 +57,7 @@ impl Pose {
     /// direction of view, and look to the eye: the cross product is exact.
     ///
     /// # Errors
-    /// As [`look_at`](super::look_at).
+    /// The errors of [`look_at`](super::look_at).
     pub(super) fn axes(&self) -> Result<[DVec3; 2], CameraError> {
         let (eye, name, towards, up) = match *self {
             Pose::LookAt { eye, look, up } => (eye, "look", look, up),

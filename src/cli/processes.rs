@@ -328,7 +328,7 @@ impl Workers {
     /// Runs a job in a separate process, on the next processor.
     ///
     /// # Errors
-    /// As [`see_through`].
+    /// The errors of [`see_through`].
     pub fn see_through(
         &self,
         process: u32,

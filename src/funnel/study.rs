@@ -278,7 +278,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, Fu
 /// Times of one process.
 ///
 /// # Errors
-/// As [`prepare`].
+/// The errors of [`prepare`].
 pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes, FunnelError> {
     let world = World::new(input.scene, input, &|_| ())?;
     let study = Study::new(&world, input)?;

@@ -186,7 +186,7 @@ impl<'w> Swept<'w> {
 /// Compares all points of a stage with the truth.
 ///
 /// # Errors
-/// As [`prepare`](super::prepare).
+/// The errors of [`prepare`](super::prepare).
 pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSweep, FunnelError> {
     let world = World::new(input.scene, input, &|_| ())?;
     let swept = Swept::new(&world, input.chain, stage);
@@ -219,7 +219,7 @@ pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSw
 /// Times of one process.
 ///
 /// # Errors
-/// As [`prepare_sweep`].
+/// The errors of [`prepare_sweep`].
 pub fn time_sweep(
     input: &FunnelInput,
     stage: StageKind,

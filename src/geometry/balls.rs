@@ -1,4 +1,4 @@
-//! Spheres of items in blocks of sixteen: centre and radius, 16 bytes an item.
+//! Bounding spheres in blocks of sixteen: centre and radius, 16 bytes per item.
 //!
 //! Four rows decide nearly every item by one sum per plane. Items within the rounding
 //! errors of a plane get the test of [`Spheres::drops`], so the sets are the same.

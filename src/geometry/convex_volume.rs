@@ -133,7 +133,7 @@ impl ConvexVolume {
     /// Planes of which some have a name.
     ///
     /// # Errors
-    /// As [`ConvexVolume::from_planes`].
+    /// The errors of [`ConvexVolume::from_planes`].
     pub fn from_labelled_planes(
         planes: &[(Option<FrustumPlane>, Plane)],
     ) -> Result<Self, VolumeError> {

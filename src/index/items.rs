@@ -55,7 +55,7 @@ impl Record {
     /// The items that a structure has to hold.
     ///
     /// # Errors
-    /// As [`indexable`].
+    /// The errors of [`indexable`].
     pub fn all(items: &[Aabb]) -> Result<Vec<Record>, BuildError> {
         let record = |id: ItemId| Record {
             bounds: items[id as usize],

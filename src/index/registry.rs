@@ -279,7 +279,7 @@ impl StructureSpec {
     /// those of others.
     ///
     /// # Errors
-    /// As [`Registry::structure`].
+    /// The errors of [`Registry::structure`].
     pub fn parse(text: &str) -> Result<StructureSpec, SpecError> {
         Registry::builtin().structure(text)
     }

@@ -102,7 +102,7 @@ fn hold(held: &mut BTreeMap<String, String>, path: &Path, bytes: &[u8]) -> Resul
 /// process has read.
 ///
 /// # Errors
-/// As [`read_file`].
+/// The errors of [`read_file`].
 pub fn stand_in(source: &str, file: &Path) -> Result<(), InputError> {
     let bytes = read_file(file)?;
     let mut pipes = PIPES.lock().unwrap_or_else(PoisonError::into_inner);

@@ -12,7 +12,7 @@ use crate::query::ItemId;
 use crate::scene::{CityGrid, Scene, UpAxis, mix64};
 use crate::spec::Spec;
 
-/// Bounds of an item that is not there: empty, and finite as every index expects.
+/// Bounds of a removed item: an empty box with finite bounds.
 pub const REMOVED: Aabb = Aabb::new(Vec3::ONE, Vec3::NEG_ONE);
 
 /// Bounds of an item after a number of moves; `None` for an item that cannot move.

@@ -256,7 +256,7 @@ pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<Came
 /// found ([`CameraPath::lens_scale`]), which is then not looked for again.
 ///
 /// # Errors
-/// As [`load`].
+/// The errors of [`load`].
 pub fn load_scaled(
     source: &str,
     scene: &Scene,

@@ -81,7 +81,7 @@ impl Experiment {
     /// Loads, builds, checks every answer, and times.
     ///
     /// # Errors
-    /// As [`measure_scene`].
+    /// The errors of [`measure_scene`].
     pub fn run(&self) -> Result<Report, ExperimentError> {
         let started_at = utc(SystemTime::now());
         let mut header = Header::of(

@@ -167,7 +167,7 @@ fn check_generated(
 /// `name` will be the scene's. A map that is named makes it a WAD.
 ///
 /// # Errors
-/// As [`load`].
+/// The errors of [`load`].
 pub fn read_bytes(
     bytes: &[u8],
     [file, name]: [&str; 2],

@@ -46,7 +46,7 @@ pub trait TreeBuilder: Send + Sync {
     /// Builds the tree.
     ///
     /// # Errors
-    /// As [`RegionIndex::build`].
+    /// The errors of [`RegionIndex::build`].
     fn build(
         input: &Input<'_>,
         params: &Self::Params,

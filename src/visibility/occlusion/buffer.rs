@@ -36,7 +36,7 @@ pub trait OcclusionBuffer {
 
     /// Returns `true` if what was drawn is nearer than the rectangle in all its pixels.
     ///
-    /// As near is not nearer.
+    /// Equal depth does not count as nearer.
     fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool;
 
     /// Tests some boxes of a block; returns the lanes of the hidden ones.

@@ -1,5 +1,5 @@
 //! Rays followed from region to region in plain f64: the regions that samples see.
-//! As simple as can be, because the back ends are tested against it.
+//! Kept simple: it is the reference that back ends are tested with.
 
 use super::graph::RegionGraph;
 use super::id_set::{IdSet, RegionId};
