@@ -75,23 +75,22 @@ def grid():
 def shuffled_scalar():
     ours = grid()[1]["linear-scalar"]["query_ns"] / grid()[0]["linear-scalar"]["query_ns"]
     return ("sseculling: 512,000 spheres shuffled / in rows, scalar test", "2.4 to 4.1 x", times(ours),
-            ours / 4.05, "Ours tests boxes; both pay for mispredicted exits from the loop over planes.")
+            ours / 4.05, "Ours tests boxes.")
 
 
 @row
 def shuffled_simd():
     ours = grid()[1]["linear"]["query_ns"] / grid()[0]["linear"]["query_ns"]
     return ("the same, SIMD test", "1.0 x", times(ours), ours,
-            "Theirs writes a bit per sphere, ours the ids of visible boxes: in rows most blocks of "
-            "sixteen have none and write nothing, shuffled 92 % have some.")
+            "Theirs writes a bit per sphere, ours ids: in rows most blocks of sixteen have none, "
+            "shuffled 92 % have some.")
 
 
 @row
 def simd_time():
     ours = grid()[1]["linear"]["query_ns"] / 1e6
     return ("the same, SIMD time of a shuffled scan", "1.21 to 2.35 ms", f"{ours:.2f} ms", ours / 1.21,
-            "Four planes of one sphere at once (SSE) against sixteen boxes of one plane (AVX-512 where "
-            "there is); theirs writes bits, ours ids.")
+            "Four planes of one sphere at once (SSE) against sixteen boxes of one plane (AVX-512).")
 
 
 TREES = {}
@@ -109,8 +108,7 @@ def trees():
 def trees_scalar():
     ours = trees()["linear-scalar"]["query_ns"] / 4e6
     return ("4 million trees, 20,000 visible: scan, per tree", "12.5 ns", f"{ours:.2f} ns", ours / 12.5,
-            "Ours rejects most trees by their first plane and reads in order; a processor of 2013, and "
-            "theirs tells inside from partial.")
+            "A processor of 2013; theirs tells inside from partial.")
 
 
 def tree_row(name, structure, theirs):
@@ -123,8 +121,7 @@ def tree_row(name, structure, theirs):
 
 WHY_TREES = {
     "quadtree-textbook": "Child pointers and one box at a time, as theirs; 3-D boxes on terrain.",
-    "quadtree": "Ours is packed: a node inside the view is one copied range of ids, and items are "
-        "tested by sixteen.",
+    "quadtree": "Ours copies a node inside the view as one range of ids and tests items by sixteen.",
     "uniform-grid": "Theirs is a 2-D grid with the best cell size by hand; ours is 3-D and chooses it.",
 }
 ROWS.append(tree_row("quadtree", "quadtree-textbook", 71))
@@ -146,8 +143,7 @@ def one_box():
     cells = run("uniform:n=1000", "outside:frames=64", "linear-scalar")
     ours = cells["linear-scalar"]["query_ns"] / 1000
     return ("Bevy: one box against a frustum that it is in (identity)", "6.82 ns", f"{ours:.2f} ns",
-            ours / 6.82, "One box again and again theirs; ours is a loop over 1,000 boxes in the "
-            "first cache that also writes ids.")
+            ours / 6.82, "Theirs repeats one box; ours loops over 1,000 boxes and writes ids.")
 
 
 @row
@@ -205,8 +201,7 @@ def ray_time():
     return ("crate bvh: time of a ray in the tree of Sponza's 66,450 triangles", "845 ns",
             f"{ours:.0f} ns (obvhs {obvhs:.0f} ns)", ours / 845,
             "Theirs tests all candidates along a random ray, ours the first hit, exact, of rays of one "
-            "image. Its other rows, lists of triangles and of boxes (361 and 114 times as slow), have no "
-            "match here.")
+            "image.")
 
 
 @row
@@ -228,9 +223,8 @@ def cones(name, theirs, label):
         found = next(s for s in stage if s["name"] == name)
         ours = 100 * (1 - found["output_count"] / found["input_count"])
         return (f"zeux: back faces of Sponza rejected by {label} (`{name}`)", f"{theirs} %",
-                f"{ours:.1f} %", ours / theirs, "Another export of Sponza and other clusters; ours counts "
-                "triangles of objects in the frustum and rejects only "
-                "what is proven to face away.")
+                f"{ours:.1f} %", ours / theirs, "Another export and other clusters; ours "
+                "rejects only what is proven to face away.")
     return made
 
 
