@@ -3,18 +3,20 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::levels::{Layer, occupied};
+use super::levels::Layer;
 use super::single_plane_buckets::{BUCKETS, SinglePlaneBuckets};
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::index::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, pass_run};
 use crate::index::padded_ids::PaddedIds;
-use crate::kernel::{Isa, first_lanes, pairs, prefetch};
+use crate::kernel::{Isa, pairs, prefetch};
 use crate::query::{ItemId, Planes, QueryVolume, Recorder, Sink, Tests};
 
 /// A query in progress.
 pub struct LevelTraversal<'a, I, V, S, R> {
     pub ids: &'a PaddedIds,
-    /// True if some leaves have lanes without an item.
+    /// The lanes of each leaf that hold an item.
+    pub occupied: &'a [LaneMask],
+    /// True if lanes before the last item hold none.
     pub has_vacant: bool,
     pub isa: I,
     pub volume: &'a V,
@@ -122,6 +124,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
             listed,
             test,
             ids: self.ids.rows(),
+            occupied: self.occupied,
             recorder: &mut *self.recorder,
         };
         for i in first_ahead(leaves.far) {
@@ -161,13 +164,12 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
     #[inline(always)]
     pub fn pass_run(&mut self, items: Range<usize>) -> ControlFlow<()> {
         if self.has_vacant {
-            let rows = self.ids.rows();
+            let ids = self.ids.rows().as_flattened();
             for leaf in items.start / LANES..items.end.div_ceil(LANES) {
-                let here = first_lanes(items.end - leaf * LANES);
-                let lanes = here & occupied(self.isa, &rows[leaf]);
+                let lanes = self.occupied[leaf];
                 self.recorder.subtree_accepted(lanes.count_ones() as usize);
                 if lanes != 0 {
-                    let (ids, first) = (rows.as_flattened(), leaf * LANES);
+                    let first = leaf * LANES;
                     self.sink.accept_lanes(self.isa, ids, first, lanes)?;
                 }
             }
@@ -180,7 +182,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
 /// Fewest leaves that are distributed over buckets.
 const WORTH_BUCKETS: usize = 48;
 
-/// The test of one leaf after another.
+/// The test of one leaf after another; `leaf` is its index in the list and its block.
 trait LeafTest<I: Isa> {
     /// True if the test reads spheres where there are any.
     const SPHERES: bool = false;
@@ -188,15 +190,17 @@ trait LeafTest<I: Isa> {
     /// Prefetches the rows of the i-th leaf that its test reads.
     fn prefetch(&self, block: &BoxBlock, i: usize);
 
-    /// The lanes of a leaf, of those that hold an item, that are answers; `leaf` is its
-    /// index in the list and its block.
-    fn kept<R: Recorder>(
+    /// The lanes of a leaf that are answers, if they hold an item.
+    fn kept(&self, isa: I, leaves: &Layer, leaf: (usize, usize)) -> LaneMask;
+
+    /// Records the test of a leaf that holds so many items.
+    fn record<R: Recorder>(
         &self,
-        isa: I,
+        recorder: &mut R,
         leaves: &Layer,
         leaf: (usize, usize),
-        recorder: &mut R,
-    ) -> LaneMask;
+        items: u32,
+    );
 }
 
 /// Leaves of a list, tested when the sink requests them.
@@ -205,6 +209,7 @@ struct ListedLeaves<'a, 't, T, R> {
     listed: &'a [u32],
     test: T,
     ids: &'a [[ItemId; LANES]],
+    occupied: &'a [LaneMask],
     recorder: &'a mut R,
 }
 
@@ -243,24 +248,25 @@ impl<I: Isa, T: LeafTest<I>, R: Recorder> Tests<I> for ListedLeaves<'_, '_, T, R
             self.prefetch(i + AHEAD);
         }
         let at = self.listed[i] as usize;
-        let kept = self.test.kept(isa, self.leaves, (i, at), self.recorder);
-        (at, kept & self.leaves.lanes(isa, at))
+        let kept = self.test.kept(isa, self.leaves, (i, at));
+        let items = self.occupied[at];
+        (self.test).record(self.recorder, self.leaves, (i, at), items.count_ones());
+        (at, kept & items)
     }
 }
 
-/// Records the test of a leaf.
+/// Records the test of a leaf against the planes of a mask.
 #[inline(always)]
-fn record<I: Isa, V: QueryVolume, R: Recorder>(
-    isa: I,
+fn record<V: QueryVolume, R: Recorder>(
     recorder: &mut R,
     volume: &V,
-    leaves: &Layer,
-    (at, mask): (usize, PlaneMask),
+    block: usize,
+    mask: PlaneMask,
+    items: u32,
 ) {
-    let items = leaves.lanes(isa, at).count_ones();
     recorder.items_tested(items);
     recorder.planes_tested(items * V::planes_open(mask));
-    recorder.block_read(leaves.level.first + at, || volume.rows_read(mask));
+    recorder.block_read(block, || volume.rows_read(mask));
 }
 
 /// Nothing to test: the leaves are wholly inside.
@@ -271,15 +277,13 @@ impl<I: Isa> LeafTest<I> for WhollyInside {
     fn prefetch(&self, _: &BoxBlock, _: usize) {}
 
     #[inline(always)]
-    fn kept<R: Recorder>(
-        &self,
-        isa: I,
-        leaves: &Layer,
-        (_, at): (usize, usize),
-        recorder: &mut R,
-    ) -> LaneMask {
-        recorder.subtree_accepted(leaves.lanes(isa, at).count_ones() as usize);
+    fn kept(&self, _: I, _: &Layer, _: (usize, usize)) -> LaneMask {
         LaneMask::MAX
+    }
+
+    #[inline(always)]
+    fn record<R: Recorder>(&self, recorder: &mut R, _: &Layer, _: (usize, usize), items: u32) {
+        recorder.subtree_accepted(items as usize);
     }
 }
 
@@ -299,20 +303,25 @@ impl<I: Isa, V: QueryVolume, P: Planes<I>> LeafTest<I> for SinglePlane<'_, V, P>
     }
 
     #[inline(always)]
-    fn kept<R: Recorder>(
-        &self,
-        isa: I,
-        leaves: &Layer,
-        (_, at): (usize, usize),
-        recorder: &mut R,
-    ) -> LaneMask {
-        record(isa, recorder, self.volume, leaves, (at, self.mask));
+    fn kept(&self, isa: I, leaves: &Layer, (_, at): (usize, usize)) -> LaneMask {
         match &leaves.balls {
             Some(balls) if V::SPHERES => {
                 (self.plane).kept_balls(isa, balls, (at, &leaves.blocks[at]))
             }
             _ => self.plane.kept(isa, &leaves.blocks[at]),
         }
+    }
+
+    #[inline(always)]
+    fn record<R: Recorder>(
+        &self,
+        recorder: &mut R,
+        leaves: &Layer,
+        (_, at): (usize, usize),
+        items: u32,
+    ) {
+        let block = leaves.level.first + at;
+        record(recorder, self.volume, block, self.mask, items);
     }
 }
 
@@ -331,19 +340,24 @@ impl<I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'_, V> {
     }
 
     #[inline(always)]
-    fn kept<R: Recorder>(
-        &self,
-        isa: I,
-        leaves: &Layer,
-        (i, at): (usize, usize),
-        recorder: &mut R,
-    ) -> LaneMask {
+    fn kept(&self, isa: I, leaves: &Layer, (i, at): (usize, usize)) -> LaneMask {
         let mask = self.masks[i];
-        record(isa, recorder, self.volume, leaves, (at, mask));
         let block = (at, &leaves.blocks[at]);
         match &leaves.balls {
             Some(balls) if V::SPHERES => self.volume.kept_balls(isa, balls, block, mask),
             _ => self.volume.kept_lanes(isa, block.1, mask),
         }
+    }
+
+    #[inline(always)]
+    fn record<R: Recorder>(
+        &self,
+        recorder: &mut R,
+        leaves: &Layer,
+        (i, at): (usize, usize),
+        items: u32,
+    ) {
+        let block = leaves.level.first + at;
+        record(recorder, self.volume, block, self.masks[i], items);
     }
 }

@@ -3,9 +3,7 @@
 use std::ops::Range;
 
 use crate::geometry::{Balls, BoxBlock, LANES, LaneMask};
-use crate::index::positions::ABSENT;
-use crate::kernel::Isa;
-use crate::query::{ItemId, runs};
+use crate::query::runs;
 
 /// A level's position among the blocks of the tree.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +37,7 @@ impl Level {
         self.first + self.blocks
     }
 
-    /// The lanes of a block that hold a box.
+    /// The lanes of a block that hold a box, of a level above the leaves.
     #[inline(always)]
     pub fn lanes(&self, block: usize) -> LaneMask {
         if block + 1 < self.blocks {
@@ -60,29 +58,11 @@ pub struct Layer<'t> {
     pub span: usize,
     /// True if its memory is prefetched.
     pub far: bool,
-    /// Ids of each leaf, of leaves of which some lanes have lost their item.
-    pub vacated: Option<&'t [[ItemId; LANES]]>,
     /// Spheres of its items, for a query of spheres.
     pub balls: Option<Balls<'t>>,
 }
 
-/// The lanes of a row that hold the id of an item.
-#[inline(always)]
-pub fn occupied<I: Isa>(isa: I, row: &[ItemId; LANES]) -> LaneMask {
-    !isa.equal(isa.words(row), ABSENT)
-}
-
 impl Layer<'_> {
-    /// The lanes of a block that hold a box.
-    #[inline(always)]
-    pub fn lanes<I: Isa>(&self, isa: I, block: usize) -> LaneMask {
-        let lanes = self.level.lanes(block);
-        match self.vacated {
-            Some(rows) => lanes & occupied(isa, &rows[block]),
-            None => lanes,
-        }
-    }
-
     /// Positions of the items below some lanes of a block, run by run; there are
     /// `count` items in all.
     #[inline(always)]

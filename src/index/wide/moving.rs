@@ -143,6 +143,7 @@ impl Moving {
             // The box may stay: nothing reads a vacant lane.
             Some(at) => {
                 self.still.ids.set(at, ABSENT);
+                self.still.occupied[at / LANES] &= !(1 << (at % LANES));
                 self.still.vacant += 1;
             }
             None => {}

@@ -1,7 +1,7 @@
 //! Refit of the wide tree: lanes of moved items, then the blocks above them.
 
 use super::Wide;
-use crate::geometry::{Aabb, LANES};
+use crate::geometry::{Aabb, LANES, LaneMask};
 use crate::index::positions::{ABSENT, Dirty};
 use crate::query::ItemId;
 
@@ -46,7 +46,10 @@ impl Wide {
         let before = self.ids[position];
         self.vacant = self.vacant + usize::from(id == ABSENT) - usize::from(before == ABSENT);
         self.ids.set(position, id);
-        self.blocks[position / LANES].set(position % LANES, bounds);
+        let (leaf, lane) = (position / LANES, position % LANES);
+        self.occupied[leaf] =
+            self.occupied[leaf] & !(1 << lane) | LaneMask::from(id != ABSENT) << lane;
+        self.blocks[leaf].set(lane, bounds);
     }
 
     /// Fits the blocks above some leaves to the boxes of these leaves.
