@@ -182,7 +182,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
 /// Fewest leaves that are distributed over buckets.
 const WORTH_BUCKETS: usize = 48;
 
-/// The test of one leaf after another; `leaf` is its index in the list and its block.
+/// The test of one leaf after another: its index in the list, and its block.
 trait LeafTest<I: Isa> {
     /// True if the test reads spheres where there are any.
     const SPHERES: bool = false;
@@ -193,7 +193,7 @@ trait LeafTest<I: Isa> {
     /// The lanes of a leaf that are answers, if they hold an item.
     fn kept(&self, isa: I, leaves: &Layer, leaf: (usize, usize)) -> LaneMask;
 
-    /// Records the test of a leaf that holds so many items.
+    /// Records the test of a leaf that holds `items` items.
     fn record<R: Recorder>(
         &self,
         recorder: &mut R,
