@@ -3,10 +3,9 @@
 //! `cullbench run`. Before them, that harness beside a loop written by hand, the floors
 //! of the stages of visibility, and region search beside itself in f32 alone. Exits 3 if
 //! a floor is missed. Words after `--` choose by name what runs: `harness`, `occlusion`,
-//! `hidden`, `stored-rows`, `truth`, `cones`, `picking`, `region-search`, or rows with the
+//! `hidden`, `stored-rows`, `truth`, `picking`, `region-search`, or rows with the
 //! word in their scene or structure. `-- --test` only checks that every row runs.
 
-mod cones;
 mod hidden;
 mod occlusion;
 mod picking;
@@ -241,13 +240,12 @@ fn main() -> ExitCode {
     };
     let turns = if only_test { 3 } else { TURNS };
     let mut missed = 0;
-    let parts: [(&str, Part); 8] = [
+    let parts: [(&str, Part); 7] = [
         ("harness", harness_overhead),
         ("occlusion", occlusion::missed),
         ("hidden", hidden::missed),
         ("stored-rows", stored_rows::missed),
         ("truth", truth::missed),
-        ("cones", cones::missed),
         ("picking", picking::missed),
         ("region-search", region_search::missed),
     ];

@@ -12,7 +12,6 @@ use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::verify::Truth;
 use crate::visibility::SampleGrid;
-use crate::visibility::occlusion::OccluderChoice;
 
 /// Most verdicts of the oracle: some 50 ns each.
 const MOST_JUDGED: usize = 1_000_000;
@@ -54,7 +53,6 @@ impl<'a> Case<'a> {
             structures: &[],
             protocol,
             claim: None,
-            occluders: OccluderChoice::All,
             inner_boxes: None,
             execution: spec.execution,
             all: true,

@@ -24,7 +24,6 @@ use crate::input::read_file;
 use crate::measure::ProcessTimes;
 use crate::scene::{LoadOptions, Scene};
 use crate::spec::SpecError;
-use crate::visibility::occlusion::OccluderChoice;
 use crate::visibility::region::Pvs;
 use crate::visibility::{Guarantee, SampleGrid};
 
@@ -209,7 +208,6 @@ impl Stages {
             cut_outs: args.cut_out.as_ref(),
             mirror: args.mirror,
             claim: self.claim.as_ref(),
-            occluders: args.occluders,
             inner_boxes: args.inner_boxes.map(|most| most as usize),
             all: args.all
                 || args.html.is_some()
@@ -240,7 +238,6 @@ pub fn plain_input<'s>(
         structures: &setting.structures,
         protocol: &setting.protocol,
         claim: None,
-        occluders: OccluderChoice::All,
         inner_boxes: None,
         execution: args.kernel.execution()?,
         all: true,

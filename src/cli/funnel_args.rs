@@ -10,7 +10,6 @@ use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::inscribed::MOST_BOXES;
-use crate::visibility::occlusion::OccluderChoice;
 
 const FUNNEL_HELP: &str = "\
 The chain has a back end for each stage; the table says what each is worth:
@@ -77,9 +76,6 @@ pub struct FunnelArgs {
     /// Back end of the occlusion stage
     #[arg(long, value_name = "NAME")]
     pub occlusion: Option<String>,
-    /// Occluders that hierarchical-z draws: all, nearest:64, largest:64
-    #[arg(long, value_name = "CHOICE", default_value = "all", value_parser = values::occluders)]
-    pub occluders: OccluderChoice,
     /// Maximum number of boxes inscribed in each closed item of a mesh, drawn as its
     /// occluders [default: 8]
     #[arg(long, value_name = "N", value_parser = values::whole(1..=MOST_BOXES as u32))]

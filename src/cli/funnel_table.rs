@@ -11,7 +11,6 @@ use crate::funnel::{
 use crate::shown::shortened;
 use crate::visibility::Guarantee;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
-use crate::visibility::occlusion::OccluderChoice;
 
 /// The chain and what it is worth; with `all` every other back end too.
 pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
@@ -40,10 +39,6 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
              holes.",
             made.item_count, made.mask, made.tile
         )));
-    }
-    if report.occluders != OccluderChoice::All.to_string() {
-        let line = format!("Occluders of hierarchical-z: {}.", report.occluders);
-        blocks.push(Block::Line(line));
     }
     blocks.push(Block::Table(chain(report)));
     let both = |row: &&StageRow| row.is_chosen && row.back_end.does_object_stage;

@@ -10,7 +10,6 @@ use crate::funnel::StageKind;
 use crate::kernel::Kernel;
 use crate::spec::{SpecError, parse_number};
 use crate::visibility::SampleGrid;
-use crate::visibility::occlusion::OccluderChoice;
 
 fn expected<T>(value: Option<T>, what: impl Display) -> Result<T, SpecError> {
     value.ok_or_else(|| SpecError::new(format_args!("expected {what}")))
@@ -119,12 +118,6 @@ pub fn steps(text: &str) -> Result<u64, SpecError> {
 pub fn stage(name: &str) -> Result<StageKind, SpecError> {
     let swept = [StageKind::Region, StageKind::Occlusion, StageKind::Triangle];
     choice("stage", &swept.map(|stage| (stage, stage.name(), "")))(name)
-}
-
-/// Which candidates are drawn as occluders.
-pub fn occluders(text: &str) -> Result<OccluderChoice, SpecError> {
-    let what = "all, nearest:COUNT or largest:COUNT, COUNT at least 1";
-    expected(OccluderChoice::parse(text), what)
 }
 
 /// Columns and rows of an image, `320x180`.

@@ -6,8 +6,7 @@ use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Regions, Scene};
 use crate::visibility::occlusion::{
-    HierarchicalZ, Interleaved, MaskedCentre, MaskedInner, OccluderChoice, OccluderScene,
-    OcclusionBuffer, TwoPass, View, ZBuffer,
+    Interleaved, MaskedCentre, MaskedInner, OccluderScene, OcclusionBuffer, View, ZBuffer,
 };
 use crate::visibility::region;
 use crate::visibility::triangle::TRIANGLE_ROWS;
@@ -104,41 +103,27 @@ impl Chain {
     }
 }
 
-/// Appends the items that are not hidden, of those given or, for a coupling that
-/// traverses its own tree, of all items of the view.
-pub type Occlude = Box<dyn FnMut(&OccluderScene, &View, &[ItemId], &mut Vec<ItemId>)>;
+/// Appends the items of a view that are not hidden.
+pub type Occlude = Box<dyn FnMut(&OccluderScene, &View, &mut Vec<ItemId>)>;
 
 /// A row of the occlusion stage.
 pub struct OcclusionRow {
     pub back_end: BackEnd,
-    /// Allocates a buffer of the given size. Two passes draw the chosen occluders; a
-    /// traversal draws the items that it finds visible.
-    pub new: fn(SampleGrid, Kernel, OccluderChoice) -> Occlude,
+    /// Allocates a buffer of the given size.
+    pub new: fn(SampleGrid, Kernel) -> Occlude,
 }
 
 impl OcclusionRow {
-    const fn interleaved<B: OcclusionBuffer + 'static>(name: &'static str) -> OcclusionRow {
+    const fn of<B: OcclusionBuffer + 'static>(name: &'static str) -> OcclusionRow {
         OcclusionRow {
             back_end: BackEnd {
                 does_object_stage: true,
                 ..BackEnd::new(StageKind::Occlusion, [name, B::SUMMARY], B::GUARANTEE)
             },
-            new: |grid, kernel, _| {
+            new: |grid, kernel| {
                 let mut state = Interleaved::new(B::new(grid), kernel);
-                Box::new(move |scene, view, _, out| {
+                Box::new(move |scene, view, out| {
                     state.cull(scene, view, out);
-                })
-            },
-        }
-    }
-
-    const fn two_pass<B: OcclusionBuffer + 'static>(name: &'static str) -> OcclusionRow {
-        OcclusionRow {
-            back_end: BackEnd::new(StageKind::Occlusion, [name, B::SUMMARY], B::GUARANTEE),
-            new: |grid, kernel, choice| {
-                let mut state = TwoPass::new(B::new(grid), choice, kernel);
-                Box::new(move |scene, view, items, out| {
-                    state.cull(scene, view, items, out);
                 })
             },
         }
@@ -146,9 +131,8 @@ impl OcclusionRow {
 }
 
 /// Rows of the occlusion stage.
-pub static OCCLUSION_ROWS: [OcclusionRow; 4] = [
-    OcclusionRow::interleaved::<MaskedInner>(MASKED_INNER),
-    OcclusionRow::interleaved::<MaskedCentre>("masked"),
-    OcclusionRow::interleaved::<ZBuffer>("z-buffer"),
-    OcclusionRow::two_pass::<HierarchicalZ>("hierarchical-z"),
+pub static OCCLUSION_ROWS: [OcclusionRow; 3] = [
+    OcclusionRow::of::<MaskedInner>(MASKED_INNER),
+    OcclusionRow::of::<MaskedCentre>("masked"),
+    OcclusionRow::of::<ZBuffer>("z-buffer"),
 ];

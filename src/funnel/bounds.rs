@@ -20,6 +20,8 @@ use crate::visibility::occlusion::{self, FrameTrace, MaskedInner, OccluderScene,
 use crate::visibility::region::{Opening, RegionId, RegionRow, Scratch};
 use crate::visibility::triangle::SafeCones;
 
+const STORED_PVS: &str = "stored-pvs";
+
 /// A lower bound of a back end, over all views.
 #[derive(Clone, Debug, Serialize)]
 pub struct BoundRow {
@@ -99,7 +101,7 @@ pub fn bounds<'w>(
 ) -> Vec<Bound<'w>> {
     let mut bounds = Vec::new();
     let row = |name| world.regions.as_ref().and_then(|regions| regions.row(name));
-    bounds.extend(row("exact-pvs").map(|row| of_table(world, row)));
+    bounds.extend(row(STORED_PVS).map(|row| of_table(world, row)));
     bounds.extend(row(PORTAL_CLIP).map(|row| of_portals(world, row)));
     bounds.extend(of_occlusion(world));
     bounds.push(of_cones(world, triangles));
@@ -117,7 +119,7 @@ fn of_table<'w>(world: &'w World, row: &'w RegionRow) -> Bound<'w> {
     });
     let homes: Vec<Vec<RegionId>> = homes.collect();
     let name = "read the rows of the eye's regions";
-    Bound::new(StageKind::Region, ["exact-pvs", name], move |view, _| {
+    Bound::new(StageKind::Region, [STORED_PVS, name], move |view, _| {
         for &home in &homes[view] {
             black_box(
                 row.stored_from(home)

@@ -70,18 +70,15 @@ impl World<'_> {
 
     /// A back end of the occlusion stage with a buffer of the given size.
     pub fn run_occlusion(&self, row: &OcclusionRow, buffer: SampleGrid) -> Run<'_> {
-        let occlude = RefCell::new((row.new)(buffer, self.kernel, self.choice));
-        let does_both = row.back_end.does_object_stage;
-        let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
+        let occlude = RefCell::new((row.new)(buffer, self.kernel));
         let occluders: Vec<_> = self.views().map(|view| self.occluders(view)).collect();
         Box::new(move |view, input, out| {
             let occluders = occluders[view];
             let View { rays, volume, .. } = &self.views[view];
             let view = occlusion::View::new(rays, volume, occluders, buffer);
-            let items = input.unwrap_or(&every);
-            (occlude.borrow_mut())(occluders, &view, items, out);
+            (occlude.borrow_mut())(occluders, &view, out);
             // A traversal of the whole scene ignores the visible regions.
-            if does_both && self.regions.is_some() && input.is_some() {
+            if let (Some(items), true) = (input, self.regions.is_some()) {
                 out.retain(|id| items.binary_search(id).is_ok());
             }
         })
@@ -109,7 +106,7 @@ impl<'w> ItemStages<'w> {
             for name in world.names(stage) {
                 all.run(&chain.steps_with(stage, &name));
             }
-            if world.is_separate(chain, stage) {
+            if chain.is_separate(stage) {
                 all.run(&chain.clone().with(stage, NONE).steps());
             }
         }
@@ -187,7 +184,7 @@ impl<'w> ItemStages<'w> {
     /// Tasks of a chain whose times add up.
     pub fn timed(&self, chain: &Chain) -> Vec<FunnelKey> {
         let steps = chain.steps();
-        let is_timed = |end: &usize| self.world.is_separate(chain, steps[end - 1].0);
+        let is_timed = |end: &usize| chain.is_separate(steps[end - 1].0);
         let ends = (1..=steps.len()).filter(is_timed);
         ends.map(|end| FunnelKey::Steps(steps[..end].to_vec()))
             .collect()

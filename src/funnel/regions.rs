@@ -1,6 +1,5 @@
 //! Regions of a scene, with the back ends that find visible regions among them.
 
-use std::cell::OnceCell;
 use std::sync::Arc;
 
 use crate::scene::{self, Dispute, Scene};
@@ -14,9 +13,6 @@ pub struct Regions {
     /// Items of each region.
     pub items: RegionItems,
     rows: Vec<RegionRow>,
-    has_exact: bool,
-    /// The exact table, computed when it is first used.
-    exact: OnceCell<Option<RegionRow>>,
 }
 
 impl Regions {
@@ -43,8 +39,6 @@ impl Regions {
                 .collect(),
             items: RegionItems::of(&graph, scene),
             graph,
-            has_exact: is_for(Source::Exact),
-            exact: OnceCell::new(),
         };
         if let Some(reject) = map.and_then(|map| map.reject()) {
             regions.store(Arc::new(reject), Source::Reject);
@@ -75,14 +69,6 @@ impl Regions {
 
     /// The back end of a name.
     pub fn row(&self, name: &str) -> Option<&RegionRow> {
-        let source = BACK_ENDS.iter().find(|row| row.name == name)?.source;
-        if source == Source::Exact {
-            let exact = self.exact.get_or_init(|| {
-                let exact = self.has_exact.then(|| Pvs::of_rooms(&self.graph).ok());
-                RegionRow::stored(source, self.graph.clone(), Arc::new(exact.flatten()?))
-            });
-            return exact.as_ref();
-        }
-        self.rows.iter().find(|row| row.back_end.source == source)
+        self.rows.iter().find(|row| row.back_end.name == name)
     }
 }

@@ -38,8 +38,6 @@ pub struct FunnelReport {
     pub level: LevelRow,
     /// Items that have holes; null unless requested.
     pub cut_outs: Option<CutOutRow>,
-    /// Occluders that `hierarchical-z` draws: `all`, `nearest:64`.
-    pub occluders: String,
     /// The chain; each stage of [`FunnelReport::stages`] gets the items that it leaves.
     pub chain: Chain,
     /// Every stage with every back end.

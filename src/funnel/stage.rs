@@ -116,6 +116,13 @@ impl Chain {
         steps
     }
 
+    /// Returns `true` if a stage is timed by itself.
+    ///
+    /// The object stage is not where the occlusion stage does both.
+    pub fn is_separate(&self, stage: StageKind) -> bool {
+        stage != StageKind::Object || self.of(StageKind::Occlusion) == NONE
+    }
+
     /// All stages of whole items that the chain does not leave out.
     pub fn steps(&self) -> Vec<Step> {
         self.steps_before(StageKind::Triangle)

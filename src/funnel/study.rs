@@ -136,9 +136,9 @@ impl<'w> Study<'w> {
     /// The chain without each of its stages, from the rows of all stages.
     fn gains(&self, rows: &[StageRow]) -> Vec<Gain> {
         let timed = self.items.timed(self.chain);
-        let of_items = StageKind::OF_ITEMS.into_iter().filter(|&stage| {
-            self.chain.of(stage) != NONE && self.world.is_separate(self.chain, stage)
-        });
+        let of_items = StageKind::OF_ITEMS
+            .into_iter()
+            .filter(|&stage| self.chain.of(stage) != NONE && self.chain.is_separate(stage));
         let of_items = of_items.map(|stage| {
             let without = self.chain.clone().with(stage, NONE);
             let counts = [&self.steps, &without.steps()].map(|steps| self.items.mean_count(steps));
@@ -244,7 +244,6 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, Fu
             .cut_outs
             .zip(world.cut_outs.as_ref())
             .map(|(typed, made)| CutOutRow::new(typed, made)),
-        occluders: input.occluders.to_string(),
         chain: input.chain.clone(),
         gains: study.gains(&rows),
         stages: rows,

@@ -19,7 +19,7 @@ use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
-use crate::visibility::occlusion::{OccluderChoice, OccluderScene};
+use crate::visibility::occlusion::OccluderScene;
 use crate::visibility::region::Pvs;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
 
@@ -51,8 +51,6 @@ pub struct FunnelInput<'a> {
     pub protocol: &'a Protocol,
     /// Claimed visible regions of each region: a back end of the region stage.
     pub claim: Option<&'a Arc<Pvs>>,
-    /// Occluders that `hierarchical-z` draws.
-    pub occluders: OccluderChoice,
     /// Most boxes inside each item of a mesh, at least 1; `None` for [`BOXES`].
     pub inner_boxes: Option<usize>,
     /// Instruction set of every stage, and threads that compute the truth.
@@ -116,8 +114,6 @@ pub struct World<'a> {
     pub cut_outs: Option<fragment::Holes>,
     /// Occluders.
     pub hiders: Hiders,
-    /// Occluders that two passes draw.
-    pub choice: OccluderChoice,
     pub regions: Option<Regions>,
     /// Structures of the object stage under their labels.
     pub structures: Vec<(String, Box<dyn DynIndex>)>,
@@ -170,7 +166,6 @@ impl<'a> World<'a> {
             views,
             shape,
             cut_outs,
-            choice: input.occluders,
             regions,
             structures,
             only: (!input.all).then(|| input.chain.clone()),
@@ -244,14 +239,6 @@ impl<'a> World<'a> {
             frustum,
             Guarantee::Conservative,
         ))
-    }
-
-    /// Returns `true` if a stage of a chain is timed by itself.
-    ///
-    /// The object stage is not where the occlusion stage does both.
-    pub fn is_separate(&self, chain: &Chain, stage: StageKind) -> bool {
-        let occlusion = self.back_end(StageKind::Occlusion, chain.of(StageKind::Occlusion));
-        stage != StageKind::Object || !occlusion.does_object_stage
     }
 }
 
@@ -398,7 +385,6 @@ mod tests {
                 cache_bytes: 0,
             },
             claim: None,
-            occluders: OccluderChoice::All,
             inner_boxes: None,
             execution: Execution::default(),
             all: true,

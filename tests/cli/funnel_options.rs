@@ -1,4 +1,4 @@
-//! `funnel`: choice of occluders, boxes inside meshes, questions of picking.
+//! `funnel`: boxes inside meshes, questions of picking.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -68,26 +68,4 @@ fn more_boxes_inside_meshes_hide_more_and_lose_nothing() {
     }
     let help = works(Path::new("."), "funnel --help");
     assert!(help.contains(&format!("[default: {BOXES}]")), "{help}");
-}
-
-#[test]
-fn fewer_occluders_hide_less() {
-    let all = city_report();
-    assert_eq!(all["occluders"], "all");
-    for choice in ["nearest:1", "largest:1"] {
-        let few = report(&format!("{CITY} --occluders {choice}"));
-        assert_eq!(few["occluders"], choice);
-        let [left, more] = [all, &few]
-            .map(|report| number(row(report, "occlusion", "hierarchical-z"), "output_count"));
-        assert!(more > left, "{choice}: {more}, with all {left}");
-        // A walk of a tree draws what it comes upon.
-        let [same, again] = [all, &few]
-            .map(|report| number(row(report, "occlusion", "masked-inner"), "output_count"));
-        assert_eq!(same, again, "{choice}");
-    }
-    for wrong in ["nearest", "nearest:0", "best:3", "all:2"] {
-        let line = format!("{CITY} --occluders {wrong}");
-        let done = cullbench(Path::new("."), &line);
-        assert_refused(&done, "nearest:COUNT", wrong);
-    }
 }

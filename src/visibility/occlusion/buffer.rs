@@ -17,10 +17,6 @@ pub trait OcclusionBuffer {
     const GUARANTEE: Guarantee;
     /// The pixels of an occluder that are drawn.
     const COVERAGE: Coverage;
-    /// `true` if draws and tests may alternate.
-    ///
-    /// If not, [`OcclusionBuffer::finish`] separates them.
-    const ALTERNATES: bool;
 
     /// An empty buffer.
     fn new(grid: SampleGrid) -> Self;
@@ -30,9 +26,6 @@ pub trait OcclusionBuffer {
 
     /// Draws an occluder.
     fn draw<I: Isa>(&mut self, isa: I, outline: &Outline);
-
-    /// Prepares the buffer for tests, after all draws.
-    fn finish(&mut self) {}
 
     /// Returns `true` if what was drawn is nearer than the rectangle in all its pixels.
     ///

@@ -59,13 +59,8 @@ fn key(depth: u32, level: u16, block: u32) -> u64 {
 }
 
 impl<B: OcclusionBuffer> Interleaved<B> {
-    /// With a buffer that may be drawn into and asked in turn, on an instruction
-    /// set.
-    ///
-    /// # Panics
-    /// If the buffer may not.
+    /// With a buffer, on an instruction set.
     pub fn new(buffer: B, kernel: Kernel) -> Interleaved<B> {
-        assert!(B::ALTERNATES, "draws and tests alternate");
         Interleaved {
             buffer,
             kernel,

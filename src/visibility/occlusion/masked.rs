@@ -53,7 +53,6 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     } else {
         Coverage::Centre
     };
-    const ALTERNATES: bool = true;
 
     fn new(grid: SampleGrid) -> Self {
         let columns = (grid.width as usize).div_ceil(TILE_WIDTH);

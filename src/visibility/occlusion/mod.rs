@@ -1,8 +1,7 @@
 //! Occlusion stage: removes items in the view that other items hide.
 //!
 //! Back ends are buffers that occluders are drawn into ([`OcclusionBuffer`]), one per
-//! file, with two couplings: [`TwoPass`] (all occluders, then all candidates) and
-//! [`Interleaved`] (front to back, with its own tree).
+//! file; [`Interleaved`] draws and tests from front to back, with its own tree.
 //!
 //! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it
 //! enters it, between near and far; a box that some ray enters before the near
@@ -13,7 +12,6 @@
 //! the ground; neither are items.
 
 mod buffer;
-mod hierarchical_z;
 mod interleaved;
 mod masked;
 mod outline;
@@ -22,20 +20,17 @@ mod scene;
 #[cfg(test)]
 mod tests;
 mod trace;
-mod two_pass;
 mod view;
 mod zbuffer;
 
 pub use buffer::{CullStats, OcclusionBuffer};
-pub use hierarchical_z::HierarchicalZ;
 pub use interleaved::Interleaved;
 pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use outline::{Coverage, Outline};
 pub use rect::{Candidate, Rect, Rects};
 pub use scene::{Faces, Occluder, OccluderScene};
 #[cfg(test)]
-pub use tests::NoOcclusion;
+pub use tests::{NoOcclusion, TwoPass};
 pub use trace::FrameTrace;
-pub use two_pass::{OccluderChoice, TwoPass};
 pub use view::{Linear, Projection, View};
 pub use zbuffer::ZBuffer;

@@ -58,14 +58,6 @@ pub struct Rect {
     pub nearness: f32,
 }
 
-impl Rect {
-    /// Pixels.
-    #[inline(always)]
-    pub fn area(&self) -> u32 {
-        u32::from(self.x1 - self.x0 + 1) * u32::from(self.y1 - self.y0 + 1)
-    }
-}
-
 /// A box that may be hidden.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {

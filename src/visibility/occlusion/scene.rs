@@ -36,8 +36,6 @@ pub struct OccluderScene {
     occluders: Vec<Occluder>,
     /// First occluder of each position; at the end their number.
     first_occluders: Vec<u32>,
-    /// Position of each item in tree order.
-    positions: Vec<u32>,
     /// How many of the boxes are items; those behind them only hide.
     items: usize,
     bounds: WorldBox,
@@ -98,11 +96,9 @@ impl OccluderScene {
             let unions: Vec<Aabb> = last.iter().map(BoxBlock::union).collect();
             levels.push(blocks_of(&unions));
         }
-        let mut positions = vec![0; ids.len()];
         let mut occluders = Vec::with_capacity(by_number.len());
         let mut first_occluders = vec![0];
-        for (position, &id) in ids.iter().enumerate() {
-            positions[id as usize] = position as u32;
+        for &id in &ids {
             let first = by_number.partition_point(|(number, _)| *number < id);
             let own = by_number[first..].iter();
             occluders.extend(
@@ -116,7 +112,6 @@ impl OccluderScene {
             levels,
             occluders,
             first_occluders,
-            positions,
             items: ids.len(),
             ids,
             bounds,
@@ -140,11 +135,6 @@ impl OccluderScene {
         ((id as usize) < self.items).then_some(id)
     }
 
-    /// Numbers, behind those of the items, of what hides and is no item.
-    pub fn blocks(&self) -> std::ops::Range<ItemId> {
-        self.items as ItemId..self.ids.len() as ItemId
-    }
-
     /// World position of the zero of the boxes.
     pub fn origin(&self) -> DVec3 {
         self.origin
@@ -153,12 +143,6 @@ impl OccluderScene {
     /// The union of the boxes as they were written.
     pub fn bounds(&self) -> &WorldBox {
         &self.bounds
-    }
-
-    /// Position of an item in tree order.
-    #[inline(always)]
-    pub fn position(&self, item: ItemId) -> usize {
-        self.positions[item as usize] as usize
     }
 
     /// Number of levels, at least one.

@@ -82,7 +82,6 @@ impl OcclusionBuffer for Traced {
     const SUMMARY: &'static str = MaskedInner::SUMMARY;
     const GUARANTEE: Guarantee = MaskedInner::GUARANTEE;
     const COVERAGE: Coverage = MaskedInner::COVERAGE;
-    const ALTERNATES: bool = MaskedInner::ALTERNATES;
 
     fn new(grid: SampleGrid) -> Traced {
         Traced {

@@ -3,7 +3,7 @@
 use super::buffer::OcclusionBuffer;
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
-use crate::kernel::{Isa, LANES, each, first_lanes};
+use crate::kernel::{Isa, LANES, first_lanes};
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Nearness at the centre of each pixel; 0 where nothing was drawn.
@@ -13,35 +13,11 @@ pub struct ZBuffer {
     nearness: Vec<f32>,
 }
 
-impl ZBuffer {
-    /// Nearness at a pixel.
-    #[inline(always)]
-    pub(super) fn at(&self, x: usize, y: usize) -> f32 {
-        self.nearness[y * self.grid.width as usize + x]
-    }
-
-    /// Sets each pixel to the farthest of the four below it, or as many as there are.
-    pub(super) fn reduce(&mut self, below: &ZBuffer) {
-        let (width, height) = (self.grid.width as usize, self.grid.height as usize);
-        let last = [below.grid.width, below.grid.height].map(|size| size as usize - 1);
-        for y in 0..height {
-            let rows = [2 * y, (2 * y + 1).min(last[1])];
-            for x in 0..width {
-                let columns = [2 * x, (2 * x + 1).min(last[0])];
-                let least = |row: usize| below.at(columns[0], row).min(below.at(columns[1], row));
-                let [upper, lower] = each(rows, least);
-                self.nearness[y * width + x] = upper.min(lower);
-            }
-        }
-    }
-}
-
 impl OcclusionBuffer for ZBuffer {
     const SUMMARY: &'static str =
         "one depth per pixel, at its centre; every pixel of a box is tested";
     const GUARANTEE: Guarantee = Guarantee::Unproven;
     const COVERAGE: Coverage = Coverage::Centre;
-    const ALTERNATES: bool = true;
 
     fn new(grid: SampleGrid) -> Self {
         ZBuffer {

@@ -8,7 +8,7 @@
 //! Sight is defined by regions and openings alone: a line of sight leaves a region
 //! through an opening, and everything else on a region's border is opaque.
 //! Doors are open. Lines that only touch an edge of an opening see nothing; all back
-//! ends but the exact ones list what they touch too.
+//! ends list what they touch too.
 
 mod boxes;
 mod csr;
@@ -23,10 +23,8 @@ mod portal_clip;
 mod portal_rect;
 mod pvs;
 mod quake;
-mod rooms;
 mod row;
 mod search;
-mod stabbing_line;
 mod view;
 mod walk;
 
@@ -36,7 +34,6 @@ pub use id_set::{IdSet, RegionId};
 pub use items::RegionItems;
 pub use opening::{Opening, OpeningPlane, rectangle};
 pub use pvs::{Pvs, PvsError};
-pub use rooms::NotFlat;
 pub use row::{BACK_ENDS, BackEnd, EyePlace, RegionRow, Scratch, Source};
 #[cfg(test)]
 pub use tests::leads_through;

@@ -3,7 +3,6 @@
 use glam::{DVec2, DVec3};
 
 use super::id_set::RegionId;
-use super::stabbing_line::turn_by_rounding;
 
 /// The plane of an opening and its front side.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -27,6 +26,19 @@ pub enum OpeningPlane {
     Undirected,
 }
 
+/// Side of the line from `a` through `b` that the point `c` is on.
+///
+/// 1 for the left, -1 for the right, 0 if rounding hides it (Shewchuk 1997, "Adaptive
+/// precision floating-point arithmetic", section 4.2: the bound is the first stage of its
+/// orient2d).
+fn turn(a: DVec2, b: DVec2, c: DVec2) -> i32 {
+    const BOUND: f64 = 4.0 / (1u64 << 53) as f64;
+    let (left, right) = ((a.x - c.x) * (b.y - c.y), (a.y - c.y) * (b.x - c.x));
+    let determinant = left - right;
+    let bound = BOUND * (left.abs() + right.abs()) + f64::MIN_POSITIVE;
+    i32::from(determinant > bound) - i32::from(determinant < -bound)
+}
+
 /// An opening between two regions, in world coordinates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Opening {
@@ -44,10 +56,7 @@ impl Opening {
     pub fn side(&self, p: DVec3) -> i32 {
         match self.plane {
             OpeningPlane::Axis { axis, at } => i32::from(p[axis] > at) - i32::from(p[axis] < at),
-            OpeningPlane::Upright { from, to } => {
-                // Above zero: the point is left of the line.
-                -turn_by_rounding(from, to, p.truncate()).unwrap_or(0)
-            }
+            OpeningPlane::Upright { from, to } => -turn(from, to, p.truncate()),
             OpeningPlane::Undirected => 0,
         }
     }

@@ -1,5 +1,4 @@
-//! Pairs of regions that may see each other: one set per region. Made by an exact
-//! search, or read from a file: then it is a claim.
+//! Pairs of regions that may see each other: one set per region, as a file claims.
 
 use serde::Deserialize;
 

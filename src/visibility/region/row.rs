@@ -42,8 +42,6 @@ pub enum Source {
     Claim,
     /// The REJECT table of a map.
     Reject,
-    /// Pairs of rooms found by [`Pvs::of_rooms`].
-    Exact,
 }
 
 /// All back ends of the region stage.
@@ -58,22 +56,15 @@ pub const BACK_ENDS: &[BackEnd] = rows! { BackEnd { name, source, guarantee, sum
         "the row of the eye's region in a set of pairs, the map's own or read from a file";
     "reject", Source::Reject, Guarantee::Unproven,
         "the row of the eye's sector in the map's REJECT table";
-    "exact-pvs", Source::Exact, Guarantee::Conservative,
-        "regions seen from anywhere in the eye's region, exactly";
 };
-
-/// Most rooms for which the exact pairs are searched.
-const MOST_EXACT_ROOMS: usize = 4_096;
 
 impl BackEnd {
     /// Tests whether a scene has the regions that the back end needs.
     pub fn is_for(&self, scene: &Scene) -> bool {
         match (&scene.regions, self.source) {
-            (Regions::Tiling(_), Source::Reject) => false,
-            (Regions::Tiling(rooms), Source::Exact) => rooms.boxes.len() <= MOST_EXACT_ROOMS,
-            (Regions::Tiling(_), _) => true,
+            (Regions::Tiling(_), source) => source != Source::Reject,
             (Regions::Leaves(_), source) => source == Source::Claim,
-            (Regions::Bsp(map), source) => source != Source::Exact && map.disputes().is_empty(),
+            (Regions::Bsp(map), _) => map.disputes().is_empty(),
             _ => false,
         }
     }

@@ -20,7 +20,7 @@ use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::occlusion::{
-    Interleaved, MaskedInner, OccluderChoice, OccluderScene, OcclusionBuffer, TwoPass, View,
+    Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, TwoPass, View,
 };
 use crate::visibility::truth::{RayIndex, visible_by_random_rays};
 use crate::visibility::{Rays, Solids};
@@ -164,8 +164,8 @@ type BackEnd = (
     Box<dyn Fn(&OccluderScene, &View, &[ItemId]) -> Vec<ItemId>>,
 );
 
-/// Both couplings of a buffer; two-pass with every choice of occluders.
-fn answers<B: OcclusionBuffer + 'static>(kernel: Kernel, name: &str) -> Vec<BackEnd> {
+/// A buffer from front to back, and in two passes.
+fn answers<B: OcclusionBuffer + 'static>(kernel: Kernel, name: &str) -> [BackEnd; 2] {
     let walk: BackEnd = (
         name.to_owned(),
         Box::new(move |scene, view, _| {
@@ -174,23 +174,20 @@ fn answers<B: OcclusionBuffer + 'static>(kernel: Kernel, name: &str) -> Vec<Back
             kept
         }),
     );
-    let choices = [
-        ("two-pass", OccluderChoice::All),
-        ("two-pass-nearest-8", OccluderChoice::Nearest(8)),
-        ("two-pass-largest-8", OccluderChoice::Largest(8)),
-    ];
-    let two_passes = choices.map(|(coupling, choice)| -> BackEnd {
-        (
-            format!("{name}-{coupling}"),
-            Box::new(move |scene, view, in_view| {
-                let mut kept = Vec::new();
-                let mut two = TwoPass::new(B::new(view.grid), choice, kernel);
-                two.cull(scene, view, in_view, &mut kept);
-                kept
-            }),
-        )
-    });
-    std::iter::once(walk).chain(two_passes).collect()
+    let two_passes: BackEnd = (
+        format!("{name}-two-pass"),
+        Box::new(move |scene, view, items| {
+            let buffer = B::new(view.grid);
+            let two = TwoPass {
+                buffer,
+                scene,
+                view,
+                items,
+            };
+            two.kept(kernel)
+        }),
+    );
+    [walk, two_passes]
 }
 
 fn occlusion_rows(

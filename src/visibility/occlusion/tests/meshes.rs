@@ -114,7 +114,9 @@ fn only_what_hides_goes_on_beyond_the_bounds_of_the_scene() {
         Scene::from_boxes("three", &[unit(0.0, 0.0), unit(2.0, 0.0), unit(4.0, 1.0)]).unwrap();
     let mut inner: Vec<_> = (0..).zip(scene.items.iter().copied()).collect();
     let faces = |occluders: &OccluderScene, item| {
-        let [occluder] = occluders.occluders(occluders.position(item)) else {
+        let mut positions = 0..occluders.len();
+        let position = positions.find(|&at| occluders.item(at) == Some(item));
+        let [occluder] = occluders.occluders(position.expect("an item")) else {
             panic!("one each");
         };
         occluder.faces

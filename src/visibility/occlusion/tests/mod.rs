@@ -10,14 +10,16 @@ mod rules;
 mod slits;
 mod streets;
 mod traces;
+mod two_pass;
 mod windows;
 mod worlds;
 
-use super::{Interleaved, OccluderChoice, OcclusionBuffer, TwoPass, View};
+use super::{Interleaved, OcclusionBuffer, View};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use by_rays::Ready;
 pub use none::NoOcclusion;
+pub use two_pass::TwoPass;
 
 /// Number of cases of a long test: the environment variable, or `cases`.
 ///
@@ -26,31 +28,18 @@ fn case_count(variable: &str, cases: usize) -> usize {
     std::env::var(variable).map_or(cases, |n| n.parse().unwrap())
 }
 
-/// Items in view that are kept, in order, by each coupling.
-///
-/// Two passes first; then interleaved if the back end supports it.
-fn kept<B: OcclusionBuffer>(ready: &Ready, view: &View, kernel: Kernel) -> Vec<Vec<ItemId>> {
-    let mut answers = vec![by_two_passes::<B>(ready, view, OccluderChoice::All, kernel)];
-    if B::ALTERNATES {
-        let mut culler = Interleaved::new(B::new(view.grid), kernel).drawing_from(u32::MAX);
-        let mut kept = Vec::new();
-        culler.cull(&ready.occluders, view, &mut kept);
-        kept.sort_unstable();
-        answers.push(kept);
-    }
-    answers
-}
-
-fn by_two_passes<B: OcclusionBuffer>(
-    ready: &Ready,
-    view: &View,
-    choice: OccluderChoice,
-    kernel: Kernel,
-) -> Vec<ItemId> {
-    let candidates = ready.in_view(view.volume);
-    let mut culler = TwoPass::new(B::new(view.grid), choice, kernel);
-    let mut kept = Vec::new();
-    culler.cull(&ready.occluders, view, &candidates, &mut kept);
-    kept.sort_unstable();
-    kept
+/// Items in view that are kept, in order: by two passes, then interleaved.
+fn kept<B: OcclusionBuffer>(ready: &Ready, view: &View, kernel: Kernel) -> [Vec<ItemId>; 2] {
+    let two_passes = TwoPass {
+        buffer: B::new(view.grid),
+        scene: &ready.occluders,
+        view,
+        items: &ready.in_view(view.volume),
+    };
+    let mut culler = Interleaved::new(B::new(view.grid), kernel).drawing_from(u32::MAX);
+    let mut interleaved = Vec::new();
+    culler.cull(&ready.occluders, view, &mut interleaved);
+    let mut both = [two_passes.kept(kernel), interleaved];
+    both.iter_mut().for_each(|kept| kept.sort_unstable());
+    both
 }

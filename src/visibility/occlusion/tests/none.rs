@@ -15,7 +15,6 @@ impl OcclusionBuffer for NoOcclusion {
     const SUMMARY: &'static str = "hides nothing";
     const GUARANTEE: Guarantee = Guarantee::Conservative;
     const COVERAGE: Coverage = Coverage::Whole;
-    const ALTERNATES: bool = true;
 
     fn new(_: SampleGrid) -> Self {
         NoOcclusion

@@ -2,9 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::{
-    HierarchicalZ, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer,
-};
+use super::super::{MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer};
 use super::by_rays::{Ready, with_view};
 use super::kept;
 use crate::camera::{Camera, Frame, Lens};
@@ -55,9 +53,6 @@ fn a_wall_hides_what_is_behind_it_and_nothing_beside_it() {
         assert_eq!(kept_of::<MaskedInner>(&boxes, DVec3::ZERO, lens), [0, 2]);
         assert_eq!(kept_of::<MaskedCentre>(&boxes, DVec3::ZERO, lens), [0, 2]);
         assert_eq!(kept_of::<ZBuffer>(&boxes, DVec3::ZERO, lens), [0, 2]);
-        // Coarser ones need a larger wall.
-        let large = within_bounds(&[solid([10.0, -7.0, -9.0], [11.0, 7.0, 9.0]), behind]);
-        assert_eq!(kept_of::<HierarchicalZ>(&large, DVec3::ZERO, lens), [0]);
         assert_eq!(kept_of::<NoOcclusion>(&boxes, DVec3::ZERO, lens), [0, 1, 2]);
     }
 }

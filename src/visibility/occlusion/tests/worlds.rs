@@ -2,9 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::{
-    HierarchicalZ, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer,
-};
+use super::super::{MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer};
 use super::by_rays::{Ready, missing, point_between, seen_by_rays, with_view};
 use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
@@ -132,7 +130,6 @@ fn samples_at_centres_lose_what_rays_see() {
         let lost = [
             losses::<MaskedCentre>(0..300, 0.0, parallel).0,
             losses::<ZBuffer>(0..300, 0.0, parallel).0,
-            losses::<HierarchicalZ>(0..300, 0.0, parallel).0,
         ];
         assert!(
             lost.iter().all(|&lost| lost > 0),

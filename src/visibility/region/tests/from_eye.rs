@@ -47,9 +47,10 @@ pub fn missing(row: &RegionRow, truth: &RegionGraph, eyes: usize, seed: u64) -> 
 #[test]
 fn a_stored_row_answers_what_is_stored() {
     let (_, graph) = rooms("rooms:n=1600,seed=1");
-    let pvs = Arc::new(Pvs::of_rooms(&graph).unwrap());
-    let stored = RegionRow::stored(Source::Exact, graph.clone(), pvs.clone()).unwrap();
     let (mut rng, mut scratch, mut homes) = (SeededRng::new(8), Scratch::default(), Vec::new());
+    let some = Pvs::of_pairs(graph.len(), |from, to| (from * 7 + to * 3) % 5 < 2);
+    let pvs = Arc::new(some.unwrap());
+    let stored = RegionRow::stored(Source::Claim, graph.clone(), pvs.clone()).unwrap();
     let [mut answer, mut wanted] = [Vec::new(), Vec::new()];
     for _ in 0..200 {
         let rays = eye_in(&graph, &mut rng);
@@ -179,5 +180,4 @@ fn openings_with_a_thickness_are_seen_through() {
     };
     assert_eq!(answers(DVec3::X), [3, 3, 3]);
     assert_eq!(answers(DVec3::NEG_X), [1, 1, 1]);
-    assert_eq!(Pvs::of_rooms(&graph).unwrap_err(), NotFlat(0));
 }

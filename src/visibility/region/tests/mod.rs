@@ -5,7 +5,6 @@ mod doom_surfaces;
 mod from_eye;
 mod items;
 mod quake;
-mod rooms;
 mod sight;
 mod stress;
 pub(super) mod worlds;

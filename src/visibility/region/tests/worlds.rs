@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::{IdSet, Opening, OpeningPlane, Pvs, RegionGraph, rectangle};
+use super::super::{Opening, OpeningPlane, RegionGraph, rectangle};
 use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::visibility::{Ray, Rays};
@@ -34,36 +34,6 @@ pub fn looking(eye: DVec3, rng: &mut SeededRng) -> Rays {
     let frame = Frame::looking_along(eye, forward, DVec3::Z).unwrap();
     let lens = Lens::perspective(60.0, 16.0 / 9.0, 0.05, None).unwrap();
     Rays::of(&Camera { frame, lens }).unwrap()
-}
-
-/// Pairs of regions that random rays, each from a random point of a region, join.
-pub fn joined_by_rays(graph: &RegionGraph, rays: usize, seed: u64) -> Pvs {
-    let mut rng = SeededRng::new(seed);
-    let mut pvs = Pvs::alone(graph.len());
-    let (mut seen, mut list) = (IdSet::default(), Vec::new());
-    for i in 0..rays {
-        let from = (i % graph.len()) as u32;
-        let b = graph.parts(from)[0];
-        let at = DVec3::new(rng.unit(), rng.unit(), rng.unit());
-        let ray = Ray {
-            origin: b.min + (b.max - b.min) * at,
-            direction: DVec3::new(
-                rng.normal(),
-                rng.normal(),
-                rng.normal() * [0.05, 1.0][i % 2],
-            ),
-            near: 0.0,
-            far: f64::INFINITY,
-        };
-        seen.clear(graph.len());
-        graph.ground().follow(graph, &ray, &mut seen);
-        seen.list(&mut list);
-        // All of one ray see each other.
-        for &a in &list {
-            list.iter().for_each(|&b| pvs.insert(a, b));
-        }
-    }
-    pvs
 }
 
 /// The first solid that a ray enters, or none.
@@ -123,14 +93,4 @@ pub fn without_opening(graph: &RegionGraph, index: usize) -> RegionGraph {
     openings.remove(index);
     let regions = (0..graph.len() as u32).map(|r| graph.parts(r).to_vec());
     RegionGraph::new(&regions.collect::<Vec<_>>(), openings, graph.ground.clone())
-}
-
-/// Number of ordered pairs, each region with itself included.
-pub fn pairs(pvs: &Pvs) -> u64 {
-    let mut row = Vec::new();
-    let count = |from| {
-        pvs.row(from).list(&mut row);
-        row.len() as u64
-    };
-    (0..pvs.len() as u32).map(count).sum()
 }

@@ -1,35 +1,20 @@
-//! One cone per cluster as meshoptimizer computes and tests it.
+//! One cone per cluster in f32 without a term for rounding: a row that loses triangles.
 //!
-//! One cluster at a time, in f32 without a term for rounding: a stand-in, written from the formulas in the
-//! documentation of `meshopt_computeClusterBounds`, and the cones of the crate `meshopt`
-//! (Kapoulkine's meshoptimizer) itself.
+//! After the documentation of `meshopt_computeClusterBounds` (Kapoulkine's meshoptimizer).
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::clusters::Clusters;
-use super::contract::{TriangleCull, TriangleRow};
-use super::eye::Eye;
-use super::selection::Selection;
+use super::super::{Clusters, Eye, Selection, TriangleCull, TriangleRow};
 use crate::kernel::Kernel;
 use crate::visibility::Guarantee;
 
-/// The row of the cones fitted here.
 pub const ROW: TriangleRow = TriangleRow {
     name: "cone-f32",
-    summary: "One normal cone per cluster as meshoptimizer tests it (stand-in, scalar)",
+    summary: "One normal cone per cluster as meshoptimizer tests it",
     guarantee: Guarantee::Unproven,
     build: |clusters| Box::new(PlainCones::of(clusters)),
-};
-
-/// The row of the crate.
-#[cfg(feature = "peers")]
-pub const ROW_MESHOPT: TriangleRow = TriangleRow {
-    name: "meshopt",
-    summary: "One cone per cluster: crate meshopt's bounds and documented test, scalar",
-    guarantee: Guarantee::Unproven,
-    build: |clusters| Box::new(PlainCones::by_meshopt(clusters)),
 };
 
 /// Below this cosine a cone is taken for useless.
@@ -52,37 +37,11 @@ pub struct PlainCones {
 impl PlainCones {
     /// One cone per cluster, fitted here. O(t).
     pub fn of(clusters: &Arc<Clusters>) -> PlainCones {
-        PlainCones::by(clusters, |cluster| {
+        let cone = |cluster| {
             let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
-            PlainCone::of(&triangles)
-        })
-    }
-
-    /// One cone per cluster, fitted by the crate. O(t).
-    #[cfg(feature = "peers")]
-    pub fn by_meshopt(clusters: &Arc<Clusters>) -> PlainCones {
-        let surfaces = &clusters.surfaces;
-        let points: Vec<[f32; 3]> = surfaces.points.iter().map(|p| p.to_array()).collect();
-        let bytes: &[u8] = bytemuck::cast_slice(&points);
-        let vertices = meshopt::VertexDataAdapter::new(bytes, size_of::<[f32; 3]>(), 0)
-            .expect("points are whole triples");
-        PlainCones::by(clusters, |cluster| {
-            let triangles = clusters.triangles_of(cluster).iter();
-            let corners = triangles.flat_map(|&t| surfaces.triangles[t as usize]);
-            let corners: Vec<u32> = corners.collect();
-            let bounds = meshopt::compute_cluster_bounds(&corners, &vertices);
-            Some(PlainCone {
-                apex: bounds.cone_apex.into(),
-                axis: bounds.cone_axis.into(),
-                cutoff: bounds.cone_cutoff,
-            })
-        })
-    }
-
-    fn by(clusters: &Clusters, fit: impl Fn(usize) -> Option<PlainCone>) -> PlainCones {
-        let cone = |cluster| match clusters.is_two_sided(cluster) {
-            true => PlainCone::NEVER,
-            false => fit(cluster).unwrap_or(PlainCone::NEVER),
+            let is_fitted = !clusters.is_two_sided(cluster);
+            let fitted = is_fitted.then(|| PlainCone::of(&triangles)).flatten();
+            fitted.unwrap_or(PlainCone::NEVER)
         };
         PlainCones {
             cones: (0..clusters.len()).map(cone).collect(),
