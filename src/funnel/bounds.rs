@@ -8,8 +8,7 @@ use std::rc::Rc;
 
 use serde::Serialize;
 
-use super::back_ends::{MASKED_INNER, PORTAL_CLIP, Z};
-use super::stage::{Chain, StageKind};
+use super::stage::{Chain, MASKED_INNER, PORTAL_CLIP, StageKind, Z};
 use super::task::{FunnelKey, KeyedTask, KeyedTimes};
 use super::triangle_stage::TriangleStage;
 use super::world::{View, World};

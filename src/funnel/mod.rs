@@ -6,18 +6,12 @@
 //! that differs from it in one stage: [`prepare`] counts, [`time`] measures in each
 //! process, [`Prepared::conclude`] combines both.
 
-mod back_ends;
 mod bounds;
-mod conclusions;
-mod counts;
 mod error;
 mod fragment_stage;
 mod item_stages;
-mod mirror;
 mod orders;
 mod picks;
-mod plan_view;
-mod regions;
 mod report;
 mod stage;
 mod study;
@@ -27,26 +21,25 @@ mod triangle_stage;
 mod truth;
 mod world;
 
-pub use back_ends::{back_ends, left_out_of};
 pub use bounds::BoundRow;
-#[cfg(test)]
-pub(crate) use counts::Errors;
+pub(crate) use error::check_memory;
 pub use fragment_stage::FragmentCounts;
+pub use item_stages::Fate;
+pub(crate) use item_stages::Run;
 pub use orders::OrderRow;
 pub use picks::PickRow;
-pub use plan_view::Fate;
 pub use report::{FunnelReport, Gain, LevelRow, StageRow};
-#[cfg(test)]
-pub(crate) use stage::BackEnd;
-pub use stage::{Chain, NONE, StageKind};
+pub use stage::{Chain, NONE, StageKind, back_ends, left_out_of};
+pub(crate) use stage::{OCCLUSION_ROWS, PORTAL_CLIP};
 pub use study::{failure, prepare, time};
 pub use sweep::{StageSweep, SweepPoint, prepare_sweep, time_sweep};
 pub use task::FunnelPlan;
 pub use triangle_stage::BYTES_PER_TRIANGLE;
 pub(crate) use truth::RaysEnd;
 pub use world::FunnelInput;
-
-pub(crate) use back_ends::{OCCLUSION_ROWS, PORTAL_CLIP};
-pub(crate) use error::check_memory;
-pub(crate) use item_stages::Run;
 pub(crate) use world::{Shape, World};
+
+#[cfg(test)]
+pub(crate) use stage::BackEnd;
+#[cfg(test)]
+pub(crate) use truth::Errors;

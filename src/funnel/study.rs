@@ -2,22 +2,17 @@
 //!
 //! All are compared with the truth, then timed side by side in one or more processes.
 
-use super::back_ends::{Z, default_test, left_out_of};
 use super::bounds::{bounds, covered_key};
-use super::conclusions::conclusions;
-use super::counts::Errors;
 use super::error::{FunnelError, LeftOutRow, check_memory};
-use super::fragment_stage::{FragmentCounts, FragmentStage, Tested};
-use super::item_stages::ItemStages;
-use super::mirror::mirrored;
+use super::fragment_stage::{FragmentCounts, FragmentStage, Tested, mirrored};
+use super::item_stages::{ItemStages, PlanView};
 use super::orders::Orders;
 use super::picks::Picks;
-use super::plan_view::PlanView;
-use super::report::{CutOutRow, FunnelReport, Gain, StageRow};
-use super::stage::{Chain, NONE, StageKind, Step};
+use super::report::{CutOutRow, FunnelReport, Gain, StageRow, conclusions};
+use super::stage::{Chain, NONE, StageKind, Step, Z, default_test, left_out_of};
 use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
-use super::truth::{Truth, visible};
+use super::truth::{Errors, Truth, visible};
 use super::world::{FunnelInput, World};
 use crate::input::gigabytes;
 use crate::measure::{ProcessTimes, Verdict};

@@ -6,14 +6,12 @@
 
 use serde::Serialize;
 
-use super::back_ends::OCCLUSION_ROWS;
-use super::counts::{Errors, ViewCounts, count_items};
 use super::error::FunnelError;
 use super::item_stages::{ItemStages, Run};
-use super::stage::{BackEnd, Chain, NONE, StageKind, Step};
+use super::stage::{BackEnd, Chain, NONE, OCCLUSION_ROWS, StageKind, Step};
 use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
-use super::truth::{Truth, visible};
+use super::truth::{Errors, Truth, ViewCounts, count_items, visible};
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, ProcessTimes};
 use crate::query::ItemId;

@@ -8,10 +8,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::counts::ViewCounts;
 use super::item_stages::ItemStages;
 use super::stage::{NONE, StageKind, Step};
 use super::task::{FunnelKey, KeyedTask};
+use super::truth::ViewCounts;
 use super::world::{Shape, World};
 use crate::camera::Camera;
 use crate::kernel::Kernel;

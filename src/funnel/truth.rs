@@ -1,15 +1,17 @@
-//! Exactly visible items of each view.
+//! Exactly visible items of each view, and counts of a stage against them.
 //!
 //! Solid boxes are boxes to rays, meshes and maps are triangles.
+
+use serde::Serialize;
 
 use super::error::{FunnelError, most_drawn};
 use super::world::{Shape, World};
 use crate::query::ItemId;
-use crate::visibility::fragment;
+use crate::statistics::{Rate, rate};
 use crate::visibility::truth::{
     RayIndex, SampleTruth, SolidBox, SurfaceIndex, visible_by_random_rays,
 };
-use crate::visibility::{Rays, SampleGrid};
+use crate::visibility::{Rays, SampleGrid, fragment};
 
 /// Samples that estimate how many items are in front at all samples.
 const FEW: SampleGrid = SampleGrid::new(16, 9);
@@ -104,5 +106,156 @@ impl RaysEnd<'_> {
             RaysEnd::Boxes(index, _) => visible_by_random_rays(index, rays, count, seed, threads),
             RaysEnd::Triangles(index) => visible_by_random_rays(index, rays, count, seed, threads),
         }
+    }
+}
+
+/// One view of one stage.
+#[derive(Clone, Copy, Default, PartialEq, Debug)]
+pub struct ViewCounts {
+    /// Candidates.
+    pub input: u64,
+    /// Returned candidates.
+    pub output: u64,
+    /// Candidates that are not visible.
+    pub hidden: u64,
+    /// Visible items.
+    pub truth: u64,
+    /// Returned, though not visible.
+    pub false_positives: u64,
+    /// Visible, and not returned.
+    pub false_negatives: u64,
+    /// Samples whose front item is not returned.
+    pub missing_samples: u64,
+    /// The most of them of one item.
+    pub worst_missing_samples: u64,
+    /// Samples with an item in front.
+    pub samples: u64,
+}
+
+/// Counts of a stage that got `input` (`None`: `all` items) and returned `output`.
+///
+/// `visible` are the visible items with the samples of each. All lists are ascending.
+pub fn count_items(
+    input: Option<&[ItemId]>,
+    all: usize,
+    output: &[ItemId],
+    visible: &[(ItemId, u32)],
+) -> ViewCounts {
+    let is_given = |item: &ItemId| input.is_none_or(|input| input.binary_search(item).is_ok());
+    let given = visible.iter().filter(|(item, _)| is_given(item)).count() as u64;
+    let input = input.map_or(all, <[ItemId]>::len) as u64;
+    let mut counts = ViewCounts {
+        input,
+        hidden: input - given,
+        output: output.len() as u64,
+        truth: visible.len() as u64,
+        ..ViewCounts::default()
+    };
+    for &(item, samples) in visible {
+        let samples = u64::from(samples);
+        counts.samples += samples;
+        if output.binary_search(&item).is_err() {
+            counts.false_negatives += 1;
+            counts.missing_samples += samples;
+            counts.worst_missing_samples = counts.worst_missing_samples.max(samples);
+        }
+    }
+    counts.false_positives = counts.output + counts.false_negatives - counts.truth;
+    counts
+}
+
+/// Errors of a stage over all views. Counts are means per view.
+#[derive(Clone, Debug, Serialize)]
+pub struct Errors {
+    /// Candidates: items or triangles.
+    pub input_count: f64,
+    /// Returned candidates.
+    pub output_count: f64,
+    /// Visible ones.
+    pub truth_count: f64,
+    /// Returned, though not visible.
+    pub false_positive_count: f64,
+    /// Visible, and not returned.
+    pub false_negative_count: f64,
+    /// False positives / visible, by view.
+    pub excess: Option<Rate>,
+    /// False negatives / visible, by view.
+    pub missing: Option<Rate>,
+    /// Share of the samples whose front item is missing, by view.
+    pub image_error: Option<Rate>,
+    /// Most samples that one missing item is in front at.
+    pub worst_missing_samples: u64,
+    /// Longest run of consecutive views that each lack a visible item.
+    pub longest_missing_streak: usize,
+    /// Share of the candidates that are not visible that the stage removed.
+    pub removed_share: Option<Rate>,
+}
+
+impl Errors {
+    /// Errors over the views of a path, in its order.
+    pub fn of(views: &[ViewCounts]) -> Errors {
+        let mean = |of: fn(&ViewCounts) -> u64| {
+            views.iter().map(|view| of(view) as f64).sum::<f64>() / views.len().max(1) as f64
+        };
+        let share = |of: fn(&ViewCounts) -> [u64; 2]| {
+            let clusters = views.iter().map(|v| of(v).map(|n| n as f64));
+            rate(&clusters.collect::<Vec<_>>())
+        };
+        let streaks = views.split(|view| view.false_negatives == 0);
+        let worst = views.iter().map(|v| v.worst_missing_samples).max();
+        Errors {
+            input_count: mean(|v| v.input),
+            output_count: mean(|v| v.output),
+            truth_count: mean(|v| v.truth),
+            false_positive_count: mean(|v| v.false_positives),
+            false_negative_count: mean(|v| v.false_negatives),
+            excess: share(|v| [v.false_positives, v.truth]),
+            missing: share(|v| [v.false_negatives, v.truth]),
+            image_error: share(|v| [v.missing_samples, v.samples]),
+            worst_missing_samples: worst.unwrap_or(0),
+            longest_missing_streak: streaks.map(<[_]>::len).max().unwrap_or(0),
+            removed_share: share(|v| [v.hidden.saturating_sub(v.false_positives), v.hidden]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_counted_by_item_and_by_sample() {
+        let visible = [(2, 10), (5, 1), (9, 4)];
+        let counts = count_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 3, 9], &visible);
+        assert_eq!((counts.false_positives, counts.false_negatives), (2, 1));
+        assert_eq!(
+            (counts.missing_samples, counts.worst_missing_samples),
+            (1, 1)
+        );
+        assert_eq!((counts.samples, counts.truth), (15, 3));
+        assert_eq!((counts.input, counts.hidden), (5, 3));
+        assert_eq!(count_items(None, 12, &[], &visible).false_negatives, 3);
+        assert_eq!(count_items(None, 12, &[1, 4], &[]).false_positives, 2);
+    }
+
+    #[test]
+    fn streaks_are_of_views_one_after_the_other() {
+        let view = |false_negatives| ViewCounts {
+            input: 10,
+            hidden: 6,
+            output: 6,
+            truth: 4,
+            false_positives: 2 + false_negatives,
+            false_negatives,
+            ..ViewCounts::default()
+        };
+        let errors = Errors::of(&[1, 0, 2, 1, 0].map(view));
+        assert_eq!(errors.longest_missing_streak, 2);
+        assert_eq!(errors.false_negative_count, 0.8);
+        assert_eq!(errors.missing.unwrap().value, 0.2);
+        assert_eq!(
+            Errors::of(&[view(0)]).removed_share.unwrap().value,
+            4.0 / 6.0
+        );
     }
 }

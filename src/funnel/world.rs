@@ -4,10 +4,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::back_ends::{OCCLUSION_ROWS, back_ends};
 use super::error::{FunnelError, check_memory};
-use super::regions::Regions;
-use super::stage::{BackEnd, Chain, NONE, StageKind};
+use super::stage::{BackEnd, Chain, NONE, OCCLUSION_ROWS, StageKind, back_ends};
 use crate::camera::{CameraError, PlaneOptions};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
@@ -15,12 +13,13 @@ use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::{ItemShape, Scene, Surfaces};
+use crate::scene::{self, Dispute, ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::OccluderScene;
-use crate::visibility::region::Pvs;
+use crate::visibility::region::doom::DoomMap;
+use crate::visibility::region::{BACK_ENDS, Pvs, RegionGraph, RegionItems, RegionRow, Source};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
 
 /// Bytes per item of structure, solids, occluders and trees for rays.
@@ -344,6 +343,73 @@ fn regions(input: &FunnelInput) -> Result<Option<Regions>, FunnelError> {
         }
     };
     Err(FunnelError::Refused(refused))
+}
+
+/// Rooms of a scene, or sectors or clusters of its map.
+pub struct Regions {
+    /// Regions and the openings between them.
+    pub graph: Arc<RegionGraph>,
+    /// Items of each region.
+    pub items: RegionItems,
+    rows: Vec<RegionRow>,
+}
+
+impl Regions {
+    /// Back ends of a scene; `Err` without regions, with the dispute of a map whose
+    /// linedefs contradict each other.
+    pub fn of(scene: &Scene) -> Result<Regions, Option<Dispute>> {
+        let map = DoomMap::of_scene(scene);
+        let graph = Arc::new(match (&map, &scene.regions) {
+            (Some(map), _) => map.graph().map_err(Some)?,
+            (None, scene::Regions::Leaves(map)) => RegionGraph::of_quake(map),
+            (None, _) => RegionGraph::of_scene(scene).map_err(|_| None)?,
+        });
+        let searches = [Source::Flood, Source::PortalRect, Source::PortalClip];
+        let is_for = |source| {
+            BACK_ENDS
+                .iter()
+                .any(|row| row.source == source && row.is_for(scene))
+        };
+        let mut regions = Regions {
+            rows: searches
+                .into_iter()
+                .filter(|&source| is_for(source))
+                .map(|source| RegionRow::search(source, graph.clone()))
+                .collect(),
+            items: RegionItems::of(&graph, scene),
+            graph,
+        };
+        if let Some(reject) = map.and_then(|map| map.reject()) {
+            regions.store(Arc::new(reject), Source::Reject);
+        }
+        if let scene::Regions::Leaves(map) = &scene.regions
+            && let Some(seen) = Pvs::of_quake(map)
+        {
+            regions.store(Arc::new(seen), Source::Claim);
+        }
+        Ok(regions)
+    }
+
+    /// Adds a claimed table, in place of the map's own.
+    ///
+    /// False if it has another number of regions.
+    pub fn claim(&mut self, claim: &Arc<Pvs>) -> bool {
+        self.store(claim.clone(), Source::Claim)
+    }
+
+    fn store(&mut self, pvs: Arc<Pvs>, source: Source) -> bool {
+        let row = RegionRow::stored(source, self.graph.clone(), pvs);
+        let fits = row.is_some();
+        self.rows
+            .retain(|row| row.back_end.source != source || !fits);
+        self.rows.extend(row);
+        fits
+    }
+
+    /// The back end of a name.
+    pub fn row(&self, name: &str) -> Option<&RegionRow> {
+        self.rows.iter().find(|row| row.back_end.name == name)
+    }
 }
 
 #[cfg(test)]

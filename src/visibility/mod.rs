@@ -5,7 +5,6 @@
 //! `truth`. Nothing here is timed or printed.
 
 pub mod fragment;
-mod guarantee;
 pub mod hiders;
 pub mod inscribed;
 mod items;
@@ -19,7 +18,8 @@ mod solids;
 pub mod triangle;
 pub mod truth;
 
-pub use guarantee::Guarantee;
+use serde::Serialize;
+
 pub use items::{holes_of, surfaces_of};
 pub use level::{Level, LevelMap};
 pub use rays::{Ray, Rays, SampleGrid};
@@ -27,3 +27,27 @@ pub use solids::Solids;
 
 #[cfg(test)]
 mod tests_extremes;
+
+named! {
+    /// Guarantee that a back end declares of its answers and that tests check.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    #[non_exhaustive]
+    pub enum Guarantee {
+        /// The visible set itself.
+        Exact = "exact",
+        /// A superset of the items that are visible along any ray.
+        Conservative = "conservative",
+        /// The set that the rays of a sample grid see.
+        SampleExact = "sample-exact",
+        /// Nothing: visible items may be missing.
+        Unproven = "unproven",
+    }
+}
+
+impl Guarantee {
+    /// Returns `true` if no visible item is ever missing.
+    pub fn is_safe(self) -> bool {
+        matches!(self, Guarantee::Exact | Guarantee::Conservative)
+    }
+}

@@ -3,6 +3,9 @@
 //! Direction and origin of a ray are f64, rounded once and exact from there on, so that
 //! every back end and the truth test the same line.
 
+use std::cmp::Ordering;
+use std::fmt::Debug;
+
 use glam::DVec3;
 
 use crate::camera::{Camera, CameraError};
@@ -133,6 +136,21 @@ impl Rays {
         let at = |index: u32, count: u32| (f64::from(index) + 0.5) / f64::from(count);
         self.through(at(column, grid.width), at(row, grid.height))
     }
+}
+
+/// A ray prepared for exact tests against one kind of body.
+pub trait Along: Copy {
+    /// A point of the ray on the surface of a body.
+    type At: Copy + Debug;
+
+    /// Exact order of two such points along the ray.
+    fn order(&self, a: &Self::At, b: &Self::At) -> Ordering;
+
+    /// Depth of a point, rounded.
+    fn depth(at: &Self::At) -> f64;
+
+    /// Upper bound of the true depth of a point.
+    fn at_most(at: &Self::At) -> f64;
 }
 
 #[cfg(test)]

@@ -2,11 +2,9 @@
 //!
 //! Counts the fragments that each test lets through.
 
-use super::canvas::{Canvas, Fragment, Visited};
-use super::depth::DepthBuffer;
-use super::mask::Holes;
+use super::canvas::{Canvas, DepthBuffer, Fragment, Stencil, Visited};
+use super::cut_outs::Holes;
 use super::order::Piece;
-use super::stencil::Stencil;
 use crate::query::ItemId;
 use crate::scene::{SurfaceKind, Surfaces};
 use crate::visibility::Solids;

@@ -1,14 +1,20 @@
 //! Errors of an order, by the exact order of depths at each sample.
+//!
+//! Items of triangles are drawn in several orders at once, ray by ray; counts are those of
+//! boxes. An item at a sample is one fragment, where the ray meets it first. Every item is
+//! taken for solid; a one-sided triangle is met from its front only.
 
 use std::cmp::Ordering;
 
+use glam::DVec3;
+
 use super::canvas::Canvas;
-use super::cycles::items_in_cycles;
-use super::draw::Tests;
-use super::order::Piece;
+use super::draw::{Tally, Tests};
+use super::order::{DepthOrder, Part, Piece};
+use crate::kernel::each;
 use crate::query::ItemId;
-use crate::visibility::Solids;
-use crate::visibility::truth::Crossing;
+use crate::visibility::truth::{Crossing, Meeting, SurfaceIndex, TriangleProbe};
+use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// The errors of an order that should be front to back.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
@@ -188,6 +194,151 @@ fn sort_and_dedup(pairs: &mut Vec<(ItemId, ItemId)>) {
     pairs.dedup();
 }
 
+/// When each part of each item is drawn.
+struct Ranks {
+    /// Leaf (or none) and place in the list of each part, by item.
+    of: Vec<Vec<(Option<u32>, u32)>>,
+}
+
+impl Ranks {
+    fn of(pieces: &[Piece], items: usize) -> Ranks {
+        let mut ranks = vec![Vec::new(); items];
+        for (piece, when) in pieces.iter().zip(0..) {
+            let leaf = match piece.part {
+                Some(Part::InLeaf(leaf)) => Some(leaf),
+                _ => None,
+            };
+            ranks[piece.item as usize].push((leaf, when));
+        }
+        Ranks { of: ranks }
+    }
+
+    /// Place in the list at which an item is drawn at a point.
+    ///
+    /// A point that rounding has put into a leaf without a part of it counts with its first part.
+    fn when(&self, item: ItemId, leaf: impl FnOnce() -> Option<u32>) -> Option<u32> {
+        let parts = &self.of[item as usize];
+        let first = parts.first()?;
+        if first.0.is_none() {
+            return Some(first.1);
+        }
+        let leaf = leaf();
+        let found = parts.iter().find(|part| part.0 == leaf);
+        Some(found.unwrap_or(first).1)
+    }
+}
+
+/// Cost and errors of several orders of the items that are left.
+///
+/// `left` has their ids among those of `index`, ascending; pieces are numbered by the place
+/// there. O(fragments log layers) and the pairs that are looked at.
+pub fn draw_surfaces(
+    rays: &Rays,
+    grid: SampleGrid,
+    index: &SurfaceIndex,
+    origin: DVec3,
+    left: &[ItemId],
+    orders: &[(&dyn DepthOrder, Vec<Piece>)],
+) -> Vec<(Tally, Result<OrderErrors, TooManyPairs>)> {
+    let ranks: Vec<Ranks> = orders
+        .iter()
+        .map(|(_, pieces)| Ranks::of(pieces, left.len()))
+        .collect();
+    let mut counts: Vec<_> = orders
+        .iter()
+        .map(|_| (Tally::default(), ErrorCount::default()))
+        .collect();
+    let mut layers: Vec<Layer<Meeting>> = Vec::new();
+    for (row, column) in (0..grid.height).flat_map(|row| (0..grid.width).map(move |c| (row, c))) {
+        let ray = rays.sample(grid, column, row);
+        let probe = TriangleProbe::new(ray, origin);
+        let mut met = index.all_along(&ray);
+        met.retain_mut(|(item, _)| {
+            let place = left.binary_search(item);
+            *item = place.unwrap_or_default() as ItemId;
+            place.is_ok()
+        });
+        met.sort_unstable_by(|(a, at_a), (b, at_b)| a.cmp(b).then(probe.compare(at_a, at_b)));
+        met.dedup_by_key(|(item, _)| *item);
+        for (((order, _), ranks), (tally, errors)) in orders.iter().zip(&ranks).zip(&mut counts) {
+            layers.clear();
+            layers.extend(met.iter().filter_map(|&(item, at)| {
+                let leaf = || {
+                    let [a, b, c] = each(at.corners(), |p| p.as_dvec3());
+                    let point = (ray.origin - origin) + ray.direction * at.depth;
+                    order.leaf(point, (b - a).cross(c - a))
+                };
+                let when = ranks.when(item, leaf)?;
+                Some(Layer { when, item, at })
+            }));
+            errors.sample(&mut layers, |a, b| probe.compare(a, b));
+            tally.fragments += layers.len() as u64;
+            tally.covered += u64::from(!layers.is_empty());
+            // The z-test: nearer than all before, of a tie the lower id.
+            let mut front: Option<&Layer<Meeting>> = None;
+            for layer in &layers {
+                let passes = front.is_none_or(|front| {
+                    let order = probe.compare(&layer.at, &front.at);
+                    order.then(layer.item.cmp(&front.item)).is_lt()
+                });
+                if passes {
+                    tally.passed += 1;
+                    front = Some(layer);
+                }
+            }
+        }
+    }
+    let all = counts.into_iter();
+    all.map(|(tally, errors)| (tally, errors.all())).collect()
+}
+
+/// Number of items on cycles of `before` pairs.
+///
+/// Those of strongly connected components of more than one item (Kosaraju; Sharir 1981). O(pairs log pairs).
+pub(super) fn items_in_cycles(before: &[(ItemId, ItemId)]) -> usize {
+    let mut items: Vec<ItemId> = before.iter().flat_map(|&(a, b)| [a, b]).collect();
+    items.sort_unstable();
+    items.dedup();
+    let node = |item| items.binary_search(&item).expect("an item of a pair");
+    let (mut next, mut previous) = (vec![Vec::new(); items.len()], vec![Vec::new(); items.len()]);
+    for &(a, b) in before {
+        let (a, b) = (node(a), node(b));
+        next[a].push(b);
+        previous[b].push(a);
+    }
+    let (mut seen, mut finished) = (vec![false; items.len()], Vec::new());
+    for root in 0..items.len() {
+        finish(&next, root, &mut seen, &mut finished);
+    }
+    seen.fill(false);
+    let components = finished.iter().rev().map(|&root| {
+        let mut component = Vec::new();
+        finish(&previous, root, &mut seen, &mut component);
+        component.len()
+    });
+    components.filter(|&nodes| nodes > 1).sum()
+}
+
+/// Appends the unseen nodes that are reached from a root, successors first.
+fn finish(next: &[Vec<usize>], root: usize, seen: &mut [bool], finished: &mut Vec<usize>) {
+    if std::mem::replace(&mut seen[root], true) {
+        return;
+    }
+    // Nodes, each with the number of its successors that are done.
+    let mut calls = vec![(root, 0)];
+    while let Some((at, done)) = calls.last_mut() {
+        match next[*at].get(*done) {
+            Some(&to) => {
+                *done += 1;
+                if !std::mem::replace(&mut seen[to], true) {
+                    calls.push((to, 0));
+                }
+            }
+            None => finished.extend(calls.pop().map(|(node, _)| node)),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
@@ -252,5 +403,21 @@ mod tests {
         assert_eq!(count.looked_at, 499_500);
         count.sample(&mut (0..9000).map(|i| layer(i, i, i)).collect(), u32::cmp);
         assert_eq!(count.all(), Err(TooManyPairs));
+    }
+
+    #[test]
+    fn items_of_cycles_are_counted_and_others_are_not() {
+        assert_eq!(items_in_cycles(&[]), 0);
+        assert_eq!(items_in_cycles(&[(1, 2), (2, 3), (1, 3)]), 0);
+        assert_eq!(
+            items_in_cycles(&[(1, 2), (2, 3), (3, 1), (3, 4), (0, 1)]),
+            3
+        );
+        assert_eq!(
+            items_in_cycles(&[(1, 2), (2, 1), (5, 6), (6, 7), (7, 5)]),
+            5
+        );
+        let long: Vec<_> = (0..100_000).map(|i| (i, (i + 1) % 100_000)).collect();
+        assert_eq!(items_in_cycles(&long), 100_000);
     }
 }

@@ -10,26 +10,17 @@
 
 mod canvas;
 mod cut_outs;
-mod cycles;
-mod depth;
 mod draw;
 mod errors;
-mod layers;
-mod mask;
 pub mod order;
 mod screen;
-mod stencil;
+
+pub use canvas::{Canvas, DepthBuffer, Fragment, Stencil};
+pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface};
+pub use draw::{Drawn, Tally, Tests, draw};
+pub use errors::{OrderErrors, TooManyPairs, draw_surfaces, order_errors};
+pub use order::{DepthOrder, Part, Piece, ToOrder};
+pub use screen::{Rectangle, Screen};
 
 #[cfg(test)]
 mod tests;
-
-pub use canvas::{Canvas, Fragment};
-pub use cut_outs::CutOuts;
-pub use depth::DepthBuffer;
-pub use draw::{Drawn, Tally, Tests, draw};
-pub use errors::{OrderErrors, TooManyPairs, order_errors};
-pub use layers::draw_surfaces;
-pub use mask::{Holes, MASKS, Mask, Surface};
-pub use order::{DepthOrder, Part, Piece, ToOrder};
-pub use screen::{Rectangle, Screen};
-pub use stencil::Stencil;

@@ -3,17 +3,22 @@
 //! They are the items themselves if these are solid boxes, boxes inside the items of a mesh and
 //! below its ground, or boxes in the solid of a map.
 
-mod blocks;
 mod ground;
-mod inner;
 
-pub use blocks::BlocksRow;
-pub use ground::{Ground, GroundRow};
-pub use inner::InnerRow;
+use std::time::Instant;
+
+use glam::DVec3;
+use serde::Serialize;
 
 use super::occlusion::OccluderScene;
 use super::{Rays, Solids};
+use crate::geometry::Aabb;
+use crate::query::ItemId;
 use crate::scene::Scene;
+use crate::visibility::inscribed::{CELLS, InnerBoxes};
+use crate::visibility::region::doom::DoomMap;
+
+pub use ground::{Ground, GroundRow};
 
 /// The occluders of a scene.
 pub struct Hiders {
@@ -36,8 +41,8 @@ impl Hiders {
     /// `solids` are its items if they are solid boxes; items of triangles get up to `most`
     /// boxes inside.
     pub fn of(scene: &Scene, solids: Option<&Solids>, most: usize, threads: usize) -> Hiders {
-        let (within, inner) = inner::inner(scene, most, threads).unzip();
-        let (blocks, row) = blocks::blocks(scene).unzip();
+        let (within, inner) = inner(scene, most, threads).unzip();
+        let (blocks, row) = blocks(scene).unzip();
         let ground = Ground::of(scene);
         let within = within.unwrap_or_default();
         let below = ground.as_ref().map(|ground| &ground.boxes);
@@ -73,4 +78,74 @@ impl Hiders {
             _ => &self.all,
         }
     }
+}
+
+/// The boxes inside the items of a mesh.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct InnerRow {
+    /// Items of the mesh.
+    pub item_count: usize,
+    /// Items that have a box inside: opaque, one-sided and closed.
+    pub boxed_count: usize,
+    /// Most boxes of an item.
+    pub box_limit: usize,
+    /// Number of boxes of all items.
+    pub box_count: usize,
+    /// Volume of the boxes / volume of the items that have one; null if none has.
+    pub volume_share: Option<f64>,
+    /// Wall time of finding and proving them all.
+    pub build_ns: f64,
+}
+
+/// Up to `most` boxes for each item, scene-local and by ascending item.
+///
+/// `None` for a scene that is no mesh.
+pub fn inner(
+    scene: &Scene,
+    most: usize,
+    threads: usize,
+) -> Option<(Vec<(ItemId, Aabb)>, InnerRow)> {
+    let surfaces = scene.surfaces.as_ref()?;
+    let begun = Instant::now();
+    let found = InnerBoxes::of(surfaces, CELLS, most, threads);
+    let row = InnerRow {
+        item_count: scene.items.len(),
+        boxed_count: found.items,
+        box_limit: most,
+        box_count: found.boxes.len(),
+        volume_share: found.share,
+        build_ns: begun.elapsed().as_nanos() as f64,
+    };
+    Some((found.boxes, row))
+}
+
+/// The boxes in the solid of a map.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct BlocksRow {
+    /// Number of boxes; none if a sector does not close.
+    pub box_count: usize,
+    /// Sectors whose linedefs do not close: rays leave the map there.
+    pub unclosed_sector_count: usize,
+    /// Wall time of finding them all.
+    pub build_ns: f64,
+}
+
+/// Boxes over the heights of a map's items, scene-local; `None` for other scenes.
+pub fn blocks(scene: &Scene) -> Option<(Vec<Aabb>, BlocksRow)> {
+    let map = DoomMap::of_scene(scene)?;
+    let begun = Instant::now();
+    let all = scene.written().map(|b| [b.min.z, b.max.z]);
+    let heights = all.reduce(|[low, high], [min, max]| [low.min(min), high.max(max)]);
+    let boxes = heights.map_or(Vec::new(), |heights| map.solid_boxes(heights));
+    let row = BlocksRow {
+        box_count: boxes.len(),
+        unclosed_sector_count: map.unclosed().len(),
+        build_ns: begun.elapsed().as_nanos() as f64,
+    };
+    // Whole numbers, so nothing is rounded.
+    let about = |corner: DVec3| (corner - scene.origin).as_vec3();
+    let local = boxes.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
+    Some((local.collect(), row))
 }

@@ -6,21 +6,21 @@
 //! "Occluder simplification using planar sections", name the voxel approach.)
 
 mod cells;
-mod grid;
 mod proof;
 
 use std::collections::BTreeMap;
 
 use glam::Vec3;
 
-pub(crate) use self::cells::Cells;
-use self::grid::Grid;
-use self::proof::is_in;
-pub(crate) use self::proof::turn;
+use super::inscribed::cells::Grid;
+use super::inscribed::proof::is_in;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::{SurfaceKind, Surfaces, volume_within};
 use crate::threads;
+
+pub(crate) use super::inscribed::cells::Cells;
+pub(crate) use super::inscribed::proof::turn;
 
 /// Boxes proven to be inside an item.
 #[derive(Clone, PartialEq, Debug)]

@@ -21,16 +21,15 @@ mod scene;
 mod tests;
 mod trace;
 mod view;
-mod zbuffer;
 
-pub use buffer::{CullStats, OcclusionBuffer};
+pub use buffer::{CullStats, OcclusionBuffer, ZBuffer};
 pub use interleaved::Interleaved;
 pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use outline::{Coverage, Outline};
 pub use rect::{Candidate, Rect, Rects};
 pub use scene::{Faces, Occluder, OccluderScene};
-#[cfg(test)]
-pub use tests::{NoOcclusion, TwoPass};
 pub use trace::FrameTrace;
 pub use view::{Linear, Projection, View};
-pub use zbuffer::ZBuffer;
+
+#[cfg(test)]
+pub use tests::{NoOcclusion, TwoPass};

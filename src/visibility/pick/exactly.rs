@@ -1,11 +1,11 @@
-//! The exact decision among candidates, which ends every exact back end.
+//! The exact decision among candidates, and the reference that tests every body.
 
 use std::cmp::Ordering;
 
-use super::contract::{Hit, Pick};
+use super::{BackEnd, Hit, Pick};
 use crate::query::ItemId;
-use crate::visibility::Ray;
-use crate::visibility::truth::{Along, Body, BodyIndex};
+use crate::visibility::truth::{Along, Bodies, Body, BodyIndex};
+use crate::visibility::{Guarantee, Ray};
 
 /// An item and where a ray meets it.
 type Met<B> = (ItemId, <B as Body>::At);
@@ -108,5 +108,41 @@ impl<B: Body> Pick for BodyIndex<B> {
         let mut met = self.all_along(ray);
         met.retain(|(item, _)| (*item as usize) < self.items());
         nearest::<B>(&self.probe(ray), met, count, hits);
+    }
+}
+
+/// The row of the reference.
+pub const LINEAR: BackEnd = BackEnd {
+    name: "linear",
+    summary: "every box or triangle, in exact arithmetic: the reference",
+    guarantee: Guarantee::Exact,
+    boxes: |boxes, _| Ok(Box::new(Linear(boxes.clone()))),
+    facets: |facets, _| Ok(Box::new(Linear(facets.clone()))),
+};
+
+/// All bodies, item by item.
+#[derive(Clone, Debug)]
+pub struct Linear<B>(pub Bodies<B>);
+
+impl<B: Body> Pick for Linear<B> {
+    /// O(n).
+    fn first(&self, ray: &Ray) -> Option<Hit> {
+        let mut first = First::<B>::new(B::probe(ray, self.0.origin), f64::INFINITY);
+        self.0.all.iter().for_each(|body| {
+            first.offer(body);
+        });
+        first.hit(self.0.items)
+    }
+
+    /// O(n), and sorting what the ray meets.
+    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        let probe = B::probe(ray, self.0.origin);
+        let counted = self
+            .0
+            .all
+            .iter()
+            .filter(|body| (body.item() as usize) < self.0.items);
+        let met = counted.filter_map(|body| Some((body.item(), body.meet(&probe, ray.far)?)));
+        nearest::<B>(&probe, met.collect(), count, hits);
     }
 }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::csr::Csr;
-use super::id_set::{IdSet, RegionId};
-use super::opening::Opening;
+use glam::{DVec2, DVec3};
+
+use super::id_set::{Csr, IdSet, RegionId};
 use crate::scene::WorldBox;
 use crate::visibility::{Ray, Rays};
 
@@ -109,5 +109,143 @@ impl RegionGraph {
         homes.sort_unstable();
         homes.dedup();
         inside
+    }
+}
+
+/// The plane of an opening and its front side.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum OpeningPlane {
+    /// Across an axis: the front has the larger coordinates.
+    Axis {
+        /// 0, 1 or 2.
+        axis: usize,
+        /// Coordinate on the axis, world units.
+        at: f64,
+    },
+    /// Upright over the line from one point to another: the front is right of it.
+    Upright {
+        /// Start of the line, seen from above.
+        from: DVec2,
+        /// End of the line.
+        to: DVec2,
+    },
+    /// One face of an opening that has a thickness: passed in both directions.
+    Undirected,
+}
+
+/// Side of the line from `a` through `b` that the point `c` is on.
+///
+/// 1 for the left, -1 for the right, 0 if rounding hides it (Shewchuk 1997, "Adaptive
+/// precision floating-point arithmetic", section 4.2: the bound is the first stage of its
+/// orient2d).
+fn turn(a: DVec2, b: DVec2, c: DVec2) -> i32 {
+    const BOUND: f64 = 4.0 / (1u64 << 53) as f64;
+    let (left, right) = ((a.x - c.x) * (b.y - c.y), (a.y - c.y) * (b.x - c.x));
+    let determinant = left - right;
+    let bound = BOUND * (left.abs() + right.abs()) + f64::MIN_POSITIVE;
+    i32::from(determinant > bound) - i32::from(determinant < -bound)
+}
+
+/// An opening, or portal, between two regions: a flat rectangle, upright or level.
+///
+/// In world coordinates.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Opening {
+    /// The region in front of it and the region behind it.
+    pub sides: [RegionId; 2],
+    /// The rectangle's corners, in turn; closed.
+    pub corners: [DVec3; 4],
+    /// Its plane.
+    pub plane: OpeningPlane,
+}
+
+impl Opening {
+    /// Side of the plane that a point is surely on: 1 in front, -1 behind, 0 on it or
+    /// too close to decide.
+    pub fn side(&self, p: DVec3) -> i32 {
+        match self.plane {
+            OpeningPlane::Axis { axis, at } => i32::from(p[axis] > at) - i32::from(p[axis] < at),
+            OpeningPlane::Upright { from, to } => -turn(from, to, p.truncate()),
+            OpeningPlane::Undirected => 0,
+        }
+    }
+
+    /// The region that a line of sight from `eye` enters through this opening out of
+    /// `region`; `None` if it can only leave the other way.
+    pub fn entered(&self, region: RegionId, eye: DVec3) -> Option<RegionId> {
+        let [front, behind] = self.sides;
+        let side = self.side(eye);
+        match (region == front, region == behind) {
+            (true, _) if side >= 0 => Some(behind),
+            (_, true) if side <= 0 => Some(front),
+            _ => None,
+        }
+    }
+
+    /// Lower and upper corner of the box about it.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let corners = self.corners.into_iter();
+        let [low, high] = [
+            corners.clone().reduce(DVec3::min),
+            corners.reduce(DVec3::max),
+        ];
+        [low, high].map(|corner| corner.expect("four corners"))
+    }
+
+    /// The other of its two regions.
+    pub fn other(&self, region: RegionId) -> RegionId {
+        let [front, behind] = self.sides;
+        if region == front { behind } else { front }
+    }
+}
+
+/// The corners of a rectangle across an axis, in turn.
+pub fn rectangle(axis: usize, min: DVec3, max: DVec3) -> [DVec3; 4] {
+    let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+    let corner = |high_j: bool, high_k: bool| {
+        let mut p = min;
+        p[j] = if high_j { max[j] } else { min[j] };
+        p[k] = if high_k { max[k] } else { min[k] };
+        p
+    };
+    [(false, false), (true, false), (true, true), (false, true)].map(|(a, b)| corner(a, b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_opening_is_passed_away_from_the_eye() {
+        let (min, max) = (DVec3::new(4.0, 0.0, 0.0), DVec3::new(4.0, 1.0, 2.0));
+        let across = Opening {
+            sides: [7, 3],
+            corners: rectangle(0, min, max),
+            plane: OpeningPlane::Axis { axis: 0, at: 4.0 },
+        };
+        let upright = Opening {
+            plane: OpeningPlane::Upright {
+                from: DVec2::new(4.0, 0.0),
+                to: DVec2::new(4.0, 1.0),
+            },
+            ..across
+        };
+        for opening in [across, upright] {
+            let (high, low) = (DVec3::splat(9.0), DVec3::splat(-9.0));
+            assert_eq!(opening.entered(7, high), Some(3));
+            assert_eq!(opening.entered(3, high), None);
+            assert_eq!(opening.entered(3, low), Some(7));
+            assert_eq!(opening.entered(7, low), None);
+            assert_eq!(opening.entered(5, low), None);
+            // On the plane it is open to both.
+            assert_eq!(opening.entered(7, min), Some(3));
+            assert_eq!(opening.entered(3, min), Some(7));
+        }
+        let ring = across.corners;
+        for i in 0..4 {
+            let edge = ring[(i + 1) % 4] - ring[i];
+            assert_eq!(edge.to_array().iter().filter(|e| **e != 0.0).count(), 1);
+        }
     }
 }

@@ -11,33 +11,25 @@
 //! ends list what they touch too.
 
 mod boxes;
-mod csr;
 pub mod doom;
-mod flood;
 mod graph;
 mod id_set;
-mod items;
 mod locate;
-mod opening;
-mod portal_clip;
-mod portal_rect;
 mod pvs;
 mod quake;
 mod row;
 mod search;
 mod view;
-mod walk;
 
-pub use boxes::NoRegions;
-pub use graph::{Ground, RegionGraph};
+pub use boxes::{NoRegions, seen_by_samples};
+pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
 pub use id_set::{IdSet, RegionId};
-pub use items::RegionItems;
-pub use opening::{Opening, OpeningPlane, rectangle};
+pub use locate::RegionItems;
 pub use pvs::{Pvs, PvsError};
 pub use row::{BACK_ENDS, BackEnd, EyePlace, RegionRow, Scratch, Source};
+
 #[cfg(test)]
 pub use tests::leads_through;
-pub use walk::seen_by_samples;
 
 #[cfg(test)]
 mod tests;

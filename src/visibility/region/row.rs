@@ -2,13 +2,10 @@
 
 use std::sync::Arc;
 
-use super::flood::Flood;
 use super::graph::RegionGraph;
 use super::id_set::{IdSet, RegionId};
-use super::portal_clip::PortalClip;
-use super::portal_rect::PortalRect;
 use super::pvs::Pvs;
-use super::search::Search;
+use super::search::{Flood, PortalClip, PortalRect, Search};
 use crate::kernel::extend;
 use crate::scene::{Regions, Scene};
 use crate::visibility::{Guarantee, Rays};

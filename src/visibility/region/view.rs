@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::opening::Opening;
+use super::graph::Opening;
 use crate::visibility::Rays;
 
 /// Distance within which a point outside of a half-space `n . x >= 0` is kept.

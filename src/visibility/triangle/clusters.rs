@@ -9,8 +9,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use obvhs::ploc::morton::morton_encode_u64;
 
-use super::exact::{faces, normal};
-use super::eye::Eye;
+use super::exact::{Eye, faces, normal};
 use crate::geometry::Aabb;
 use crate::kernel::each;
 use crate::scene::Surfaces;

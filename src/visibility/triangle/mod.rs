@@ -4,26 +4,18 @@
 
 mod clusters;
 mod cones;
-mod contract;
 mod exact;
-mod eye;
-mod metrics;
-mod normal_cone;
 mod per_triangle;
 mod selection;
 
 pub use clusters::{Clusters, MOST_TRIANGLES};
-pub use cones::{Cones, SafeCones};
-pub use contract::{TriangleCull, TriangleRow};
-pub use exact::{faces, normal};
-pub use eye::Eye;
-pub use metrics::{Counts, facing};
-pub use normal_cone::Cone;
-pub use selection::Selection;
+pub use cones::{Cone, Cones, SafeCones};
+pub use exact::{Eye, faces, normal};
+pub use selection::{Counts, Selection, TriangleCull, TriangleRow, facing};
 
 /// All back ends of this stage.
 pub const TRIANGLE_ROWS: &[TriangleRow] = &[
-    contract::NONE,
+    selection::NONE,
     per_triangle::ROW,
     cones::ROW,
     cones::ROW_SEVERAL,

@@ -12,11 +12,8 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::clusters::Clusters;
-use super::contract::{TriangleCull, TriangleRow};
-use super::exact::normal;
-use super::eye::Eye;
-use super::metrics::facing;
-use super::selection::Selection;
+use super::exact::{Eye, normal};
+use super::selection::{Selection, TriangleCull, TriangleRow, facing};
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 use crate::visibility::Guarantee;

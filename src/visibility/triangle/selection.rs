@@ -1,8 +1,13 @@
-//! The triangles that a stage takes and returns: a word per cluster, a bit per
-//! triangle.
+//! The triangles that a stage takes and returns, a bit each in a word per cluster.
+//!
+//! With the contract of its back ends, and the truth that they are compared with.
+
+use std::sync::Arc;
 
 use super::clusters::Clusters;
-use crate::kernel::LANES;
+use super::exact::Eye;
+use crate::kernel::{Kernel, LANES};
+use crate::visibility::Guarantee;
 
 /// Some of the triangles of clusters.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -87,6 +92,77 @@ impl Selection {
                     *word &= !(1 << bit);
                 }
             }
+        }
+    }
+}
+
+/// A back end, built for certain clusters.
+pub trait TriangleCull: Send + Sync {
+    /// Removes triangles that cannot be seen from `kept`; adds none.
+    ///
+    /// The answer is the same with every kernel.
+    fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection);
+}
+
+/// A row of the table of back ends.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct TriangleRow {
+    /// Name on the command line and in tables.
+    pub name: &'static str,
+    /// One line for tables and help.
+    pub summary: &'static str,
+    /// Guarantee of its answers.
+    pub guarantee: Guarantee,
+    /// Builds it.
+    pub build: fn(&Arc<Clusters>) -> Box<dyn TriangleCull>,
+}
+
+/// No test: what the stage costs if it is left out.
+pub const NONE: TriangleRow = TriangleRow {
+    name: "none",
+    summary: "Keeps every triangle",
+    guarantee: Guarantee::Conservative,
+    build: |_| Box::new(()),
+};
+
+impl TriangleCull for () {
+    fn cull(&self, _: &Eye, _: Kernel, _: &mut Selection) {}
+}
+
+/// The truth of this stage: triangles of `candidates` whose front the eye sees,
+/// and all two-sided ones. Exact; one predicate per triangle, no shared structure.
+pub fn facing(clusters: &Clusters, eye: &Eye, candidates: &Selection) -> Selection {
+    let mut truth = candidates.clone();
+    truth.retain(|cluster, bit| clusters.is_seen(eye, cluster, bit));
+    truth
+}
+
+/// Triangles in and out of a stage.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+#[non_exhaustive]
+pub struct Counts {
+    /// Triangles that the stage was given.
+    pub candidates: usize,
+    /// Triangles that it delivered.
+    pub delivered: usize,
+    /// Triangles that it should have delivered.
+    pub truth: usize,
+    /// Delivered, but not in the truth.
+    pub false_positives: usize,
+    /// In the truth, but not delivered.
+    pub false_negatives: usize,
+}
+
+impl Counts {
+    /// Compares two selections of the same candidates.
+    pub fn of(candidates: &Selection, delivered: &Selection, truth: &Selection) -> Counts {
+        Counts {
+            candidates: candidates.triangles(),
+            delivered: delivered.triangles(),
+            truth: truth.triangles(),
+            false_positives: delivered.without(truth),
+            false_negatives: truth.without(delivered),
         }
     }
 }

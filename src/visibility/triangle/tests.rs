@@ -5,14 +5,14 @@ mod plain_cones;
 
 use std::sync::Arc;
 
+use audit::{EyeKind, audit};
 use glam::DVec3;
 
-use super::super::guarantee::Guarantee;
+use super::super::Guarantee;
 use super::*;
 use crate::camera::{Camera, Lens, look_at};
 use crate::kernel::Kernel;
 use crate::scene::{Family, MESHES, SeededRng, Surfaces, load};
-use audit::{EyeKind, audit};
 
 /// Scenes of some thousand triangles: all meshes, and boxes far from the zero.
 fn scenes() -> Vec<(String, Arc<Clusters>)> {

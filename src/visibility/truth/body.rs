@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use glam::{DVec3, Vec3};
 
-use super::along::Along;
+use super::super::rays::Along;
 use super::ray_box::Probe;
 use super::ray_triangle::TriangleProbe;
 use crate::geometry::Aabb;

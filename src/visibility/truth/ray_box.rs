@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::along::Along;
+use super::super::rays::Along;
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
 use crate::scene::WorldBox;
@@ -236,9 +236,10 @@ impl Probe {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::scene::SeededRng;
-    use glam::DVec3;
 
     #[test]
     fn near_and_far_are_decided_to_the_last_bit() {

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 
 use glam::{DVec3, I64Vec3, Vec3};
 
-use super::along::Along;
+use super::super::rays::Along;
 use crate::arithmetic::exact::{self, ExactVector};
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;

@@ -11,8 +11,7 @@
 //! are too many parts or planes, and for a ray within a plane both sides are on the eye's
 //! side.
 
-use super::contract::{self, DepthOrder, Piece, ToOrder};
-use super::whole::nearest;
+use super::{DepthOrder, Piece, ToOrder, nearest};
 use crate::camera::Camera;
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
@@ -211,7 +210,7 @@ impl DepthOrder for BspOrder {
                     parts.sort_by(|a, b| far(a).total_cmp(&far(b)).then(a.item.cmp(&b.item)));
                     pieces.extend(parts.iter().map(|part| Piece {
                         item: part.item,
-                        part: part.cut.then_some(contract::Part::Within(part.b)),
+                        part: part.cut.then_some(super::Part::Within(part.b)),
                     }));
                 }
             }
@@ -236,9 +235,10 @@ impl DepthOrder for BspOrder {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::visibility::truth::judge;
-    use glam::DVec3;
 
     /// A limit of parts alone does not end the cutting of nested boxes.
     #[test]

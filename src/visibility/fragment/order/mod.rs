@@ -1,15 +1,18 @@
 //! Depth orders: lists of items from front to back, as well as each can.
 
 mod bsp;
-mod contract;
 mod partition;
-mod whole;
+
+use glam::DVec3;
+
+use crate::camera::Camera;
+use crate::geometry::PlaneTree;
+use crate::index::{Input, RegionIndex, Wide};
+use crate::query::ItemId;
+use crate::scene::{Surfaces, WorldBox};
+use crate::visibility::{Guarantee, Solids};
 
 pub use bsp::BspOrder;
-pub use contract::{DepthOrder, Part, Piece, ToOrder};
-pub use whole::front_to_back;
-
-use crate::visibility::Guarantee;
 
 /// A row of the table of orders.
 #[derive(Clone, Copy, Debug)]
@@ -28,16 +31,168 @@ pub struct OrderRow {
 
 /// All orders.
 pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, build }
-    "none", "items in the order of their ids", Guarantee::Unproven, whole::by_id;
+    "none", "items in the order of their ids", Guarantee::Unproven, by_id;
     "tree", "items in the order of the tree 'wide', the same for all views",
-        Guarantee::Unproven, whole::by_tree;
+        Guarantee::Unproven, by_tree;
     "centre-distance", "sorted by the distance of the centre of each box",
-        Guarantee::Unproven, whole::by_centre;
+        Guarantee::Unproven, by_centre;
     "box-distance", "sorted by the distance of the nearest point of each box",
-        Guarantee::Unproven, whole::by_box;
+        Guarantee::Unproven, by_box;
     "bsp", "planes through faces of boxes, which are cut where they cross: exact",
         Guarantee::Exact, bsp::order;
     // In a leaf of walls that surround it nothing hides a wall but what is no wall.
     "map-bsp", "the map's own BSP leaf by leaf, items of one leaf by distance",
         Guarantee::Unproven, partition::order;
 };
+
+/// Input of an order.
+#[derive(Clone, Copy, Debug)]
+pub struct ToOrder<'a> {
+    /// The items as solid boxes, or the boxes about them.
+    pub boxes: &'a Solids,
+    /// Their triangles, if they are no solid boxes.
+    pub surfaces: Option<&'a Surfaces>,
+    /// Planes of the scene's own partition.
+    pub planes: Option<&'a PlaneTree>,
+}
+
+/// A part of an item.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Part {
+    /// The part that is entered through this box.
+    Within(WorldBox),
+    /// The part in a leaf ([`DepthOrder::leaf`]).
+    InLeaf(u32),
+}
+
+/// An item to be drawn, or a part of it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Piece {
+    /// The item.
+    pub item: ItemId,
+    /// `None` is all of it.
+    pub part: Option<Part>,
+}
+
+impl Piece {
+    /// All of an item.
+    pub fn whole(item: ItemId) -> Piece {
+        Piece { item, part: None }
+    }
+}
+
+/// A way to order items for a camera.
+pub trait DepthOrder: Send + Sync {
+    /// Replaces `pieces` by all items, from front to back as well as it can.
+    /// Deterministic.
+    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>);
+
+    /// Leaf of a point of a triangle; `None` if parts are no leaves.
+    ///
+    /// The point is relative to the zero of the surfaces.
+    fn leaf(&self, _at: DVec3, _normal: DVec3) -> Option<u32> {
+        None
+    }
+
+    /// Reason why an order that is declared exact may be wrong for a camera.
+    fn exception(&self, _: &Camera) -> Option<&'static str> {
+        None
+    }
+}
+
+impl<F> DepthOrder for F
+where
+    F: Fn(&Solids, &Camera, &mut Vec<Piece>) + Send + Sync,
+{
+    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
+        self(solids, camera, pieces);
+    }
+}
+
+/// The same list of items for every camera.
+struct Fixed(Vec<ItemId>);
+
+impl DepthOrder for Fixed {
+    fn order(&self, _: &Solids, _: &Camera, pieces: &mut Vec<Piece>) {
+        pieces.clear();
+        pieces.extend(self.0.iter().map(|&item| Piece::whole(item)));
+    }
+}
+
+/// Items in the order of their ids.
+pub fn by_id(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    let items = 0..of.boxes.boxes.len() as ItemId;
+    Some(Box::new(Fixed(items.collect())))
+}
+
+/// Items in the order of the packed tree: the output of the object stage, unsorted.
+pub fn by_tree(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    let tree = Wide::build(&Input::new(&of.boxes.outer), &Default::default());
+    match tree.ok().and_then(|tree| Some(tree.tree_order()?.to_vec())) {
+        Some(items) => Some(Box::new(Fixed(items))),
+        None => by_id(of),
+    }
+}
+
+/// Items sorted by a key of their boxes, then by id. O(n log n) per view.
+struct Sorted(fn(&Camera, &WorldBox) -> f64);
+
+impl DepthOrder for Sorted {
+    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
+        let boxes = solids.boxes.iter().zip(0..);
+        let mut keyed: Vec<_> = boxes.map(|(b, item)| (self.0(camera, b), item)).collect();
+        sort(&mut keyed);
+        pieces.clear();
+        pieces.extend(keyed.into_iter().map(|(_, item)| Piece::whole(item)));
+    }
+}
+
+/// Items sorted by the distance of the centre of each box.
+pub fn by_centre(_: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    let key = |camera: &Camera, b: &WorldBox| distance(camera, b.min / 2.0 + b.max / 2.0);
+    Some(Box::new(Sorted(key)))
+}
+
+/// Items sorted by the distance of the nearest point of each box.
+pub fn by_box(_: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    Some(Box::new(Sorted(nearest)))
+}
+
+/// Sorts items by the distance of the nearest point of each box. O(n log n).
+///
+/// # Panics
+/// If there is no such item.
+pub fn front_to_back(solids: &Solids, camera: &Camera, items: &mut [ItemId]) {
+    let key = |&item: &ItemId| (nearest(camera, &solids.boxes[item as usize]), item);
+    let mut keyed: Vec<_> = items.iter().map(key).collect();
+    sort(&mut keyed);
+    let places = items.iter_mut().zip(keyed);
+    places.for_each(|(to, (_, item))| *to = item);
+}
+
+fn sort(keyed: &mut [(f64, ItemId)]) {
+    keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+}
+
+fn distance(camera: &Camera, point: DVec3) -> f64 {
+    let away = point - camera.frame.eye;
+    match camera.lens.is_orthographic() {
+        true => away.dot(camera.frame.forward()),
+        false => away.length_squared(),
+    }
+}
+
+/// Distance of the nearest point of a box.
+///
+/// Squared from the eye; the depth for an orthographic lens.
+pub fn nearest(camera: &Camera, b: &WorldBox) -> f64 {
+    let point = match camera.lens.is_orthographic() {
+        true => {
+            let forward = camera.frame.forward();
+            let pick = |k: usize| if forward[k] > 0.0 { b.min[k] } else { b.max[k] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        }
+        false => camera.frame.eye.max(b.min).min(b.max),
+    };
+    distance(camera, point)
+}

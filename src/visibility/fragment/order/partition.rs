@@ -11,8 +11,7 @@
 
 use glam::DVec3;
 
-use super::contract::{DepthOrder, Part, Piece, ToOrder};
-use super::whole::nearest;
+use super::{DepthOrder, Part, Piece, ToOrder, nearest};
 use crate::camera::Camera;
 use crate::geometry::PlaneTree;
 use crate::query::ItemId;

@@ -1,4 +1,4 @@
-//! Two passes: all occluders are drawn, also hidden ones, then all items are tested.
+//! Two passes: all occluders are drawn, hidden ones too, then items are tested.
 //!
 //! Harder for a buffer than drawing what is found visible from front to back.
 
@@ -12,13 +12,13 @@ use crate::query::ItemId;
 
 /// Two passes over the items in a view.
 pub struct TwoPass<'a, B> {
-    /// What is drawn into.
+    /// The buffer that is drawn into.
     pub buffer: B,
     /// The occluders.
     pub scene: &'a OccluderScene,
     /// The view.
     pub view: &'a View<'a>,
-    /// Items in the view.
+    /// Items in the view, ascending.
     pub items: &'a [ItemId],
 }
 
@@ -37,7 +37,7 @@ impl<B: OcclusionBuffer> Work for TwoPass<'_, B> {
         let (scene, view) = (self.scene, self.view);
         let is_given = |&position: &usize| {
             let item = scene.item(position);
-            item.is_none_or(|item| self.items.contains(&item))
+            item.is_none_or(|item| self.items.binary_search(&item).is_ok())
         };
         let positions: Vec<usize> = (0..scene.len()).filter(is_given).collect();
         let mut candidates: Vec<Candidate> = Vec::new();

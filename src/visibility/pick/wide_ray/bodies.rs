@@ -8,8 +8,8 @@ use super::slabs::around;
 use super::{Candidates, Tree};
 use crate::kernel::{Isa, Kernel, Work};
 use crate::visibility::Ray;
-use crate::visibility::pick::contract::{Hit, NotBuilt, Pick};
 use crate::visibility::pick::exactly::{self, First};
+use crate::visibility::pick::{Hit, NotBuilt, Pick};
 use crate::visibility::truth::{Along, Bodies, Body};
 
 /// A body in one cache line.

@@ -12,10 +12,9 @@
 //! [`DoomMap::surfaces`]; what these enclose from outside, in boxes, is
 //! [`DoomMap::solid_boxes`].
 
-mod ground;
 mod map;
-mod plan;
 mod solid;
-mod surfaces;
 
 pub use map::DoomMap;
+
+mod surfaces;

@@ -10,7 +10,7 @@
 use glam::DVec3;
 
 use super::map::DoomMap;
-use super::plan::{Point, turn};
+use super::surfaces::{Point, turn};
 use crate::scene::WorldBox;
 
 /// Most columns, and most rows, of the plan.

@@ -7,10 +7,8 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::super::clusters::Clusters;
-use super::super::contract::TriangleRow;
-use super::super::exact::{faces, normal};
-use super::super::eye::Eye;
-use super::super::selection::Selection;
+use super::super::exact::{Eye, faces, normal};
+use super::super::selection::{Selection, TriangleRow};
 use crate::kernel::Kernel;
 use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 

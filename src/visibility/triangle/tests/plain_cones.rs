@@ -1,4 +1,4 @@
-//! One cone per cluster in f32 without a term for rounding: a row that loses triangles.
+//! One cone per cluster without a term for rounding: a row that loses triangles.
 //!
 //! After the documentation of `meshopt_computeClusterBounds` (Kapoulkine's meshoptimizer).
 
