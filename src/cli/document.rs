@@ -18,6 +18,12 @@ pub enum Block {
     Figure(Figure),
 }
 
+impl Block {
+    pub fn line(text: &str) -> Block {
+        Block::Line(text.to_owned())
+    }
+}
+
 fn markdown_table(table: &Table) -> String {
     let line = |cells: &[String]| {
         let cells: Vec<String> = cells.iter().map(|cell| markdown(cell)).collect();
@@ -49,11 +55,12 @@ fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
     });
     let of_structures = table.header.first().is_some_and(|name| name == "structure");
     let row = |row: &Vec<String>| {
-        let most = row.iter().filter_map(|cell| cell.parse().ok());
-        let most = most.fold(0.0, f64::max);
+        // Without the mark of the fastest.
+        let number = |cell: &String| cell.trim_start_matches('*').parse::<f64>().ok();
+        let most = row.iter().filter_map(number).fold(0.0, f64::max);
         let cells = row.iter().enumerate().map(|(column, cell)| {
-            let shade = match cell.parse::<f64>() {
-                Ok(value) if is_heat => {
+            let shade = match number(cell) {
+                Some(value) if is_heat => {
                     let shade = 1.0 - (most / value).log2() / 3.0;
                     format!(" style=\"--v:{:.2}\"", shade.clamp(0.0, 1.0))
                 }

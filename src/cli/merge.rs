@@ -6,9 +6,8 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::args::MergeArgs;
-use super::report::page;
+use super::report::{page, show, show_written};
 use super::run_resume::same_recorded;
-use super::run_table::{show, show_written};
 use super::{Ending, expect_folder, interrupt, tell, text, unread_is_fine};
 use crate::report::{Report, Stream, merge as join, read_stream, save_page};
 

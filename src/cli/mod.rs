@@ -89,8 +89,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::index::Registry;
-use crate::input::{hold_files, tell_notes, tell_warnings};
-use crate::report::{FolderError, try_folder, try_place, write_atomically};
+use crate::input::{InputError, hold_files, tell_notes, tell_warnings};
+use crate::report::{try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene};
 use crate::shown::expected_by;
 use clap::{CommandFactory, Parser};
@@ -373,7 +373,7 @@ fn print(
 }
 
 /// Writes a text as a file.
-fn write_text(file: &Path, text: &str) -> Result<(), FolderError> {
+fn write_text(file: &Path, text: &str) -> Result<(), InputError> {
     write_atomically(file, |out| out.write_all(text.as_bytes()))
 }
 

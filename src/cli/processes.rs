@@ -17,7 +17,7 @@ use super::protocol::{Job, Message, PROTOCOL, Request};
 use super::run_resume::typed_args;
 use crate::input;
 use crate::measure::{Part, ProcessTimes, Status, TaskSamples, Verdict};
-use crate::report::{bare, temporary_in};
+use crate::report::temporary_in;
 use crate::shown::shortened;
 
 /// Longest wait before looking whether the user wants to stop.
@@ -311,7 +311,7 @@ impl Workers {
                 Ok(file)
             });
             let place = || format!("{source}: cannot be copied for the processes to read");
-            let file = kept.map_err(bare).with_context(place)?;
+            let file = kept.map_err(input::bare).with_context(place)?;
             spooled.insert(source, std::path::absolute(file.path())?);
             spool.push(file);
         }

@@ -1,5 +1,5 @@
 //! `cullbench report`: the results of a run as Markdown, pictures or one HTML page,
-//! from its report.json.
+//! from its report.json; their summary on the terminal, at the end of `run`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,19 +9,16 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::args::ReportArgs;
-use super::document::{Block, to_html, to_markdown};
+use super::document::{Block, to_html, to_markdown, to_terminal};
 use super::surface_charts::{self, Picture};
-use super::table::{Column, Table};
+use super::table::Table;
 use super::{
     Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_table,
     surface_tables, tell, text, write_text,
 };
 use crate::index::Registry;
-use crate::measure::{BOUNDS, METRICS, Status};
-use crate::report::{
-    Comparison, Overall, Ranked, Report, ReportCell, Views, comparisons, growths, read_report,
-    surfaces, times_as_fast, views,
-};
+use crate::measure::{BOUNDS, METRICS};
+use crate::report::{Comparison, Overall, Report, Views, comparisons, read_report, views};
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
     let outputs = [
@@ -97,9 +94,7 @@ fn glossary() -> [Block; 2] {
         table.add_row([*column, *meaning]);
     }
     let figures = run_table::FIGURES.iter().map(|figure| (figure.0, figure.1));
-    let figures = [("speed-up vs linear", "speedup")]
-        .into_iter()
-        .chain(figures);
+    let figures = [("vs linear", "speedup")].into_iter().chain(figures);
     for (column, metric) in figures {
         let info = METRICS.iter().find(|info| info.name == metric);
         table.add_row([column, info.map_or("", |info| info.summary)]);
@@ -120,14 +115,10 @@ const MEANINGS: &[(&str, &str)] = &[
         "rank",
         "1 is the fastest; structures that no test tells apart share a rank",
     ),
-    ("[95 %]", "95 % interval over the processes"),
+    ("±, [a, b]", "95 % interval over the processes"),
     (
-        "speed-up vs fastest peer",
+        "vs fastest peer",
         "time of the fastest structure of another crate / time of this structure",
-    ),
-    (
-        "break-even",
-        "queries of that path after which the build is repaid against linear; empty if never",
     ),
     (
         "geometric mean",
@@ -165,6 +156,40 @@ fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
     Ok(written?)
 }
 
+/// Shows tables and conclusions of each cache state and culling test.
+pub fn show(report: &Report, all_columns: bool) -> io::Result<()> {
+    let mut out = text::terminal();
+    out.write_all(shown(report, all_columns, text::width()).as_bytes())?;
+    out.flush()
+}
+
+fn shown(report: &Report, all_columns: bool, width: usize) -> String {
+    let all = comparisons(report);
+    let mut blocks = Vec::new();
+    if all_columns {
+        blocks = details(&all, &BTreeMap::new());
+    }
+    for group in run_table::groups(&all) {
+        let overall = Overall::of(&group);
+        blocks.push(Block::line(""));
+        match &group[..] {
+            [_] if all_columns => {}
+            [one] => {
+                blocks.extend(run_table::heads(one).into_iter().map(Block::Line));
+                let table = run_table::structures(one, overall.base, false);
+                blocks.push(Block::Table(table.parts(width).swap_remove(0)));
+            }
+            _ => blocks.extend(run_table::of_many(&group, &overall, width)),
+        }
+        blocks.push(Block::line(""));
+        blocks.extend(run_table::reasons(&group).into_iter().map(Block::Line));
+        blocks.push(Block::Line(run_table::conclusion(&group, &overall)));
+    }
+    // A world of one size has its ranked tables; that is the surface.
+    blocks.extend(surface_tables::blocks(report, 2));
+    to_terminal(&blocks, width)
+}
+
 fn title(report: &Report) -> String {
     format!("{} run {}", program::name(), report.run.id)
 }
@@ -176,136 +201,76 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
         let overall = Overall::of(&group);
         blocks.push(Block::Line(run_table::conclusion(&group, &overall)));
         if let Some(base) = overall.base.filter(|_| group.len() > 1) {
-            blocks.push(Block::Heading(2, format!("Speed-up over {base}")));
-            blocks.push(Block::Heat(matrix(&group, &overall, base)));
+            let names = group.iter().map(|comparison| run_figures::of(comparison));
+            let table = run_table::matrix(names.collect(), &group, &overall);
+            let heading = Block::Heading(2, format!("Speed-up over {base}"));
+            let legend = Block::Line(run_table::legend(&group, &overall));
+            blocks.extend([heading, Block::Heat(table), legend]);
         }
     }
+    blocks.extend(details(&all, views));
+    blocks.extend(surface_tables::blocks(report, 1));
+    blocks.push(Block::Heading(2, "Statuses".to_owned()));
+    let cells = text::counted(report.cells.len(), "cell");
+    let reasons = run_table::reasons(&all.iter().collect::<Vec<_>>());
+    let all_ok = reasons.is_empty().then(|| format!("{cells}, all ok."));
+    blocks.extend(reasons.into_iter().chain(all_ok).map(Block::Line));
+    blocks.push(Block::Heading(2, "Machine and command".to_owned()));
+    blocks.extend(about(report).into_iter().map(Block::Line));
+    blocks
+}
+
+/// Every scene and path with all its figures.
+fn details(all: &[Comparison], views: &BTreeMap<String, Views>) -> Vec<Block> {
+    let mut blocks = Vec::new();
     let mut scene = "";
-    for (place, comparison) in all.iter().enumerate() {
+    for comparison in all {
         let about = comparison.about();
         if about.scene.name != scene {
             scene = &about.scene.name;
             blocks.push(Block::Heading(2, scene.to_owned()));
-            blocks.push(Block::Line(format!(
-                "{}, {}{}.",
-                text::counted(about.scene.total_count, "item"),
-                text::counted(about.scene.region_count, "region"),
-                match about.scene.total_count {
-                    0 => "; nothing is ranked",
-                    _ => "",
-                }
-            )));
         }
         let base = Overall::of(&[comparison]).base;
         let own = views.get(&about.key().group.id());
         let own = own.filter(|_| about.path.motion.is_empty());
         blocks.extend(of_comparison(comparison, base, own));
-        let of_path = |c: &&Comparison| {
-            let other = c.about();
-            let of = |cell: &ReportCell| {
-                let path = &cell.path;
-                [&path.name, &path.cache, &path.motion].map(String::clone)
-            };
-            let [a, b] = [about, other].map(of);
-            other.scene.name == scene && a == b
+        let path = |comparison: &Comparison| {
+            let cell = comparison.about();
+            let path = &cell.path;
+            [&cell.scene.name, &path.name, &path.cache, &path.motion].map(String::clone)
         };
-        let tests: Vec<&Comparison> = all.iter().filter(of_path).collect();
+        let tests: Vec<&Comparison> = (all.iter())
+            .filter(|other| path(other) == path(comparison))
+            .collect();
         if tests
             .last()
             .is_some_and(|last| std::ptr::eq(*last, comparison))
         {
             blocks.extend(run_figures::errors(&tests).map(Block::Figure));
         }
-        let next = all.get(place + 1).map(|next| &next.about().scene.name);
-        if next != Some(&about.scene.name) {
-            let of_scene = all.iter().filter(|c| c.about().scene.name == scene);
-            blocks.extend(builds(&of_scene.collect::<Vec<_>>()));
-        }
     }
-    for surface in surfaces(all).iter().filter(|surface| surface.spans()) {
-        let heading = format!("Crossover: {}", surface_tables::title(surface));
-        blocks.push(Block::Heading(2, heading));
-        blocks.extend(surface_tables::of_surface(surface));
-        let figures = run_figures::growth(surface);
-        blocks.extend(figures.into_iter().map(|figure| Block::Figure(figure.1)));
-    }
-    let growths = growths(report);
-    if !growths.is_empty() {
-        let heading = "Growth at a fixed number of visible items".to_owned();
-        blocks.push(Block::Heading(2, heading));
-        blocks.push(Block::Table(surface_tables::of_growths(&growths)));
-    }
-    blocks.extend(statuses(report));
-    blocks.push(Block::Heading(2, "Machine and command".to_owned()));
-    blocks.extend(about(report).into_iter().map(Block::Line));
     blocks
 }
 
-/// A row per scene and path, a column per structure, and the geometric means.
-fn matrix(all: &[&Comparison], overall: &Overall, base: &str) -> Table {
-    let standings = &overall.standings;
-    let names = standings.iter().map(|standing| standing.structure);
-    let mut table = Table::of_numbers(["scene, path"].into_iter().chain(names));
-    for comparison in all {
-        let ratios = standings.iter().map(|standing| {
-            let cell = comparison.sound_cell(standing.structure);
-            let ratio = cell.and_then(|cell| comparison.speedup(base, cell));
-            text::some(ratio, |(ratio, _)| text::significant(ratio))
-        });
-        let name = run_figures::of(comparison);
-        table.add_row([name].into_iter().chain(ratios));
-    }
-    let means = standings
-        .iter()
-        .map(|s| text::some(s.speedup, text::significant));
-    table.add_row(["geometric mean".to_owned()].into_iter().chain(means));
-    table
-}
-
-/// Cost of the builds on a scene, and when it is repaid on each path.
-fn builds(comparisons: &[&Comparison]) -> Vec<Block> {
-    let paths = comparisons.iter().map(|comparison| {
-        let about = comparison.about();
-        format!("break-even, {}, {}", about.path.name, about.test)
-    });
-    let heads = BUILDS.map(str::to_owned);
-    let mut table = Table::of_numbers(
-        ["structure".to_owned()]
-            .into_iter()
-            .chain(heads)
-            .chain(paths),
-    );
-    for Ranked { cell, .. } in comparisons.iter().take(1).flat_map(|c| &c.ranked) {
-        let figures = run_table::figures(cell, &BUILDS);
-        let queries = comparisons.iter().map(|comparison| {
-            let own = comparison.sound_cell(&cell.structure);
-            let queries = own.and_then(|own| own.value("break_even_queries"));
-            text::some(queries, |n| text::count(n as usize))
-        });
-        let name = [cell.structure.clone()].into_iter();
-        table.add_row(name.chain(figures).chain(queries));
-    }
-    let heading = Block::Heading(3, "Build, memory and break-even".to_owned());
-    vec![heading, Block::Table(table.without_empty_columns())]
-}
-
-/// All cells that are not ok, with their reasons.
-fn statuses(report: &Report) -> Vec<Block> {
-    let others = report.cells.iter().chain(&report.bounds);
-    let others: Vec<&ReportCell> = others.filter(|cell| cell.status != Status::Ok).collect();
-    let heading = Block::Heading(2, "Statuses".to_owned());
-    if others.is_empty() {
-        let told = format!("{}, all ok.", text::counted(report.cells.len(), "cell"));
-        return vec![heading, Block::Line(told)];
-    }
-    let columns: &[Column<&ReportCell>] = &[
-        ("structure", |cell| cell.structure.clone()),
-        ("scene", |cell| cell.scene.name.clone()),
-        ("path", |cell| cell.path.name.clone()),
-        ("status", |cell| cell.status.name().to_owned()),
-        ("reason", |cell| cell.reason.clone().unwrap_or_default()),
-    ];
-    vec![heading, Block::Table(Table::with(others, columns))]
+fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Views>) -> Vec<Block> {
+    let about = comparison.about();
+    let motion = match about.path.motion.as_str() {
+        "" => String::new(),
+        motion => format!(", {motion}"),
+    };
+    let (path, cache, test) = (&about.path.name, &about.path.cache, &about.test);
+    let mut blocks = vec![Block::Heading(
+        3,
+        format!("{path}, {cache}, {test}{motion}"),
+    )];
+    blocks.extend(run_table::heads(comparison).into_iter().map(Block::Line));
+    blocks.push(Block::Line(text::basis(comparison)));
+    let plot = base.and_then(|base| run_figures::speedups(comparison, base));
+    let along = views.map(|views| run_figures::along(comparison, views));
+    let figures = plot.into_iter().chain(along.into_iter().flatten());
+    blocks.extend(figures.map(Block::Figure));
+    blocks.push(Block::Table(run_table::structures(comparison, base, true)));
+    blocks
 }
 
 fn known(text: &Option<String>) -> &str {
@@ -352,106 +317,30 @@ fn about(report: &Report) -> Vec<String> {
     lines
 }
 
-fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Views>) -> Vec<Block> {
-    let about = comparison.about();
-    let share = |metric: &str, what: &str| {
-        let value = comparison.of_any(metric)?;
-        Some(format!(", {} {what}", text::percent(value)))
-    };
-    let motion = match about.path.motion.as_str() {
-        "" => String::new(),
-        motion => format!(", {motion}"),
-    };
-    let heading = format!(
-        "{}, {}, {}{motion}{}",
-        about.path.name,
-        about.path.cache,
-        about.test,
-        share("cull_rate", "culled").unwrap_or_default()
-    );
-    let peer = comparison.fastest_peer();
-    let header = [
-        "structure",
-        "rank",
-        "query [95 %]",
-        "p95",
-        "speed-up vs linear [95 %]",
-    ];
-    let of_peer = peer.map(|_| "speed-up vs fastest peer");
-    let header = header.into_iter().chain(of_peer).chain(OF_PATH);
-    let mut table = Table::of_numbers(header.chain(["status"]));
-    for Ranked { rank, cell } in &comparison.ranked {
-        let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
-        table.rows.push(row(cell, rank, peer));
-    }
-    for bound in &comparison.bounds {
-        table.rows.push(row(bound, "lower bound".to_owned(), peer));
-    }
-    let basis = format!("{}.", text::basis(comparison));
-    let mut blocks = vec![Block::Heading(3, heading), Block::Line(basis)];
-    blocks.extend(false_positives(comparison).map(Block::Line));
-    let plot = base.and_then(|base| run_figures::speedups(comparison, base));
-    let along = views.map(|views| run_figures::along(comparison, views));
-    let figures = plot.into_iter().chain(along.into_iter().flatten());
-    blocks.extend(figures.map(Block::Figure));
-    blocks.push(Block::Table(table.without_empty_columns()));
-    if !comparison.bounds.is_empty() {
-        let meaning = "/ read, / copy: time / time of that lower bound.";
-        blocks.push(Block::Line(meaning.to_owned()));
-    }
-    blocks
+/// Shows the files of a run.
+pub fn show_written(out: &mut impl Write, folder: &Path) -> io::Result<()> {
+    writeln!(out, "report  {}", folder.join("report.html").display())?;
+    writeln!(
+        out,
+        "        report.json, summary.csv, samples.csv, stream.jsonl"
+    )
 }
 
-/// Share of false positives, and their sources if not all are the culling test's.
-fn false_positives(comparison: &Comparison) -> Option<String> {
-    let share = text::false_positives(comparison);
-    let sources = text::by_source(comparison);
-    let sources = sources.map(|items| format!("{items} items {}", text::BY_SOURCE));
-    let told = match (share, sources) {
-        (None, None) => return None,
-        (None, Some(sources)) => format!("{sources}; nothing is visible"),
-        (Some(share), None) => format!("{share} of the visible items"),
-        (Some(share), Some(sources)) => format!("{share} of the visible items; {sources}"),
-    };
-    Some(format!("False positives: {told}."))
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::read_report;
 
-/// Figures of the queries or the motion of a path.
-const OF_PATH: [&str; 11] = [
-    "/ read",
-    "/ copy",
-    "locate",
-    "frame",
-    "worst",
-    "update",
-    "further query",
-    "x after 1",
-    "x after 10",
-    "x after 100",
-    "x after 1000",
-];
-
-/// Figures of a structure on a scene.
-const BUILDS: [&str; 4] = ["build", "update of 1 %", "query after 32", "bytes/item"];
-
-fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String> {
-    let mut row = vec![
-        cell.structure.clone(),
-        rank,
-        text::some(cell.metrics.get("query_ns"), |ns| {
-            text::time_within(ns.estimate())
-        }),
-        text::some(cell.value("query_ns_p95"), text::time),
-        text::some(cell.metrics.get("speedup"), |found| {
-            text::within(found.estimate())
-        }),
-    ];
-    row.extend(peer.map(|peer| {
-        let is_sound = cell.status == Status::Ok;
-        let ratio = times_as_fast(peer, cell).filter(|_| is_sound);
-        text::some(ratio, text::significant)
-    }));
-    row.extend(run_table::figures(cell, &OF_PATH));
-    row.push(cell.status.name().to_owned());
-    row
+    #[test]
+    fn the_quick_suite_fits_sixty_lines() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/results/reference/report.json");
+        let report = read_report(file.as_ref()).unwrap();
+        let told = shown(&report, false, 80);
+        // Basis, warnings, files and the next command are below.
+        assert!((20..=48).contains(&told.lines().count()), "{told}");
+        assert!(
+            told.lines().all(|line| line.chars().count() <= 80),
+            "{told}"
+        );
+    }
 }

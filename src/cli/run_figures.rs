@@ -1,16 +1,14 @@
 //! Figures of a run: speed-ups, growth, views along the path, error against time.
 
-use std::collections::BTreeMap;
-
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::error_figure::{Against, Measured};
 use super::figure::{Axis, Figure, is_drawn, left_out};
 use super::figure_rows::{Form, Row, rows};
 use super::palette::Look;
 use super::run_verdict::times;
-use super::{surface_tables, text};
+use super::text;
 use crate::measure::Metric;
-use crate::report::{Comparison, Place, Reading, ReportCell, Speedup, Surface, Views};
+use crate::report::{Comparison, Reading, ReportCell, Speedup, Views};
 use crate::statistics::quantile;
 
 /// Least number of clock readings along a path for a line, and for quantiles.
@@ -100,100 +98,6 @@ fn ratio_name(ratio: f64) -> String {
         }
         false => times(ratio),
     }
-}
-
-/// Time against the number of items, a line per structure, named at its right end.
-///
-/// One figure per class of shares that has at least two sizes; their axes are the same.
-pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
-    let mut beyond = BTreeMap::new();
-    let curve = |class: f64, name: &str| -> (usize, Vec<Point>) {
-        let points = surface.curve(name, class, "query_ns");
-        let is_drawn = |p: &&(usize, f64)| is_drawn(p.0 as f64) && is_drawn(p.1);
-        let point = |&(items, ns): &(usize, f64)| {
-            let here = |place: &&Place| place.class == class && place.items == items;
-            let mut cells = (surface.places.iter().filter(here)).filter_map(|p| p.cell(name));
-            let metric = cells.next().and_then(|cell| cell.metrics.get("query_ns"));
-            Point {
-                at: [items as f64, ns],
-                ends: metric.and_then(ends),
-                note: format!(
-                    "{name}, {}: {}",
-                    text::count(items),
-                    text::some(metric, |ns| text::time_within(ns.estimate()))
-                ),
-                ..Point::default()
-            }
-        };
-        let drawn: Vec<Point> = points.iter().filter(is_drawn).map(point).collect();
-        (points.len() - drawn.len(), drawn)
-    };
-    let is_scan = |name: &str| {
-        let cells = surface.places.iter().filter_map(|place| place.cell(name));
-        cells.take(1).any(ReportCell::is_scan)
-    };
-    let mut figures = Vec::new();
-    for class in surface.classes() {
-        let mut series = Vec::new();
-        for name in surface.structures() {
-            let (left_out, points) = curve(class, name);
-            *beyond.entry(class.to_bits()).or_insert(0) += left_out;
-            if points.len() > 1 {
-                series.push(Series {
-                    name: name.to_owned(),
-                    look: Look::of(name),
-                    is_scan: is_scan(name),
-                    points,
-                });
-            }
-        }
-        // The fastest at the largest size keeps its colour.
-        let last = |series: &Series| series.points.last().map_or(f64::INFINITY, |p| p.at[1]);
-        series.sort_by(|a, b| last(a).total_cmp(&last(b)));
-        if !series.is_empty() {
-            figures.push((class, series));
-        }
-    }
-    let points = || figures.iter().flat_map(|f| &f.1).flat_map(|s| &s.points);
-    let values = |place: usize| points().map(move |p| p.at[place]).collect::<Vec<_>>();
-    let [items, ns] = [0, 1].map(values);
-    let mut sizes = items.clone();
-    sizes.sort_by(f64::total_cmp);
-    sizes.dedup();
-    let size = |items: f64| text::count(items.round() as usize);
-    let figure = |(class, series)| {
-        let shown = surface_tables::class(class);
-        let caption = format!(
-            "{}: mean time per query against items, {shown} visible{}{}",
-            surface_tables::title(surface),
-            measured(surface, class),
-            left_out(beyond[&class.to_bits()])
-        );
-        let mut x = Axis::log("items", items.iter().copied(), 1.05, &size);
-        x.ticks.clone_from(&sizes);
-        let y = Axis::log("", ns.iter().copied(), 1.1, &text::time);
-        (
-            shown,
-            Diagram::of(caption, [x, y], Joined::Marked, series).draw(),
-        )
-    };
-    figures.into_iter().map(figure).collect()
-}
-
-/// The shares that a class stands for, where it does not say it by itself.
-fn measured(surface: &Surface, class: f64) -> String {
-    let here = || surface.places.iter().filter(|place| place.class == class);
-    if !here().any(Place::is_off_class) {
-        return String::new();
-    }
-    let shares = || here().map(|place| place.share);
-    let least = shares().fold(f64::INFINITY, f64::min);
-    let most = shares().fold(0.0, f64::max);
-    format!(
-        " (measured: {} to {})",
-        text::percent(least),
-        text::percent(most)
-    )
 }
 
 /// Time and visible items along the path, and the distribution of times over it.

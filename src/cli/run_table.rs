@@ -1,49 +1,15 @@
-//! The end of `cullbench run` on the terminal: tables, then the conclusion.
-//!
-//! One scene and path is a row per structure, several are a row each.
+//! Tables of the results of a run: one scene and path is a row per structure, several
+//! are a row each. The terminal shows a summary of them, documents all.
 
 use std::collections::BTreeSet;
-use std::io::{self, Write};
-use std::path::Path;
 
+use super::document::Block;
 use super::table::Table;
-use super::{inputs, run_verdict, surface_tables, text};
+use super::{inputs, run_verdict, text};
 use crate::measure::Status;
-use crate::report::{Comparison, Overall, Ranked, Report, ReportCell, comparisons, times_as_fast};
+use crate::report::{Comparison, Overall, Ranked, ReportCell, Speedup, times_as_fast};
 use crate::shown::shortened;
 use crate::spec::parse_number;
-
-/// Shows the tables and conclusions of each cache state and culling test.
-pub fn show(report: &Report, all_columns: bool) -> io::Result<()> {
-    let mut out = text::terminal();
-    write(&mut out, report, all_columns, text::width())?;
-    out.flush()
-}
-
-fn write(out: &mut impl Write, report: &Report, all_columns: bool, width: usize) -> io::Result<()> {
-    let all = comparisons(report);
-    for group in groups(&all) {
-        let overall = Overall::of(&group);
-        writeln!(out)?;
-        match &group[..] {
-            [one] => write!(out, "{}", of_one(one, overall.base, all_columns, width))?,
-            _ => {
-                let rows: Vec<_> = labels(&group).into_iter().zip(group.clone()).collect();
-                write!(out, "{}", of_many(&rows, &overall, all_columns, width))?;
-                for one in group.iter().filter(|_| all_columns) {
-                    write!(out, "\n{}", of_one(one, overall.base, true, width))?;
-                }
-            }
-        }
-        for line in reasons(&group)
-            .into_iter()
-            .chain([conclusion(&group, &overall)])
-        {
-            writeln!(out, "{}", text::wrapped(&line, width))?;
-        }
-    }
-    surface_tables::show(out, report, width)
-}
 
 /// Comparisons of one cache state and culling test each.
 pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>> {
@@ -64,10 +30,7 @@ pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>>
 pub fn conclusion(group: &[&Comparison], overall: &Overall) -> String {
     match group {
         [one] => run_verdict::of_one(one, overall.base),
-        _ => {
-            let rows: Vec<_> = labels(group).into_iter().zip(group.to_vec()).collect();
-            run_verdict::of_many(&rows, overall)
-        }
+        _ => run_verdict::of_many(&labels(group), group, overall),
     }
 }
 
@@ -78,7 +41,7 @@ fn key<'r>(comparison: &Comparison<'r>) -> [&'r str; 3] {
 }
 
 /// Lines above a table: the scene, the queries, and what they return.
-fn heads(comparison: &Comparison) -> Vec<String> {
+pub fn heads(comparison: &Comparison) -> Vec<String> {
     let cell = comparison.about();
     let (scene, path) = (&cell.scene, &cell.path);
     let mut first = format!(
@@ -141,8 +104,9 @@ fn share(share: f64) -> String {
 /// A column of single figures: head, metric and form.
 pub type Figure = (&'static str, &'static str, fn(f64) -> String);
 
-/// All of them, by their names for [`figures`].
-pub const FIGURES: [Figure; 20] = [
+/// Figures of queries by priority, then those of frames. A summary has the first two,
+/// or the first five of a motion.
+pub const FIGURES: [Figure; 19] = [
     ("build", "build_ms", |ms| text::time(ms * 1e6)),
     ("bytes/item", "memory_bytes_per_item", |b| format!("{b:.1}")),
     ("p95", "query_ns_p95", text::time),
@@ -155,173 +119,136 @@ pub const FIGURES: [Figure; 20] = [
     ("repaid after", "break_even_queries", |n| {
         text::count(n as usize)
     }),
-    ("query", "query_ns", text::time),
-    ("frame", "frame_ns", text::time),
     ("worst", "worst_frame_ns", text::time),
     ("update", "update_ns", text::time),
-    ("further query", "further_query_ns", text::time),
+    ("query", "query_ns", text::time),
+    ("x after 100", "ageing_100", text::significant),
     ("false positives", "excess", text::percent),
+    ("further query", "further_query_ns", text::time),
     ("x after 1", "ageing_1", text::significant),
     ("x after 10", "ageing_10", text::significant),
-    ("x after 100", "ageing_100", text::significant),
     ("x after 1000", "ageing_1000", text::significant),
 ];
 
-/// The figures of a cell, by the names of their columns.
-pub fn figures(cell: &ReportCell, names: &[&str]) -> Vec<String> {
-    let row = |name: &&str| FIGURES.iter().find(|figure| figure.0 == *name);
-    let shown = |(_, metric, show): &Figure| text::some(cell.value(metric), show);
-    names
-        .iter()
-        .map(|name| text::some(row(name), shown))
-        .collect()
-}
-
-/// Figures of queries by priority.
-///
-/// All but the first two, and those that do not fit, are left to `--all-columns`.
-const OF_QUERIES: &[&str] = &[
-    "build",
-    "bytes/item",
-    "p95",
-    "/ read",
-    "/ copy",
-    "/ replay",
-    "locate",
-    "update of 1 %",
-    "query after 32",
-    "repaid after",
-];
-
-/// Figures of a motion, likewise but for the first five.
-const OF_FRAMES: &[&str] = &[
-    "worst",
-    "update",
-    "query",
-    "x after 100",
-    "false positives",
-    "further query",
-    "x after 10",
-    "x after 1000",
-    "build",
-    "bytes/item",
-];
-
-/// Head and table of one scene and path.
-fn of_one(comparison: &Comparison, base: Option<&str>, all: bool, width: usize) -> String {
-    let base = base.and_then(|base| comparison.sound_cell(base));
-    let (time, names, shown) = match comparison.about().path.motion.is_empty() {
-        true => ("time per query", OF_QUERIES, 2),
-        false => ("time per frame", OF_FRAMES, 5),
+/// A row per structure of one scene and path; in full with intervals, lower bounds and
+/// every figure.
+pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) -> Table {
+    let (queries, frames) = FIGURES.split_at(10);
+    let (time, figures, brief) = match comparison.about().path.motion.is_empty() {
+        true => ("time per query", queries.to_vec(), 2),
+        false => ("time per frame", [frames, &queries[..2]].concat(), 5),
     };
-    let names = if all { names } else { &names[..shown] };
-    let of_base = text::some(base, |base| format!("vs {}", cell_name(base)));
-    let head = ["structure", time, &of_base].into_iter();
-    let head = head.chain(names.iter().copied()).chain(["speed-up [95 %]"]);
-    let mut table = Table::of_numbers(head);
+    let figures = if is_full { &figures } else { &figures[..brief] };
+    let peer = comparison.fastest_peer().filter(|_| is_full);
+    let of_base = text::some(base, |base| format!("vs {}", text::plain(base)));
+    let head = ["structure", "rank", time, &of_base].into_iter();
+    let head = head.chain(figures.iter().map(|figure| figure.0));
+    let mut table = Table::of_numbers(head.chain(["vs fastest peer", "status"]));
     let mut add = |rank: String, cell: &ReportCell| {
-        let time = match cell.time() {
-            None => cell.status.name().to_owned(),
-            Some(time) => text::time_with(time),
-        };
-        let ratio = base.and_then(|base| times_as_fast(base, cell));
-        let ratio = ratio.filter(|_| cell.status == Status::Ok);
+        let is_ok = cell.status == Status::Ok;
+        let speedup = base.and_then(|base| comparison.speedup(base, cell));
+        let of_peer = peer.and_then(|peer| times_as_fast(peer, cell));
+        let status = cell.status.name().to_owned();
         let row = [
-            format!("{rank:>2} {}", shortened(&cell_name(cell), width / 2)),
-            time,
-            text::some(ratio, |ratio| format!("{} x", text::significant(ratio))),
+            text::plain(&cell.structure),
+            rank,
+            cell.time().map_or(status.clone(), text::time_with),
+            text::some(speedup.filter(|_| is_ok), |found| ratio(found, is_full)),
         ];
-        let speedup = cell.metrics.get("speedup").filter(|_| all);
-        let row = row.into_iter().chain(figures(cell, names));
-        let speedup = text::some(speedup, |found| text::within(found.estimate()));
-        table.add_row(row.chain([speedup]));
+        let figure = |(_, metric, show): &Figure| text::some(cell.value(metric), show);
+        let last = [
+            text::some(of_peer.filter(|_| is_ok), text::significant),
+            if is_full && !is_ok {
+                status
+            } else {
+                String::new()
+            },
+        ];
+        let row = row.into_iter().chain(figures.iter().map(figure));
+        table.add_row(row.chain(last));
     };
     for Ranked { rank, cell } in &comparison.ranked {
         add(rank.map_or("-".to_owned(), |rank| rank.to_string()), cell);
     }
-    for cell in comparison.bounds.iter().filter(|_| all) {
-        add(String::new(), cell);
+    for cell in comparison.bounds.iter().filter(|_| is_full) {
+        add("lower bound".to_owned(), cell);
     }
-    let mut lines = heads(comparison);
-    if all {
-        lines.push(text::basis(comparison));
-    }
-    let lines = lines
-        .iter()
-        .map(|line| text::wrapped(&text::plain(line), width) + "\n");
-    let parts = table.without_empty_columns().parts(width);
-    let shown = if all { parts.len() } else { 1 };
-    let parts = parts
-        .iter()
-        .take(shown)
-        .map(|part| format!("\n{}", part.bare()));
-    lines.chain(parts).chain(["\n".to_owned()]).collect()
+    table.without_empty_columns()
 }
 
-fn cell_name(cell: &ReportCell) -> String {
-    text::plain(&cell.structure)
+/// "4.04 x", in full with its 95 % interval.
+fn ratio((ratio, ends): Speedup, is_full: bool) -> String {
+    let ends = ends.filter(|_| is_full).map(|ends| ends.map(Some));
+    let interval = text::interval(ends.unwrap_or_default(), 1.0);
+    format!("{} x{interval}", text::significant(ratio))
 }
 
-/// Speed-ups: a row per scene and path, a column per structure, the base's time.
-fn of_many(rows: &[(String, &Comparison)], overall: &Overall, all: bool, width: usize) -> String {
-    let of_base = |name: &str| overall.base == Some(name);
+/// Speed-ups over the base: a row per scene and path, a column per structure, and the
+/// geometric means. The base has its times; `*` marks the fastest and its ties.
+pub fn matrix(names: Vec<String>, all: &[&Comparison], overall: &Overall) -> Table {
+    let is_base = |name: &str| overall.base == Some(name);
     let mut columns: Vec<_> = overall.standings.iter().collect();
-    columns.sort_by_key(|standing| !of_base(standing.structure));
-    let names = columns.iter().map(|standing| standing.structure.to_owned());
-    let mut table = Table::of_numbers([String::new()].into_iter().chain(names));
-    for (label, comparison) in rows {
-        let base = overall.base.and_then(|base| comparison.sound_cell(base));
+    columns.sort_by_key(|standing| !is_base(standing.structure));
+    let head = columns.iter().map(|standing| standing.structure);
+    let mut table = Table::of_numbers(["scene, path"].into_iter().chain(head));
+    for (name, comparison) in names.into_iter().zip(all) {
         let figure = |structure: &str| {
             let mut cells = comparison.ranked.iter();
             let Some(found) = cells.find(|ranked| ranked.cell.structure == structure) else {
                 return String::new();
             };
-            let is_first = if found.rank == Some(1) { "*" } else { " " };
-            let time = text::some(found.cell.time(), |time| text::time(time.value));
-            let shown = match (found.rank, base) {
-                (None, _) => found.cell.status.name().to_owned(),
-                (_, Some(base)) if !of_base(structure) => {
-                    text::some(times_as_fast(base, found.cell), text::significant)
-                }
-                _ => time,
+            let speedup = overall.base.filter(|base| *base != structure);
+            let speedup = speedup.and_then(|base| comparison.speedup(base, found.cell));
+            let shown = match (found.rank, speedup) {
+                (None, _) => return found.cell.status.name().to_owned(),
+                (_, Some((ratio, _))) => text::significant(ratio),
+                (_, None) => text::some(found.cell.time(), |time| text::time(time.value)),
             };
-            shown + is_first
+            let mark = if found.rank == Some(1) { "*" } else { "" };
+            format!("{mark}{shown}")
         };
         let figures = columns.iter().map(|standing| figure(standing.structure));
-        table.add_row([shortened(label, width / 2)].into_iter().chain(figures));
+        table.add_row([name].into_iter().chain(figures));
     }
     if let Some(base) = overall.base {
-        let mean = |speedup: Option<f64>| text::some(speedup, |x| text::significant(x) + " ");
-        let means = columns.iter().map(|standing| mean(standing.speedup));
+        let means = columns.iter();
+        let means = means.map(|standing| text::some(standing.speedup, text::significant));
         let label = format!("geometric mean, x {base}");
         table.add_row([label].into_iter().chain(means));
     }
-    let parts = table.parts(width);
-    let shown = if all { parts.len() } else { 1 };
-    let hidden = parts[shown..].iter().map(|part| part.header.len() - 1);
-    let more = match hidden.sum() {
-        0 => String::new(),
-        hidden => format!(
-            "{}: --all-columns\n",
-            text::counted(hidden, "further structure")
-        ),
-    };
-    let parts: Vec<String> = parts[..shown].iter().map(Table::bare).collect();
-    let about = || rows.iter().map(|(_, comparison)| comparison.about());
+    table
+}
+
+/// Summary of several scenes and paths: as many structures as fit.
+pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Block> {
+    let about = || all.iter().map(|comparison| comparison.about());
     let up: BTreeSet<&str> = about().map(|cell| cell.scene.up.as_str()).collect();
     let up: Vec<&str> = up.into_iter().collect();
     let lens = inputs::lenses(about().map(|cell| &cell.path));
-    let head = lens.map(|lens| format!("{} up; {lens}\n\n", up.join(" or ")));
-    let head = text::wrapped(&head.unwrap_or_default(), width);
+    let lens = lens.map(|lens| Block::Line(format!("{} up; {lens}", up.join(" or "))));
+    let names = labels(all).into_iter();
+    let names = names.map(|label| shortened(&label, width / 2));
+    let mut parts = matrix(names.collect(), all, overall).parts(width);
+    let hidden = parts.split_off(1);
+    let hidden: usize = hidden.iter().map(|part| part.header.len() - 1).sum();
+    let more = text::counted(hidden, "further structure");
+    let more = (hidden > 0).then(|| Block::Line(format!("{more}: --all-columns")));
+    let lines = [lens, Some(Block::Table(parts.swap_remove(0)))];
+    let lines = lines
+        .into_iter()
+        .chain([Some(Block::Line(legend(all, overall)))]);
+    lines.chain([more]).flatten().collect()
+}
+
+/// Meaning of the figures of a [`matrix`].
+pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
     let unit = text::some(overall.base, |base| {
-        let moves = about().any(|cell| !cell.path.motion.is_empty());
+        let mut about = all.iter().map(|comparison| comparison.about());
+        let moves = about.any(|cell| !cell.path.motion.is_empty());
         let per = if moves { "frame" } else { "query" };
         format!("; {base}: time per {per}, others: x {base}")
     });
-    format!(
-        "{head}{}\n* fastest or tied{unit}\n{more}\n",
-        parts.join("\n")
-    )
+    format!("* fastest or tied{unit}")
 }
 
 /// Short names of scenes and paths: "city 100k flythrough 2 %".
@@ -376,7 +303,7 @@ fn short_count(typed: &str) -> String {
 }
 
 /// Reasons why cells are not ok, each once with the number of its paths.
-fn reasons(group: &[&Comparison]) -> Vec<String> {
+pub fn reasons(group: &[&Comparison]) -> Vec<String> {
     let mut found: Vec<(String, usize)> = Vec::new();
     let ranked = group
         .iter()
@@ -400,34 +327,4 @@ fn reasons(group: &[&Comparison]) -> Vec<String> {
         .into_iter()
         .map(|(line, count)| text::plain(&line) + &of(count));
     lines.collect()
-}
-
-/// Shows the files of a run.
-pub fn show_written(out: &mut impl Write, folder: &Path) -> io::Result<()> {
-    writeln!(out, "report  {}", folder.join("report.html").display())?;
-    writeln!(
-        out,
-        "        report.json, summary.csv, samples.csv, stream.jsonl"
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::read_report;
-
-    #[test]
-    fn the_quick_suite_fits_sixty_lines() {
-        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/results/reference/report.json");
-        let mut told = Vec::new();
-        let report = read_report(file.as_ref()).unwrap();
-        write(&mut told, &report, false, 80).unwrap();
-        let told = String::from_utf8(told).unwrap();
-        // Basis, warnings, files and the next command are below.
-        assert!((20..=48).contains(&told.lines().count()), "{told}");
-        assert!(
-            told.lines().all(|line| line.chars().count() <= 80),
-            "{told}"
-        );
-    }
 }

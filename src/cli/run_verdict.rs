@@ -206,16 +206,15 @@ fn were(count: usize) -> String {
 }
 
 /// Conclusion of several scenes and paths with their labels.
-pub fn of_many(all: &[(String, &Comparison)], overall: &Overall) -> String {
-    let comparisons: Vec<&Comparison> = all.iter().map(|row| row.1).collect();
-    let mut told = vec![standing(all, overall)];
+pub fn of_many(labels: &[String], all: &[&Comparison], overall: &Overall) -> String {
+    let mut told = vec![standing(labels, all, overall)];
     told.extend(overall.base.and_then(fallback));
-    told.extend(checked(&comparisons));
-    told.extend(failed(&comparisons));
+    told.extend(checked(all));
+    told.extend(failed(all));
     told.join(" ")
 }
 
-fn standing(all: &[(String, &Comparison)], overall: &Overall) -> String {
+fn standing(labels: &[String], all: &[&Comparison], overall: &Overall) -> String {
     let mut ranked = overall.standings.iter().filter(|s| s.speedup.is_some());
     let (Some(base), Some(best)) = (overall.base, ranked.next()) else {
         return "No structure has times everywhere, so there are no means.".to_owned();
@@ -241,8 +240,7 @@ fn standing(all: &[(String, &Comparison)], overall: &Overall) -> String {
         listed(&firsts, "and"),
         all.len()
     );
-    let mut elsewhere: Vec<(f64, String)> = all
-        .iter()
+    let mut elsewhere: Vec<(f64, String)> = (labels.iter().zip(all))
         .filter_map(|(label, comparison)| {
             let first = comparison.winners().next()?;
             let own = comparison

@@ -3,7 +3,7 @@
 //! Growth with the number of items, and the speed-ups of each scene and path.
 
 use super::figure::picture;
-use super::run_figures;
+use super::{run_figures, surface_tables};
 use crate::report::{Overall, Report, comparisons, surfaces};
 
 /// A picture with a name that fits a file.
@@ -22,7 +22,7 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
         pictures.push(Picture { name, svg });
     };
     for surface in surfaces(comparisons(report)) {
-        for (shown, figure) in run_figures::growth(&surface) {
+        for (shown, figure) in surface_tables::growth(&surface) {
             add(
                 [&surface.world, surface.cache, surface.test, &shown],
                 figure,

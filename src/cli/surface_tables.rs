@@ -2,22 +2,28 @@
 //! linear scan is beaten, and how cost grows. For the end of `run` and for
 //! `report`; read off a report, nothing is measured.
 
-use std::io::{self, Write};
+use std::collections::BTreeMap;
 
+use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::Block;
+use super::figure::{Axis, Figure, is_drawn, left_out};
+use super::palette::Look;
+use super::run_figures::ends;
 use super::table::Table;
 use super::text;
-use crate::report::{Crossing, Growth, Place, Report, Surface, comparisons, growths, surfaces};
+use crate::report::{
+    Crossing, Growth, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
+};
 
 /// A class of shares: "0.1 %", "100 %".
-pub fn class(share: f64) -> String {
+fn share(share: f64) -> String {
     // At most two digits by its making; the rest is rounding.
     let rounded = format!("{:.6}", share * 100.0);
     let plain = rounded.trim_end_matches('0').trim_end_matches('.');
     format!("{plain} %")
 }
 
-pub fn title(surface: &Surface) -> String {
+fn title(surface: &Surface) -> String {
     format!("{}, {}, {}", surface.world, surface.cache, surface.test)
 }
 
@@ -26,7 +32,7 @@ pub fn title(surface: &Surface) -> String {
 fn winners(surface: &Surface) -> Table {
     let classes = surface.classes();
     let header = ["items \\ visible".to_owned()].into_iter();
-    let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| class(*c))));
+    let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| share(*c))));
     for size in surface.sizes() {
         let mut row = vec![text::count(size)];
         for class in &classes {
@@ -65,7 +71,7 @@ fn winner(place: &Place) -> String {
 fn crossings(surface: &Surface) -> Option<Table> {
     let classes = surface.classes();
     let header = ["faster than linear from".to_owned()].into_iter();
-    let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| class(*c))));
+    let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| share(*c))));
     for structure in surface.no_scans() {
         let told = classes
             .iter()
@@ -118,30 +124,41 @@ fn break_even(surface: &Surface) -> Option<Table> {
     (!structures.is_empty()).then_some(table)
 }
 
-/// The tables of one surface.
-pub fn of_surface(surface: &Surface) -> Vec<Block> {
-    let mut blocks = vec![
-        Block::Line(
+/// Crossovers and growth of a report, in tables and figures; a surface has as many
+/// `sizes`, or one size and several shares.
+pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    let is_shown = |surface: &&Surface| surface.spans() && surface.sizes().len() >= sizes;
+    for surface in surfaces(comparisons(report)).iter().filter(is_shown) {
+        blocks.push(Block::Heading(2, format!("Crossover: {}", title(surface))));
+        blocks.push(Block::line(
             "The fastest structure (= if differences are not significant) and its speed-up vs \
              linear; none if a scan wins. Shares are rounded on a log scale to 1, 1.5, 2, 3, 5, \
              7, 10, ... percent; (at ...) gives a share that is more than a tenth off. ~ N is \
-             interpolated between two sizes, on log scales."
-                .to_owned(),
-        ),
-        Block::Table(winners(surface)),
-    ];
-    blocks.extend(crossings(surface).map(Block::Table));
-    if let Some(rows) = break_even(surface) {
-        blocks.push(Block::Line(
-            "Queries after which the build pays off against the linear scan:".to_owned(),
+             interpolated between two sizes, on log scales.",
         ));
-        blocks.push(Block::Table(rows));
+        blocks.push(Block::Table(winners(surface)));
+        blocks.extend(crossings(surface).map(Block::Table));
+        if let Some(rows) = break_even(surface) {
+            let line = "Queries after which the build pays off against the linear scan:";
+            blocks.extend([Block::line(line), Block::Table(rows)]);
+        }
+        let figures = growth(surface).into_iter();
+        blocks.extend(figures.map(|figure| Block::Figure(figure.1)));
+    }
+    let growths = growths(report);
+    if !growths.is_empty() {
+        let heading = "Growth at a fixed number of visible items".to_owned();
+        blocks.extend([
+            Block::Heading(2, heading),
+            Block::Table(of_growths(&growths)),
+        ]);
     }
     blocks
 }
 
 /// How cost grows at a fixed number of visible items.
-pub fn of_growths(growths: &[Growth]) -> Table {
+fn of_growths(growths: &[Growth]) -> Table {
     let mut table = Table::of(
         "world, path, cache, test | structure | >visible | >items | >query time ~ N^e, e =",
     );
@@ -169,30 +186,98 @@ pub fn of_growths(growths: &[Growth]) -> Table {
     table
 }
 
-/// Shows crossovers and growth in tables of at most `width` characters.
-pub fn show(out: &mut impl Write, report: &Report, width: usize) -> io::Result<()> {
-    let mut tables = Vec::new();
-    for surface in surfaces(comparisons(report)) {
-        // A world of one size has its ranked tables; that is the surface.
-        if surface.sizes().len() < 2 {
-            continue;
+/// Time against the number of items, a line per structure, named at its right end.
+///
+/// One figure per class of shares that has at least two sizes; their axes are the same.
+pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
+    let mut beyond = BTreeMap::new();
+    let curve = |class: f64, name: &str| -> (usize, Vec<Point>) {
+        let points = surface.curve(name, class, "query_ns");
+        let is_drawn = |p: &&(usize, f64)| is_drawn(p.0 as f64) && is_drawn(p.1);
+        let point = |&(items, ns): &(usize, f64)| {
+            let here = |place: &&Place| place.class == class && place.items == items;
+            let mut cells = (surface.places.iter().filter(here)).filter_map(|p| p.cell(name));
+            let metric = cells.next().and_then(|cell| cell.metrics.get("query_ns"));
+            Point {
+                at: [items as f64, ns],
+                ends: metric.and_then(ends),
+                note: format!(
+                    "{name}, {}: {}",
+                    text::count(items),
+                    text::some(metric, |ns| text::time_within(ns.estimate()))
+                ),
+                ..Point::default()
+            }
+        };
+        let drawn: Vec<Point> = points.iter().filter(is_drawn).map(point).collect();
+        (points.len() - drawn.len(), drawn)
+    };
+    let is_scan = |name: &str| {
+        let cells = surface.places.iter().filter_map(|place| place.cell(name));
+        cells.take(1).any(ReportCell::is_scan)
+    };
+    let mut figures = Vec::new();
+    for class in surface.classes() {
+        let mut series = Vec::new();
+        for name in surface.structures() {
+            let (left_out, points) = curve(class, name);
+            *beyond.entry(class.to_bits()).or_insert(0) += left_out;
+            if points.len() > 1 {
+                series.push(Series {
+                    name: name.to_owned(),
+                    look: Look::of(name),
+                    is_scan: is_scan(name),
+                    points,
+                });
+            }
         }
-        let title = format!("\ncrossover surface: {}", title(&surface));
-        tables.push((title, winners(&surface)));
-        tables.extend(crossings(&surface).map(|rows| (String::new(), rows)));
-    }
-    let growths = growths(report);
-    if !growths.is_empty() {
-        let title = "\ngrowth at a fixed number of visible items [95 % interval]";
-        tables.push((title.to_owned(), of_growths(&growths)));
-    }
-    for (title, table) in tables {
-        for (n, part) in table.parts(width).iter().enumerate() {
-            let title = if n == 0 { &title } else { "" };
-            writeln!(out, "{}\n{}", title, part.bare().trim_end())?;
+        // The fastest at the largest size keeps its colour.
+        let last = |series: &Series| series.points.last().map_or(f64::INFINITY, |p| p.at[1]);
+        series.sort_by(|a, b| last(a).total_cmp(&last(b)));
+        if !series.is_empty() {
+            figures.push((class, series));
         }
     }
-    Ok(())
+    let points = || figures.iter().flat_map(|f| &f.1).flat_map(|s| &s.points);
+    let values = |place: usize| points().map(move |p| p.at[place]).collect::<Vec<_>>();
+    let [items, ns] = [0, 1].map(values);
+    let mut sizes = items.clone();
+    sizes.sort_by(f64::total_cmp);
+    sizes.dedup();
+    let size = |items: f64| text::count(items.round() as usize);
+    let figure = |(class, series)| {
+        let shown = share(class);
+        let caption = format!(
+            "{}: mean time per query against items, {shown} visible{}{}",
+            title(surface),
+            measured(surface, class),
+            left_out(beyond[&class.to_bits()])
+        );
+        let mut x = Axis::log("items", items.iter().copied(), 1.05, &size);
+        x.ticks.clone_from(&sizes);
+        let y = Axis::log("", ns.iter().copied(), 1.1, &text::time);
+        (
+            shown,
+            Diagram::of(caption, [x, y], Joined::Marked, series).draw(),
+        )
+    };
+    figures.into_iter().map(figure).collect()
+}
+
+/// The shares that a class stands for, where it does not say it by itself.
+fn measured(surface: &Surface, class: f64) -> String {
+    let here = || surface.places.iter().filter(|place| place.class == class);
+    if !here().any(Place::is_off_class) {
+        return String::new();
+    }
+    let shares = || here().map(|place| place.share);
+    let least = shares().fold(f64::INFINITY, f64::min);
+    let most = shares().fold(0.0, f64::max);
+    format!(
+        " (measured: {} to {})",
+        text::percent(least),
+        text::percent(most)
+    )
 }
 
 #[cfg(test)]
@@ -203,7 +288,7 @@ mod tests {
     fn shares_and_interpolated_sizes_are_rounded() {
         let shares = [0.001, 0.02, 0.2, 1.0, 0.0005];
         assert_eq!(
-            shares.map(class),
+            shares.map(share),
             ["0.1 %", "2 %", "20 %", "100 %", "0.05 %"]
         );
         assert_eq!([1234.0, 7.2, 98_765.0].map(two_digits), [1200, 7, 99_000]);

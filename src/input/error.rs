@@ -1,125 +1,87 @@
 //! Errors in files and texts of users, each one line: where, found, expected.
 
-use std::path::PathBuf;
+use std::fmt::Display;
+use std::io;
+use std::path::Path;
 
 use crate::shown::expected_by;
 use crate::spec::SpecError;
 
-/// Why a file or text cannot be used: where, what was found, what was expected.
+/// Error of reading or writing a file or a text, in one line: where, what was found, what
+/// was expected.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum InputError {
-    /// The system refused to read it.
-    #[error("{}: {source}{}", path.display(), expected_by(source, "file"))]
-    Io {
-        /// File that was to be read.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
-    /// A file that has changed since it was read ([`hold_files`](super::hold_files)).
-    #[error("{}: has changed since it was first read; expected the same file until the end", path.display())]
-    Changed {
-        /// Name of the file.
-        path: PathBuf,
-    },
-    /// A text file: `line` counts from 1 and includes the header.
-    #[error("{file}, line {line}: {found}; expected {expected}")]
-    Line {
-        /// Name of the file.
-        file: String,
-        /// From 1, the header included.
-        line: u64,
-        /// Text that was found.
-        found: String,
-        /// The rule.
-        expected: String,
-    },
-    /// A structured file, by the path of the value in it.
-    #[error("{file}, {place}: {found}; expected {expected}")]
-    Value {
-        /// Name of the file.
-        file: String,
-        /// Path of the value, `cases[3].near`.
-        place: String,
-        /// Text that was found.
-        found: String,
-        /// The rule.
-        expected: String,
-    },
-    /// A binary file.
-    #[error("{file}, byte {offset}: {found}; expected {expected}")]
-    Byte {
-        /// Name of the file.
-        file: String,
-        /// Bytes before it.
-        offset: u64,
-        /// Bytes that were found.
-        found: String,
-        /// The rule.
-        expected: String,
-    },
-    /// Several items of a file are bad; the first is named.
-    #[error(
-        "{first} ({count} bad items in all; --skip-bad-items leaves them out and reports the count)"
-    )]
-    BadItems {
-        /// The first of them.
-        first: Box<InputError>,
-        /// How many there are, the first included.
-        count: usize,
-    },
-    /// A scene that would not fit into memory; sizes in bytes.
-    #[error(
-        "{scene}: needs about {}{}, {} are free; expected fewer items{}",
-        gigabytes(*needed),
-        match structures {
-            0 => String::new(),
-            1 => " with 1 structure".to_owned(),
-            more => format!(" with {more} structures"),
-        },
-        gigabytes(*available),
-        if *structures > 1 { " or fewer structures" } else { "" }
-    )]
-    TooLarge {
-        /// Name of the scene.
-        scene: String,
-        /// Structures that are to be built at once; 0 for the scene alone.
-        structures: u64,
-        /// Bytes that are needed.
-        needed: u64,
-        /// Bytes that are free.
-        available: u64,
-    },
-    /// An item of a scene that was not read from a file.
-    #[error("scene '{scene}', item {item}: {reason}")]
-    BadItem {
-        /// Name of the scene.
-        scene: String,
-        /// Index of the item.
-        item: usize,
-        /// Text found and text expected.
-        reason: String,
-    },
-    /// The name or a parameter is wrong.
-    #[error("{0}")]
-    Spec(#[from] SpecError),
+#[error("{text}")]
+pub struct InputError {
+    text: String,
+    source: Option<io::Error>,
 }
 
 impl InputError {
-    /// An error in a line of a text file; `line` counts from 1.
-    pub fn line(
-        file: &str,
-        line: u64,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-    ) -> InputError {
-        InputError::Line {
-            file: file.to_owned(),
-            line,
-            found: found.into(),
-            expected: expected.into(),
+    /// An error that reads as this text.
+    pub fn new(text: impl Display) -> InputError {
+        InputError {
+            text: text.to_string(),
+            source: None,
         }
+    }
+
+    /// An error in a place of a file: "line 3", "byte 17", "cases[3].near".
+    pub fn at(
+        file: impl Display,
+        place: impl Display,
+        found: impl Display,
+        expected: impl Display,
+    ) -> InputError {
+        InputError::new(format_args!(
+            "{file}, {place}: {found}; expected {expected}"
+        ))
+    }
+
+    /// An error in a line of a text file; `line` counts from 1, the header included.
+    pub fn line(
+        file: impl Display,
+        line: u64,
+        found: impl Display,
+        expected: impl Display,
+    ) -> InputError {
+        InputError::at(file, format_args!("line {line}"), found, expected)
+    }
+
+    /// An error in a binary file behind `offset` bytes.
+    pub fn byte(
+        file: impl Display,
+        offset: usize,
+        found: impl Display,
+        expected: impl Display,
+    ) -> InputError {
+        InputError::at(file, format_args!("byte {offset}"), found, expected)
+    }
+
+    /// An error of the system about a path, which is a "file" or a "file or folder".
+    pub fn io(path: &Path, what: &str) -> impl Fn(io::Error) -> InputError + Copy {
+        move |error| {
+            let source = bare(error);
+            let expected = expected_by(&source, what);
+            InputError {
+                text: format!("{}: {source}{expected}", path.display()),
+                source: Some(source),
+            }
+        }
+    }
+}
+
+impl From<SpecError> for InputError {
+    fn from(error: SpecError) -> InputError {
+        InputError::new(error)
+    }
+}
+
+/// The error of the system, without the name of a temporary file.
+pub fn bare(error: io::Error) -> io::Error {
+    // `tempfile` wraps it so, and passes no more of it than its kind and text.
+    match error.to_string().split_once(" at path \"") {
+        Some((said, _)) if error.get_ref().is_some() => io::Error::new(error.kind(), said),
+        _ => error,
     }
 }
 

@@ -35,10 +35,7 @@ fn is_stdin(path: &Path) -> bool {
 /// # Errors
 /// I/O errors, with the path.
 pub fn read_file(path: &Path) -> Result<Arc<[u8]>, InputError> {
-    let io = |source| InputError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let io = InputError::io(path, "file");
     let mut pipes = PIPES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(bytes) = pipes.get(path) {
         return Ok(bytes.clone());
@@ -92,9 +89,10 @@ fn hold(held: &mut BTreeMap<String, String>, path: &Path, bytes: &[u8]) -> Resul
         .or_insert_with(|| digest.clone());
     match *first == digest {
         true => Ok(()),
-        false => Err(InputError::Changed {
-            path: path.to_owned(),
-        }),
+        false => Err(InputError::new(format_args!(
+            "{}: has changed since it was first read; expected the same file until the end",
+            path.display()
+        ))),
     }
 }
 

@@ -3,12 +3,11 @@
 
 mod error;
 mod file;
-mod lines;
 mod note;
 mod table;
 
-pub use error::InputError;
 pub(crate) use error::gigabytes;
+pub use error::{InputError, bare};
 pub use file::{held_files, hold_files, is_readable, pipes, read_file, stand_in};
 pub(crate) use note::{note, warn};
 pub use note::{tell_notes, tell_warnings};

@@ -4,9 +4,7 @@
 //! mechanics that the box, camera and point readers share; what the columns mean is theirs.
 
 use std::collections::HashSet;
-use std::io::{Chain, Cursor, Read};
 
-use super::lines::{LineCounter, QuoteFault};
 use super::{InputError, note};
 use crate::shown::{counted, first_of, shortened};
 use crate::spec::nearest;
@@ -16,17 +14,17 @@ const LABELS: [&str; 9] = [
     "camera", "comment", "frame", "id", "label", "name", "note", "time", "time_s",
 ];
 
-/// Bytes in which the header is searched for the delimiter.
-const HEAD: u64 = 1 << 16;
-
 /// A CSV file with its header read.
-pub struct TableReader<R> {
+pub struct TableReader<'b> {
     file: String,
-    csv: csv::Reader<LineCounter<Chain<Cursor<Vec<u8>>, R>>>,
+    bytes: &'b [u8],
+    csv: csv::Reader<&'b [u8]>,
     delimiter: u8,
     header: Vec<String>,
     header_line: u64,
     record: csv::ByteRecord,
+    /// Begin of the last record in bytes, and its line.
+    at: (usize, u64),
 }
 
 /// One data row.
@@ -37,26 +35,21 @@ pub struct Row<'a> {
     line: u64,
 }
 
-impl<R: Read> TableReader<R> {
+impl<'b> TableReader<'b> {
     /// Reads the header. Names are trimmed; a byte order mark is dropped.
     ///
     /// # Errors
-    /// An unreadable or empty file, a column named twice, text that is no
+    /// An empty file, a column named twice, a quote that is never closed, text that is no
     /// comma-separated UTF-8 with a header.
-    pub fn open(mut input: R, file: &str) -> Result<Self, InputError> {
-        let mut head = Vec::new();
-        let read = input.by_ref().take(HEAD).read_to_end(&mut head);
-        read.map_err(|error| csv_error(file, error.into()))?;
-        let delimiter = delimiter(&head);
+    pub fn open(bytes: &'b [u8], file: &str) -> Result<Self, InputError> {
+        let delimiter = delimiter(bytes);
         let mut csv = csv::ReaderBuilder::new()
             .flexible(true)
             .delimiter(delimiter)
             .trim(csv::Trim::All)
-            .from_reader(LineCounter::new(Cursor::new(head).chain(input), delimiter));
-        let fields = csv
-            .byte_headers()
-            .map_err(|error| csv_error(file, error))?
-            .clone();
+            .from_reader(bytes);
+        // From memory nothing fails to be read.
+        let fields = csv.byte_headers().cloned().unwrap_or_default();
         let header: Vec<String> = fields
             .iter()
             .map(|f| {
@@ -65,16 +58,23 @@ impl<R: Read> TableReader<R> {
                     .to_owned()
             })
             .collect();
-        let header_line = csv.get_mut().line_of_record_at(0);
-        let complain =
-            |found: String, expected: &str| InputError::line(file, header_line, found, expected);
+        let mut table = TableReader {
+            file: file.to_owned(),
+            bytes,
+            csv,
+            delimiter,
+            header: Vec::new(),
+            header_line: 1,
+            record: csv::ByteRecord::new(),
+            at: (0, 1),
+        };
+        table.header_line = table.line_of_record_at(0);
+        let complain = |found: String, expected: &str| table.error(found, expected.to_owned());
         if fields.as_slice().contains(&0) {
             let found = "zero bytes, as in UTF-16 text".to_owned();
             return Err(complain(found, "UTF-8 text"));
         }
-        if let Some(fault) = csv.get_ref().fault_before(csv.position().byte()) {
-            return Err(quote_error(file, fault));
-        }
+        check_quotes(bytes, delimiter, file)?;
         if header.iter().all(String::is_empty) {
             let found = match header.len() {
                 0 | 1 => "an empty file".to_owned(),
@@ -93,14 +93,20 @@ impl<R: Read> TableReader<R> {
                 return Err(complain(found, "each column once"));
             }
         }
-        Ok(TableReader {
-            file: file.to_owned(),
-            csv,
-            delimiter,
-            header,
-            header_line,
-            record: csv::ByteRecord::new(),
-        })
+        table.header = header;
+        Ok(table)
+    }
+
+    /// Line of the first record at or behind a byte. The CSV reader begins to look for a
+    /// record at the line ends before it. Records come in the order of the file.
+    fn line_of_record_at(&mut self, byte: usize) -> u64 {
+        let (last, line) = self.at;
+        let ends = self.bytes[byte..].iter().take_while(|byte| is_end(byte));
+        let at = byte + ends.count();
+        // The last line end of the file begins no line.
+        let to = at.min(self.bytes.len().saturating_sub(1));
+        self.at = (at, line + lines(&self.bytes[last.min(to)..to]));
+        self.at.1
     }
 
     /// The names of the columns, in order.
@@ -162,28 +168,19 @@ impl<R: Read> TableReader<R> {
     }
 
     /// The next row, or what is wrong with it; `None` at the end of the file.
-    ///
-    /// # Errors
-    /// Nothing can be read any more: an unreadable file, a quote that is never
-    /// closed.
-    pub fn next_row(&mut self) -> Result<Option<Result<Row<'_>, InputError>>, InputError> {
+    pub fn next_row(&mut self) -> Option<Result<Row<'_>, InputError>> {
         let read = self.csv.read_byte_record(&mut self.record);
-        if !read.map_err(|error| csv_error(&self.file, error))? {
-            return Ok(None);
-        }
-        let end = self.csv.position().byte();
-        if let Some(fault) = self.csv.get_ref().fault_before(end) {
-            return Err(quote_error(&self.file, fault));
-        }
+        read.ok().filter(|is_there| *is_there)?;
         let start = self.record.position().map_or(0, csv::Position::byte);
+        let line = self.line_of_record_at(start as usize);
         let row = Row {
             file: &self.file,
             header: &self.header,
-            line: self.csv.get_mut().line_of_record_at(start),
+            line,
             record: &self.record,
         };
         let (found, wanted) = (self.record.len(), self.header.len());
-        Ok(Some(match found == wanted {
+        Some(match found == wanted {
             true => Ok(row),
             false => {
                 // Where all are numbers, some of them may be behind a decimal comma.
@@ -196,7 +193,7 @@ impl<R: Read> TableReader<R> {
                 let expected = format!("{wanted}, as in the header{why}");
                 Err(row.error(counted(found, "field"), expected))
             }
-        }))
+        })
     }
 }
 
@@ -258,24 +255,56 @@ fn is_data(header: &[String]) -> bool {
     numbers.count() >= 3
 }
 
-fn quote_error(file: &str, fault: QuoteFault) -> InputError {
-    let found = match fault.end {
-        None => "a quote that is never closed".to_owned(),
-        Some(end) => format!("a quote that is not closed before line {end}"),
-    };
-    let expected = "'\"' at both ends of a field, and doubled within it";
-    InputError::line(file, fault.line, found, expected)
+fn is_end(byte: &u8) -> bool {
+    matches!(byte, b'\n' | b'\r')
 }
 
-fn csv_error(file: &str, error: csv::Error) -> InputError {
-    let line = error.position().map_or(1, csv::Position::line);
-    match error.into_kind() {
-        csv::ErrorKind::Io(source) => InputError::Io {
-            path: file.into(),
-            source,
-        },
-        other => InputError::line(file, line, format!("{other:?}"), "comma-separated values"),
+/// Line ends as an editor counts them: LF, CR, or both.
+fn lines(bytes: &[u8]) -> u64 {
+    let next = bytes.iter().skip(1).chain([&0]);
+    let ends = bytes.iter().zip(next);
+    let ends = ends.filter(|(byte, next)| is_end(byte) && (**byte, **next) != (b'\r', b'\n'));
+    ends.count() as u64
+}
+
+/// Refuses a quote that takes following lines into its field: it is never closed, or the
+/// quote that closes it has text behind it and was meant to open another field.
+fn check_quotes(bytes: &[u8], delimiter: u8, file: &str) -> Result<(), InputError> {
+    // A byte order mark, which the CSV reader drops.
+    let mut begin = if bytes.starts_with(b"\xef\xbb\xbf") {
+        3
+    } else {
+        0
+    };
+    let fault = |open: usize, found: String| {
+        let expected = "'\"' at both ends of a field, and doubled within it";
+        InputError::line(file, lines(&bytes[..open]) + 1, found, expected)
+    };
+    let separates = |byte: &u8| is_end(byte) || *byte == delimiter;
+    while let Some(first) = bytes.get(begin) {
+        let mut end = begin;
+        if *first == b'"' {
+            loop {
+                let close = bytes[end + 1..].iter().position(|byte| *byte == b'"');
+                let never = || fault(begin, "a quote that is never closed".to_owned());
+                end += 1 + close.ok_or_else(never)?;
+                if bytes.get(end + 1) != Some(&b'"') {
+                    break;
+                }
+                end += 1;
+            }
+            let behind = bytes[end + 1..].iter().find(|byte| !b" \t".contains(byte));
+            let has_text = behind.is_some_and(|byte| !separates(byte));
+            if has_text && bytes[begin..end].iter().any(is_end) {
+                let line = lines(&bytes[..end]) + 1;
+                let found = format!("a quote that is not closed before line {line}");
+                return Err(fault(begin, found));
+            }
+        }
+        let length = bytes[end..].iter().position(separates);
+        begin = end + length.map_or(bytes.len() - end, |length| length + 1);
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -285,10 +314,14 @@ mod tests {
     /// The line of the first row whose field `x` is no number.
     fn bad_line(text: &str) -> u64 {
         let mut table = TableReader::open(text.as_bytes(), "t.csv").unwrap();
-        while let Some(row) = table.next_row().unwrap() {
+        while let Some(row) = table.next_row() {
             match row.and_then(|row| row.finite_number(0)) {
-                Err(InputError::Line { line, .. }) => return line,
-                other => assert!(other.is_ok(), "{other:?}"),
+                Err(error) => {
+                    let error = error.to_string();
+                    let line = error.strip_prefix("t.csv, line ").unwrap_or_default();
+                    return line.split(':').next().unwrap_or_default().parse().unwrap();
+                }
+                Ok(_) => {}
             }
         }
         0
@@ -343,10 +376,10 @@ mod tests {
             let mut table = TableReader::open(text.as_bytes(), "t.csv").unwrap();
             let columns = table.columns(&["x", "y", "z"]).unwrap();
             assert_eq!(table.header().len(), 4, "{text}");
-            let row = table.next_row().unwrap().unwrap().unwrap();
+            let row = table.next_row().unwrap().unwrap();
             let numbers = columns.map(|column| row.finite_number(column).unwrap());
             assert_eq!(numbers, [1.0, 2.0, 3.0], "{text}");
-            assert!(table.next_row().unwrap().is_none());
+            assert!(table.next_row().is_none());
         }
     }
 
@@ -355,7 +388,7 @@ mod tests {
         let read = || -> Result<(), InputError> {
             let mut table = TableReader::open(text, "t.csv")?;
             let columns = table.columns(&["x", "y", "z"])?;
-            while let Some(row) = table.next_row()? {
+            while let Some(row) = table.next_row() {
                 row?.finite_number(columns[1])?;
             }
             Ok(())

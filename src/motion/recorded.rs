@@ -1,7 +1,5 @@
 //! Recorded motions: CSV rows of a time, an item and its new bounds.
 
-use std::io::Read;
-
 use glam::DVec3;
 
 use super::laws::REMOVED;
@@ -76,16 +74,16 @@ impl Recorded {
 /// The line of the first value that is no number, no box or no item of the scene; a time
 /// before the last one; an item twice at one time; a file without rows.
 pub(super) fn read_motion_csv(
-    input: impl Read,
+    bytes: &[u8],
     file: &str,
     scene: &Scene,
 ) -> Result<Recorded, InputError> {
-    let mut table = TableReader::open(input, file)?;
+    let mut table = TableReader::open(bytes, file)?;
     let columns = table.columns(&COLUMNS)?;
     table.note_unread(&COLUMNS, &[]);
     let (mut recorded, mut rows) = (Recorded::default(), Vec::new());
     let mut last = None;
-    while let Some(row) = table.next_row()? {
+    while let Some(row) = table.next_row() {
         let row = row?;
         let time = row.finite_number(columns[0])?;
         match last {

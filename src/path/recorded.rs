@@ -1,7 +1,5 @@
 //! Recorded cameras and points: the CSV formats that other tools write.
 
-use std::io::Read;
-
 use glam::DVec3;
 
 use super::{CameraPath, PathError};
@@ -95,11 +93,11 @@ const FAR_IN_NEARS: f64 = 1000.0;
 /// the last one; a file without cameras; matrices without a convention, or beside an eye or a lens; both a
 /// place to look at and a direction.
 pub fn read_cameras_csv(
-    input: impl Read,
+    bytes: &[u8],
     file: &str,
     defaults: &LensDefaults,
 ) -> Result<CameraPath, PathError> {
-    let mut table = TableReader::open(input, file)?;
+    let mut table = TableReader::open(bytes, file)?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
     let read: CameraReader = if is_matrix {
         matrices(&table, defaults.matrix)?
@@ -141,13 +139,13 @@ const BESIDE: usize = 64;
 
 /// All rows of a table, of which there must be one.
 fn rows<T>(
-    table: &mut TableReader<impl Read>,
+    table: &mut TableReader,
     file: &str,
     none: &str,
     mut read: impl FnMut(&Row) -> Result<T, InputError>,
 ) -> Result<Vec<T>, InputError> {
     let mut found: Vec<T> = Vec::new();
-    while let Some(row) = table.next_row()? {
+    while let Some(row) = table.next_row() {
         // How long a pipe is shows as it is read.
         if found.len() == found.capacity() {
             let needed = 2 * found.capacity() * (size_of::<T>() + BESIDE);
@@ -156,12 +154,8 @@ fn rows<T>(
         found.push(read(&row?)?);
     }
     if found.is_empty() {
-        return Err(InputError::Line {
-            file: file.to_owned(),
-            line: 2,
-            found: none.to_owned(),
-            expected: "at least one row after the header".to_owned(),
-        });
+        let expected = "at least one row after the header";
+        return Err(InputError::line(file, 2, none, expected));
     }
     Ok(found)
 }
@@ -191,7 +185,7 @@ const SYNONYMS: [(&str, &str); 3] = [
 ];
 
 fn matrices<'a>(
-    table: &TableReader<impl Read>,
+    table: &TableReader,
     convention: Option<MatrixConvention>,
 ) -> Result<CameraReader<'a>, InputError> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
@@ -218,7 +212,7 @@ fn matrices<'a>(
 }
 
 fn eyes<'a>(
-    table: &TableReader<impl Read>,
+    table: &TableReader,
     defaults: &'a LensDefaults,
 ) -> Result<CameraReader<'a>, InputError> {
     let vector = |name: &str| {
@@ -292,8 +286,8 @@ fn eyes<'a>(
 /// # Errors
 /// The line of the first value that is no finite number; a file without
 /// points.
-pub fn read_points_csv(input: impl Read, file: &str) -> Result<Vec<DVec3>, InputError> {
-    let mut table = TableReader::open(input, file)?;
+pub fn read_points_csv(bytes: &[u8], file: &str) -> Result<Vec<DVec3>, InputError> {
+    let mut table = TableReader::open(bytes, file)?;
     let columns = table.columns(&["x", "y", "z"])?;
     let points = rows(&mut table, file, "no point", |row| point(row, columns))?;
     table.note_unread(&["x", "y", "z"], &[]);

@@ -12,11 +12,12 @@ use std::time::{Duration, Instant};
 
 use tempfile::NamedTempFile;
 
-use super::files::{FolderError, PAGE, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY};
+use super::files::{self, PAGE, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY};
 use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Line, Stream};
 use super::writing::{locked_temporary_in, replace_atomically, sweep};
 use super::{Report, ReportCell};
+use crate::input::InputError;
 use crate::measure::{METRICS, Part, TaskSamples};
 use crate::path::CameraFacts;
 use crate::shown::shown_field;
@@ -35,8 +36,8 @@ impl RunFolder {
     ///
     /// # Errors
     /// An error if it holds a file of a run already.
-    pub fn create(path: &Path, header: &Header) -> Result<RunFolder, FolderError> {
-        let io = FolderError::io(path);
+    pub fn create(path: &Path, header: &Header) -> Result<RunFolder, InputError> {
+        let io = files::io(path);
         let is_new = !path.exists();
         fs::create_dir_all(path).map_err(io)?;
         refuse_taken(path)?;
@@ -57,7 +58,7 @@ impl RunFolder {
         let stream = match begun.persist_noclobber(&file) {
             Ok(stream) => stream,
             Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
-                return Err(FolderError::taken(path));
+                return Err(files::taken(path));
             }
             Err(error) => return Err(io(error.error)),
         };
@@ -75,12 +76,12 @@ impl RunFolder {
     }
 
     /// No samples yet: the names of the columns.
-    fn begin_samples(&mut self) -> Result<(), FolderError> {
+    fn begin_samples(&mut self) -> Result<(), InputError> {
         let mut write = || {
             self.samples.set_len(0)?;
             self.samples.write_all(SAMPLE_COLUMNS.as_bytes())
         };
-        write().map_err(FolderError::io(&self.path.join(SAMPLES)))?;
+        write().map_err(files::io(&self.path.join(SAMPLES)))?;
         self.samples_end = SAMPLE_COLUMNS.len() as u64;
         Ok(())
     }
@@ -94,16 +95,16 @@ impl RunFolder {
     ///
     /// # Errors
     /// I/O errors.
-    pub fn append(&mut self, line: &Line) -> Result<(), FolderError> {
+    pub fn append(&mut self, line: &Line) -> Result<(), InputError> {
         let written = line.to_json().and_then(|text| self.stream.write_all(&text));
-        written.map_err(FolderError::io(&self.path.join(STREAM)))
+        written.map_err(files::io(&self.path.join(STREAM)))
     }
 
     /// Appends a part: its samples first, then the line that refers to them.
     ///
     /// # Errors
     /// I/O errors.
-    pub fn keep(&mut self, part: Part, samples: &[TaskSamples]) -> Result<KeptPart, FolderError> {
+    pub fn keep(&mut self, part: Part, samples: &[TaskSamples]) -> Result<KeptPart, InputError> {
         let key = &part.key;
         let mut rows = BTreeMap::new();
         let mut write = || -> Result<Vec<u8>, csv::Error> {
@@ -125,7 +126,7 @@ impl RunFolder {
             Ok(csv.into_inner().map_err(csv::IntoInnerError::into_error)?)
         };
         let file = self.path.join(SAMPLES);
-        let io = FolderError::io(&file);
+        let io = files::io(&file);
         let text = write().map_err(|error| io(error.into()))?;
         self.samples.write_all(&text).map_err(io)?;
         self.samples_end += text.len() as u64;
@@ -142,7 +143,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// I/O errors.
-    pub fn save(&self, report: &Report) -> Result<(), FolderError> {
+    pub fn save(&self, report: &Report) -> Result<(), InputError> {
         save_report(&self.path, report)
     }
 
@@ -176,9 +177,9 @@ impl StoppedRun {
     /// # Errors
     /// No stream, not a stream, another schema version, or another process at
     /// work in it.
-    pub fn open(path: &Path) -> Result<(StoppedRun, Stream), FolderError> {
+    pub fn open(path: &Path) -> Result<(StoppedRun, Stream), InputError> {
         let file = path.join(STREAM);
-        let io = FolderError::io(&file);
+        let io = files::io(&file);
         fs::metadata(&file).map_err(io)?;
         let lock = open(&file)?;
         let begin = Instant::now();
@@ -191,7 +192,7 @@ impl StoppedRun {
                 Err(fs::TryLockError::WouldBlock) => {
                     let found = "another run is writing here; expected a folder of its own for \
                                  each run";
-                    return Err(FolderError::at(path, found));
+                    return Err(files::at(path, found));
                 }
                 Err(fs::TryLockError::Error(source)) => return Err(io(source)),
             }
@@ -229,7 +230,7 @@ impl StoppedRun {
     ///
     /// # Errors
     /// I/O errors.
-    pub fn go_on(self, stream: &Stream) -> Result<RunFolder, FolderError> {
+    pub fn go_on(self, stream: &Stream) -> Result<RunFolder, InputError> {
         let mut folder = RunFolder {
             samples: open(&self.path.join(SAMPLES))?,
             path: self.path,
@@ -237,7 +238,7 @@ impl StoppedRun {
             samples_end: 0,
         };
         let path = folder.path.clone();
-        let io = FolderError::io(&path);
+        let io = files::io(&path);
         folder.stream.set_len(self.length).map_err(io)?;
         match stream.parts.last() {
             Some(kept) => {
@@ -255,29 +256,29 @@ impl StoppedRun {
 ///
 /// # Errors
 /// An error that names the folder.
-pub(super) fn refuse_taken(path: &Path) -> Result<(), FolderError> {
+pub(super) fn refuse_taken(path: &Path) -> Result<(), InputError> {
     let files = [REPORT, SUMMARY, SAMPLES, STREAM, PAGE];
     // A link that leads nowhere is one too.
     let is_there = |file| fs::symlink_metadata(path.join(file)).is_ok();
     match files.into_iter().any(is_there) {
-        true => Err(FolderError::taken(path)),
+        true => Err(files::taken(path)),
         false => Ok(()),
     }
 }
 
 /// Opens a file to append to, made if it is not there. A link is refused: what it
 /// leads to is not the run's.
-fn open(file: &Path) -> Result<File, FolderError> {
+fn open(file: &Path) -> Result<File, InputError> {
     if fs::symlink_metadata(file).is_ok_and(|found| !found.is_file()) {
         let found = io::Error::other("a link or a device; expected a file of the run's own");
-        return Err(FolderError::io(file)(found));
+        return Err(files::io(file)(found));
     }
     let opened = OpenOptions::new()
         .read(true)
         .append(true)
         .create(true)
         .open(file);
-    opened.map_err(FolderError::io(file))
+    opened.map_err(files::io(file))
 }
 
 /// Bytes of samples.csv up to the first NUL. A power cut leaves NULs where data
@@ -305,7 +306,7 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
 ///
 /// # Errors
 /// What the file system says.
-pub fn save_page(folder: &Path, page: &str) -> Result<(), FolderError> {
+pub fn save_page(folder: &Path, page: &str) -> Result<(), InputError> {
     replace_atomically(&folder.join(PAGE), |out| out.write_all(page.as_bytes()))
 }
 
@@ -313,7 +314,7 @@ pub fn save_page(folder: &Path, page: &str) -> Result<(), FolderError> {
 ///
 /// # Errors
 /// I/O errors.
-pub fn save_report(folder: &Path, report: &Report) -> Result<(), FolderError> {
+pub fn save_report(folder: &Path, report: &Report) -> Result<(), InputError> {
     replace_atomically(&folder.join(SUMMARY), |out| {
         write_summary(&report.cells, out)
     })?;

@@ -6,11 +6,12 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::files::{FolderError, SAMPLE_COLUMNS, SAMPLES, STREAM};
+use super::files::{self, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::folder::{self, save_report};
 use super::reading::read_stream;
 use super::stream::{Difference, Header, KeptPart, Stream};
 use super::writing::temporary_folder_in;
+use crate::input::InputError;
 use crate::measure::GroupKey;
 use crate::shown::first_of;
 
@@ -30,13 +31,13 @@ pub struct Merged {
 /// # Errors
 /// An unfinished shard; another seed, suite, structure, machine, build or
 /// source; a cell in two shards; without `partial` a group in none.
-pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merged, FolderError> {
+pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merged, InputError> {
     let mut shards = Vec::new();
     for path in folders {
         let (stream, _) = read_stream(&path.join(STREAM))?;
         if !stream.is_finished() {
             let path = path.display();
-            return Err(FolderError::new(format!(
+            return Err(InputError::new(format!(
                 "{path}: the run is not finished; expected a finished one (run --resume --out {path})"
             )));
         }
@@ -51,14 +52,14 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
             .or_else(|| another_plan(&begin.header, &stream.header, first))
             .or_else(|| before.find_map(|(before, other)| overlap(stream, other, before)));
         if let Some(reason) = reason {
-            return Err(FolderError::at(path, reason));
+            return Err(files::at(path, reason));
         }
     }
     let whole = begin.header.whole().to_vec();
     let has = |key: &&GroupKey| shards.iter().any(|(_, s)| s.header.groups.contains(key));
     let missing: Vec<GroupKey> = whole.iter().filter(|key| !has(key)).cloned().collect();
     if !missing.is_empty() && !partial {
-        return Err(FolderError::new(format!(
+        return Err(InputError::new(format!(
             "no shard has {}; expected all of the plan (--partial joins what is there)",
             pairs(&missing)
         )));
@@ -71,9 +72,9 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
             parts.push((kept, (file.clone(), [from, kept.samples_end])));
             from = kept.samples_end;
         }
-        let found = folder::length_of_samples(&file).map_err(FolderError::io(&file))?;
+        let found = folder::length_of_samples(&file).map_err(files::io(&file))?;
         if found < from {
-            return Err(FolderError::at(
+            return Err(files::at(
                 &file,
                 format!("{found} sound bytes; expected {from} that stream.jsonl refers to"),
             ));
@@ -120,8 +121,8 @@ impl Merged {
     ///
     /// # Errors
     /// A folder that holds a run or other files; errors of the file system.
-    pub fn write(&self, out: &Path, stop: &dyn Fn() -> bool) -> Result<bool, FolderError> {
-        let io = FolderError::io(out);
+    pub fn write(&self, out: &Path, stop: &dyn Fn() -> bool) -> Result<bool, InputError> {
+        let io = files::io(out);
         folder::refuse_taken(out)?;
         let out = match out.exists() {
             true => fs::canonicalize(out).map_err(io)?,

@@ -23,7 +23,6 @@ mod writing;
 pub use crate::measure::{ReportCell, SamplesRef};
 pub use changes::{FEW_OTHERS, changes};
 pub use experiment::Experiment;
-pub use files::{FolderError, bare};
 pub use folder::{RunFolder, StoppedRun, save_page, save_report};
 pub use growth::{Growth, growths};
 pub use judging::{

@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::files::{FolderError, REPORT, SAMPLE_COLUMNS, STREAM};
+use super::files::{self, REPORT, SAMPLE_COLUMNS, STREAM};
 use super::stream::{Header, KeptPart, Stream};
 use super::{Report, SCHEMA_VERSION};
+use crate::input::InputError;
 use crate::json::{JsonError, from_json};
 use crate::measure::{GroupKey, Part};
 use crate::shown::plain;
@@ -20,7 +21,7 @@ use crate::shown::plain;
 ///
 /// # Errors
 /// I/O errors, a file that is not a report, or another schema version.
-pub fn read_report(path: &Path) -> Result<Report, FolderError> {
+pub fn read_report(path: &Path) -> Result<Report, InputError> {
     let stream = path.join(STREAM);
     if !path.is_dir() || !stream.is_file() {
         return read_json(match path.is_dir() {
@@ -35,18 +36,18 @@ pub fn read_report(path: &Path) -> Result<Report, FolderError> {
     }
 }
 
-fn read_json(path: PathBuf) -> Result<Report, FolderError> {
+fn read_json(path: PathBuf) -> Result<Report, InputError> {
     /// Read first: another version has other fields, and that is no damage.
     #[derive(Deserialize)]
     struct Versioned {
         schema_version: u32,
     }
-    let bytes = fs::read(&path).map_err(FolderError::io(&path))?;
-    let bad = |error| FolderError::json(&path, &error, "the report of a run");
+    let bytes = fs::read(&path).map_err(files::io(&path))?;
+    let bad = |error| files::json(&path, &error, "the report of a run");
     let Versioned { schema_version } = from_json(&bytes).map_err(bad)?;
     match schema_version == SCHEMA_VERSION {
         true => from_json(&bytes).map_err(bad),
-        false => Err(FolderError::version(&path, schema_version)),
+        false => Err(files::version(&path, schema_version)),
     }
 }
 
@@ -56,7 +57,7 @@ fn read_json(path: PathBuf) -> Result<Report, FolderError> {
 /// # Errors
 /// Errors of the file system; a line that is none or does not belong there (by its
 /// number); another schema version.
-pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), FolderError> {
+pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
     /// Read first: the kind of the rest of the line.
     #[derive(Deserialize)]
     struct Tag {
@@ -67,7 +68,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), FolderError> {
     struct Finished {
         at: String,
     }
-    let bytes = fs::read(path).map_err(FolderError::io(path))?;
+    let bytes = fs::read(path).map_err(files::io(path))?;
     let mut stream: Option<Stream> = None;
     let (mut seen, mut groups) = (BTreeSet::new(), BTreeMap::new());
     let (mut ends, mut end) = (Vec::new(), 0);
@@ -86,15 +87,22 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), FolderError> {
                 line: n + 1,
                 ..error
             };
-            FolderError::json(path, &error, "the stream of a run")
+            files::json(path, &error, "the stream of a run")
         };
-        let bad = |found: &str, expected| Err(FolderError::line(path, n + 1, found, expected));
+        let bad = |found: &str, expected| {
+            Err(InputError::line(
+                path.display(),
+                n as u64 + 1,
+                found,
+                expected,
+            ))
+        };
         let tag: Tag = from_json(text).map_err(no_json)?;
         match (tag.line.as_str(), &mut stream) {
             ("run", None) => {
                 let version = tag.schema_version.unwrap_or(SCHEMA_VERSION);
                 if version != SCHEMA_VERSION {
-                    return Err(FolderError::version(path, version));
+                    return Err(files::version(path, version));
                 }
                 let header: Header = from_json(text).map_err(no_json)?;
                 groups.extend(header.groups.iter().map(GroupKey::id).zip(0_usize..));
@@ -138,7 +146,14 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), FolderError> {
         }
     }
     ends.push(end);
-    let none = || FolderError::line(path, 1, "no run begins here", "the stream of a run");
+    let none = || {
+        InputError::line(
+            path.display(),
+            1,
+            "no run begins here",
+            "the stream of a run",
+        )
+    };
     Ok((stream.ok_or_else(none)?, ends))
 }
 

@@ -10,7 +10,8 @@ use std::path::Path;
 
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-use super::files::FolderError;
+use super::files;
+use crate::input::InputError;
 
 /// Beginning and end of temporary names.
 const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
@@ -24,7 +25,7 @@ const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), FolderError> {
+) -> Result<(), InputError> {
     let attempt = || -> io::Result<()> {
         let old = fs::metadata(path).ok();
         if old.as_ref().is_some_and(is_stream) {
@@ -37,7 +38,7 @@ pub fn write_atomically(
             None => replace(path, write),
         }
     };
-    attempt().map_err(FolderError::io(path))
+    attempt().map_err(files::io(path))
 }
 
 /// The same of a file in a folder of the program's own. Anything of its name, a
@@ -45,8 +46,8 @@ pub fn write_atomically(
 pub(super) fn replace_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), FolderError> {
-    replace(path, write).map_err(FolderError::io(path))
+) -> Result<(), InputError> {
+    replace(path, write).map_err(files::io(path))
 }
 
 fn replace(target: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
@@ -84,7 +85,7 @@ fn is_stream(found: &fs::Metadata) -> bool {
 ///
 /// # Errors
 /// I/O errors, with the path.
-pub fn try_place(path: &Path) -> Result<(), FolderError> {
+pub fn try_place(path: &Path) -> Result<(), InputError> {
     let attempt = || -> io::Result<()> {
         let target = match fs::metadata(path) {
             // A pipe or a device has no place; opening a pipe would wait for its reader.
@@ -94,16 +95,16 @@ pub fn try_place(path: &Path) -> Result<(), FolderError> {
         };
         try_writing(folder_of(&target))
     };
-    attempt().map_err(FolderError::io(path))
+    attempt().map_err(files::io(path))
 }
 
 /// The same of a folder that is there or is to be made.
 ///
 /// # Errors
 /// I/O errors, with the path.
-pub fn try_folder(path: &Path) -> Result<(), FolderError> {
+pub fn try_folder(path: &Path) -> Result<(), InputError> {
     let folder = path.ancestors().find(|folder| folder.exists());
-    try_writing(folder.unwrap_or(Path::new("."))).map_err(FolderError::io(path))
+    try_writing(folder.unwrap_or(Path::new("."))).map_err(files::io(path))
 }
 
 /// Writes a block and takes it away again.
@@ -225,7 +226,7 @@ mod tests {
             error.to_string().contains(TEMPORARY.0),
             "the premise: {error}"
         );
-        let told = FolderError::io(Path::new("no/such"))(error).to_string();
+        let told = files::io(Path::new("no/such"))(error).to_string();
         assert!(
             told.starts_with("no/such: ") && !told.contains(TEMPORARY.0),
             "{told}"

@@ -2,7 +2,7 @@
 //! columns as labels; the item id is the zero-based data row. It defines the
 //! reading and writing of that one format.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 
 use glam::DVec3;
 
@@ -20,21 +20,16 @@ const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"]
 /// that are kept.
 ///
 /// # Errors
-/// [`InputError::Line`] for a missing or wrong header, [`InputError::BadItems`]
-/// with the first bad row and the number of all.
-pub fn read_boxes_csv(
-    input: impl Read,
-    file: &str,
-    skip_bad_items: bool,
-) -> Result<Scene, InputError> {
-    let mut rows = read_rows(input, file, f64::from(f32::MAX))?;
+/// A missing or wrong header; the first bad row with the number of all.
+pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<Scene, InputError> {
+    let mut rows = read_rows(bytes, file, f64::from(f32::MAX))?;
     if let Some(first) = rows.first_bad.take().filter(|_| !skip_bad_items) {
         return Err(match rows.bad {
             1 => first,
-            count => InputError::BadItems {
-                first: Box::new(first),
-                count,
-            },
+            count => InputError::new(format_args!(
+                "{first} ({count} bad items in all; --skip-bad-items leaves them out and reports \
+                 the count)"
+            )),
         });
     }
     rows.note_near_names(file);
@@ -47,9 +42,9 @@ pub fn read_boxes_csv(
 /// Boxes to search by, of the same form: any numbers of f64.
 ///
 /// # Errors
-/// [`InputError::Line`] for a missing or wrong header and the first bad row.
-pub fn read_sought_boxes_csv(input: impl Read, file: &str) -> Result<Vec<WorldBox>, InputError> {
-    let mut rows = read_rows(input, file, f64::MAX)?;
+/// A missing or wrong header, or the first bad row.
+pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>, InputError> {
+    let mut rows = read_rows(bytes, file, f64::MAX)?;
     rows.first_bad.take().map_or(Ok(()), Err)?;
     rows.note_near_names(file);
     Ok(rows.boxes)
@@ -82,15 +77,15 @@ impl Rows {
 }
 
 /// Reads all rows; bad is also a bound beyond `limit`.
-fn read_rows(input: impl Read, file: &str, limit: f64) -> Result<Rows, InputError> {
-    let mut table = TableReader::open(input, file)?;
+fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
+    let mut table = TableReader::open(bytes, file)?;
     let columns = table.columns(&BOUNDS)?;
     let others = table.header().iter().enumerate();
     let others = others.filter(|(i, _)| !columns.contains(i));
     let labels = others.map(|(i, name)| (i, Labels::new(from_field(name))));
     let mut labels: Vec<(usize, Labels)> = labels.collect();
     let (mut boxes, mut first_bad, mut bad) = (Vec::new(), None, 0);
-    while let Some(row) = table.next_row()? {
+    while let Some(row) = table.next_row() {
         let checked = row.and_then(|row| {
             let mut bounds = [0.0; 6];
             for (bound, &column) in bounds.iter_mut().zip(&columns) {

@@ -61,12 +61,8 @@ pub fn refuse(bytes: &[u8], file: &str) -> Result<(), InputError> {
         }
         None => return Ok(()),
     };
-    Err(InputError::Byte {
-        file: file.to_owned(),
-        offset: 0,
-        found: format!("{name}, which is not read"),
-        expected: expected.to_owned(),
-    })
+    let found = format_args!("{name}, which is not read");
+    Err(InputError::byte(file, 0, found, expected))
 }
 
 /// Tells binary STL by its size: 80 bytes, a count, 50 bytes for each triangle.

@@ -8,7 +8,7 @@ use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
 use super::WorldBox;
 use crate::geometry::Aabb;
-use crate::input::InputError;
+use crate::input::{InputError, gigabytes};
 
 /// Bytes of an item in a scene: as indexes hold it, and as it was written.
 const HELD: u64 = (size_of::<Aabb>() + size_of::<WorldBox>()) as u64;
@@ -42,22 +42,25 @@ pub fn needed_by_triangles(triangles: u64, beside: u64, structures: u64) -> u64 
 /// If that is unknown, any scene passes.
 ///
 /// # Errors
-/// [`InputError::TooLarge`].
+/// The sizes needed and free.
 pub fn check_fits(
     scene: &str,
     needed: u64,
     structures: u64,
     available: Option<u64>,
 ) -> Result<(), InputError> {
-    match available {
-        Some(available) if needed > available => Err(InputError::TooLarge {
-            scene: scene.to_owned(),
-            structures,
-            needed,
-            available,
-        }),
-        _ => Ok(()),
-    }
+    let Some(available) = available.filter(|available| needed > *available) else {
+        return Ok(());
+    };
+    let (held, or_fewer) = match structures {
+        0 => (String::new(), ""),
+        1 => (" with 1 structure".to_owned(), ""),
+        more => (format!(" with {more} structures"), " or fewer structures"),
+    };
+    let (needed, free) = (gigabytes(needed), gigabytes(available));
+    Err(InputError::new(format_args!(
+        "{scene}: needs about {needed}{held}, {free} are free; expected fewer items{or_fewer}"
+    )))
 }
 
 /// Bytes that are free for a scene of `count` items or triangles.

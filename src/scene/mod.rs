@@ -39,6 +39,7 @@ mod up;
 mod wad;
 mod zip;
 
+use std::fmt;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
@@ -216,8 +217,7 @@ impl Scene {
     /// Rounds the boxes outward about the origin that suits them.
     ///
     /// # Errors
-    /// [`InputError::BadItem`] for the first box that is not finite, inverted
-    /// or too large for f32.
+    /// The first box that is not finite, inverted or too large for f32.
     pub fn from_boxes(name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene, InputError> {
         let origin = choose_origin(boxes.iter().copied());
         Scene::about(name, boxes, origin)
@@ -235,12 +235,9 @@ impl Scene {
         let is_bad = |b: &Aabb| !b.is_finite() || b.is_empty();
         if let Some(item) = items.iter().position(is_bad) {
             let [min, max] = [boxes[item].min, boxes[item].max].map(|corner| corner.to_array());
-            let rule = "expected min <= max within the range of f32";
-            return Err(InputError::BadItem {
-                reason: format!("a box from {min:?} to {max:?}; {rule}"),
-                scene: name,
-                item,
-            });
+            let found = format_args!("a box from {min:?} to {max:?}");
+            let rule = "min <= max within the range of f32";
+            return Err(bad_item(&name, item, found, rule));
         }
         Ok(Scene {
             bounds: Aabb::union_of(&items),
@@ -319,6 +316,12 @@ fn origin_between(low: DVec3, high: DVec3) -> DVec3 {
     DVec3::new(axis(0), axis(1), axis(2))
 }
 
+/// An error of an item of a scene that was not read from a file.
+fn bad_item(scene: &str, item: usize, found: fmt::Arguments, expected: &str) -> InputError {
+    let place = format!("scene '{scene}', item {item}");
+    InputError::new(format_args!("{place}: {found}; expected {expected}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -361,10 +364,8 @@ mod tests {
         let ok = WorldBox::around(DVec3::ZERO, DVec3::ONE);
         let huge = WorldBox::around(DVec3::ZERO, DVec3::splat(1e40));
         let error = Scene::from_boxes("test", &[ok, huge]).unwrap_err();
-        assert!(
-            matches!(error, InputError::BadItem { item: 1, .. }),
-            "{error}"
-        );
+        let wanted = "scene 'test', item 1: a box from";
+        assert!(error.to_string().starts_with(wanted), "{error}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::{Scene, WorldBox};
+use super::{Scene, WorldBox, bad_item};
 use crate::input::InputError;
 
 impl Scene {
@@ -26,7 +26,7 @@ impl Scene {
     /// about that one.
     ///
     /// # Errors
-    /// [`InputError::BadItem`] for an item that lies beyond what the reader
+    /// An item that lies beyond what the reader
     /// takes: the range of f32, in world coordinates.
     pub fn settled(self) -> Result<Scene, InputError> {
         let most = f64::from(f32::MAX);
@@ -34,11 +34,8 @@ impl Scene {
         let boxes: Vec<WorldBox> = self.written().collect();
         let outside = boxes.iter().position(|b| !within(b.min) || !within(b.max));
         if let Some(item) = outside {
-            return Err(InputError::BadItem {
-                scene: self.name,
-                item,
-                reason: format!("in world coordinates beyond +-{most:e}; expected less in a file"),
-            });
+            let found = format_args!("in world coordinates beyond +-{most:e}");
+            return Err(bad_item(&self.name, item, found, "less in a file"));
         }
         Ok(Scene {
             labels: self.labels,

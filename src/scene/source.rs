@@ -104,13 +104,9 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     }
     let looks_like_a_file = source.contains(['/', '\\', '.']) && !source.contains('=');
     if looks_like_a_file {
-        return Err(InputError::Io {
-            path: file.into(),
-            source: match fs::metadata(file) {
-                Ok(_) => std::io::ErrorKind::IsADirectory.into(),
-                Err(error) => error,
-            },
-        });
+        let error = fs::metadata(file).err();
+        let error = error.unwrap_or(std::io::ErrorKind::IsADirectory.into());
+        return Err(InputError::io(Path::new(file), "file")(error));
     }
     let spec = Spec::parse_behind(MESH_PREFIX, source)?;
     if let Some(family) = Family::named(spec.name()) {
@@ -131,7 +127,7 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
 /// loaded.
 ///
 /// # Errors
-/// [`InputError::TooLarge`].
+/// A scene that would not fit.
 pub fn check_fits(source: &str, options: &LoadOptions) -> Result<(), InputError> {
     let Ok(spec) = Spec::parse_behind(MESH_PREFIX, source) else {
         return Ok(());

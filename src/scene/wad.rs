@@ -64,7 +64,7 @@ impl WadMap {
     /// Decodes one map: the named one, or the only one.
     ///
     /// # Errors
-    /// [`InputError::Byte`] with the offset of the first thing that is wrong.
+    /// The offset of the first thing that is wrong.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap, InputError> {
         let wad = Wad::open(bytes, file)?;
         let of = wad.tables(map)?;

@@ -55,7 +55,7 @@ pub fn unpack<'w>(
     let (name, record, map) = chosen(&entries, file, wanted)?;
     let damaged = |found: &dyn Display, expected: &str| {
         let place = format!("entry {}", shortened(name, 80));
-        error(file, &place, found.to_string(), expected)
+        InputError::at(file, &place, found.to_string(), expected)
     };
     if record.flags().is_encrypted() {
         return Err(damaged(&"encrypted", "an entry without a password"));
@@ -97,7 +97,7 @@ type Archive<'a> = ZipSliceArchive<&'a [u8]>;
 
 fn open<'a>(bytes: &'a [u8], file: &str) -> Result<Archive<'a>, InputError> {
     let archive = ZipArchive::from_slice(bytes);
-    archive.map_err(|e| error(file, "directory", e.to_string(), "a zip archive"))
+    archive.map_err(|e| InputError::at(file, "directory", e.to_string(), "a zip archive"))
 }
 
 /// Names and records in the order of the directory, without folders.
@@ -106,7 +106,8 @@ fn entries<'a>(
     file: &str,
 ) -> Result<Vec<(String, ZipFileHeaderRecord<'a>)>, InputError> {
     let (mut all, mut records) = (Vec::new(), archive.entries());
-    let damaged = |e: rawzip::Error| error(file, "directory", e.to_string(), "a zip archive");
+    let damaged =
+        |e: rawzip::Error| InputError::at(file, "directory", e.to_string(), "a zip archive");
     while let Some(record) = records.next_entry().map_err(damaged)? {
         let path = record.file_path();
         if !record.is_dir() {
@@ -163,16 +164,7 @@ fn chosen<'e, 'r, 'w>(
             )
         }
     };
-    Err(error(file, "directory", found, &expected))
-}
-
-fn error(file: &str, place: &str, found: String, expected: &str) -> InputError {
-    InputError::Value {
-        file: file.to_owned(),
-        place: place.to_owned(),
-        found,
-        expected: expected.to_owned(),
-    }
+    Err(InputError::at(file, "directory", found, &expected))
 }
 
 #[cfg(test)]

@@ -204,11 +204,8 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
 /// # Errors
 /// One line: the file, the path of the field, what was found and expected.
 pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError> {
-    let wrong = |place: String, found: String, expected: String| InputError::Value {
-        file: file.to_owned(),
-        place,
-        found,
-        expected,
+    let wrong = |place: String, found: String, expected: String| {
+        InputError::at(file, place, found, expected)
     };
     let is_array = bytes.iter().find(|byte| b"[{".contains(byte)) == Some(&b'[');
     let read = match is_array {

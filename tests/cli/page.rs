@@ -129,7 +129,7 @@ fn what_failed_is_on_the_page_with_its_reason_and_has_no_mark() {
     works(folder.path(), "report run --html page.html");
     let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
     assert_well_formed(&page);
-    assert!(page.contains("<td>wrong</td><td>item 3 &lt;is&gt; missing</td>"));
+    assert!(page.contains("<p>wide: wrong: item 3 &lt;is&gt; missing</p>"));
     assert!(page.contains("Not ok, of 3 cells: 1 wrong."));
     assert_eq!(page.matches("<polygon class=\"mark").count(), 2);
     assert!(page.contains("Speed-up over "));

@@ -1,6 +1,7 @@
 //! A glTF file with its buffers: what its indices and accessors refer to.
 
 use std::borrow::Cow;
+use std::fmt;
 use std::path::Path;
 
 use base64::Engine;
@@ -37,13 +38,11 @@ pub struct File<'f> {
 
 impl<'f> File<'f> {
     pub fn open(bytes: &'f [u8], name: &'f str) -> Result<File<'f>, InputError> {
-        let error = |found: String| value_error(name, "JSON", found, "glTF 2.0");
+        let error = |found: String| InputError::at(name, "JSON", found, "glTF 2.0");
         let (json, mut bin) = match bytes.starts_with(b"glTF") {
-            true => glb(bytes).ok_or_else(|| InputError::Byte {
-                file: name.to_owned(),
-                offset: 4,
-                found: "a GLB of another version or with chunks beyond its end".to_owned(),
-                expected: "a GLB of version 2, its first chunk JSON".to_owned(),
+            true => glb(bytes).ok_or_else(|| {
+                let found = "a GLB of another version or with chunks beyond its end";
+                InputError::byte(name, 4, found, "a GLB of version 2, its first chunk JSON")
             })?,
             false => (bytes, None),
         };
@@ -100,8 +99,8 @@ impl<'f> File<'f> {
         }
     }
 
-    pub fn error(&self, place: String, found: impl Into<String>, expected: &str) -> InputError {
-        value_error(self.name, &place, found, expected)
+    pub fn error(&self, place: String, found: impl fmt::Display, expected: &str) -> InputError {
+        InputError::at(self.name, &place, found, expected)
     }
 
     pub fn get<'s, T>(
@@ -177,15 +176,6 @@ impl<'f> File<'f> {
         Ok(Ok(numbers
             .map(|bytes| number(bytes, kind, accessor.normalized))
             .collect()))
-    }
-}
-
-fn value_error(file: &str, place: &str, found: impl Into<String>, expected: &str) -> InputError {
-    InputError::Value {
-        file: file.to_owned(),
-        place: place.to_owned(),
-        found: found.into(),
-        expected: expected.to_owned(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The lumps of an IBSP file: tables of 32-bit numbers. No byte is trusted.
 
+use std::fmt;
 use std::ops::Range;
 
 use glam::Vec3;
@@ -53,7 +54,8 @@ pub struct Lump<'a> {
 /// Another format, a lump beyond the file or one that is no whole number of records.
 pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Lump<'a>, InputError> {
     let (name, record) = LUMPS[number];
-    let error = |offset, found, expected: String| Err(byte_error(file, offset, found, expected));
+    let error =
+        |offset, found, expected: String| Err(InputError::byte(file, offset, found, expected));
     if !bytes.starts_with(b"IBSP\x2e\0\0\0") {
         let other = OTHERS.iter().find(|other| bytes.starts_with(other.0));
         let start = bytes.get(..8).unwrap_or(bytes).escape_ascii();
@@ -148,29 +150,15 @@ impl Lump<'_> {
         &self,
         i: usize,
         at: usize,
-        found: impl Into<String>,
-        expected: impl Into<String>,
+        found: impl fmt::Display,
+        expected: impl fmt::Display,
     ) -> InputError {
-        byte_error(
+        InputError::byte(
             self.file,
             self.start + i * self.record + at,
             found,
             expected,
         )
-    }
-}
-
-fn byte_error(
-    file: &str,
-    offset: usize,
-    found: impl Into<String>,
-    expected: impl Into<String>,
-) -> InputError {
-    InputError::Byte {
-        file: file.to_owned(),
-        offset: offset as u64,
-        found: found.into(),
-        expected: expected.into(),
     }
 }
 

@@ -3,6 +3,7 @@
 //! After the unofficial Doom specs 1.666, Matthew S. Fell 1994. No byte is trusted.
 
 use std::collections::HashSet;
+use std::fmt;
 use std::ops::Range;
 
 use glam::DVec2;
@@ -250,15 +251,10 @@ impl<'a> Wad<'a> {
     fn error(
         &self,
         offset: usize,
-        found: impl Into<String>,
-        expected: impl Into<String>,
+        found: impl fmt::Display,
+        expected: impl fmt::Display,
     ) -> InputError {
-        InputError::Byte {
-            file: self.file.to_owned(),
-            offset: offset as u64,
-            found: found.into(),
-            expected: expected.into(),
-        }
+        InputError::byte(self.file, offset, found, expected)
     }
 }
 
@@ -307,8 +303,8 @@ impl Table<'_> {
         &self,
         i: usize,
         at: usize,
-        found: impl Into<String>,
-        expected: impl Into<String>,
+        found: impl fmt::Display,
+        expected: impl fmt::Display,
     ) -> InputError {
         let offset = self.start + i * self.record + at;
         self.wad.error(offset, found, expected)
