@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::args::AdviseArgs;
 use super::processes::Said;
-use super::protocol::{Job, Timing};
+use super::processes::{Job, Timing};
 use super::study::{Setting, Study};
 use super::table::{Column, Table};
 use super::text::some;

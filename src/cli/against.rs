@@ -13,8 +13,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::interrupt::{self, Interrupted};
+use super::processes::{Job, PROTOCOL, Request};
 use super::processes::{Said, Worker, processors, see_through};
-use super::protocol::{Job, PROTOCOL, Request};
 use crate::input;
 use crate::measure::{GroupKey, Known, Part, Plan, Share, Status, TaskKind, Verdict};
 use crate::statistics::{Judgement, interquartile_mean, judge, resolved, trimmed_mean};

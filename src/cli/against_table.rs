@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::against::{Against, Duel};
 use super::args::Cli;
-use super::compare_args::{CompareArgs, Gate};
+use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD};
 use super::study::progress;
 use super::{Ending, compare_page, interrupt, run_plan, text};

@@ -8,14 +8,14 @@ use crate::drift::{ARMS, ArmKind};
 use crate::funnel::StageKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::compare_args::CompareArgs;
-use super::funnel_args::FunnelArgs;
-use super::scene_args::SceneCommand;
+use super::command_args::CompareArgs;
+use super::command_args::FunnelArgs;
+use super::command_args::SceneCommand;
+use super::command_args::ViewArgs;
 use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs, TableFormat,
     WhatArgs,
 };
-use super::view_args::ViewArgs;
 use super::{program, text, values};
 
 /// Benchmarks spatial indexes: frustum culling, region search, checked answers

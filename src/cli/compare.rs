@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{bail, ensure};
 use serde_json::json;
 
-use super::compare_args::{CompareArgs, Gate};
+use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD, name, reason};
 use super::{Ending, baseline, compare_page, expect_places, text};
 use crate::index::Registry;

@@ -1,10 +1,10 @@
 //! Output of a comparison: its table, and its page with the changes as intervals.
 
-use super::compare_args::CompareArgs;
+use super::command_args::CompareArgs;
 use super::compare_table::{CompareTable, change_of, name};
+use super::diagram::{Form, Row, rows};
 use super::document::{Block, to_page};
 use super::figure::{Axis, Figure, is_drawn};
-use super::figure_rows::{Form, Row, rows};
 use super::{Ending, text, unread_is_fine, write_text};
 use crate::report::Changes;
 

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::compare_args::{CompareArgs, Gate};
+use super::command_args::{CompareArgs, Gate};
 use super::document::{Block, folded, to_markdown, to_terminal};
 use super::run_table::short;
 use super::shared_args::TableFormat;

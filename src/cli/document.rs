@@ -4,7 +4,7 @@
 use super::figure::Figure;
 use super::table::Table;
 use super::text::html;
-use super::{palette, program, text};
+use super::{program, text};
 
 pub enum Block {
     /// A heading of the first, second or third level.
@@ -193,7 +193,7 @@ pub fn page(title: &str, style: &str, body: &str, script: &str) -> String {
         html(title),
         include_str!("assets/page.css"),
         include_str!("assets/figure.css"),
-        palette::style(),
+        include_str!("assets/dark.css"),
     )
 }
 

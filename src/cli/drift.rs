@@ -6,10 +6,10 @@ use std::io::Write;
 
 use super::args::DriftArgs;
 use super::document::{Block, to_page, to_terminal};
-use super::protocol::{Job, Timing};
+use super::processes::{Job, Timing};
 use super::study::Study;
 use super::table::{Column, Table};
-use super::{Ending, drift_arms, drift_chart, expect_places, print, text, write_text};
+use super::{Ending, drift_arms, expect_places, print, text, write_text};
 use crate::drift::{
     self, ArmKind, ArmOptions, DriftOptions, DriftReport, ORBIT_RADIUS, OrbitDrift, Rated,
     Recommendation, RotationDrift, SWING_DEG, TurnDrift,
@@ -48,10 +48,10 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
         text::terminal().write_all(shown.as_bytes())
     })?;
     if let Some(file) = &args.svg {
-        write_text(file, &drift_chart::draw(&report.arm))?;
+        write_text(file, &drift_arms::draw(&report.arm))?;
     }
     if let Some(file) = &args.html {
-        let figures = drift_chart::figures(&report.arm).into_iter();
+        let figures = drift_arms::figures(&report.arm).into_iter();
         let (figures, blocks) = (figures.map(Block::Figure), blocks(&report, true));
         write_text(file, &to_page("drift", usize::MAX, figures, blocks))?;
     }

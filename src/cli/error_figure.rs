@@ -5,7 +5,6 @@
 
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::figure::{Axis, Figure, is_drawn, left_out};
-use super::palette::Look;
 use super::text;
 
 /// A structure with a test.
@@ -94,12 +93,10 @@ impl Against<'_> {
             };
             match series.iter_mut().find(|s| s.name == point.structure) {
                 Some(series) => series.points.push(own),
-                None => series.push(Series {
-                    name: point.structure.clone(),
-                    look: Look::of(&point.structure),
-                    is_scan: point.structure.starts_with("linear"),
-                    points: vec![own],
-                }),
+                None => {
+                    let is_scan = point.structure.starts_with("linear");
+                    series.push(Series::of(&point.structure, is_scan, vec![own]));
+                }
             }
         }
         let places = || series.iter().flat_map(|series| &series.points);

@@ -6,7 +6,6 @@
 
 use std::ops::Range;
 
-use super::palette::{self, Look, SHAPES};
 use super::text;
 use super::text::html;
 use crate::shown::shortened;
@@ -140,27 +139,100 @@ impl<'t> Axis<'t> {
                 _ => {}
             }
         }
-        let raw = (end - start) / 5.0;
-        let power = 10f64.powf(raw.log10().floor());
-        let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
-        let step = steps.into_iter().find(|step| *step >= raw).unwrap_or(raw);
-        let first = (start / step).ceil();
-        within((0..8).map(|n| (first + f64::from(n)) * step).collect())
+        round_values([start, end], 5.0).1
+    }
+}
+
+/// About `count` round values within a range, and the step between them.
+pub fn round_values([low, high]: [f64; 2], count: f64) -> (f64, Vec<f64>) {
+    let rough = (high - low) / count;
+    let power = 10f64.powf(rough.log10().floor());
+    let steps = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power);
+    let step = steps.into_iter().find(|step| *step >= rough);
+    let step = step.unwrap_or(rough);
+    let first = (low / step).ceil();
+    let values = (0..12).map(|n| (first + f64::from(n)) * step + 0.0);
+    (step, values.take_while(|value| *value <= high).collect())
+}
+
+/// Colour and mark of a structure.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Look {
+    /// Index of the class `cN` in `assets/figure.css`.
+    pub colour: usize,
+    /// Index into [`SHAPES`].
+    pub shape: usize,
+    /// Outlined; the structures with a place of their own are filled.
+    pub hollow: bool,
+}
+
+/// Corners of marks around the origin: disc, square, diamond, triangle.
+const SHAPES: [&str; 4] = [
+    "-2,-5 2,-5 5,-2 5,2 2,5 -2,5 -5,2 -5,-2",
+    "-4,-4 4,-4 4,4 -4,4",
+    "0,-6 6,0 0,6 -6,0",
+    "0,-6 6,4 -6,4",
+];
+
+/// Colour of scans and of what is not to stand out.
+const GREY: usize = 7;
+
+/// Structures with a look of their own: name, colour, shape.
+const OWN: [(&str, usize, usize); 9] = [
+    ("wide", 0, 0),
+    ("bvh", 1, 1),
+    ("octree", 2, 2),
+    ("bsp", 3, 3),
+    ("quadtree", 4, 1),
+    ("uniform-grid", 5, 2),
+    ("kd", 6, 3),
+    ("linear", GREY, 0),
+    ("linear-scalar", GREY, 2),
+];
+
+impl Look {
+    /// The look of series `n` that is no structure.
+    pub fn nth(n: usize) -> Look {
+        Look {
+            colour: n % GREY,
+            shape: n % SHAPES.len(),
+            hollow: n >= GREY,
+        }
+    }
+
+    /// The look of a structure by its label. Any other label than those with a look of
+    /// their own has a hollow mark that its text decides.
+    pub fn of(label: &str) -> Look {
+        if let Some(&(_, colour, shape)) = OWN.iter().find(|own| own.0 == label) {
+            return Look {
+                colour,
+                shape,
+                hollow: false,
+            };
+        }
+        // FNV-1a.
+        let hash = label.bytes().fold(0x811c_9dc5_u32, |hash, byte| {
+            (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+        }) as usize;
+        Look {
+            colour: hash % GREY,
+            shape: hash / GREY % SHAPES.len(),
+            hollow: true,
+        }
     }
 }
 
 /// The mark of a structure with its note, around `x` in percent and `y` in pixels.
 pub fn mark(look: Look, kind: &str, [x, y]: [f64; 2], note: &str) -> String {
     let class = if look.hollow { "mark hollow" } else { "mark" };
-    let corners = SHAPES[look.shape].iter().map(|(x, y)| format!("{x},{y} "));
+    let corners = SHAPES[look.shape];
     let note = match note {
         "" => String::new(),
         note => format!("<title>{}</title>", html(note)),
     };
     format!(
         "<svg x=\"{x:.2}%\" y=\"{y:.1}\" overflow=\"visible\"><polygon class=\"{class}{kind}\" \
-         points=\"{}\">{note}</polygon></svg>",
-        corners.collect::<String>().trim_end()
+         points=\"{corners}\">{note}</polygon></svg>"
     )
 }
 
@@ -238,11 +310,7 @@ pub fn picture(figures: &[Figure], columns: usize) -> String {
         y += height;
     }
     let width = width * columns.min(figures.len()).max(1) as f64;
-    let style = format!(
-        "{}{}",
-        include_str!("assets/figure.css"),
-        palette::on_light()
-    );
+    let style = include_str!("assets/figure.css").to_owned();
     // Programs that are no browsers do not resolve variables.
     let variables = [
         ("bg", "#fff"),
@@ -310,5 +378,15 @@ mod tests {
         }
         assert_eq!(left_out(0), "");
         assert_eq!(left_out(1), " (1 point beyond the axis left out)");
+    }
+
+    #[test]
+    fn looks_of_their_own_differ_and_others_are_hollow() {
+        let own = OWN.map(|(name, ..)| Look::of(name));
+        for (n, look) in own.iter().enumerate() {
+            assert!(!own[..n].contains(look), "{look:?}");
+        }
+        let other = Look::of("peer-bvh");
+        assert!(other.hollow && other.colour < GREY && other == Look::of("peer-bvh"));
     }
 }

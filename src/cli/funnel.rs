@@ -9,14 +9,13 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 
+use super::command_args::FunnelArgs;
 use super::document::{Block, to_page, to_terminal};
-use super::funnel_args::FunnelArgs;
-use super::protocol::{Job, Timing};
+use super::processes::{Job, Timing};
 use super::shared_args::{StudyArgs, TableFormat};
 use super::study::{Setting, Study};
 use super::{
-    Ending, expect_folder, expect_places, funnel_csv, funnel_figure, funnel_picture, funnel_table,
-    print, text, write_text,
+    Ending, expect_folder, expect_places, funnel_files, funnel_table, print, text, write_text,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -76,14 +75,14 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         text::terminal().write_all(text.as_bytes())
     });
     if let Some(folder) = &args.csv {
-        funnel_csv::write(&report, folder)?;
+        funnel_files::write(&report, folder)?;
     }
     if let Some(file) = &args.svg {
-        write_text(file, &funnel_picture::draw(&report, &stages.setting.scene))?;
+        write_text(file, &funnel_files::draw(&report, &stages.setting.scene))?;
     }
     if let Some(file) = &args.html {
-        let picture = Block::Picture(funnel_picture::draw(&report, &stages.setting.scene));
-        let figures = [Block::Figure(funnel_figure::chain(&report)), picture];
+        let picture = Block::Picture(funnel_files::draw(&report, &stages.setting.scene));
+        let figures = [Block::Figure(funnel_files::chain(&report)), picture];
         let title = format!("funnel {}, {}", report.scene, report.path);
         let blocks = funnel_table::blocks(&report, true);
         let page = to_page(&title, report.conclusions.len(), figures, blocks);

@@ -3,7 +3,6 @@
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, to_html};
 use super::figure::{Axis, is_drawn};
-use super::palette::Look;
 use super::run_figures::ends;
 use super::table::{Column, Table};
 use super::{program, text};
@@ -104,12 +103,9 @@ pub fn page(mut reports: Vec<Report>) -> String {
                     ..Point::default()
                 })
             };
-            series.push(Series {
-                name: structure.clone(),
-                look: Look::of(structure),
-                is_scan: cells.iter().flatten().any(|cell| cell.is_scan()),
-                points: times.iter().enumerate().filter_map(point).collect(),
-            });
+            let is_scan = cells.iter().flatten().any(|cell| cell.is_scan());
+            let points = times.iter().enumerate().filter_map(point).collect();
+            series.push(Series::of(structure, is_scan, points));
         }
         series.retain(|series| !series.points.is_empty());
         // The fastest of the last run keeps its colour.

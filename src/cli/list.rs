@@ -5,12 +5,13 @@ use std::io::{self, Write};
 use clap::ValueEnum;
 use serde_json::{Map, Value, json};
 
-use super::args::{ListArgs, ListTopic};
+use super::args::{EnvArgs, ListArgs, ListTopic};
 use super::shared_args::TableFormat;
+use super::table::Table;
 use super::{Ending, print_json, program, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
-use crate::measure::{BOUNDS, METRICS};
+use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
 use crate::motion::{MOTION_PARAMS, MOTIONS};
 use crate::path::{PATH_PARAMS, PATHS};
 use crate::scene::{FAMILIES, FETCHED, MESHES, SAMPLES, SCENE_PARAMS};
@@ -206,4 +207,40 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
             ("motions", note, rows.collect())
         }
     })
+}
+
+pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
+    let facts = json!({
+        "machine": Machine::capture(),
+        "toolchain": Toolchain::capture(),
+        "source": Source::capture(),
+    });
+    match args.format {
+        TableFormat::Json => print_json(&facts)?,
+        TableFormat::Table => {
+            let mut table = Table::of("fact | value");
+            for (group, facts) in facts.as_object().into_iter().flatten() {
+                for (name, value) in facts.as_object().into_iter().flatten() {
+                    table.add_row([format!("{group}.{name}"), plain(value)]);
+                }
+            }
+            write!(io::stdout(), "{}", table.fitted(text::width()))?;
+        }
+    }
+    Ok(Ending::Ok)
+}
+
+fn plain(value: &Value) -> String {
+    match value {
+        Value::Null => "unknown".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(" "),
+        Value::Object(fields) => {
+            let fields = fields
+                .iter()
+                .map(|(name, value)| format!("{name}={}", plain(value)));
+            format!("({})", fields.collect::<Vec<_>>().join(", "))
+        }
+        other => other.to_string(),
+    }
 }

@@ -13,8 +13,8 @@ mod against_table;
 mod args;
 mod baseline;
 mod bencher;
+mod command_args;
 mod compare;
-mod compare_args;
 mod compare_page;
 mod compare_structures;
 mod compare_table;
@@ -22,32 +22,21 @@ mod diagram;
 mod document;
 mod drift;
 mod drift_arms;
-mod drift_chart;
-mod env;
 mod error_figure;
 mod figure;
-mod figure_rows;
 mod funnel;
-mod funnel_args;
-mod funnel_csv;
-mod funnel_figure;
-mod funnel_picture;
+mod funnel_files;
 mod funnel_table;
 mod history;
-mod inputs;
 mod interrupt;
 mod list;
 mod merge;
-mod palette;
 mod plan;
-mod plan_cells;
 mod precision;
-mod precision_chart;
 mod precision_conclusions;
 mod precision_tables;
 mod processes;
 mod program;
-mod protocol;
 mod query;
 mod report;
 mod run;
@@ -58,7 +47,6 @@ mod run_table;
 mod run_verdict;
 mod run_why;
 mod scene;
-mod scene_args;
 mod scene_draw;
 mod scene_facts;
 mod shared_args;
@@ -66,19 +54,15 @@ mod sheet;
 mod stage_sweep;
 mod stress;
 mod study;
-mod surface_charts;
 mod surface_tables;
 mod table;
 #[cfg(test)]
 mod tests_same_truth;
 mod text;
-mod usage;
 mod values;
 mod verify;
 mod verify_table;
 mod view;
-mod view_args;
-mod view_data;
 mod worker;
 
 use std::collections::BTreeMap;
@@ -98,7 +82,7 @@ use interrupt::Interrupted;
 use serde::Serialize;
 
 use args::{Cli, Command};
-use scene_args::SceneCommand;
+use command_args::SceneCommand;
 use shared_args::{SceneArgs, TableFormat};
 
 /// Exit code after Ctrl-C.
@@ -204,7 +188,7 @@ fn refused(error: &clap::Error) -> ExitCode {
         tell(&format!("error: {line}"));
         ExitCode::from(2)
     };
-    if let Some(line) = usage::one_line(error) {
+    if let Some(line) = program::one_line(error) {
         return failed(line);
     }
     match error.print().and_then(|()| io::stdout().flush()) {
@@ -245,7 +229,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
         Command::Scene(SceneCommand::Draw(args)) => scene_draw::draw(registry, &args),
         Command::View(args) => view::view(registry, &args),
-        Command::Env(args) => env::env(&args),
+        Command::Env(args) => list::env(&args),
         Command::Worker => worker::worker(registry),
         Command::Completions { shell } => {
             let mut script = Vec::new();

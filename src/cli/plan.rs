@@ -6,20 +6,11 @@ use std::fmt::Write;
 
 use glam::DVec3;
 
-use super::plan_cells::Cells;
+use super::sheet::{Cells, Class};
 use super::sheet::{Rect, SIDE, Sheet, at, centre, longest, union, united};
 use super::text;
 use crate::camera::Camera;
 use crate::scene::{Regions, Scene, UpAxis};
-
-/// Colour and words of a class of items.
-#[derive(Clone, Copy)]
-pub struct Class {
-    pub colour: &'static str,
-    pub words: &'static str,
-    /// Drawn in any case, however far from the eye.
-    pub is_key: bool,
-}
 
 /// A drawing. Later classes of items are drawn over earlier ones of the same size.
 pub struct Plan<'p> {
@@ -179,42 +170,36 @@ impl Plan<'_> {
 
     /// Swatches and words: classes of items with their counts, then those of cells.
     fn legend(&self) -> Vec<(String, String)> {
-        let mut counts = vec![0; self.classes.len()];
-        (0..self.scene.items.len()).for_each(|item| counts[(self.class_of)(item)] += 1);
         let total = text::count(self.scene.items.len());
-        let items = self.classes.iter().zip(&counts);
-        let items = items
-            .filter(|(_, count)| **count > 0)
-            .map(|(class, &count)| {
-                let words = format!("{}: {} of {total}", class.words, text::count(count));
-                (format!("fill=\"{}\"", class.colour), words)
-            });
-        let mut legend: Vec<_> = items.collect();
-        if let Some(Cells {
-            cells,
-            classes,
-            class_of,
-            ..
-        }) = &self.cells
-        {
-            let mut counts = vec![0; classes.len()];
-            (0..cells.len()).for_each(|cell| counts[class_of(cell)] += 1);
-            for (class, count) in classes.iter().zip(counts).filter(|(_, count)| *count > 0) {
-                let words = format!("{}: {}", class.words, text::count(count));
-                let fill = if class.is_filled {
-                    class.colour
-                } else {
-                    "#fff"
-                };
-                let swatch = format!(
-                    "fill=\"{fill}\" fill-opacity=\".3\" stroke=\"{}\"",
-                    class.colour
-                );
-                legend.push((swatch, words));
-            }
-        }
-        legend
+        let items = counted(self.classes, self.scene.items.len(), self.class_of);
+        let items = items.map(|(class, count)| {
+            let words = format!("{}: {count} of {total}", class.words);
+            (format!("fill=\"{}\"", class.colour), words)
+        });
+        let cells = self
+            .cells
+            .iter()
+            .flat_map(|drawn| counted(drawn.classes, drawn.cells.len(), drawn.class_of));
+        let cells = cells.map(|(class, count)| {
+            let colour = class.colour;
+            let fill = if class.is_key { colour } else { "#fff" };
+            let swatch = format!("fill=\"{fill}\" fill-opacity=\".3\" stroke=\"{colour}\"");
+            (swatch, format!("{}: {count}", class.words))
+        });
+        items.chain(cells).collect()
     }
+}
+
+/// Classes that are not empty, with their counts.
+fn counted<'c>(
+    classes: &'c [Class],
+    all: usize,
+    class_of: &dyn Fn(usize) -> usize,
+) -> impl Iterator<Item = (&'c Class, String)> {
+    let mut counts = vec![0; classes.len()];
+    (0..all).for_each(|one| counts[class_of(one)] += 1);
+    let counted = classes.iter().zip(counts).filter(|(_, count)| *count > 0);
+    counted.map(|(class, count)| (class, text::count(count)))
 }
 
 /// The part of the plane that is drawn.
@@ -286,6 +271,7 @@ fn draw_camera(camera: &Camera, up: UpAxis, sheet: &Sheet, body: &mut String) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sheet::class;
     use super::*;
     use crate::scene::WorldBox;
 
@@ -300,11 +286,7 @@ mod tests {
             flat(49.0, 49.0, 0.0),
         ];
         let scene = Scene::from_boxes("a<b", &boxes).expect("boxes");
-        let class = |colour| Class {
-            colour,
-            words: "of it",
-            is_key: false,
-        };
+        let class = |colour| class(colour, "of it", false);
         let plan = Plan {
             caption: scene.name.clone(),
             scene: &scene,

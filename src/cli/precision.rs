@@ -7,11 +7,11 @@ use std::io::Write;
 use super::args::PrecisionArgs;
 use super::document::{Block, to_page, to_terminal};
 use super::figure::picture;
-use super::protocol::{Job, Timing};
+use super::processes::{Job, Timing};
 use super::study::{Setting, Study};
 use super::{
-    Ending, expect_places, precision_chart, precision_conclusions, precision_tables, print,
-    stage_sweep, text, write_text,
+    Ending, expect_places, precision_conclusions, precision_tables, print, stage_sweep, text,
+    write_text,
 };
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Status};
@@ -78,11 +78,11 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         text::terminal().write_all(shown.as_bytes())
     });
     if let Some(file) = &args.svg {
-        let figures = precision_chart::figures(&outcome.precision);
+        let figures = precision_conclusions::figures(&outcome.precision);
         write_text(file, &picture(&figures, 1))?;
     }
     if let Some(file) = &args.html {
-        let figures = precision_chart::figures(&outcome.precision).into_iter();
+        let figures = precision_conclusions::figures(&outcome.precision).into_iter();
         let title = format!("precision {}, {}", args.study.scene, args.study.path);
         let blocks = blocks(&outcome, true, usize::MAX);
         let figures = figures.map(Block::Figure);

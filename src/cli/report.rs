@@ -10,7 +10,7 @@ use anyhow::{Context, bail};
 
 use super::args::ReportArgs;
 use super::document::{Block, to_html, to_markdown, to_terminal};
-use super::surface_charts::{self, Picture};
+use super::surface_tables::Picture;
 use super::table::Table;
 use super::{
     Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_table,
@@ -51,7 +51,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     let mut report = read_report(path)?;
     declare(&mut report, registry);
     let pictures = match args.svg.is_some() {
-        true => surface_charts::pictures(&report),
+        true => surface_tables::pictures(&report),
         false => Vec::new(),
     };
     if let Some(path) = &args.markdown {

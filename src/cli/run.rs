@@ -11,8 +11,8 @@ use indicatif::ProgressBar;
 
 use super::args::RunArgs;
 use super::interrupt::Interrupted;
+use super::processes::Job;
 use super::processes::{Ended, Said, Workers};
-use super::protocol::Job;
 use super::report::{page, show, show_written};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};

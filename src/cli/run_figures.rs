@@ -1,10 +1,9 @@
 //! Figures of a run: speed-ups, growth, views along the path, error against time.
 
 use super::diagram::{Diagram, Joined, Point, Series};
+use super::diagram::{Form, Row, rows};
 use super::error_figure::{Against, Measured};
-use super::figure::{Axis, Figure, is_drawn, left_out};
-use super::figure_rows::{Form, Row, rows};
-use super::palette::Look;
+use super::figure::{Axis, Figure, Look, is_drawn, left_out};
 use super::run_verdict::times;
 use super::text;
 use crate::measure::Metric;
@@ -117,12 +116,8 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         };
         if readings.len() >= LEAST_READINGS[0] {
             queries = readings.iter().map(|r| r.queries).fold(queries, u32::max);
-            series.push(Series {
-                name: cell.structure.clone(),
-                look: Look::of(&cell.structure),
-                is_scan: cell.is_scan(),
-                points: readings.iter().map(point).collect(),
-            });
+            let points = readings.iter().map(point).collect();
+            series.push(Series::of(&cell.structure, cell.is_scan(), points));
         }
         if readings.len() >= LEAST_READINGS[1] {
             let mut ns: Vec<f64> = readings.iter().map(|r| r.ns).collect();

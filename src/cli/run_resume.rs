@@ -12,10 +12,10 @@ use clap::{ArgMatches, CommandFactory, Parser};
 
 use super::args::{Cli, Command, RunArgs};
 use super::run_plan::RunPlan;
-use super::{program, tell, text, usage};
+use super::{program, tell, text};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
-    Difference, Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, read_report,
+    Header, RunFolder, RunInfo, SCHEMA_VERSION, Setting, StoppedRun, Stream, dated, read_report,
     read_stream, utc,
 };
 use crate::scene;
@@ -146,7 +146,7 @@ pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
 
 /// An error of recorded options, which are no usage of this command.
 fn one_line(error: clap::Error) -> anyhow::Error {
-    match usage::one_line(&error) {
+    match program::one_line(&error) {
         Some(line) => anyhow::anyhow!("recorded options: {line}"),
         None => anyhow::anyhow!(NO_RUN),
     }
@@ -211,8 +211,11 @@ fn same_place(header: &Header, begun: &RunArgs) -> anyhow::Result<()> {
         binary: binary_digest(),
         ..header.clone()
     };
-    if let Some(Difference { what, before, here }) = header.differs_in_place(&here) {
-        bail!("the {what} was '{before}' and is '{here}'; expected the same: begin a new run");
+    if let Some(Setting {
+        of, what, old, new, ..
+    }) = header.differs_in_place(&here)
+    {
+        bail!("{of} differs: {what} '{old}', and '{new}' here; expected the same: begin a new run");
     }
     Ok(())
 }

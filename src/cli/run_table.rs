@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use super::document::Block;
 use super::table::Table;
-use super::{inputs, run_verdict, text};
+use super::{run_verdict, scene_facts, text};
 use crate::measure::Status;
 use crate::report::{Comparison, Overall, Ranked, ReportCell, Speedup, times_as_fast};
 use crate::shown::shortened;
@@ -30,7 +30,7 @@ pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>>
 pub fn conclusion(group: &[&Comparison], overall: &Overall) -> String {
     match group {
         [one] => run_verdict::of_one(one, overall.base),
-        _ => run_verdict::of_many(&labels(group), group, overall),
+        _ => run_verdict::of_many(group, overall),
     }
 }
 
@@ -51,7 +51,7 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         text::counted(scene.region_count, "region")
     );
     if !scene.up.is_empty() {
-        first += &format!(", {}", inputs::axes(scene));
+        first += &format!(", {}", scene_facts::axes(scene));
     }
     if scene.skipped_items > 0 {
         let bad = text::counted(scene.skipped_items, "bad item");
@@ -85,9 +85,13 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         (None, sources) => sources.map(|items| format!("false positives {items}")),
     };
     let third: Vec<String> = visible.into_iter().chain(excess).collect();
-    let lens = path.lens.as_ref().map(inputs::lens).unwrap_or_default();
+    let lens = path
+        .lens
+        .as_ref()
+        .map(scene_facts::lens)
+        .unwrap_or_default();
     let matrix = path.lens.as_ref().and_then(|lens| lens.matrix.as_ref());
-    let matrix = matrix.map(|matrix| format!("matrices: {}", inputs::matrices(matrix)));
+    let matrix = matrix.map(|matrix| format!("matrices: {}", scene_facts::matrices(matrix)));
     let matrix = matrix.unwrap_or_default();
     let lines = [first, second, motion, lens, matrix, third.join(", ")].into_iter();
     lines.filter(|line| !line.is_empty()).collect()
@@ -224,7 +228,7 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
     let about = || all.iter().map(|comparison| comparison.about());
     let up: BTreeSet<&str> = about().map(|cell| cell.scene.up.as_str()).collect();
     let up: Vec<&str> = up.into_iter().collect();
-    let lens = inputs::lenses(about().map(|cell| &cell.path));
+    let lens = scene_facts::lenses(about().map(|cell| &cell.path));
     let lens = lens.map(|lens| Block::Line(format!("{} up; {lens}", up.join(" or "))));
     let names = labels(all).into_iter();
     let names = names.map(|label| shortened(&label, width / 2));

@@ -35,7 +35,6 @@ pub fn times(ratio: f64) -> String {
 pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     let mut told = vec![ranking(comparison, base)];
     told.extend(base.and_then(fallback));
-    told.extend(frames(comparison));
     told.extend(repaid(comparison));
     told.extend(shared(comparison));
     told.extend(checked(&[comparison]));
@@ -114,22 +113,6 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     )
 }
 
-/// Frame time and worst frame of the fastest structure, and of the flat scan.
-fn frames(comparison: &Comparison) -> Option<String> {
-    let of = |cell: &ReportCell| {
-        let worst = text::time(cell.value("worst_frame_ns")?);
-        let frame = text::time(cell.value("frame_ns")?);
-        Some(format!("{frame}, the worst one {worst}"))
-    };
-    let best = comparison.winners().next()?;
-    let own = format!("A frame of {} takes {}", best.structure, of(best)?);
-    let scan = comparison
-        .sound_cell(YARDSTICK)
-        .filter(|scan| *scan != best);
-    let scan = scan.and_then(|scan| Some(format!("; of {}, {}", described(YARDSTICK), of(scan)?)));
-    Some(format!("{own}{}.", scan.unwrap_or_default()))
-}
-
 /// The base of speed-ups, where it is not the usual one.
 fn fallback(base: &str) -> Option<String> {
     let other = base != YARDSTICK;
@@ -205,16 +188,16 @@ fn were(count: usize) -> String {
     }
 }
 
-/// Conclusion of several scenes and paths with their labels.
-pub fn of_many(labels: &[String], all: &[&Comparison], overall: &Overall) -> String {
-    let mut told = vec![standing(labels, all, overall)];
+/// Conclusion of several scenes and paths.
+pub fn of_many(all: &[&Comparison], overall: &Overall) -> String {
+    let mut told = vec![standing(all.len(), overall)];
     told.extend(overall.base.and_then(fallback));
     told.extend(checked(all));
     told.extend(failed(all));
     told.join(" ")
 }
 
-fn standing(labels: &[String], all: &[&Comparison], overall: &Overall) -> String {
+fn standing(all: usize, overall: &Overall) -> String {
     let mut ranked = overall.standings.iter().filter(|s| s.speedup.is_some());
     let (Some(base), Some(best)) = (overall.base, ranked.next()) else {
         return "No structure has times everywhere, so there are no means.".to_owned();
@@ -235,37 +218,6 @@ fn standing(labels: &[String], all: &[&Comparison], overall: &Overall) -> String
     let firsts = [best].into_iter().chain(tied.iter().copied());
     let firsts: Vec<String> = firsts.map(|s| s.first_in.to_string()).collect();
     let firsts: Vec<&str> = firsts.iter().map(String::as_str).collect();
-    told += &format!(
-        "; first or tied in {} of {}.",
-        listed(&firsts, "and"),
-        all.len()
-    );
-    let mut elsewhere: Vec<(f64, String)> = (labels.iter().zip(all))
-        .filter_map(|(label, comparison)| {
-            let first = comparison.winners().next()?;
-            let own = comparison
-                .sound()
-                .find(|c| names.contains(&c.structure.as_str()))?;
-            let ratio = times_as_fast(own, first).filter(|_| own.rank != Some(1))?;
-            Some((
-                ratio,
-                format!("{} by {} ({label})", first.structure, times(ratio)),
-            ))
-        })
-        .collect();
-    elsewhere.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let shown: Vec<&str> = elsewhere.iter().take(3).map(|row| row.1.as_str()).collect();
-    if !shown.is_empty() {
-        told += &format!(
-            " Others are ahead in {}{}: {}.",
-            elsewhere.len(),
-            if elsewhere.len() > shown.len() {
-                ", most of all"
-            } else {
-                ""
-            },
-            listed(&shown, "and")
-        );
-    }
+    told += &format!("; first or tied in {} of {all}.", listed(&firsts, "and"));
     told
 }

@@ -6,10 +6,10 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
+use super::command_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
 use super::scene_facts::{SceneFacts, people};
 use super::shared_args::TableFormat;
-use super::{Ending, expect_place_for, inputs, interrupt, load_scene, print_json, tell, text};
+use super::{Ending, expect_place_for, interrupt, load_scene, print_json, scene_facts, tell, text};
 use crate::measure::SceneInfo;
 use crate::path::{self, CameraFacts};
 use crate::report::write_atomically;
@@ -63,7 +63,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         ("items", people(info.total_count)),
         ("bounds", format!("{low} to {high}")),
         ("origin", origin),
-        ("axes", inputs::axes(&info)),
+        ("axes", scene_facts::axes(&info)),
         (
             "regions",
             format!("{}: {}", people(info.region_count), scene.regions.kind()),
@@ -74,13 +74,13 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     match (&facts, &args.path) {
         (Some(facts), Some(path)) => {
             let views = text::counted(cameras.len(), "camera");
-            let lens = inputs::lens(facts);
+            let lens = scene_facts::lens(facts);
             rows.push(("cameras", text::plain(&format!("{path}: {views}, {lens}"))));
-            let matrix = facts.matrix.as_ref().map(inputs::matrices);
+            let matrix = facts.matrix.as_ref().map(scene_facts::matrices);
             rows.extend(matrix.map(|matrix| ("matrices", matrix)));
         }
         _ => {
-            let lens = inputs::default_lens(&defaults);
+            let lens = scene_facts::default_lens(&defaults);
             rows.push(("cameras", format!("recorded ones without a lens: {lens}")));
         }
     }

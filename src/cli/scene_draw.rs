@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
-use super::plan::{Class, Plan};
-use super::plan_cells::{CellClass, Cells};
-use super::scene_args::SceneDrawArgs;
+use super::command_args::SceneDrawArgs;
+use super::plan::Plan;
+use super::sheet::{Cells, Class, class};
 use super::{Ending, expect_places, load_scene, tell, text, write_text};
 use crate::culling::{CameraView, Culling};
 use crate::geometry::Aabb;
@@ -16,14 +16,6 @@ use crate::path;
 use crate::query::Containment;
 use crate::scene::Scene;
 use crate::spec::SpecError;
-
-const fn class(colour: &'static str, words: &'static str, is_key: bool) -> Class {
-    Class {
-        colour,
-        words,
-        is_key,
-    }
-}
 
 /// Items of a scene without a camera.
 const ITEMS: [Class; 1] = [class("#9fb4c4", "items", false)];
@@ -46,23 +38,15 @@ const OUTSIDE: usize = 1;
 const VISIBLE: usize = 2;
 const ACCEPTED: usize = 3;
 
-const fn cells_of(colour: &'static str, words: &'static str, is_filled: bool) -> CellClass {
-    CellClass {
-        colour,
-        words,
-        is_filled,
-    }
-}
-
 /// Cells without a camera.
-const CELLS: [CellClass; 1] = [cells_of("#0072b2", "cells", false)];
+const CELLS: [Class; 1] = [class("#0072b2", "cells", false)];
 
 /// Cells by the verdict of a query.
-const CELL_VERDICTS: [CellClass; 4] = [
-    cells_of("#b0b0b0", "cells not reached", false),
-    cells_of("#d55e00", "cells rejected, outside", true),
-    cells_of("#009e73", "cells accepted, inside", true),
-    cells_of("#0072b2", "cells opened, across a plane", false),
+const CELL_VERDICTS: [Class; 4] = [
+    class("#b0b0b0", "cells not reached", false),
+    class("#d55e00", "cells rejected, outside", true),
+    class("#009e73", "cells accepted, inside", true),
+    class("#0072b2", "cells opened, across a plane", false),
 ];
 
 pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending> {

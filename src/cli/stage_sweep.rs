@@ -7,7 +7,7 @@ use anyhow::bail;
 
 use super::args::PrecisionArgs;
 use super::funnel::plain_input;
-use super::protocol::{Job, Timing};
+use super::processes::{Job, Timing};
 use super::study::{Setting, Study};
 use super::table::Table;
 use super::{Ending, funnel_table, print, text};

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use serde_json::json;
 
+use super::processes::{Job, Timing};
 use super::processes::{Said, Workers};
-use super::protocol::{Job, Timing};
 use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
 use super::{Ending, interrupt, load_scene_by, print, tell, text};
 use crate::index::{Registry, StructureSpec};

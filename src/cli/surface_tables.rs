@@ -6,13 +6,12 @@ use std::collections::BTreeMap;
 
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::Block;
-use super::figure::{Axis, Figure, is_drawn, left_out};
-use super::palette::Look;
+use super::figure::{Axis, Figure, is_drawn, left_out, picture};
 use super::run_figures::ends;
 use super::table::Table;
-use super::text;
+use super::{run_figures, text};
 use crate::report::{
-    Crossing, Growth, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
+    Crossing, Growth, Overall, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
 };
 
 /// A class of shares: "0.1 %", "100 %".
@@ -223,12 +222,7 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
             let (left_out, points) = curve(class, name);
             *beyond.entry(class.to_bits()).or_insert(0) += left_out;
             if points.len() > 1 {
-                series.push(Series {
-                    name: name.to_owned(),
-                    look: Look::of(name),
-                    is_scan: is_scan(name),
-                    points,
-                });
+                series.push(Series::of(name, is_scan(name), points));
             }
         }
         // The fastest at the largest size keeps its colour.
@@ -280,6 +274,64 @@ fn measured(surface: &Surface, class: f64) -> String {
     )
 }
 
+/// A picture with a name that fits a file.
+pub struct Picture {
+    pub name: String,
+    pub svg: String,
+}
+
+/// A picture for each class of shares that has at least two sizes, and one for each
+/// scene and path that ranks anything.
+pub fn pictures(report: &Report) -> Vec<Picture> {
+    let mut pictures: Vec<Picture> = Vec::new();
+    let mut add = |words: [&str; 4], figure| {
+        let name = file_name(words, &pictures);
+        let svg = picture(&[figure], 1);
+        pictures.push(Picture { name, svg });
+    };
+    for surface in surfaces(comparisons(report)) {
+        for (shown, figure) in growth(&surface) {
+            add(
+                [&surface.world, surface.cache, surface.test, &shown],
+                figure,
+            );
+        }
+    }
+    for comparison in &comparisons(report) {
+        let about = comparison.about();
+        let base = Overall::of(&[comparison]).base;
+        if let Some(mut figure) = base.and_then(|base| run_figures::speedups(comparison, base)) {
+            let [scene, path] = [&about.scene.name, &about.path.name];
+            figure.caption = format!("{scene}, {path}: {}", figure.caption);
+            add([scene, path, &about.path.cache, &about.test], figure);
+        }
+    }
+    pictures
+}
+
+/// A name of its own, of less than the 255 bytes that file systems take.
+fn file_name(words: [&str; 4], taken: &[Picture]) -> String {
+    let words = words.map(|word| word.chars().take(70).collect::<String>());
+    let name: String = slug(&words.join("-")).chars().take(200).collect();
+    let is_free = |name: &String| taken.iter().all(|picture| picture.name != *name);
+    // Two worlds may look the same to a file system.
+    let mut names = (1..).map(|n| match n {
+        1 => name.clone(),
+        n => format!("{name}-{n}"),
+    });
+    names.find(is_free).unwrap_or_default()
+}
+
+/// Letters, digits and points; a dash for anything else.
+fn slug(words: &str) -> String {
+    let plain = words.chars().map(|c| match c {
+        c if c.is_ascii_alphanumeric() || c == '.' => c,
+        _ => '-',
+    });
+    let name: String = plain.collect::<String>().replace("--", "-");
+    name.trim_matches(['-', '.']).to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -292,5 +344,25 @@ mod tests {
             ["0.1 %", "2 %", "20 %", "100 %", "0.05 %"]
         );
         assert_eq!([1234.0, 7.2, 98_765.0].map(two_digits), [1200, 7, 99_000]);
+    }
+
+    #[test]
+    fn names_fit_a_file() {
+        assert_eq!(
+            slug("city:seed=7-warm-six-plane-0.1 %"),
+            "city-seed-7-warm-six-plane-0.1"
+        );
+        assert_eq!(slug("../a/b.csv"), "a-b.csv");
+        let world = "x".repeat(3000);
+        let mut pictures: Vec<Picture> = Vec::new();
+        for world in [&world, &format!("{world}y"), "a", "a-warm-t-2 %-2", "a"] {
+            let name = file_name([world, "warm", "t", "2 %"], &pictures);
+            assert!(
+                name.len() < 250 && pictures.iter().all(|p| p.name != name),
+                "{name}"
+            );
+            let svg = String::new();
+            pictures.push(Picture { name, svg });
+        }
     }
 }

@@ -6,15 +6,20 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::{Context, ensure};
+use glam::{DMat4, DVec3, DVec4, I64Vec3};
+use obvhs::ploc::morton::morton_encode_u64;
+use serde::Serialize;
 
+use super::command_args::ViewArgs;
 use super::compare_structures::{Row, ask_all};
 use super::document::page;
 use super::query::frustum;
 use super::study::progress;
 use super::text::html;
-use super::view_args::ViewArgs;
-use super::view_data::{FATES, Fate, Frame, ViewData};
-use super::{Ending, expect_places, inputs, load_scene, tell, text, unread_is_fine, write_text};
+use super::{
+    Ending, expect_places, load_scene, scene_facts, tell, text, unread_is_fine, write_text,
+};
+use crate::camera::{Camera, ClipSpace, LensKind};
 use crate::funnel::{RaysEnd, Shape};
 use crate::index::Registry;
 use crate::input::tell_warnings;
@@ -22,6 +27,7 @@ use crate::measure::{SceneInfo, Workload};
 use crate::oracle::Verdict;
 use crate::path::{self, CameraFacts};
 use crate::query::ItemId;
+use crate::scene::Scene;
 use crate::verify::Truth;
 use crate::visibility::Rays;
 
@@ -104,9 +110,12 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         .map(|grid| format!("{}x{}", grid.width, grid.height));
     let told = conclusion(&data, totals, agree);
     let facts = CameraFacts::of(&cameras.cameras);
-    let (axes, lens) = (inputs::axes(&SceneInfo::of(&scene)), inputs::lens(&facts));
+    let (axes, lens) = (
+        scene_facts::axes(&SceneInfo::of(&scene)),
+        scene_facts::lens(&facts),
+    );
     let matrix = text::some(facts.matrix.as_ref(), |matrix| {
-        format!("; matrices: {}", inputs::matrices(matrix))
+        format!("; matrices: {}", scene_facts::matrices(matrix))
     });
     let about = format!(
         "Scene: {axes}. Lens: {lens}{matrix}. Test: {}.",
@@ -217,4 +226,245 @@ fn conclusion(data: &ViewData, totals: [usize; FATES], agree: bool) -> String {
         text::counted(data.items, "item"),
         parts.join(", "),
     )
+}
+
+/// Digits of packed numbers, safe in JSON and HTML.
+const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+
+/// Whole numbers as text, five bits per digit, lowest first.
+///
+/// A sixth bit is set if more digits of the number follow.
+#[derive(Default)]
+struct Packed(String);
+
+impl Packed {
+    fn push(&mut self, mut number: u64) {
+        loop {
+            let more = u64::from(number > 31) << 5;
+            self.0.push(DIGITS[(number & 31 | more) as usize].into());
+            number >>= 5;
+            if number == 0 {
+                return;
+            }
+        }
+    }
+
+    /// 0, -1, 1, -2, .. as 0, 1, 2, 3, ..
+    fn push_signed(&mut self, number: i64) {
+        self.push((number << 1 ^ number >> 63) as u64);
+    }
+}
+
+/// Members of a set as packed runs.
+///
+/// A run is twice the gap before it, plus 1 if it is longer than 1; then its length less 2.
+fn runs(set: impl Iterator<Item = bool>) -> String {
+    let (mut packed, mut gap, mut run) = (Packed::default(), 0, 0);
+    for is_member in set.chain([false]) {
+        if is_member {
+            run += 1;
+            continue;
+        }
+        if run > 0 {
+            packed.push(2 * gap + u64::from(run > 1));
+            if run > 1 {
+                packed.push(run - 2);
+            }
+            (gap, run) = (0, 0);
+        }
+        gap += 1;
+    }
+    packed.0
+}
+
+/// Kinds of [`Fate`].
+pub const FATES: usize = 5;
+
+/// Result for an item in a view.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Fate {
+    Culled,
+    Visible,
+    FalsePositive,
+    Hidden,
+    Lost,
+}
+
+/// Everything that the page draws.
+#[derive(Serialize)]
+pub struct ViewData {
+    pub scene: String,
+    pub path: String,
+    pub items: usize,
+    /// Axis that points up, y or z.
+    up: &'static str,
+    /// Steps per axis that corners are rounded to, outward.
+    steps: u32,
+    /// Lowest corner of all items, scene-local.
+    low: [f64; 3],
+    /// Extent of all items.
+    extent: [f64; 3],
+    /// Scene-local zero in world coordinates.
+    origin: [f64; 3],
+    /// Ids of the items in the order of the curve: signed differences.
+    ids: String,
+    /// Lower corner of each item less the one before, signed, and the extents.
+    boxes: String,
+    pub samples: Option<String>,
+    pub frames: Vec<Frame>,
+    pub structures: Vec<Counters>,
+}
+
+/// A view of the path.
+#[derive(Clone, Default, Serialize)]
+pub struct Frame {
+    /// Index in the path.
+    pub camera: usize,
+    /// Scene-local to clip coordinates (near depth -1, far depth 1), column by column.
+    clip: [f64; 16],
+    visible: String,
+    false_positive: String,
+    hidden: String,
+    lost: String,
+}
+
+/// Tests that a structure made, per view.
+#[derive(Default, Serialize)]
+pub struct Counters {
+    pub name: String,
+    pub nodes_tested: Vec<u64>,
+    pub items_tested: Vec<u64>,
+}
+
+impl ViewData {
+    /// Data without views, and the items in the order of the curve.
+    pub fn of(scene: &Scene, path: &str) -> (ViewData, Vec<ItemId>) {
+        // Few items may be far smaller than the scene.
+        let steps: u32 = if scene.items.len() > 20_000 {
+            1 << 16
+        } else {
+            1 << 20
+        };
+        let bounds = match scene.items.is_empty() {
+            true => Default::default(),
+            false => [scene.bounds.min.as_dvec3(), scene.bounds.max.as_dvec3()],
+        };
+        let (low, extent) = (bounds[0], bounds[1] - bounds[0]);
+        let scale = extent.map(|e| if e > 0.0 { f64::from(steps) / e } else { 0.0 });
+        let corners = |item: usize| {
+            let b = &scene.items[item];
+            let [min, max] = [b.min, b.max].map(|corner| (corner.as_dvec3() - low) * scale);
+            (min.floor().as_i64vec3(), max.ceil().as_i64vec3())
+        };
+        let code = |item: usize| {
+            let (min, max) = corners(item);
+            let [x, y, z] = ((min + max) / 2).to_array().map(|c| c as u32);
+            (morton_encode_u64(x, y, z), item)
+        };
+        let mut order: Vec<(u64, usize)> = (0..scene.items.len()).map(code).collect();
+        order.sort_unstable();
+        let (mut ids, mut boxes) = (Packed::default(), Packed::default());
+        let (mut id, mut low_corner) = (0, I64Vec3::ZERO);
+        for &(_, item) in &order {
+            ids.push_signed(item as i64 - id);
+            let (min, max) = corners(item);
+            for difference in (min - low_corner).to_array() {
+                boxes.push_signed(difference);
+            }
+            for side in (max - min).to_array() {
+                boxes.push(side as u64);
+            }
+            (id, low_corner) = (item as i64, min);
+        }
+        let data = ViewData {
+            scene: scene.name.clone(),
+            path: path.to_owned(),
+            items: scene.items.len(),
+            up: scene.up.name(),
+            steps,
+            low: low.to_array(),
+            extent: extent.to_array(),
+            origin: scene.origin.to_array(),
+            ids: ids.0,
+            boxes: boxes.0,
+            samples: None,
+            frames: Vec::new(),
+            structures: Vec::new(),
+        };
+        (
+            data,
+            order.into_iter().map(|(_, item)| item as ItemId).collect(),
+        )
+    }
+
+    /// Adds the tests of a structure in its next view.
+    pub fn count(&mut self, row: &Row) {
+        let known = self
+            .structures
+            .iter()
+            .position(|own| own.name == row.structure);
+        let at = known.unwrap_or_else(|| {
+            self.structures.push(Counters {
+                name: row.structure.clone(),
+                ..Counters::default()
+            });
+            self.structures.len() - 1
+        });
+        let counters = &mut self.structures[at];
+        counters.nodes_tested.push(row.cost.nodes_tested);
+        counters.items_tested.push(row.cost.items_tested);
+    }
+}
+
+impl Frame {
+    /// A view with the fates of all items, in the order of the curve.
+    pub fn of(index: usize, camera: &Camera, origin: DVec3, fates: &[Fate]) -> Frame {
+        let set = |fate: Fate| runs(fates.iter().map(|own| *own == fate));
+        Frame {
+            camera: index,
+            clip: clip_matrix(camera, origin).to_cols_array(),
+            visible: set(Fate::Visible),
+            false_positive: set(Fate::FalsePositive),
+            hidden: set(Fate::Hidden),
+            lost: set(Fate::Lost),
+        }
+    }
+}
+
+/// Scene-local to clip coordinates; near depth is -1, far depth 1.
+fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
+    let LensKind::Matrix(matrix) = camera.lens.kind() else {
+        let view = camera.frame.relative_to(origin).world_to_eye();
+        return camera.lens.projection(ClipSpace::OpenGl) * view;
+    };
+    let [x, y, z, w] = matrix.rows().map(DVec4::from);
+    let lowest = if matrix.is_from_zero() { 0.0 } else { -1.0 };
+    let [near, far] = match matrix.unprojected() {
+        Ok(unprojected) => unprojected.depths,
+        Err(_) => [lowest, 1.0],
+    };
+    let z = (2.0 * z - (near + far) * w) / (far - near);
+    DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_runs_are_packed_as_the_page_reads_them() {
+        let mut packed = Packed::default();
+        [0, 31, 32, 1023, 1024]
+            .into_iter()
+            .for_each(|n| packed.push(n));
+        [0, -1, 1, -2, i64::MIN]
+            .into_iter()
+            .for_each(|n| packed.push_signed(n));
+        assert_eq!(packed.0, "AfgB_fggBABCD____________P");
+        let set = |text: &str| runs(text.bytes().map(|b| b == b'x'));
+        assert_eq!(
+            [set(""), set("..."), set("x"), set("..x.xxx")],
+            ["", "", "A", "EDB"]
+        );
+    }
 }

@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 
 use super::Ending;
 use super::args::{Cli, Command};
-use super::protocol::{Job, Message, PROTOCOL, Request};
+use super::processes::{Job, Message, PROTOCOL, Request};
 use super::{advise, drift, funnel, precision, run_plan, stage_sweep};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{Part, Plan, ProcessTimes, Share, TIMING, TaskSamples, measure_scene};

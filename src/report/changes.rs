@@ -4,10 +4,12 @@
 
 use std::collections::BTreeMap;
 
+use serde::Serialize;
+
 use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, WORK, work_changes};
 use super::matching::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
 use super::{Report, ReportCell};
-use crate::measure::{CellKey, GroupKey, Status};
+use crate::measure::{CellKey, GroupKey, Machine, Status, Toolchain};
 use crate::shown::number;
 use crate::statistics::{Judgement, judge_unpaired, median, trimmed_mean};
 
@@ -293,3 +295,66 @@ fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
 
 #[cfg(test)]
 mod tests;
+
+/// A fact that differs.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Setting {
+    /// "machine" or "toolchain"; of shards and resumed runs "program" or "plan" as well.
+    pub of: &'static str,
+    /// Name of the fact.
+    pub what: &'static str,
+    /// In the old report.
+    pub old: String,
+    /// In the new report.
+    pub new: String,
+    /// True if it is another machine: absolute times do not compare.
+    pub is_machine: bool,
+}
+
+/// Whose, name, whether it tells two machines apart, and the fact itself.
+pub(super) type Fact = (&'static str, &'static str, bool, String);
+
+pub(super) fn known(fact: Option<&str>) -> String {
+    fact.unwrap_or("unknown").to_owned()
+}
+
+pub(super) fn facts(machine: &Machine, tools: &Toolchain) -> Vec<Fact> {
+    let (of_machine, of_tools) = ("machine", "toolchain");
+    let (vectors, locked) = (machine.instruction_set.clone(), tools.lock_digest.clone());
+    let known = |fact: &Option<String>| known(fact.as_deref());
+    let caches = machine.caches.iter();
+    let caches = caches.map(|cache| format!("L{} {} KiB", cache.level, cache.bytes >> 10));
+    let caches = caches.collect::<Vec<_>>().join(" ");
+    vec![
+        (of_machine, "cpu", true, known(&machine.cpu)),
+        (of_machine, "cores", true, machine.cores.to_string()),
+        (of_machine, "caches", true, caches),
+        (of_machine, "instruction set", true, vectors),
+        (of_machine, "os kernel", false, known(&machine.kernel)),
+        (of_tools, "rustc", false, known(&tools.rustc)),
+        (of_tools, "target", false, known(&tools.target)),
+        (of_tools, "flags", false, tools.flags.clone()),
+        (of_tools, "profile", false, known(&tools.profile)),
+        (of_tools, "opt-level", false, known(&tools.opt_level)),
+        (of_tools, "features", false, tools.features.join(",")),
+        (of_tools, "dependencies", false, locked),
+    ]
+}
+
+/// Differing facts of two lists of the same names, in their order.
+pub(super) fn differences(old: Vec<Fact>, new: Vec<Fact>) -> impl Iterator<Item = Setting> {
+    let differing = old.into_iter().zip(new).filter(|(old, new)| old.3 != new.3);
+    differing.map(|((of, what, is_machine, old), (.., new))| Setting {
+        of,
+        what,
+        old,
+        new,
+        is_machine,
+    })
+}
+
+/// Differing facts, in the order of the report.
+pub fn settings(old: &Report, new: &Report) -> Vec<Setting> {
+    let [old, new] = [old, new].map(|report| facts(&report.machine, &report.toolchain));
+    differences(old, new).collect()
+}

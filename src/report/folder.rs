@@ -354,32 +354,16 @@ const SUMMARY_COLUMNS: [Column; 16] = [
 const INPUT_COLUMNS: [Column; 15] = [
     ("up", |cell| cell.scene.up.clone()),
     ("unit", |cell| text(cell.scene.unit.as_ref())),
-    ("fovy_deg_min", |cell| {
-        text(lens(cell, |l| Some(l.fovy_deg?[0])))
-    }),
-    ("fovy_deg_max", |cell| {
-        text(lens(cell, |l| Some(l.fovy_deg?[1])))
-    }),
-    ("ortho_height_min", |cell| {
-        text(lens(cell, |l| Some(l.ortho_height?[0])))
-    }),
-    ("ortho_height_max", |cell| {
-        text(lens(cell, |l| Some(l.ortho_height?[1])))
-    }),
-    ("aspect_min", |cell| {
-        text(lens(cell, |l| Some(l.aspect?[0])))
-    }),
-    ("aspect_max", |cell| {
-        text(lens(cell, |l| Some(l.aspect?[1])))
-    }),
-    ("near_min", |cell| text(lens(cell, |l| Some(l.near?[0])))),
-    ("near_max", |cell| text(lens(cell, |l| Some(l.near?[1])))),
-    ("far_min", |cell| {
-        text(lens(cell, |l| Some(l.far[0].unwrap_or(f64::INFINITY))))
-    }),
-    ("far_max", |cell| {
-        text(lens(cell, |l| Some(l.far[1].unwrap_or(f64::INFINITY))))
-    }),
+    ("fovy_deg_min", |cell| end(cell, |l| l.fovy_deg, 0)),
+    ("fovy_deg_max", |cell| end(cell, |l| l.fovy_deg, 1)),
+    ("ortho_height_min", |cell| end(cell, |l| l.ortho_height, 0)),
+    ("ortho_height_max", |cell| end(cell, |l| l.ortho_height, 1)),
+    ("aspect_min", |cell| end(cell, |l| l.aspect, 0)),
+    ("aspect_max", |cell| end(cell, |l| l.aspect, 1)),
+    ("near_min", |cell| end(cell, |l| l.near, 0)),
+    ("near_max", |cell| end(cell, |l| l.near, 1)),
+    ("far_min", |cell| end(cell, far, 0)),
+    ("far_max", |cell| end(cell, far, 1)),
     ("matrix_convention", |cell| {
         let lens = cell.path.lens.as_ref();
         text(lens.and_then(|lens| Some(lens.matrix.as_ref()?.convention.as_str())))
@@ -391,9 +375,14 @@ const INPUT_COLUMNS: [Column; 15] = [
     }),
 ];
 
-/// A value of the lenses of a cell.
-fn lens(cell: &ReportCell, of: fn(&CameraFacts) -> Option<f64>) -> Option<f64> {
-    cell.path.lens.as_ref().and_then(of)
+/// The least or the most of a value of the lenses of a cell.
+fn end(cell: &ReportCell, of: fn(&CameraFacts) -> Option<[f64; 2]>, end: usize) -> String {
+    let ends = cell.path.lens.as_ref().and_then(of);
+    text(ends.map(|ends| ends[end]))
+}
+
+fn far(lens: &CameraFacts) -> Option<[f64; 2]> {
+    Some(lens.far.map(|far| far.unwrap_or(f64::INFINITY)))
 }
 
 /// The metrics whose intervals summary.csv has.

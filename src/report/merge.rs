@@ -6,10 +6,11 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use super::changes::Setting;
 use super::files::{self, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::folder::{self, save_report};
 use super::reading::read_stream;
-use super::stream::{Difference, Header, KeptPart, Stream};
+use super::stream::{Header, KeptPart, Stream};
 use super::writing::temporary_folder_in;
 use crate::input::InputError;
 use crate::measure::GroupKey;
@@ -184,9 +185,12 @@ fn another_plan(begin: &Header, own: &Header, first: &Path) -> Option<String> {
     let difference = begin.differs_in_plan(own);
     let difference = difference.or_else(|| begin.differs_in_place(own));
     let first = first.display();
-    if let Some(Difference { what, before, here }) = difference {
+    if let Some(Setting {
+        of, what, old, new, ..
+    }) = difference
+    {
         return Some(format!(
-            "the {what} is '{here}', and '{before}' in {first}; expected the same in all shards"
+            "{of} differs: {what} '{new}', and '{old}' in {first}; expected the same in all shards"
         ));
     }
     (begin.whole() != own.whole()).then(|| {

@@ -6,7 +6,6 @@ mod changes;
 mod experiment;
 mod files;
 mod folder;
-mod growth;
 mod judging;
 mod matching;
 mod merge;
@@ -14,17 +13,15 @@ mod model;
 mod overall;
 mod ranking;
 mod reading;
-mod setting;
 mod stream;
 mod surface;
-mod views;
 mod writing;
 
 pub use crate::measure::{ReportCell, SamplesRef};
 pub use changes::{FEW_OTHERS, changes};
+pub use changes::{Setting, settings};
 pub use experiment::Experiment;
 pub use folder::{RunFolder, StoppedRun, save_page, save_report};
-pub use growth::{Growth, growths};
 pub use judging::{
     COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WORK, WorkChange,
     work_changes,
@@ -33,9 +30,9 @@ pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
 pub use overall::{Mean, Overall};
 pub use ranking::{Comparison, Ranked, Speedup, comparisons, times_as_fast};
+pub use reading::{Reading, Views, views};
 pub use reading::{read_report, read_stream};
-pub use setting::{Setting, settings};
-pub use stream::{Difference, Header, KeptPart, Line, Stream, dated, utc};
+pub use stream::{Header, KeptPart, Line, Stream, dated, utc};
 pub use surface::{Crossing, Place, Surface, surfaces};
-pub use views::{Reading, Views, views};
+pub use surface::{Growth, growths};
 pub use writing::{temporary_in, try_folder, try_place, write_atomically};

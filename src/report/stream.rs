@@ -8,6 +8,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
+use super::changes::{Fact, Setting, differences, facts, known};
 use super::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
@@ -56,19 +57,6 @@ pub struct Header {
     pub binary: Option<String>,
 }
 
-/// A fact that two runs must have in common for their times to belong together, and
-/// its two values.
-#[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub struct Difference {
-    /// Name of the fact.
-    pub what: &'static str,
-    /// In the run that was begun.
-    pub before: String,
-    /// In this process.
-    pub here: String,
-}
-
 impl Line {
     /// The line as JSON, with its end.
     ///
@@ -109,58 +97,44 @@ impl Header {
     }
 
     /// The first fact of machine, build or program in which two runs differ.
-    pub fn differs_in_place(&self, other: &Header) -> Option<Difference> {
-        first_difference(self.place(), other.place())
+    pub fn differs_in_place(&self, other: &Header) -> Option<Setting> {
+        differences(self.place(), other.place()).next()
     }
 
     /// The first fact in which the plans of two runs differ, the shard apart.
-    pub fn differs_in_plan(&self, other: &Header) -> Option<Difference> {
-        first_difference(self.plan(), other.plan())
+    pub fn differs_in_plan(&self, other: &Header) -> Option<Setting> {
+        differences(self.plan(), other.plan()).next()
     }
 
     fn place(&self) -> Vec<Fact> {
-        let (machine, tools, source) = (&self.machine, &self.toolchain, &self.source);
+        let (machine, source) = (&self.machine, &self.source);
+        let (version, features) = (self.schema_version.to_string(), machine.features.join(","));
+        // A system keeps some of it for itself, now more, now less.
         let gib = |bytes: u64| format!("{:.0} GiB", bytes as f64 / f64::from(1 << 30));
-        let level = tools.opt_level.as_deref().unwrap_or_default();
-        let profile = tools.profile.as_ref();
-        let profile = profile.map(|profile| format!("{profile}, level {level}"));
+        let memory = machine.memory_bytes.map(gib);
         let dirty = source.dirty.map(|dirty| dirty.to_string());
-        let program = self.binary.as_deref().map(short);
-        vec![
-            ("schema version", Some(self.schema_version.to_string())),
-            ("processor", machine.cpu.clone()),
-            ("number of cores", Some(machine.cores.to_string())),
-            ("instruction set", Some(machine.instruction_set.clone())),
-            (
-                "list of processor features",
-                Some(machine.features.join(",")),
-            ),
-            ("list of caches", Some(caches(machine).join(", "))),
-            // A system keeps some of it for itself, now more, now less.
-            ("memory", machine.memory_bytes.map(gib)),
-            ("system", machine.os.clone()),
-            ("kernel of the system", machine.kernel.clone()),
-            ("version", Some(source.version.clone())),
-            ("commit", source.commit.clone()),
-            ("state of the source (dirty)", dirty),
-            ("compiler", tools.rustc.clone()),
-            ("target", tools.target.clone()),
-            ("compiler flags", Some(tools.flags.clone())),
-            ("profile", profile),
-            ("list of features", Some(tools.features.join(","))),
-            ("digest of Cargo.lock", Some(short(&tools.lock_digest))),
-            ("digest of the program", program),
-        ]
+        let mut all = facts(machine, &self.toolchain);
+        all.extend([
+            ("program", "schema version", false, version),
+            ("machine", "features", true, features),
+            ("machine", "memory", true, known(memory.as_deref())),
+            ("machine", "system", false, known(machine.os.as_deref())),
+            ("program", "version", false, source.version.clone()),
+            ("program", "commit", false, known(source.commit.as_deref())),
+            ("program", "dirty", false, known(dirty.as_deref())),
+            ("program", "digest", false, known(self.binary.as_deref())),
+        ]);
+        all
     }
 
     fn plan(&self) -> Vec<Fact> {
         let run = &self.run;
         vec![
-            ("seed", Some(run.seed.to_string())),
-            ("suite", run.suite.clone()),
-            ("generator", Some(run.generator.clone())),
-            ("number of processes", Some(run.processes.to_string())),
-            ("list of structures", Some(self.structures.join(","))),
+            ("plan", "seed", false, run.seed.to_string()),
+            ("plan", "suite", false, known(run.suite.as_deref())),
+            ("plan", "generator", false, run.generator.clone()),
+            ("plan", "processes", false, run.processes.to_string()),
+            ("plan", "structures", false, self.structures.join(",")),
         ]
     }
 
@@ -171,32 +145,6 @@ impl Header {
             false => &self.whole,
         }
     }
-}
-
-/// A named fact of a run; `None` if it is unknown.
-type Fact = (&'static str, Option<String>);
-
-fn first_difference(before: Vec<Fact>, here: Vec<Fact>) -> Option<Difference> {
-    let shown = |value: Option<String>| value.unwrap_or_else(|| "unknown".to_owned());
-    let mut pairs = before.into_iter().zip(here);
-    let ((what, before), (_, here)) = pairs.find(|(before, here)| before != here)?;
-    Some(Difference {
-        what,
-        before: shown(before),
-        here: shown(here),
-    })
-}
-
-/// Levels and sizes of the caches, "L1 32 KiB".
-pub(super) fn caches(machine: &Machine) -> Vec<String> {
-    let caches = machine.caches.iter();
-    let shown = caches.map(|cache| format!("L{} {} KiB", cache.level, cache.bytes >> 10));
-    shown.collect()
-}
-
-/// Beginning of a digest, enough for a reader.
-fn short(digest: &str) -> String {
-    digest.chars().take(12).collect()
 }
 
 /// A part with what samples.csv holds up to its end.

@@ -201,44 +201,28 @@ fn only_the_recorded_run_goes_on() {
     let run = folder.path().join("r");
     let kept = fs::read(run.join("stream.jsonl")).expect("a stream");
     for (place, value, wanted) in [
-        (
-            "/binary",
-            Value::from("00"),
-            "digest of the program was '00'",
-        ),
-        (
-            "/source/dirty",
-            Value::Null,
-            "state of the source (dirty) was 'unknown'",
-        ),
-        ("/source/commit", "abc".into(), "commit was 'abc'"),
-        ("/machine/cpu", "Another".into(), "processor was 'Another'"),
-        ("/machine/cores", 99.into(), "number of cores was '99'"),
+        ("/binary", Value::from("00"), "digest '00'"),
+        ("/source/dirty", Value::Null, "dirty 'unknown'"),
+        ("/source/commit", "abc".into(), "commit 'abc'"),
+        ("/machine/cpu", "Another".into(), "cpu 'Another'"),
+        ("/machine/cores", 99.into(), "cores '99'"),
         (
             "/machine/caches",
             serde_json::json!([{"level": 3, "bytes": 3 << 20}]),
-            "list of caches was 'L3 3072 KiB'",
+            "caches 'L3 3072 KiB'",
         ),
         (
             "/machine/memory_bytes",
             (5u64 << 40).into(),
-            "memory was '5120 GiB'",
+            "memory '5120 GiB'",
         ),
-        (
-            "/machine/kernel",
-            "2.4".into(),
-            "kernel of the system was '2.4'",
-        ),
+        ("/machine/kernel", "2.4".into(), "os kernel '2.4'"),
         (
             "/machine/instruction_set",
             "mmx".into(),
-            "instruction set was 'mmx'",
+            "instruction set 'mmx'",
         ),
-        (
-            "/toolchain/features",
-            Value::Array(vec![]),
-            "list of features was ''",
-        ),
+        ("/toolchain/features", Value::Array(vec![]), "features ''"),
         ("/structures/0", "wide".into(), "another plan"),
         ("/schema_version", 1.into(), "schema version 1"),
     ] {

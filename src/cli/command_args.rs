@@ -1,0 +1,346 @@
+//! Options of `cullbench view`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use super::shared_args::{
+    CullingArgs, KernelArgs, LensArgs, SceneArgs, StudyArgs, TableFormat, WhatArgs,
+};
+use super::{program, values};
+use crate::query::ItemId;
+use crate::suite::DEFAULT_PATH;
+use crate::visibility::SampleGrid;
+use crate::visibility::fragment::CutOuts;
+use crate::visibility::inscribed::MOST_BOXES;
+
+const VIEW_HELP: &str = "\
+Example:
+  cullbench view --scene city:n=20000 --path street:frames=120 -o city.html
+
+The page needs WebGL2 and no network. It shows every item as a box in the colour
+of its verdict, which the exact oracle gives: visible, false positive (returned,
+but not visible), lost (visible, but not returned) or culled. With --samples,
+returned items that are in front at no sample are hidden. Boxes are rounded for
+drawing only; the sets of a view are those of `query --ids`.";
+
+#[derive(Args, Debug)]
+#[command(after_help = VIEW_HELP)]
+pub struct ViewArgs {
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
+    #[arg(long)]
+    pub scene: String,
+    /// A camera path: a spec or a cameras CSV
+    #[arg(long, visible_alias = "cameras", value_name = "PATH", default_value = DEFAULT_PATH)]
+    pub path: String,
+    /// The page to write
+    #[arg(long, short, value_name = "FILE.html")]
+    pub out: PathBuf,
+    /// Number of cameras to use, evenly spread over the path
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = values::whole(1..=10_000usize))]
+    pub frames: usize,
+    /// Structures to count the tested nodes of, e.g. linear,bvh:leaf=4
+    #[arg(long, value_name = "LIST", default_value = "default")]
+    pub structure: String,
+    /// The culling test: sphere, six-plane, six-box or exact
+    #[arg(long, default_value = "six-plane")]
+    pub test: String,
+    /// Columns and rows of samples that find hidden items, e.g. 320x180 [default: none]
+    #[arg(long, value_name = "WxH", value_parser = values::samples)]
+    pub samples: Option<SampleGrid>,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+    #[command(flatten)]
+    pub culling: CullingArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
+}
+
+const FUNNEL_HELP: &str = "\
+The chain has a back end for each stage; the table says what each is worth:
+  in, out        items (triangles in the triangle stage) that the stage
+                 receives and passes, per view
+  time           CPU time of the stage per view, with half of its 95 % interval
+  worth it from  cost of drawing one item (a triangle, shading a fragment) above
+                 which the stage pays off: its time / what it removes in the end
+
+With --all every other back end of each stage stands beside it:
+  truth        received items in front at some sample; received triangles that
+               face the eye
+  FP, FN       false positives (passed, not visible) and false negatives
+               (visible, not passed)
+  per item     time / number of removed items
+All back ends of a stage receive the output of the chain's previous stage. *
+marks a back end of the chain, ? one without a guarantee. NAME is a value of the
+column `by`; none leaves a stage out. The truth is exact, along the rays through
+the samples. If the occlusion stage traverses its own tree (masked-inner,
+masked), its time includes the object stage.
+
+Orders: pairs of items that overlap in the image, pairs drawn in the wrong
+order, and samples that show a wrong item without a z-test. Lower bounds do only
+what any program must at least do; they decide nothing.
+
+With and without a stage: the items, triangles (triangle stage) or shaded
+fragments (fragment stage) that remain in the end. The stage pays off if drawing
+or shading one of them takes longer than the last column. A fragment is an item
+at a sample, in meshes and maps a triangle at a sample; orders draw whole items.
+The time of the fragment stage is that of an exact test on one thread.
+
+Items with cut-outs hide nothing in the occlusion stage, and at a sample only
+where their mask is opaque: z-test treats them as solid, alpha-test tests the
+mask. stencil-test (rooms) draws items beyond the eye's room only at the samples
+that see its portals. Walls of rooms have no cut-outs; picking treats every item
+as solid.";
+
+#[derive(Args, Debug)]
+#[command(after_help = FUNNEL_HELP)]
+#[command(mut_arg("path", |arg| arg.default_value("street:frames=32")))]
+#[command(mut_arg("structure", |arg| arg
+    .default_value("wide,bvh,linear")
+    .help("Structures for the object stage; the chain uses the first")))]
+pub struct FunnelArgs {
+    #[command(flatten)]
+    pub study: StudyArgs,
+    /// Number of cameras to use, evenly spread over the path
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = values::whole(1..=u32::MAX))]
+    pub frames: u32,
+    /// Columns and rows of samples
+    #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]
+    pub samples: SampleGrid,
+    /// Cut holes into a share of the items: fence or foliage, e.g.
+    /// fence:share=0.2,tile=1,seed=1
+    #[arg(long, value_name = "MASK", value_parser = CutOuts::parse)]
+    pub cut_out: Option<CutOuts>,
+    /// Treat a face of this item (across its shortest edge) as a mirror, and draw its
+    /// reflection with and without a stencil
+    #[arg(long, value_name = "ITEM", value_parser = values::whole(0..=ItemId::MAX))]
+    pub mirror: Option<ItemId>,
+    /// Back end of the region stage [default: the best for the regions of the scene]
+    #[arg(long, value_name = "NAME")]
+    pub region: Option<String>,
+    /// Back end of the occlusion stage
+    #[arg(long, value_name = "NAME")]
+    pub occlusion: Option<String>,
+    /// Maximum number of boxes inscribed in each closed item of a mesh, drawn as its
+    /// occluders [default: 8]
+    #[arg(long, value_name = "N", value_parser = values::whole(1..=MOST_BOXES as u32))]
+    pub inner_boxes: Option<u32>,
+    /// Back end of the triangle stage
+    #[arg(long, value_name = "NAME")]
+    pub triangle: Option<String>,
+    /// Back end of the fragment stage
+    #[arg(long, value_name = "NAME")]
+    pub fragment: Option<String>,
+    /// A potentially visible set for the back end stored-pvs: {"regions": N, "sees":
+    /// [[0, 1], ..]}
+    #[arg(long, value_name = "FILE")]
+    pub pvs: Option<PathBuf>,
+    /// Compare every back end of every stage, depth orders, picking and lower bounds
+    /// too, as --format json, --csv and --html do
+    #[arg(long)]
+    pub all: bool,
+    /// Leave picking out of what --all, --format, --csv and --html add
+    #[arg(long)]
+    pub no_picks: bool,
+    /// Also write tables and picture as one HTML page
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Also write each table as a CSV file (stages.csv, gains.csv, ..) to a folder
+    #[arg(long, value_name = "FOLDER")]
+    pub csv: Option<PathBuf>,
+    /// Draw the first view from above, items coloured by the stage that removed them
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+}
+
+#[derive(Subcommand, Debug)]
+pub enum SceneCommand {
+    /// Show the contents of a scene
+    Info(SceneInfoArgs),
+    /// Write a scene as boxes CSV
+    Generate(SceneGenerateArgs),
+    /// Write any scene to a file that every command reads
+    Convert(SceneConvertArgs),
+    /// Draw a scene from above, with cells of a structure and verdicts of a query
+    Draw(SceneDrawArgs),
+}
+
+#[derive(Args, Debug)]
+pub struct SceneInfoArgs {
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// Cameras to show as used: a path, or a cameras CSV
+    #[arg(long, visible_alias = "cameras", value_name = "PATH")]
+    pub path: Option<String>,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct SceneGenerateArgs {
+    /// A spec such as city:n=100000,seed=7, or any other scene
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// The file to write [default: standard output]
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+}
+
+/// Formats of a written scene.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum SceneFormat {
+    Csv,
+}
+
+const CONVERT_HELP: &str = "\
+Examples:
+  cullbench scene convert maps.wad#MAP07 --out map07.csv
+  cullbench scene convert helsinki city.csv
+  cullbench scene convert city:n=1000 | head
+
+Boxes CSV has world coordinates and all labels, in the order of ids. Bounds are
+written in f64 as they were read, not rounded to f32: queries on the file have
+the same answers, and converting it again writes the same bytes. Regions, camera
+places and the tree of a map are not written.";
+
+#[derive(Args, Debug)]
+#[command(after_help = program::named(CONVERT_HELP))]
+pub struct SceneConvertArgs {
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
+    #[arg(value_name = "INPUT")]
+    pub scene: String,
+    /// The file to write [default: standard output]
+    #[arg(value_name = "OUTPUT")]
+    pub output: Option<PathBuf>,
+    /// The file to write, in place of OUTPUT
+    #[arg(long, short, value_name = "FILE", conflicts_with = "output")]
+    pub out: Option<PathBuf>,
+    /// The format [default: by the extension]
+    #[arg(long, value_enum)]
+    pub to: Option<SceneFormat>,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+}
+
+const DRAW_HELP: &str = "\
+Examples:
+  cullbench scene draw freedm-map12 --structure bsp-textbook --depth 3 -o bsp.svg
+  cullbench scene draw city:n=1000 --structure quadtree-textbook --camera street -o tree.svg
+  cullbench scene draw helsinki --camera orbit:frames=8 --frame 3 -o view.svg
+
+Cells that a query rejects are filled, those that it opens have a blue outline.
+Items that lie around others are outlined. Cells of a structure are what its
+queries test: children in blocks of sixteen, but for the textbook forms.";
+
+#[derive(Args, Debug)]
+#[command(after_help = program::named(DRAW_HELP))]
+pub struct SceneDrawArgs {
+    /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// A structure whose cells are drawn, e.g. quadtree-textbook:leaf=4
+    #[arg(long, value_name = "STRUCTURE")]
+    pub structure: Option<String>,
+    /// A camera path (spec or cameras CSV); one of its cameras is drawn with its query
+    #[arg(long, value_name = "PATH")]
+    pub camera: Option<String>,
+    /// The camera of the path, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "camera")]
+    pub frame: usize,
+    /// Deepest level of cells that is drawn; 0 is the root
+    #[arg(long, value_name = "LEVEL", default_value_t = 3, value_parser = values::whole(0..=1000u32))]
+    pub depth: u32,
+    /// The SVG file to write
+    #[arg(long, short, value_name = "FILE")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+}
+
+const COMPARE_HELP: &str = "\
+Examples:
+  cullbench compare results/before results/after
+  cullbench compare old.json new.json --threshold 10% --metric query_ns,build_ms
+  cullbench compare old.json new.json --markdown > changes.md
+  cullbench run --save main; ..; cullbench run; cullbench compare --baseline main
+  cullbench compare --against ./before --gate work     counts only, no times: seconds, no noise
+
+Two reports are compared process by process, each structure relative to the others of its scene
+and path; a change of all structures at once is reported as one line. Reports of one process are
+inconclusive. compare --against BINARY resolves smaller changes: it runs both programs in turns.
+Exit codes: 0 no regression, 1 wrong answer in NEW, 2 wrong usage or bad input, 3 regression: an
+answer is lost, or slower (--gate time), or takes more than --threshold more tests of nodes, items
+or planes per query (--gate work).";
+
+/// Measure of a regression; an answer that is not given any more is one by each.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum Gate {
+    /// A proven change of the time
+    Time,
+    /// Nodes, items and planes tested per query, which are exact; no times are judged
+    Work,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = program::named(COMPARE_HELP))]
+pub struct CompareArgs {
+    /// report.json of the older run, or the folder it is in; with --baseline NEW alone
+    #[arg(value_name = "OLD.json", required_unless_present_any = ["against", "baseline"])]
+    pub old: Option<PathBuf>,
+    /// report.json of the newer run, or the folder it is in [default with --baseline:
+    /// the newest run under results/]
+    #[arg(value_name = "NEW.json", required_unless_present_any = ["against", "baseline"])]
+    pub new: Option<PathBuf>,
+    /// OLD is the baseline that `run --save NAME` kept
+    #[arg(long, value_name = "NAME", value_parser = values::baseline, conflicts_with_all = ["new", "against"])]
+    pub baseline: Option<String>,
+    /// Run another build of this program against this one instead: OLD is that binary
+    /// (a name without a slash is looked up in PATH), NEW is this
+    #[arg(long, value_name = "BINARY", conflicts_with_all = ["old", "new"])]
+    pub against: Option<PathBuf>,
+    #[command(flatten)]
+    pub what: WhatArgs,
+    /// Largest relative change that counts as no change, of time or work: 5% or 0.05
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value = "5%",
+        value_parser = values::threshold,
+        allow_hyphen_values = true
+    )]
+    pub threshold: f64,
+    /// Metrics to compare: query_ns, locate_ns, locate_batched_ns, build_ms, frame_ns,
+    /// update_ns; may be repeated [default: query_ns, and frame_ns of motions]
+    #[arg(long, value_name = "LIST", conflicts_with = "against")]
+    pub metric: Vec<String>,
+    /// Measure of a regression
+    #[arg(long, value_enum, default_value = "time")]
+    pub gate: Gate,
+    /// Exit with 3 where a cell is inconclusive as well
+    #[arg(long)]
+    pub fail_inconclusive: bool,
+    /// Show unchanged cells and every column as well
+    #[arg(long)]
+    pub all: bool,
+    /// Also write the changes and the whole table as one page
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+    /// Print Markdown, for a pull request: one line, and the rest folded
+    #[arg(long, conflicts_with = "format")]
+    pub markdown: bool,
+}
