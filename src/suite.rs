@@ -54,6 +54,23 @@ macro_rules! surface {
 /// The same number of visible items whatever the size of the scene.
 const FIXED_COUNT: &str = "flythrough:frames=256,visible=500";
 
+/// Effort of short suites.
+const SHORT: Effort = Effort {
+    processes: 10,
+    rounds: [2, 40],
+    task_ns: 2.5e6,
+    pass_ns: 7e6,
+    extras: Extras::All,
+};
+
+/// Effort of long ones.
+const LONG: Effort = Effort {
+    rounds: [3, 40],
+    task_ns: 40e6,
+    pass_ns: 100e6,
+    ..SHORT
+};
+
 /// All suites. The first one is what `cullbench run` does by itself.
 pub static SUITES: &[Suite] = &[
     Suite {
@@ -70,13 +87,7 @@ pub static SUITES: &[Suite] = &[
             "helsinki" ["flythrough:frames=512,visible=2%", "zoom:frames=512"];
             "us-counties" ["orbit:frames=512", "outside:frames=512"];
         },
-        effort: Effort {
-            processes: 10,
-            rounds: [2, 40],
-            task_ns: 2.5e6,
-            pass_ns: 7e6,
-            extras: Extras::All,
-        },
+        effort: SHORT,
         structures: "default",
     },
     Suite {
@@ -99,8 +110,7 @@ pub static SUITES: &[Suite] = &[
             processes: 12,
             rounds: [3, 60],
             task_ns: 60e6,
-            pass_ns: 100e6,
-            extras: Extras::All,
+            ..LONG
         },
         structures: "all",
     },
@@ -125,13 +135,7 @@ pub static SUITES: &[Suite] = &[
             "helsinki" ["flythrough:frames=512,visible=2%", "orbit:frames=512"];
             "us-counties" ["orbit:frames=512", "outside:frames=512"];
         },
-        effort: Effort {
-            processes: 10,
-            rounds: [3, 40],
-            task_ns: 40e6,
-            pass_ns: 100e6,
-            extras: Extras::All,
-        },
+        effort: LONG,
         structures: "all",
     },
     Suite {
@@ -144,13 +148,7 @@ pub static SUITES: &[Suite] = &[
             "helsinki" ["flythrough:frames=128,visible=2%", "street:frames=128"];
             "us-counties" ["flythrough:frames=128,visible=2%", "outside:frames=128"];
         },
-        effort: Effort {
-            processes: 10,
-            rounds: [2, 40],
-            task_ns: 2.5e6,
-            pass_ns: 7e6,
-            extras: Extras::All,
-        },
+        effort: SHORT,
         structures: "default",
     },
     Suite {
@@ -163,11 +161,11 @@ pub static SUITES: &[Suite] = &[
             "uniform:n=100000" ["flythrough:frames=64,visible=2%"];
         },
         effort: Effort {
-            processes: 10,
             rounds: [12, 80],
             task_ns: 80e6,
             pass_ns: 40e6,
             extras: Extras::Nothing,
+            ..LONG
         },
         structures: "default",
     },
@@ -181,11 +179,9 @@ pub static SUITES: &[Suite] = &[
             "uniform:n=10000000" [FIXED_COUNT];
         },
         effort: Effort {
-            processes: 10,
-            rounds: [3, 40],
             task_ns: 60e6,
             pass_ns: 200e6,
-            extras: Extras::All,
+            ..LONG
         },
         structures: "default",
     },

@@ -5,16 +5,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use clap::CommandFactory;
-use clap::parser::ValueSource;
 use serde_json::json;
 
 use super::against::{Against, Duel};
-use super::args::Cli;
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD};
+use super::run_resume::RunOptions;
 use super::study::progress;
-use super::{Ending, compare_page, interrupt, run_plan, text};
+use super::{interrupt, run_plan, text};
 use crate::index::Registry;
 use crate::measure::{CellKey, Machine, Plan, Status};
 use crate::report::{Changes, JudgedRow, Lone, WORK, work_changes};
@@ -34,7 +32,7 @@ pub fn compare_against(
     args: &CompareArgs,
     binary: &Path,
     threshold: f64,
-) -> anyhow::Result<Ending> {
+) -> anyhow::Result<CompareTable> {
     let is_timed = args.gate == Gate::Time;
     if is_timed && threshold < LEAST_THRESHOLD {
         bail!(
@@ -83,7 +81,7 @@ pub fn compare_against(
         false => None,
     };
     let [old, new] = sides;
-    let table = CompareTable {
+    Ok(CompareTable {
         old,
         new,
         basis: Basis::Pairs,
@@ -102,8 +100,7 @@ pub fn compare_against(
         notes: busy.map(note).into_iter().chain(left_out).collect(),
         settings: Vec::new(),
         changes: changes(&found, threshold, args.gate),
-    };
-    compare_page::show(&table, args)
+    })
 }
 
 /// Line on the default structures of a run that a comparison lacks.
@@ -199,29 +196,7 @@ fn changes(found: &Against, threshold: f64, gate: Gate) -> Changes {
 
 /// The options of `run` that were typed behind `compare`.
 fn typed() -> anyhow::Result<Vec<String>> {
-    let matches = Cli::command().try_get_matches_from(std::env::args_os())?;
-    let Some(matches) = matches.subcommand_matches("compare") else {
-        return Ok(Vec::new());
-    };
-    let command = Cli::command();
-    let run = command.find_subcommand("run").into_iter();
-    let typed = run.flat_map(|run| run.get_arguments()).filter(|arg| {
-        let id = arg.get_id().as_str();
-        matches.try_contains_id(id).unwrap_or(false)
-            && matches.value_source(id) == Some(ValueSource::CommandLine)
-    });
-    let words = typed.flat_map(|arg| {
-        let id = arg.get_id().as_str();
-        let name = arg.get_long().unwrap_or(id);
-        let values = matches.get_raw(id).into_iter().flatten();
-        match arg.get_action().takes_values() {
-            true => values
-                .map(|value| format!("--{name}={}", value.to_string_lossy()))
-                .collect(),
-            false => vec![format!("--{name}")],
-        }
-    });
-    Ok(words.collect())
+    Ok(RunOptions::of("compare", std::env::args_os())?.words(|_| true))
 }
 
 /// The arguments of `run` for the same measurement.

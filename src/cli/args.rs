@@ -37,19 +37,7 @@ fn taking_negative_numbers(command: clap::Command) -> clap::Command {
     })
 }
 
-const EXAMPLES: &str = "\
-Examples:
-  cullbench run                                        the quick suite
-  cullbench run --scene my.csv --path my_cameras.csv   your scene, your cameras
-  cullbench query --scene city:n=100000 --cameras orbit:frames=8 --structure all
-  cullbench locate --scene freedm-map12 --points points.csv --structure bvh
-  cullbench advise --scene my.csv                      structure, test, shortcuts
-  cullbench compare old/report.json new/report.json    regressions between two runs
-
-Scenes and paths are files or specs such as city:n=100000,seed=7;
-see `cullbench list`.
-Exit codes: 0 ok, 1 wrong or missing answer or failed verification, 2 wrong
-usage or bad input, 3 regression (compare), 130 interrupted.";
+const EXAMPLES: &str = include_str!("assets/help/examples.txt");
 
 #[derive(Subcommand, Debug)]
 pub enum Command {
@@ -117,27 +105,7 @@ pub struct ListArgs {
     pub format: TableFormat,
 }
 
-const RUN_HELP: &str = "\
-One scene and path: a row per structure. Several: a row per scene and path with
-the speed-up of each structure, and the geometric means. Columns that are wider
-than the terminal (80 characters in a pipe) are left to --all-columns.
-  time per query  CPU time of one frustum query; ±: 95 % interval over processes
-  vs linear       time of linear / time of the structure; where linear has no
-                  times, the slowest structure stands in its place
-  p95             95th percentile over groups of cameras, given twenty
-                  comparable groups
-  / read          time / time of reading the bounds of all items (bound-read)
-  / copy          time / time of copying the answer (bound-memcpy)
-  / replay        time / time of reading and copying what wide does (bound-replay)
-  locate          time of one region search
-  update of 1 %   time of an update after 1 % of the items have moved
-  query after 32  query time after 32 updates of 1 % / query time of a fresh build
-  repaid after    queries after which the build is repaid against linear
-With --motion: time per frame (update and queries), the worst frame, its parts
-(update, first query, further query), and
-  x after N       query time after N frames / query time of a fresh build
-  false positives of fat bounds (--update fat=M), part of the visible items
-Structures share a rank if their times do not differ significantly.";
+const RUN_HELP: &str = include_str!("assets/help/run.txt");
 
 #[derive(Args, Debug)]
 #[command(after_help = RUN_HELP)]
@@ -186,15 +154,7 @@ pub struct RunArgs {
     pub save: Option<String>,
 }
 
-const MERGE_HELP: &str = "\
-Example:
-  cullbench run --shard 1/2 --out part1        here, or on a machine of the same kind
-  cullbench run --shard 2/2 --out part2
-  cullbench merge part1 part2 --out whole
-
-All shards must be of the same plan, from the same build of the program, on
-machines of the same kind. It is an error if two shards have the same cell or a
-shard is missing.";
+const MERGE_HELP: &str = include_str!("assets/help/merge.txt");
 
 #[derive(Args, Debug)]
 #[command(after_help = program::named(MERGE_HELP))]

@@ -14,15 +14,7 @@ use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::inscribed::MOST_BOXES;
 
-const VIEW_HELP: &str = "\
-Example:
-  cullbench view --scene city:n=20000 --path street:frames=120 -o city.html
-
-The page needs WebGL2 and no network. It shows every item as a box in the colour
-of its verdict, which the exact oracle gives: visible, false positive (returned,
-but not visible), lost (visible, but not returned) or culled. With --samples,
-returned items that are in front at no sample are hidden. Boxes are rounded for
-drawing only; the sets of a view are those of `query --ids`.";
+const VIEW_HELP: &str = include_str!("assets/help/view.txt");
 
 #[derive(Args, Debug)]
 #[command(after_help = VIEW_HELP)]
@@ -58,41 +50,7 @@ pub struct ViewArgs {
     pub kernel: KernelArgs,
 }
 
-const FUNNEL_HELP: &str = "\
-The chain has a back end for each stage; the table says what each is worth:
-  in, out        items (triangles in the triangle stage) that the stage
-                 receives and passes, per view
-  time           CPU time of the stage per view, with half of its 95 % interval
-  worth it from  cost of drawing one item (a triangle, shading a fragment) above
-                 which the stage pays off: its time / what it removes in the end
-
-With --all every other back end of each stage stands beside it:
-  truth        received items in front at some sample; received triangles that
-               face the eye
-  FP, FN       false positives (passed, not visible) and false negatives
-               (visible, not passed)
-  per item     time / number of removed items
-All back ends of a stage receive the output of the chain's previous stage. *
-marks a back end of the chain, ? one without a guarantee. NAME is a value of the
-column `by`; none leaves a stage out. The truth is exact, along the rays through
-the samples. If the occlusion stage traverses its own tree (masked-inner,
-masked), its time includes the object stage.
-
-Orders: pairs of items that overlap in the image, pairs drawn in the wrong
-order, and samples that show a wrong item without a z-test. Lower bounds do only
-what any program must at least do; they decide nothing.
-
-With and without a stage: the items, triangles (triangle stage) or shaded
-fragments (fragment stage) that remain in the end. The stage pays off if drawing
-or shading one of them takes longer than the last column. A fragment is an item
-at a sample, in meshes and maps a triangle at a sample; orders draw whole items.
-The time of the fragment stage is that of an exact test on one thread.
-
-Items with cut-outs hide nothing in the occlusion stage, and at a sample only
-where their mask is opaque: z-test treats them as solid, alpha-test tests the
-mask. stencil-test (rooms) draws items beyond the eye's room only at the samples
-that see its portals. Walls of rooms have no cut-outs; picking treats every item
-as solid.";
+const FUNNEL_HELP: &str = include_str!("assets/help/funnel.txt");
 
 #[derive(Args, Debug)]
 #[command(after_help = FUNNEL_HELP)]
@@ -203,16 +161,7 @@ pub enum SceneFormat {
     Csv,
 }
 
-const CONVERT_HELP: &str = "\
-Examples:
-  cullbench scene convert maps.wad#MAP07 --out map07.csv
-  cullbench scene convert helsinki city.csv
-  cullbench scene convert city:n=1000 | head
-
-Boxes CSV has world coordinates and all labels, in the order of ids. Bounds are
-written in f64 as they were read, not rounded to f32: queries on the file have
-the same answers, and converting it again writes the same bytes. Regions, camera
-places and the tree of a map are not written.";
+const CONVERT_HELP: &str = include_str!("assets/help/convert.txt");
 
 #[derive(Args, Debug)]
 #[command(after_help = program::named(CONVERT_HELP))]
@@ -233,15 +182,7 @@ pub struct SceneConvertArgs {
     pub scene_args: SceneArgs,
 }
 
-const DRAW_HELP: &str = "\
-Examples:
-  cullbench scene draw freedm-map12 --structure bsp-textbook --depth 3 -o bsp.svg
-  cullbench scene draw city:n=1000 --structure quadtree-textbook --camera street -o tree.svg
-  cullbench scene draw helsinki --camera orbit:frames=8 --frame 3 -o view.svg
-
-Cells that a query rejects are filled, those that it opens have a blue outline.
-Items that lie around others are outlined. Cells of a structure are what its
-queries test: children in blocks of sixteen, but for the textbook forms.";
+const DRAW_HELP: &str = include_str!("assets/help/draw.txt");
 
 #[derive(Args, Debug)]
 #[command(after_help = program::named(DRAW_HELP))]
@@ -270,20 +211,7 @@ pub struct SceneDrawArgs {
     pub lens: LensArgs,
 }
 
-const COMPARE_HELP: &str = "\
-Examples:
-  cullbench compare results/before results/after
-  cullbench compare old.json new.json --threshold 10% --metric query_ns,build_ms
-  cullbench compare old.json new.json --markdown > changes.md
-  cullbench run --save main; ..; cullbench run; cullbench compare --baseline main
-  cullbench compare --against ./before --gate work     counts only, no times: seconds, no noise
-
-Two reports are compared process by process, each structure relative to the others of its scene
-and path; a change of all structures at once is reported as one line. Reports of one process are
-inconclusive. compare --against BINARY resolves smaller changes: it runs both programs in turns.
-Exit codes: 0 no regression, 1 wrong answer in NEW, 2 wrong usage or bad input, 3 regression: an
-answer is lost, or slower (--gate time), or takes more than --threshold more tests of nodes, items
-or planes per query (--gate work).";
+const COMPARE_HELP: &str = include_str!("assets/help/compare.txt");
 
 /// Measure of a regression; an answer that is not given any more is one by each.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]

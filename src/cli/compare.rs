@@ -8,8 +8,11 @@ use anyhow::{bail, ensure};
 use serde_json::json;
 
 use super::command_args::{CompareArgs, Gate};
-use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD, name, reason};
-use super::{Ending, baseline, compare_page, expect_places, text};
+use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD, change_of, name, reason};
+use super::diagram::{Form, Row, rows};
+use super::document::{Block, to_page};
+use super::figure::{Axis, Figure, is_drawn};
+use super::{Ending, baseline, expect_places, text, unread_is_fine, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
@@ -27,7 +30,8 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
     expect_places(&[("--html", args.html.as_deref())], &inputs)?;
     let threshold = args.threshold;
     if let Some(binary) = &args.against {
-        return super::against_table::compare_against(registry, args, binary, threshold);
+        let table = super::against_table::compare_against(registry, args, binary, threshold)?;
+        return show(&table, args);
     }
     super::against_table::expect_none_of_a_run()?;
     let mut metrics = match (args.gate, args.metric.is_empty()) {
@@ -81,7 +85,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         settings,
         changes,
     };
-    compare_page::show(&table, args)
+    show(&table, args)
 }
 
 /// The metrics of all lists, each once.
@@ -178,6 +182,55 @@ fn side(report: &Report) -> Side {
             "cells": report.cells.len(),
         }),
     }
+}
+
+/// Rows in the figure.
+const DRAWN: usize = 40;
+
+/// Prints a comparison in the chosen format, and writes its page.
+pub fn show(table: &CompareTable, args: &CompareArgs) -> anyhow::Result<Ending> {
+    let shown = unread_is_fine(table.print(args));
+    if let Some(file) = &args.html {
+        let blocks = table.blocks(true, Some(usize::MAX));
+        let changes = figure(&table.changes).map(Block::Figure);
+        write_text(file, &to_page("compare", 1, changes, blocks))?;
+    }
+    shown?;
+    Ok(table.ending())
+}
+
+/// The changes with intervals, the worst first.
+fn figure(changes: &Changes) -> Option<Figure> {
+    let all = changes.rows.iter().filter_map(|row| {
+        let ratio = row.ratio().filter(|ratio| is_drawn(*ratio))?;
+        let judged = row.judgement.as_ref();
+        let ends = judged.and_then(|judged| judged.lower.zip(judged.upper));
+        Some(Row {
+            name: row.cell.structure.clone(),
+            value: ratio,
+            ends: ends.map(<[f64; 2]>::from),
+            label: format!("{} {}", row.cell.structure, change_of(ratio, None)),
+            note: format!("{}: {}", name(&row.cell), change_of(ratio, ends)),
+            ..Row::default()
+        })
+    });
+    let shown: Vec<Row> = all.take(DRAWN).collect();
+    shown.first()?;
+    let change = |ratio: f64| format!("{:+.0} %", (ratio - 1.0) * 100.0);
+    let limits = [1.0 - changes.threshold, 1.0, 1.0 + changes.threshold];
+    let values = shown
+        .iter()
+        .flat_map(|row| row.ends.unwrap_or([row.value; 2]));
+    let mut axis = Axis::log("", values.chain(limits), 1.05, &change);
+    axis.ticks = limits.to_vec();
+    let caption = format!(
+        "Change from OLD to NEW with its 95 % interval, the worst {} of {}; lines: no change, \
+         and the threshold",
+        shown.len(),
+        text::counted(changes.rows.len(), "figure")
+    );
+    let labels = [caption.clone(), caption];
+    Some(rows(labels, &axis, Some(1.0), Form::Marks, &shown))
 }
 
 #[cfg(test)]

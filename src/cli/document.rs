@@ -1,6 +1,8 @@
 //! A document of headings, lines and tables, written as Markdown, as one HTML page
 //! or for a terminal, and the escaping of each.
 
+use std::io::{self, Write};
+
 use super::figure::Figure;
 use super::table::Table;
 use super::text::html;
@@ -133,6 +135,12 @@ pub fn to_terminal(blocks: &[Block], width: usize) -> String {
         Block::Picture(_) | Block::Figure(_) => String::new(),
     });
     parts.collect()
+}
+
+/// Shows the document on standard output.
+pub fn show(blocks: &[Block]) -> io::Result<()> {
+    let text = to_terminal(blocks, text::width());
+    text::terminal().write_all(text.as_bytes())
 }
 
 /// A page of what a terminal shows, with figures after its conclusions.

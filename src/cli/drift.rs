@@ -2,10 +2,9 @@
 //! of the cost of a step of each, and recommendations.
 
 use std::collections::BTreeSet;
-use std::io::Write;
 
 use super::args::DriftArgs;
-use super::document::{Block, to_page, to_terminal};
+use super::document::{Block, show, to_page};
 use super::processes::{Job, Timing};
 use super::study::Study;
 use super::table::{Column, Table};
@@ -43,10 +42,7 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let job = |timing| Job::Drift(schedule.clone(), timing);
     let times = study.times("everything, timed", None, job)?;
     report.conclude(&times, schedule.rounds);
-    print(args.format, &report, || {
-        let shown = to_terminal(&blocks(&report, args.all), text::width());
-        text::terminal().write_all(shown.as_bytes())
-    })?;
+    print(args.format, &report, || show(&blocks(&report, args.all)))?;
     if let Some(file) = &args.svg {
         write_text(file, &drift_arms::draw(&report.arm))?;
     }

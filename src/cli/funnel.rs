@@ -3,14 +3,13 @@
 //! `funnel_table`.
 
 use std::cell::Cell;
-use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
 
 use super::command_args::FunnelArgs;
-use super::document::{Block, to_page, to_terminal};
+use super::document::{Block, show, to_page};
 use super::processes::{Job, Timing};
 use super::shared_args::{StudyArgs, TableFormat};
 use super::study::{Setting, Study};
@@ -70,9 +69,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     let report = prepared.conclude(&times);
     let shown = print(args.format, &report, || {
-        let blocks = funnel_table::blocks(&report, args.all);
-        let text = to_terminal(&blocks, text::width());
-        text::terminal().write_all(text.as_bytes())
+        show(&funnel_table::blocks(&report, args.all))
     });
     if let Some(folder) = &args.csv {
         funnel_files::write(&report, folder)?;

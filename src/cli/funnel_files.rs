@@ -18,68 +18,13 @@ use crate::shown::shown_field;
 /// Tables of the report, each a list of rows or a single row, with their fields.
 ///
 /// `/` stands before a field of a field. The columns are the same for every report.
-const TABLES: [(&str, &str); 12] = [
-    (
-        "level",
-        "map_count selected input_count output_count saved_load_ns saved_load_ns_lower \
-         saved_load_ns_upper",
-    ),
-    ("cut_outs", "mask share tile seed item_count"),
-    (
-        "inner_boxes",
-        "item_count boxed_count box_limit box_count volume_share build_ns",
-    ),
-    ("ground", "item_count box_count volume_share build_ns"),
-    ("solid_blocks", "box_count unclosed_sector_count build_ns"),
-    (
-        "mirror",
-        "item axis view_count marked_count shown_count wrong_sample_count \
-         with_stencil/asked_count with_stencil/kept_out_count with_stencil/fragment_count \
-         with_stencil/clear_count with_stencil/shaded_count with_stencil/covered_count \
-         without_stencil/asked_count without_stencil/kept_out_count \
-         without_stencil/fragment_count without_stencil/clear_count \
-         without_stencil/shaded_count without_stencil/covered_count",
-    ),
-    (
-        "stages",
-        "stage name structure guarantee is_chosen does_object_stage unit \
-         input_count output_count truth_count false_positive_count false_negative_count \
-         excess/value excess/lower excess/upper missing/value missing/lower missing/upper \
-         image_error/value image_error/lower image_error/upper \
-         removed_share/value removed_share/lower removed_share/upper \
-         worst_missing_samples longest_missing_streak stage_ns stage_ns_lower stage_ns_upper \
-         ns_per_removed ns_per_decided \
-         fragments/asked_count fragments/kept_out_count fragments/fragment_count \
-         fragments/clear_count fragments/shaded_count fragments/covered_count",
-    ),
-    (
-        "orders",
-        "name guarantee fragment_count shaded_count covered_count overdraw pair_count \
-         wrong_pair_count wrong_sample_count cyclic_count exceptions \
-         stage_ns stage_ns_lower stage_ns_upper",
-    ),
-    (
-        "picks",
-        "question name guarantee ray_count wrong_count stage_ns stage_ns_lower stage_ns_upper \
-         ns_per_ray",
-    ),
-    ("left_out", "section name reason"),
-    (
-        "bounds",
-        "stage back_end name stage_ns stage_ns_lower stage_ns_upper ratio ratio_lower ratio_upper",
-    ),
-    (
-        "gains",
-        "stage back_end unit with_ns without_ns with_count without_count \
-         break_even_ns break_even_ns_lower break_even_ns_upper",
-    ),
-];
+const TABLES: &str = include_str!("assets/funnel_tables.txt");
 
 /// Writes all tables; numbers as they are, lists as their lengths.
 pub fn write(report: &FunnelReport, folder: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let tables = serde_json::to_value(report)?;
-    for (table, fields) in TABLES {
+    for (table, fields) in TABLES.lines().filter_map(|line| line.split_once(": ")) {
         let rows = match &tables[table] {
             Value::Array(rows) => &rows[..],
             Value::Null => &[],

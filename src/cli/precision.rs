@@ -2,20 +2,26 @@
 //! sweeps over item size and ill-conditioned cameras behind it. How it is shown is
 //! in `precision_tables` and `precision_conclusions`.
 
-use std::io::Write;
+use anyhow::bail;
 
 use super::args::PrecisionArgs;
-use super::document::{Block, to_page, to_terminal};
+use super::document::{Block, show, to_page};
 use super::figure::picture;
+use super::funnel::plain_input;
 use super::processes::{Job, Timing};
 use super::study::{Setting, Study};
+use super::table::{Column, Table};
 use super::{
-    Ending, expect_places, precision_conclusions, precision_tables, print, stage_sweep, text,
+    Ending, expect_places, funnel_table, precision_conclusions, precision_tables, print, text,
     write_text,
 };
+use crate::funnel::{self, Chain, FunnelPlan, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Status};
 use crate::precision::{self, PointPlan, PrecisionInput, SWEEPS, size_sweep, sweep};
+use crate::scene::LoadOptions;
+use crate::suite::DEFAULT_PATH;
+use crate::visibility::{Guarantee, SampleGrid};
 
 /// Rounds of a point, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -31,7 +37,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     ];
     expect_places(&outputs, &inputs)?;
     if let Some(stage) = args.stage {
-        return stage_sweep::sweep(registry, args, stage);
+        return sweep_stage(registry, args, stage);
     }
     let setting = setting(registry, args, None)?;
     let spread = &args.study.spread;
@@ -72,10 +78,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         sweeps,
     };
     let shown = print(args.format, &outcome, || {
-        let width = text::width();
-        let room = if args.all { usize::MAX } else { width };
-        let shown = to_terminal(&blocks(&outcome, args.all, room), width);
-        text::terminal().write_all(shown.as_bytes())
+        let room = if args.all { usize::MAX } else { text::width() };
+        show(&blocks(&outcome, args.all, room))
     });
     if let Some(file) = &args.svg {
         let figures = precision_conclusions::figures(&outcome.precision);
@@ -141,4 +145,146 @@ pub fn time(
 ) -> anyhow::Result<ProcessTimes> {
     let setting = setting(registry, args, Some(timing))?;
     Ok(precision::time(&input(args, &setting), plan)?)
+}
+
+/// Rounds of a point, if one process has them all.
+const STAGE_ROUNDS: [usize; 2] = [3, 9];
+/// The samples of a view, beside its random rays.
+const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
+/// The default path: stages behind the frustum have work there.
+const STREET: &str = "street:frames=32";
+
+/// The inputs of the command itself, or of a worker.
+fn stage_setting(
+    registry: &Registry,
+    args: &PrecisionArgs,
+    timing: Option<&Timing>,
+) -> anyhow::Result<(Setting, Chain)> {
+    let held = |_| LoadOptions {
+        per_triangle: funnel::BYTES_PER_TRIANGLE,
+        ..args.study.scene_args.options(3)
+    };
+    let path = match args.study.path.as_str() {
+        DEFAULT_PATH => STREET,
+        typed => typed,
+    };
+    let mut setting = Setting::load(registry, &args.study, path, STAGE_ROUNDS, timing, held)?;
+    setting.structures.truncate(1);
+    let object = setting.structures.first().map_or(NONE, |spec| &spec.label);
+    let chain = Chain::for_scene(&setting.scene, false).with(StageKind::Object, object);
+    Ok((setting, chain))
+}
+
+fn sweep_stage(
+    registry: &Registry,
+    args: &PrecisionArgs,
+    stage: StageKind,
+) -> anyhow::Result<Ending> {
+    if args.svg.is_some() || args.html.is_some() {
+        bail!("--svg and --html draw the frustum's diagram; expected them or --stage, not both");
+    }
+    let (setting, chain) = stage_setting(registry, args, None)?;
+    let scene = &setting.scene;
+    if funnel::back_ends(stage, scene, false)
+        .iter()
+        .all(|row| row.name == NONE)
+    {
+        // Every scene has something for the others.
+        let (name, stage) = (&scene.name, stage.name());
+        let why = funnel::left_out_of(scene);
+        let why = why.map_or(String::new(), |row| format!(": {}", row.reason));
+        bail!(
+            "scene '{name}' has nothing for the {stage} stage{why}; expected a scene with rooms or \
+             sectors"
+        );
+    }
+    let about = format!("{}, {} stage: ", args.study.scene, stage.name());
+    let study = Study::new(about, 0, &args.study.spread)?;
+    study.begin("every point, judged");
+    let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
+    let prepared = funnel::prepare_sweep(&input, stage)?;
+    let items = text::counted(scene.items.len(), "item");
+    study.announce(&items, "less than a minute");
+    let job = |timing| Job::Sweep(prepared.plan.clone(), timing);
+    let lens_scale = setting.path.lens_scale;
+    let times = study.times("every point, timed", lens_scale, job)?;
+    let sweep = prepared.conclude(&times);
+    print(args.format, &sweep, || show(&stage_blocks(&sweep)))?;
+    let is_broken =
+        |point: &SweepPoint| is_guaranteed(point) && point.errors.false_negative_count > 0.0;
+    Ok(Ending::of(!sweep.points.iter().any(is_broken)))
+}
+
+/// Times all points in one process.
+pub fn time_stage(
+    registry: &Registry,
+    args: &PrecisionArgs,
+    plan: &FunnelPlan,
+    timing: &Timing,
+) -> anyhow::Result<ProcessTimes> {
+    let Some(stage) = args.stage else {
+        bail!("a sweep without a stage");
+    };
+    let (setting, chain) = stage_setting(registry, args, Some(timing))?;
+    let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
+    Ok(funnel::time_sweep(&input, stage, plan)?)
+}
+
+/// The points of a stage, and the number of those that dropped visible items.
+fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
+    let (scene, path, stage) = (&sweep.scene, &sweep.path, sweep.stage.name());
+    let basis = format!(
+        "{} with {} random rays each beside {} x {} samples; {}.",
+        text::counted(sweep.views, "view"),
+        sweep.rays_per_view,
+        SAMPLES.width,
+        SAMPLES.height,
+        funnel_table::spread(sweep.processes)
+    );
+    let columns: &[Column<&SweepPoint>] = &[
+        ("by", |point| {
+            let doubt = funnel_table::doubt(point.back_end.guarantee);
+            format!("{}{doubt}", point.back_end.name)
+        }),
+        (">buffer", |point| {
+            text::some(point.buffer, |[w, h]| format!("{w}x{h}"))
+        }),
+        (">out", |point| text::significant(point.errors.output_count)),
+        (">FP / visible", |point| {
+            text::rate(point.errors.excess, 1.0)
+        }),
+        (">FN / visible", |point| {
+            text::rate(point.errors.missing, 1.0)
+        }),
+        (">FN / view", |point| {
+            text::significant(point.errors.false_negative_count)
+        }),
+        (">time / view", |point| text::time_plus_minus(point.time)),
+        (">front", |point| {
+            if point.on_front { "*" } else { "" }.to_owned()
+        }),
+    ];
+    let is_lossy = |point: &&SweepPoint| point.errors.false_negative_count > 0.0;
+    let lossy = sweep.points.iter().filter(is_lossy);
+    let told = format!(
+        "{} of {} points dropped visible items; {} of these have a guarantee. * On the Pareto \
+         front: no other point is significantly better in time or an error and as good in the \
+         rest.",
+        lossy.clone().count(),
+        sweep.points.len(),
+        lossy.filter(|point| is_guaranteed(point)).count()
+    );
+    vec![
+        Block::Line(format!(
+            "{scene}, {path}: {stage} stage, error against run time"
+        )),
+        Block::Line(basis),
+        Block::Table(Table::with(&sweep.points, columns)),
+        Block::line(""),
+        Block::Line(told),
+    ]
+}
+
+fn is_guaranteed(point: &SweepPoint) -> bool {
+    point.back_end.guarantee != Guarantee::Unproven
 }

@@ -15,7 +15,7 @@ use super::processes::Job;
 use super::processes::{Ended, Said, Workers};
 use super::report::{page, show, show_written};
 use super::run_plan::{RunPlan, plan};
-use super::run_resume::{create, go_on, resume, utc_now};
+use super::run_resume::{RunOptions, create, go_on, resume, utc_now};
 use super::study::progress;
 use super::{Ending, baseline, expect_folder, interrupt, run_why, tell, text, unread_is_fine};
 use crate::index::Registry;
@@ -329,7 +329,7 @@ impl Run {
             let warning = format!("warning: {warning}");
             writeln!(out, "{}", text::wrapped(&warning, width))?;
         }
-        if let Some(line) = next(report, width) {
+        if let Some(line) = next(report, &self.stream.header.args, width) {
             writeln!(out, "{line}")?;
         }
         show_written(&mut out, self.folder.path())?;
@@ -343,18 +343,18 @@ impl Run {
 
 /// Options that decide how files are read.
 const READS: [&str; 7] = [
-    "--up",
-    "--skip-bad-items",
-    "--matrix-convention",
-    "--fovy",
-    "--aspect",
-    "--near",
-    "--far",
+    "up",
+    "skip-bad-items",
+    "matrix-convention",
+    "fovy",
+    "aspect",
+    "near",
+    "far",
 ];
 
 /// The command that a reader will want next, with what it gives if that fits into
 /// `width` characters; `None` where nothing is ranked.
-fn next(report: &Report, width: usize) -> Option<String> {
+fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
     let program = report.run.command.split(' ').next()?;
     let all = comparisons(report);
     let first = all.iter().find(|c| c.winners().next().is_some())?.about();
@@ -370,19 +370,8 @@ fn next(report: &Report, width: usize) -> Option<String> {
         .map(|path| format!("--path {path}"))
         .into_iter()
         .collect();
-    let typed: Vec<&str> = report.run.command.split(' ').collect();
-    for (n, word) in typed.iter().enumerate() {
-        let mut option = (*word).to_owned();
-        if !READS.contains(&word.split('=').next()?) {
-            continue;
-        }
-        if let Some(value) = typed.get(n + 1).filter(|next| !next.starts_with('-'))
-            && !word.contains('=')
-        {
-            option += &format!(" {value}");
-        }
-        options.push(option);
-    }
+    let recorded = RunOptions::recorded(args).ok()?;
+    options.extend(recorded.words(|name| READS.contains(&name)));
     for option in options.iter().filter(|_| report.run.suite.is_none()) {
         let last = line.rsplit('\n').next().unwrap_or_default();
         let is_within = last.chars().count() + option.chars().count() < width;

@@ -105,10 +105,9 @@ const NOT_OF_THE_PLAN: [&str; 6] = ["resume", "out", "timeout", "save", "all_col
 /// The recorded options, if those typed now say nothing else.
 fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
     let before = RunOptions::recorded(recorded)?;
-    let now = RunOptions::of(std::env::args_os())?;
-    for (id, name) in RunOptions::all() {
-        let typed = now.0.value_source(&id) == Some(ValueSource::CommandLine);
-        let is_free = !typed || NOT_OF_THE_PLAN.contains(&id.as_str());
+    let now = RunOptions::of("run", std::env::args_os())?;
+    for (id, name, _) in RunOptions::all() {
+        let is_free = !now.is_typed(&id) || NOT_OF_THE_PLAN.contains(&id.as_str());
         ensure!(
             is_free || before.values(&id) == now.values(&id),
             "--{name} is '{}', and the run was begun {}; expected the same or none: \
@@ -131,7 +130,7 @@ const NO_RUN: &str = "no run was recorded there; expected the folder of a run";
 /// shard.
 pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
     let (one, other) = (RunOptions::recorded(one)?, RunOptions::recorded(other)?);
-    for (id, name) in RunOptions::all() {
+    for (id, name, _) in RunOptions::all() {
         let of_all = id != "shard" && !NOT_OF_THE_PLAN.contains(&id.as_str());
         if of_all && one.values(&id) != other.values(&id) {
             bail!(
@@ -156,33 +155,52 @@ fn first() -> std::iter::Once<String> {
     std::iter::once(program::name().to_owned())
 }
 
-/// The options of a `run`, as they were typed.
-struct RunOptions(ArgMatches);
+/// The options of `run`, as they were typed behind a command.
+pub struct RunOptions(ArgMatches);
 
 impl RunOptions {
-    fn recorded(args: &[String]) -> anyhow::Result<RunOptions> {
-        RunOptions::of(first().chain(args.to_vec()))
+    /// The options of a run that was begun.
+    pub fn recorded(args: &[String]) -> anyhow::Result<RunOptions> {
+        RunOptions::of("run", first().chain(args.to_vec()))
     }
 
-    fn of(
+    /// Those of a command line.
+    pub fn of(
+        command: &str,
         line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     ) -> anyhow::Result<RunOptions> {
         let matches = Cli::command()
             .try_get_matches_from(line)
             .map_err(one_line)?;
-        let run = matches.subcommand_matches("run").cloned();
-        let run = run.context(NO_RUN)?;
-        Ok(RunOptions(run))
+        let run = matches.subcommand_matches(command).cloned();
+        Ok(RunOptions(run.context(NO_RUN)?))
     }
 
-    /// Ids and names of all options.
-    fn all() -> Vec<(String, String)> {
+    fn is_typed(&self, id: &str) -> bool {
+        let is_known = self.0.try_contains_id(id).unwrap_or(false);
+        is_known && self.0.value_source(id) == Some(ValueSource::CommandLine)
+    }
+
+    /// The typed options as words, `--up=y`; those of which `is_wanted` takes the name.
+    pub fn words(&self, is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
+        let all = RunOptions::all().into_iter();
+        let typed = all.filter(|(id, name, _)| self.is_typed(id) && is_wanted(name));
+        let words = typed.flat_map(|(id, name, has_value)| match has_value {
+            true => (self.values(&id).iter().map(|v| format!("--{name}={v}"))).collect(),
+            false => vec![format!("--{name}")],
+        });
+        words.collect()
+    }
+
+    /// Ids and names of all options; true for those with a value.
+    fn all() -> Vec<(String, String, bool)> {
         let command = Cli::command();
         let run = command.find_subcommand("run").into_iter();
         let arguments = run.flat_map(|run| run.get_arguments());
         let named = arguments.map(|arg| {
             let id = arg.get_id().as_str();
-            (id.to_owned(), arg.get_long().unwrap_or(id).to_owned())
+            let name = arg.get_long().unwrap_or(id).to_owned();
+            (id.to_owned(), name, arg.get_action().takes_values())
         });
         named.collect()
     }

@@ -16,7 +16,7 @@ use rand_pcg::Pcg64;
 use super::Ending;
 use super::args::{Cli, Command};
 use super::processes::{Job, Message, PROTOCOL, Request};
-use super::{advise, drift, funnel, precision, run_plan, stage_sweep};
+use super::{advise, drift, funnel, precision, run_plan};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{Part, Plan, ProcessTimes, Share, TIMING, TaskSamples, measure_scene};
 
@@ -96,7 +96,7 @@ fn times(registry: &Registry, job: &Job, command: &Command) -> anyhow::Result<Pr
             precision::time(registry, args, plan, timing)
         }
         (Job::Sweep(plan, timing), Command::Precision(args)) => {
-            stage_sweep::time(registry, args, plan, timing)
+            precision::time_stage(registry, args, plan, timing)
         }
         (Job::Funnel(plan, timing), Command::Funnel(args)) => {
             funnel::time(registry, args, plan, timing)
