@@ -1,5 +1,7 @@
-//! Tables of the results of a run: one scene and path is a row per structure, several
-//! are a row each. The terminal shows a summary of them, documents all.
+//! Tables of the results of a run.
+//!
+//! One scene and path is a row per structure, several are a row each. The terminal shows a
+//! summary of them, documents all.
 
 use std::collections::BTreeSet;
 
@@ -108,8 +110,9 @@ fn share(share: f64) -> String {
 /// A column of single figures: head, metric and form.
 pub type Figure = (&'static str, &'static str, fn(f64) -> String);
 
-/// Figures of queries by priority, then those of frames. A summary has the first two,
-/// or the first five of a motion.
+/// Figures of queries by priority, then those of frames.
+///
+/// A summary has the first two, or the first five of a motion.
 pub const FIGURES: [Figure; 19] = [
     ("build", "build_ms", |ms| text::time(ms * 1e6)),
     ("bytes/item", "memory_bytes_per_item", |b| format!("{b:.1}")),
@@ -134,8 +137,9 @@ pub const FIGURES: [Figure; 19] = [
     ("x after 1000", "ageing_1000", text::significant),
 ];
 
-/// A row per structure of one scene and path; in full with intervals, lower bounds and
-/// every figure.
+/// A row per structure of one scene and path.
+///
+/// In full with intervals, lower bounds and every figure.
 pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) -> Table {
     let (queries, frames) = FIGURES.split_at(10);
     let (time, figures, brief) = match comparison.about().path.motion.is_empty() {
@@ -187,8 +191,10 @@ fn ratio((ratio, ends): Speedup, is_full: bool) -> String {
     format!("{} x{interval}", text::significant(ratio))
 }
 
-/// Speed-ups over the base: a row per scene and path, a column per structure, and the
-/// geometric means. The base has its times; `*` marks the fastest and its ties.
+/// Speed-ups over the base, and their geometric means.
+///
+/// A row per scene and path, a column per structure. The base has its times; `*` marks
+/// the fastest and its ties.
 pub fn matrix(names: Vec<String>, all: &[&Comparison], overall: &Overall) -> Table {
     let is_base = |name: &str| overall.base == Some(name);
     let mut columns: Vec<_> = overall.standings.iter().collect();

@@ -193,7 +193,7 @@ pub fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
 pub struct Class {
     pub colour: &'static str,
     pub words: &'static str,
-    /// Of items: drawn in any case, however far from the eye. Of cells: filled.
+    /// Items that are drawn however far from the eye; cells that are filled.
     pub is_key: bool,
 }
 

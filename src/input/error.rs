@@ -7,8 +7,9 @@ use std::path::Path;
 use crate::shown::expected_by;
 use crate::spec::SpecError;
 
-/// Error of reading or writing a file or a text, in one line: where, what was found, what
-/// was expected.
+/// Error of reading or writing a file or a text, in one line.
+///
+/// It says where, what was found and what was expected.
 #[derive(Debug, thiserror::Error)]
 #[error("{text}")]
 pub struct InputError {

@@ -97,8 +97,10 @@ impl<'b> TableReader<'b> {
         Ok(table)
     }
 
-    /// Line of the first record at or behind a byte. The CSV reader begins to look for a
-    /// record at the line ends before it. Records come in the order of the file.
+    /// Line of the first record at or behind a byte.
+    ///
+    /// The CSV reader begins to look for a record at the line ends before it. Records come
+    /// in the order of the file.
     fn line_of_record_at(&mut self, byte: usize) -> u64 {
         let (last, line) = self.at;
         let ends = self.bytes[byte..].iter().take_while(|byte| is_end(byte));
@@ -267,8 +269,10 @@ fn lines(bytes: &[u8]) -> u64 {
     ends.count() as u64
 }
 
-/// Refuses a quote that takes following lines into its field: it is never closed, or the
-/// quote that closes it has text behind it and was meant to open another field.
+/// Refuses a quote that takes following lines into its field.
+///
+/// It is never closed, or the quote that closes it has text behind it and was meant to
+/// open another field.
 fn check_quotes(bytes: &[u8], delimiter: u8, file: &str) -> Result<(), InputError> {
     // A byte order mark, which the CSV reader drops.
     let mut begin = if bytes.starts_with(b"\xef\xbb\xbf") {

@@ -299,7 +299,7 @@ mod tests;
 /// A fact that differs.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Setting {
-    /// "machine" or "toolchain"; of shards and resumed runs "program" or "plan" as well.
+    /// "machine" or "toolchain"; between shards "program" or "plan" as well.
     pub of: &'static str,
     /// Name of the fact.
     pub what: &'static str,
