@@ -1,9 +1,13 @@
-//! Lenses of a path's cameras as used, and matrices as they were read.
+//! Lenses of cameras as used, matrices as they were read, and doubts about cameras:
+//! another up axis, broken matrices, eyes far outside, empty views.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{Camera, Lens, LensKind};
+use super::CameraPath;
+use crate::camera::{Camera, Frame, Lens, LensKind, PlaneOptions, ViewProjection};
+use crate::scene::{Scene, UpAxis};
+use crate::shown::counted;
 
 /// Lenses of all cameras. Pairs are the least and the largest value.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
@@ -143,4 +147,138 @@ fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     values
         .map(|value| [value; 2])
         .reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
+}
+
+/// Scene diagonals from the scene to an eye that is far outside.
+const FAR_OUTSIDE: f64 = 3.0;
+
+/// One line for each kind of doubt about the cameras of a path.
+pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
+    let found = [
+        rolled(scene, cameras),
+        unstraight(cameras),
+        far_outside(scene, cameras),
+        blind(scene, cameras),
+    ];
+    let found = found.into_iter().flatten();
+    found.map(|doubt| format!("{path}: {doubt}")).collect()
+}
+
+impl CameraPath {
+    /// [`warnings`] about these cameras in a scene.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        warnings(scene, &self.name, &self.cameras)
+    }
+}
+
+/// "2 of 8 cameras".
+fn share(part: usize, cameras: &[Camera]) -> String {
+    format!("{part} of {}", counted(cameras.len(), "camera"))
+}
+
+/// Cameras whose up in the image is more than 45 degrees from the scene's.
+fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
+    let ups: Vec<DVec3> = cameras
+        .iter()
+        .filter_map(|c| rolled_up(scene.up, c))
+        .collect();
+    let (first, own) = (ups.first()?, scene.up.name());
+    let what = share(ups.len(), cameras);
+    let is_along = |axis: &UpAxis| {
+        let along: f64 = ups.iter().map(|up| up.dot(axis.vector()).abs()).sum();
+        along > 0.7 * ups.len() as f64
+    };
+    Some(match UpAxis::ALL.into_iter().find(is_along) {
+        Some(other) if other != scene.up => format!(
+            "{other} is up in {what}, {own} in {}; --up {other} if it is the scene's",
+            scene.name,
+            other = other.name(),
+        ),
+        _ => format!(
+            "{what} rolled by more than 45 degrees, first with ({:.3}, {:.3}, {:.3}) up; {own} is \
+             up in {}",
+            first.x, first.y, first.z, scene.name
+        ),
+    })
+}
+
+/// Up in the image of a camera that is rolled.
+fn rolled_up(up: UpAxis, camera: &Camera) -> Option<DVec3> {
+    let (frame, is_mirrored): (Frame, bool) = match camera.lens.kind() {
+        LensKind::Matrix(matrix) => {
+            let found = matrix.unprojected().ok()?;
+            (found.camera.frame, found.is_mirrored)
+        }
+        _ => (camera.frame, false),
+    };
+    let [across, along] = [frame.u(), frame.v()].map(|axis| axis.dot(up.vector()));
+    // A mirrored image may have y downward.
+    let along = if is_mirrored { along.abs() } else { along };
+    // Straight up or down there is no roll.
+    let is_level = across.hypot(along) > 0.1;
+    (is_level && along < across.abs()).then(|| frame.v())
+}
+
+/// Matrices that are no camera's, and those whose transposes are.
+fn unstraight(cameras: &[Camera]) -> Option<String> {
+    let matrices = cameras
+        .iter()
+        .filter_map(|camera| match camera.lens.kind() {
+            LensKind::Matrix(matrix) if !matrix.is_straight() => Some(matrix),
+            _ => None,
+        });
+    let matrices: Vec<&ViewProjection> = matrices.collect();
+    let first = matrices.first()?;
+    let what = share(matrices.len(), cameras);
+    let transposed = matrices.iter().filter_map(|matrix| matrix.transposed());
+    if transposed.filter(ViewProjection::is_straight).count() == matrices.len() {
+        let convention = first.convention();
+        return Some(format!(
+            "{what} read as {} sheared, their transposes are not; --matrix-convention {} if they \
+             are transposed",
+            convention.name(),
+            convention.transposed().name()
+        ));
+    }
+    Some(format!(
+        "{what} sheared, or with an oblique near plane: image axes or depths at no right angles"
+    ))
+}
+
+/// Eyes many scene diagonals away.
+fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
+    let bounds = scene.world_bounds();
+    let diagonal = (bounds.max - bounds.min).length();
+    let most = FAR_OUTSIDE * if diagonal > 0.0 { diagonal } else { 1.0 };
+    let outside = |camera: &Camera| {
+        let eye = camera.frame.eye;
+        let distance = eye.distance(eye.clamp(bounds.min, bounds.max));
+        // Parallel lines of sight begin anywhere.
+        (distance > most && !camera.lens.is_orthographic()).then_some(distance / diagonal)
+    };
+    let far: Vec<f64> = cameras.iter().filter_map(outside).collect();
+    let farthest = far.iter().copied().reduce(f64::max)?;
+    Some(format!(
+        "{} more than {FAR_OUTSIDE} scene diagonals outside of {}, up to {farthest:.3e}; expected \
+         the scene's unit and axes",
+        share(far.len(), cameras),
+        scene.name
+    ))
+}
+
+/// Views that all miss all items.
+fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {
+    let around = scene.surroundings();
+    let sees_any = |camera: &Camera| {
+        let volume = camera.volume(&PlaneOptions::default(), &around);
+        // A camera without a view is an error elsewhere.
+        volume.map_or(true, |volume| {
+            volume.sees(&scene.bounds) && scene.items.iter().any(|b| volume.sees(b))
+        })
+    };
+    let is_blind = !scene.items.is_empty() && !cameras.is_empty() && !cameras.iter().any(sees_any);
+    is_blind.then(|| {
+        let views = counted(cameras.len(), "view");
+        format!("nothing of {} is visible in any of {views}", scene.name)
+    })
 }

@@ -1,21 +1,13 @@
 //! Camera paths: generated, recorded, or taken from the places of a scene.
 //!
-//! Each generated family has a file of its own.
+//! Generated families are in `families`, the longer ones in `street` and `walk`.
 
-mod animation;
 mod calibrate;
 mod facts;
-mod flythrough;
-mod orbit;
-mod outside;
-mod places;
+mod families;
 mod recorded;
-mod spin;
 mod street;
-mod teleport;
 mod walk;
-mod warnings;
-mod zoom;
 
 use std::path::Path;
 
@@ -28,9 +20,8 @@ use crate::scene::{self, PlaceView, Scene, SeededRng, UpAxis, WorldBox};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
-pub use facts::{CameraFacts, MatrixFacts};
+pub use facts::{CameraFacts, MatrixFacts, warnings};
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
-pub use warnings::warnings;
 
 /// A named sequence of cameras.
 #[derive(Clone, Debug)]
@@ -114,20 +105,20 @@ pub struct PathFamily {
 /// All generated families, in the order of the help.
 pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, frames }
     "orbit", "a full circle about the scene, looking at its centre",
-        "radius=0.6 (of half the scene's diagonal), height=0.35 (of the radius)", orbit::frames;
+        "radius=0.6 (of half the scene's diagonal), height=0.35 (of the radius)", families::orbit;
     "flythrough", "a closed spline through seeded way points, looking ahead",
-        "waypoints=8 (at least 4)", flythrough::frames;
-    "spin", "a full turn in place at the centre (yaw)", "", spin::frames;
+        "waypoints=8 (at least 4)", families::flythrough;
+    "spin", "a full turn in place at the centre (yaw)", "", families::spin;
     "zoom", "a dolly towards the centre, then a zoom by field of view",
-        "power=8 (largest magnification)", zoom::frames;
-    "teleport", "a new random place and direction every frame: no coherence", "", teleport::frames;
-    "outside", "the whole scene from outside, from all around", "", outside::frames;
+        "power=8 (largest magnification)", families::zoom;
+    "teleport", "a new random place and direction every frame: no coherence", "", families::teleport;
+    "outside", "the whole scene from outside, from all around", "", families::outside;
     "street", "eyes outside of every item, above the ground, looking level",
         "height=1.7 (above the ground), near=0.1", street::frames;
     "walk", "through the doors of rooms or a Doom map at constant height above the floors",
         "height=1.7 (eyes above the floor; 41 in a Doom map), doors=32 (passed)", walk::frames;
-    "places", "the scene's own camera places (things of a Doom map, cameras of glTF)", "", places::frames;
-    "animation", "the camera that the animation of a glTF file moves, at even times", "", animation::frames;
+    "places", "the scene's own camera places (things of a Doom map, cameras of glTF)", "", families::places;
+    "animation", "the camera that the animation of a glTF file moves, at even times", "", families::animation;
 };
 
 /// Parameters that every generated path takes.

@@ -149,7 +149,7 @@ fn rows<T>(
         // How long a pipe is shows as it is read.
         if found.len() == found.capacity() {
             let needed = 2 * found.capacity() * (size_of::<T>() + BESIDE);
-            memory::check_fits(file, needed as u64, 0, memory::free_for(found.len() as u64))?;
+            memory::check_fits(file, needed as u64, 0, found.len() as u64)?;
         }
         found.push(read(&row?)?);
     }

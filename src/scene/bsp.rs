@@ -1,6 +1,8 @@
 //! The 2-D BSP tree of a Doom map: the bounds of its leaves, and which leaf holds a
 //! point, exactly.
 
+use std::ops::{Add, Mul, Sub};
+
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
@@ -182,9 +184,8 @@ impl BspTree {
 /// coordinates of 2^16), far below anything a map shows.
 const CELL_MARGIN: f64 = 1.0 / 1024.0;
 
-/// The part of a convex polygon on one side of a node's line (Sutherland and
-/// Hodgman 1974), the line moved outward by [`CELL_MARGIN`] so that rounding
-/// and ties can only make the cell larger.
+/// The part of a convex polygon on one side of a node's line, the line moved outward
+/// by [`CELL_MARGIN`] so that rounding and ties can only make the cell larger.
 fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
     let length = node.direction.length();
     if length == 0.0 {
@@ -192,7 +193,15 @@ fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
     }
     let sign = if side == 0 { 1.0 } else { -1.0 };
     let front = -node.direction.perp() / length * sign;
-    let depth = |p: DVec2| front.dot(p - node.start) + CELL_MARGIN;
+    clipped(polygon, |p| front.dot(p - node.start) + CELL_MARGIN)
+}
+
+/// The part of a convex polygon where a depth is not negative (Sutherland and Hodgman
+/// 1974); the depth is linear in the point.
+pub fn clipped<P>(polygon: &[P], depth: impl Fn(P) -> f64) -> Vec<P>
+where
+    P: Copy + Add<Output = P> + Sub<Output = P> + Mul<f64, Output = P>,
+{
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (i, &p) in polygon.iter().enumerate() {
         let previous = polygon[(i + polygon.len() - 1) % polygon.len()];

@@ -1,11 +1,12 @@
 //! The tables of generated worlds, and their common parameters.
 //!
-//! Each family has a file of its own; adding one is that file and one row here.
+//! Boxes are made in `families` and `rooms`, meshes in `meshes`; adding one is a function
+//! there and a row here.
 
-use super::meshes::{forest as mesh_forest, spheres, statue, terrain};
+use super::meshes::{ground, spheres};
 use super::rng::SeededRng;
-use super::tiling::World;
-use super::{Regions, Scene, Surfaces, city, clustered, forest, layouts, rooms, uniform};
+use super::rooms::World;
+use super::{Regions, Scene, Surfaces, families, rooms};
 use crate::input::InputError;
 use crate::spec::{Spec, SpecError};
 
@@ -32,49 +33,51 @@ pub struct Family {
 #[derive(Clone, Copy)]
 pub enum Build {
     /// Makes `n` boxes from parameters and a random stream.
-    Boxes(fn(&mut Spec, usize, &mut SeededRng) -> Result<World, SpecError>),
+    Boxes(fn(&mut Spec, usize, &mut SeededRng) -> families::Made),
+    /// Makes `n` boxes, and the rooms that they enclose.
+    Rooms(fn(&mut Spec, usize, &mut SeededRng) -> Result<World, SpecError>),
     /// Makes about `n` triangles (at least one object) from a seed.
     Mesh(fn(usize, u64) -> Surfaces),
 }
-use Build::{Boxes, Mesh};
+use Build::{Boxes, Mesh, Rooms};
 
 /// All families of boxes, in the order of the help.
 pub static FAMILIES: &[Family] = rows! { Family { name, summary, params, build }
     "uniform", "boxes scattered evenly in a cube",
-        "side=1000 (cube edge, m), size=0.2*side/cbrt(n) (mean box edge, m)", Boxes(uniform::build);
+        "side=1000 (cube edge, m), size=0.2*side/cbrt(n) (mean box edge, m)", Boxes(families::uniform);
     "clustered", "Gaussian clusters of uneven weight",
-        "clusters=64, side=1000 (m), spread=0.02 (standard deviation / side)", Boxes(clustered::build);
+        "clusters=64, side=1000 (m), spread=0.02 (standard deviation / side)", Boxes(families::clustered);
     "city", "a flat grid of blocks: tall buildings, streets, tiny street furniture",
-        "block=80 (m), street=16 (m)", Boxes(city::build);
+        "block=80 (m), street=16 (m)", Boxes(families::city);
     "forest", "trees, bushes and rocks on a fractal heightfield",
-        "relief=0.12 (height / width), spacing=5 (m between plants)", Boxes(forest::build);
+        "relief=0.12 (height / width), spacing=5 (m between plants)", Boxes(families::forest);
     "rooms", "an indoor block of cells joined by doors; the cells are the regions",
-        "storeys=3, room=6 (mean edge, m)", Boxes(rooms::build);
+        "storeys=3, room=6 (mean edge, m)", Rooms(rooms::build);
     "shell", "unit cubes evenly over a sphere, for views from its centre (Bevy's many_cubes: n=160k)",
-        "radius=1.25*sqrt(n) (m)", Boxes(layouts::shell);
+        "radius=1.25*sqrt(n) (m)", Boxes(families::shell);
     "grid3", "boxes of touching unit spheres on a cubic grid (sseculling: n=512k)",
-        "shuffled=0 (1: in random order)", Boxes(layouts::grid3);
+        "shuffled=0 (1: in random order)", Boxes(families::grid3);
     "bepu", "edges 1 + 99 X^10, X even in 0..1: many small boxes, few large (bepuphysics: n=65536)",
-        "side=15.625*cbrt(n) (cube edge, m)", Boxes(layouts::bepu);
+        "side=15.625*cbrt(n) (cube edge, m)", Boxes(families::bepu);
     "corridor", "boxes scattered evenly along a line",
-        "width=10 (m), length=1000*width (m)", Boxes(layouts::corridor);
+        "width=10 (m), length=1000*width (m)", Boxes(families::corridor);
     "tiles2d", "rectangles in a plane that tile a square; neighbours share exact coordinates",
-        "side=1000 (m)", Boxes(layouts::tiles2d);
-    "stack", "piles of coincident boxes", "piles=16", Boxes(layouts::stack);
+        "side=1000 (m)", Boxes(families::tiles2d);
+    "stack", "piles of coincident boxes", "piles=16", Boxes(families::stack);
     "voxels", "unit cubes on whole coordinates under a fractal surface: ties everywhere",
-        "relief=0.2 (height / width)", Boxes(layouts::voxels);
+        "relief=0.2 (height / width)", Boxes(families::voxels);
 };
 
 /// All generated meshes, in the order of the help.
 pub static MESHES: &[Family] = rows! { Family { name, summary, params, build }
     "mesh:terrain", "A heightfield in tiles of 512 triangles; one-sided, open",
-        "", Mesh(terrain::build);
+        "", Mesh(ground::terrain);
     "mesh:forest", "Terrain with trees (closed) and bushes of cut-out leaf cards",
-        "", Mesh(mesh_forest::build);
+        "", Mesh(ground::forest);
     "mesh:spheres", "Geodesic spheres of 1,280 triangles each; closed",
-        "", Mesh(spheres::build);
+        "", Mesh(spheres::spheres);
     "mesh:statue", "One bumpy closed blob, up to millions of triangles",
-        "", Mesh(statue::build);
+        "", Mesh(spheres::statue);
 };
 
 /// Parameters that every generated scene takes; `n` of a mesh counts triangles.
@@ -98,13 +101,17 @@ impl Family {
     /// A parameter that is unknown or out of range.
     pub fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene, InputError> {
         let n = match self.build {
-            Boxes(_) => spec.whole("n", COUNT, MOST)?,
+            Boxes(_) | Rooms(_) => spec.whole("n", COUNT, MOST)?,
             Mesh(_) => spec.count("n", COUNT, MOST)?,
         };
         let seed = spec.whole("seed", 1, u64::MAX)?;
         let offset = spec.number("offset", 0.0)?;
         let mut world = match self.build {
-            Boxes(build) => build(&mut spec, n as usize, &mut SeededRng::new(seed))?,
+            Boxes(build) => World {
+                boxes: build(&mut spec, n as usize, &mut SeededRng::new(seed))?,
+                ..World::default()
+            },
+            Rooms(build) => build(&mut spec, n as usize, &mut SeededRng::new(seed))?,
             Mesh(build) => {
                 spec.finish()?;
                 let mut surfaces = build(n as usize, seed);
@@ -136,7 +143,7 @@ mod tests {
         pub fn mesh(&self, n: usize, seed: u64) -> Surfaces {
             match self.build {
                 Mesh(build) => build(n, seed),
-                Boxes(_) => panic!("{} is no mesh", self.name),
+                _ => panic!("{} is no mesh", self.name),
             }
         }
     }

@@ -37,13 +37,18 @@ pub fn needed_by_triangles(triangles: u64, beside: u64, structures: u64) -> u64 
     triangles * (MESHED + beside) + needed_by_items(triangles / FEWEST, structures)
 }
 
-/// Refuses a scene that needs more bytes than are available.
+/// Refuses a scene of `count` items or triangles that needs more bytes than are free.
 ///
-/// If that is unknown, any scene passes.
+/// A small scene passes, and any scene where the free bytes are not known.
 ///
 /// # Errors
 /// The sizes needed and free.
-pub fn check_fits(
+pub fn check_fits(scene: &str, needed: u64, structures: u64, count: u64) -> Result<(), InputError> {
+    let available = (count > ANYWHERE).then(available_bytes).flatten();
+    fits(scene, needed, structures, available)
+}
+
+fn fits(
     scene: &str,
     needed: u64,
     structures: u64,
@@ -61,13 +66,6 @@ pub fn check_fits(
     Err(InputError::new(format_args!(
         "{scene}: needs about {needed}{held}, {free} are free; expected fewer items{or_fewer}"
     )))
-}
-
-/// Bytes that are free for a scene of `count` items or triangles.
-///
-/// `None` where that is unknown or the scene is small.
-pub fn free_for(count: u64) -> Option<u64> {
-    (count > ANYWHERE).then(available_bytes).flatten()
 }
 
 /// Bytes that the system, the control groups and the limits of this process leave.
@@ -152,7 +150,7 @@ mod tests {
     fn what_does_not_fit_is_refused_before_it_is_made() {
         let refused = |items, structures, available| {
             let needed = needed_by_items(items, structures);
-            let result = check_fits("uniform:n=9", needed, structures, available);
+            let result = fits("uniform:n=9", needed, structures, available);
             result.err().map(|error| error.to_string())
         };
         let gigabyte = 1_000_000_000;

@@ -6,37 +6,25 @@
 
 mod boxes_csv;
 mod bsp;
-mod city;
-mod clustered;
 mod disputes;
-mod fetched;
-mod foreign;
-mod forest;
+mod families;
 mod generate;
 mod gltf;
 mod ibsp;
 mod labels;
-mod layouts;
 mod lumps;
 pub(crate) mod memory;
 mod meshes;
-mod noise;
 mod obj;
 mod options;
-mod originals;
-mod place;
+mod records;
 mod rng;
 mod rooms;
 mod samples;
-mod settled;
-mod shape;
-mod sought;
 mod source;
 mod surface;
-mod tiling;
-mod uniform;
-mod up;
 mod wad;
+mod written;
 mod zip;
 
 use std::fmt;
@@ -52,30 +40,25 @@ use crate::query::ItemId;
 
 pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
-pub(crate) use city::Grid as CityGrid;
 pub use disputes::{Dispute, Linedef};
-pub use fetched::{FETCHED, Fetched};
+pub(crate) use families::CityGrid;
 pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
 pub use gltf::{CameraAnimation, read_gltf};
 pub use ibsp::{LeafChild, LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
 pub use obj::read_obj;
-pub use options::{ITEM_KINDS, ItemKind, LoadOptions};
-pub use originals::Originals;
-pub use place::{CameraPlace, PlaceView};
+pub use options::{CameraPlace, ITEM_KINDS, ItemKind, LoadOptions, PlaceView, UP_AXES, UpAxis};
 pub use rng::SeededRng;
 pub(crate) use rng::mix64;
-pub use samples::{NOTICE, SAMPLES, Sample};
-pub use shape::ItemShape;
-pub use sought::{Sought, SoughtBox};
+pub use rooms::{Portal, Tiling};
+pub use samples::{FETCHED, Fetched, NOTICE, SAMPLES, Sample};
 pub use source::{check_fits, every_part, is_wad, load, part_names, read_bytes, split_part};
 #[cfg(feature = "cli")]
 pub(crate) use surface::volume_within;
-pub use surface::{SurfaceKind, Surfaces};
-pub use tiling::{Portal, Tiling};
-pub use up::{UP_AXES, UpAxis};
+pub use surface::{ItemShape, SurfaceKind, Surfaces};
 pub use wad::{WadMap, map_names};
+pub use written::{Originals, Sought, SoughtBox};
 
 /// A box in world coordinates, as a file or a generator states it.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -48,9 +48,7 @@ pub fn read_obj(
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
     let size = bytes.len() as u64;
-    let fits = |needed, count| {
-        memory::check_fits(name, needed, options.structures, memory::free_for(count))
-    };
+    let fits = |needed, count| memory::check_fits(name, needed, options.structures, count);
     fits(size.saturating_mul(BYTES_PER_BYTE), size)?;
     let mut obj = Obj {
         file,

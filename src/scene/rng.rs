@@ -1,6 +1,7 @@
-//! Random numbers from a seed, and a hash: the only randomness of generated scenes.
+//! Random numbers from a seed, a hash, and value noise in octaves: the only randomness of
+//! generated scenes, the same on every machine.
 
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -53,4 +54,60 @@ pub fn mix64(key: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^ (z >> 31)
+}
+
+/// Smooth noise between the values at the corners of a lattice of unit cells.
+fn noise(p: DVec3, corner: impl Fn(IVec3) -> f64) -> f64 {
+    let cell = p.floor();
+    let smooth = (p - cell) * (p - cell) * (DVec3::splat(3.0) - (p - cell) * 2.0);
+    let base = cell.as_ivec3();
+    let corner = |i: i32| corner(base + IVec3::new(i & 1, i >> 1 & 1, i >> 2));
+    let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    let row = |i: i32| mix(corner(i), corner(i + 1), smooth.x);
+    let sheet = |i: i32| mix(row(i), row(i + 2), smooth.y);
+    mix(sheet(0), sheet(4), smooth.z)
+}
+
+/// Octaves of noise in `[0, 1)`, from the values in `[0, 1)` that `hash` has for an
+/// octave and a lattice point.
+pub fn octaves(p: DVec3, octaves: u64, hash: impl Fn(u64, IVec3) -> f64) -> f64 {
+    let (mut at, mut amplitude, mut sum) = (p, 0.5, 0.0);
+    for octave in 0..octaves {
+        sum += amplitude * noise(at, |corner| hash(octave, corner));
+        at *= 2.0;
+        amplitude *= 0.5;
+    }
+    sum
+}
+
+/// Octaves of noise in `[0, 1)` from a seed.
+pub fn fractal(p: DVec3, count: u64, seed: u64) -> f64 {
+    octaves(p, count, |octave, corner| {
+        let [x, y, z] = corner.to_array().map(|v| v as i64 as u64);
+        let key = seed
+            ^ (octave << 56)
+            ^ x.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            ^ y.wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
+            ^ z.wrapping_mul(0x1656_67B1_9E37_79F9);
+        (mix64(key) >> 11) as f64 / (1u64 << 53) as f64
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_continuous_and_within_its_range() {
+        for i in 0..500 {
+            let p = DVec3::new(f64::from(i) * 0.37 - 60.0, f64::from(i) * 0.11, 3.0);
+            let here = fractal(p, 6, 5);
+            assert!((0.0..1.0).contains(&here));
+            assert!((fractal(p + DVec3::X * 1e-9, 6, 5) - here).abs() < 1e-6);
+        }
+        assert_ne!(
+            fractal(DVec3::splat(0.5), 1, 1),
+            fractal(DVec3::splat(0.5), 1, 2)
+        );
+    }
 }

@@ -1,13 +1,12 @@
-//! Surfaces beside boxes: the triangles of the items, what light does at them and
-//! how many sides they have. It defines the form and its checks; where triangles
-//! come from is in `meshes`.
+//! Surfaces beside boxes: the triangles of the items, what light does at them and how many
+//! sides they have, with its checks; where triangles come from is in `meshes`.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::{Labels, LoadOptions, Scene, WorldBox, memory};
+use super::{Labels, LoadOptions, Regions, Scene, WorldBox, memory};
 use crate::geometry::Aabb;
 use crate::input::InputError;
 use crate::query::ItemId;
@@ -248,12 +247,7 @@ impl Scene {
         let count = surfaces.triangles.len() as u64;
         let needed = memory::needed_by_items(count, options.structures)
             + memory::needed_by_triangles(count, options.per_triangle, 0);
-        memory::check_fits(
-            &self.name,
-            needed,
-            options.structures,
-            memory::free_for(count),
-        )?;
+        memory::check_fits(&self.name, needed, options.structures, count)?;
         let mut single = Surfaces::about(surfaces.origin);
         let empty = |labels: &Labels| Labels::new(labels.column.clone());
         let mut labels: Vec<Labels> = self.labels.iter().map(empty).collect();
@@ -288,6 +282,31 @@ pub(crate) fn volume_within(triangles: impl Iterator<Item = [Vec3; 3]>) -> f64 {
         a.dot(b.cross(c))
     });
     six.sum::<f64>() / 6.0
+}
+
+named! {
+    /// Content of the box of an item.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+    #[non_exhaustive]
+    pub enum ItemShape {
+        /// The box itself, solid.
+        Box = "solid boxes",
+        /// Walls of a linedef, or the sprite of a thing.
+        Wall = "walls",
+        /// Triangles: [`Scene::surfaces`].
+        Mesh = "triangles",
+    }
+}
+
+impl Scene {
+    /// Shape of the items.
+    pub fn item_shape(&self) -> ItemShape {
+        match (&self.surfaces, &self.regions) {
+            (Some(_), _) => ItemShape::Mesh,
+            (None, Regions::Bsp(_)) => ItemShape::Wall,
+            (None, _) => ItemShape::Box,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -342,5 +361,21 @@ mod tests {
         let owners: Vec<usize> = (0..23).map(|t| surfaces.item_of(t)).collect();
         assert!(owners[..11].iter().all(|&item| item == 0));
         assert!(owners[11..].iter().all(|&item| item == 1));
+    }
+
+    #[test]
+    fn shapes_are_those_of_their_sources() {
+        for (source, shape) in [
+            ("city:n=10", ItemShape::Box),
+            ("rooms:n=10", ItemShape::Box),
+            ("freedm-map12", ItemShape::Wall),
+            ("mesh:spheres:n=2000", ItemShape::Mesh),
+        ] {
+            let scene = load(source, &Default::default()).unwrap();
+            assert_eq!(scene.item_shape(), shape, "{source}");
+            // A boxes file holds boxes.
+            let settled = scene.settled().unwrap();
+            assert_eq!(settled.item_shape(), ItemShape::Box, "{source}");
+        }
     }
 }

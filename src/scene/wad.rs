@@ -7,7 +7,8 @@ use glam::{DVec2, DVec3};
 
 use super::bsp::{BspChild, BspNode, BspTree};
 use super::disputes::{Dispute, Linedef, disputes};
-use super::lumps::{Table, Wad};
+use super::lumps::Wad;
+use super::records::Table;
 use super::{CameraPlace, Labels, Regions, Scene, WorldBox};
 use crate::input::InputError;
 
@@ -64,13 +65,13 @@ impl WadMap {
     /// Decodes one map: the named one, or the only one.
     ///
     /// # Errors
-    /// The offset of the first thing that is wrong.
+    /// The first thing that is wrong, by its byte.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap, InputError> {
         let wad = Wad::open(bytes, file)?;
         let of = wad.tables(map)?;
         let vertex = |table: &Table, i: usize, at: usize| -> Result<[i32; 2], InputError> {
-            let v = table.index(i, at, &of.vertices)?;
-            Ok([0, 2].map(|at| of.vertices.int(v, at) as i32))
+            let v = table.index16(i, at, &of.vertices)?;
+            Ok([0, 2].map(|at| of.vertices.short(v, at) as i32))
         };
         // The sector on a side of a line (0 right, 1 left), if there is one.
         let sector_of = |line: usize, side: usize| -> Result<Option<u32>, InputError> {
@@ -78,8 +79,8 @@ impl WadMap {
             if of.lines.word(line, at) == u16::MAX {
                 return Ok(None);
             }
-            let side = of.lines.index(line, at, &of.sides)?;
-            Ok(Some(of.sides.index(side, 28, &of.sectors)? as u32))
+            let side = of.lines.index16(line, at, &of.sides)?;
+            Ok(Some(of.sides.index16(side, 28, &of.sectors)? as u32))
         };
         let linedef = |i: usize| -> Result<Linedef, InputError> {
             let sectors = [sector_of(i, 0)?, sector_of(i, 1)?];
@@ -99,16 +100,16 @@ impl WadMap {
         for i in 0..of.segs.len() {
             vertex(&of.segs, i, 0)?;
             vertex(&of.segs, i, 2)?;
-            of.segs.index(i, 6, &of.lines)?;
+            of.segs.index16(i, 6, &of.lines)?;
         }
         let leaf_sector = |i: usize| -> Result<u32, InputError> {
-            let (count, first) = (of.leaves.word(i, 0), of.leaves.index(i, 2, &of.segs)?);
+            let (count, first) = (of.leaves.word(i, 0), of.leaves.index16(i, 2, &of.segs)?);
             if count == 0 || first + usize::from(count) > of.segs.len() {
                 let found = format!("a subsector of {count} segs from {first} on");
                 let expected = format!("at least one, of {}", of.segs.len());
                 return Err(of.leaves.error(i, 0, found, expected));
             }
-            let line = of.segs.index(first, 6, &of.lines)?;
+            let line = of.segs.index16(first, 6, &of.lines)?;
             let side = usize::from(of.segs.word(first, 8) != 0);
             lines[line].sectors[side].ok_or_else(|| {
                 let found = format!("a seg on the missing side of linedef {line}");
@@ -132,11 +133,11 @@ impl WadMap {
         };
         let things = (0..of.things.len()).map(|i| Thing {
             at: of.things.point(i, 0),
-            angle_deg: of.things.int(i, 4),
+            angle_deg: of.things.short(i, 4),
             kind: of.things.word(i, 6),
         });
         let sectors = (0..of.sectors.len()).map(|i| SectorRecord {
-            heights: [0, 2].map(|at| of.sectors.int(i, at)),
+            heights: [0, 2].map(|at| of.sectors.short(i, at)),
             tag: of.sectors.word(i, 24),
         });
         Ok(WadMap {

@@ -53,7 +53,7 @@ pub fn read_gltf(
     let numbers = meshes.clone().map(|mesh| file.numbers(mesh));
     let numbers = numbers.fold(0, u64::saturating_add);
     let needed = numbers.saturating_mul(BYTES_PER_NUMBER);
-    memory::check_fits(name, needed, options.structures, memory::free_for(numbers))?;
+    memory::check_fits(name, needed, options.structures, numbers)?;
     let meshes: Vec<Mesh> = meshes
         .map(|mesh| file.mesh(mesh))
         .collect::<Result<_, _>>()?;
@@ -239,12 +239,7 @@ impl File<'_> {
             options.per_triangle,
             options.structures,
         );
-        memory::check_fits(
-            name,
-            needed,
-            options.structures,
-            memory::free_for(triangles.max(points)),
-        )?;
+        memory::check_fits(name, needed, options.structures, triangles.max(points))?;
         if triangles.max(points) > u64::from(u32::MAX) / 4 {
             let found = format!("{triangles} triangles");
             return Err(self.error("meshes".to_owned(), found, "at most a billion"));

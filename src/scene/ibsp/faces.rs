@@ -4,9 +4,10 @@
 
 use glam::{DVec3, Vec3};
 
-use super::lumps::Lump;
 use crate::geometry::Aabb;
 use crate::input::InputError;
+use crate::scene::bsp::clipped;
+use crate::scene::records::Table;
 
 /// Points, and triangles as indices into them.
 pub type Faces = (Vec<Vec3>, Vec<[u32; 3]>);
@@ -61,7 +62,7 @@ pub fn bounds_of(points: &[Vec3]) -> Aabb {
 ///
 /// # Errors
 /// Sides that are not.
-pub fn brush_box(brushes: &Lump, brush: usize, sides: &[(Vec3, f32)]) -> Result<Aabb, InputError> {
+pub fn brush_box(brushes: &Table, brush: usize, sides: &[(Vec3, f32)]) -> Result<Aabb, InputError> {
     let mut bounds = Aabb::EMPTY;
     for axis in 0..3 {
         let pair = sides.get(2 * axis..2 * axis + 2);
@@ -91,7 +92,7 @@ pub fn brush(sides: &[(Vec3, f32)], bounds: &Aabb) -> Option<Faces> {
     for (at, side) in sides.iter().enumerate() {
         let mut polygon = square(*side, bounds)?;
         for (_, other) in sides.iter().enumerate().filter(|(other, _)| *other != at) {
-            polygon = behind(&polygon, *other);
+            polygon = clipped(&polygon, |p| other.1 - other.0.dot(p));
         }
         let mut corners: Vec<u32> = Vec::with_capacity(polygon.len());
         for p in polygon {
@@ -130,20 +131,4 @@ fn square((n, d): (DVec3, f64), bounds: &Aabb) -> Option<Vec<DVec3>> {
     }
     let is_plane = corners.iter().all(|p| p.is_finite());
     is_plane.then(|| corners.to_vec())
-}
-
-/// The part of a polygon behind a plane (Sutherland and Hodgman 1974).
-fn behind(polygon: &[DVec3], (n, d): (DVec3, f64)) -> Vec<DVec3> {
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (i, &p) in polygon.iter().enumerate() {
-        let previous = polygon[(i + polygon.len() - 1) % polygon.len()];
-        let (a, b) = (n.dot(previous) - d, n.dot(p) - d);
-        if (a > 0.0) != (b > 0.0) {
-            kept.push(previous + (p - previous) * (a / (a - b)));
-        }
-        if b <= 0.0 {
-            kept.push(p);
-        }
-    }
-    kept
 }

@@ -13,8 +13,9 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use self::faces::{PER_PATCH, bounds_of, brush, brush_box, patch};
-use self::lumps::{Lump, lump};
+use self::lumps::lump;
 pub use self::tree::{LeafChild, LeafNode, LeafTree};
+use super::records::Table;
 use super::{
     CameraPlace, ItemKind, Labels, LoadOptions, Regions, Scene, SurfaceKind, Surfaces, WorldBox,
     memory,
@@ -120,7 +121,7 @@ impl Items {
 }
 
 /// Effect of a shader on light.
-fn kind_of(shaders: &Lump, shader: usize, is_drawn: bool) -> SurfaceKind {
+fn kind_of(shaders: &Table, shader: usize, is_drawn: bool) -> SurfaceKind {
     let [flags, contents] = [64, 68].map(|at| shaders.int(shader, at));
     let hides = contents & (SOLID | TRANSLUCENT) == SOLID;
     match hides && !(is_drawn && flags & NO_DRAW != 0) {
@@ -203,9 +204,9 @@ pub fn read_ibsp(
 ///
 /// It would be much larger in memory than in the file.
 fn check_counts(
-    surfaces: &Lump,
-    [vertices, corners]: [&Lump; 2],
-    [brushes, sides]: [&Lump; 2],
+    surfaces: &Table,
+    [vertices, corners]: [&Table; 2],
+    [brushes, sides]: [&Table; 2],
     name: &str,
     options: &LoadOptions,
 ) -> Result<(), InputError> {
@@ -235,21 +236,16 @@ fn check_counts(
     let needed = memory::needed_by_items(items, options.structures).saturating_add(
         memory::needed_by_triangles(triangles, options.per_triangle, 0),
     );
-    memory::check_fits(
-        name,
-        needed,
-        options.structures,
-        memory::free_for(triangles),
-    )
+    memory::check_fits(name, needed, options.structures, triangles)
 }
 
 type Surface = (&'static str, Aabb, faces::Faces);
 
 /// Kind, box and triangles of a surface, if it has any.
 fn faces_of(
-    surfaces: &Lump,
+    surfaces: &Table,
     i: usize,
-    [vertices, corners]: [&Lump; 2],
+    [vertices, corners]: [&Table; 2],
 ) -> Result<Option<Surface>, InputError> {
     let of_vertex = |vertex| vertices.vector(vertex, 0);
     let points = surfaces.range(i, 12, vertices)?.map(of_vertex);

@@ -2,11 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
-use super::lumps::Lump;
 use crate::arithmetic::Expansion;
 use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
 use crate::input::InputError;
 use crate::query::ItemId;
+use crate::scene::records::Table;
 
 /// Most nodes on the way to a leaf; maps have less than a hundred.
 const MOST_DEEP: u32 = 1 << 12;
@@ -67,9 +67,9 @@ impl LeafNode {
 impl LeafTree {
     /// Links the tree; `clusters` is their number, where the file states it.
     pub fn read(
-        nodes: &Lump,
-        leaves: &Lump,
-        planes: &Lump,
+        nodes: &Table,
+        leaves: &Table,
+        planes: &Table,
         clusters: Option<usize>,
     ) -> Result<LeafTree, InputError> {
         let reached = reached_leaves(nodes, leaves)?;
@@ -152,7 +152,7 @@ impl LeafTree {
 ///
 /// # Errors
 /// Nodes that form no tree, or a very deep one.
-fn reached_leaves(nodes: &Lump, leaves: &Lump) -> Result<Vec<bool>, InputError> {
+fn reached_leaves(nodes: &Table, leaves: &Table) -> Result<Vec<bool>, InputError> {
     let error = |node, at, found: String| Err(nodes.error(node, at, found, "a BSP tree"));
     if nodes.len() == 0 {
         return error(0, 0, "no nodes".to_owned());

@@ -6,8 +6,7 @@ use std::collections::HashSet;
 use std::fmt;
 use std::ops::Range;
 
-use glam::DVec2;
-
+use super::records::{Table, int_at, range_within};
 use crate::input::InputError;
 use crate::shown::first_of;
 
@@ -183,7 +182,7 @@ impl<'a> Wad<'a> {
                 return Err(self.error(start, found, format!("a multiple of {record} bytes")));
             }
             Ok(Table {
-                wad: self,
+                file: self.file,
                 name: of,
                 start,
                 data,
@@ -221,13 +220,11 @@ impl<'a> Wad<'a> {
     /// The bytes of a lump; an empty range at the directory entry for an empty lump,
     /// whose place means nothing.
     fn range(&self, lump: &Lump) -> Result<Range<usize>, InputError> {
-        let [offset, size] = [0, 4].map(|at| i32_at(self.bytes, lump.entry + at));
+        let [offset, size] = [0, 4].map(|at| int_at(self.bytes, lump.entry + at));
         if size == 0 {
             return Ok(lump.entry..lump.entry);
         }
-        let range = usize::try_from(offset).ok().zip(usize::try_from(size).ok());
-        let range = range.and_then(|(offset, size)| Some(offset..offset.checked_add(size)?));
-        let whole = range.filter(|range| range.end <= self.bytes.len());
+        let whole = range_within(offset, size, self.bytes.len());
         whole.ok_or_else(|| {
             let found = format!("lump {} at {offset}, {size} bytes long", lump.name);
             let expected = format!("a lump within the file's {} bytes", self.bytes.len());
@@ -241,7 +238,7 @@ impl<'a> Wad<'a> {
             return Err(self.error(self.bytes.len(), "the end of the file", "a 12 byte header"));
         }
         let int = |at: usize| {
-            let value = i32_at(self.bytes, at);
+            let value = int_at(self.bytes, at);
             let expected = "a count or offset of at least 0";
             usize::try_from(value).map_err(|_| self.error(at, value.to_string(), expected))
         };
@@ -256,63 +253,6 @@ impl<'a> Wad<'a> {
     ) -> InputError {
         InputError::byte(self.file, offset, found, expected)
     }
-}
-
-/// A lump of fixed-size records.
-pub struct Table<'a> {
-    wad: &'a Wad<'a>,
-    name: &'static str,
-    /// Offset of its first byte in the file.
-    start: usize,
-    data: &'a [u8],
-    record: usize,
-}
-
-impl Table<'_> {
-    pub fn len(&self) -> usize {
-        self.data.len() / self.record
-    }
-
-    /// The unsigned 16-bit field at byte `at` of record `i`.
-    pub fn word(&self, i: usize, at: usize) -> u16 {
-        let start = i * self.record + at;
-        u16::from_le_bytes([self.data[start], self.data[start + 1]])
-    }
-
-    /// The signed 16-bit field, as a coordinate.
-    pub fn int(&self, i: usize, at: usize) -> f64 {
-        f64::from(self.word(i, at) as i16)
-    }
-
-    /// Two signed 16-bit fields, x then y.
-    pub fn point(&self, i: usize, at: usize) -> DVec2 {
-        DVec2::new(self.int(i, at), self.int(i, at + 2))
-    }
-
-    /// A field that counts records of another table.
-    pub fn index(&self, i: usize, at: usize, of: &Table) -> Result<usize, InputError> {
-        let index = usize::from(self.word(i, at));
-        if index < of.len() {
-            return Ok(index);
-        }
-        let found = format!("{} {index} in {} {i}", of.name, self.name);
-        Err(self.error(i, at, found, format!("less than {}", of.len())))
-    }
-
-    pub fn error(
-        &self,
-        i: usize,
-        at: usize,
-        found: impl fmt::Display,
-        expected: impl fmt::Display,
-    ) -> InputError {
-        let offset = self.start + i * self.record + at;
-        self.wad.error(offset, found, expected)
-    }
-}
-
-fn i32_at(bytes: &[u8], at: usize) -> i32 {
-    i32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
 #[cfg(test)]

@@ -1,12 +1,8 @@
 //! Generated meshes: scenes of triangles, each from a number of triangles and a
 //! seed. One file a mesh; the table `MESHES` in `generate` names them all.
 
-pub mod forest;
-mod icosphere;
-mod shapes;
+pub mod ground;
 pub mod spheres;
-pub mod statue;
-pub mod terrain;
 
 #[cfg(test)]
 mod tests {
@@ -116,7 +112,7 @@ mod tests {
             let surfaces = mesh.mesh(20_000, 11);
             for item in 0..surfaces.items() {
                 // Ground is open, and so are the cards of bushes.
-                let is_tile = surfaces.of_item[item].len() == terrain::TILE;
+                let is_tile = surfaces.of_item[item].len() == ground::TILE;
                 let is_bush = surfaces.kinds[item] == SurfaceKind::CutOut;
                 if !is_tile && !is_bush {
                     assert_eq!(surfaces.open_edges(item), 0, "{} {item}", mesh.name);

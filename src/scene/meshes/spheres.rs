@@ -1,18 +1,23 @@
-//! A field of spheres in space: many closed objects, each with all directions.
+//! Spheres and a statue, both from the geodesic sphere: an icosahedron whose faces are
+//! cut into f² triangles, pushed out to the sphere. Neighbouring faces share the points of
+//! their edge.
+
+use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-use super::super::{SurfaceKind, Surfaces};
-use super::icosphere::icosphere;
-use crate::scene::SeededRng;
+use crate::scene::rng::fractal;
+use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 
 /// Cuts along the edges of the icosahedron.
 const FREQUENCY: u32 = 8;
 /// Distance of the centres before they are moved, world units.
 const SPACING: f64 = 6.0;
 
-/// Spheres near the points of a lattice; none touches another.
-pub fn build(triangles: usize, seed: u64) -> Surfaces {
+/// A field of spheres in space, each with all directions.
+///
+/// They lie near the points of a lattice; none touches another.
+pub fn spheres(triangles: usize, seed: u64) -> Surfaces {
     let (directions, faces) = icosphere(FREQUENCY);
     let count = (triangles / faces.len()).max(1);
     let side = libm::ceil(libm::cbrt(count as f64)) as usize;
@@ -35,16 +40,186 @@ pub fn build(triangles: usize, seed: u64) -> Surfaces {
     surfaces
 }
 
+/// Bulges (positive) and hollows of the body.
+const LOBES: usize = 12;
+/// How much taller than wide it is.
+const TALL: f64 = 1.8;
+/// Radius without bulges, world units.
+const RADIUS: f64 = 1.0;
+
+/// A statue-like blob of about `triangles` triangles in one item: a sphere whose radius
+/// changes with the direction, smoothly at large and roughly at small.
+///
+/// Each direction meets the surface once, so it is closed and never crosses itself.
+pub fn statue(triangles: usize, seed: u64) -> Surfaces {
+    let frequency = libm::sqrt(triangles as f64 / 20.0) as u32;
+    let (directions, faces) = icosphere(frequency);
+    let shape = Body::new(seed);
+    let points: Vec<Vec3> = directions
+        .iter()
+        .map(|d| (*d * DVec3::new(1.0, 1.0, TALL) * shape.radius(*d)).as_vec3())
+        .collect();
+    let mut surfaces = Surfaces::about(DVec3::ZERO);
+    surfaces.push(SurfaceKind::Opaque, false, &points, &faces);
+    surfaces
+}
+
+struct Body {
+    seed: u64,
+    /// Direction, height and sharpness of each.
+    lobes: Vec<(DVec3, f64, f64)>,
+}
+
+impl Body {
+    fn new(seed: u64) -> Body {
+        let mut rng = SeededRng::new(seed);
+        let lobes = (0..LOBES).map(|_| {
+            let direction = rng.normal3().normalize_or(DVec3::Z);
+            (direction, rng.between(-0.3, 0.6), rng.between(4.0, 30.0))
+        });
+        Body {
+            seed,
+            lobes: lobes.collect(),
+        }
+    }
+
+    /// Between 0.2 and some units.
+    fn radius(&self, d: DVec3) -> f64 {
+        let bulge = |(at, height, sharp): &(DVec3, f64, f64)| {
+            height * libm::exp(-sharp * (1.0 - at.dot(d)))
+        };
+        let large: f64 = self.lobes.iter().map(bulge).sum();
+        let small = fractal(d * 6.0, 5, self.seed) - 0.5;
+        (RADIUS * (1.0 + large + 0.15 * small)).max(0.2)
+    }
+}
+
+/// Golden ratio.
+const PHI: f64 = 1.618_033_988_749_895;
+
+const CORNERS: [[f64; 3]; 12] = [
+    [-1.0, PHI, 0.0],
+    [1.0, PHI, 0.0],
+    [-1.0, -PHI, 0.0],
+    [1.0, -PHI, 0.0],
+    [0.0, -1.0, PHI],
+    [0.0, 1.0, PHI],
+    [0.0, -1.0, -PHI],
+    [0.0, 1.0, -PHI],
+    [PHI, 0.0, -1.0],
+    [PHI, 0.0, 1.0],
+    [-PHI, 0.0, -1.0],
+    [-PHI, 0.0, 1.0],
+];
+
+/// Counter-clockwise from outside.
+const FACES: [[usize; 3]; 20] = [
+    [0, 11, 5],
+    [0, 5, 1],
+    [0, 1, 7],
+    [0, 7, 10],
+    [0, 10, 11],
+    [1, 5, 9],
+    [5, 11, 4],
+    [11, 10, 2],
+    [10, 7, 6],
+    [7, 1, 8],
+    [3, 9, 4],
+    [3, 4, 2],
+    [3, 2, 6],
+    [3, 6, 8],
+    [3, 8, 9],
+    [4, 9, 5],
+    [2, 4, 11],
+    [6, 2, 10],
+    [8, 6, 7],
+    [9, 8, 1],
+];
+
+/// Unit directions and the triangles between them: 20 f² triangles and 10 f² + 2
+/// points for a frequency f >= 1.
+pub fn icosphere(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let f = frequency.max(1);
+    let mut sphere = Sphere {
+        frequency: f,
+        ids: HashMap::new(),
+        points: Vec::new(),
+    };
+    let mut triangles = Vec::new();
+    for face in FACES {
+        for j in 0..f {
+            for i in 0..f - j {
+                let mut at = |i: u32, j: u32| sphere.point(face, [f - i - j, i, j]);
+                let (a, b, c) = (at(i, j), at(i + 1, j), at(i, j + 1));
+                triangles.push([a, b, c]);
+                if i + j + 1 < f {
+                    triangles.push([b, at(i + 1, j + 1), c]);
+                }
+            }
+        }
+    }
+    (sphere.points, triangles)
+}
+
+struct Sphere {
+    frequency: u32,
+    /// Point of each set of corners with their weights, without those of weight zero.
+    ids: HashMap<[(usize, u32); 3], u32>,
+    points: Vec<DVec3>,
+}
+
+impl Sphere {
+    fn point(&mut self, face: [usize; 3], weights: [u32; 3]) -> u32 {
+        let mut key = [0, 1, 2].map(|k| match weights[k] {
+            0 => (usize::MAX, 0),
+            weight => (face[k], weight),
+        });
+        // The same sum in the same order, whichever face asks.
+        key.sort_unstable();
+        let (next, frequency) = (self.points.len() as u32, f64::from(self.frequency));
+        *self.ids.entry(key).or_insert_with(|| {
+            let parts = key.iter().filter(|(_, weight)| *weight > 0);
+            let sum = parts.fold(DVec3::ZERO, |sum, &(corner, weight)| {
+                sum + DVec3::from(CORNERS[corner]) * (f64::from(weight) / frequency)
+            });
+            self.points.push(sum.normalize());
+            next
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn spheres_are_apart_from_each_other() {
-        let surfaces = build(64 * 1280, 5);
+        let surfaces = spheres(64 * 1280, 5);
         let boxes: Vec<_> = (0..surfaces.items()).map(|i| surfaces.bounds(i)).collect();
         for (i, a) in boxes.iter().enumerate() {
             assert!(boxes[..i].iter().all(|b| !a.intersects(b)));
+        }
+    }
+
+    #[test]
+    fn the_centre_is_behind_every_triangle() {
+        let surfaces = statue(30_000, 2);
+        for [a, b, c] in surfaces.of(0).map(|c| c.map(Vec3::as_dvec3)) {
+            assert!(a.dot(b.cross(c)) > 0.0);
+        }
+        assert_eq!(surfaces.open_edges(0), 0);
+    }
+
+    #[test]
+    fn euler_counts_and_outward_faces() {
+        for f in [1, 2, 7] {
+            let (points, triangles) = icosphere(f);
+            assert_eq!(triangles.len(), 20 * (f * f) as usize);
+            assert_eq!(points.len(), 10 * (f * f) as usize + 2);
+            for [a, b, c] in &triangles {
+                let [a, b, c] = [a, b, c].map(|&p| points[p as usize]);
+                assert!(a.dot(b.cross(c)) > 0.0);
+            }
         }
     }
 }

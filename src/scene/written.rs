@@ -1,13 +1,42 @@
-//! Region search made exact: points and boxes as they were written, as indexes take
-//! them, and the exact test of the candidates that an index returns.
+//! Boxes and points as they were written, in f64, beside the f32 that indexes hold, and
+//! region search made exact by them: the exact test of the candidates of an index.
+
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::originals::Originals;
-use super::{Regions, Scene, WorldBox};
+use super::{Regions, Scene, WorldBox, bad_item};
 use crate::arithmetic::two_sum;
 use crate::geometry::{Aabb, ConvexVolume};
+use crate::input::InputError;
 use crate::query::ItemId;
+
+/// The boxes as written, kept only where f32 holds one of them otherwise.
+#[derive(Clone, Default, Debug)]
+pub struct Originals {
+    boxes: Arc<[WorldBox]>,
+}
+
+impl Originals {
+    /// `stored` are the same boxes as indexes have them, about `origin`.
+    pub(super) fn of(written: &[WorldBox], stored: &[Aabb], origin: DVec3) -> Originals {
+        let same = |written: f64, stored: f32, origin: f64| {
+            two_sum(origin, f64::from(stored)) == (written, 0.0)
+        };
+        let exact = written.iter().zip(stored).all(|(w, s)| {
+            (0..3)
+                .all(|k| same(w.min[k], s.min[k], origin[k]) && same(w.max[k], s.max[k], origin[k]))
+        });
+        Originals {
+            boxes: if exact { &[] } else { written }.into(),
+        }
+    }
+
+    /// In world coordinates; `None` if the stored boxes are the very same.
+    pub fn boxes(&self) -> Option<&[WorldBox]> {
+        (!self.boxes.is_empty()).then_some(&self.boxes)
+    }
+}
 
 /// A point to search for: as it was written, and as indexes take it.
 ///
@@ -181,10 +210,69 @@ fn retain_from(first: usize, ids: &mut Vec<ItemId>, keep: impl Fn(ItemId) -> boo
     ids.truncate(kept);
 }
 
+impl Scene {
+    /// The items as they were written, world coordinates. Exact: where no
+    /// original is kept, origin and stored box add up without rounding.
+    pub fn written(&self) -> impl Iterator<Item = WorldBox> {
+        let originals = self.originals.boxes();
+        let items = self.items.iter().enumerate();
+        items.map(move |(id, item)| match originals {
+            Some(boxes) => boxes[id],
+            None => WorldBox::of(item, self.origin),
+        })
+    }
+
+    /// The scene as it is read back from a boxes file: the same boxes, as they
+    /// were written, and labels; no triangles, regions, camera places or own tree.
+    ///
+    /// Almost always the stored items are the very same too. Where the reader
+    /// chooses another origin (a map whose zero lies far away), they are rounded
+    /// about that one.
+    ///
+    /// # Errors
+    /// An item that lies beyond what the reader
+    /// takes: the range of f32, in world coordinates.
+    pub fn settled(self) -> Result<Scene, InputError> {
+        let most = f64::from(f32::MAX);
+        let within = |v: DVec3| v.abs().cmple(DVec3::splat(most)).all();
+        let boxes: Vec<WorldBox> = self.written().collect();
+        let outside = boxes.iter().position(|b| !within(b.min) || !within(b.max));
+        if let Some(item) = outside {
+            let found = format_args!("in world coordinates beyond +-{most:e}");
+            return Err(bad_item(&self.name, item, found, "less in a file"));
+        }
+        Ok(Scene {
+            labels: self.labels,
+            skipped_items: self.skipped_items,
+            up: self.up,
+            unit: self.unit,
+            ..Scene::from_boxes(self.name, &boxes)?
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::{LoadOptions, load, read_boxes_csv, write_boxes_csv};
     use super::*;
+    use crate::scene::{Scene, WorldBox};
     use dashu_int::IBig;
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    #[test]
+    fn what_f32_holds_exactly_needs_no_second_look() {
+        let boxes = [WorldBox::new(DVec3::ZERO, DVec3::ONE)];
+        let scene = Scene::about("exact", &boxes, DVec3::ZERO).expect("a scene");
+        assert!(scene.originals.boxes().is_none());
+        let p = scene.sought(DVec3::splat(0.5));
+        assert!(!scene.is_refined(&p));
+        let p = scene.sought(DVec3::new(1.0 + 1e-12, 0.5, 0.5));
+        let mut found = vec![0];
+        assert!(scene.is_refined(&p) && p.local.x == 1.0);
+        scene.refine(&p, &mut found, 0);
+        assert!(found.is_empty());
+    }
 
     #[test]
     fn boxes_beyond_f32_are_searched_by_what_lies_within() {
@@ -241,5 +329,101 @@ mod tests {
             ties += u32::from(wanted == 0);
         }
         assert!(ties > 1000, "{ties}");
+    }
+
+    fn written(scene: &Scene) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        write_boxes_csv(scene, &mut bytes).unwrap();
+        bytes
+    }
+
+    /// Writes, reads and writes again; what was read.
+    fn there_and_back(scene: &Scene) -> Scene {
+        let kept = scene.clone().settled().unwrap();
+        let bytes = written(&kept);
+        let read = read_boxes_csv(&bytes[..], "b.csv", false).unwrap();
+        // Zero may lose its sign on the way, and nothing else may change.
+        assert_eq!((kept.origin, &kept.items), (read.origin, &read.items));
+        assert_eq!(kept.bounds, read.bounds);
+        assert_eq!(kept.originals.boxes(), read.originals.boxes());
+        assert!(scene.written().eq(read.written()), "{}", scene.name);
+        assert!(written(&read.clone().settled().unwrap()) == bytes);
+        read
+    }
+
+    #[test]
+    fn every_kind_of_scene_is_read_back_with_the_same_items() {
+        for source in [
+            "uniform:n=0",
+            "uniform:n=200",
+            "uniform:n=200,offset=1e7",
+            "city:n=200,offset=-123456.789",
+            "forest:n=200,offset=1e9",
+            "rooms:n=200,seed=3",
+            "clustered:n=200,offset=3e15",
+            "freedm-map12",
+            "helsinki",
+            "us-counties",
+            "mesh:terrain:n=5000",
+            "mesh:forest:n=5000",
+        ] {
+            let scene = load(source, &LoadOptions::default()).unwrap();
+            let read = there_and_back(&scene);
+            let is_same = (scene.origin, &scene.items) == (read.origin, &read.items);
+            // A map's own zero is not what a reader chooses.
+            assert!(is_same || source.starts_with("freedm"), "{source}");
+        }
+    }
+
+    #[test]
+    fn another_origin_is_taken_once() {
+        let b = |low: f64, high: f64| WorldBox::new(DVec3::splat(low), DVec3::splat(high));
+        // A map's own zero, far away.
+        let far = [b(1e7 + 0.1, 1e7 + 1.7), b(1e7 + 3.3, 1e7 + 3.3)];
+        let map = Scene::about("map", &far, DVec3::ZERO).unwrap();
+        let read = there_and_back(&map);
+        // Stored about the map's zero they were a step of f32 larger.
+        assert!(read.origin.x > 9e6 && read.world_bounds().min.x > map.world_bounds().min.x);
+        // Rounded outward, these are a power of two wide.
+        for shift in 0..64 {
+            let low = 1e7 + 0.3 + 16.0 * f64::from(shift);
+            let wide = [b(low, low + 1.0), b(low + 5.0, low + 1_023.999_99)];
+            let scene = Scene::from_boxes("wide", &wide).unwrap();
+            there_and_back(&scene);
+        }
+    }
+
+    #[test]
+    fn what_the_reader_does_not_take_is_refused() {
+        let scene = load("uniform:n=3,offset=1e39", &LoadOptions::default()).unwrap();
+        let error = scene.settled().unwrap_err().to_string();
+        assert!(error.contains("item 0") && error.contains("3.4"), "{error}");
+    }
+
+    proptest! {
+        /// Any boxes about any origin: what is read back are the very same, and
+        /// they are written the same.
+        #[test]
+        fn nothing_is_lost_and_the_second_time_is_the_first(
+            centre in prop::num::f64::NORMAL.prop_map(|v| v % 1e12),
+            edges in prop::collection::vec((-1e3f64..1e3, 0.0f64..50.0), 1..12),
+            origin in prop_oneof![Just(0.0), -1e9f64..1e9],
+        ) {
+            let boxes: Vec<WorldBox> = edges
+                .iter()
+                .map(|(at, edge)| {
+                    let min = DVec3::new(centre + at, *at, centre - at);
+                    WorldBox::new(min, min + *edge)
+                })
+                .collect();
+            for scene in [
+                Scene::from_boxes("chosen", &boxes),
+                Scene::about("given", &boxes, DVec3::splat(origin)),
+            ] {
+                let scene = scene.unwrap();
+                prop_assert!(scene.written().eq(boxes.iter().copied()));
+                there_and_back(&scene);
+            }
+        }
     }
 }

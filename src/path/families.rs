@@ -1,0 +1,213 @@
+//! Generated paths, one function per family; `street` and `walk` have files of their own.
+
+use glam::DVec3;
+
+use super::{PathError, Pose, Stage};
+use crate::camera::Frame;
+use crate::scene::{CameraPlace, PlaceView};
+use crate::spec::Spec;
+
+/// A circle about the scene: everything turns past.
+///
+/// `radius` is in half diagonals, `height` (of the eye above the centre) in radii.
+pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    let radius = spec.number_between("radius", 0.6, 0.0, 1e6)? * stage.radius();
+    let height = spec.number("height", 0.35)? * radius;
+    let pose = |turn: f64| {
+        let angle = std::f64::consts::TAU * turn;
+        let arm = DVec3::new(libm::cos(angle) * radius, libm::sin(angle) * radius, height);
+        Pose::new(stage.centre() + arm, -arm)
+    };
+    Ok(stage.turns().map(pose).collect())
+}
+
+/// A closed flight through `waypoints` seeded points within the scene's middle: the
+/// coherent path of a game or a film camera.
+pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    let count = spec.whole("waypoints", 8, 10_000)?.max(4) as usize;
+    let mut rng = stage.rng();
+    let (low, extent) = (stage.bounds.min, stage.extent());
+    let points: Vec<DVec3> = (0..count)
+        .map(|_| {
+            let share = rng.point() * 0.8 + 0.1;
+            let z = stage.flight_level(share.z);
+            (low + extent * share).with_z(z)
+        })
+        .collect();
+    let step = 1e-3;
+    let pose = |turn: f64| {
+        let at = turn * count as f64;
+        let eye = spline(&points, at);
+        // Slightly downward, as a pilot looks.
+        let ahead = (spline(&points, at + step) - eye) / step;
+        let forward = ahead - DVec3::Z * 0.15 * ahead.length();
+        let moving = forward.length() > 1e-9 * stage.radius();
+        Pose::new(eye, if moving { forward } else { DVec3::X })
+    };
+    Ok(stage.turns().map(pose).collect())
+}
+
+/// A closed centripetal Catmull-Rom spline at `at` (segment number plus
+/// fraction), by the pyramid of Barry and Goldman 1988; no loops and no cusps
+/// within a segment (Yuksel et al. 2011).
+fn spline(points: &[DVec3], at: f64) -> DVec3 {
+    let n = points.len();
+    let segment = at.floor();
+    let point = |k: usize| points[(segment as usize + n + k - 1) % n];
+    let p = [point(0), point(1), point(2), point(3)];
+    let mut knots = [0.0; 4];
+    for i in 1..4 {
+        let gap = (p[i] - p[i - 1]).length().sqrt();
+        knots[i] = knots[i - 1] + gap.max(1e-12);
+    }
+    let t = knots[1] + (knots[2] - knots[1]) * (at - segment);
+    let mix = |a: DVec3, b: DVec3, from: usize, to: usize| {
+        a + (b - a) * ((t - knots[from]) / (knots[to] - knots[from]))
+    };
+    let a = [
+        mix(p[0], p[1], 0, 1),
+        mix(p[1], p[2], 1, 2),
+        mix(p[2], p[3], 2, 3),
+    ];
+    let b = [mix(a[0], a[1], 0, 2), mix(a[1], a[2], 1, 3)];
+    mix(b[0], b[1], 1, 2)
+}
+
+/// A turn in place by the camera's own yaw: the eye rests, the view changes.
+pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    let eye = stage.centre().with_z(stage.flight_level(0.3));
+    let level = Frame::looking_along(eye, DVec3::X, DVec3::Z);
+    let mut frame = level.map_err(|error| PathError::unfit("spin", error))?;
+    let step = 360.0 / stage.count as f64;
+    let poses = (0..stage.count).map(|_| {
+        let pose = Pose::new(frame.eye, frame.forward());
+        frame.yaw(step);
+        pose
+    });
+    Ok(poses.collect())
+}
+
+/// The lecture's zoom in both of its senses: the eye moves along the look, then rests
+/// while the field of view narrows. `power` is the magnification at the end.
+pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    let power = spec.number_between("power", 8.0, 1.0, 1e6)?;
+    let forward = DVec3::new(0.8, 0.5, -0.3).normalize();
+    let from = stage.centre() - forward * stage.radius();
+    let pose = |t: f64| {
+        // From the rim to a tenth of the way before the centre.
+        let travelled = (2.0 * t).min(1.0) * 0.9 * stage.radius();
+        let magnification = libm::pow(power, (2.0 * t - 1.0).max(0.0));
+        Pose {
+            magnification,
+            ..Pose::new(from + forward * travelled, forward)
+        }
+    };
+    Ok(stage.turns().map(pose).collect())
+}
+
+/// Unrelated views: the eye jumps, so nothing of the last frame helps.
+pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    let mut rng = stage.rng();
+    let poses = (0..stage.count).map(|_| {
+        let share = rng.point();
+        let z = stage.flight_level(share.z);
+        let eye = (stage.bounds.min + stage.extent() * share).with_z(z);
+        // Normal components: every direction is equally likely.
+        let forward = rng.normal3();
+        let forward = if forward == DVec3::ZERO {
+            DVec3::X
+        } else {
+            forward
+        };
+        Pose::new(eye, forward)
+    });
+    Ok(poses.collect())
+}
+
+/// The whole scene from outside: everything is visible, so the cost of the answer
+/// itself shows. Eyes on a Fibonacci spiral over the sphere, far enough away for any
+/// field of view above 30 degrees to take in the scene's bounding sphere.
+pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+    // 1/sin(15 degrees) = 3.86 radii.
+    let distance = 4.0 * stage.radius();
+    let pose = |turn: f64| {
+        let i = turn * stage.count as f64;
+        let z = 0.98 * (1.0 - 2.0 * turn);
+        let ring = (1.0 - z * z).sqrt();
+        let arm = DVec3::new(
+            ring * libm::cos(i * GOLDEN_ANGLE),
+            ring * libm::sin(i * GOLDEN_ANGLE),
+            z,
+        );
+        Pose::new(stage.centre() + arm * distance, -arm)
+    };
+    Ok(stage.turns().map(pose).collect())
+}
+
+/// The scene's own camera places: things of Doom maps, cameras of glTF. Roll and lens
+/// are the file's, where it states them.
+pub(super) fn places(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    if stage.scene.places.is_empty() {
+        let reason = format!(
+            "scene '{}' has no camera places of its own; expected one with places, such as a Doom map",
+            stage.scene.name
+        );
+        return Err(PathError::unfit("places", reason));
+    }
+    let places = stage.scene.places.iter();
+    Ok(places.map(|place| pose(stage, place)).collect())
+}
+
+pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
+    let turned = |v| stage.up.to_z_up(v);
+    let view = place.view.map(|view| PlaceView {
+        up: turned(view.up),
+        ..view
+    });
+    Pose {
+        view,
+        ..Pose::new(turned(place.eye), turned(place.forward))
+    }
+}
+
+/// The camera that the animation of a scene's file moves, at even times.
+pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    let unfit = |reason: String| PathError::unfit("animation", reason);
+    let Some(animation) = &stage.scene.animation else {
+        let name = &stage.scene.name;
+        return Err(unfit(format!(
+            "scene '{name}' has no animated camera; expected a glTF file with one"
+        )));
+    };
+    let [first, last] = animation.seconds;
+    let step = (last - first) / stage.count.saturating_sub(1).max(1) as f64;
+    let times = (0..stage.count).map(|frame| first + step * frame as f64);
+    let pose = |time: f64| match animation.at(time) {
+        Some(place) => Ok(pose(stage, &place)),
+        None => Err(unfit(format!(
+            "no direction of view at {time} s; expected a rotation that is not zero"
+        ))),
+    };
+    times.map(pose).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spline_passes_through_its_points_without_jumps() {
+        let points = [
+            DVec3::ZERO,
+            DVec3::X,
+            DVec3::new(3.0, 2.0, 0.0),
+            DVec3::new(0.0, 5.0, 1.0),
+        ];
+        for (i, p) in points.iter().enumerate() {
+            assert!((spline(&points, i as f64) - *p).length() < 1e-9);
+            let across = spline(&points, i as f64 + 1e-7) - spline(&points, i as f64 + 4.0 - 1e-7);
+            assert!(across.length() < 1e-5);
+        }
+    }
+}
