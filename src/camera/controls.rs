@@ -5,7 +5,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::pose::unit;
+use super::frame::unit;
 use super::{Camera, CameraError, Frame, Lens, LensKind, require};
 
 /// Rotations between two corrections: a rotation drifts by about 2e-16, so

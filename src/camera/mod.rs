@@ -6,16 +6,14 @@ mod lens;
 mod margin;
 mod matrix;
 mod planes;
-mod pose;
 mod projection;
 mod unprojected;
 
-pub use frame::{Frame, look_at};
+pub use frame::{Frame, Pose, look_at};
 pub use lens::{Lens, LensKind};
 pub(crate) use margin::check_sums;
 pub use matrix::{FARTHEST, MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, ViewProjection};
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};
-pub use pose::Pose;
 pub use projection::ClipSpace;
 pub use unprojected::Unprojected;
 

@@ -3,34 +3,27 @@
 
 mod arm;
 mod arm_study;
-mod closed_form;
 mod exact;
 mod frames;
-mod orbit;
 mod rated;
 mod rotation;
-mod stability;
-mod walk;
 
 use serde::Serialize;
 
 pub use arm::Method as ArmMethod;
 pub use arm::{ARMS, ArmKind};
-pub use arm_study::{ArmChoice, ArmOptions, ArmPoint};
-pub use frames::Turn;
-pub use orbit::{OrbitDrift, SWING_DEG};
+pub use arm_study::{ArmChoice, ArmOptions, ArmPoint, StabilityLimit};
+pub use frames::{ORBIT_RADIUS, Turn};
 pub use rated::{Rated, Recommendation};
-pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
-pub use stability::StabilityLimit;
+pub use rotation::{OrbitDrift, PERIOD, RotationDrift, SWING_DEG, TurnDrift};
 
 use crate::measure::{
     OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed_rounds, timed_to_end,
 };
 use exact::larger;
-use orbit::{CARRIERS, SWING};
+use frames::{QUERIES, QUERY_STEPS, walking};
 use rated::rated;
-use rotation::{METHODS, Method, STEADY, moments};
-use walk::{QUERIES, QUERY_STEPS, walking};
+use rotation::{CARRIERS, METHODS, Method, STEADY, SWING, moments};
 
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
 pub const MOST_STEPS: u64 = 1_000_000_000;
@@ -133,7 +126,7 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
     }
     for carrier in CARRIERS {
         begin(carrier.name);
-        report.orbit.extend(orbit::drift(carrier, &looks));
+        report.orbit.extend(rotation::orbit_drift(carrier, &looks));
     }
     let mut points = Vec::new();
     for setting in arm_study::settings(&options.arm) {
@@ -146,7 +139,7 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
         tolerance: options.arm.tolerance,
         methods: arm::METHODS,
         points,
-        stability: stability::limits(),
+        stability: arm_study::limits(),
         choices: Vec::new(),
     };
     report

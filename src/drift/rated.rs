@@ -2,9 +2,8 @@
 
 use serde::Serialize;
 
-use super::orbit;
+use super::frames::QUERY_STEPS;
 use super::rotation::{self, Method};
-use super::walk::QUERY_STEPS;
 use crate::measure::OverProcesses;
 use crate::statistics::{ALPHA, Estimate, flat, ranks};
 
@@ -66,7 +65,7 @@ pub fn rated<'m>(
         all.push(Rated {
             name,
             summary: method.summary,
-            is_default: [rotation::TOOLKIT, orbit::TOOLKIT].contains(&name),
+            is_default: [rotation::TOOLKIT, rotation::TOOLKIT_ORBIT].contains(&name),
             error,
             time_per_step: times.ns(task).map(|ns| ns.per(QUERY_STEPS as f64)),
             qualifies: error.is_some_and(|error| error <= tolerance),

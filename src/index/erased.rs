@@ -1,7 +1,11 @@
-//! [`DynIndex`], the object type of all structures.
+//! [`DynIndex`], the object type of all structures, and how it is updated.
 //!
-//! Dispatch happens once per query, never per node: behind each method is a traversal compiled for that structure,
-//! volume, recorder and instruction set.
+//! Dispatch happens once per query, never per node: behind each method is a traversal
+//! compiled for that structure, volume, recorder and instruction set.
+
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::str::FromStr;
 
 use glam::Vec3;
 
@@ -11,6 +15,71 @@ use crate::kernel::{BASELINE, Isa, Kernel, Work};
 use crate::query::{
     AnyVolume, Dispatched, ItemId, Located, NoRecorder, QueryContext, QueryCost, each_volume,
 };
+use crate::spec::{SpecError, parse_number};
+
+/// Runs a closure; returns the message of a panic. The state that the closure has
+/// changed by then stays as it is and must not be relied upon.
+pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let text = panic
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| panic.downcast_ref::<&str>().copied());
+        text.unwrap_or("no message").to_owned()
+    })
+}
+
+/// Work of a frame after items have moved.
+#[derive(Clone, Copy, PartialEq, Default, Debug)]
+#[non_exhaustive]
+pub enum UpdatePolicy {
+    /// A refit; a new build only where the structure cannot refit.
+    #[default]
+    Refit,
+    /// A new build in every frame.
+    Rebuild,
+    /// A new build in every n-th frame, refits in the others.
+    Every(u32),
+    /// Bounds enlarged by this part of an item's size on each side.
+    ///
+    /// Only items that have left theirs are updated; queries return false positives.
+    Fat(f64),
+}
+
+impl fmt::Display for UpdatePolicy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            UpdatePolicy::Refit => f.write_str("refit"),
+            UpdatePolicy::Rebuild => f.write_str("rebuild"),
+            UpdatePolicy::Every(frames) => write!(f, "every={frames}"),
+            UpdatePolicy::Fat(margin) => write!(f, "fat={margin}"),
+        }
+    }
+}
+
+impl FromStr for UpdatePolicy {
+    type Err = SpecError;
+
+    fn from_str(text: &str) -> Result<Self, SpecError> {
+        let (name, value) = text.split_once('=').unwrap_or((text, ""));
+        let whole = || value.parse().ok().filter(|n| (2..=1_000_000).contains(n));
+        let margin = || parse_number(value).filter(|m| *m > 0.0 && *m <= 100.0);
+        let found = match name {
+            "refit" | "rebuild" if text != name => None,
+            "refit" => Some(UpdatePolicy::Refit),
+            "rebuild" => Some(UpdatePolicy::Rebuild),
+            "every" => whole().map(UpdatePolicy::Every),
+            "fat" => margin().map(UpdatePolicy::Fat),
+            _ => None,
+        };
+        found.ok_or_else(|| {
+            SpecError::new(format_args!(
+                "--update '{text}'; expected refit, rebuild, every=N (frames, at least 2) or \
+                 fat=M (margin in item sizes, above 0)"
+            ))
+        })
+    }
+}
 
 /// Kernel of queries and number of threads of builds. Answers do not depend on it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,9 +1,16 @@
-//! Non-empty items, which every structure holds: their ids, and records for builds.
+//! Non-empty items, which every structure holds: ids, records, positions.
+//!
+//! Records are for builds, positions and changed nodes for refits; rows of sixteen ids are
+//! read with one access to memory.
 
+use std::ops::Deref;
+
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::BuildError;
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, LANES};
+use crate::kernel::prefetch;
 use crate::query::ItemId;
 
 /// Ids of all non-empty items, ascending, after a check of all bounds.
@@ -74,4 +81,201 @@ impl Record {
 /// Smallest box that holds the given centres.
 pub fn bounds_of_centres(centres: impl Iterator<Item = Vec3>) -> Aabb {
     centres.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)))
+}
+
+/// Position of each item, computed at the first refit.
+#[derive(Default)]
+pub struct Positions(Vec<u32>);
+
+/// Position of an item that the structure does not hold; also the id of no item.
+pub const ABSENT: u32 = u32::MAX;
+
+/// Distance of prefetches in a list of moved items.
+pub const MOVED_AHEAD: usize = 24;
+
+impl Positions {
+    /// Computes the positions of the ids in `order`, at the first call. O(items), once.
+    pub fn prepare(&mut self, order: &[ItemId], items: usize) {
+        let is_first = self.0.is_empty();
+        if self.0.len() < items {
+            self.0.resize(items, ABSENT);
+        }
+        if is_first {
+            for (&id, position) in order.iter().zip(0..) {
+                self.0[id as usize] = position;
+            }
+        }
+    }
+
+    /// Position of an item that the structure holds.
+    #[inline(always)]
+    pub fn of(&self, id: ItemId) -> Option<usize> {
+        let position = self.0[id as usize];
+        (position != ABSENT).then_some(position as usize)
+    }
+
+    /// Replaces the position of an item.
+    #[inline(always)]
+    pub fn set(&mut self, id: ItemId, position: u32) {
+        self.0[id as usize] = position;
+    }
+
+    /// Prefetches positions and bounds of the moved item two distances ahead of the
+    /// i-th; returns the position of the one a single distance ahead.
+    #[inline(always)]
+    pub fn ahead(&self, items: &[Aabb], moved: &[ItemId], i: usize) -> Option<usize> {
+        if let Some(&id) = moved.get(i + 2 * MOVED_AHEAD)
+            && let (Some(position), Some(b)) = (self.0.get(id as usize), items.get(id as usize))
+        {
+            prefetch(position);
+            prefetch(&b.min);
+            prefetch(&b.max);
+        }
+        self.of(*moved.get(i + MOVED_AHEAD)?)
+    }
+
+    /// Heap bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.0[..])
+    }
+}
+
+/// Set of nodes whose bounds have changed, a bit each.
+#[derive(Default)]
+pub struct Dirty(Vec<u64>);
+
+impl Dirty {
+    /// None of `nodes` nodes.
+    pub fn none(nodes: usize) -> Dirty {
+        Dirty(vec![0; nodes.div_ceil(64)])
+    }
+
+    /// Adds a node; returns whether it is new.
+    #[inline(always)]
+    pub fn mark(&mut self, node: usize) -> bool {
+        let (word, bit) = (&mut self.0[node / 64], 1 << (node % 64));
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
+    }
+
+    /// Number of words of 64 nodes.
+    pub fn words(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Nodes of a word, ascending; none of a word that does not exist.
+    #[inline(always)]
+    pub fn of_word(&self, word: usize) -> impl DoubleEndedIterator<Item = usize> + use<> {
+        Ones(self.0.get(word).copied().unwrap_or(0)).map(move |bit| word * 64 + bit)
+    }
+}
+
+/// Indices of the bits of a word.
+struct Ones(u64);
+
+impl Iterator for Ones {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let bit = (self.0 != 0).then(|| self.0.trailing_zeros() as usize)?;
+        self.0 &= self.0 - 1;
+        Some(bit)
+    }
+}
+
+impl DoubleEndedIterator for Ones {
+    #[inline(always)]
+    fn next_back(&mut self) -> Option<usize> {
+        let bit = self.0.checked_ilog2()? as usize;
+        self.0 &= !(1 << bit);
+        Some(bit)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line([ItemId; LANES]);
+
+/// Ids, the last row of which is padded with zeros.
+#[derive(Clone, Default, PartialEq)]
+pub struct PaddedIds {
+    lines: Vec<Line>,
+    len: usize,
+}
+
+impl From<&[ItemId]> for PaddedIds {
+    /// O(ids).
+    fn from(ids: &[ItemId]) -> Self {
+        let mut lines = vec![Line::zeroed(); ids.len().div_ceil(LANES)];
+        bytemuck::cast_slice_mut(&mut lines)[..ids.len()].copy_from_slice(ids);
+        PaddedIds {
+            lines,
+            len: ids.len(),
+        }
+    }
+}
+
+impl PaddedIds {
+    /// Sixteen ids per row; zeros follow the last id.
+    #[inline(always)]
+    pub fn rows(&self) -> &[[ItemId; LANES]] {
+        bytemuck::cast_slice(&self.lines)
+    }
+
+    /// Replaces the id at an index below the number of ids.
+    #[inline(always)]
+    pub fn set(&mut self, place: usize, id: ItemId) {
+        self.lines[place / LANES].0[place % LANES] = id;
+    }
+
+    /// Appends an id.
+    pub fn push(&mut self, id: ItemId) {
+        if self.len.is_multiple_of(LANES) {
+            self.lines.push(Line::zeroed());
+        }
+        self.len += 1;
+        self.set(self.len - 1, id);
+    }
+
+    /// Removes the last id.
+    pub fn pop(&mut self) -> Option<ItemId> {
+        let last = *self.last()?;
+        self.len -= 1;
+        self.lines.truncate(self.len.div_ceil(LANES));
+        Some(last)
+    }
+
+    /// Heap bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.lines[..])
+    }
+}
+
+impl Deref for PaddedIds {
+    type Target = [ItemId];
+
+    #[inline(always)]
+    fn deref(&self) -> &[ItemId] {
+        &bytemuck::cast_slice(&self.lines)[..self.len]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_hold_the_ids_and_begin_cache_lines() {
+        for len in [0, 1, 15, 16, 17, 40] {
+            let ids: Vec<ItemId> = (7..7 + len).collect();
+            let rows = PaddedIds::from(&ids[..]);
+            assert_eq!(rows[..], ids);
+            assert_eq!(rows.rows().len(), ids.len().div_ceil(LANES));
+            assert!(rows.rows().as_flattened().starts_with(&ids));
+            assert_eq!(rows.rows().as_ptr().align_offset(64), 0);
+            assert_eq!(rows.bytes(), rows.rows().len() * 64);
+        }
+    }
 }

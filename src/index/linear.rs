@@ -7,9 +7,7 @@ use std::ops::{ControlFlow, Range};
 
 use serde::{Deserialize, Serialize};
 
-use super::items::indexable;
-use super::padded_ids::PaddedIds;
-use super::positions::{ABSENT, Positions};
+use super::items::{ABSENT, PaddedIds, Positions, indexable};
 use super::shared_query::{QueryInParts, QueryThreads, in_parts};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex};
 use crate::geometry::{Aabb, BallBlocks, Balls, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};

@@ -12,8 +12,8 @@
 //! | `tree/` | the packed tree of `bvh`, `bsp`, `octree` and `quadtree`, with its queries |
 //! | `build/` | a builder of packed trees per file: `bvh`, `bsp`, `cells` (octree, quadtree) |
 //! | `textbook/`, `peers/` | plain forms for comparison; structures of other crates |
-//! | `items`, `positions` | for builds: non-empty items; for refits: positions, changed nodes |
-//! | `frontier`, `padded_ids` | for queries of trees and blocks: open nodes; rows of ids |
+//! | `items` | non-empty items, their records, positions, and rows of ids |
+//! | `frontier` | for queries of trees: open nodes |
 //! | `shared_query` | one query shared among threads |
 //! | `box_test`, `centre_bounds` | for the grid, textbook forms and peers: one box at a time |
 //!
@@ -23,7 +23,6 @@
 
 mod box_test;
 mod build;
-mod catch_panic;
 mod cells;
 mod centre_bounds;
 mod contract;
@@ -33,15 +32,12 @@ mod grid;
 mod info;
 mod items;
 mod linear;
-mod padded_ids;
 #[cfg(feature = "peers")]
 pub mod peers;
-mod positions;
 mod registry;
 mod shared_query;
 mod textbook;
 mod tree;
-mod update_policy;
 mod wide;
 
 pub use build::bsp::{Bsp, BspParams, PlaneSource};
@@ -50,13 +46,12 @@ pub(crate) use build::bvh::scale_for;
 pub use build::bvh::{Bvh, BvhParams, BvhPreset};
 pub use build::cells::{CellParams, Octree, Quadtree};
 pub(crate) use build::ploc;
-pub use catch_panic::caught;
 pub use cells::TreeCell;
 #[cfg(feature = "cli")]
 pub(crate) use cells::verdicts;
 pub(crate) use contract::check_range;
 pub use contract::{BuildError, FrustumQuery, Input, MemoryUsage, NoParams, Query, RegionIndex};
-pub use erased::{DynIndex, Execution, WithKernel};
+pub use erased::{DynIndex, Execution, UpdatePolicy, WithKernel, caught};
 pub use grid::UniformGrid;
 pub use info::{Capabilities, Info, Kind, Origin};
 pub use items::{Record, indexable};
@@ -65,5 +60,4 @@ pub use registry::{Registry, Row, StructureSpec};
 pub use shared_query::QueryThreads;
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
 pub use tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
-pub use update_policy::UpdatePolicy;
 pub use wide::{BlockOrder, Moving, Trace, Wide, WideParams};

@@ -1,12 +1,18 @@
 //! A cell of a report: one structure on one scene, path and culling test.
+//!
+//! Scene and queries have digests, so that two reports can be compared for the same question.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{CellKey, GroupKey, Judged, Metric, PathInfo, SceneInfo, Status, Verdict};
+use super::key::{CellKey, GroupKey};
+use super::{Judged, Metric, Status, Verdict, Workload};
+use crate::culling::Culling;
 use crate::index::{Kind, Origin};
+use crate::path::{self, CameraFacts};
+use crate::scene::{self, Scene};
 
 /// A structure, or a lower bound, on one scene, path and test.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -121,5 +127,182 @@ impl ReportCell {
     /// A metric's value, if the cell has it.
     pub fn value(&self, metric: &str) -> Option<f64> {
         self.metrics.get(metric).map(|m| m.value)
+    }
+}
+
+/// The scene of a cell.
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct SceneInfo {
+    /// File name or spec.
+    pub name: String,
+    /// Number of items.
+    pub total_count: usize,
+    /// Number of regions for region search.
+    pub region_count: usize,
+    /// Axis that points up, y or z; empty in older reports.
+    #[serde(default)]
+    pub up: String,
+    /// Unit of coordinates; null where the file does not say.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// Scene-local zero in world coordinates.
+    pub origin: [f64; 3],
+    /// Smallest corner of all items, scene-local.
+    pub bounds_min: [f64; 3],
+    /// Largest corner of all items, scene-local.
+    pub bounds_max: [f64; 3],
+    /// Items that were left out because they could not be read.
+    pub skipped_items: usize,
+    /// SHA-256 over origin and item bounds.
+    pub digest: String,
+}
+
+impl SceneInfo {
+    /// A scene that could not be loaded.
+    pub fn unknown(name: &str) -> SceneInfo {
+        SceneInfo {
+            name: name.to_owned(),
+            ..SceneInfo::default()
+        }
+    }
+
+    /// The facts of a loaded scene.
+    pub fn of(scene: &Scene) -> SceneInfo {
+        let bounds = scene.world_bounds();
+        SceneInfo {
+            name: scene.name.clone(),
+            total_count: scene.items.len(),
+            region_count: scene.regions.boxes(&scene.items).len(),
+            up: scene.up.name().to_owned(),
+            unit: scene.unit.map(str::to_owned),
+            origin: scene.origin.to_array(),
+            bounds_min: bounds.min.to_array(),
+            bounds_max: bounds.max.to_array(),
+            skipped_items: scene.skipped_items,
+            digest: scene.digest(),
+        }
+    }
+}
+
+/// The queries of a cell.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct PathInfo {
+    /// File name or spec.
+    pub name: String,
+    /// Number of cameras, timed or not.
+    pub camera_count: usize,
+    /// "warm" or "cold".
+    pub cache: String,
+    /// Name of the method that planes are derived by.
+    pub planes: String,
+    /// Factor c of the planes' epsilon.
+    pub epsilon: f64,
+    /// The numbers that the culling test is carried out in.
+    pub arithmetic: String,
+    /// SHA-256 over the cameras' frames and lenses; null in older reports.
+    #[serde(default)]
+    pub digest: Option<String>,
+    /// Lenses as used, and how matrices were read; null in older reports.
+    #[serde(default)]
+    pub lens: Option<CameraFacts>,
+    /// Doubts about the cameras, one line each.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// File name or spec of the motion; absent for a still scene.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub motion: String,
+    /// Number of queries of a frame of the motion; absent for a still scene.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub views_per_frame: usize,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
+impl PathInfo {
+    /// A path that could not be loaded.
+    pub fn unknown(key: &GroupKey) -> PathInfo {
+        PathInfo {
+            name: key.path.clone(),
+            camera_count: 0,
+            cache: key.cache.clone(),
+            planes: key.planes.clone(),
+            epsilon: key.epsilon,
+            arithmetic: key.arithmetic.clone(),
+            digest: None,
+            lens: None,
+            warnings: Vec::new(),
+            motion: key.motion.clone(),
+            views_per_frame: 0,
+        }
+    }
+
+    /// The facts of a workload along the path of this name.
+    pub fn of(path: &str, workload: &Workload, cold: bool) -> PathInfo {
+        let motion = workload.motion.as_ref();
+        let name = motion.map_or("", |motion| &motion.name);
+        let key = GroupKey::of(&workload.scene.name, path, cold, &workload.culling, name);
+        let views_per_frame = motion.map_or(0, |_| workload.views_per_frame);
+        PathInfo {
+            camera_count: workload.cameras.len(),
+            digest: Some(workload.digest()),
+            views_per_frame,
+            lens: Some(CameraFacts::of(&workload.cameras)),
+            warnings: path::warnings(workload.scene, path, &workload.cameras),
+            ..PathInfo::unknown(&key)
+        }
+    }
+}
+
+impl Workload<'_> {
+    /// SHA-256 over the cameras, and over the frames of a motion.
+    pub fn digest(&self) -> String {
+        let cameras = path::digest(&self.cameras);
+        let Some(motion) = &self.motion else {
+            return cameras;
+        };
+        let frames = format!("{cameras} {} {}", motion.digest(), self.views_per_frame);
+        scene::hex(&hmac_sha256::Hash::hash(frames.as_bytes()))
+    }
+}
+
+impl GroupKey {
+    /// The key of a scene's queries along a path.
+    ///
+    /// The motion is empty for a still scene.
+    pub fn of(scene: &str, path: &str, cold: bool, culling: &Culling, motion: &str) -> GroupKey {
+        GroupKey {
+            scene: scene.to_owned(),
+            path: path.to_owned(),
+            cache: if cold { "cold" } else { "warm" }.to_owned(),
+            test: culling.test.name().to_owned(),
+            arithmetic: culling.arithmetic.name().to_owned(),
+            planes: culling.planes.method.name().to_owned(),
+            epsilon: culling.planes.epsilon,
+            motion: motion.to_owned(),
+        }
+    }
+
+    /// The key of a path's queries by a culling test.
+    pub fn new(scene: &str, path: &PathInfo, test: &str) -> GroupKey {
+        GroupKey {
+            scene: scene.to_owned(),
+            path: path.name.clone(),
+            cache: path.cache.clone(),
+            test: test.to_owned(),
+            arithmetic: path.arithmetic.clone(),
+            planes: path.planes.clone(),
+            epsilon: path.epsilon,
+            motion: path.motion.clone(),
+        }
     }
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::bounds::BOUNDS;
+use super::bounds::{BOUNDS, Bound};
 use super::frames::measure_queries_or_frames;
 use super::group::GroupPlan;
 use super::key::{CellKey, GroupKey};
@@ -15,7 +15,8 @@ use super::progress::Notice;
 use super::refitted::refitted_ln;
 use super::schedule::cameras_within;
 use super::{
-    Machine, PathInfo, Protocol, SceneInfo, Status, Subject, Verdict, Workload, WorkloadError,
+    Group, Machine, PathInfo, Protocol, SceneInfo, Status, Subject, Verdict, Workload,
+    WorkloadError,
 };
 use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
@@ -362,6 +363,31 @@ pub fn measure_scene(
         keep(part, samples);
     }
     Ok(true)
+}
+
+/// Measures a group in this process alone; `None` if stopped.
+///
+/// Values have no intervals, and ranks are the order of the values.
+pub fn measure_group(
+    workload: &Workload,
+    subjects: &[Subject],
+    bounds: &[Bound],
+    protocol: &Protocol,
+    stop: &dyn Fn() -> bool,
+) -> Option<Group> {
+    let scene = SceneInfo::of(workload.scene);
+    let plan = GroupPlan {
+        path: PathInfo::of(&workload.path, workload, protocol.cold),
+        scene: &scene,
+        process: 0,
+        protocol: *protocol,
+        bounds,
+        known: None,
+        plan_only: false,
+        locate: true,
+    };
+    let (part, _) = measure_queries_or_frames(workload, subjects, plan, &|_, _| (), stop)?;
+    Some(Group::of(&[part]))
 }
 
 #[cfg(test)]

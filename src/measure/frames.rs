@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 use super::clock::Stopwatch;
 use super::group::{GroupPlan, counts, measure_part};
 use super::moving::{Frames, Laps, Moving, ageing, lap_ns, replay};
-use super::orders::Orders;
 use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
 use super::progress::{Notice, TIMING};
+use super::schedule::Orders;
 use super::{
     Counted, GroupKey, KeyedSchedule, Protocol, Sample, Schedule, Status, Subject, TaskKind,
     TaskPlan, Verdict, Workload, guarded,

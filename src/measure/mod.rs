@@ -20,20 +20,17 @@
 //! | `experiment`, `key` | plan, groups and cells of a run; one process's share of a scene |
 //! | `group`, `process_result` | measurement of one group in one process; its result, [`Part`] |
 //! | `workload`, `index_under_test` | queries; built structures |
-//! | `count`, `answer` | count pass, oracle; digests of answers |
-//! | `task`, `tasks`, `schedule` | one timed task; a keyed list of them; their schedule |
-//! | `timing`, `orders`, `clock`, `cache_flush` | timed pass; order of tasks; clocks; cold caches |
+//! | `count` | count pass, oracle; digests of answers |
+//! | `task`, `schedule` | one timed task; a keyed list of them; their schedule and order |
+//! | `timing`, `clock` | timed pass, cold caches; clocks |
 //! | `frames`, `moving` | groups whose items move: update and queries, frame by frame |
 //! | `update`, `refitted`, `bounds` | updates of moved items; lower bounds |
-//! | `results`, `cell`, `cell_info`, `metrics` | cells of a report from parts |
+//! | `results`, `cell`, `metrics` | cells of a report from parts |
 //! | `over_processes` | times of a study's tasks over several processes |
 //! | `guarded`, `progress`, `environment` | panics as verdicts; progress; machine and toolchain |
 
-mod answer;
 mod bounds;
-mod cache_flush;
 mod cell;
-mod cell_info;
 mod clock;
 mod count;
 mod environment;
@@ -45,7 +42,6 @@ mod index_under_test;
 mod key;
 mod metrics;
 mod moving;
-mod orders;
 mod over_processes;
 mod process_result;
 mod progress;
@@ -53,7 +49,6 @@ mod refitted;
 mod results;
 mod schedule;
 mod task;
-mod tasks;
 mod timing;
 mod update;
 mod workload;
@@ -62,17 +57,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::verify::Fault;
 
-pub use answer::{Answer, id_sum};
 pub use bounds::{BOUNDS, Bound, Material};
-pub use cell::{CellTimes, ReportCell, SamplesRef};
-pub use cell_info::{PathInfo, SceneInfo};
+pub use cell::{CellTimes, PathInfo, ReportCell, SamplesRef, SceneInfo};
 pub use clock::{Lap, Stopwatch};
 #[cfg(feature = "cli")]
 pub(crate) use count::blamed;
-pub use count::{Counted, Judged, count_pass, judge};
+pub use count::{Answer, Counted, Judged, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
-    Effort, ExperimentError, Extras, Plan, PlannedScene, SceneGroup, Share, measure_scene,
+    Effort, ExperimentError, Extras, Plan, PlannedScene, SceneGroup, Share, measure_group,
+    measure_scene,
 };
 pub use group::{GroupPlan, NO_ITEMS, measure_part};
 pub use guarded::guarded;
@@ -82,10 +76,9 @@ pub use metrics::{METRICS, Metric, MetricInfo};
 pub use over_processes::{OverProcesses, ProcessTimes};
 pub use process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
 pub use progress::{Notice, TIMING};
-pub use results::{Group, YARDSTICK, measure_group};
-pub use schedule::{CLOCK_NS, Protocol, Schedule, TaskPlan, cameras_within};
+pub use results::{Group, YARDSTICK};
+pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, Tasks, cameras_within};
 pub use task::{Ask, AskMany, TimedTask};
-pub use tasks::{KeyedSchedule, Tasks};
 pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
 pub use update::{UPDATE_SHARES, move_share};
 pub use workload::{Workload, WorkloadError, input_of};

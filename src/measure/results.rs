@@ -8,18 +8,14 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::bounds::{BOUNDS, Bound};
-use super::frames::measure_queries_or_frames;
-use super::group::{GroupPlan, LEAST_TAIL};
+use super::bounds::BOUNDS;
+use super::group::LEAST_TAIL;
 use super::index_under_test::TWIN;
 use super::metrics::{METRICS, Metrics, WALL_METRICS};
 use super::moving::AGES;
 use super::process_result::{Known, Part, SubjectPart, TaskPart};
 use super::update::MOST_UPDATED;
-use super::{
-    CellTimes, Judged, PathInfo, Protocol, ReportCell, SceneInfo, Status, Subject, TaskKind,
-    UPDATE_SHARES, Verdict, Workload,
-};
+use super::{CellTimes, Judged, ReportCell, Status, TaskKind, UPDATE_SHARES, Verdict};
 use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted, speedup,
 };
@@ -70,31 +66,6 @@ pub struct Group {
     pub twin: Option<(String, Estimate)>,
     /// Ranks of the structures by their times of region search, by label.
     pub located: Vec<(String, usize)>,
-}
-
-/// Measures a group in this process alone; `None` if stopped.
-///
-/// Values have no intervals, and ranks are the order of the values.
-pub fn measure_group(
-    workload: &Workload,
-    subjects: &[Subject],
-    bounds: &[Bound],
-    protocol: &Protocol,
-    stop: &dyn Fn() -> bool,
-) -> Option<Group> {
-    let scene = SceneInfo::of(workload.scene);
-    let plan = GroupPlan {
-        path: PathInfo::of(&workload.path, workload, protocol.cold),
-        scene: &scene,
-        process: 0,
-        protocol: *protocol,
-        bounds,
-        known: None,
-        plan_only: false,
-        locate: true,
-    };
-    let (part, _) = measure_queries_or_frames(workload, subjects, plan, &|_, _| (), stop)?;
-    Some(Group::of(&[part]))
 }
 
 impl Group {

@@ -1,7 +1,9 @@
-//! Schedule of a timed pass: cameras, queries per clock reading, rounds of tasks.
+//! Schedule of a timed pass: cameras, queries per clock reading, order of tasks.
 //!
 //! The first process of a run makes it from a [`Protocol`]; all others use the same one, and
-//! so do both sides of a comparison.
+//! so do both sides of a comparison. Tasks have keys ([`Tasks`]): times are found by key,
+//! never by position. Orders ([`Orders`]) are balanced, so that neither a position nor a
+//! neighbour favours a task.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +11,7 @@ use super::clock::Stopwatch;
 use super::guarded::guarded;
 use super::task::TimedTask;
 use crate::query::ItemId;
+use crate::scene::SeededRng;
 use crate::statistics::median;
 
 /// Limits that a schedule is made within: rounds, time, cameras, cache state.
@@ -177,6 +180,127 @@ fn batch(query_ns: f64, cameras: usize) -> usize {
         .min(cameras)
 }
 
+/// Tasks of one timed pass and their keys, in the order in which they are pushed.
+pub struct Tasks<'a, K> {
+    keys: Vec<K>,
+    tasks: Vec<TimedTask<'a>>,
+}
+
+/// A schedule with the keys of its tasks.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct KeyedSchedule<K> {
+    /// Keys of the tasks, in the order of the schedule.
+    #[serde(rename = "names")]
+    pub keys: Vec<K>,
+    /// Cameras, batches and rounds.
+    pub schedule: Schedule,
+}
+
+impl<K> Default for Tasks<'_, K> {
+    fn default() -> Self {
+        Tasks {
+            keys: Vec::new(),
+            tasks: Vec::new(),
+        }
+    }
+}
+
+impl<'a, K: PartialEq> Tasks<'a, K> {
+    /// Adds a task.
+    pub fn push(&mut self, key: K, task: TimedTask<'a>) {
+        debug_assert!(!self.keys.contains(&key), "each key once");
+        self.keys.push(key);
+        self.tasks.push(task);
+    }
+
+    /// Keys in the order of the tasks: what [`OverProcesses::keyed`] takes.
+    ///
+    /// [`OverProcesses::keyed`]: super::OverProcesses::keyed
+    pub fn keys(&self) -> &[K] {
+        &self.keys
+    }
+
+    /// The tasks, as [`Schedule::new`] and [`timed`](super::timed) take them.
+    pub fn tasks(&self) -> &[TimedTask<'a>] {
+        &self.tasks
+    }
+
+    /// Makes the schedule of the tasks for `cameras` cameras.
+    ///
+    /// With a `given` schedule, returns its part for these tasks and drops the tasks
+    /// that it does not have.
+    pub fn schedule(
+        &mut self,
+        given: Option<&KeyedSchedule<K>>,
+        cameras: usize,
+        protocol: &Protocol,
+    ) -> Schedule {
+        let Some(given) = given else {
+            return Schedule::new(cameras, &self.tasks, protocol);
+        };
+        let mut kept = Vec::new();
+        let Tasks { keys, tasks } = std::mem::take(self);
+        for (key, task) in keys.into_iter().zip(tasks) {
+            if let Some(position) = given.keys.iter().position(|planned| *planned == key) {
+                kept.push(position);
+                self.push(key, task);
+            }
+        }
+        given.schedule.of_tasks(&kept)
+    }
+}
+
+/// Balanced orders of n tasks: a Williams square per block of n rounds.
+///
+/// In a block every task takes every position once and follows every other task once; for
+/// odd n a block has 2n rounds, and everything occurs twice. Each block permutes the tasks
+/// at random. (E. J. Williams 1949, "Experimental designs balanced for the estimation of
+/// residual effects of treatments".) A task that follows one that streams through the
+/// caches starts worse than others, so a fixed neighbour would be a bias.
+pub struct Orders {
+    names: Vec<usize>,
+    turn: usize,
+    rng: SeededRng,
+}
+
+impl Orders {
+    /// Orders of `count` tasks.
+    pub fn new(count: usize, seed: u64) -> Orders {
+        Orders {
+            names: (0..count).collect(),
+            turn: 0,
+            rng: SeededRng::new(seed),
+        }
+    }
+
+    /// The next round's order.
+    pub fn next(&mut self) -> Vec<usize> {
+        let count = self.names.len();
+        let block = if count.is_multiple_of(2) {
+            count
+        } else {
+            2 * count
+        };
+        let turn = self.turn.checked_rem(block).unwrap_or(0);
+        if turn == 0 {
+            for i in (1..count).rev() {
+                self.names.swap(i, self.rng.below(i + 1));
+            }
+        }
+        self.turn += 1;
+        // 0, 1, n-1, 2, n-2, ...: every difference once.
+        let zigzag = |k: usize| match k % 2 {
+            1 => k.div_ceil(2),
+            _ => count - k / 2,
+        };
+        let places = (0..count).map(|k| self.names[(zigzag(k) + turn) % count]);
+        match turn < count {
+            true => places.collect(),
+            false => places.rev().collect(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -248,5 +372,36 @@ mod tests {
         assert!(schedule.rounds / schedule.tasks[1].every >= 3);
         let second = schedule.of_tasks(&[1]);
         assert_eq!(second.tasks, [schedule.tasks[1]]);
+    }
+
+    #[test]
+    fn everyone_takes_every_place_and_follows_everyone_equally_often() {
+        for (count, rounds, often) in [(2, 2, 1), (6, 6, 1), (8, 8, 1), (5, 10, 2), (9, 18, 2)] {
+            let mut orders = Orders::new(count, 7);
+            // A second block, drawn again.
+            for _ in 0..2 {
+                let mut taken = vec![vec![0; count]; count];
+                let mut follows = vec![vec![0; count]; count];
+                for _ in 0..rounds {
+                    let order = orders.next();
+                    for (place, &c) in order.iter().enumerate() {
+                        taken[c][place] += 1;
+                    }
+                    for pair in order.windows(2) {
+                        follows[pair[1]][pair[0]] += 1;
+                    }
+                }
+                for c in 0..count {
+                    assert!(taken[c].iter().all(|&n| n == often), "{count}: {taken:?}");
+                    let others = (0..count).filter(|&other| other != c);
+                    assert!(
+                        others.clone().all(|other| follows[c][other] == often),
+                        "{count}: {follows:?}"
+                    );
+                }
+            }
+        }
+        assert!(Orders::new(0, 1).next().is_empty());
+        assert_eq!(Orders::new(1, 1).next(), [0]);
     }
 }

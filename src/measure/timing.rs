@@ -2,17 +2,15 @@
 //!
 //! Rounds in balanced random order over all tasks, each warmed up, with several queries per
 //! clock reading where one is short. In a cold pass the caches are streamed over before the
-//! queries of every camera.
+//! queries of every camera, and outputs do not grow while timed.
 
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::cache_flush::Cold;
 use super::clock::Stopwatch;
 use super::guarded::guarded;
-use super::orders::Orders;
-use super::schedule::{Protocol, Schedule};
+use super::schedule::{Orders, Protocol, Schedule};
 use super::task::TimedTask;
 use super::{Status, Verdict};
 use crate::query::ItemId;
@@ -227,6 +225,56 @@ fn warm_up(task: &TimedTask, cameras: &[u32], batch: usize, out: &mut Vec<ItemId
         if started.elapsed() > WARM_UP {
             break;
         }
+    }
+}
+
+/// Number of ids of spare room in an output: structures write whole rows.
+const SLACK: usize = 64;
+
+/// Sweep and outputs of cold queries.
+///
+/// One sweep serves one query of every task: each task has its own data, which no other
+/// query loads into the caches, and its own output.
+pub(super) struct Cold {
+    pub(super) sweep: Sweep,
+    /// An output per task.
+    pub(super) outs: Vec<Vec<ItemId>>,
+}
+
+impl Cold {
+    /// Allocates the sweep, and outputs of their final size.
+    ///
+    /// A query that runs once per sweep must not pay for the growth of its output.
+    pub(super) fn new(protocol: &Protocol, tasks: &[TimedTask]) -> Cold {
+        let most = |c: &TimedTask| c.expected.iter().copied().max().unwrap_or(0) as usize;
+        Cold {
+            sweep: Sweep::new(protocol.cache_bytes),
+            outs: tasks
+                .iter()
+                .map(|c| {
+                    let mut out = vec![0; most(c) + SLACK];
+                    out.clear();
+                    out
+                })
+                .collect(),
+        }
+    }
+}
+
+/// Memory larger than the last cache, overwritten between cold queries.
+pub(super) struct Sweep(Vec<u64>);
+
+impl Sweep {
+    fn new(bytes: usize) -> Self {
+        Sweep(vec![1; bytes / size_of::<u64>()])
+    }
+
+    pub(super) fn over_caches(&mut self) {
+        // Written, not only read: shared zero pages would stay in one line.
+        for line in self.0.chunks_mut(8) {
+            line[0] = line[0].wrapping_add(1);
+        }
+        std::hint::black_box(&self.0);
     }
 }
 

@@ -1,4 +1,6 @@
-//! Generated paths, one function per family; `street` and `walk` have files of their own.
+//! Generated paths, one function per family.
+//!
+//! `street` and `walk` have files of their own.
 
 use glam::DVec3;
 
@@ -87,8 +89,10 @@ pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> 
     Ok(poses.collect())
 }
 
-/// The lecture's zoom in both of its senses: the eye moves along the look, then rests
-/// while the field of view narrows. `power` is the magnification at the end.
+/// The lecture's zoom in both of its senses.
+///
+/// The eye moves along the look, then rests while the field of view narrows. `power` is
+/// the magnification at the end.
 pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
     let power = spec.number_between("power", 8.0, 1.0, 1e6)?;
     let forward = DVec3::new(0.8, 0.5, -0.3).normalize();
@@ -145,8 +149,9 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathErro
     Ok(stage.turns().map(pose).collect())
 }
 
-/// The scene's own camera places: things of Doom maps, cameras of glTF. Roll and lens
-/// are the file's, where it states them.
+/// The scene's own camera places: things of Doom maps, cameras of glTF.
+///
+/// Roll and lens are the file's, where it states them.
 pub(super) fn places(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
     if stage.scene.places.is_empty() {
         let reason = format!(

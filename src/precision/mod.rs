@@ -8,13 +8,11 @@ mod point;
 mod points;
 mod region_search;
 mod size_sweep;
-mod stability;
 mod sweeps;
 
 pub use judged::{CullingErrors, Names};
-pub use point::Point;
+pub use point::{Point, StableAfter};
 pub use points::{PointPlan, Precision, PrecisionInput, prepare, time};
 pub use region_search::RegionErrors;
 pub use size_sweep::{SIZE_RATIOS, SizeRow, size_sweep};
-pub use stability::StableAfter;
 pub use sweeps::{SWEEPS, SweepRow, sweep};

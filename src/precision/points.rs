@@ -5,11 +5,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::judged::{CullingErrors, Judged, Shots, Truths};
-use super::point::{self, Point};
+use super::point::{self, Point, StableAfter, by_camera, stability};
 use super::region_search::{
     POINTS_PER_CAMERA, RegionErrors, RegionJudged, RegionNumbers, RegionQueries,
 };
-use super::stability::{StableAfter, by_camera, stability};
 use crate::camera::{PLANE_METHODS, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, DynIndex, StructureSpec};

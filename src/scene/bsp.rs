@@ -184,8 +184,10 @@ impl BspTree {
 /// coordinates of 2^16), far below anything a map shows.
 const CELL_MARGIN: f64 = 1.0 / 1024.0;
 
-/// The part of a convex polygon on one side of a node's line, the line moved outward
-/// by [`CELL_MARGIN`] so that rounding and ties can only make the cell larger.
+/// The part of a convex polygon on one side of a node's line.
+///
+/// The line is moved outward by [`CELL_MARGIN`], so that rounding and ties can only make
+/// the cell larger.
 fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
     let length = node.direction.length();
     if length == 0.0 {
@@ -196,8 +198,9 @@ fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
     clipped(polygon, |p| front.dot(p - node.start) + CELL_MARGIN)
 }
 
-/// The part of a convex polygon where a depth is not negative (Sutherland and Hodgman
-/// 1974); the depth is linear in the point.
+/// The part of a convex polygon where a depth is not negative.
+///
+/// The depth is linear in the point (Sutherland and Hodgman 1974).
 pub fn clipped<P>(polygon: &[P], depth: impl Fn(P) -> f64) -> Vec<P>
 where
     P: Copy + Add<Output = P> + Sub<Output = P> + Mul<f64, Output = P>,

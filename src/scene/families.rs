@@ -1,6 +1,8 @@
-//! Generated boxes, a function per family: cities, forests, clusters, layouts of other
-//! benchmarks (Bevy's `many_cubes`, `sseculling`, the trees of bepuphysics), and the
-//! extremes of shape: a line, a plane, piles, a lattice.
+//! Generated boxes, a function per family.
+//!
+//! Cities, forests, clusters, layouts of other benchmarks (Bevy's `many_cubes`,
+//! `sseculling`, the trees of bepuphysics), and the extremes of shape: a line, a plane,
+//! piles, a lattice.
 
 use std::f64::consts::TAU;
 
@@ -13,9 +15,9 @@ use crate::spec::{Spec, SpecError};
 /// The boxes of a family, or a parameter that is wrong.
 pub type Made = Result<Vec<WorldBox>, SpecError>;
 
-/// Boxes scattered evenly in a cube: the scene without structure, against which every
-/// other one is a special case. Edges vary between half and one and a half times the
-/// mean, per axis.
+/// Boxes scattered evenly in a cube: a scene without structure.
+///
+/// Edges vary between half and one and a half times the mean, per axis.
 pub fn uniform(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let side = spec.number_between("side", 1000.0, 0.0, f64::INFINITY)?;
     let fitting = 0.2 * side / libm::cbrt(n.max(1) as f64);
@@ -89,9 +91,9 @@ impl CityGrid {
     }
 }
 
-/// A flat city: square blocks between streets, tall buildings in the blocks, tiny street
-/// furniture along the kerbs. Wide in two axes and thin in the third, with sizes from
-/// decimetres to a hundred metres.
+/// A flat city: tall buildings in square blocks, tiny furniture in the streets.
+///
+/// Wide in two axes and thin in the third, with sizes from decimetres to a hundred metres.
 pub fn city(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let CityGrid {
         block,
@@ -148,7 +150,8 @@ fn furniture(block_low: DVec3, block: f64, street: f64, rng: &mut SeededRng) -> 
 /// Share of the items that are ground tiles.
 const GROUND: f64 = 0.1;
 
-/// A forest on terrain: ground tiles, trees, bushes and rocks on a fractal heightfield.
+/// A forest: ground tiles, trees, bushes and rocks on a fractal heightfield.
+///
 /// Flat as a city, but nothing lies on a grid or at one height.
 pub fn forest(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let relief = spec.number_between("relief", 0.12, -1.0, 10.0)?;

@@ -37,9 +37,9 @@ pub fn needed_by_triangles(triangles: u64, beside: u64, structures: u64) -> u64 
     triangles * (MESHED + beside) + needed_by_items(triangles / FEWEST, structures)
 }
 
-/// Refuses a scene of `count` items or triangles that needs more bytes than are free.
+/// Refuses a scene that needs more bytes than are free.
 ///
-/// A small scene passes, and any scene where the free bytes are not known.
+/// A scene of few items or triangles (`count`) passes, and any scene where the free bytes are not known.
 ///
 /// # Errors
 /// The sizes needed and free.

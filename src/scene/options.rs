@@ -1,5 +1,4 @@
-//! Choices of a user that all readers of scenes share, and what files state beside items:
-//! the up axis and camera places.
+//! Choices of a user that all readers of scenes share, up axes and camera places.
 
 use glam::{DVec3, Vec3Swizzles};
 

@@ -1,4 +1,6 @@
-//! Tables of records of one size in binary files, little-endian. No byte is trusted.
+//! Tables of records of one size in binary files, little-endian.
+//!
+//! No byte is trusted.
 
 use std::fmt;
 use std::ops::Range;
@@ -105,7 +107,7 @@ impl Table<'_> {
     }
 }
 
-/// So many from a first one on, if all are below a limit.
+/// The range of `count` numbers from `first` on, if all are below a limit.
 pub fn range_within(first: i32, count: i32, limit: usize) -> Option<Range<usize>> {
     let (first, count) = (usize::try_from(first).ok()?, usize::try_from(count).ok()?);
     let range = first..first.checked_add(count)?;

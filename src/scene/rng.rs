@@ -1,5 +1,6 @@
-//! Random numbers from a seed, a hash, and value noise in octaves: the only randomness of
-//! generated scenes, the same on every machine.
+//! Random numbers from a seed, a hash, and value noise in octaves.
+//!
+//! The only randomness of generated scenes, the same on every machine.
 
 use glam::{DVec3, IVec3};
 use rand::{Rng, RngExt, SeedableRng};

@@ -1,5 +1,7 @@
-//! Real scenes by name: samples that are compiled in, so that the main job needs no file,
-//! and files that `scripts/fetch.py` fetches. Provenance is in `datasets/README.md`.
+//! Real scenes by name.
+//!
+//! Samples are compiled in, so that the main job needs no file; others are files that
+//! `scripts/fetch.py` fetches. Provenance is in `datasets/README.md`.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;

@@ -1,6 +1,7 @@
-//! From a typed scene to its data: a built-in sample, a generated family with parameters,
-//! or a file by its contents. Formats that are recognised and not read are refused with
-//! what to do instead.
+//! From a typed scene to its data.
+//!
+//! A built-in sample, a generated family with parameters, or a file by its contents.
+//! Formats that are recognised and not read are refused with what to do instead.
 
 use std::fs;
 use std::path::Path;

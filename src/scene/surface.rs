@@ -1,5 +1,6 @@
-//! Surfaces beside boxes: the triangles of the items, what light does at them and how many
-//! sides they have, with its checks; where triangles come from is in `meshes`.
+//! Surfaces beside boxes: the triangles of the items, their kinds and sides.
+//!
+//! It defines the form and its checks; where triangles come from is in `meshes`.
 
 use std::ops::Range;
 use std::sync::Arc;

@@ -1,5 +1,6 @@
-//! Boxes and points as they were written, in f64, beside the f32 that indexes hold, and
-//! region search made exact by them: the exact test of the candidates of an index.
+//! Boxes and points as they were written, in f64, beside the f32 of indexes.
+//!
+//! Region search is made exact by them: the exact test of the candidates of an index.
 
 use std::sync::Arc;
 

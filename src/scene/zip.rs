@@ -63,7 +63,7 @@ pub fn unpack<'w>(
     let stated = record.uncompressed_size_hint();
     let needed = stated.saturating_mul(GROWTH);
     let label = format!("{file}#{}", plain(name));
-    memory::check_fits(&label, needed, 0, memory::free_for(stated))?;
+    memory::check_fits(&label, needed, 0, stated)?;
     let packed = archive.get_entry(record.wayfinder());
     let packed = packed.map_err(|e| damaged(&e, "an entry within the file"))?;
     let limit = usize::try_from(stated).unwrap_or(usize::MAX);

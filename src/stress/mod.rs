@@ -2,7 +2,6 @@
 //! structure, at planes and at camera level. This file defines the rows that come out.
 
 pub mod extremes;
-mod margin;
 mod replay;
 mod sheet;
 mod vectors;

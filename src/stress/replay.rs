@@ -3,8 +3,7 @@
 
 use glam::DVec3;
 
-use super::margin::slack;
-use super::sheet::{Built, Sheet};
+use super::sheet::{Built, Sheet, slack};
 use super::{Level, Name, Row, Said, Status, Vector, VectorBox, VectorCamera};
 use crate::camera::{PlaneOptions, Surroundings};
 use crate::culling::{Culling, CullingTest, TESTS};

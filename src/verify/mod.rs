@@ -1,14 +1,12 @@
 //! Cross-checking structures: the reference answer by the plainest loop there
-//! is, the comparison with it, and the first difference in words. Random
-//! differential cases live in `random`, degenerate scenes in `edges`, and the
-//! contract of a structure as tests in [`conformance`]. Nothing here is timed.
+//! is, the comparison with it, and the first difference in words. Random and
+//! degenerate scenes and volumes are in `cases`, the contract of a structure as tests
+//! in [`conformance`]. Nothing here is timed.
 
+mod cases;
 pub mod conformance;
-mod edges;
-mod random;
 mod trial;
 mod truth;
-mod variants;
 
 use std::fmt;
 
@@ -17,11 +15,9 @@ use glam::Vec3;
 use crate::geometry::Aabb;
 use crate::query::{AnyVolume, ItemId};
 
-pub use edges::{edge_scenes, edge_volumes, points_on_faces};
-pub use random::{RandomCase, VOLUME_KINDS};
+pub use cases::{RandomCase, VOLUME_KINDS, edge_scenes, edge_volumes, points_on_faces, variants};
 pub use trial::{Fault, Trial};
 pub use truth::{ErrorCount, Truth};
-pub use variants::variants;
 
 /// Answer of the plainest loop: the ids of the items that satisfy a test.
 pub fn scan(items: &[Aabb], sees: impl Fn(&Aabb) -> bool) -> impl Iterator<Item = ItemId> {

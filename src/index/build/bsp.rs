@@ -13,7 +13,7 @@ use super::bsp_split_planes::{
 use crate::geometry::{Plane, PlaneTree};
 use crate::index::items::Record;
 use crate::index::tree::kd_treelets::{DESCENT_LEAF, Treelets};
-use crate::index::tree::stack::Stack;
+use crate::index::tree::node::Stack;
 use crate::index::tree::{Descent, PackedTree, Part, Splitter, Tree, TreeBuilder, build_top_down};
 use crate::index::{BuildError, Info, Input, Kind, Origin, check_range};
 use crate::kernel::Isa;

@@ -12,9 +12,8 @@ use serde::{Deserialize, Serialize};
 use super::refuse_stacks;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
-use crate::index::items::Record;
-use crate::index::positions::Positions;
-use crate::index::tree::stack::Stack;
+use crate::index::items::{Positions, Record};
+use crate::index::tree::node::Stack;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
 use crate::query::{ItemId, Recorder, Sink};
 

@@ -1,13 +1,11 @@
 //! The trees as lectures show them: nodes with child pointers, a recursive walk,
 //! one box at a time, no SIMD. Compared with the packed trees they show the effect of
-//! a layout; compared with the scan, of a tree. Here are the node and the walk; a file
-//! per kind of tree has its division.
+//! a layout; compared with the scan, of a tree. Here are the node and the walk;
+//! `divisions` has a division per kind of tree.
 //!
 //! The walk does not depend on the instruction set, so it is compiled once for all.
 
-mod bsp;
-mod bvh;
-mod cells;
+mod divisions;
 
 use std::marker::PhantomData;
 use std::ops::ControlFlow;
@@ -23,9 +21,7 @@ use crate::geometry::{Aabb, Plane, PlaneMask};
 use crate::kernel::pairs;
 use crate::query::{Containment, Context, ItemId, Predicate, QueryVolume, Recorder, Sink};
 
-pub use bsp::BspTextbook;
-pub use bvh::BvhTextbook;
-pub use cells::{OctreeTextbook, QuadtreeTextbook};
+pub use divisions::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook};
 
 /// Parameters: `octree-textbook:leaf=8,depth=64`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]

@@ -5,18 +5,17 @@
 //!
 //! | file | contents |
 //! |---|---|
-//! | `node`, `packed` | nodes in depth-first order; layout, construction, refit |
+//! | `node`, `packed` | nodes in depth-first order, stacks of them; layout, construction, refit |
 //! | `wide_nodes` | the same nodes in blocks of sixteen, for queries by volumes |
-//! | `search`, `stack` | queries by volumes, by points, by many points |
+//! | `search` | queries by volumes, by points, by many points |
 //! | `partition` | top-down construction by a [`Splitter`] |
 //! | `kd_treelets` | region search by axis-parallel planes, a descent of `bsp` |
 
 pub mod kd_treelets;
-mod node;
+pub mod node;
 mod packed;
 mod partition;
 mod search;
-pub mod stack;
 mod wide_nodes;
 
 use std::ops::ControlFlow;

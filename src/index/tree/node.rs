@@ -1,4 +1,4 @@
-//! A node of the packed tree.
+//! A node of the packed tree, and the open nodes of a depth-first traversal.
 
 use std::ops::Range;
 
@@ -49,4 +49,45 @@ pub fn children(nodes: &[TreeNode], node: usize) -> impl Iterator<Item = usize> 
         child = nodes[this].after();
         Some(this)
     })
+}
+
+/// Open subtrees kept without the heap: enough for any balanced tree.
+const NEAR: usize = 64;
+
+/// Open nodes, each with a state of the traversal such as its open planes.
+pub struct Stack<M> {
+    near: [(u32, M); NEAR],
+    used: usize,
+    /// Deeper levels of degenerate trees.
+    far: Vec<(u32, M)>,
+}
+
+impl<M: Copy> Stack<M> {
+    #[inline(always)]
+    pub fn new(root: (u32, M)) -> Self {
+        Stack {
+            near: [root; NEAR],
+            used: 1,
+            far: Vec::new(),
+        }
+    }
+
+    #[inline(always)]
+    pub fn pop(&mut self) -> Option<(u32, M)> {
+        if let Some(top) = self.far.pop() {
+            return Some(top);
+        }
+        self.used = self.used.checked_sub(1)?;
+        Some(self.near[self.used])
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, entry: (u32, M)) {
+        if let Some(slot) = self.near.get_mut(self.used) {
+            *slot = entry;
+            self.used += 1;
+        } else {
+            self.far.push(entry);
+        }
+    }
 }

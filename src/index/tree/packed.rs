@@ -6,7 +6,7 @@
 use super::node::{TreeNode, children, is_leaf};
 use super::wide_nodes::WideNodes;
 use crate::geometry::{Aabb, BoxBlocks, LANES};
-use crate::index::positions::{Dirty, Positions};
+use crate::index::items::{Dirty, Positions};
 use crate::index::{MemoryUsage, TreeCell};
 use crate::kernel::prefetch;
 use crate::query::ItemId;

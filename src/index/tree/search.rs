@@ -9,9 +9,8 @@ use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 
-use super::node::TreeNode;
+use super::node::{Stack, TreeNode};
 use super::packed::PackedTree;
-use super::stack::Stack;
 use crate::geometry::{LANES, LaneMask, PlaneMask};
 use crate::index::frontier::{
     AHEAD, Frontier, Merger, first_ahead, is_far, pass_run, put_back, take,

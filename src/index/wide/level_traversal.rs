@@ -7,7 +7,7 @@ use super::levels::Layer;
 use super::single_plane_buckets::{BUCKETS, SinglePlaneBuckets};
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::index::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, pass_run};
-use crate::index::padded_ids::PaddedIds;
+use crate::index::items::PaddedIds;
 use crate::kernel::{Isa, pairs, prefetch};
 use crate::query::{ItemId, Planes, QueryVolume, Recorder, Sink, Tests};
 

@@ -14,7 +14,7 @@ use super::block_order::{BlockOrder, block_ordered};
 use super::{SCRATCH, Wide, WideParams};
 use crate::geometry::{Aabb, LANES};
 use crate::index::frontier::{put_back, take};
-use crate::index::positions::{ABSENT, Dirty, Positions};
+use crate::index::items::{ABSENT, Dirty, Positions};
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::kernel::prefetch;
 use crate::query::{Context, ItemId, QueryVolume};

@@ -2,7 +2,7 @@
 
 use super::Wide;
 use crate::geometry::{Aabb, LANES, LaneMask};
-use crate::index::positions::{ABSENT, Dirty};
+use crate::index::items::{ABSENT, Dirty};
 use crate::query::ItemId;
 
 impl Wide {

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::super::{Answer, GroupKey, KeyedSchedule, Schedule, TaskPlan};
+use super::super::{Answer, GroupKey, KeyedSchedule, PathInfo, SceneInfo, Schedule, TaskPlan};
 use super::*;
 use crate::index::{Kind, Origin};
 

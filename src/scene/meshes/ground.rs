@@ -1,5 +1,6 @@
-//! A heightfield, and a forest on it: neighbouring tiles compute the points of their
-//! common edge alike.
+//! A heightfield, and a forest on it.
+//!
+//! Neighbouring tiles compute the points of their common edge alike.
 
 use glam::{DVec3, Vec3};
 

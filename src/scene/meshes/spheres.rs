@@ -1,6 +1,7 @@
-//! Spheres and a statue, both from the geodesic sphere: an icosahedron whose faces are
-//! cut into f² triangles, pushed out to the sphere. Neighbouring faces share the points of
-//! their edge.
+//! Spheres and a statue, both from the geodesic sphere.
+//!
+//! That is an icosahedron whose faces are cut into f² triangles, pushed out to the sphere.
+//! Neighbouring faces share the points of their edge.
 
 use std::collections::HashMap;
 
@@ -47,8 +48,9 @@ const TALL: f64 = 1.8;
 /// Radius without bulges, world units.
 const RADIUS: f64 = 1.0;
 
-/// A statue-like blob of about `triangles` triangles in one item: a sphere whose radius
-/// changes with the direction, smoothly at large and roughly at small.
+/// A statue-like blob of about `triangles` triangles in one item.
+///
+/// A sphere whose radius changes with the direction, smoothly at large and roughly at small.
 ///
 /// Each direction meets the surface once, so it is closed and never crosses itself.
 pub fn statue(triangles: usize, seed: u64) -> Surfaces {

@@ -1,10 +1,8 @@
 //! Generated extremes: families of seeded cases with their outcome declared,
 //! and the loop that runs them.
 
-mod boxes;
 mod cameras;
 mod check;
-mod findings;
 mod volumes;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,11 +15,9 @@ use crate::index::StructureSpec;
 use crate::scene::SeededRng;
 use crate::threads;
 
-pub use boxes::Shapes;
-use boxes::adversarial;
-pub use cameras::{CAMERA_FAMILIES, CameraFamily, Draft};
-pub use check::{Case, Drops};
-pub use findings::{Fault, Findings, SCALAR, Tally};
+use cameras::adversarial;
+pub use cameras::{CAMERA_FAMILIES, CameraFamily, Draft, Shapes};
+pub use check::{Case, Drops, Fault, Findings, SCALAR, Tally};
 pub use volumes::{PLANES_FAMILIES, PlanesCase, PlanesFamily};
 
 /// Cases of each variant that make ten million boxes at camera level.

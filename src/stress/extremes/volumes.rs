@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use super::findings::{Findings, SCALAR};
+use super::check::{Findings, SCALAR};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, Plane, RelativeVolume, Spheres, sphere_cube,
 };
@@ -12,7 +12,7 @@ use crate::index::{Input, StructureSpec};
 use crate::oracle::{Oracle, Verdict};
 use crate::query::AnyVolume;
 use crate::scene::SeededRng;
-use crate::stress::margin::sees_exactly;
+use crate::stress::sheet::sees_exactly;
 use crate::verify::{RandomCase, VOLUME_KINDS, explain_visibility};
 
 /// A volume and boxes, at planes level.

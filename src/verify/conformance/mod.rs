@@ -2,11 +2,8 @@
 //! [`RegionIndex`]. [`conformance!`](crate::conformance) makes a test of each; an
 //! error names the difference and the scene.
 
-mod declared;
-mod locate;
+mod behaviour;
 mod questions;
-mod refit;
-mod views;
 
 use std::ops::{ControlFlow, Range};
 
@@ -23,12 +20,11 @@ use questions::{
     generated_scenes, is_right, points, seen, sorted,
 };
 
-pub use declared::declared_capabilities_are_true;
-pub use locate::many_points_are_answered_as_one_by_one;
-pub use locate::region_search_is_the_closed_box_scan;
-pub use refit::items_that_come_and_go_are_followed;
-pub use refit::refit_equals_a_fresh_build;
-pub use views::every_view_sees_what_the_scan_sees;
+pub use behaviour::{
+    declared_capabilities_are_true, every_view_sees_what_the_scan_sees,
+    items_that_come_and_go_are_followed, many_points_are_answered_as_one_by_one,
+    refit_equals_a_fresh_build, region_search_is_the_closed_box_scan,
+};
 
 /// Stamps one `#[test]` per property of the contract for a structure with its
 /// default parameters. The tests are named after the properties: two

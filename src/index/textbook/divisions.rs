@@ -1,0 +1,307 @@
+//! The textbook trees: the division of octree, quadtree, BSP tree and BVH.
+
+use glam::Vec3;
+use obvhs::BvhBuildParams;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
+
+use super::{Division, Node, Textbook, TextbookParams};
+use crate::geometry::{Aabb, Plane, PlaneTree};
+use crate::index::build::bsp_split_planes::planes_of;
+use crate::index::build::cells::widest_axes;
+use crate::index::items::Record;
+use crate::index::{Input, ploc};
+
+/// An octree (Meagher 1982, "Geometric modeling using octree encoding") as the
+/// lecture on visibility means it (slides "Visibility", "Region search"). O(log n
+/// + answers) per query where items are small against their cells.
+///
+/// An item that crosses the middle of a cell stays with the cell, however small it is,
+/// and every query that reaches the cell tests it: not so in [`Octree`](crate::index::Octree),
+/// whose items all descend with their centres, nor in loose octrees (Ulrich 2000).
+pub type OctreeTextbook = Textbook<OctreeCells>;
+
+/// A quadtree (Finkel and Bentley 1974, "Quad trees: a data structure for
+/// retrieval on composite keys") as the lecture on visibility means it (slides
+/// "Visibility", "Region search"), over boxes.
+///
+/// As in [`OctreeTextbook`], an item lies with the smallest cell that contains it. Cells
+/// are columns through the whole scene, over the two axes in which it is widest. Takes
+/// O(log n + answers) per query where the scene is flat and items are small against their
+/// cells; nothing is culled by height.
+pub type QuadtreeTextbook = Textbook<QuadtreeCells>;
+
+/// Division of [`OctreeTextbook`].
+pub struct OctreeCells;
+
+/// Division of [`QuadtreeTextbook`].
+pub struct QuadtreeCells;
+
+impl Division for OctreeCells {
+    const NAME: &str = "octree-textbook";
+    const SUMMARY: &str = "lecture form: items at the smallest cell that holds them";
+
+    fn root(input: &Input<'_>, records: Vec<Record>, params: &TextbookParams) -> Node {
+        let axes = [0, 1, 2];
+        let cell = root_cell(&Aabb::union_of(input.items), &axes);
+        divided(cell, &axes, records, params, 0)
+    }
+}
+
+impl Division for QuadtreeCells {
+    const NAME: &str = "quadtree-textbook";
+    const SUMMARY: &str = "lecture form: items at the smallest column that holds them";
+
+    fn root(input: &Input<'_>, records: Vec<Record>, params: &TextbookParams) -> Node {
+        let scene = Aabb::union_of(input.items);
+        let axes = widest_axes(&scene);
+        divided(root_cell(&scene, &axes), &axes, records, params, 0)
+    }
+}
+
+/// The cell of a whole scene: as wide on each of the axes that are cut.
+fn root_cell(scene: &Aabb, axes: &[usize]) -> Aabb {
+    // Halved before subtracting and clamped: bounds may span the range of f32.
+    let half = scene.max * 0.5 - scene.min * 0.5;
+    let widest = axes.iter().map(|&axis| half[axis]).fold(0.0, f32::max);
+    let cube = Aabb::around(scene.centre(), Vec3::splat(widest));
+    let mut cell = *scene;
+    for &axis in axes {
+        // Rounding may have put a face of the cube within the scene.
+        cell.min[axis] = cube.min[axis].min(scene.min[axis]).max(f32::MIN);
+        cell.max[axis] = cube.max[axis].max(scene.max[axis]).min(f32::MAX);
+    }
+    cell
+}
+
+/// A cell with its items and subtrees; children without items are left out.
+///
+/// Bit `k` of a child's number is its side of the middle of `axes[k]`.
+fn divided(
+    bounds: Aabb,
+    axes: &[usize],
+    records: Vec<Record>,
+    params: &TextbookParams,
+    level: u32,
+) -> Node {
+    if params.ends_at(records.len(), level) {
+        return Node::with(bounds, &records);
+    }
+    let cells = (0..1 << axes.len()).map(|child| part(&bounds, axes, child));
+    let mut below: Vec<(Aabb, Vec<Record>)> = cells.map(|cell| (cell, Vec::new())).collect();
+    let mut own = Vec::new();
+    for record in records {
+        // Closed bounds: on a face, the first of the cells that share it.
+        match below
+            .iter_mut()
+            .find(|(cell, _)| cell.contains(&record.bounds))
+        {
+            Some((_, items)) => items.push(record),
+            None => own.push(record),
+        }
+    }
+    let mut node = Node::with(bounds, &own);
+    let some = below.into_iter().filter(|(_, items)| !items.is_empty());
+    node.children = some
+        .map(|(cell, items)| divided(cell, axes, items, params, level + 1))
+        .collect();
+    node
+}
+
+/// A part of a cell. Its faces are the cell's or the middle, so parts meet exactly.
+fn part(cell: &Aabb, axes: &[usize], child: usize) -> Aabb {
+    let (mut part, middle) = (*cell, cell.centre());
+    for (bit, &axis) in axes.iter().enumerate() {
+        match child >> bit & 1 {
+            0 => part.max[axis] = middle[axis],
+            _ => part.min[axis] = middle[axis],
+        }
+    }
+    part
+}
+
+/// A BSP tree (Fuchs, Kedem and Naylor 1980, "On visible surface generation by a
+/// priori tree structures"; lecture on visibility, slides "BSP trees" and "Region
+/// search").
+///
+/// Region search takes the side of the plane that the point is on: O(log n) where planes
+/// cut few items. A frustum is tested against the bounds of each node's items.
+pub type BspTextbook = Textbook<DividingPlanes>;
+
+/// Division of [`BspTextbook`].
+pub struct DividingPlanes;
+
+impl Division for DividingPlanes {
+    const NAME: &str = "bsp-textbook";
+    const SUMMARY: &str =
+        "lecture form: the map's own planes or item faces, cut items at their plane";
+    const BY_HALF_SPACES: bool = true;
+
+    fn root(input: &Input<'_>, records: Vec<Record>, params: &TextbookParams) -> Node {
+        let own = input.own_tree;
+        let planes = Planes { own, params };
+        planes.divided(&records, own.and_then(|own| own.root), 0)
+    }
+}
+
+/// Items on the sides of a plane.
+struct Sides {
+    plane: Plane,
+    /// Wholly in front, and wholly behind.
+    of: [Vec<Record>; 2],
+    cut: Vec<Record>,
+}
+
+/// In front of a plane (0), behind it (1), or cut by it. Touching is not cut: walls
+/// that lie in a plane are on its sides.
+fn side_of(plane: &Plane, b: &Aabb) -> Option<usize> {
+    if plane.contains(b) {
+        return Some(0);
+    }
+    (plane.value_at(plane.p_vertex(b)) <= 0.0).then_some(1)
+}
+
+impl Sides {
+    fn of(plane: Plane, records: &[Record]) -> Sides {
+        let (mut of, mut cut) = ([const { Vec::new() }; 2], Vec::new());
+        for &record in records {
+            match side_of(&plane, &record.bounds) {
+                Some(side) => of[side].push(record),
+                None => cut.push(record),
+            }
+        }
+        Sides { plane, of, cut }
+    }
+}
+
+/// Rank of a plane, best first.
+///
+/// First the items that its emptier side lacks to a quarter, then the items it cuts,
+/// since every search of the node tests them.
+fn demerit(plane: &Plane, records: &[Record]) -> (usize, usize) {
+    let mut sides = [0, 0];
+    for side in records.iter().filter_map(|r| side_of(plane, &r.bounds)) {
+        sides[side] += 1;
+    }
+    let [front, back] = sides;
+    let lacking = (records.len() / 4).saturating_sub(front.min(back));
+    (lacking, records.len() - front - back)
+}
+
+/// Source of dividing planes.
+struct Planes<'a> {
+    own: Option<&'a PlaneTree>,
+    params: &'a TextbookParams,
+}
+
+/// Boxes per node that offer planes, and items by which the planes are ranked.
+const OFFER: usize = 4;
+const JUDGES: usize = 512;
+
+impl Planes<'_> {
+    /// The division of some items, with the map's nodes in front and behind; `at` is
+    /// the map's next node. Skips those of its planes with everything on one side.
+    /// `None` if no candidate plane divides the items.
+    fn sides(&self, records: &[Record], mut at: Option<u32>) -> Option<(Sides, [Option<u32>; 2])> {
+        while let Some(own) = at.and_then(|at| self.own?.nodes.get(at as usize)) {
+            let sides = Sides::of(own.plane, records);
+            match sides.of.iter().position(|side| side.len() == records.len()) {
+                Some(side) => at = own.children[side],
+                None if sides.cut.len() == records.len() => break,
+                None => return Some((sides, own.children)),
+            }
+        }
+        let step = records.len().div_ceil(JUDGES);
+        let judges: Vec<Record> = records.iter().step_by(step).copied().collect();
+        let best = planes_of(records, OFFER).min_by_key(|plane| demerit(plane, &judges))?;
+        let sides = Sides::of(best, records);
+        let divides = sides.of.iter().all(|side| !side.is_empty());
+        divides.then_some((sides, [None; 2]))
+    }
+
+    fn divided(&self, records: &[Record], at: Option<u32>, level: u32) -> Node {
+        let bounds = Aabb::union_of(records.iter().map(|record| &record.bounds));
+        let ends = self.params.ends_at(records.len(), level);
+        let found = if ends { None } else { self.sides(records, at) };
+        let Some((Sides { plane, of, cut }, own)) = found else {
+            return Node::with(bounds, records);
+        };
+        let mut node = Node::with(bounds, &cut);
+        let half_spaces = [plane, Plane::new(-plane.normal, -plane.d)];
+        let sides = of.iter().zip(own).zip(half_spaces);
+        node.children = sides
+            .filter(|((records, _), _)| !records.is_empty())
+            .map(|((records, at), half_space)| Node {
+                half_space: Some(half_space),
+                ..self.divided(records, at, level + 1)
+            })
+            .collect();
+        node
+    }
+}
+
+/// A bounding volume hierarchy (Clark 1976, "Hierarchical geometric models for
+/// visible surface algorithms"; the crate builds it bottom-up, by PLOC: Meister and
+/// Bittner 2018). O(log n + answers) per query.
+///
+/// The lecture on visibility does not name it; engines use it instead of the lecture's
+/// trees.
+pub type BvhTextbook = Textbook<ObvhsNodes>;
+
+/// Division of [`BvhTextbook`].
+pub struct ObvhsNodes;
+
+impl Division for ObvhsNodes {
+    const NAME: &str = "bvh-textbook";
+    const SUMMARY: &str = "lecture form: the nodes of crate obvhs, one at a time";
+
+    fn root(input: &Input<'_>, mut records: Vec<Record>, params: &TextbookParams) -> Node {
+        // Items with identical bounds are one primitive for the builder, whose search for
+        // the nearest neighbour fails among them.
+        let key = |r: &Record| r.bounds.bits();
+        records.sort_unstable_by_key(|r| (key(r), r.id));
+        let stacks: Vec<&[Record]> = records.chunk_by(|a, b| key(a) == key(b)).collect();
+        // At unit size: the builder compares areas, which must not overflow.
+        let reach = Aabb::union_of(input.items).reach().max_element();
+        let scale = reach.recip().min(f32::MAX);
+        let scaled = |b: &Aabb| Aabb::new(b.min * scale, b.max * scale);
+        let boxes = stacks.iter().map(|stack| scaled(&stack[0].bounds));
+        let config = BvhBuildParams {
+            max_prims_per_leaf: params.leaf.min(255),
+            ..BvhBuildParams::medium_build()
+        };
+        let built = ploc::build(&boxes.collect::<Vec<_>>(), config);
+        subtree(&built, built.nodes[0], params.depth, &stacks)
+    }
+}
+
+/// A node of obvhs with the exact bounds of its items, which the builder rounds.
+///
+/// At the deepest level allowed it keeps the items of all leaves below: the builder's
+/// trees may be deeper.
+fn subtree(built: &Bvh2, node: Bvh2Node, levels: u32, stacks: &[&[Record]]) -> Node {
+    let children = |node: &Bvh2Node| {
+        let first = node.first_index as usize;
+        [built.nodes[first], built.nodes[first + 1]]
+    };
+    if levels > 0 && !node.is_leaf() {
+        let below = children(&node).map(|child| subtree(built, child, levels - 1, stacks));
+        let mut inner = Node::with(below[0].bounds.union(&below[1].bounds), &[]);
+        inner.children = below.into();
+        return inner;
+    }
+    let (mut records, mut open) = (Vec::new(), vec![node]);
+    while let Some(node) = open.pop() {
+        let (first, count) = (node.first_index as usize, node.prim_count as usize);
+        match node.is_leaf() {
+            true => {
+                for &stack in &built.primitive_indices[first..first + count] {
+                    records.extend_from_slice(stacks[stack as usize]);
+                }
+            }
+            false => open.extend(children(&node)),
+        }
+    }
+    let bounds = Aabb::union_of(records.iter().map(|record| &record.bounds));
+    Node::with(bounds, &records)
+}

@@ -1,0 +1,282 @@
+//! Properties of views, of region search, of refits and of declared capabilities.
+//!
+//! A structure is queried with each kind of view, and with one point and many; it is
+//! refitted, or built again where it declines; it can do what it declares, and nothing else.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+
+use super::*;
+use crate::geometry::{ConvexVolumeF64, PlaneF64, RelativeVolume, Spheres, sphere_cube};
+use crate::kernel::BASELINE;
+use crate::query::{Located, ManySink, QueryVolume, Ranges};
+use crate::threads::Pool;
+
+/// `visible` returns exactly `{ i : view.sees(items[i]) }` for every kind of
+/// [`QueryVolume`], over the items and over the cubes of their spheres; a counted
+/// query gives the same ids and evaluates no plane twice.
+pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
+    // Every kind of plane set, not each of them at each of its places.
+    each(edges(), |asked, index: &mut T| {
+        check(asked, index, 5, usize::MAX)
+    })?;
+    each(cases(SEEDS), |asked, index: &mut T| {
+        check(asked, index, 1, 1)
+    })?;
+    each(generated_scenes(500)?, |asked, index: &mut T| {
+        check(asked, index, 1, 3)
+    })
+}
+
+/// Queries with every kind of view of some of the volumes.
+fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize) -> Outcome {
+    let items = &asked.items;
+    let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
+    let index_of_cubes: T = build(&cubes)?;
+    let input = Input::new(&cubes).spheres(true);
+    let of_spheres = T::build(&input, &T::Params::default()).map_err(|e| e.to_string())?;
+    for volume in asked.volumes.iter().step_by(step).take(most) {
+        let wide =
+            ConvexVolumeF64::from_planes(&finer(volume)).map_err(|error| error.to_string())?;
+        right("planes", index, items, volume)?;
+        let spheres = Spheres::new(volume);
+        right("spheres", &index_of_cubes, &cubes, &spheres)?;
+        right("spheres in blocks", &of_spheres, &cubes, &spheres)?;
+        right("f64 planes", index, items, &wide)?;
+        let eye = items.first().map_or(Vec3::ONE, |b| b.max);
+        // A plane may leave f32 on its way to the eye.
+        if let Ok(relative) = RelativeVolume::about(eye, volume) {
+            right("planes about the eye", index, items, &relative)?;
+        }
+    }
+    // A box at either end, and all of them.
+    let ends = [items.first(), items.last()].into_iter().flatten().copied();
+    let sought = ends.chain([Aabb::union_of(items)]);
+    let mut sound = sought.filter(|b| !b.is_empty());
+    sound.try_for_each(|sought| right("a box", index, items, &sought))
+}
+
+/// Planes that are none of f32.
+fn finer(volume: &ConvexVolume) -> Vec<PlaneF64> {
+    let planes = volume.planes().iter().map(PlaneF64::from);
+    let turned = planes.map(|p| PlaneF64::new(p.normal * (1.0 + 1e-9), p.d));
+    turned.collect()
+}
+
+fn right<T: RegionIndex, Q: QueryVolume>(
+    kind: &str,
+    index: &T,
+    items: &[Aabb],
+    view: &Q,
+) -> Outcome {
+    let why = |b: &Aabb| format!("{b:?} is seen: {}", view.sees(b));
+    is_right(kind, index, items, view, why)?;
+    counts_are_plausible(index, view).map_err(|error| format!("{kind}: {error}"))
+}
+
+/// A point is answered with exactly the boxes that hold the point, bounds closed.
+pub fn region_search_is_the_closed_box_scan<T: RegionIndex>() -> Outcome {
+    let scenes = edges().chain(cases(SEEDS)).chain(generated_scenes(500)?);
+    each(scenes, |asked, index: &mut T| asked.locate_is_right(index))
+}
+
+/// `query_many` passes the ids of `query` for every point in order:
+/// whatever the size of the batch, with points that come again, lie on faces or
+/// outside, or are no numbers; and stops where its sink does.
+pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
+    let scenes = edges().chain(cases(SEEDS)).chain([cells()]);
+    let scenes = scenes.chain(generated_scenes(500)?);
+    each(scenes, |asked, index: &mut T| {
+        let mut points = asked.points.clone();
+        let strange = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX];
+        for value in strange {
+            points.push(Vec3::splat(value));
+            points.extend(asked.points.iter().take(4).map(|p| p.with_y(value)));
+        }
+        // Neighbours in a batch, and far apart.
+        points.extend_from_within(points.len() / 2..);
+        let mut trial = Trial::new(asked.items.len());
+        for count in [0, 1, 3, points.len()] {
+            let points = &points[..count.min(points.len())];
+            let (mut many, count) = (Located::default(), points.len());
+            let flow = index.query_many(BASELINE, points, &mut many);
+            ensure(many.len() == count && flow.is_continue(), || {
+                format!("{} of {count} points answered, {flow:?}", many.len())
+            })?;
+            for (&p, found) in points.iter().zip(many.iter()) {
+                trial.expect(scan(&asked.items, |b| b.contains_point(p)));
+                let alone = seen(index, &p);
+                let answer = trial.ask(|ids| ids.extend_from_slice(found));
+                let fault = answer.err().map(|fault| fault.explained(|_| None));
+                ensure(fault.is_none() && found == alone, || {
+                    format!("{p} among {count} points: {fault:?}; {found:?}, alone {alone:?}")
+                })?;
+            }
+        }
+        if points.len() > 1 {
+            let most = points.len() as u32 / 2;
+            let mut sink = StopsAfter { most, got: 0 };
+            let flow = index.query_many(BASELINE, &points, &mut sink);
+            ensure(flow.is_break() && sink.got == most, || {
+                format!("stopped after {most} points, got {} and {flow:?}", sink.got)
+            })?;
+        }
+        Ok(())
+    })
+}
+
+/// Breaks when it has its points.
+struct StopsAfter {
+    most: u32,
+    got: u32,
+}
+
+impl ManySink for StopsAfter {
+    fn accept(&mut self, _: u32, _: &[ItemId]) -> ControlFlow<()> {
+        self.got += 1;
+        match self.got < self.most {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
+        }
+    }
+}
+
+/// Cells that tile a block, with points within, on faces, edges and corners,
+/// and beside the block.
+fn cells() -> Questions {
+    const SIDE: u16 = 11;
+    let at = |x: u16, y: u16, z: u16| Vec3::from([x, y, z].map(f32::from));
+    let grid = |i: u16| at(i % SIDE, i / SIDE % SIDE, i / SIDE / SIDE);
+    let items = (0..SIDE * SIDE * SIDE).map(|i| Aabb::new(grid(i), grid(i) + 1.0));
+    // Halves: every other coordinate is a face.
+    let points = (0..2 * SIDE * SIDE).map(|i| {
+        let step = i.wrapping_mul(31);
+        at(i % 23, step % 23, step / 23 % 25) * 0.5
+    });
+    Questions {
+        scene: "cells".to_owned(),
+        items: items.collect(),
+        volumes: vec![],
+        points: points.collect(),
+    }
+}
+
+/// Brings an index up to date: by refitting where it can, else by building.
+/// An index that cannot must not have changed.
+fn update<T: RegionIndex>(index: &mut T, asked: &Questions, moved: &[ItemId]) -> Outcome {
+    let before = asked.answers(index);
+    if index.refit(&asked.items, moved) {
+        return Ok(());
+    }
+    ensure(before == asked.answers(index), || {
+        "refit refused, but changed the structure".to_owned()
+    })?;
+    *index = build(&asked.items)?;
+    Ok(())
+}
+
+/// After 0.1 %, 1 %, 10 % and 100 % of the items have moved, one after the
+/// other, a structure that refits answers as a newly built one.
+pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
+    let degenerate = ["all the same", "needles", "inverted among sound"];
+    let degenerate = edges().filter(|asked| degenerate.contains(&asked.scene.as_str()));
+    let scenes = generated_scenes(1000)?.into_iter().chain(degenerate);
+    each(scenes, |asked, index: &mut T| {
+        let mut rng = SeededRng::new(11);
+        let width = f64::from(Aabb::union_of(&asked.items).extent().max_element());
+        update(index, asked, &[])?;
+        for step in [1000, 100, 10, 1] {
+            let all = 0..asked.items.len() as ItemId;
+            let moved: Vec<ItemId> = all.skip(step / 3).step_by(step).collect();
+            for (at, &id) in moved.iter().enumerate() {
+                // Most move a little, some far.
+                let far = if at % 5 == 0 { 0.5 } else { 0.01 };
+                let by = (rng.normal3() * width * far).as_vec3();
+                let b = &mut asked.items[id as usize];
+                *b = Aabb::new(b.min + by, b.max + by);
+            }
+            update(index, asked, &moved)?;
+            asked.points = points(&asked.items);
+            let corners = moved.iter().map(|&id| asked.items[id as usize].max);
+            asked.points.extend(corners.take(20));
+            let right = asked.both_are_right(index);
+            right.map_err(|error| format!("after {} moves: {error}", moved.len()))?;
+        }
+        Ok(())
+    })
+}
+
+/// An item that becomes empty is gone, and one that becomes sound is there.
+pub fn items_that_come_and_go_are_followed<T: RegionIndex>() -> Outcome {
+    let names = ["one", "coplanar", "inverted among sound", "only inverted"];
+    let scenes = edges().filter(|asked| names.contains(&asked.scene.as_str()));
+    each(scenes, |asked, index: &mut T| {
+        let last = asked.items.len() as ItemId - 1;
+        let all: Vec<ItemId> = (0..=last).collect();
+        // The first and the last turn about (a sound box becomes empty and
+        // the other way round) and back, then all of them at once.
+        let steps = [vec![0], vec![0], vec![last], vec![last], all.clone(), all];
+        for moved in steps {
+            for &id in &moved {
+                let b = &mut asked.items[id as usize];
+                *b = Aabb::new(b.max, b.min);
+            }
+            update(index, asked, &moved)?;
+            let right = asked.both_are_right(index);
+            right.map_err(|error| format!("{} items turned about: {error}", moved.len()))?;
+        }
+        Ok(())
+    })
+}
+
+/// Items that move are taken over if the structure says that it refits, and
+/// declined if not; it has a tree order if it says so, and then answers in
+/// ranges of it are the reference set. A build looks at how many threads it may
+/// use if it says so, and answers the same with several.
+pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
+    let says = T::INFO.capabilities;
+    each(generated_scenes(500)?, |asked, index: &mut T| {
+        let ordered = index.tree_order().is_some();
+        ensure(ordered == says.ranges, || {
+            let (says, has) = (says.ranges, if ordered { "has" } else { "lacks" });
+            format!("declares ranges: {says}, yet {has} a tree order")
+        })?;
+        if let Some(ids) = index.tree_order() {
+            for volume in &asked.volumes {
+                let mut ranges = Vec::new();
+                let mut sink = Ranges::onto(&mut ranges);
+                let _ = ask(index, volume, &mut sink, &mut NoRecorder);
+                let places = ranges.into_iter().flatten();
+                let found = places.map(|place| ids.get(place as usize).copied());
+                let found: Option<Vec<ItemId>> = found.collect();
+                let wanted = sorted(seen(index, volume));
+                ensure(found.map(sorted).as_ref() == Some(&wanted), || {
+                    let count = wanted.len();
+                    format!("its ranges are not the {count} items that it sees")
+                })?;
+            }
+        }
+        let pool = Pool::new(3);
+        let shared = T::build(&Input::new(&asked.items).pool(&pool), &T::Params::default());
+        let shared = shared.map_err(|error| error.to_string())?;
+        let was_asked = pool.was_asked();
+        ensure(was_asked == says.threaded_build, || {
+            let says = says.threaded_build;
+            format!("declares threaded-build: {says}, yet its build asks for threads: {was_asked}")
+        })?;
+        ensure(asked.answers(&shared) == asked.answers(index), || {
+            "built on three threads, answered differently".to_owned()
+        })?;
+        let moved: Vec<ItemId> = (0..asked.items.len() as ItemId).step_by(7).collect();
+        for &id in &moved {
+            let b = &mut asked.items[id as usize];
+            *b = Aabb::new(b.min + b.extent(), b.max + b.extent());
+        }
+        let refitted = index.refit(&asked.items, &moved);
+        ensure(refitted == says.refits, || {
+            let (says, count) = (says.refits, moved.len());
+            format!("declares refits: {says}, yet refit of {count} items says {refitted}")
+        })
+    })
+}
