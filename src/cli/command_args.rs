@@ -155,12 +155,6 @@ pub struct SceneGenerateArgs {
     pub scene_args: SceneArgs,
 }
 
-/// Formats of a written scene.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
-pub enum SceneFormat {
-    Csv,
-}
-
 const CONVERT_HELP: &str = include_str!("assets/help/convert.txt");
 
 #[derive(Args, Debug)]
@@ -176,8 +170,8 @@ pub struct SceneConvertArgs {
     #[arg(long, short, value_name = "FILE", conflicts_with = "output")]
     pub out: Option<PathBuf>,
     /// The format [default: by the extension]
-    #[arg(long, value_enum)]
-    pub to: Option<SceneFormat>,
+    #[arg(long, value_parser = ["csv"])]
+    pub to: Option<String>,
     #[command(flatten)]
     pub scene_args: SceneArgs,
 }

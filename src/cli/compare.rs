@@ -2,9 +2,11 @@
 //! report.json and measures nothing; the verdicts come from `report`, the table
 //! from `compare_table`.
 
+use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{bail, ensure};
+use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
 use super::command_args::{CompareArgs, Gate};
@@ -12,12 +14,12 @@ use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD, change_of, name
 use super::diagram::{Form, Row, rows};
 use super::document::{Block, to_page};
 use super::figure::{Axis, Figure, is_drawn};
-use super::{Ending, baseline, expect_places, text, unread_is_fine, write_text};
+use super::{Ending, expect_places, text, unread_is_fine, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
     Changes, JUDGED_METRICS, Lone, Outcome, Report, ReportCell, Setting, WORK, changes,
-    read_report, settings,
+    read_report, settings, write_atomically,
 };
 use crate::spec::SpecError;
 
@@ -47,7 +49,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
     };
     let [old, new] = match (&args.baseline, &args.old, &args.new) {
         // The only run that is named is NEW.
-        (Some(name), new, _) => baseline::sides(name, new.as_deref())?,
+        (Some(name), new, _) => baseline_and(name, new.as_deref())?,
         (None, Some(old), Some(new)) => [read_report(old)?, read_report(new)?],
         _ => bail!("two reports, or --against BINARY: expected one of them"),
     };
@@ -231,6 +233,63 @@ fn figure(changes: &Changes) -> Option<Figure> {
     );
     let labels = [caption.clone(), caption];
     Some(rows(labels, &axis, Some(1.0), Form::Marks, &shown))
+}
+
+/// Folder of the baselines, beside the runs.
+pub const BASELINES: &str = "results/baselines";
+
+/// File of a baseline.
+pub fn baseline_file(name: &str) -> PathBuf {
+    Path::new(BASELINES).join(format!("{name}.json"))
+}
+
+/// Keeps a report under a name, in the place of an older one.
+pub fn save_baseline(name: &str, report: &Report) -> anyhow::Result<()> {
+    fs::create_dir_all(BASELINES).context(BASELINES)?;
+    let write = |out: &mut dyn Write| Ok(serde_json::to_writer_pretty(out, report)?);
+    Ok(write_atomically(&baseline_file(name), write)?)
+}
+
+/// Reads a baseline and the run to compare with it, by default the newest run under
+/// results/.
+fn baseline_and(name: &str, new: Option<&Path>) -> anyhow::Result<[Report; 2]> {
+    ensure!(
+        baseline_file(name).is_file(),
+        "no baseline '{name}' in {BASELINES}; {}",
+        match names(BASELINES, |_| true).as_slice() {
+            [] => "expected one that `run --save NAME` kept".to_owned(),
+            known => format!("available: {}", known.join(", ").replace(".json", "")),
+        }
+    );
+    let old = read_report(&baseline_file(name))?;
+    let new = match new {
+        Some(new) => read_report(new)?,
+        None => {
+            // Names of runs begin with their time.
+            let runs = names("results", |name| {
+                name.starts_with(|c: char| c.is_ascii_digit())
+            });
+            let newest = runs.last().context(
+                "no run in results; expected one to compare with the baseline, or its folder",
+            )?;
+            read_report(&Path::new("results").join(newest))?
+        }
+    };
+    ensure!(
+        old.run.id != new.run.id,
+        "{} is the baseline '{name}' itself; expected another run to compare with it",
+        text::plain(&new.run.id)
+    );
+    Ok([old, new])
+}
+
+/// Names in a folder, sorted; none where there is no folder.
+fn names(folder: &str, is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
+    let listing = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = listing.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| is_wanted(name)).collect();
+    names.sort();
+    names
 }
 
 #[cfg(test)]

@@ -304,33 +304,30 @@ impl CompareTable {
         let more = self.changes.more_pairs();
         let mut rows = self.changes.rows.iter();
         let lacks_others = rows.any(|row| row.reason.as_deref() == Some(FEW_OTHERS));
-        Some(match (self.basis, more) {
-            (Basis::Reports, None) if lacks_others => format!(
-                "{cells}: runs with the same four structures or more would decide (run \
-                 --structure), or compare --against BINARY"
-            ),
-            (Basis::Reports, Some(more)) if more > MOST_MORE => format!(
-                "{cells}: too noisy to resolve {}: try compare --against BINARY, which runs both \
-                 programs in turns",
-                text::percent(self.changes.threshold)
-            ),
-            (Basis::Reports, Some(more)) => format!(
-                "{cells}: about {} in each run (run --processes) would decide, or compare \
-                 --against BINARY, which runs both programs in turns",
-                text::counted(more, "more process")
-            ),
-            (Basis::Reports, None) => format!(
-                "{cells}: runs with more processes (run --processes 20) may decide, or compare \
-                 --against BINARY, which runs both programs in turns"
-            ),
+        let decides = match (self.basis, more) {
             (Basis::Pairs, Some(more)) => {
-                format!(
+                return Some(format!(
                     "{cells}: about {} would decide",
                     text::counted(more, "more pair")
-                )
+                ));
             }
-            (Basis::Pairs, None) => format!("{cells}: more pairs would not decide"),
-        })
+            (Basis::Pairs, None) => return Some(format!("{cells}: more pairs would not decide")),
+            (Basis::Reports, None) if lacks_others => {
+                "runs with the same four structures or more (run --structure)".to_owned()
+            }
+            (Basis::Reports, Some(more)) if more <= MOST_MORE => {
+                let more = text::counted(more, "more process");
+                format!("about {more} in each run (run --processes)")
+            }
+            (Basis::Reports, _) => {
+                let threshold = text::percent(self.changes.threshold);
+                format!("a resolution of {threshold} (run --processes 20 may do)")
+            }
+        };
+        Some(format!(
+            "{cells}: {decides} would decide, or compare --against BINARY, which runs both programs in \
+             turns"
+        ))
     }
 }
 

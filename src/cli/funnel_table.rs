@@ -40,7 +40,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
             made.item_count, made.mask, made.tile
         )));
     }
-    blocks.push(Block::Table(chain(report)));
+    blocks.push(Block::Table(stages(report, false)));
     let both = |row: &&StageRow| row.is_chosen && row.back_end.does_object_stage;
     if let Some(row) = report.stages.iter().find(both) {
         let name = row.back_end.name;
@@ -50,7 +50,10 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     }
     if all {
         let heading = "Every back end of every stage".to_owned();
-        blocks.extend([Block::Heading(2, heading), Block::Table(stages(report))]);
+        blocks.extend([
+            Block::Heading(2, heading),
+            Block::Table(stages(report, true)),
+        ]);
         blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
         blocks.extend(report.ground.as_ref().map(ground));
         blocks.extend(report.solid_blocks.as_ref().map(solid_blocks));
@@ -101,31 +104,38 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     blocks
 }
 
-/// Stages of the chain.
-fn chain(report: &FunnelReport) -> Table {
-    let mut table = Table::of("stage | by | >in | >out | >time | >worth it from");
+/// Stages of the chain and the gain of each; with `all` every back end.
+fn stages(report: &FunnelReport, all: bool) -> Table {
+    let mut table = Table::of(match all {
+        true => "stage | by | >in | >out | >truth | >FP | >FN | >time | >per item",
+        false => "stage | by | >in | >out | >time | >worth it from",
+    });
     let level = &report.level;
-    if level.map_count > 1 {
+    if all || level.map_count > 1 {
         let [given, left] = [level.input_count, level.output_count].map(text::count);
-        let row = ["level", &level.selected, &given, &left, "", ""];
-        table.add_row(row.map(|cell| shortened(cell, 24)));
+        let selected = shortened(&level.selected, 24);
+        table.add_row(["level".to_owned(), selected, given, left]);
     }
-    let is_shown = |row: &&StageRow| row.is_chosen && row.back_end.name != NONE;
-    for row in report.stages.iter().filter(is_shown) {
-        let stage = row.back_end.stage;
-        let worth = match gain(report, stage) {
+    let is_in_chain = |row: &StageRow| row.is_chosen && row.back_end.name != NONE;
+    for row in report.stages.iter().filter(|row| all || is_in_chain(row)) {
+        let (stage, errors) = (row.back_end.stage, &row.errors);
+        let mark = if all && row.is_chosen { "*" } else { "" };
+        let name = shortened(row.structure.as_deref().unwrap_or(row.back_end.name), 24);
+        let by = format!("{name}{mark}{}", doubt(row.back_end.guarantee));
+        let mut cells = vec![stage.name().to_owned(), by];
+        cells.extend([errors.input_count, errors.output_count].map(count));
+        if all {
+            let extra = (errors.false_positive_count, errors.false_negative_count);
+            cells.extend([errors.truth_count, extra.0, extra.1].map(count));
+        }
+        cells.push(text::time_plus_minus(row.time));
+        cells.push(match gain(report, stage) {
+            _ if all => text::some(row.ns_per_removed, text::time),
             // Another stage does it in its own traversal.
             None if stage == StageKind::Object => "in occlusion".to_owned(),
             gain => text::some(gain, worth),
-        };
-        table.add_row([
-            stage.name().to_owned(),
-            shortened(name(row), 24) + doubt(row.back_end.guarantee),
-            count(row.errors.input_count),
-            count(row.errors.output_count),
-            text::time_plus_minus(row.time),
-            worth,
-        ]);
+        });
+        table.add_row(cells);
     }
     table
 }
@@ -172,7 +182,7 @@ fn saved_load(level: &LevelRow) -> Option<String> {
 
 /// Line on the occluders inside a mesh.
 fn inner_boxes(row: &InnerRow) -> Block {
-    let held = row.volume_share.map(|share| {
+    let held = text::some(row.volume_share, |share| {
         let [held, lost] = [share, 1.0 - share].map(|share| share * 100.0);
         format!(", {held:.1} % of the volume of these (loss {lost:.1} %)")
     });
@@ -180,44 +190,41 @@ fn inner_boxes(row: &InnerRow) -> Block {
         0 => "any".to_owned(),
         boxed => text::count(boxed),
     };
-    Block::Line(format!(
-        "Occluders: {} proven inside {inside} of {}{}; found in {}.",
-        text::counted(row.box_count, "box"),
-        text::counted(row.item_count, "item"),
-        held.unwrap_or_default(),
-        text::time(row.build_ns)
-    ))
+    let items = text::counted(row.item_count, "item");
+    let place = format!("proven inside {inside} of {items}{held}");
+    occluders("Occluders", row.box_count, &place, row.build_ns)
 }
 
 /// Line on the occluders below the ground.
 fn ground(row: &GroundRow) -> Block {
-    let held = row.volume_share.map(|share| {
+    let held = text::some(row.volume_share, |share| {
         let held = share * 100.0;
         format!(", {held:.1} % of the volume between the ground and its lowest place")
     });
-    Block::Line(format!(
-        "Ground: {} below {}{}; found in {}.",
-        text::counted(row.box_count, "box"),
-        text::counted(row.item_count, "item"),
-        held.unwrap_or_default(),
-        text::time(row.build_ns)
-    ))
+    let items = text::counted(row.item_count, "item");
+    occluders(
+        "Ground",
+        row.box_count,
+        &format!("below {items}{held}"),
+        row.build_ns,
+    )
 }
 
 /// Line on the occluders in the solid of a map.
 fn solid_blocks(row: &BlocksRow) -> Block {
-    Block::Line(match row.unclosed_sector_count {
-        0 => format!(
-            "Occluders: {} in the solid between the rooms of the map, below floors and above \
-             ceilings; found in {}.",
-            text::counted(row.box_count, "box"),
-            text::time(row.build_ns)
-        ),
-        unclosed => format!(
+    let place = "in the solid between the rooms of the map, below floors and above ceilings";
+    match row.unclosed_sector_count {
+        0 => occluders("Occluders", row.box_count, place, row.build_ns),
+        unclosed => Block::Line(format!(
             "Occluders: none, since the linedefs of {} are not closed or contradict others.",
             text::counted(unclosed, "sector")
-        ),
-    })
+        )),
+    }
+}
+
+fn occluders(what: &str, boxes: usize, place: &str, build_ns: f64) -> Block {
+    let (boxes, time) = (text::counted(boxes, "box"), text::time(build_ns));
+    Block::Line(format!("{what}: {boxes} {place}; found in {time}."))
 }
 
 /// Basis of the times.
@@ -231,50 +238,12 @@ pub fn spread(processes: usize) -> String {
     }
 }
 
-fn stages(report: &FunnelReport) -> Table {
-    let mut table = Table::of("stage | by | >in | >out | >truth | >FP | >FN | >time | >per item");
-    let level = &report.level;
-    let [given, left] = [level.input_count, level.output_count].map(text::count);
-    let selected = shortened(&level.selected, 24);
-    let mut first = vec!["level".to_owned(), selected, given, left];
-    first.resize(table.header.len(), String::new());
-    table.add_row(first);
-    table.rows.extend(report.stages.iter().map(stage));
-    table
-}
-
-/// A back end with its marks.
-fn by(row: &StageRow) -> String {
-    let mark = if row.is_chosen { "*" } else { "" };
-    let name = shortened(name(row), 24);
-    format!("{name}{mark}{}", doubt(row.back_end.guarantee))
-}
-
-fn name(row: &StageRow) -> &str {
-    row.structure.as_deref().unwrap_or(row.back_end.name)
-}
-
 /// Mark of an unproven back end.
 pub fn doubt(guarantee: Guarantee) -> &'static str {
     match guarantee {
         Guarantee::Unproven => "?",
         _ => "",
     }
-}
-
-fn stage(row: &StageRow) -> Vec<String> {
-    let errors = &row.errors;
-    vec![
-        row.back_end.stage.name().to_owned(),
-        by(row),
-        count(errors.input_count),
-        count(errors.output_count),
-        count(errors.truth_count),
-        count(errors.false_positive_count),
-        count(errors.false_negative_count),
-        text::time_plus_minus(row.time),
-        text::some(row.ns_per_removed, text::time),
-    ]
 }
 
 /// A mean of counts.

@@ -73,19 +73,19 @@ fn told((name, columns, summary): Row) -> [String; 2] {
         }
         other => other.to_string(),
     };
-    let columns = columns.iter().map(|(column, value)| match *column {
-        "origin" | "timed" => format!("{column} {}", of(value)),
-        // As they are typed behind the name.
-        "params" => of(value).replace("\":", "=").replace(['{', '}', '"'], ""),
-        _ => of(value),
+    let told = columns.iter().map(|(column, value)| {
+        // Parameters as they are typed behind the name.
+        let value = of(value).replace("\":", "=").replace(['{', '}', '"'], "");
+        (column, value)
     });
-    let columns: Vec<String> = columns.filter(|column| !column.is_empty()).collect();
-    let columns = columns.join("; ");
-    // A unit stands behind the summary.
-    match columns.len() {
-        0 => [name, summary],
-        1..12 => [name, format!("{summary} ({columns})")],
-        _ => [name, format!("{summary}\n{columns}")],
+    let told = told.filter(|(_, value)| !value.is_empty());
+    let told: Vec<String> = told
+        .map(|(column, value)| format!("{column} {value}"))
+        .collect();
+    let columns = told.iter().map(|column| format!("\n{column}"));
+    match told.join("; ") {
+        short if short.len() < 60 && !told.is_empty() => [name, format!("{summary} ({short})")],
+        _ => [name, summary + &columns.collect::<String>()],
     }
 }
 

@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::args::{LocateArgs, QueryArgs};
-use super::compare_structures::{Row, ask_all, write};
+use super::compare_structures::{Column, Row, ask_all, write};
 use super::{Ending, load_scene, tell};
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, Registry};
@@ -20,9 +20,6 @@ use crate::spec::SpecError;
 
 /// Points that are the camera places of the scene.
 const PLACES: &str = "places";
-
-/// A column of the answers: its name and its value of a row.
-type Column<'c> = (&'c str, &'c dyn Fn(&Row) -> Value);
 
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
@@ -38,7 +35,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         tell(&format!("note: {doubt}"));
     }
     let ask = frustum(&workload);
-    let columns: [Column; 9] = [
+    let columns: [Column<Row>; 9] = [
         ("camera", &|row| json!(row.question)),
         ("structure", &|row| json!(row.structure)),
         ("test", &|_| json!(culling.test.name())),
@@ -97,7 +94,7 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
         Some(_) => "point",
         None => "box",
     };
-    let columns: [Column; 6] = [
+    let columns: [Column<Row>; 6] = [
         (what, &|row| json!(row.question)),
         ("structure", &|row| json!(row.structure)),
         ("region_count", &|row| json!(row.answer.count)),

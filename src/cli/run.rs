@@ -17,7 +17,7 @@ use super::report::{page, show, show_written};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{RunOptions, create, go_on, resume, utc_now};
 use super::study::progress;
-use super::{Ending, baseline, expect_folder, interrupt, run_why, tell, text, unread_is_fine};
+use super::{Ending, compare, expect_folder, interrupt, run_why, tell, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
@@ -30,7 +30,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
         return print_plan(registry, args);
     }
     expect_folder("--out", args.out.as_deref())?;
-    let folder = args.save.as_ref().map(|_| Path::new(baseline::FOLDER));
+    let folder = args.save.as_ref().map(|_| Path::new(compare::BASELINES));
     expect_folder("--save", folder)?;
     if args.resume {
         let (folder, stream, begun) = resume(args)?;
@@ -159,7 +159,7 @@ impl Run {
         save_page(self.folder.path(), &page(&report, self.folder.path()))?;
         let save = save.filter(|_| !stopped);
         if let Some(name) = &save {
-            baseline::save(name, &report)?;
+            compare::save_baseline(name, &report)?;
         }
         shown?;
         unread_is_fine(self.close(&report, save.as_deref()))?;
@@ -334,7 +334,7 @@ impl Run {
         }
         show_written(&mut out, self.folder.path())?;
         if let Some(name) = save {
-            let file = baseline::file(name);
+            let file = compare::baseline_file(name);
             writeln!(out, "        {}: compare --baseline {name}", file.display())?;
         }
         out.flush()

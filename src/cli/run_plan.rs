@@ -1,7 +1,9 @@
 //! The plan of `cullbench run`: scenes, paths, structures and culling tests,
 //! checked as far as possible before anything runs.
 
-use anyhow::bail;
+use std::collections::BTreeSet;
+
+use anyhow::{bail, ensure};
 
 use super::args::RunArgs;
 use super::shared_args::WhatArgs;
@@ -61,15 +63,11 @@ pub fn plan_of(
         true => default_structures.unwrap_or(suite.structures).to_owned(),
         false => args.structure.join(","),
     };
-    let mut cullings: Vec<Culling> = Vec::new();
-    for test in args.test.iter().flat_map(|t| t.split(',')) {
-        let culling = args.culling.culling(test)?;
-        culling.check()?;
-        if cullings.contains(&culling) {
-            bail!("test '{test}' is named twice; expected each once");
-        }
-        cullings.push(culling);
-    }
+    let tests = || args.test.iter().flat_map(|tests| tests.split(','));
+    let cullings = tests().map(|test| args.culling.culling(test));
+    let cullings: Vec<Culling> = cullings.collect::<Result<_, _>>()?;
+    cullings.iter().try_for_each(Culling::check)?;
+    each_once("test", tests())?;
     let structures = args.kernel.structures(registry, &structures)?;
     let plan = Plan {
         scenes: scenes(args, suite)?,
@@ -83,7 +81,10 @@ pub fn plan_of(
         bounds: !args.no_bounds,
         seed: args.seed,
     };
-    check_names(&plan)?;
+    each_once("scene", plan.scenes.iter().map(|scene| &scene.source))?;
+    for scene in &plan.scenes {
+        each_once("path", &scene.paths)?;
+    }
     Ok(RunPlan {
         plan,
         suite,
@@ -139,17 +140,16 @@ fn shard(text: &str) -> Result<(usize, usize), SpecError> {
     }
 }
 
-/// A cell is found by its names: each may come once.
-fn check_names(plan: &Plan) -> anyhow::Result<()> {
-    for (i, PlannedScene { source, paths, .. }) in plan.scenes.iter().enumerate() {
-        if plan.scenes[..i].iter().any(|other| other.source == *source) {
-            bail!("scene '{source}' is named twice; expected each once");
-        }
-        for (k, path) in paths.iter().enumerate() {
-            if paths[..k].contains(path) {
-                bail!("path '{path}' is named twice; expected each once");
-            }
-        }
+/// Refuses a name that comes twice: a cell is found by its names.
+fn each_once(what: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> anyhow::Result<()> {
+    let mut seen = BTreeSet::new();
+    for name in names {
+        let name = name.as_ref().to_owned();
+        ensure!(
+            !seen.contains(&name),
+            "{what} '{name}' is named twice; expected each once"
+        );
+        seen.insert(name);
     }
     Ok(())
 }
@@ -158,11 +158,7 @@ impl RunPlan {
     /// Motions are named once and measured with warm caches.
     fn check_motions(&self) -> anyhow::Result<()> {
         let motions = &self.plan.motions;
-        for (i, motion) in motions.iter().enumerate() {
-            if motions[..i].contains(motion) {
-                bail!("motion '{motion}' is named twice; expected each once");
-            }
-        }
+        each_once("motion", motions)?;
         let mut cold = self
             .plan
             .scenes

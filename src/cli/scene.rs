@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::command_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
+use super::command_args::{SceneConvertArgs, SceneGenerateArgs, SceneInfoArgs};
 use super::scene_facts::{SceneFacts, people};
 use super::shared_args::TableFormat;
 use super::{Ending, expect_place_for, interrupt, load_scene, print_json, scene_facts, tell, text};
@@ -126,7 +126,9 @@ pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
 
 pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     let out = args.output.as_deref().or(args.out.as_deref());
-    let SceneFormat::Csv = args.to.map_or_else(|| format_of(out), Ok)?;
+    if args.to.is_none() {
+        expect_csv(out)?;
+    }
     expect_place_for("--out", out)?;
     let scene = load_scene(&args.scene, &args.scene_args, 0)?;
     let (origin, lost) = (scene.origin, left_behind(&scene));
@@ -152,8 +154,8 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     write(kept, out)
 }
 
-/// Format of the extension. A file without one (a pipe, a terminal) gets boxes too.
-fn format_of(out: Option<&Path>) -> Result<SceneFormat, SpecError> {
+/// Refuses another extension; a file without one gets boxes too.
+fn expect_csv(out: Option<&Path>) -> Result<(), SpecError> {
     match out.and_then(Path::extension) {
         Some(extension) if !extension.eq_ignore_ascii_case("csv") => {
             Err(SpecError::new(format_args!(
@@ -162,7 +164,7 @@ fn format_of(out: Option<&Path>) -> Result<SceneFormat, SpecError> {
                 extension.display()
             )))
         }
-        _ => Ok(SceneFormat::Csv),
+        _ => Ok(()),
     }
 }
 

@@ -191,19 +191,10 @@ impl Table {
     }
 
     /// The table without the columns that are empty in every row.
-    pub fn without_empty_columns(mut self) -> Table {
-        for column in (0..self.header.len()).rev() {
-            if self.rows.iter().all(|row| row[column].is_empty()) {
-                self.header.remove(column);
-                self.right.retain(|&right| right != column);
-                let after = self.right.iter_mut().filter(|right| **right > column);
-                after.for_each(|right| *right -= 1);
-                self.rows
-                    .iter_mut()
-                    .for_each(|row| drop(row.remove(column)));
-            }
-        }
-        self
+    pub fn without_empty_columns(&self) -> Table {
+        let has_text = |&column: &usize| self.rows.iter().any(|row| !row[column].is_empty());
+        let left: Vec<usize> = (0..self.header.len()).filter(has_text).collect();
+        self.of_columns(&left)
     }
 }
 

@@ -12,9 +12,9 @@ use std::time::{Duration, Instant};
 
 use tempfile::NamedTempFile;
 
-use super::files::{self, PAGE, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY};
 use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Line, Stream};
+use super::writing::{self, PAGE, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY};
 use super::writing::{locked_temporary_in, replace_atomically, sweep};
 use super::{Report, ReportCell};
 use crate::input::InputError;
@@ -37,7 +37,7 @@ impl RunFolder {
     /// # Errors
     /// An error if it holds a file of a run already.
     pub fn create(path: &Path, header: &Header) -> Result<RunFolder, InputError> {
-        let io = files::io(path);
+        let io = writing::io(path);
         let is_new = !path.exists();
         fs::create_dir_all(path).map_err(io)?;
         refuse_taken(path)?;
@@ -58,7 +58,7 @@ impl RunFolder {
         let stream = match begun.persist_noclobber(&file) {
             Ok(stream) => stream,
             Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
-                return Err(files::taken(path));
+                return Err(writing::taken(path));
             }
             Err(error) => return Err(io(error.error)),
         };
@@ -81,7 +81,7 @@ impl RunFolder {
             self.samples.set_len(0)?;
             self.samples.write_all(SAMPLE_COLUMNS.as_bytes())
         };
-        write().map_err(files::io(&self.path.join(SAMPLES)))?;
+        write().map_err(writing::io(&self.path.join(SAMPLES)))?;
         self.samples_end = SAMPLE_COLUMNS.len() as u64;
         Ok(())
     }
@@ -97,7 +97,7 @@ impl RunFolder {
     /// I/O errors.
     pub fn append(&mut self, line: &Line) -> Result<(), InputError> {
         let written = line.to_json().and_then(|text| self.stream.write_all(&text));
-        written.map_err(files::io(&self.path.join(STREAM)))
+        written.map_err(writing::io(&self.path.join(STREAM)))
     }
 
     /// Appends a part: its samples first, then the line that refers to them.
@@ -126,7 +126,7 @@ impl RunFolder {
             Ok(csv.into_inner().map_err(csv::IntoInnerError::into_error)?)
         };
         let file = self.path.join(SAMPLES);
-        let io = files::io(&file);
+        let io = writing::io(&file);
         let text = write().map_err(|error| io(error.into()))?;
         self.samples.write_all(&text).map_err(io)?;
         self.samples_end += text.len() as u64;
@@ -179,7 +179,7 @@ impl StoppedRun {
     /// work in it.
     pub fn open(path: &Path) -> Result<(StoppedRun, Stream), InputError> {
         let file = path.join(STREAM);
-        let io = files::io(&file);
+        let io = writing::io(&file);
         fs::metadata(&file).map_err(io)?;
         let lock = open(&file)?;
         let begin = Instant::now();
@@ -192,7 +192,7 @@ impl StoppedRun {
                 Err(fs::TryLockError::WouldBlock) => {
                     let found = "another run is writing here; expected a folder of its own for \
                                  each run";
-                    return Err(files::at(path, found));
+                    return Err(writing::at(path, found));
                 }
                 Err(fs::TryLockError::Error(source)) => return Err(io(source)),
             }
@@ -238,7 +238,7 @@ impl StoppedRun {
             samples_end: 0,
         };
         let path = folder.path.clone();
-        let io = files::io(&path);
+        let io = writing::io(&path);
         folder.stream.set_len(self.length).map_err(io)?;
         match stream.parts.last() {
             Some(kept) => {
@@ -261,7 +261,7 @@ pub(super) fn refuse_taken(path: &Path) -> Result<(), InputError> {
     // A link that leads nowhere is one too.
     let is_there = |file| fs::symlink_metadata(path.join(file)).is_ok();
     match files.into_iter().any(is_there) {
-        true => Err(files::taken(path)),
+        true => Err(writing::taken(path)),
         false => Ok(()),
     }
 }
@@ -271,14 +271,14 @@ pub(super) fn refuse_taken(path: &Path) -> Result<(), InputError> {
 fn open(file: &Path) -> Result<File, InputError> {
     if fs::symlink_metadata(file).is_ok_and(|found| !found.is_file()) {
         let found = io::Error::other("a link or a device; expected a file of the run's own");
-        return Err(files::io(file)(found));
+        return Err(writing::io(file)(found));
     }
     let opened = OpenOptions::new()
         .read(true)
         .append(true)
         .create(true)
         .open(file);
-    opened.map_err(files::io(file))
+    opened.map_err(writing::io(file))
 }
 
 /// Bytes of samples.csv up to the first NUL. A power cut leaves NULs where data

@@ -7,11 +7,11 @@ use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::changes::Setting;
-use super::files::{self, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::folder::{self, save_report};
 use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Stream};
 use super::writing::temporary_folder_in;
+use super::writing::{self, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use crate::input::InputError;
 use crate::measure::GroupKey;
 use crate::shown::first_of;
@@ -53,7 +53,7 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
             .or_else(|| another_plan(&begin.header, &stream.header, first))
             .or_else(|| before.find_map(|(before, other)| overlap(stream, other, before)));
         if let Some(reason) = reason {
-            return Err(files::at(path, reason));
+            return Err(writing::at(path, reason));
         }
     }
     let whole = begin.header.whole().to_vec();
@@ -73,9 +73,9 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
             parts.push((kept, (file.clone(), [from, kept.samples_end])));
             from = kept.samples_end;
         }
-        let found = folder::length_of_samples(&file).map_err(files::io(&file))?;
+        let found = folder::length_of_samples(&file).map_err(writing::io(&file))?;
         if found < from {
-            return Err(files::at(
+            return Err(writing::at(
                 &file,
                 format!("{found} sound bytes; expected {from} that stream.jsonl refers to"),
             ));
@@ -123,7 +123,7 @@ impl Merged {
     /// # Errors
     /// A folder that holds a run or other files; errors of the file system.
     pub fn write(&self, out: &Path, stop: &dyn Fn() -> bool) -> Result<bool, InputError> {
-        let io = files::io(out);
+        let io = writing::io(out);
         folder::refuse_taken(out)?;
         let out = match out.exists() {
             true => fs::canonicalize(out).map_err(io)?,

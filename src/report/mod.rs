@@ -4,7 +4,6 @@
 
 mod changes;
 mod experiment;
-mod files;
 mod folder;
 mod judging;
 mod matching;

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::files::{self, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::stream::{Header, KeptPart, Stream};
+use super::writing::{self, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::{Report, SCHEMA_VERSION};
 use crate::input::InputError;
 use crate::json::{JsonError, from_json};
@@ -43,12 +43,12 @@ fn read_json(path: PathBuf) -> Result<Report, InputError> {
     struct Versioned {
         schema_version: u32,
     }
-    let bytes = fs::read(&path).map_err(files::io(&path))?;
-    let bad = |error| files::json(&path, &error, "the report of a run");
+    let bytes = fs::read(&path).map_err(writing::io(&path))?;
+    let bad = |error| writing::json(&path, &error, "the report of a run");
     let Versioned { schema_version } = from_json(&bytes).map_err(bad)?;
     match schema_version == SCHEMA_VERSION {
         true => from_json(&bytes).map_err(bad),
-        false => Err(files::version(&path, schema_version)),
+        false => Err(writing::version(&path, schema_version)),
     }
 }
 
@@ -69,7 +69,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
     struct Finished {
         at: String,
     }
-    let bytes = fs::read(path).map_err(files::io(path))?;
+    let bytes = fs::read(path).map_err(writing::io(path))?;
     let mut stream: Option<Stream> = None;
     let (mut seen, mut groups) = (BTreeSet::new(), BTreeMap::new());
     let (mut ends, mut end) = (Vec::new(), 0);
@@ -88,7 +88,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
                 line: n + 1,
                 ..error
             };
-            files::json(path, &error, "the stream of a run")
+            writing::json(path, &error, "the stream of a run")
         };
         let bad = |found: &str, expected| {
             Err(InputError::line(
@@ -103,7 +103,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
             ("run", None) => {
                 let version = tag.schema_version.unwrap_or(SCHEMA_VERSION);
                 if version != SCHEMA_VERSION {
-                    return Err(files::version(path, version));
+                    return Err(writing::version(path, version));
                 }
                 let header: Header = from_json(text).map_err(no_json)?;
                 groups.extend(header.groups.iter().map(GroupKey::id).zip(0_usize..));

@@ -247,7 +247,7 @@ impl Stream {
                 let rows = kept.iter().filter_map(|kept| kept.rows.get(label));
                 let rows = rows.fold(0, |sum: u64, rows| sum.saturating_add(*rows));
                 (rows > 0).then(|| SamplesRef {
-                    file: super::files::SAMPLES.to_owned(),
+                    file: super::writing::SAMPLES.to_owned(),
                     rows,
                 })
             };

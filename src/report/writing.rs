@@ -1,17 +1,19 @@
-//! Files and folders that appear whole or not at all.
+//! Files of a run and their names; files that appear whole or not at all.
 //!
 //! They are written beside their place under a temporary name, then renamed into it. A
 //! process locks its temporary names while it runs; an unlocked one is the leftover of a
 //! killed process, and the next write into the same folder removes it.
 
+use std::fmt::Display;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-use super::files;
+use super::SCHEMA_VERSION;
 use crate::input::InputError;
+use crate::json::JsonError;
 
 /// Beginning and end of temporary names.
 const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
@@ -38,7 +40,7 @@ pub fn write_atomically(
             None => replace(path, write),
         }
     };
-    attempt().map_err(files::io(path))
+    attempt().map_err(io(path))
 }
 
 /// The same of a file in a folder of the program's own. Anything of its name, a
@@ -47,7 +49,7 @@ pub(super) fn replace_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), InputError> {
-    replace(path, write).map_err(files::io(path))
+    replace(path, write).map_err(io(path))
 }
 
 fn replace(target: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
@@ -95,7 +97,7 @@ pub fn try_place(path: &Path) -> Result<(), InputError> {
         };
         try_writing(folder_of(&target))
     };
-    attempt().map_err(files::io(path))
+    attempt().map_err(io(path))
 }
 
 /// The same of a folder that is there or is to be made.
@@ -104,7 +106,7 @@ pub fn try_place(path: &Path) -> Result<(), InputError> {
 /// I/O errors, with the path.
 pub fn try_folder(path: &Path) -> Result<(), InputError> {
     let folder = path.ancestors().find(|folder| folder.exists());
-    try_writing(folder.unwrap_or(Path::new("."))).map_err(files::io(path))
+    try_writing(folder.unwrap_or(Path::new("."))).map_err(io(path))
 }
 
 /// Writes a block and takes it away again.
@@ -196,6 +198,48 @@ pub(super) fn sweep(folder: &Path) {
             false => fs::remove_file(path),
         };
     }
+}
+
+pub(super) const REPORT: &str = "report.json";
+pub(super) const SUMMARY: &str = "summary.csv";
+pub(super) const SAMPLES: &str = "samples.csv";
+pub(super) const PAGE: &str = "report.html";
+pub(super) const STREAM: &str = "stream.jsonl";
+
+/// The first line of samples.csv.
+pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
+                                         queries,cpu_ns,wall_ns,returned\n";
+
+/// An error in a file or folder: the text says what was found and expected.
+pub(super) fn at(path: &Path, text: impl Display) -> InputError {
+    InputError::new(format_args!("{}: {text}", path.display()))
+}
+
+/// An error of the file system about a path.
+pub(super) fn io(path: &Path) -> impl Fn(io::Error) -> InputError + Copy {
+    InputError::io(path, "file or folder")
+}
+
+/// Text that is not the JSON of `whole`, such as "the report of a run".
+pub(super) fn json(path: &Path, error: &JsonError, whole: &str) -> InputError {
+    let expected = error.expected_of(whole);
+    InputError::at(path.display(), error.place(), &error.found, expected)
+}
+
+/// A file of another schema version.
+pub(super) fn version(path: &Path, found: u32) -> InputError {
+    at(
+        path,
+        format_args!("schema version {found}; expected {SCHEMA_VERSION}"),
+    )
+}
+
+/// A folder that holds a run already.
+pub(super) fn taken(path: &Path) -> InputError {
+    InputError::new(format_args!(
+        "{} already holds a run; expected an empty or new folder (continue it with --resume)",
+        path.display()
+    ))
 }
 
 #[cfg(test)]
