@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD, change_of, name, reason};
-use super::diagram::{Form, Row, rows};
+use super::diagram::{Row, rows};
 use super::document::{Block, to_page};
 use super::figure::{Axis, Figure, is_drawn};
 use super::{Ending, expect_places, text, unread_is_fine, write_text};
@@ -231,8 +231,7 @@ fn figure(changes: &Changes) -> Option<Figure> {
         shown.len(),
         text::counted(changes.rows.len(), "figure")
     );
-    let labels = [caption.clone(), caption];
-    Some(rows(labels, &axis, Some(1.0), Form::Marks, &shown))
+    Some(rows(caption, &axis, Some(1.0), &shown))
 }
 
 /// Folder of the baselines, beside the runs.

@@ -163,7 +163,6 @@ impl<'d> Diagram<'d> {
         );
         let right = names.iter().map(|(name, _)| name.chars().count()).max();
         Figure {
-            label: self.caption.clone(),
             caption: self.caption.clone(),
             margins: [
                 14.0 + CHARACTER * left as f64,
@@ -306,21 +305,8 @@ pub struct Row {
     pub is_tied: bool,
 }
 
-/// Form of the values of a figure of rows.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Form {
-    Marks,
-    Bars,
-}
-
 /// Rows from above to below over one axis with the line at `one`.
-pub fn rows(
-    [label, caption]: [String; 2],
-    axis: &Axis,
-    one: Option<f64>,
-    form: Form,
-    rows: &[Row],
-) -> Figure {
+pub fn rows(caption: String, axis: &Axis, one: Option<f64>, rows: &[Row]) -> Figure {
     let bottom = LINE * 1.5 * rows.len() as f64 + 8.0;
     let y = |row: usize| LINE * (1.5 * row as f64 + 1.0);
     let mut parts = String::new();
@@ -342,53 +328,37 @@ pub fn rows(
         if known.is_none() && !row.is_scan {
             names.push(&row.name);
         }
-        let class = match form {
-            Form::Marks => class(look, row.is_scan, place),
-            Form::Bars => "c0".to_owned(),
-        };
+        let class = class(look, row.is_scan, place);
         let range = |ends: Option<[f64; 2]>| ends.map(|ends| ends.map(|end| axis.percent(end)));
         let ends = range(row.ends);
         let mut shape = text::some(ends, |ends| line("interval", ends, [y0, y0]));
         shape += &text::some(range(row.inner), |ends| line("inner", ends, [y0, y0]));
-        shape += &match form {
-            Form::Marks => mark(look, "", [x, y0], ""),
-            Form::Bars => format!(
-                "<rect class=\"bar\" width=\"{x:.2}%\" height=\"{LINE}\" y=\"{:.1}\"/>",
-                y0 - LINE / 2.0
-            ),
-        };
+        shape += &mark(look, "", [x, y0], "");
         // A label stands where there is room on the narrowest page, or below.
         let [low, high] = ends.unwrap_or([x, x]);
         let length = CHARACTER * row.label.chars().count() as f64 / NARROWEST * 100.0;
-        let (anchor, at, by, below) = match form {
-            Form::Marks if x > 50.0 && low > length => ("end", low, -10, 4.0),
-            Form::Marks if high + length > 100.0 && low > length => ("end", low, -10, 4.0),
-            Form::Marks if high + length > 100.0 => {
-                let half = (length / 2.0).min(50.0);
-                ("middle", x.clamp(half, 100.0 - half), 0, 15.0)
-            }
-            _ => ("start", high, 10, 4.0),
-        };
-        let data = match form {
-            Form::Marks => format!(" data-s=\"{}\"{}", html(&row.name), row.data),
-            Form::Bars => String::new(),
+        let is_beyond = high + length > 100.0;
+        let (anchor, at, by, below) = if (x > 50.0 || is_beyond) && low > length {
+            ("end", low, -10, 4.0)
+        } else if is_beyond {
+            let half = (length / 2.0).min(50.0);
+            ("middle", x.clamp(half, 100.0 - half), 0, 15.0)
+        } else {
+            ("start", high, 10, 4.0)
         };
         parts += &format!(
-            "<g class=\"s {class}\"{data}><title>{}</title>{shape}<text x=\"{at:.2}%\" \
+            "<g class=\"s {class}\" data-s=\"{}\"{}><title>{}</title>{shape}<text x=\"{at:.2}%\" \
              y=\"{:.1}\" dx=\"{by}\" text-anchor=\"{anchor}\">{}</text></g>\n",
+            html(&row.name),
+            row.data,
             html(&row.note),
             y0 + below,
             html(&row.label),
         );
     }
-    let longest = rows.iter().map(|row| row.label.chars().count()).max();
     Figure {
-        label,
         caption,
-        margins: match form {
-            Form::Marks => [12.0, 12.0],
-            Form::Bars => [12.0, 16.0 + CHARACTER * longest.unwrap_or(0) as f64],
-        },
+        margins: [12.0, 12.0],
         height: bottom + 1.5 * LINE,
         parts,
         legend: (String::new(), 0.0),

@@ -253,8 +253,6 @@ pub fn class(look: Look, is_scan: bool, place: usize) -> String {
 
 /// A drawn figure.
 pub struct Figure {
-    /// Its description for screen readers.
-    pub label: String,
     pub caption: String,
     /// Pixels left and right of the plot.
     pub margins: [f64; 2],
@@ -267,15 +265,14 @@ pub struct Figure {
 impl Figure {
     /// The figure as a part of a page.
     pub fn inline(&self) -> String {
-        let [left, right] = self.margins;
+        let ([left, right], caption) = (self.margins, html(&self.caption));
         format!(
             "<svg class=\"plot\" role=\"img\" style=\"margin-left:{left:.0}px;width:calc(100% - \
-             {:.0}px)\" height=\"{:.0}\" aria-label=\"{}\">\n{}</svg><figcaption>{}</figcaption>",
+             {:.0}px)\" height=\"{:.0}\" aria-label=\"{caption}\">\n{}</svg>\
+             <figcaption>{caption}</figcaption>",
             left + right,
             self.height,
-            html(&self.label),
             self.parts,
-            html(&self.caption)
         )
     }
 }

@@ -11,7 +11,7 @@ use anyhow::{Context, bail};
 use serde_json::Value;
 
 use super::command_args::FunnelArgs;
-use super::diagram::{Form, Row, rows};
+use super::diagram::{Row, rows};
 use super::document::{Block, show, to_page};
 use super::figure::{Axis, Figure};
 use super::plan::Plan;
@@ -86,7 +86,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     if let Some(file) = &args.html {
         let picture = Block::Picture(draw(&report, &stages.setting.scene));
-        let figures = [Block::Figure(bars(&report)), picture];
+        let figures = [Block::Figure(passed(&report)), picture];
         let title = format!("funnel {}, {}", report.scene, report.path);
         let blocks = funnel_table::blocks(&report, true);
         let page = to_page(&title, report.conclusions.len(), figures, blocks);
@@ -310,13 +310,14 @@ fn cell(value: Option<&Value>) -> String {
     }
 }
 
-/// Bars on a logarithmic axis, from all items to what the last stage passes.
-pub fn bars(report: &FunnelReport) -> Figure {
+/// Items that each stage of the chain passes.
+fn passed(report: &FunnelReport) -> Figure {
     let count = |mean: f64| match mean.fract() == 0.0 || mean >= 1000.0 {
         true => text::count(mean.round() as usize),
         false => text::significant(mean),
     };
     let row = |name: &str, value: f64, unit: &str, note: String| Row {
+        name: name.to_owned(),
         value,
         label: format!("{name} {} {unit}", count(value)),
         note,
@@ -331,13 +332,13 @@ pub fn bars(report: &FunnelReport) -> Figure {
         let note = format!("{name} by {by}: of {given} {}", stage.unit);
         row(name, errors.output_count, stage.unit, note)
     });
-    let bars: Vec<Row> = [all].into_iter().chain(stages).collect();
-    let axis = Axis::log("", bars.iter().map(|row| row.value), 3.0, &count);
+    let stages: Vec<Row> = [all].into_iter().chain(stages).collect();
+    let axis = Axis::log("", stages.iter().map(|row| row.value), 3.0, &count);
     let caption = format!(
         "{}, {}: what each stage leaves per view (logarithmic)",
         report.scene, report.path
     );
-    rows([caption.clone(), caption], &axis, None, Form::Bars, &bars)
+    rows(caption, &axis, None, &stages)
 }
 
 /// Every fate, with its colour and its words.

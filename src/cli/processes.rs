@@ -294,22 +294,17 @@ impl Workers {
     /// # Errors
     /// As [`Workers::new`]; an argument that is no text.
     pub fn of_study() -> anyhow::Result<Workers> {
-        let temporary = || temporary_in(&std::env::temp_dir());
-        Workers::new(typed_args()?, Duration::MAX, &temporary)
+        Workers::new(typed_args()?, Duration::MAX, &std::env::temp_dir())
     }
 
-    /// `temporary` makes the files that stand for pipes.
+    /// Files in `folder` stand for pipes.
     ///
     /// # Errors
     /// Such a file cannot be written.
-    pub fn new(
-        args: Vec<String>,
-        patience: Duration,
-        temporary: &dyn Fn() -> io::Result<NamedTempFile>,
-    ) -> anyhow::Result<Workers> {
+    pub fn new(args: Vec<String>, patience: Duration, folder: &Path) -> anyhow::Result<Workers> {
         let (mut spool, mut spooled) = (Vec::new(), BTreeMap::new());
         for (source, bytes) in input::pipes() {
-            let kept = temporary().and_then(|mut file| {
+            let kept = temporary_in(folder).and_then(|mut file| {
                 file.write_all(&bytes)?;
                 Ok(file)
             });

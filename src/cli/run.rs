@@ -22,7 +22,7 @@ use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
 };
-use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_page, temporary_in};
+use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_page};
 use crate::suite::DEFAULT_PATH;
 
 pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
@@ -110,7 +110,7 @@ impl Run {
             workers: Workers::new(
                 stream.header.args.clone(),
                 Duration::from_secs(args.what.timeout),
-                &|| temporary_in(folder.path()),
+                folder.path(),
             )?,
             started: Instant::now(),
             all_columns: args.all_columns,

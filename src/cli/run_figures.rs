@@ -1,7 +1,7 @@
 //! Figures of a run: speed-ups, growth, views along the path, error against time.
 
 use super::diagram::{Diagram, Joined, Point, Series};
-use super::diagram::{Form, Row, rows};
+use super::diagram::{Row, rows};
 use super::error_figure::{Against, Measured};
 use super::figure::{Axis, Figure, Look, is_drawn, left_out};
 use super::run_verdict::times;
@@ -75,17 +75,11 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
         }
     };
     let structures: Vec<Row> = drawn.iter().enumerate().map(row).collect();
-    let label = format!(
-        "Speed-ups over {base} of {} on {}",
-        text::counted(drawn.len(), "structure"),
-        of(comparison)
-    );
     let caption = format!(
-        "Speed-up over {base}, 95 % interval; a line joins structures of one rank{}",
+        "Speed-ups over {base}, 95 % interval; a line joins structures of one rank{}",
         left_out(all.len() - drawn.len())
     );
-    let (one, form) = (Some(1.0), Form::Marks);
-    Some(rows([label, caption], &axis, one, form, &structures))
+    Some(rows(caption, &axis, Some(1.0), &structures))
 }
 
 /// "4 x", "1/4 x".
@@ -189,8 +183,7 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         let caption = format!(
             "{about}: distribution over the views{each}; median, middle half, and 5 to 95 %"
         );
-        let labels = [caption.clone(), caption];
-        figures.push(rows(labels, &axis, None, Form::Marks, &spread));
+        figures.push(rows(caption, &axis, None, &spread));
     }
     figures
 }

@@ -15,9 +15,14 @@ fn expected<T>(value: Option<T>, what: impl Display) -> Result<T, SpecError> {
     value.ok_or_else(|| SpecError::new(format_args!("expected {what}")))
 }
 
-/// A finite number.
-fn number(text: &str) -> Option<f64> {
-    text.parse().ok().filter(|n: &f64| n.is_finite())
+/// A finite number that is sound.
+fn number(
+    text: &str,
+    what: impl Display,
+    is_sound: impl Fn(f64) -> bool,
+) -> Result<f64, SpecError> {
+    let number = text.parse().ok();
+    expected(number.filter(|n: &f64| n.is_finite() && is_sound(*n)), what)
 }
 
 /// A whole number of a range.
@@ -39,47 +44,43 @@ where
 }
 
 pub fn at_least_zero(text: &str) -> Result<f64, SpecError> {
-    let sound = number(text).filter(|n| *n >= 0.0);
-    expected(sound, "a number of at least 0")
+    number(text, "a number of at least 0", |n| n >= 0.0)
 }
 
 pub fn above_zero(text: &str) -> Result<f64, SpecError> {
-    let sound = number(text).filter(|n| *n > 0.0);
-    expected(sound, "a number above 0")
+    number(text, "a number above 0", |n| n > 0.0)
 }
 
 pub fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, SpecError> + Clone {
     move |text| {
-        let sound = number(text).filter(|n| range.contains(n));
         let (least, most) = (range.start(), range.end());
-        expected(sound, format_args!("a number from {least} to {most:e}"))
+        let what = format_args!("a number from {least} to {most:e}");
+        number(text, what, |n| range.contains(&n))
     }
 }
 
 /// A vertical angle of view in degrees.
 pub fn field_of_view(text: &str) -> Result<f64, SpecError> {
-    let sound = number(text).filter(|n| *n > 0.0 && *n < 180.0);
-    expected(sound, "a number above 0 and below 180")
+    number(text, "a number above 0 and below 180", |n| {
+        n > 0.0 && n < 180.0
+    })
 }
 
 /// A far plane; `inf` is none.
 pub fn far(text: &str) -> Result<f64, SpecError> {
-    let endless = text.eq_ignore_ascii_case("inf").then_some(f64::INFINITY);
-    let sound = endless.or_else(|| number(text).filter(|n| *n > 0.0));
-    expected(sound, "a number above 0 or inf")
+    match text.eq_ignore_ascii_case("inf") {
+        true => Ok(f64::INFINITY),
+        false => number(text, "a number above 0 or inf", |n| n > 0.0),
+    }
 }
 
 /// A share that is not nothing: `1%` or `0.01`.
 pub fn share(text: &str) -> Result<f64, SpecError> {
-    let share = match text.strip_suffix('%') {
-        Some(percent) => number(percent.trim()).map(|n| n / 100.0),
-        None => number(text.trim()),
-    };
-    let share = share.filter(|share| *share > 0.0 && *share <= 1.0);
-    expected(
-        share,
-        "a share such as 1% or 0.01, above 0 and at most 100%",
-    )
+    let what = "a share such as 1% or 0.01, above 0 and at most 100%";
+    match text.strip_suffix('%') {
+        Some(percent) => number(percent.trim(), what, |n| n > 0.0 && n <= 100.0).map(|n| n / 100.0),
+        None => number(text.trim(), what, |n| n > 0.0 && n <= 1.0),
+    }
 }
 
 /// "5%", "5 %" or "0.05". A bare 5 could be meant as either, and as 500 % it

@@ -270,7 +270,7 @@ mod tests {
             error.to_string().contains(TEMPORARY.0),
             "the premise: {error}"
         );
-        let told = files::io(Path::new("no/such"))(error).to_string();
+        let told = io(Path::new("no/such"))(error).to_string();
         assert!(
             told.starts_with("no/such: ") && !told.contains(TEMPORARY.0),
             "{told}"
