@@ -313,7 +313,7 @@ impl CompareTable {
             }
             (Basis::Pairs, None) => return Some(format!("{cells}: more pairs would not decide")),
             (Basis::Reports, None) if lacks_others => {
-                "runs with the same four structures or more (run --structure)".to_owned()
+                "runs (run --structure) with the same four structures or more".to_owned()
             }
             (Basis::Reports, Some(more)) if more <= MOST_MORE => {
                 let more = text::counted(more, "more process");
