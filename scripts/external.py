@@ -233,9 +233,8 @@ ROWS.append(cones("several-cones", 28.5, "four cones per cluster"))
 
 HEAD = """# Published figures, reproduced
 
-Written by `scripts/external.py` on a shared {machine}. Times are CPU time per query on one thread. The
-fourth column is ours / theirs (the newest processor's, where theirs is a range); 1 is not the aim,
-as machines and programs differ: the last column says why.
+Written by `scripts/external.py` on a shared {machine}. Times are CPU time per query on one
+thread. Ratios are to the newest processor's figure where theirs is a range.
 
 | figure | theirs | ours | ours / theirs | why it differs |
 |---|---|---|---|---|
