@@ -76,7 +76,7 @@ const SHAPES: [Shape; 12] = [
 ];
 
 /// Back ends of picking whose trees are built or clustered here.
-const PICKING: [&str; 3] = ["wide-ray", "obvhs", "obvhs-cwbvh"];
+const PICKING: [&str; 2] = ["wide-ray", "obvhs-cwbvh"];
 
 /// Median build time in seconds, and the bytes where they are known.
 type Build = Box<dyn Fn(&Scene) -> (f64, Option<usize>)>;
@@ -110,7 +110,7 @@ fn builds() -> Vec<(&'static str, Build)> {
     for row in BACK_ENDS.iter().filter(|row| PICKING.contains(&row.name)) {
         let build = |scene: &Scene| {
             let boxes = Boxes::of(&Solids::of(scene));
-            let built = || (row.boxes)(&boxes, Kernel::best()).expect("can be built");
+            let built = || (row.build.boxes)(&boxes, Kernel::best()).expect("can be built");
             (median(built).0, None)
         };
         all.push((row.name, Box::new(build)));

@@ -58,8 +58,8 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
     let built = |name: &str, kernel: Kernel| -> Box<dyn Pick> {
         let row = BACK_ENDS.iter().find(|row| row.name == name).expect(name);
         let pick = match &facets {
-            Some(facets) => (row.facets)(facets, kernel),
-            None => (row.boxes)(&boxes, kernel),
+            Some(facets) => (row.build.facets)(facets, kernel),
+            None => (row.build.boxes)(&boxes, kernel),
         };
         pick.expect(name)
     };
@@ -77,7 +77,7 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
         let mut ns = 0.0;
         let [times, low, high] = over_builds(if only_test { 3 } else { BUILDS }, |_| {
             let ours = built("wide-ray", kernel);
-            let theirs = built("obvhs", Kernel::Portable);
+            let theirs = built("obvhs-cwbvh", Kernel::Portable);
             let by_ours = || {
                 ns = time(&*ours);
                 ns

@@ -5,12 +5,11 @@ use super::document::Block;
 use super::table::{Column, Table};
 use super::text;
 use crate::funnel::{
-    BoundRow, FragmentCounts, FunnelReport, Gain, LevelRow, NONE, OrderRow, PickRow, StageKind,
-    StageRow,
+    BoundRow, FragmentCounts, FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow,
 };
 use crate::shown::shortened;
-use crate::visibility::Guarantee;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
+use crate::visibility::{Guarantee, Level};
 
 /// The chain and what it is worth; with `all` every other back end too.
 pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
@@ -37,7 +36,9 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         blocks.push(Block::Line(format!(
             "{} of the items are cut out by a mask ({}, tiles of {}): they hide nothing at its \
              holes.",
-            made.item_count, made.mask, made.tile
+            made.item_count,
+            made.typed.mask.name(),
+            made.typed.tile
         )));
     }
     blocks.push(Block::Table(stages(report, false)));
@@ -163,7 +164,7 @@ fn worth(gain: &Gain) -> String {
 }
 
 /// Line on the load that the selection of a level saves; none for a single level.
-fn saved_load(level: &LevelRow) -> Option<String> {
+fn saved_load(level: &Level) -> Option<String> {
     let time = level.saved_load?;
     let [lower, upper] = [time.lower?, time.upper?];
     let others = text::counted(level.map_count - 1, "other map");

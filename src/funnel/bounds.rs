@@ -157,33 +157,36 @@ fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
         (occluders, FrameTrace::of(occluders, &view, world.kernel))
     };
     let traces: Rc<[_]> = world.views().map(trace).collect();
-    let [drawn, replayed, tested] = [(); 3].map(|()| traces.clone());
-    let buffer = RefCell::new(MaskedInner::new(world.samples));
-    let read = MaskedInner::new(world.samples);
-    let stage = StageKind::Occlusion;
-    [
-        Bound::new(
-            stage,
-            [MASKED_INNER, "read the occluders that are drawn"],
-            move |view, _| {
-                let (occluders, trace) = &drawn[view];
+    let bounds: [(&str, fn(&OccluderScene, &FrameTrace, &mut MaskedInner)); 3] = [
+        (
+            "read the occluders that are drawn",
+            |occluders, trace, _| {
                 black_box(trace.read_occluders(occluders));
             },
         ),
-        Bound::new(
-            stage,
-            [MASKED_INNER, "clear the buffer and write its tiles again"],
-            move |view, _| replayed[view].1.replay(&mut buffer.borrow_mut()),
+        (
+            "clear the buffer and write its tiles again",
+            |_, trace, buffer| trace.replay(buffer),
         ),
-        Bound::new(
-            stage,
-            [MASKED_INNER, "read the tested boxes and the deciding tiles"],
-            move |view, _| {
-                let (occluders, trace) = &tested[view];
-                black_box(trace.read_tested(occluders, &read));
+        (
+            "read the tested boxes and the deciding tiles",
+            |occluders, trace, buffer| {
+                black_box(trace.read_tested(occluders, buffer));
             },
         ),
-    ]
+    ];
+    bounds.map(|(name, work)| {
+        let traces = traces.clone();
+        let buffer = RefCell::new(MaskedInner::new(world.samples));
+        Bound::new(
+            StageKind::Occlusion,
+            [MASKED_INNER, name],
+            move |view, _| {
+                let (occluders, trace) = &traces[view];
+                work(occluders, trace, &mut buffer.borrow_mut());
+            },
+        )
+    })
 }
 
 fn of_cones<'w>(world: &World, triangles: &TriangleStage) -> Bound<'w> {

@@ -25,7 +25,7 @@ impl World<'_> {
             StageKind::Region => self.run_region(name),
             StageKind::Object => self.run_object(name),
             StageKind::Occlusion => {
-                let row = OCCLUSION_ROWS.iter().find(|row| row.back_end.name == name);
+                let row = OCCLUSION_ROWS.iter().find(|row| row.name == name);
                 self.run_occlusion(row.expect("a row of the occlusion stage"), self.samples)
             }
             StageKind::Triangle | StageKind::Fragment => unreachable!("no stage of whole items"),
@@ -68,7 +68,7 @@ impl World<'_> {
 
     /// A back end of the occlusion stage with a buffer of the given size.
     pub fn run_occlusion(&self, row: &OcclusionRow, buffer: SampleGrid) -> Run<'_> {
-        let occlude = RefCell::new((row.new)(buffer, self.kernel));
+        let occlude = RefCell::new((row.build)(buffer, self.kernel));
         let occluders: Vec<_> = self.views().map(|view| self.occluders(view)).collect();
         Box::new(move |view, input, out| {
             let occluders = occluders[view];

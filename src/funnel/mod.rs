@@ -28,7 +28,7 @@ pub use item_stages::Fate;
 pub(crate) use item_stages::Run;
 pub use orders::OrderRow;
 pub use picks::PickRow;
-pub use report::{FunnelReport, Gain, LevelRow, StageRow};
+pub use report::{FunnelReport, Gain, StageRow};
 pub use stage::{Chain, NONE, StageKind, back_ends, left_out_of};
 pub(crate) use stage::{OCCLUSION_ROWS, PORTAL_CLIP};
 pub use study::{failure, prepare, time};

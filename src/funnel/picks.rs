@@ -124,12 +124,12 @@ impl<'w> Picks<'w> {
         let (count, build): (usize, Build) = match &world.shape {
             Shape::Boxes(solids) => {
                 let boxes = Boxes::of(solids);
-                let build: Build = Box::new(move |row| (row.boxes)(&boxes, world.kernel));
+                let build: Build = Box::new(move |row| (row.build.boxes)(&boxes, world.kernel));
                 (solids.boxes.len(), build)
             }
             Shape::Triangles(surfaces) => {
                 let facets = Facets::solid(surfaces, world.items());
-                let build: Build = Box::new(move |row| (row.facets)(&facets, world.kernel));
+                let build: Build = Box::new(move |row| (row.build.facets)(&facets, world.kernel));
                 (surfaces.triangles.len(), build)
             }
         };
@@ -200,7 +200,7 @@ impl<'w> Picks<'w> {
                 pick.nearest(&cursor.ray, NEAREST, &mut hits);
             }
         };
-        caught(ask).map_err(|message| NotBuilt::Panicked { name, message })
+        caught(ask).map_err(|message| NotBuilt::panicked(name, &message))
     }
 
     /// Every row; the ids are the answers at all cursors of a view in turn.

@@ -14,7 +14,7 @@ use super::truth::Errors;
 use crate::shown::{counted, significant, time};
 use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
 use crate::visibility::Level;
-use crate::visibility::fragment::{CutOuts, Holes};
+use crate::visibility::fragment::CutOuts;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 
 /// The funnel of a scene and a path.
@@ -35,7 +35,7 @@ pub struct FunnelReport {
     /// Number of timed processes.
     pub processes: usize,
     /// The selected level of the scene's file.
-    pub level: LevelRow,
+    pub level: Level,
     /// Items that have holes; null unless requested.
     pub cut_outs: Option<CutOutRow>,
     /// The chain; each stage of [`FunnelReport::stages`] gets the items that it leaves.
@@ -81,63 +81,14 @@ impl FunnelReport {
     }
 }
 
-/// The level stage.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct LevelRow {
-    /// Maps of the file; 1 for a file without maps.
-    pub map_count: usize,
-    /// The selected map.
-    pub selected: String,
-    /// Items of all maps.
-    pub input_count: usize,
-    /// Items of the selected map.
-    pub output_count: usize,
-    /// Wall time of decoding the other maps; null without others.
-    #[serde(flatten, serialize_with = "flat::saved_load_ns")]
-    pub saved_load: Option<Estimate>,
-}
-
-impl From<&Level> for LevelRow {
-    fn from(level: &Level) -> LevelRow {
-        LevelRow {
-            map_count: level.maps.len(),
-            selected: level.maps[level.selected].name.clone(),
-            input_count: level.items(),
-            output_count: level.selected_items(),
-            saved_load: level.saved_ns().map(|saved| {
-                let (lower, upper) = saved.interval(1.0 - ALPHA);
-                Estimate::within(saved.mean, [lower.max(0.0), upper])
-            }),
-        }
-    }
-}
-
 /// The items that have holes.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct CutOutRow {
-    /// Name of the mask that says where they are opaque.
-    pub mask: &'static str,
-    /// Share of the items that may be cut out.
-    pub share: f64,
-    /// Edge length of a tile of the mask, world units.
-    pub tile: f64,
-    /// Seed of the choice of items.
-    pub seed: u64,
+    /// Their mask, share and seed.
+    #[serde(flatten)]
+    pub typed: CutOuts,
     /// Number of items with holes.
     pub item_count: usize,
-}
-
-impl CutOutRow {
-    /// Options, and the surfaces made from them.
-    pub(super) fn new(cut_outs: &CutOuts, made: &Holes) -> CutOutRow {
-        CutOutRow {
-            mask: cut_outs.mask.name(),
-            share: cut_outs.share,
-            tile: cut_outs.tile,
-            seed: cut_outs.seed,
-            item_count: made.count(),
-        }
-    }
 }
 
 /// A stage done by a back end.

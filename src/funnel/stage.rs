@@ -10,7 +10,7 @@ use crate::visibility::occlusion::{
     Interleaved, MaskedCentre, MaskedInner, OccluderScene, OcclusionBuffer, View, ZBuffer,
 };
 use crate::visibility::triangle::TRIANGLE_ROWS;
-use crate::visibility::{Guarantee, SampleGrid, region};
+use crate::visibility::{Guarantee, Row, SampleGrid, region};
 
 named! {
     /// A stage that takes candidates and returns fewer of them.
@@ -64,8 +64,8 @@ pub struct BackEnd {
 }
 
 impl BackEnd {
-    /// A back end of a single stage.
-    pub const fn new(
+    /// A back end of a stage; of the occlusion stage, one with a tree of its own.
+    pub fn new(
         stage: StageKind,
         [name, summary]: [&'static str; 2],
         guarantee: Guarantee,
@@ -75,8 +75,13 @@ impl BackEnd {
             name,
             summary,
             guarantee,
-            does_object_stage: false,
+            does_object_stage: stage == StageKind::Occlusion && name != NONE,
         }
+    }
+
+    /// The back end of a row of the stage's table.
+    pub fn of<B>(stage: StageKind, row: &Row<B>) -> BackEnd {
+        BackEnd::new(stage, [row.name, row.summary], row.guarantee)
     }
 }
 
@@ -163,17 +168,14 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
     match stage {
         StageKind::Region => {
             let known = region::BACK_ENDS.iter().filter(|row| row.is_for(scene));
-            rows.extend(
-                known.map(|row| BackEnd::new(stage, [row.name, row.summary], row.guarantee)),
-            );
+            rows.extend(known.map(|row| BackEnd::of(stage, row)));
         }
         StageKind::Object => {}
-        StageKind::Occlusion => rows.extend(OCCLUSION_ROWS.iter().map(|row| row.back_end)),
+        StageKind::Occlusion => {
+            rows.extend(OCCLUSION_ROWS.iter().map(|row| BackEnd::of(stage, row)));
+        }
         StageKind::Triangle => {
-            let culls = TRIANGLE_ROWS.iter().filter(|row| row.name != NONE);
-            rows.extend(
-                culls.map(|row| BackEnd::new(stage, [row.name, row.summary], row.guarantee)),
-            );
+            rows.extend(TRIANGLE_ROWS.iter().map(|row| BackEnd::of(stage, row)));
         }
         StageKind::Fragment => rows.extend(fragment_tests(scene, has_cut_outs)),
     }
@@ -231,33 +233,26 @@ impl Chain {
 /// Appends the items of a view that are not hidden.
 pub type Occlude = Box<dyn FnMut(&OccluderScene, &View, &mut Vec<ItemId>)>;
 
-/// A row of the occlusion stage.
-pub struct OcclusionRow {
-    pub back_end: BackEnd,
-    /// Allocates a buffer of the given size.
-    pub new: fn(SampleGrid, Kernel) -> Occlude,
-}
+/// A row of the occlusion stage: allocates a buffer of the given size.
+pub type OcclusionRow = Row<fn(SampleGrid, Kernel) -> Occlude>;
 
-impl OcclusionRow {
-    const fn of<B: OcclusionBuffer + 'static>(name: &'static str) -> OcclusionRow {
-        OcclusionRow {
-            back_end: BackEnd {
-                does_object_stage: true,
-                ..BackEnd::new(StageKind::Occlusion, [name, B::SUMMARY], B::GUARANTEE)
-            },
-            new: |grid, kernel| {
-                let mut state = Interleaved::new(B::new(grid), kernel);
-                Box::new(move |scene, view, out| {
-                    state.cull(scene, view, out);
-                })
-            },
-        }
+const fn occlusion<B: OcclusionBuffer + 'static>(name: &'static str) -> OcclusionRow {
+    OcclusionRow {
+        name,
+        summary: B::SUMMARY,
+        guarantee: B::GUARANTEE,
+        build: |grid, kernel| {
+            let mut state = Interleaved::new(B::new(grid), kernel);
+            Box::new(move |scene, view, out| {
+                state.cull(scene, view, out);
+            })
+        },
     }
 }
 
 /// Rows of the occlusion stage.
 pub static OCCLUSION_ROWS: [OcclusionRow; 3] = [
-    OcclusionRow::of::<MaskedInner>(MASKED_INNER),
-    OcclusionRow::of::<MaskedCentre>("masked"),
-    OcclusionRow::of::<ZBuffer>("z-buffer"),
+    occlusion::<MaskedInner>(MASKED_INNER),
+    occlusion::<MaskedCentre>("masked"),
+    occlusion::<ZBuffer>("z-buffer"),
 ];

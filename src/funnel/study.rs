@@ -234,11 +234,14 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, Fu
         cameras: input.path.cameras.len(),
         samples: [input.samples.width, input.samples.height],
         processes: 0,
-        level: (&Level::of(&input.scene.name, input.scene)?).into(),
+        level: Level::of(&input.scene.name, input.scene)?,
         cut_outs: input
             .cut_outs
             .zip(world.cut_outs.as_ref())
-            .map(|(typed, made)| CutOutRow::new(typed, made)),
+            .map(|(typed, made)| CutOutRow {
+                typed: *typed,
+                item_count: made.count(),
+            }),
         chain: input.chain.clone(),
         gains: study.gains(&rows),
         stages: rows,

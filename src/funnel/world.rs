@@ -273,7 +273,7 @@ fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), Fun
         let is_there = |name: &str| match stage {
             StageKind::Region => regions.is_some_and(|regions| regions.row(name).is_some()),
             StageKind::Object => labels().any(|label| label == name),
-            _ => OCCLUSION_ROWS.iter().any(|row| row.back_end.name == name),
+            _ => OCCLUSION_ROWS.iter().any(|row| row.name == name),
         };
         let name = input.chain.of(stage);
         if name != NONE && !is_there(name) {
@@ -362,13 +362,13 @@ impl Regions {
         let graph = Arc::new(match (&map, &scene.regions) {
             (Some(map), _) => map.graph().map_err(Some)?,
             (None, scene::Regions::Leaves(map)) => RegionGraph::of_quake(map),
-            (None, _) => RegionGraph::of_scene(scene).map_err(|_| None)?,
+            (None, _) => RegionGraph::of_scene(scene).ok_or(None)?,
         });
         let searches = [Source::Flood, Source::PortalRect, Source::PortalClip];
         let is_for = |source| {
             BACK_ENDS
                 .iter()
-                .any(|row| row.source == source && row.is_for(scene))
+                .any(|row| row.build == source && row.is_for(scene))
         };
         let mut regions = Regions {
             rows: searches
@@ -401,7 +401,7 @@ impl Regions {
         let row = RegionRow::stored(source, self.graph.clone(), pvs);
         let fits = row.is_some();
         self.rows
-            .retain(|row| row.back_end.source != source || !fits);
+            .retain(|row| row.back_end.build != source || !fits);
         self.rows.extend(row);
         fits
     }

@@ -5,32 +5,29 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use serde::Serialize;
+
 use crate::input::{InputError, is_readable, read_file};
 use crate::scene::{LoadOptions, Sample, Scene, part_names, read_bytes, split_part};
-use crate::statistics::{Trimmed, trimmed_mean};
+use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
 
-/// Rounds of decoding all maps of a file, so that the time has an interval.
+/// Rounds of decoding the other maps of a file, so that the time has an interval.
 const ROUNDS: usize = 7;
 
-/// A map of a file, decoded to count the items that it would add.
-#[derive(Clone, PartialEq, Debug)]
-pub struct LevelMap {
-    /// Name in the file.
-    pub name: String,
-    /// Number of items of the map as a scene.
-    pub items: usize,
-    /// Wall time of decoding it, ns, in each of seven rounds over all maps; empty for
-    /// a file of one map.
-    pub load_ns: Vec<f64>,
-}
-
-/// The maps of a scene's file, and the one that the scene is.
-#[derive(Clone, PartialEq, Debug)]
+/// The level stage.
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Level {
-    /// Maps in file order; one for a source without maps.
-    pub maps: Vec<LevelMap>,
-    /// Index of the one that was loaded.
-    pub selected: usize,
+    /// Maps of the file; 1 for a file without maps.
+    pub map_count: usize,
+    /// The selected map.
+    pub selected: String,
+    /// Items of all maps.
+    pub input_count: usize,
+    /// Items of the selected map.
+    pub output_count: usize,
+    /// Wall time of decoding the other maps; null without others.
+    #[serde(flatten, serialize_with = "flat::saved_load_ns")]
+    pub saved_load: Option<Estimate>,
 }
 
 impl Level {
@@ -40,11 +37,19 @@ impl Level {
     /// # Errors
     /// The file cannot be read again.
     pub fn of(source: &str, scene: &Scene) -> Result<Level, InputError> {
+        // A source without maps is the scene itself.
+        let alone = Level {
+            map_count: 1,
+            selected: scene.name.clone(),
+            input_count: scene.items.len(),
+            output_count: scene.items.len(),
+            saved_load: None,
+        };
         let (file, selected) = split_part(source);
         let bytes: Arc<[u8]> = match (is_readable(Path::new(file)), Sample::named(file)) {
             (true, _) => read_file(Path::new(file))?,
             (false, Some(sample)) => sample.bytes.into(),
-            (false, None) => return Ok(Level::alone(scene)),
+            (false, None) => return Ok(alone),
         };
         let decode = |name: &str| {
             let begun = Instant::now();
@@ -52,62 +57,34 @@ impl Level {
             let map = read_bytes(&bytes, [file, name], Some(name), &options).ok()?;
             Some((map.items.len(), begun.elapsed().as_nanos() as f64))
         };
-        let names = part_names(&bytes, file)?;
-        let has_others = names.len() > 1;
-        // The first time is of memory that has not been read yet.
-        let decoded = names.into_iter().filter_map(|name| {
-            Some(LevelMap {
-                items: decode(&name)?.0,
-                load_ns: Vec::new(),
-                name,
-            })
-        });
-        let mut maps: Vec<LevelMap> = decoded.collect();
-        for _ in 0..if has_others { ROUNDS } else { 0 } {
-            for map in &mut maps {
-                map.load_ns.extend(decode(&map.name).map(|(_, ns)| ns));
-            }
-        }
-        let is_selected =
-            |map: &LevelMap| selected.is_none_or(|name| map.name.eq_ignore_ascii_case(name));
-        match maps.iter().position(is_selected) {
-            Some(selected) => Ok(Level { maps, selected }),
-            None => Ok(Level::alone(scene)),
-        }
-    }
-
-    /// The level of a source without maps: the scene itself.
-    fn alone(scene: &Scene) -> Level {
-        Level {
-            maps: vec![LevelMap {
-                name: scene.name.clone(),
-                items: scene.items.len(),
-                load_ns: Vec::new(),
-            }],
-            selected: 0,
-        }
-    }
-
-    /// Items in the whole file.
-    pub fn items(&self) -> usize {
-        self.maps.iter().map(|map| map.items).sum()
-    }
-
-    /// Items of the map that was selected.
-    pub fn selected_items(&self) -> usize {
-        self.maps[self.selected].items
-    }
-
-    /// Wall time of decoding the maps that were not selected, ns; `None` if there are
-    /// none.
-    pub fn saved_ns(&self) -> Option<Trimmed> {
-        let others = || {
-            let maps = self.maps.iter().enumerate();
-            maps.filter_map(|(i, map)| (i != self.selected).then_some(&map.load_ns))
+        // The first time is of memory that has not been read yet, and not used.
+        let names = part_names(&bytes, file)?.into_iter();
+        let maps: Vec<(String, usize)> = names
+            .filter_map(|name| decode(&name).map(|(items, _)| (name, items)))
+            .collect();
+        let is_selected = |(name, _): &(String, usize)| {
+            selected.is_none_or(|selected| name.eq_ignore_ascii_case(selected))
         };
-        let rounds = others().next()?.len();
-        let sums = (0..rounds).map(|round| others().map(|load_ns| load_ns[round]).sum());
-        trimmed_mean(&sums.collect::<Vec<f64>>())
+        let Some(own) = maps.iter().position(is_selected) else {
+            return Ok(alone);
+        };
+        let load_others = |_| {
+            let others = maps.iter().enumerate().filter(|(i, _)| *i != own);
+            let times = others.filter_map(|(_, (name, _))| decode(name));
+            times.map(|(_, ns)| ns).sum()
+        };
+        let rounds = if maps.len() > 1 { ROUNDS } else { 0 };
+        let sums: Vec<f64> = (0..rounds).map(load_others).collect();
+        Ok(Level {
+            map_count: maps.len(),
+            selected: maps[own].0.clone(),
+            input_count: maps.iter().map(|(_, items)| items).sum(),
+            output_count: maps[own].1,
+            saved_load: trimmed_mean(&sums).map(|saved| {
+                let (lower, upper) = saved.interval(1.0 - ALPHA);
+                Estimate::within(saved.mean, [lower.max(0.0), upper])
+            }),
+        })
     }
 }
 
@@ -155,15 +132,12 @@ mod tests {
         let source = format!("{file}#map20");
         let scene = scene::load(&source, &Default::default()).expect("a map");
         let level = Level::of(&source, &scene).expect("a level");
-        assert_eq!(level.maps.len(), 2);
-        assert_eq!(
-            (level.selected, level.selected_items()),
-            (1, scene.items.len())
-        );
-        assert_eq!(level.items(), level.maps[0].items + scene.items.len());
-        let saved = level.saved_ns().expect("another map");
-        assert_eq!(saved.count, ROUNDS);
-        assert!(saved.mean > 0.0);
+        let other = scene::load(&format!("{file}#map12"), &Default::default()).expect("a map");
+        assert_eq!((level.map_count, &level.selected[..]), (2, "MAP20"));
+        assert_eq!(level.output_count, scene.items.len());
+        assert_eq!(level.input_count, other.items.len() + scene.items.len());
+        let saved = level.saved_load.expect("another map");
+        assert!(saved.value > 0.0 && saved.lower <= saved.upper);
     }
 
     #[test]
@@ -190,12 +164,12 @@ mod tests {
         let source = format!("{many}#MAP12");
         let scene = scene::load(&source, &Default::default()).expect("a map");
         let level = Level::of(&source, &scene).expect("a level");
-        assert_eq!((level.maps.len(), level.selected), (2, 1));
+        assert_eq!((level.map_count, &level.selected[..]), (2, "MAP12"));
         let one = written(folder.path(), &["freedm-map12"]);
         for source in [one.clone(), format!("{one}#MAP12")] {
             let level = |scene: &Scene| Level::of(&source, scene).expect("a level");
             let scene = scene::load(&source, &Default::default()).expect("a map");
-            assert_eq!(level(&scene).items(), scene.items.len());
+            assert_eq!(level(&scene).input_count, scene.items.len());
         }
     }
 
@@ -203,7 +177,7 @@ mod tests {
     fn what_has_no_maps_is_one_level() {
         let scene = scene::load("city:n=50", &Default::default()).expect("a scene");
         let level = Level::of("city:n=50", &scene).expect("a level");
-        assert_eq!((level.items(), level.selected_items()), (50, 50));
-        assert_eq!(level.saved_ns(), None, "no other map, and so no time");
+        assert_eq!((level.input_count, level.output_count), (50, 50));
+        assert_eq!(level.saved_load, None, "no other map, and so no time");
     }
 }

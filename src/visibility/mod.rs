@@ -7,7 +7,6 @@
 pub mod fragment;
 pub mod hiders;
 pub mod inscribed;
-mod items;
 mod level;
 pub mod occlusion;
 pub mod pick;
@@ -20,9 +19,10 @@ pub mod truth;
 
 use serde::Serialize;
 
-pub use items::{holes_of, surfaces_of};
-pub use level::{Level, LevelMap};
+pub use fragment::holes_of;
+pub use level::Level;
 pub use rays::{Ray, Rays, SampleGrid};
+pub use region::doom::surfaces_of;
 pub use solids::Solids;
 
 #[cfg(test)]
@@ -50,4 +50,18 @@ impl Guarantee {
     pub fn is_safe(self) -> bool {
         matches!(self, Guarantee::Exact | Guarantee::Conservative)
     }
+}
+
+/// A row of a stage's table of back ends.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Row<B> {
+    /// Name on the command line and in tables, unique in the table.
+    pub name: &'static str,
+    /// One line for tables and help.
+    pub summary: &'static str,
+    /// Guarantee of its answers.
+    pub guarantee: Guarantee,
+    /// Function that builds it, or the source of its answers.
+    pub build: B,
 }

@@ -109,27 +109,6 @@ impl Rays {
         }
     }
 
-    /// Position of a point in the image, across and down, rounded; `None` outside.
-    ///
-    /// The ray [`through`](Rays::through) the position leads to the point.
-    pub fn in_image(&self, point: DVec3) -> Option<[f64; 2]> {
-        let frame = &self.camera.frame;
-        let about = point - frame.eye;
-        let depth = match self.camera.lens.is_orthographic() {
-            true => 1.0,
-            false => about.dot(frame.forward()),
-        };
-        let [left, right, bottom, top] = self.window;
-        let across = about.dot(frame.u()) / depth;
-        let up = about.dot(frame.v()) / depth;
-        let at = [
-            (across - left) / (right - left),
-            (up - top) / (bottom - top),
-        ];
-        let is_inside = depth > 0.0 && at.iter().all(|x| (0.0..=1.0).contains(x));
-        is_inside.then_some(at)
-    }
-
     /// The ray of a sample: the centre of a pixel, column from the left and row
     /// from the top.
     pub fn sample(&self, grid: SampleGrid, column: u32, row: u32) -> Ray {
@@ -154,9 +133,30 @@ pub trait Along: Copy {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::camera::{Lens, look_at};
+
+    /// Position of a point in the image, across and down, rounded; `None` outside.
+    ///
+    /// The ray [`through`](Rays::through) the position leads to the point.
+    pub fn in_image(rays: &Rays, point: DVec3) -> Option<[f64; 2]> {
+        let frame = &rays.camera.frame;
+        let about = point - frame.eye;
+        let depth = match rays.camera.lens.is_orthographic() {
+            true => 1.0,
+            false => about.dot(frame.forward()),
+        };
+        let [left, right, bottom, top] = rays.window;
+        let across = about.dot(frame.u()) / depth;
+        let up = about.dot(frame.v()) / depth;
+        let at = [
+            (across - left) / (right - left),
+            (up - top) / (bottom - top),
+        ];
+        let is_inside = depth > 0.0 && at.iter().all(|x| (0.0..=1.0).contains(x));
+        is_inside.then_some(at)
+    }
 
     #[test]
     fn rays_pass_through_the_corners_of_the_view() {
@@ -168,9 +168,9 @@ mod tests {
         ] {
             let rays = Rays::of(&Camera { frame, lens }).unwrap();
             let corners = lens.corners(&frame).unwrap();
-            let [x, y] = rays.in_image(rays.through(0.3, 0.8).at(7.0)).unwrap();
+            let [x, y] = in_image(&rays, rays.through(0.3, 0.8).at(7.0)).unwrap();
             assert!((x - 0.3).abs() < 1e-12 && (y - 0.8).abs() < 1e-12);
-            assert_eq!(rays.in_image(rays.through(1.1, 0.8).at(7.0)), None);
+            assert_eq!(in_image(&rays, rays.through(1.1, 0.8).at(7.0)), None);
             for (i, (x, y)) in [(0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0)]
                 .iter()
                 .enumerate()

@@ -359,7 +359,7 @@ pub fn picked_exactly(report: &Value) {
             assert_eq!(number(row, "wrong_count"), 0.0, "{row}");
         }
     }
-    let crates = picks.iter().find(|row| row["name"] == "obvhs");
+    let crates = picks.iter().find(|row| row["name"] == "obvhs-cwbvh");
     let crates = crates.expect("the crate obvhs");
     assert!(number(crates, "wrong_count") < 0.02 * number(crates, "ray_count"));
 }

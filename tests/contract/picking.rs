@@ -19,7 +19,7 @@ fn peers_pick_what_the_reference_picks() {
     let boxes = Boxes::of(&solids);
     let reference = pick::Linear(boxes.clone());
     for row in pick::BACK_ENDS {
-        let back_end = (row.boxes)(&boxes, Kernel::best()).unwrap();
+        let back_end = (row.build.boxes)(&boxes, Kernel::best()).unwrap();
         let (mut hits, mut truth) = (Vec::new(), Vec::new());
         let mut met = 0;
         for _ in 0..300 {
@@ -52,7 +52,7 @@ fn peers_pick_the_triangles_that_the_reference_picks() {
     let facets = Facets::solid(surfaces, scene.items.len());
     let bounds = scene.world_bounds();
     let rows = pick::BACK_ENDS.iter();
-    let built = rows.map(|row| (row, (row.facets)(&facets, Kernel::best()).unwrap()));
+    let built = rows.map(|row| (row, (row.build.facets)(&facets, Kernel::best()).unwrap()));
     let built: Vec<_> = built.collect();
     let (_, reference) = &built[0];
     assert_eq!(built[0].0.name, "linear");

@@ -5,15 +5,18 @@
 use std::fmt::{self, Display, Formatter};
 
 use glam::DVec3;
+use serde::Serialize;
 
 use crate::query::ItemId;
-use crate::scene::{SeededRng, WorldBox};
+use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::spec::{Spec, SpecError};
+use crate::visibility::region::RegionGraph;
 use crate::visibility::truth::{Crossing, Probe};
 
 named! {
     /// Pattern of the opaque parts of a surface.
-    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
+    #[serde(rename_all = "lowercase")]
     #[non_exhaustive]
     pub enum Mask, MASKS {
         Fence = "fence", "four pickets in ten of a tile, and two rails";
@@ -122,7 +125,7 @@ fn face_axis(b: &WorldBox, probe: &Probe, at: &Crossing) -> usize {
 }
 
 /// A seeded share of the items of a scene, cut out by one mask.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[non_exhaustive]
 pub struct CutOuts {
     /// Pattern of their opaque parts.
@@ -189,6 +192,15 @@ impl CutOuts {
         }
         holes
     }
+}
+
+/// The items of a scene that are cut out: all but the walls of its rooms.
+///
+/// The regions of the rooms are `graph`; a view into the next room leads through portals only.
+pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> Holes {
+    let walls = graph.map(|graph| graph.borders(scene));
+    let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
+    typed.holes(scene.items.len(), is_free)
 }
 
 #[cfg(test)]

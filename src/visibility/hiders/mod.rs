@@ -13,11 +13,11 @@ use serde::Serialize;
 use super::occlusion::OccluderScene;
 use super::{Rays, Solids};
 use crate::geometry::Aabb;
-use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::visibility::inscribed::{CELLS, InnerBoxes};
 use crate::visibility::region::doom::DoomMap;
 
+pub use super::inscribed::InnerRow;
 pub use ground::{Ground, GroundRow};
 
 /// The occluders of a scene.
@@ -41,7 +41,9 @@ impl Hiders {
     /// `solids` are its items if they are solid boxes; items of triangles get up to `most`
     /// boxes inside.
     pub fn of(scene: &Scene, solids: Option<&Solids>, most: usize, threads: usize) -> Hiders {
-        let (within, inner) = inner(scene, most, threads).unzip();
+        let inner = scene.surfaces.as_ref();
+        let inner = inner.map(|surfaces| InnerBoxes::of(surfaces, CELLS, most, threads));
+        let (within, inner) = inner.map(|inner| (inner.boxes, inner.row)).unzip();
         let (blocks, row) = blocks(scene).unzip();
         let ground = Ground::of(scene);
         let within = within.unwrap_or_default();
@@ -78,46 +80,6 @@ impl Hiders {
             _ => &self.all,
         }
     }
-}
-
-/// The boxes inside the items of a mesh.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
-pub struct InnerRow {
-    /// Items of the mesh.
-    pub item_count: usize,
-    /// Items that have a box inside: opaque, one-sided and closed.
-    pub boxed_count: usize,
-    /// Most boxes of an item.
-    pub box_limit: usize,
-    /// Number of boxes of all items.
-    pub box_count: usize,
-    /// Volume of the boxes / volume of the items that have one; null if none has.
-    pub volume_share: Option<f64>,
-    /// Wall time of finding and proving them all.
-    pub build_ns: f64,
-}
-
-/// Up to `most` boxes for each item, scene-local and by ascending item.
-///
-/// `None` for a scene that is no mesh.
-pub fn inner(
-    scene: &Scene,
-    most: usize,
-    threads: usize,
-) -> Option<(Vec<(ItemId, Aabb)>, InnerRow)> {
-    let surfaces = scene.surfaces.as_ref()?;
-    let begun = Instant::now();
-    let found = InnerBoxes::of(surfaces, CELLS, most, threads);
-    let row = InnerRow {
-        item_count: scene.items.len(),
-        boxed_count: found.items,
-        box_limit: most,
-        box_count: found.boxes.len(),
-        volume_share: found.share,
-        build_ns: begun.elapsed().as_nanos() as f64,
-    };
-    Some((found.boxes, row))
 }
 
 /// The boxes in the solid of a map.

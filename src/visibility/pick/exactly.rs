@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{BackEnd, Hit, Pick};
+use super::{BackEnd, Builds, Hit, Pick};
 use crate::query::ItemId;
 use crate::visibility::truth::{Along, Bodies, Body, BodyIndex};
 use crate::visibility::{Guarantee, Ray};
@@ -116,8 +116,10 @@ pub const LINEAR: BackEnd = BackEnd {
     name: "linear",
     summary: "every box or triangle, in exact arithmetic: the reference",
     guarantee: Guarantee::Exact,
-    boxes: |boxes, _| Ok(Box::new(Linear(boxes.clone()))),
-    facets: |facets, _| Ok(Box::new(Linear(facets.clone()))),
+    build: Builds {
+        boxes: |boxes, _| Ok(Box::new(Linear(boxes.clone()))),
+        facets: |facets, _| Ok(Box::new(Linear(facets.clone()))),
+    },
 };
 
 /// All bodies, item by item.

@@ -3,19 +3,19 @@
 //! Queries are the first item that a ray meets, the nearest few, and everything in the
 //! cursor's frustum.
 
-mod cursor;
 mod exactly;
 mod obvhs;
 mod wide_ray;
 
 use std::cmp::Ordering;
 
+use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
+use crate::geometry::ConvexVolume;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::truth::{Boxes, Facets};
-use crate::visibility::{Guarantee, Ray};
+use crate::visibility::{Ray, Rays, Row};
 
-pub use cursor::CursorRectangle;
 pub use exactly::Linear;
 pub use wide_ray::WideRay;
 
@@ -23,7 +23,7 @@ pub use wide_ray::WideRay;
 mod tests;
 
 /// All back ends, the reference first.
-pub const BACK_ENDS: &[BackEnd] = &[exactly::LINEAR, wide_ray::ROW, obvhs::ROW, obvhs::ROW_WIDE];
+pub const BACK_ENDS: &[BackEnd] = &[exactly::LINEAR, wide_ray::ROW, obvhs::ROW];
 
 /// An item that a ray meets, and where.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -36,7 +36,7 @@ pub struct Hit {
 
 impl Hit {
     /// Order by depth, then by id.
-    pub(super) fn order(&self, other: &Hit) -> Ordering {
+    fn order(&self, other: &Hit) -> Ordering {
         let by_depth = self.depth.total_cmp(&other.depth);
         by_depth.then(self.item.cmp(&other.item))
     }
@@ -67,50 +67,89 @@ pub trait Pick: Send + Sync {
 pub type Build<Bodies> = fn(&Bodies, Kernel) -> Result<Box<dyn Pick>, NotBuilt>;
 
 /// A row of the table of back ends.
+///
+/// [Exact](crate::visibility::Guarantee::Exact) answers are those of exact arithmetic, ties
+/// included.
+pub type BackEnd = Row<Builds>;
+
+/// Functions that build a back end.
 #[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct BackEnd {
-    /// Name on the command line, unique.
-    pub name: &'static str,
-    /// One line for tables and help.
-    pub summary: &'static str,
-    /// Guarantee of its answers. [`Guarantee::Exact`]: those of exact arithmetic, ties
-    /// included.
-    pub guarantee: Guarantee,
+pub struct Builds {
     /// Builds it over boxes.
     pub boxes: Build<Boxes>,
     /// Builds it over triangles.
     pub facets: Build<Facets>,
 }
 
-/// A back end that cannot hold the items.
+/// Reason for which a back end cannot hold the items or failed, in a line.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum NotBuilt {
-    /// More items than there are ids.
-    #[error("{count} items; expected at most {most}")]
-    TooMany {
-        /// Number of items.
-        count: usize,
-        /// Largest number of items.
-        most: usize,
-    },
-    /// A tree with more levels than its traversal supports.
-    #[error("the tree of '{name}' has {levels} levels; expected at most {most}")]
-    TooDeep {
-        /// The back end.
-        name: &'static str,
-        /// Number of levels.
-        levels: usize,
-        /// Largest number of levels.
-        most: usize,
-    },
+#[error("{0}")]
+pub struct NotBuilt(String);
+
+impl NotBuilt {
     /// A panic of a back end, when it is built or when it answers.
-    #[error("'{name}' panicked: {message}")]
-    Panicked {
-        /// The back end.
-        name: &'static str,
-        /// The panic's message.
-        message: String,
-    },
+    pub fn panicked(name: &str, message: &str) -> NotBuilt {
+        NotBuilt(format!("'{name}' panicked: {message}"))
+    }
+}
+
+/// A rectangle of the image: (0, 0) is its upper left corner, (1, 1) its lower
+/// right one. Closed.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct CursorRectangle {
+    /// Upper left corner, across and down.
+    pub min: [f64; 2],
+    /// Lower right corner; beyond `min` on both axes.
+    pub max: [f64; 2],
+}
+
+impl CursorRectangle {
+    /// The rectangle that reaches `half` pixels to each side of a cursor at
+    /// (`x`, `y`), in pixels of an image of that size.
+    pub fn around([x, y]: [f64; 2], half: f64, [width, height]: [f64; 2]) -> CursorRectangle {
+        CursorRectangle {
+            min: [(x - half) / width, (y - half) / height],
+            max: [(x + half) / width, (y + half) / height],
+        }
+    }
+
+    /// The camera that sees what the rays through the rectangle see: the same eye
+    /// (moved aside for an orthographic lens), near and far.
+    ///
+    /// # Errors
+    /// An empty rectangle; one that f64 cannot tell from a point.
+    pub fn camera(&self, rays: &Rays) -> Result<Camera, CameraError> {
+        let camera = rays.camera();
+        let [left, right, bottom, top] = rays.window();
+        let across = |x: f64| left + (right - left) * x;
+        let up = |y: f64| top + (bottom - top) * y;
+        let window = [
+            across(self.min[0]),
+            across(self.max[0]),
+            up(self.max[1]),
+            up(self.min[1]),
+        ];
+        let (near, far) = (camera.lens.near(), camera.lens.far());
+        let mut frame = camera.frame;
+        let lens = match camera.lens.is_orthographic() {
+            true => {
+                let [left, right, bottom, top] = window;
+                let (middle, middle_up) = ((left + right) / 2.0, (bottom + top) / 2.0);
+                frame.eye += frame.u() * middle + frame.v() * middle_up;
+                let (width, height) = (right - left, top - bottom);
+                let far = far.unwrap_or(f64::INFINITY);
+                Lens::orthographic(height, width / height, near, far)?
+            }
+            false => Lens::off_axis(window.map(|slope| slope * near), near, far)?,
+        };
+        Ok(Camera { frame, lens })
+    }
+
+    /// Its planes in the f32 of a scene, moved outward by what they may be off.
+    ///
+    /// # Errors
+    /// As [`CursorRectangle::camera`] and [`Camera::volume`].
+    pub fn volume(&self, rays: &Rays, around: &Surroundings) -> Result<ConvexVolume, CameraError> {
+        self.camera(rays)?.volume(&PlaneOptions::default(), around)
+    }
 }

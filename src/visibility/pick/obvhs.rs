@@ -1,7 +1,7 @@
 //! Ray traversals of the crate obvhs: boxes, or its own triangles, as primitives.
 //!
-//! One row for its binary tree, one for its eight-wide tree with quantised nodes. Rays and
-//! bodies are rounded to f32, without bounds on rounding.
+//! By its eight-wide tree with quantised nodes. Rays and bodies are rounded to f32, without
+//! bounds on rounding.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use ::obvhs::triangle::Triangle;
 use glam::{DVec3, Vec3};
 
 use super::exactly::kept;
-use super::{BackEnd, Hit, NotBuilt, Pick};
+use super::{BackEnd, Builds, Hit, NotBuilt, Pick};
 use crate::geometry::Aabb;
 use crate::index::{caught, ploc, scale_for};
 use crate::query::ItemId;
@@ -145,93 +145,17 @@ impl Primitive for Facet {
     }
 }
 
-/// The row of the binary tree.
-pub const ROW: BackEnd = BackEnd {
-    name: "obvhs",
-    summary: "crate obvhs, binary tree, one item per leaf, its ray_traverse",
-    // Rays, nodes and boxes are rounded to f32.
-    guarantee: Guarantee::Unproven,
-    boxes: |boxes, _| Obvhs::<Bvh2, _>::boxed(boxes, ROW.name),
-    facets: |facets, _| Obvhs::<Bvh2, _>::boxed(facets, ROW.name),
-};
-
 /// The row of the eight-wide tree.
-pub const ROW_WIDE: BackEnd = BackEnd {
+pub const ROW: BackEnd = BackEnd {
     name: "obvhs-cwbvh",
     summary: "crate obvhs, eight-wide quantised tree, its ray_traverse",
+    // Rays, nodes and boxes are rounded to f32.
     guarantee: Guarantee::Unproven,
-    boxes: |boxes, _| Obvhs::<CwBvh, _>::boxed(boxes, ROW_WIDE.name),
-    facets: |facets, _| Obvhs::<CwBvh, _>::boxed(facets, ROW_WIDE.name),
+    build: Builds {
+        boxes: |boxes, _| Obvhs::boxed(boxes),
+        facets: |facets, _| Obvhs::boxed(facets),
+    },
 };
-
-/// A tree of the crate that rays are cast through.
-trait Cast: Sized + Send + Sync + 'static {
-    /// The tree of the crate's binary one, whose levels are counted.
-    fn of(binary: Bvh2, levels: usize) -> Result<Self, NotBuilt>;
-
-    fn order(&self) -> &[u32];
-
-    /// The first box that is entered.
-    fn first(&self, ray: TheirRay, found: &mut RayHit, entry: impl FnMut(&TheirRay, usize) -> f32);
-
-    /// All boxes that may be.
-    fn all(&self, ray: TheirRay, visit: impl FnMut(&TheirRay, usize));
-}
-
-impl Cast for Bvh2 {
-    fn of(mut tree: Bvh2, levels: usize) -> Result<Bvh2, NotBuilt> {
-        tree.reorder_in_stack_traversal_order();
-        // A walk keeps one entry a level; the crate's default is 96.
-        tree.max_depth = tree.max_depth.max(levels + 2);
-        Ok(tree)
-    }
-
-    fn order(&self) -> &[u32] {
-        &self.primitive_indices
-    }
-
-    #[inline(always)]
-    fn first(&self, ray: TheirRay, found: &mut RayHit, entry: impl FnMut(&TheirRay, usize) -> f32) {
-        self.ray_traverse(ray, found, entry);
-    }
-
-    #[inline(always)]
-    fn all(&self, ray: TheirRay, visit: impl FnMut(&TheirRay, usize)) {
-        self.ray_traverse_anyhit(ray, visit);
-    }
-}
-
-impl Cast for CwBvh {
-    fn of(binary: Bvh2, levels: usize) -> Result<CwBvh, NotBuilt> {
-        refuse_deep(levels, MOST_BINARY)?;
-        let tree = bvh2_to_cwbvh(&binary, 3, true, false);
-        let children = |node: usize| {
-            let node = &tree.nodes[node];
-            let first = node.child_base_idx as usize;
-            first..first + node.imask.count_ones() as usize
-        };
-        refuse_deep(levels_of(tree.nodes.len(), children), MOST_WIDE)?;
-        Ok(tree)
-    }
-
-    fn order(&self) -> &[u32] {
-        &self.primitive_indices
-    }
-
-    #[inline(always)]
-    fn first(&self, ray: TheirRay, found: &mut RayHit, entry: impl FnMut(&TheirRay, usize) -> f32) {
-        if !self.nodes.is_empty() {
-            self.ray_traverse(ray, found, entry);
-        }
-    }
-
-    #[inline(always)]
-    fn all(&self, ray: TheirRay, visit: impl FnMut(&TheirRay, usize)) {
-        if !self.nodes.is_empty() {
-            self.ray_traverse_anyhit(ray, visit);
-        }
-    }
-}
 
 /// Most levels of a binary tree to be converted: the conversion recurses per level.
 const MOST_BINARY: usize = 500;
@@ -239,11 +163,26 @@ const MOST_BINARY: usize = 500;
 const MOST_WIDE: usize = 32;
 
 fn refuse_deep(levels: usize, most: usize) -> Result<(), NotBuilt> {
-    let name = ROW_WIDE.name;
+    let name = ROW.name;
     match levels > most {
-        true => Err(NotBuilt::TooDeep { name, levels, most }),
+        true => Err(NotBuilt(format!(
+            "the tree of '{name}' has {levels} levels; expected at most {most}"
+        ))),
         false => Ok(()),
     }
+}
+
+/// The eight-wide tree of a binary one, whose levels are counted.
+fn widened(binary: &Bvh2, levels: usize) -> Result<CwBvh, NotBuilt> {
+    refuse_deep(levels, MOST_BINARY)?;
+    let tree = bvh2_to_cwbvh(binary, 3, true, false);
+    let children = |node: usize| {
+        let node = &tree.nodes[node];
+        let first = node.child_base_idx as usize;
+        first..first + node.imask.count_ones() as usize
+    };
+    refuse_deep(levels_of(tree.nodes.len(), children), MOST_WIDE)?;
+    Ok(tree)
 }
 
 /// Levels of a tree of some nodes, the first of which is the root.
@@ -258,8 +197,8 @@ fn levels_of(nodes: usize, children: impl Fn(usize) -> Range<usize>) -> usize {
 }
 
 /// A tree of the crate over bodies.
-struct Obvhs<T, B: Primitive> {
-    tree: T,
+struct Obvhs<B: Primitive> {
+    tree: CwBvh,
     /// In the order of the tree's primitives.
     bodies: Vec<B::Rounded>,
     ids: Vec<ItemId>,
@@ -267,9 +206,9 @@ struct Obvhs<T, B: Primitive> {
     items: usize,
 }
 
-impl<T: Cast, B: Primitive> Obvhs<T, B> {
+impl<B: Primitive> Obvhs<B> {
     /// Builds the tree; a panic of the crate is an error.
-    fn boxed(all: &Bodies<B>, name: &'static str) -> Result<Box<dyn Pick>, NotBuilt> {
+    fn boxed(all: &Bodies<B>) -> Result<Box<dyn Pick>, NotBuilt> {
         let about = About::of(all.origin, &all.bounds);
         let boxes: Vec<Aabb> = all.bounds.iter().map(|b| about.scaled(b)).collect();
         let build = || {
@@ -279,12 +218,12 @@ impl<T: Cast, B: Primitive> Obvhs<T, B> {
                 let first = node.first_index as usize;
                 first..first + if node.is_leaf() { 0 } else { 2 }
             });
-            T::of(binary, levels)
+            widened(&binary, levels)
         };
-        let tree =
-            caught(build).unwrap_or_else(|message| Err(NotBuilt::Panicked { name, message }))?;
-        let order = tree.order().iter().map(|&place| place as usize);
-        Ok(Box::new(Obvhs::<T, B> {
+        let panicked = |message: String| Err(NotBuilt::panicked(ROW.name, &message));
+        let tree = caught(build).unwrap_or_else(panicked)?;
+        let order = tree.primitive_indices.iter().map(|&place| place as usize);
+        Ok(Box::new(Obvhs::<B> {
             bodies: order
                 .clone()
                 .map(|place| all.all[place].rounded(&all.bounds[place], &about))
@@ -297,12 +236,15 @@ impl<T: Cast, B: Primitive> Obvhs<T, B> {
     }
 }
 
-impl<T: Cast, B: Primitive> Pick for Obvhs<T, B> {
+impl<B: Primitive> Pick for Obvhs<B> {
     fn first(&self, ray: &Ray) -> Option<Hit> {
         let rounded = RoundedRay::of(ray, &self.about);
         let mut found = RayHit::none();
         let entry = |ray: &TheirRay, place: usize| B::depth(&self.bodies[place], &rounded, ray);
-        self.tree.first(rounded.theirs(), &mut found, entry);
+        // The crate's walk begins at a root that an empty tree does not have.
+        if !self.ids.is_empty() {
+            self.tree.ray_traverse(rounded.theirs(), &mut found, entry);
+        }
         let item = *self.ids.get(found.primitive_id as usize)?;
         ((item as usize) < self.items).then(|| self.about.hit(item, found.t))
     }
@@ -317,7 +259,9 @@ impl<T: Cast, B: Primitive> Pick for Obvhs<T, B> {
                 hits.push(self.about.hit(item, depth));
             }
         };
-        self.tree.all(rounded.theirs(), visit);
+        if !self.ids.is_empty() {
+            self.tree.ray_traverse_anyhit(rounded.theirs(), visit);
+        }
         if !B::IS_BOX {
             hits.sort_unstable_by(|a, b| a.item.cmp(&b.item).then(a.order(b)));
             hits.dedup_by_key(|hit| hit.item);
@@ -359,28 +303,10 @@ mod tests {
 
     #[test]
     fn trees_that_are_too_deep_to_walk_are_refused() {
-        let of = |levels| CwBvh::of(chain(levels), levels).err();
+        let of = |levels| widened(&chain(levels), levels).err().map(|e| e.to_string());
         assert_eq!(of(100), None);
-        let too_deep = |levels, most| {
-            let name = ROW_WIDE.name;
-            Some(NotBuilt::TooDeep { name, levels, most })
-        };
-        assert_eq!(of(100_000), too_deep(100_000, MOST_BINARY));
-        let wide = of(400);
-        assert!(
-            matches!(
-                wide,
-                Some(NotBuilt::TooDeep {
-                    most: MOST_WIDE,
-                    ..
-                })
-            ),
-            "{wide:?}"
-        );
-        // The binary tree's walk has as much memory as it needs.
-        assert_eq!(
-            Bvh2::of(chain(100_000), 100_000).unwrap().max_depth,
-            100_002
-        );
+        let refused = "has 100000 levels; expected at most 500";
+        assert!(of(100_000).is_some_and(|error| error.ends_with(refused)));
+        assert!(of(400).is_some_and(|error| error.ends_with("expected at most 32")));
     }
 }

@@ -125,7 +125,7 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
                 .map(|row| {
                     (
                         row.name,
-                        (row.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap(),
+                        (row.build.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap(),
                     )
                 })
                 .collect();
@@ -176,7 +176,7 @@ fn back_ends_in_f32_differ_on_few_ties() {
         let (mut on_grids, mut asked) = (0, 0);
         for mut worlds in grids(77) {
             let solids = worlds.boxes(40);
-            let back_end = (row.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap();
+            let back_end = (row.build.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap();
             for _ in 0..150 {
                 let ray = worlds.ray();
                 let truth = all_judged(&ray, &solids);
@@ -201,7 +201,7 @@ fn boxes_of_any_size_are_picked_alike() {
             .map(|row| {
                 (
                     row,
-                    (row.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap(),
+                    (row.build.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap(),
                 )
             })
             .collect();
@@ -390,7 +390,7 @@ fn ray(origin: DVec3, direction: DVec3) -> Ray {
 
 /// Every back end over triangles.
 fn triangle_back_ends(facets: &Facets) -> Vec<(&'static BackEnd, Box<dyn Pick>)> {
-    let built = |row: &'static BackEnd| (row, (row.facets)(facets, Kernel::best()).unwrap());
+    let built = |row: &'static BackEnd| (row, (row.build.facets)(facets, Kernel::best()).unwrap());
     BACK_ENDS.iter().map(built).collect()
 }
 

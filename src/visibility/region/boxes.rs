@@ -14,11 +14,6 @@ use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
 use crate::visibility::{Ray, Rays, SampleGrid};
 
-/// No regions are known of a scene.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("the scene has {0} as regions; expected a tiling of boxes with portals")]
-pub struct NoRegions(pub &'static str);
-
 /// A ground of boxes, one a region.
 #[derive(Debug)]
 struct Boxes {
@@ -78,11 +73,10 @@ impl RegionGraph {
     /// openings, lie in solid items. An opening is flat, as the tiling has it: the wall
     /// about it has a thickness, so less is seen through it.
     ///
-    /// # Errors
-    /// A scene whose regions are not a tiling.
-    pub fn of_scene(scene: &Scene) -> Result<RegionGraph, NoRegions> {
+    /// `None` for a scene whose regions are not a tiling.
+    pub fn of_scene(scene: &Scene) -> Option<RegionGraph> {
         let Regions::Tiling(tiling) = &scene.regions else {
-            return Err(NoRegions(scene.regions.kind()));
+            return None;
         };
         let mut graph = RegionGraph::of_tiling(tiling, scene.origin);
         let borders = graph.borders(scene).into_iter().zip(&scene.items);
@@ -92,7 +86,7 @@ impl RegionGraph {
             borders: BoxGrid::new(borders.collect()),
             regions: BoxGrid::new(graph.parts.all.clone()),
         });
-        Ok(graph)
+        Some(graph)
     }
 
     /// Tests, by item, for a possible border between regions; furniture is none.

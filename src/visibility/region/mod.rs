@@ -15,18 +15,16 @@ pub mod doom;
 mod graph;
 mod id_set;
 mod locate;
-mod pvs;
 mod quake;
 mod row;
 mod search;
 mod view;
 
-pub use boxes::{NoRegions, seen_by_samples};
+pub use boxes::seen_by_samples;
 pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
 pub use id_set::{IdSet, RegionId};
 pub use locate::RegionItems;
-pub use pvs::{Pvs, PvsError};
-pub use row::{BACK_ENDS, BackEnd, EyePlace, RegionRow, Scratch, Source};
+pub use row::{BACK_ENDS, BackEnd, EyePlace, Pvs, PvsError, RegionRow, Scratch, Source};
 
 #[cfg(test)]
 pub use tests::leads_through;

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::graph::{Ground, RegionGraph};
 use super::id_set::{IdSet, RegionId};
-use super::pvs::Pvs;
+use super::row::Pvs;
 use crate::scene::{LeafChild, LeafNode, QuakeMap, WorldBox};
 use crate::visibility::Ray;
 
@@ -111,7 +111,6 @@ impl Pvs {
     ///
     /// `None` where the map has none, as all are seen then, or where it is too large.
     pub fn of_quake(map: &QuakeMap) -> Option<Pvs> {
-        let sees = map.sees()?;
-        Pvs::of_pairs(map.clusters, sees).ok()
+        Pvs::of_pairs(map.clusters, map.sees()?)
     }
 }

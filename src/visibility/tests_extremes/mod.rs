@@ -22,6 +22,7 @@ use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::occlusion::{
     Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, TwoPass, View,
 };
+use crate::visibility::rays::tests::in_image;
 use crate::visibility::truth::{RayIndex, visible_by_random_rays};
 use crate::visibility::{Rays, Solids};
 use case::{RAYS, StageCase, along};
@@ -233,7 +234,7 @@ fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) ->
     let at_boxes =
         (0..RAYS_AT_BOXES).map(|_| point_of(&case.boxes[rng.below(case.boxes.len())], rng));
     for point in at_boxes.chain(case.aims.iter().copied()) {
-        if let Some([x, y]) = rays.in_image(point) {
+        if let Some([x, y]) = in_image(rays, point) {
             seen.extend(index.front_of(&rays.through(x, y)).front);
         }
     }

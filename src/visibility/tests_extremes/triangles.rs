@@ -9,6 +9,7 @@ use super::case::{RAYS, StageCase, along, looking};
 use crate::camera::{Camera, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{MESHES, Scene, SeededRng, Surfaces};
+use crate::visibility::rays::tests::in_image;
 use crate::visibility::triangle::{
     Clusters, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleRow,
 };
@@ -78,7 +79,7 @@ impl TriangleCase {
         let rays = Rays::of(&self.camera).expect("a camera with a lens");
         let aimed: Vec<DVec3> = (0..RAYS).map(|_| self.point(rng)).collect();
         let aims = aimed.iter().chain(&self.aims);
-        let aims = aims.filter_map(|&point| rays.in_image(point));
+        let aims = aims.filter_map(|&point| in_image(&rays, point));
         let random = (0..RAYS).map(|_| [rng.unit(), rng.unit()]);
         let anywhere: Vec<[f64; 2]> = aims.chain(random).collect();
         let anywhere = anywhere.iter().map(|&[x, y]| rays.through(x, y));

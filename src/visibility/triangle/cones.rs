@@ -30,7 +30,7 @@ use glam::{DVec3, Vec3};
 
 use super::clusters::Clusters;
 use super::exact::{Eye, faces, normal};
-use super::selection::{Selection, TriangleCull, TriangleRow};
+use super::{Selection, TriangleCull, TriangleRow};
 use crate::arithmetic::rounding::round_up;
 use crate::geometry::Aabb;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};

@@ -6,20 +6,124 @@ mod clusters;
 mod cones;
 mod exact;
 mod per_triangle;
-mod selection;
+
+use std::sync::Arc;
+
+use crate::kernel::{Kernel, LANES};
+use crate::visibility::Row;
 
 pub use clusters::{Clusters, MOST_TRIANGLES};
 pub use cones::{Cone, Cones, SafeCones};
 pub use exact::{Eye, faces, normal};
-pub use selection::{Counts, Selection, TriangleCull, TriangleRow, facing};
 
 /// All back ends of this stage.
-pub const TRIANGLE_ROWS: &[TriangleRow] = &[
-    selection::NONE,
-    per_triangle::ROW,
-    cones::ROW,
-    cones::ROW_SEVERAL,
-];
+pub const TRIANGLE_ROWS: &[TriangleRow] = &[per_triangle::ROW, cones::ROW, cones::ROW_SEVERAL];
 
 #[cfg(test)]
 mod tests;
+
+/// Some of the triangles of clusters.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Selection {
+    /// Those beyond the last cluster are zero.
+    blocks: Vec<[u64; LANES]>,
+    clusters: usize,
+}
+
+impl Selection {
+    /// All triangles.
+    pub fn all(clusters: &Clusters) -> Selection {
+        let mut selection = Selection::none(clusters);
+        for (cluster, word) in selection.words_mut().iter_mut().enumerate() {
+            *word = clusters.word(cluster);
+        }
+        selection
+    }
+
+    /// All triangles of these items: what the object stage left.
+    pub fn of_items(clusters: &Clusters, items: impl IntoIterator<Item = u32>) -> Selection {
+        let mut selection = Selection::none(clusters);
+        let words = selection.words_mut();
+        for item in items {
+            for cluster in clusters.of_item[item as usize].clone() {
+                words[cluster as usize] = clusters.word(cluster as usize);
+            }
+        }
+        selection
+    }
+
+    fn none(clusters: &Clusters) -> Selection {
+        let clusters = clusters.len();
+        Selection {
+            blocks: vec![[0; LANES]; clusters.div_ceil(LANES)],
+            clusters,
+        }
+    }
+
+    /// One word per cluster; bit `i` is the `i`-th of [`Clusters::triangles_of`].
+    pub fn words(&self) -> &[u64] {
+        &self.blocks.as_flattened()[..self.clusters]
+    }
+
+    /// The words, to remove triangles.
+    ///
+    /// Bits beyond the triangles of a cluster stay zero.
+    pub fn words_mut(&mut self) -> &mut [u64] {
+        &mut self.blocks.as_flattened_mut()[..self.clusters]
+    }
+
+    /// The words of sixteen clusters at a time.
+    ///
+    /// Those beyond the last cluster are zero and stay so.
+    fn blocks_mut(&mut self) -> &mut [[u64; LANES]] {
+        &mut self.blocks
+    }
+
+    /// How many triangles there are.
+    pub fn triangles(&self) -> usize {
+        self.words()
+            .iter()
+            .map(|word| word.count_ones() as usize)
+            .sum()
+    }
+
+    /// How many of these triangles are not in another selection.
+    pub fn without(&self, other: &Selection) -> usize {
+        let pairs = self.words().iter().zip(other.words());
+        pairs.map(|(a, b)| (a & !b).count_ones() as usize).sum()
+    }
+
+    /// Keeps the triangles for which `keep(cluster, bit)` is true.
+    #[inline(always)]
+    pub fn retain(&mut self, mut keep: impl FnMut(usize, usize) -> bool) {
+        for (cluster, word) in self.words_mut().iter_mut().enumerate() {
+            let mut left = *word;
+            while left != 0 {
+                let bit = left.trailing_zeros() as usize;
+                left &= left - 1;
+                if !keep(cluster, bit) {
+                    *word &= !(1 << bit);
+                }
+            }
+        }
+    }
+}
+
+/// A back end, built for certain clusters.
+pub trait TriangleCull: Send + Sync {
+    /// Removes triangles that cannot be seen from `kept`; adds none.
+    ///
+    /// The answer is the same with every kernel.
+    fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection);
+}
+
+/// A row of the table of back ends.
+pub type TriangleRow = Row<fn(&Arc<Clusters>) -> Box<dyn TriangleCull>>;
+
+/// The truth of this stage: triangles of `candidates` whose front the eye sees,
+/// and all two-sided ones. Exact; one predicate per triangle, no shared structure.
+pub fn facing(clusters: &Clusters, eye: &Eye, candidates: &Selection) -> Selection {
+    let mut truth = candidates.clone();
+    truth.retain(|cluster, bit| clusters.is_seen(eye, cluster, bit));
+    truth
+}

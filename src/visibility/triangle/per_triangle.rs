@@ -13,7 +13,7 @@ use glam::{DVec3, Vec3};
 
 use super::clusters::Clusters;
 use super::exact::{Eye, normal};
-use super::selection::{Selection, TriangleCull, TriangleRow, facing};
+use super::{Selection, TriangleCull, TriangleRow, facing};
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 use crate::visibility::Guarantee;

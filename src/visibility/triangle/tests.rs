@@ -14,6 +14,34 @@ use crate::camera::{Camera, Lens, look_at};
 use crate::kernel::Kernel;
 use crate::scene::{Family, MESHES, SeededRng, Surfaces, load};
 
+/// Triangles in and out of a stage.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+struct Counts {
+    /// Triangles that the stage was given.
+    candidates: usize,
+    /// Triangles that it delivered.
+    delivered: usize,
+    /// Triangles that it should have delivered.
+    truth: usize,
+    /// Delivered, but not in the truth.
+    false_positives: usize,
+    /// In the truth, but not delivered.
+    false_negatives: usize,
+}
+
+impl Counts {
+    /// Compares two selections of the same candidates.
+    fn of(candidates: &Selection, delivered: &Selection, truth: &Selection) -> Counts {
+        Counts {
+            candidates: candidates.triangles(),
+            delivered: delivered.triangles(),
+            truth: truth.triangles(),
+            false_positives: delivered.without(truth),
+            false_negatives: truth.without(delivered),
+        }
+    }
+}
+
 /// Scenes of some thousand triangles: all meshes, and boxes far from the zero.
 fn scenes() -> Vec<(String, Arc<Clusters>)> {
     let mesh = |mesh: &Family| (mesh.name.to_string(), mesh.mesh(6000, 5));
@@ -97,7 +125,7 @@ fn rows_keep_their_promises_and_kernels_agree() {
             let removed = 1.0 - sum.delivered as f64 / sum.candidates as f64;
             let is_smooth = name == "mesh:spheres" || name == "mesh:statue";
             assert!(
-                row.name == "none" || !is_smooth || removed > 0.05,
+                !is_smooth || removed > 0.05,
                 "{name} {}: {removed:.3}",
                 row.name
             );
@@ -117,7 +145,7 @@ fn adversarial_eyes_find_what_the_unsafe_rows_lose_and_nothing_else() {
                 assert!(found.false_negatives > 10, "{what}");
             }
             // A search that rejects nothing shows nothing.
-            assert!(row.name == "none" || found.rejected > 200, "{what}");
+            assert!(found.rejected > 200, "{what}");
         }
     }
 }

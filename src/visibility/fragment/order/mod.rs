@@ -10,26 +10,17 @@ use crate::geometry::PlaneTree;
 use crate::index::{Input, RegionIndex, Wide};
 use crate::query::ItemId;
 use crate::scene::{Surfaces, WorldBox};
-use crate::visibility::{Guarantee, Solids};
+use crate::visibility::{Guarantee, Row, Solids};
 
 pub use bsp::BspOrder;
 
-/// A row of the table of orders.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct OrderRow {
-    /// Name as typed.
-    pub name: &'static str,
-    /// One line for tables and help.
-    pub summary: &'static str,
-    /// [`Guarantee::Exact`]: no pair that overlaps in the image is the wrong way
-    /// round, but where it says so ([`DepthOrder::exception`]).
-    pub guarantee: Guarantee,
-    /// Prepares it for the items of a scene, if it can order them.
-    pub build: fn(&ToOrder) -> Option<Box<dyn DepthOrder>>,
-}
+/// A row of the table of orders: prepares one for items, if it can order them.
+pub type OrderRow = Row<fn(&ToOrder) -> Option<Box<dyn DepthOrder>>>;
 
 /// All orders.
+///
+/// An [exact](Guarantee::Exact) one has no pair that overlaps in the image the wrong way
+/// round, but where it says so ([`DepthOrder::exception`]).
 pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, build }
     "none", "items in the order of their ids", Guarantee::Unproven, by_id;
     "tree", "items in the order of the tree 'wide', the same for all views",

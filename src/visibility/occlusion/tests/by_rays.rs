@@ -7,6 +7,7 @@ use crate::camera::{Camera, PlaneOptions, Surroundings};
 use crate::geometry::ConvexVolume;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox};
+use crate::visibility::rays::tests::in_image;
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
 /// A scene with its solids and occluders.
@@ -98,7 +99,7 @@ pub fn seen_by_rays(
     for number in 0..count {
         let at = match number % 2 {
             0 => Some([rng.unit(), rng.unit()]),
-            _ => rays.in_image(point_of(&boxes[rng.below(boxes.len())], rng)),
+            _ => in_image(rays, point_of(&boxes[rng.below(boxes.len())], rng)),
         };
         if let Some([x, y]) = at {
             seen.extend(front(&rays.through(x, y), boxes));

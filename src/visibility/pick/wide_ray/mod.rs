@@ -12,7 +12,7 @@ use std::hint::black_box;
 use glam::DVec3;
 
 use super::wide_ray::slabs::{Rows, Slabs};
-use super::{BackEnd, NotBuilt};
+use super::{BackEnd, Builds, NotBuilt};
 use crate::geometry::Aabb;
 use crate::index::Record;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask};
@@ -27,8 +27,10 @@ pub const ROW: BackEnd = BackEnd {
     name: "wide-ray",
     summary: "16-wide tree, sixteen slab tests at once, the last step exact",
     guarantee: Guarantee::Exact,
-    boxes: |boxes, kernel| Ok(Box::new(WideRay::of(boxes, kernel)?)),
-    facets: |facets, kernel| Ok(Box::new(WideRay::of(facets, kernel)?)),
+    build: Builds {
+        boxes: |boxes, kernel| Ok(Box::new(WideRay::of(boxes, kernel)?)),
+        facets: |facets, kernel| Ok(Box::new(WideRay::of(facets, kernel)?)),
+    },
 };
 
 /// The nodes, some 45 bytes of them a box.
@@ -52,7 +54,7 @@ impl Tree {
         // Each node holds at least one box.
         let (count, most) = (boxes.len(), Child::MOST);
         if count > most {
-            return Err(NotBuilt::TooMany { count, most });
+            return Err(NotBuilt(format!("{count} items; expected at most {most}")));
         }
         let (nodes, root, ids) = build(boxes);
         let tree = Tree {

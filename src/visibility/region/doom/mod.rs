@@ -12,9 +12,295 @@
 //! [`DoomMap::surfaces`]; what these enclose from outside, in boxes, is
 //! [`DoomMap::solid_boxes`].
 
-mod map;
 mod solid;
-
-pub use map::DoomMap;
-
 mod surfaces;
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use super::graph::{Ground, Opening, OpeningPlane, RegionGraph};
+use super::id_set::{IdSet, RegionId};
+use super::row::Pvs;
+use crate::scene::{Dispute, Linedef, Regions, Scene, WadMap, WorldBox};
+use crate::visibility::Ray;
+
+pub use surfaces::surfaces_of;
+
+/// Height at which sectors that move end; map units fit 16 bits.
+const HIGHEST: f64 = 32768.0;
+
+/// A Doom map with its moving sectors open.
+#[derive(Clone, Debug)]
+pub struct DoomMap {
+    /// The map as decoded.
+    file: Arc<WadMap>,
+    /// Linedefs, in file order, those of length zero left out.
+    pub lines: Vec<Linedef>,
+    /// Heights of floor and ceiling of each sector, in file order; beyond all others
+    /// where the sector moves.
+    pub sectors: Vec<[f64; 2]>,
+}
+
+/// Tests for an action that opens or moves the sector behind its own line.
+///
+/// After linuxdoom 1.10, p_doors.c, EV_VerticalDoor.
+fn is_door(action: u16) -> bool {
+    matches!(action, 1 | 26 | 27 | 28 | 31..=34 | 117 | 118)
+}
+
+/// Tests for an action that moves no sector with its tag.
+///
+/// Exits, teleporters, lights, scrolling walls (linuxdoom 1.10, p_spec.c, p_switch.c).
+fn is_still(action: u16) -> bool {
+    matches!(
+        action,
+        0 | 11..=13 | 17 | 35 | 39 | 48 | 51 | 52 | 79..=81 | 97 | 104 | 124..=126 | 138 | 139
+    )
+}
+
+/// Tags of sectors that the death of a boss moves.
+const BOSS_TAGS: [u16; 2] = [666, 667];
+
+impl DoomMap {
+    /// The map that a scene was loaded from, if it was one.
+    pub fn of_scene(scene: &Scene) -> Option<Arc<DoomMap>> {
+        match &scene.regions {
+            Regions::Bsp(map) => Some(Arc::new(DoomMap::of(map.clone()))),
+            _ => None,
+        }
+    }
+
+    /// Finds the sectors that move. O(linedefs * sectors).
+    pub fn of(file: Arc<WadMap>) -> DoomMap {
+        let is_moved = |tag: u16, sector: u32| {
+            let moves = |line: &Linedef| {
+                let is_tagged = line.tag != 0 && line.tag == tag && !is_still(line.action);
+                is_tagged || is_door(line.action) && line.sectors[1] == Some(sector)
+            };
+            BOSS_TAGS.contains(&tag) || file.lines.iter().any(moves)
+        };
+        let sectors = file.sectors.iter().zip(0..);
+        let sectors = sectors.map(|(sector, id)| match is_moved(sector.tag, id) {
+            true => [-HIGHEST, HIGHEST],
+            false => sector.heights,
+        });
+        let lines = file
+            .lines
+            .iter()
+            .filter(|line| line.ends[0] != line.ends[1]);
+        DoomMap {
+            lines: lines.copied().collect(),
+            sectors: sectors.collect(),
+            file: file.clone(),
+        }
+    }
+
+    /// Lowest and highest height that a linedef lets through; `None` where it is solid.
+    pub fn opening(&self, line: &Linedef) -> Option<[f64; 2]> {
+        let [Some(a), Some(b)] = line.sectors else {
+            return None;
+        };
+        let [a, b] = [a, b].map(|sector| self.sectors[sector as usize]);
+        let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
+        (low < high).then_some([low, high])
+    }
+
+    /// The map's REJECT table: its claim of which sectors see each other. A table that
+    /// is too short counts as none, as in engines.
+    pub fn reject(&self) -> Option<Pvs> {
+        Pvs::from_reject(&self.file.reject, self.sectors.len())
+    }
+
+    /// Places about which its linedefs disagree, by the sectors that they have there.
+    pub fn disputes(&self) -> &[Dispute] {
+        self.file.disputes()
+    }
+}
+
+/// The height, seen from above, of a strip of the map that lists its linedefs.
+const STRIP: f64 = 64.0;
+
+/// The ground of a map.
+#[derive(Debug)]
+struct SectorGround {
+    map: Arc<DoomMap>,
+    /// The linedefs that meet each strip, from the least y on.
+    strips: Vec<Vec<Linedef>>,
+    low: f64,
+}
+
+fn plan([x, y]: [i32; 2]) -> DVec2 {
+    DVec2::new(x.into(), y.into())
+}
+
+impl SectorGround {
+    /// Sorts the linedefs into strips. O(linedefs * strips that each meets).
+    pub fn new(map: Arc<DoomMap>) -> SectorGround {
+        let ends = map.lines.iter().flat_map(|line| line.ends);
+        let (low, high) = ends.fold((0.0f64, 0.0f64), |(low, high), [_, y]| {
+            (low.min(y.into()), high.max(y.into()))
+        });
+        let mut ground = SectorGround {
+            strips: vec![Vec::new(); ((high - low) / STRIP) as usize + 1],
+            map: map.clone(),
+            low,
+        };
+        for line in &map.lines {
+            let [a, b] = line.ends.map(|[_, y]| ground.strip(y.into()));
+            for strip in a.min(b)..=a.max(b) {
+                ground.strips[strip].push(*line);
+            }
+        }
+        ground
+    }
+
+    /// Monotone in y; what is beyond the map has the first or the last.
+    fn strip(&self, y: f64) -> usize {
+        (((y - self.low) / STRIP) as usize).min(self.strips.len() - 1)
+    }
+
+    /// The sector of a point: what the first linedef towards larger x has on this
+    /// side. O(linedefs of its strip).
+    fn sector_at(&self, p: DVec2) -> Option<RegionId> {
+        let (mut nearest, mut found) = (f64::INFINITY, None);
+        for line in &self.strips[self.strip(p.y)] {
+            let [a, b] = line.ends.map(plan);
+            if (a.y <= p.y) == (b.y <= p.y) {
+                continue;
+            }
+            let x = a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
+            if x >= p.x && x < nearest {
+                // Left of a line that goes up is the side of smaller x.
+                (nearest, found) = (x, line.sectors[usize::from(b.y > a.y)]);
+            }
+        }
+        found
+    }
+}
+
+/// Tests whether a linedef may meet a closed box, seen from above.
+fn meets(line: &Linedef, b: &WorldBox) -> bool {
+    let [from, to] = line.ends.map(plan);
+    let (low, high) = (b.min.truncate(), b.max.truncate());
+    if !(from.min(to).cmple(high).all() && low.cmple(from.max(to)).all()) {
+        return false;
+    }
+    let d = to - from;
+    let side = |x: f64, y: f64| d.x * (y - from.y) - d.y * (x - from.x);
+    let corners = [
+        (low.x, low.y),
+        (high.x, low.y),
+        (low.x, high.y),
+        (high.x, high.y),
+    ];
+    let sides = corners.map(|(x, y)| side(x, y));
+    // Rounding of the side is below this: |d| and distances are below 2^18.
+    let slack = 1e-9;
+    sides.iter().any(|s| *s <= slack) && sides.iter().any(|s| *s >= -slack)
+}
+
+impl DoomMap {
+    /// Sectors as regions, linedefs that are open as openings. A sector's parts have
+    /// all heights.
+    ///
+    /// # Errors
+    /// A place about which the linedefs disagree: what is open to what is not known then.
+    pub fn graph(self: &Arc<Self>) -> Result<RegionGraph, Dispute> {
+        if let Some(dispute) = self.disputes().first() {
+            return Err(*dispute);
+        }
+        let opening = |line: &Linedef| {
+            let ([Some(front), Some(behind)], Some([low, high])) =
+                (line.sectors, self.opening(line))
+            else {
+                return None;
+            };
+            let [from, to] = line.ends.map(plan);
+            let corners = [
+                from.extend(low),
+                to.extend(low),
+                to.extend(high),
+                from.extend(high),
+            ];
+            (front != behind).then_some(Opening {
+                sides: [front, behind],
+                corners,
+                plane: OpeningPlane::Upright { from, to },
+            })
+        };
+        let openings = self.lines.iter().filter_map(opening).collect();
+        // Boxes about the leaves of the map's own tree, without a height.
+        let all_heights = DVec3::Z * (2.0 * HIGHEST);
+        let mut parts = vec![Vec::new(); self.sectors.len()];
+        for (&sector, b) in self.file.leaf_sectors.iter().zip(&self.file.tree.boxes) {
+            let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+            parts[sector as usize].push(WorldBox::new(min - all_heights, max + all_heights));
+        }
+        let ground = Arc::new(SectorGround::new(self.clone()));
+        Ok(RegionGraph::new(&parts, openings, ground))
+    }
+}
+
+impl Ground for SectorGround {
+    fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
+        let mut inside = true;
+        let first = out.len();
+        let strips = &self.strips[self.strip(b.min.y)..=self.strip(b.max.y)];
+        for line in strips.iter().flatten().filter(|line| meets(line, b)) {
+            inside &= line.sectors[1].is_some();
+            out.extend(line.sectors.iter().flatten());
+        }
+        match self.sector_at((b.min + b.max).truncate() * 0.5) {
+            Some(sector) => out.push(sector),
+            None => inside = false,
+        }
+        // Below a floor or above a ceiling is nowhere.
+        inside
+            && out[first..].iter().all(|&sector| {
+                let [floor, ceiling] = self.map.sectors[sector as usize];
+                floor <= b.min.z && b.max.z <= ceiling
+            })
+    }
+
+    /// Leaves of the map's tree differ from its sectors by what a node builder rounds.
+    fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
+        self.regions_at(b, out);
+    }
+
+    fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
+        let start = ray.at(ray.near);
+        let Some(mut sector) = self.sector_at(start.truncate()) else {
+            return;
+        };
+        let (o, d) = (ray.origin.truncate(), ray.direction.truncate());
+        let mut crossings = Vec::new();
+        for line in &self.map.lines {
+            let [a, b] = line.ends.map(plan);
+            let (sa, sb) = (d.perp_dot(a - o), d.perp_dot(b - o));
+            if (sa < 0.0) == (sb < 0.0) {
+                continue;
+            }
+            let t = (a - o).perp_dot(b - a) / d.perp_dot(b - a);
+            if t >= ray.near && t <= ray.far {
+                // It begins right of the ray: crossed from its left to its right.
+                crossings.push((t, line, sa < 0.0));
+            }
+        }
+        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        seen.insert(sector);
+        for (t, line, to_right) in crossings {
+            let z = ray.origin.z + ray.direction.z * t;
+            let [floor, ceiling] = self.map.sectors[sector as usize];
+            let passes = |[low, high]: [f64; 2]| low < z && z < high;
+            let is_inside = floor <= z && z <= ceiling;
+            if !is_inside || !self.map.opening(line).is_some_and(passes) {
+                return;
+            }
+            if let Some(next) = line.sectors[usize::from(!to_right)] {
+                sector = next;
+                seen.insert(sector);
+            }
+        }
+    }
+}

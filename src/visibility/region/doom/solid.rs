@@ -9,7 +9,7 @@
 
 use glam::DVec3;
 
-use super::map::DoomMap;
+use super::DoomMap;
 use super::surfaces::{Point, turn};
 use crate::scene::WorldBox;
 

@@ -3,11 +3,21 @@
 //! Floors and ceilings follow the items; they hide too. They are triangulated seen from above
 //! in whole numbers, so that they meet each other and the walls exactly.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::super::id_set::RegionId;
-use super::map::DoomMap;
+use super::DoomMap;
 use crate::scene::{Linedef, Scene, SurfaceKind, Surfaces};
+
+/// The triangles of a scene's items, if they are no solid boxes.
+///
+/// Those of a map's floors and ceilings follow the items.
+pub fn surfaces_of(scene: &Scene) -> Option<Arc<Surfaces>> {
+    let of_map = || Some(Arc::new(DoomMap::of_scene(scene)?.surfaces(scene)));
+    scene.surfaces.clone().or_else(of_map)
+}
 
 /// A part of a linedef's wall: the side that it faces, lower and upper height.
 type Part = (usize, [f64; 2]);

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use super::super::clusters::Clusters;
 use super::super::exact::{Eye, faces, normal};
-use super::super::selection::{Selection, TriangleRow};
+use super::super::{Selection, TriangleRow};
 use crate::kernel::Kernel;
 use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 
