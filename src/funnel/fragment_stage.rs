@@ -159,7 +159,7 @@ impl<'w> FragmentStage<'w> {
                 canvas.turn_to(rays, DVec3::ZERO);
                 let left = &views[view];
                 left.draw(test, canvas, drawn);
-                let visible = drawn.depth.visible(canvas).into_iter();
+                let visible = drawn.visible(canvas).into_iter();
                 out.extend(visible.map(|index| left.items[index as usize]));
                 drawn.tally
             }
@@ -200,8 +200,9 @@ impl<'w> FragmentStage<'w> {
     /// Counts of no test and of every test.
     pub fn tested(&self, stages: &ItemStages, steps: &[Step], truth: &Truth) -> Vec<Tested> {
         let world = self.world;
-        let none = world.back_end(StageKind::Fragment, NONE);
-        let tested = std::iter::once(none).chain(self.tests()).map(|back_end| {
+        let rows = world.back_ends(StageKind::Fragment).into_iter();
+        let drawn = rows.filter(|row| row.name == NONE || self.too_much.is_none());
+        let tested = drawn.map(|back_end| {
             let (mut counts, mut tallies) = (Vec::new(), Vec::new());
             for view in world.views() {
                 let given = stages.items(steps, view);
@@ -301,7 +302,7 @@ impl Room {
 
     /// Samples that see a portal before everything that is drawn already.
     fn stencil(&self, canvas: &Canvas, drawn: &Drawn) -> Stencil {
-        drawn.depth.stencil(canvas, &self.portals)
+        drawn.stencil(canvas, &self.portals)
     }
 }
 
@@ -358,7 +359,7 @@ pub fn mirrored(
         let left = world.listed(stages.items(steps, view));
         let left: Vec<Piece> = left.iter().copied().map(Piece::whole).collect();
         let direct = draw(&canvas, solids, &left, &Tests::default());
-        let stencil = direct.depth.stencil(&canvas, &[face]);
+        let stencil = direct.stencil(&canvas, &[face]);
         let reflected = canvas.mirrored(axis, face.min[axis]);
         let screen = reflected.screen();
         let rectangles = solids.boxes.iter().filter_map(|b| screen.rectangle(b));
@@ -370,12 +371,12 @@ pub fn mirrored(
         let mut seen = draw(&reflected, solids, &others, &tests);
         let all = draw(&reflected, solids, &others, &Tests::default());
         seen.tally.asked += stencil.tested;
-        let [own, other] = [&seen, &all].map(|drawn| drawn.depth.ids());
+        let [own, other] = [&seen, &all].map(|drawn| drawn.ids());
         let marks = (0..own.len()).filter(|&sample| stencil.holds(sample));
         wrong += marks.filter(|&sample| own[sample] != other[sample]).count() as u64;
         views += usize::from(stencil.count() > 0);
         marked += stencil.count();
-        shown += seen.depth.visible(&reflected).len();
+        shown += seen.visible(&reflected).len();
         with.push(seen.tally);
         without.push(all.tally);
     }

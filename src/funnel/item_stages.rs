@@ -101,7 +101,7 @@ impl<'w> ItemStages<'w> {
         let mut all = ItemStages::new(world);
         all.run(&chain.steps());
         for stage in StageKind::OF_ITEMS {
-            for name in world.names(stage) {
+            for (_, name) in world.rows(stage) {
                 all.run(&chain.steps_with(stage, &name));
             }
             if chain.is_separate(stage) {

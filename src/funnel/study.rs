@@ -98,7 +98,7 @@ impl<'w> Study<'w> {
     fn rows(&self, truth: &Truth) -> Vec<StageRow> {
         let mut rows = Vec::new();
         for stage in [&StageKind::OF_ITEMS[..], &[StageKind::Triangle]].concat() {
-            for name in self.world.names(stage) {
+            for (back_end, name) in self.world.rows(stage) {
                 let counts = match stage {
                     StageKind::Triangle => self.triangles.counts(&name),
                     _ => {
@@ -107,7 +107,6 @@ impl<'w> Study<'w> {
                         self.items.counts(&before, &steps, truth)
                     }
                 };
-                let back_end = self.world.back_end(stage, &name);
                 rows.push(StageRow::new(
                     back_end,
                     &name,

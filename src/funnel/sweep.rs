@@ -155,9 +155,8 @@ impl<'w> Swept<'w> {
     }
 
     fn rows(&self) -> impl Iterator<Item = BackEnd> {
-        let names = self.world.names(self.stage).into_iter();
-        let names = names.filter(|name| name != NONE);
-        names.map(|name| self.world.back_end(self.stage, &name))
+        let rows = self.world.rows(self.stage).into_iter();
+        rows.map(|(row, _)| row).filter(|row| row.name != NONE)
     }
 
     fn with_task<'s>(&'s self, point: SweepPoint, run: Run<'s>) -> (SweepPoint, KeyedTask<'s>) {

@@ -208,36 +208,26 @@ impl<'a> World<'a> {
         back_ends(stage, self.scene, self.cut_outs.is_some())
     }
 
-    /// Names of the back ends of a stage that are compared.
-    pub fn names(&self, stage: StageKind) -> Vec<String> {
-        let is_there = |name: &str| match (stage, &self.regions) {
-            (StageKind::Region, Some(regions)) => name == NONE || regions.row(name).is_some(),
-            (StageKind::Region, None) => name == NONE,
-            _ => true,
+    /// Back ends of a stage that are compared, each with its name or its structure's.
+    pub fn rows(&self, stage: StageKind) -> Vec<(BackEnd, String)> {
+        let is_there = |name: &str| {
+            let regions = self.regions.as_ref();
+            let is_row = || regions.is_some_and(|regions| regions.row(name).is_some());
+            stage != StageKind::Region || name == NONE || is_row()
         };
-        let rows = self.back_ends(stage).into_iter().map(|row| row.name);
-        let names = rows.filter(|name| is_there(name)).map(str::to_owned);
-        let of_objects = (stage == StageKind::Object).then_some(&self.structures);
-        let labels = of_objects
-            .into_iter()
-            .flatten()
-            .map(|(label, _)| label.clone());
-        let is_wanted = |name: &String| {
+        let rows = self.back_ends(stage).into_iter();
+        let rows = rows.filter(|row| is_there(row.name));
+        let rows = rows.map(|row| (row, row.name.to_owned()));
+        let frustum = ["frustum", "the six-plane test by a structure"];
+        let frustum = BackEnd::new(stage, frustum, Guarantee::Conservative);
+        let built = self.structures.iter();
+        let of_objects = built.filter(|_| stage == StageKind::Object);
+        let structures = of_objects.map(|(label, _)| (frustum, label.clone()));
+        let is_wanted = |(_, name): &(BackEnd, String)| {
             let only = self.only.as_ref();
             only.is_none_or(|chain| chain.of(stage) == name)
         };
-        names.chain(labels).filter(is_wanted).collect()
-    }
-
-    /// Declaration of a back end.
-    pub fn back_end(&self, stage: StageKind, name: &str) -> BackEnd {
-        let mut rows = self.back_ends(stage).into_iter();
-        let frustum = ["frustum", "the six-plane test by a structure"];
-        rows.find(|row| row.name == name).unwrap_or(BackEnd::new(
-            stage,
-            frustum,
-            Guarantee::Conservative,
-        ))
+        rows.chain(structures).filter(is_wanted).collect()
     }
 }
 

@@ -2,13 +2,13 @@
 //!
 //! Counts the fragments that each test lets through.
 
-use super::canvas::{Canvas, DepthBuffer, Fragment, Stencil, Visited};
+use super::canvas::{Canvas, Fragment, Stencil, Visited};
 use super::cut_outs::Holes;
 use super::order::Piece;
 use crate::query::ItemId;
-use crate::scene::{SurfaceKind, Surfaces};
+use crate::scene::{SurfaceKind, Surfaces, WorldBox};
 use crate::visibility::Solids;
-use crate::visibility::truth::{Body, Facet, SolidBox};
+use crate::visibility::truth::{Along, Body, Facet, NO_ITEM, SolidBox};
 
 /// The fragment tests beside the z-test.
 #[derive(Clone, Copy, Default, Debug)]
@@ -65,11 +65,12 @@ impl Tally {
 pub struct Drawn<B: Body = SolidBox> {
     /// Counts of all that was drawn.
     pub tally: Tally,
-    /// The exact front of each sample, of opaque items.
-    pub depth: DepthBuffer<B>,
-    /// Items of triangles that hide nothing and are met before the front or with it,
-    /// ascending.
-    pub before: Vec<ItemId>,
+    /// The exact front of each sample, of opaque items; of a tie the lowest id.
+    front: Vec<Option<(B::At, ItemId)>>,
+    /// Fragments that were as near as the one in front, and lost by their id.
+    ties: Vec<Fragment<B::At>>,
+    /// Items of triangles that hide nothing and are met before the front or with it.
+    before: Vec<ItemId>,
 }
 
 /// Draws the pieces in this order. Θ(samples of the screen rectangles).
@@ -89,7 +90,8 @@ impl<B: Body> Drawn<B> {
     pub fn new(samples: usize) -> Drawn<B> {
         Drawn {
             tally: Tally::default(),
-            depth: DepthBuffer::new(samples),
+            front: vec![None; samples],
+            ties: Vec::new(),
             before: Vec::new(),
         }
     }
@@ -97,8 +99,57 @@ impl<B: Body> Drawn<B> {
     /// Empties the image.
     pub fn clear(&mut self) {
         self.tally = Tally::default();
-        self.depth.clear();
+        self.front.fill(None);
+        self.ties.clear();
         self.before.clear();
+    }
+
+    /// Draws the fragment, if it passes: its sample is empty, or holds an item that is
+    /// deeper, or as deep with a higher id. Returns whether it passed.
+    #[inline]
+    fn test(&mut self, canvas: &Canvas<B>, fragment: &Fragment<B::At>) -> bool {
+        let Fragment { sample, item, at } = *fragment;
+        let front = &mut self.front[sample];
+        if let Some((other, other_item)) = *front {
+            let order = canvas.probe(sample).order(&at, &other);
+            if order.is_gt() {
+                return false;
+            }
+            if order.is_eq() {
+                // The same item may come in several pieces.
+                if item == other_item {
+                    return false;
+                }
+                let lost = item.max(other_item);
+                let tie = Fragment {
+                    item: lost,
+                    ..*fragment
+                };
+                self.ties.push(tie);
+                if lost == item {
+                    return false;
+                }
+            }
+        }
+        *front = Some((at, item));
+        true
+    }
+
+    /// The front item of a sample, and where its ray meets it.
+    #[inline]
+    pub fn front(&self, sample: usize) -> Option<(B::At, ItemId)> {
+        self.front[sample]
+    }
+
+    /// The id buffer: the item in front at each sample, [`NO_ITEM`] for none.
+    pub fn ids(&self) -> Vec<ItemId> {
+        let id = |front: &Option<(B::At, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
+        self.front.iter().map(id).collect()
+    }
+
+    /// Number of samples that have been drawn on.
+    fn covered(&self) -> u64 {
+        self.front.iter().filter(|front| front.is_some()).count() as u64
     }
 
     /// The exact visible set of the samples, ascending.
@@ -106,7 +157,14 @@ impl<B: Body> Drawn<B> {
     /// All items that are in front anywhere, every item of a tie, and the items before them
     /// that hide nothing.
     pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
-        let mut visible = self.depth.visible(canvas);
+        let in_front = |tie: &&Fragment<B::At>| {
+            let front = self.front[tie.sample];
+            let order = |front: (B::At, _)| canvas.probe(tie.sample).order(&tie.at, &front.0);
+            front.is_some_and(|front| order(front).is_eq())
+        };
+        let ties = self.ties.iter().filter(in_front).map(|tie| tie.item);
+        let mut visible: Vec<ItemId> = self.front.iter().flatten().map(|front| front.1).collect();
+        visible.extend(ties);
         visible.extend_from_slice(&self.before);
         visible.sort_unstable();
         visible.dedup();
@@ -123,19 +181,35 @@ impl Drawn {
         pieces: impl IntoIterator<Item = &'a Piece>,
         tests: &Tests<'_>,
     ) {
-        let Drawn { tally, depth, .. } = self;
         for piece in pieces {
             let visited = canvas.fragments(solids, piece, tests.stencil, |fragment| {
-                tally.fragments += 1;
+                self.tally.fragments += 1;
                 if tests.keep(canvas, solids, &fragment) {
-                    tally.passed += u64::from(depth.test(canvas, &fragment));
+                    self.tally.passed += u64::from(self.test(canvas, &fragment));
                 } else {
-                    tally.clear += 1;
+                    self.tally.clear += 1;
                 }
             });
-            tally.visited(visited);
+            self.tally.visited(visited);
         }
-        tally.covered = depth.covered();
+        self.tally.covered = self.covered();
+    }
+
+    /// Marks the samples at which a rectangle is no farther than what was drawn.
+    ///
+    /// A rectangle is a box without thickness along one axis.
+    pub fn stencil(&self, canvas: &Canvas, rectangles: &[WorldBox]) -> Stencil {
+        let mut stencil = Stencil::new(canvas.grid().samples());
+        for rectangle in rectangles {
+            let visited = canvas.meet(rectangle, None, |sample, at| {
+                let before = |(front, _): (_, _)| canvas.probe(sample).compare(&at, &front).is_le();
+                if self.front(sample).is_none_or(before) {
+                    stencil.mark(sample);
+                }
+            });
+            stencil.tested += visited.tested;
+        }
+        stencil
     }
 }
 
@@ -160,17 +234,10 @@ impl Drawn<Facet> {
                 }
             }
         }
-        self.tally.covered = self.depth.covered();
-        self.before.sort_unstable();
-        self.before.dedup();
+        self.tally.covered = self.covered();
     }
 
     fn add(&mut self, canvas: &Canvas<Facet>, surfaces: &Surfaces, triangle: u32, item: usize) {
-        let Drawn {
-            tally,
-            depth,
-            before,
-        } = self;
         let facet = Facet {
             corners: surfaces.corners(triangle),
             item: item as ItemId,
@@ -183,18 +250,18 @@ impl Drawn<Facet> {
             let Some(at) = facet.meet(probe, probe.ray().far) else {
                 return;
             };
-            tally.fragments += 1;
+            self.tally.fragments += 1;
             let is_before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
             let passes = match hides {
-                true => depth.test(canvas, &Fragment { sample, item, at }),
-                false => depth.front(sample).is_none_or(is_before),
+                true => self.test(canvas, &Fragment { sample, item, at }),
+                false => self.front(sample).is_none_or(is_before),
             };
-            tally.passed += u64::from(passes);
-            if passes && !hides && before.last() != Some(&item) {
-                before.push(item);
+            self.tally.passed += u64::from(passes);
+            if passes && !hides && self.before.last() != Some(&item) {
+                self.before.push(item);
             }
         });
-        tally.visited(visited);
+        self.tally.visited(visited);
     }
 }
 
@@ -219,7 +286,7 @@ mod tests {
         let mut drawn = Drawn::new(grid.samples());
         for turn in 0..2 {
             drawn.draw_triangles(&canvas, surfaces, &triangles);
-            assert_eq!(drawn.depth.ids(), truth.front, "{turn} {surfaces:?}");
+            assert_eq!(drawn.ids(), truth.front, "{turn} {surfaces:?}");
             assert_eq!(drawn.visible(&canvas), truth.visible, "{turn} {surfaces:?}");
             assert!(drawn.tally.passed >= drawn.tally.covered);
             triangles.reverse();

@@ -15,7 +15,7 @@ mod errors;
 pub mod order;
 mod screen;
 
-pub use canvas::{Canvas, DepthBuffer, Fragment, Stencil};
+pub use canvas::{Canvas, Fragment, Stencil};
 pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface, holes_of};
 pub use draw::{Drawn, Tally, Tests, draw};
 pub use errors::{OrderErrors, TooManyPairs, draw_surfaces, order_errors};

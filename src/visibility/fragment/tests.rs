@@ -84,13 +84,8 @@ fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
             for (row, order) in &orders {
                 order.order(&solids, &camera, &mut pieces);
                 let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
-                assert_eq!(drawn.depth.ids(), truth.front, "{name} {}", row.name);
-                assert_eq!(
-                    drawn.depth.visible(&canvas),
-                    truth.visible,
-                    "{name} {}",
-                    row.name
-                );
+                assert_eq!(drawn.ids(), truth.front, "{name} {}", row.name);
+                assert_eq!(drawn.visible(&canvas), truth.visible, "{name} {}", row.name);
                 assert!(drawn.tally.passed >= drawn.tally.covered);
             }
         }
@@ -116,13 +111,13 @@ fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
             order.order(&solids, &camera, &mut pieces);
             let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
             assert_eq!(
-                drawn.depth.ids(),
+                drawn.ids(),
                 truth.front,
                 "{} {camera:?} {:?}",
                 row.name,
                 solids.boxes
             );
-            assert_eq!(drawn.depth.visible(&canvas), truth.visible, "{}", row.name);
+            assert_eq!(drawn.visible(&canvas), truth.visible, "{}", row.name);
         }
         let samples: u32 = truth.samples_of.iter().sum();
         let covered = truth.front.iter().filter(|&&id| id != NO_ITEM).count();
@@ -178,7 +173,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
                 pairs += errors.pairs;
                 // The painter's picture, drawn, is wrong where it was said to be.
                 let drawn = draw(&canvas, &solids, pieces.iter().rev(), &Tests::default());
-                let ids = drawn.depth.ids();
+                let ids = drawn.ids();
                 let mut last = vec![NO_ITEM; ids.len()];
                 for piece in pieces.iter().rev() {
                     canvas.fragments(&solids, piece, None, |f| last[f.sample] = f.item);

@@ -2,10 +2,10 @@
 
 use std::cmp::Ordering;
 
-use super::{BackEnd, Builds, Hit, Pick};
+use super::{Hit, Pick};
 use crate::query::ItemId;
+use crate::visibility::Ray;
 use crate::visibility::truth::{Along, Bodies, Body, BodyIndex};
-use crate::visibility::{Guarantee, Ray};
 
 /// An item and where a ray meets it.
 type Met<B> = (ItemId, <B as Body>::At);
@@ -110,17 +110,6 @@ impl<B: Body> Pick for BodyIndex<B> {
         nearest::<B>(&self.probe(ray), met, count, hits);
     }
 }
-
-/// The row of the reference.
-pub const LINEAR: BackEnd = BackEnd {
-    name: "linear",
-    summary: "every box or triangle, in exact arithmetic: the reference",
-    guarantee: Guarantee::Exact,
-    build: Builds {
-        boxes: |boxes, _| Ok(Box::new(Linear(boxes.clone()))),
-        facets: |facets, _| Ok(Box::new(Linear(facets.clone()))),
-    },
-};
 
 /// All bodies, item by item.
 #[derive(Clone, Debug)]

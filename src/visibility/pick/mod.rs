@@ -14,7 +14,7 @@ use crate::geometry::ConvexVolume;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::truth::{Boxes, Facets};
-use crate::visibility::{Ray, Rays, Row};
+use crate::visibility::{Guarantee, Ray, Rays, Row};
 
 pub use exactly::Linear;
 pub use wide_ray::WideRay;
@@ -23,7 +23,25 @@ pub use wide_ray::WideRay;
 mod tests;
 
 /// All back ends, the reference first.
-pub const BACK_ENDS: &[BackEnd] = &[exactly::LINEAR, wide_ray::ROW, obvhs::ROW];
+pub const BACK_ENDS: &[BackEnd] = rows! { BackEnd { name, guarantee, summary, build }
+    "linear", Guarantee::Exact, "every box or triangle, in exact arithmetic: the reference",
+        Builds {
+            boxes: |boxes, _| Ok(Box::new(Linear(boxes.clone()))),
+            facets: |facets, _| Ok(Box::new(Linear(facets.clone()))),
+        };
+    "wide-ray", Guarantee::Exact,
+        "16-wide tree, sixteen slab tests at once, the last step exact",
+        Builds {
+            boxes: |boxes, kernel| Ok(Box::new(WideRay::of(boxes, kernel)?)),
+            facets: |facets, kernel| Ok(Box::new(WideRay::of(facets, kernel)?)),
+        };
+    // Rays, nodes and boxes are rounded to f32.
+    obvhs::NAME, Guarantee::Unproven, "crate obvhs, eight-wide quantised tree, its ray_traverse",
+        Builds {
+            boxes: |boxes, _| obvhs::Obvhs::boxed(boxes),
+            facets: |facets, _| obvhs::Obvhs::boxed(facets),
+        };
+};
 
 /// An item that a ray meets, and where.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -68,7 +86,7 @@ pub type Build<Bodies> = fn(&Bodies, Kernel) -> Result<Box<dyn Pick>, NotBuilt>;
 
 /// A row of the table of back ends.
 ///
-/// [Exact](crate::visibility::Guarantee::Exact) answers are those of exact arithmetic, ties
+/// [Exact](Guarantee::Exact) answers are those of exact arithmetic, ties
 /// included.
 pub type BackEnd = Row<Builds>;
 

@@ -13,12 +13,12 @@ use ::obvhs::triangle::Triangle;
 use glam::{DVec3, Vec3};
 
 use super::exactly::kept;
-use super::{BackEnd, Builds, Hit, NotBuilt, Pick};
+use super::{Hit, NotBuilt, Pick};
 use crate::geometry::Aabb;
 use crate::index::{caught, ploc, scale_for};
 use crate::query::ItemId;
+use crate::visibility::Ray;
 use crate::visibility::truth::{Bodies, Body, Facet, SolidBox};
-use crate::visibility::{Guarantee, Ray};
 
 /// Least component of a direction that is divided by.
 const LEAST: f32 = 1e-20;
@@ -92,7 +92,7 @@ impl RoundedRay {
 }
 
 /// A body as a leaf of the crate's trees holds it.
-pub(super) trait Primitive: Body {
+pub trait Primitive: Body {
     /// The body in f32.
     type Rounded: Send + Sync;
 
@@ -145,17 +145,8 @@ impl Primitive for Facet {
     }
 }
 
-/// The row of the eight-wide tree.
-pub const ROW: BackEnd = BackEnd {
-    name: "obvhs-cwbvh",
-    summary: "crate obvhs, eight-wide quantised tree, its ray_traverse",
-    // Rays, nodes and boxes are rounded to f32.
-    guarantee: Guarantee::Unproven,
-    build: Builds {
-        boxes: |boxes, _| Obvhs::boxed(boxes),
-        facets: |facets, _| Obvhs::boxed(facets),
-    },
-};
+/// Name of the row of the eight-wide tree.
+pub const NAME: &str = "obvhs-cwbvh";
 
 /// Most levels of a binary tree to be converted: the conversion recurses per level.
 const MOST_BINARY: usize = 500;
@@ -163,7 +154,7 @@ const MOST_BINARY: usize = 500;
 const MOST_WIDE: usize = 32;
 
 fn refuse_deep(levels: usize, most: usize) -> Result<(), NotBuilt> {
-    let name = ROW.name;
+    let name = NAME;
     match levels > most {
         true => Err(NotBuilt(format!(
             "the tree of '{name}' has {levels} levels; expected at most {most}"
@@ -197,7 +188,7 @@ fn levels_of(nodes: usize, children: impl Fn(usize) -> Range<usize>) -> usize {
 }
 
 /// A tree of the crate over bodies.
-struct Obvhs<B: Primitive> {
+pub struct Obvhs<B: Primitive> {
     tree: CwBvh,
     /// In the order of the tree's primitives.
     bodies: Vec<B::Rounded>,
@@ -208,7 +199,7 @@ struct Obvhs<B: Primitive> {
 
 impl<B: Primitive> Obvhs<B> {
     /// Builds the tree; a panic of the crate is an error.
-    fn boxed(all: &Bodies<B>) -> Result<Box<dyn Pick>, NotBuilt> {
+    pub fn boxed(all: &Bodies<B>) -> Result<Box<dyn Pick>, NotBuilt> {
         let about = About::of(all.origin, &all.bounds);
         let boxes: Vec<Aabb> = all.bounds.iter().map(|b| about.scaled(b)).collect();
         let build = || {
@@ -220,7 +211,7 @@ impl<B: Primitive> Obvhs<B> {
             });
             widened(&binary, levels)
         };
-        let panicked = |message: String| Err(NotBuilt::panicked(ROW.name, &message));
+        let panicked = |message: String| Err(NotBuilt::panicked(NAME, &message));
         let tree = caught(build).unwrap_or_else(panicked)?;
         let order = tree.primitive_indices.iter().map(|&place| place as usize);
         Ok(Box::new(Obvhs::<B> {

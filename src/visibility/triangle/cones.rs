@@ -30,11 +30,10 @@ use glam::{DVec3, Vec3};
 
 use super::clusters::Clusters;
 use super::exact::{Eye, faces, normal};
-use super::{Selection, TriangleCull, TriangleRow};
+use super::{Selection, TriangleCull};
 use crate::arithmetic::rounding::round_up;
 use crate::geometry::Aabb;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
-use crate::visibility::Guarantee;
 
 /// Slack of the sine for the rounding of the test: see above.
 const SLACK: f64 = 10.0 / (1u64 << 24) as f64;
@@ -167,22 +166,6 @@ impl Prepared {
         })
     }
 }
-
-/// The row of one cone per cluster.
-pub const ROW: TriangleRow = TriangleRow {
-    name: "cone-f32-safe",
-    summary: "One normal cone per cluster, sixteen at a time, rounding proven; 28 B",
-    guarantee: Guarantee::Conservative,
-    build: |clusters| Box::new(SafeCones::of(clusters)),
-};
-
-/// The row of four cones per cluster.
-pub const ROW_SEVERAL: TriangleRow = TriangleRow {
-    name: "several-cones",
-    summary: "Four cones per cluster, each of triangles of similar orientation, rounding proven",
-    guarantee: Guarantee::Conservative,
-    build: |clusters| Box::new(Cones::<4>::of(clusters)),
-};
 
 /// Rounds of moving triangles to the nearest of the directions.
 const ROUNDS: usize = 8;

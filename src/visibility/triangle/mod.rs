@@ -10,14 +10,24 @@ mod per_triangle;
 use std::sync::Arc;
 
 use crate::kernel::{Kernel, LANES};
-use crate::visibility::Row;
+use crate::visibility::{Guarantee, Row};
 
 pub use clusters::{Clusters, MOST_TRIANGLES};
 pub use cones::{Cone, Cones, SafeCones};
 pub use exact::{Eye, faces, normal};
 
 /// All back ends of this stage.
-pub const TRIANGLE_ROWS: &[TriangleRow] = &[per_triangle::ROW, cones::ROW, cones::ROW_SEVERAL];
+pub const TRIANGLE_ROWS: &[TriangleRow] = rows! { TriangleRow { name, guarantee, summary, build }
+    "per-triangle", Guarantee::Exact,
+        "The side of each triangle's plane, exactly (f32, f64, then expansions)",
+        |clusters| Box::new(per_triangle::PerTriangle::of(clusters));
+    "cone-f32-safe", Guarantee::Conservative,
+        "One normal cone per cluster, sixteen at a time, rounding proven; 28 B",
+        |clusters| Box::new(SafeCones::of(clusters));
+    "several-cones", Guarantee::Conservative,
+        "Four cones per cluster, each of triangles of similar orientation, rounding proven",
+        |clusters| Box::new(Cones::<4>::of(clusters));
+};
 
 #[cfg(test)]
 mod tests;

@@ -13,18 +13,9 @@ use glam::{DVec3, Vec3};
 
 use super::clusters::Clusters;
 use super::exact::{Eye, normal};
-use super::{Selection, TriangleCull, TriangleRow, facing};
+use super::{Selection, TriangleCull, facing};
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
-use crate::visibility::Guarantee;
-
-/// The row of this file.
-pub const ROW: TriangleRow = TriangleRow {
-    name: "per-triangle",
-    summary: "The side of each triangle's plane, exactly (f32, f64, then expansions)",
-    guarantee: Guarantee::Exact,
-    build: |clusters| Box::new(PerTriangle::of(clusters)),
-};
 
 /// Error per unit of the way: see above.
 const ERROR: f32 = 8.0 / (1u32 << 24) as f32;
@@ -50,7 +41,7 @@ impl Planes {
     };
 }
 
-struct PerTriangle {
+pub struct PerTriangle {
     clusters: Arc<Clusters>,
     /// First planes of each cluster; one more at the end. A two-sided cluster has none.
     starts: Vec<u32>,
@@ -61,7 +52,7 @@ struct PerTriangle {
 
 impl PerTriangle {
     /// O(t).
-    fn of(clusters: &Arc<Clusters>) -> PerTriangle {
+    pub fn of(clusters: &Arc<Clusters>) -> PerTriangle {
         let (mut starts, mut planes) = (vec![0], Vec::new());
         for cluster in 0..clusters.len() {
             let first = planes.len();

@@ -28,8 +28,8 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
         let opaque =
             |body: &SolidBox, probe: &_, at: &_| surfaces.opaque(body.item, &body.b, probe, at);
         let truth = SampleTruth::of_opaque(&index, &opaque, &rays, GRID, 1);
-        assert_eq!(drawn.depth.visible(&canvas), truth.visible);
-        let (ids, solid) = (drawn.depth.ids(), solid.depth.ids());
+        assert_eq!(drawn.visible(&canvas), truth.visible);
+        let (ids, solid) = (drawn.ids(), solid.ids());
         assert_eq!(ids, truth.front);
         for (sample, &id) in ids.iter().enumerate() {
             let probe = canvas.probe(sample);
@@ -78,7 +78,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     let walls = draw(&canvas, &solids, room, &Tests::default());
     let portal = wall([-1.0, 1.0], [0.0, 2.0]);
     let portal = WorldBox::new(portal.min, DVec3::new(10.0, portal.max.y, portal.max.z));
-    let stencil = walls.depth.stencil(&canvas, &[portal]);
+    let stencil = walls.stencil(&canvas, &[portal]);
     assert!((5..400).contains(&stencil.count()), "{}", stencil.count());
     let tests = Tests {
         stencil: Some(&stencil),
@@ -90,7 +90,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     );
     let mut behind = 0;
     for sample in 0..GRID.samples() {
-        let (masked, open) = (masked.depth.front(sample), open.depth.front(sample));
+        let (masked, open) = (masked.front(sample), open.front(sample));
         assert_eq!(masked, open.filter(|_| stencil.holds(sample)));
         // Marked is what sees the portal, and no wall or pillar before it.
         let ray = canvas.probe(sample).ray();
@@ -135,14 +135,14 @@ fn a_mirror_shows_reflected_boxes_behind_its_plane() {
         let canvas = Canvas::of(&Rays::of(&Camera { frame, lens }).unwrap(), GRID);
         let mut mirror = WorldBox::new(DVec3::splat(-9.0), DVec3::splat(9.0));
         (mirror.min[axis], mirror.max[axis]) = (at, at);
-        let nothing = DepthBuffer::new(GRID.samples());
+        let nothing = Drawn::new(GRID.samples());
         let stencil = nothing.stencil(&canvas, &[mirror]);
         let tests = Tests {
             stencil: Some(&stencil),
             surfaces: None,
         };
         let drawn = draw(&canvas.mirrored(axis, at), &solids, &all(&solids), &tests);
-        for (sample, &id) in drawn.depth.ids().iter().enumerate() {
+        for (sample, &id) in drawn.ids().iter().enumerate() {
             let probe = canvas.probe(sample);
             let plane = (at - eye[axis]) / probe.ray().direction[axis];
             let beyond = Ray {

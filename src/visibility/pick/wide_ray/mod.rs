@@ -11,27 +11,16 @@ use std::hint::black_box;
 
 use glam::DVec3;
 
+use super::NotBuilt;
 use super::wide_ray::slabs::{Rows, Slabs};
-use super::{BackEnd, Builds, NotBuilt};
 use crate::geometry::Aabb;
 use crate::index::Record;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask};
 use crate::query::ItemId;
+use crate::visibility::Ray;
 use crate::visibility::sah::{Part, halve};
-use crate::visibility::{Guarantee, Ray};
 
 pub use super::wide_ray::bodies::WideRay;
-
-/// The row of this folder.
-pub const ROW: BackEnd = BackEnd {
-    name: "wide-ray",
-    summary: "16-wide tree, sixteen slab tests at once, the last step exact",
-    guarantee: Guarantee::Exact,
-    build: Builds {
-        boxes: |boxes, kernel| Ok(Box::new(WideRay::of(boxes, kernel)?)),
-        facets: |facets, kernel| Ok(Box::new(WideRay::of(facets, kernel)?)),
-    },
-};
 
 /// The nodes, some 45 bytes of them a box.
 #[derive(Clone, Debug)]
