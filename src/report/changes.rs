@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, WORK, work_changes};
-use super::matching::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
+use super::ranking::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
 use super::{Report, ReportCell};
 use crate::measure::{CellKey, GroupKey, Machine, Status, Toolchain};
 use crate::shown::number;

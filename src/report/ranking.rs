@@ -1,9 +1,13 @@
-//! Reading a report: groups of cells with the same question, in the order of
-//! their ranks. Ranks are the run's own; nothing here decides a tie.
+//! Cells of reports that belong together.
+//!
+//! Groups of cells with the same question, in the order of their ranks, which are the
+//! run's own; structures over several groups; cells of two reports with the same key.
 
-use super::matching::grouped;
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::{Report, ReportCell};
 use crate::measure::{Judged, Metric, Status, YARDSTICK};
+use crate::statistics::geometric_mean;
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
@@ -143,6 +147,177 @@ impl<'r> Comparison<'r> {
 /// times as fast the cell is.
 pub fn times_as_fast(base: &ReportCell, cell: &ReportCell) -> Option<f64> {
     Some(base.time()?.value / cell.time()?.value)
+}
+
+/// Values by their key, both in the order in which they come.
+pub(super) fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> Vec<(K, Vec<V>)> {
+    let mut groups: Vec<(K, Vec<V>)> = Vec::new();
+    for (key, value) in pairs {
+        match groups.iter_mut().find(|group| group.0 == key) {
+            Some(group) => group.1.push(value),
+            None => groups.push((key, vec![value])),
+        }
+    }
+    groups
+}
+
+/// Group, structure, and number of cells before it that have both.
+/// A report that holds a cell twice loses none of them.
+type Numbered<'r> = (String, &'r str, usize);
+
+fn keyed(cells: &[ReportCell]) -> Vec<(Numbered<'_>, &ReportCell)> {
+    let mut seen = BTreeMap::new();
+    let keys = cells.iter().map(|cell| {
+        let key = (cell.key().group.id(), cell.structure.as_str());
+        let before = seen.entry(key.clone()).or_insert(0);
+        *before += 1;
+        ((key.0, key.1, *before), cell)
+    });
+    keys.collect()
+}
+
+/// A cell in both reports.
+pub(super) type Pair<'r> = (&'r ReportCell, &'r ReportCell);
+
+/// Cells of the same name, and those that only one side has, in their order.
+pub(super) struct Matched<'r> {
+    pub pairs: Vec<Pair<'r>>,
+    pub only_old: Vec<&'r ReportCell>,
+    pub only_new: Vec<&'r ReportCell>,
+}
+
+pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Matched<'r> {
+    let (old, new) = (keyed(old), keyed(new));
+    let known: BTreeSet<Numbered> = old.iter().map(|(key, _)| key.clone()).collect();
+    let partners: BTreeMap<Numbered, &ReportCell> = new.iter().cloned().collect();
+    let (mut pairs, mut only_old) = (Vec::new(), Vec::new());
+    for (key, cell) in old {
+        match partners.get(&key) {
+            Some(partner) => pairs.push((cell, *partner)),
+            None => only_old.push(cell),
+        }
+    }
+    let only_new = new.into_iter().filter(|(key, _)| !known.contains(key));
+    Matched {
+        pairs,
+        only_old,
+        only_new: only_new.map(|(_, cell)| cell).collect(),
+    }
+}
+
+/// Why the two cells are not the same question, if they are not.
+pub(super) fn asked_otherwise((old, new): Pair) -> Option<String> {
+    let digests = |what: &str, old: &str, new: &str| {
+        let short = |digest: &str| digest.chars().take(8).collect::<String>();
+        (old != new).then(|| format!("{what}: digest {} and {}", short(old), short(new)))
+    };
+    if let Some(reason) = digests("other items", &old.scene.digest, &new.scene.digest) {
+        return Some(reason);
+    }
+    let cameras = (old.path.camera_count, new.path.camera_count);
+    if cameras.0 != cameras.1 {
+        return Some(format!("{} cameras and {}", cameras.0, cameras.1));
+    }
+    // A report may not know its cameras.
+    let (was, is) = (old.path.digest.as_ref(), new.path.digest.as_ref());
+    was.zip(is)
+        .and_then(|(was, is)| digests("other cameras", was, is))
+}
+
+/// Why the times are not of the same work, if they are not: the mean over other
+/// cameras, or of shorter batches, is another figure.
+pub(super) fn timed_otherwise((old, new): Pair) -> Option<String> {
+    let (was, is) = (&old.times, &new.times);
+    if was.cameras_timed != is.cameras_timed {
+        let (was, is) = (was.cameras_timed, is.cameras_timed);
+        return Some(format!("{was} cameras timed and {is}"));
+    }
+    (was.batch != is.batch).then(|| format!("batches of {} and {} queries", was.batch, is.batch))
+}
+
+/// The structures of several comparisons.
+pub struct Overall<'r> {
+    /// Structure that speed-ups refer to: `linear`; where it has no times, the slowest
+    /// of those that have times everywhere.
+    pub base: Option<&'r str>,
+    /// Those with times everywhere, fastest first; the others behind them.
+    pub standings: Vec<Mean<'r>>,
+}
+
+/// One structure over several comparisons.
+pub struct Mean<'r> {
+    /// Its label.
+    pub structure: &'r str,
+    /// Geometric mean of its speed-ups vs the base; `None` if a time is missing.
+    pub speedup: Option<f64>,
+    /// Comparisons in which it has the first rank, alone or not.
+    pub first_in: usize,
+    /// Half the 95 % interval of the logarithm of its mean time; 0 without intervals.
+    margin: f64,
+}
+
+impl Mean<'_> {
+    /// True if the geometric means are not told apart. Conservative: the times of two
+    /// structures are paired, which this leaves unused.
+    pub fn ties_with(&self, other: &Mean) -> bool {
+        let ratio = self.speedup.zip(other.speedup).map(|(a, b)| (a / b).ln());
+        ratio.is_some_and(|ratio| ratio.abs() <= self.margin.hypot(other.margin))
+    }
+}
+
+impl<'r> Overall<'r> {
+    /// The structures of `all`, of which those without ranks count nothing.
+    pub fn of(all: &[&Comparison<'r>]) -> Overall<'r> {
+        let ranked = || all.iter().filter(|c| c.winners().next().is_some());
+        let mut names: Vec<&'r str> = Vec::new();
+        for structure in all
+            .iter()
+            .flat_map(|c| &c.ranked)
+            .map(|r| r.cell.structure.as_str())
+        {
+            if !names.contains(&structure) {
+                names.push(structure);
+            }
+        }
+        let cells = |name: &str| -> Option<Vec<&'r ReportCell>> {
+            ranked().map(|c| c.sound_cell(name)).collect()
+        };
+        let mean = |name: &str| {
+            let times = cells(name)?
+                .into_iter()
+                .map(|cell| Some(cell.time()?.value));
+            geometric_mean(&times.collect::<Option<Vec<f64>>>()?)
+        };
+        let timed = || names.iter().copied().filter_map(|n| Some((n, mean(n)?)));
+        let base = timed().find(|(name, _)| *name == YARDSTICK);
+        let base = base.or_else(|| timed().max_by(|a, b| a.1.total_cmp(&b.1)));
+        let standing = |&structure: &&'r str| Mean {
+            structure,
+            speedup: base.zip(mean(structure)).map(|(base, mean)| base.1 / mean),
+            first_in: ranked()
+                .filter(|c| c.winners().any(|cell| cell.structure == structure))
+                .count(),
+            margin: cells(structure).map_or(0.0, |cells| margin(&cells)),
+        };
+        let mut standings: Vec<Mean> = names.iter().map(standing).collect();
+        let speed = |standing: &Mean| standing.speedup.unwrap_or(0.0);
+        standings.sort_by(|a, b| speed(b).total_cmp(&speed(a)));
+        Overall {
+            base: base.map(|(name, _)| name),
+            standings,
+        }
+    }
+}
+
+/// Half the interval of the mean logarithm of independent times.
+fn margin(cells: &[&ReportCell]) -> f64 {
+    let halves = cells.iter().map(|cell| {
+        let time = cell.time();
+        let ends = time.and_then(|time| Some((time.lower?, time.upper?)));
+        ends.map_or(0.0, |(lower, upper)| (upper / lower).ln() / 2.0)
+    });
+    let squares: f64 = halves.map(|half| half * half).sum();
+    squares.sqrt() / cells.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! and the share of them that is visible, and from which size on a structure is
 //! faster than the linear scan. Read off a report; nothing is measured.
 
-use super::matching::grouped;
+use super::ranking::grouped;
 use super::{Comparison, Report, ReportCell};
 use crate::measure::{Status, YARDSTICK};
 use crate::statistics::{Estimate, slope};

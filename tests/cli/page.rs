@@ -132,8 +132,8 @@ fn what_failed_is_on_the_page_with_its_reason_and_has_no_mark() {
     assert!(page.contains("<p>wide: wrong: item 3 &lt;is&gt; missing</p>"));
     assert!(page.contains("Not ok, of 3 cells: 1 wrong."));
     assert_eq!(page.matches("<polygon class=\"mark").count(), 2);
-    assert!(page.contains("Speed-up over "));
-    assert!(!page.contains("Speed-up over linear"));
+    assert!(page.contains("Speed-ups over "));
+    assert!(!page.contains("Speed-ups over linear"));
 }
 
 #[test]

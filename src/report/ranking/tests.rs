@@ -68,3 +68,116 @@ fn ranks_are_the_runs_own_and_what_failed_has_none() {
     assert!(failed.fastest_peer().is_none() && failed.winners().next().is_none());
     assert_eq!(times_as_fast(peer, &cells[1]), Some(104.0 / 100.0));
 }
+
+#[test]
+fn cells_are_matched_by_their_whole_name_each_once() {
+    let one = cell("s", 10, "p", "a", 1.0);
+    let changed = |change: fn(&mut ReportCell)| {
+        let mut other = one.clone();
+        change(&mut other);
+        let matched = matched(std::slice::from_ref(&one), std::slice::from_ref(&other));
+        let counts = (matched.only_old.len(), matched.only_new.len());
+        (matched.pairs.len(), counts)
+    };
+    for change in [
+        (|c| c.scene.name.push('x')) as fn(&mut ReportCell),
+        |c| c.path.name.push('x'),
+        |c| c.path.cache.push('x'),
+        |c| c.path.arithmetic.push('x'),
+        |c| c.path.planes.push('x'),
+        |c| c.path.epsilon = 0.0,
+        |c| c.test.push('x'),
+        |c| c.structure.push('x'),
+    ] {
+        assert_eq!(changed(change), (0, (1, 1)));
+    }
+    // What was measured and found is no part of the name.
+    assert_eq!(changed(|c| c.scene.digest.push('x')), (1, (0, 0)));
+    let (old, new) = (vec![one.clone(); 3], vec![one.clone(); 2]);
+    let some = matched(&old, &new);
+    assert_eq!((some.pairs.len(), some.only_old.len()), (2, 1));
+    assert!(some.only_new.is_empty());
+}
+
+/// Two paths with times of each structure, ranked by them.
+fn cells(rows: &[(&str, [f64; 2])]) -> Vec<ReportCell> {
+    let of_path = |path: usize| {
+        let of_row = move |row: &(&str, [f64; 2])| {
+            let mut cell = cell("s", 10, ["p", "q"][path], row.0, row.1[path]);
+            let faster = rows.iter().filter(|other| other.1[path] < row.1[path]);
+            cell.rank = Some(1 + faster.count());
+            cell
+        };
+        rows.iter().map(of_row).collect::<Vec<_>>()
+    };
+    [of_path(0), of_path(1)].concat()
+}
+
+fn overall(cells: &[ReportCell], look: impl Fn(&Overall)) {
+    let paths = cells.chunks(cells.len() / 2).map(|cells| Comparison {
+        ranked: cells
+            .iter()
+            .map(|cell| Ranked {
+                rank: cell.rank,
+                cell,
+            })
+            .collect(),
+        bounds: Vec::new(),
+    });
+    let paths: Vec<Comparison> = paths.collect();
+    look(&Overall::of(&paths.iter().collect::<Vec<_>>()));
+}
+
+#[test]
+fn means_are_geometric_and_refer_to_linear_or_else_to_the_slowest() {
+    let rows = [
+        ("linear", [800.0, 200.0]),
+        ("slow", [1600.0, 1600.0]),
+        ("bvh", [100.0, 100.0]),
+    ];
+    let told = |overall: &Overall| {
+        let standings = overall.standings.iter();
+        let told = standings.map(|s| (s.structure.to_owned(), s.speedup, s.first_in));
+        told.collect::<Vec<_>>()
+    };
+    let near = |found: Option<f64>, wanted: f64| (found.unwrap() / wanted - 1.0).abs() < 1e-12;
+    overall(&cells(&rows), |overall| {
+        assert_eq!(overall.base, Some("linear"));
+        let [bvh, linear, slow] = &told(overall)[..] else {
+            panic!("three structures");
+        };
+        assert_eq!((bvh.0.as_str(), bvh.2), ("bvh", 2));
+        assert!(near(bvh.1, 4.0) && near(linear.1, 1.0) && near(slow.1, 0.25));
+    });
+    // A wrong answer of linear: it counts nowhere, and is still named.
+    let mut failed = cells(&rows);
+    failed[0].rank = None;
+    overall(&failed, |overall| {
+        assert_eq!(overall.base, Some("slow"));
+        let told = told(overall);
+        assert!(near(told[0].1, 16.0));
+        assert_eq!((told[2].0.as_str(), told[2].1), ("linear", None));
+    });
+}
+
+#[test]
+fn means_within_their_intervals_tie() {
+    let mut cells = cells(&[("linear", [400.0; 2]), ("a", [100.0; 2]), ("b", [103.0; 2])]);
+    let ties = |cells: &[ReportCell], wanted: [bool; 2]| {
+        overall(cells, |overall| {
+            let [a, b, linear] = &overall.standings[..] else {
+                panic!("three structures");
+            };
+            assert_eq!([a.ties_with(b), a.ties_with(linear)], wanted);
+        });
+    };
+    ties(&cells, [false, false]);
+    for cell in &mut cells {
+        if let Some(time) = cell.metrics.get_mut("query_ns") {
+            time.lower = Some(time.value / 1.05);
+            time.upper = Some(time.value * 1.05);
+        }
+    }
+    // Over two paths, 5 % of each of two structures are 5 % of the ratio.
+    ties(&cells, [true, false]);
+}
