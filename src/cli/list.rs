@@ -56,7 +56,7 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
 
 /// Condition under which a run times a structure.
 fn timed(info: &Info) -> &'static str {
-    if info.textbook {
+    if info.on_request {
         "if named"
     } else {
         "by default"

@@ -182,7 +182,9 @@ fn shown(report: &Report, all_columns: bool, width: usize) -> String {
             _ => blocks.extend(run_table::of_many(&group, &overall, width)),
         }
         blocks.push(Block::line(""));
-        blocks.extend(run_table::reasons(&group).into_iter().map(Block::Line));
+        let notes = run_table::reasons(&group).into_iter();
+        let notes = notes.chain(run_table::choices(&group));
+        blocks.extend(notes.map(Block::Line));
         blocks.push(Block::Line(run_table::conclusion(&group, &overall)));
     }
     // A world of one size has its ranked tables; that is the surface.

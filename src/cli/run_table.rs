@@ -314,16 +314,28 @@ fn short_count(typed: &str) -> String {
 
 /// Reasons why cells are not ok, each once with the number of its paths.
 pub fn reasons(group: &[&Comparison]) -> Vec<String> {
+    notes(group, |cell| {
+        let reason = cell.reason.as_ref()?;
+        Some(format!("{}: {reason}", cell.status.name()))
+    })
+}
+
+/// Choices of structures, each once with the number of its paths.
+pub fn choices(group: &[&Comparison]) -> Vec<String> {
+    notes(group, |cell| cell.chose.clone())
+}
+
+fn notes(group: &[&Comparison], of: impl Fn(&ReportCell) -> Option<String>) -> Vec<String> {
     let mut found: Vec<(String, usize)> = Vec::new();
     let ranked = group
         .iter()
         .flat_map(|c| c.ranked.iter().map(|ranked| ranked.cell));
     let bounds = group.iter().flat_map(|c| c.bounds.iter().copied());
     for cell in ranked.chain(bounds) {
-        let Some(reason) = &cell.reason else {
+        let Some(note) = of(cell) else {
             continue;
         };
-        let line = format!("{}: {}: {reason}", cell.structure, cell.status.name());
+        let line = format!("{}: {note}", cell.structure);
         match found.iter_mut().find(|(known, _)| *known == line) {
             Some((_, count)) => *count += 1,
             None => found.push((line, 1)),

@@ -59,8 +59,8 @@ pub struct WhatArgs {
     /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
     #[arg(long, visible_alias = "cameras", value_name = "PATH")]
     pub path: Vec<String>,
-    /// Structures, e.g. linear,bvh:leaf=4, or all, or default (all but the textbook
-    /// forms); may be repeated [default: all for the suites standard and full, else
+    /// Structures, e.g. linear,bvh:leaf=4, or all, or default (all but auto and
+    /// the textbook forms); may be repeated [default: all for the suites standard and full, else
     /// default; compare --against: the trees, linear and wide]
     #[arg(long, value_name = "LIST")]
     pub structure: Vec<String>,

@@ -217,6 +217,11 @@ pub trait RegionIndex: Sized + Send + Sync {
         false
     }
 
+    /// The choice of a structure that chooses, and what it left out, in a phrase.
+    fn chose(&self) -> Option<String> {
+        None
+    }
+
     /// Cells of the structure in depth-first order, for `cullbench scene draw`.
     ///
     /// None from a structure without nested cells. A query with a volume of planes must

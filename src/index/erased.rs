@@ -117,6 +117,10 @@ pub trait DynIndex: Send + Sync {
     fn cells(&self) -> Vec<TreeCell<'_>> {
         Vec::new()
     }
+    /// See [`RegionIndex::chose`].
+    fn chose(&self) -> Option<String> {
+        None
+    }
     /// See [`RegionIndex::refit`].
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool;
 
@@ -182,6 +186,10 @@ impl<T: RegionIndex> DynIndex for WithKernel<T> {
 
     fn cells(&self) -> Vec<TreeCell<'_>> {
         self.index.cells()
+    }
+
+    fn chose(&self) -> Option<String> {
+        self.index.chose()
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {

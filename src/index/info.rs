@@ -26,9 +26,9 @@ pub struct Info {
     pub origin: Origin<&'static str>,
     /// Capabilities beyond the contract.
     pub capabilities: Capabilities,
-    /// The form that lectures show, for comparison: timed if named, or with `all`, and
-    /// not part of the list `default`.
-    pub textbook: bool,
+    /// Timed if named, or with `all`, and not part of the list `default`: a form for
+    /// comparison, or one that is always another of the list.
+    pub on_request: bool,
 }
 
 named! {
@@ -104,7 +104,7 @@ impl Info {
                 ranges: false,
                 threaded_build: false,
             },
-            textbook: false,
+            on_request: false,
         }
     }
 
@@ -126,9 +126,9 @@ impl Info {
         self
     }
 
-    /// Declares [`Info::textbook`].
-    pub const fn textbook(mut self) -> Info {
-        self.textbook = true;
+    /// Declares [`Info::on_request`].
+    pub const fn on_request(mut self) -> Info {
+        self.on_request = true;
         self
     }
 

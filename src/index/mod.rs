@@ -8,7 +8,7 @@
 //! | `registry`, `erased` | a row per structure; the same structures without their types |
 //! | `cells` | nested cells of a structure, for pictures |
 //! | `linear`, `grid` | the two scans, the uniform grid |
-//! | `wide/` | the 16-ary implicit tree; a pair of them for items that move |
+//! | `wide/` | the 16-ary implicit tree; a pair of them for items that move; `auto` |
 //! | `tree/` | the packed tree of `bvh`, `bsp`, `octree` and `quadtree`, with its queries |
 //! | `build/` | a builder of packed trees per file: `bvh`, `bsp`, `cells` (octree, quadtree) |
 //! | `textbook/`, `peers/` | plain forms for comparison; structures of other crates |
@@ -60,4 +60,4 @@ pub use registry::{Registry, Row, StructureSpec};
 pub use shared_query::QueryThreads;
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
 pub use tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
-pub use wide::{BlockOrder, Moving, Trace, Wide, WideParams};
+pub use wide::{Auto, AutoParams, BlockOrder, Moving, Trace, Wide, WideParams};

@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 #[cfg(feature = "peers")]
 use super::peers;
 use super::{
-    Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, DynIndex, Execution, Info, Input, Linear,
+    Auto, Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, DynIndex, Execution, Info, Input, Linear,
     LinearScalar, Moving, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex,
     UniformGrid, UpdatePolicy, Wide, WithKernel, caught,
 };
@@ -22,7 +22,7 @@ use crate::threads::Pool;
 
 /// Name in a list that stands for all structures.
 const ALL: &str = "all";
-/// Name in a list that stands for all structures but the textbook forms.
+/// Name in a list that stands for all but those [on request](Info::on_request).
 const DEFAULT: &str = "default";
 
 /// A build without the structure's type; parameters are JSON.
@@ -121,6 +121,7 @@ impl Registry {
             .with::<Bvh>()
             .with::<Wide>()
             .with::<Moving>()
+            .with::<Auto>()
             .with::<UniformGrid>()
             .with::<BspTextbook>()
             .with::<OctreeTextbook>()
@@ -227,7 +228,7 @@ impl Registry {
     }
 
     /// The structures of a comma-separated list, in which `all` are all of them and
-    /// `default` those that are no textbook form ([`Info::textbook`]).
+    /// `default` those that are not [on request](Info::on_request).
     ///
     /// # Errors
     /// As [`Registry::structure`]; an empty list, a structure named twice.
@@ -236,7 +237,7 @@ impl Registry {
         for text in Spec::split_list(list) {
             let more = match text.as_str() {
                 ALL => self.specs(|_| true)?,
-                DEFAULT => self.specs(|info| !info.textbook)?,
+                DEFAULT => self.specs(|info| !info.on_request)?,
                 _ => vec![self.structure(&text)?],
             };
             for spec in more {
@@ -362,8 +363,8 @@ mod tests {
         let all = registry.structures("all").unwrap();
         assert_eq!(all.len(), registry.rows().len());
         let named = registry.structures("default,octree-textbook").unwrap();
-        assert_eq!(named.iter().filter(|s| s.info().textbook).count(), 1);
-        assert_eq!(named.len(), all.len() - 3);
+        assert_eq!(named.iter().filter(|s| s.info().on_request).count(), 1);
+        assert_eq!(named.len(), all.len() - 4);
         let two = registry
             .structures("bvh:leaf=4,preset=medium,linear")
             .unwrap();
@@ -438,7 +439,7 @@ mod tests {
     /// The hint names exactly what the feature brings.
     #[test]
     fn the_names_of_the_peers_are_those_of_their_rows() {
-        let own = 13;
+        let own = 14;
         let peers: Vec<_> = Registry::builtin().rows()[own..]
             .iter()
             .map(|row| row.info.name)

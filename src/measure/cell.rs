@@ -55,6 +55,9 @@ pub struct ReportCell {
     pub left_out: Vec<String>,
     /// Location of the samples of this cell; null without samples.
     pub samples_ref: Option<SamplesRef>,
+    /// Choice of a structure that chooses, and what it left out; absent of any other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chose: Option<String>,
 }
 
 /// The cell's rows in samples.csv: those that have its names.

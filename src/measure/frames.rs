@@ -42,6 +42,7 @@ struct Entry<'a> {
     /// CPU time of one replay in the count pass, ns.
     replay_ns: f64,
     memory_after: Option<u64>,
+    chose: Option<String>,
     /// Ids of fat bounds whose items are not visible.
     false_positives: u64,
     rounds: Vec<Vec<Laps>>,
@@ -82,6 +83,7 @@ fn measure_frames(
             counted: Counted::default(),
             replay_ns: 1.0,
             memory_after: None,
+            chose: None,
             false_positives: 0,
             rounds: Vec::new(),
         };
@@ -188,6 +190,7 @@ impl Entry<'_> {
             }
         }
         self.memory_after = Some(moving.index.memory().total() as u64);
+        self.chose = moving.index.chose();
         self.counted.answers[0] = frames.right.clone();
         self.counted.costs[0] = cost;
         Ok(())
@@ -215,6 +218,7 @@ impl Entry<'_> {
             build_ms: built.map(|b| b.build_ms),
             memory_bytes: built.map(|b| b.memory.total() as u64),
             memory_after_bytes: self.memory_after,
+            chose: self.chose.clone(),
             counts: if is_counted {
                 counted()
             } else {

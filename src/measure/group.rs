@@ -66,6 +66,7 @@ impl Entry<'_> {
             build_ms: built.map(|b| b.build_ms),
             memory_bytes: built.map(|b| b.memory.total() as u64),
             update_ms: built.map(|b| b.update_ms.clone()).unwrap_or_default(),
+            chose: built.and_then(|b| b.items.chose()),
             counts: counted.map_or_else(BTreeMap::new, |c| counts(c, workload.scene.items.len())),
             ..SubjectPart::unknown(&self.subject.spec, self.verdict.clone())
         }

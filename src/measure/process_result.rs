@@ -75,6 +75,9 @@ pub struct SubjectPart {
     pub ageing_ln: BTreeMap<usize, f64>,
     /// Metrics of the count pass, means per query; the first process only.
     pub counts: BTreeMap<String, f64>,
+    /// Choice of a structure that chooses; of a motion in the first process only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chose: Option<String>,
 }
 
 /// Times of one task of a structure or a lower bound in one process.
@@ -143,6 +146,7 @@ impl SubjectPart {
             memory_after_bytes: None,
             ageing_ln: BTreeMap::new(),
             counts: BTreeMap::new(),
+            chose: None,
         }
     }
 }

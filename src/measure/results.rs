@@ -248,6 +248,7 @@ impl<'p> MergedParts<'p> {
             params: subject.params.clone(),
             error: judged,
             left_out,
+            chose: self.subjects(label).find_map(|s| s.chose.clone()),
             ..self.timed(label, verdict, metrics)
         }
     }
@@ -278,6 +279,7 @@ impl<'p> MergedParts<'p> {
             error: None,
             left_out: Vec::new(),
             samples_ref: None,
+            chose: None,
         }
     }
 

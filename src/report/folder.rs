@@ -351,7 +351,7 @@ const SUMMARY_COLUMNS: [Column; 16] = [
 ];
 
 /// Columns of summary.csv behind those of the metrics.
-const INPUT_COLUMNS: [Column; 15] = [
+const INPUT_COLUMNS: [Column; 16] = [
     ("up", |cell| cell.scene.up.clone()),
     ("unit", |cell| text(cell.scene.unit.as_ref())),
     ("fovy_deg_min", |cell| end(cell, |l| l.fovy_deg, 0)),
@@ -372,6 +372,9 @@ const INPUT_COLUMNS: [Column; 15] = [
     ("views_per_frame", |cell| match cell.path.views_per_frame {
         0 => String::new(),
         views => views.to_string(),
+    }),
+    ("chose", |cell| {
+        shown_field(cell.chose.as_deref().unwrap_or_default())
     }),
 ];
 

@@ -123,6 +123,46 @@ fn a_motion_is_an_axis_of_a_run() {
 }
 
 #[test]
+fn what_auto_has_chosen_stands_in_cell_summary_and_notes() {
+    let folder = folder(&[]);
+    let run = "run --scene city:n=300 --path orbit:frames=4 --processes 1 --out r --structure \
+        linear,auto,auto:use=wide,auto:use=linear";
+    let forced = [
+        ("auto:use=wide", "tree, not scan of all items ("),
+        ("auto:use=linear", "scan of all items, not "),
+    ];
+    let check = |options: &str, updates: [&str; 2]| {
+        let line = format!("{run} {options}");
+        let told = unwrapped(&works(folder.path(), &line));
+        let whole = report(&folder.path().join("r"));
+        let chose = |cell: usize| cells(&whole)[cell]["chose"].as_str();
+        assert_eq!(chose(0), None, "linear chooses nothing");
+        assert!(chose(1).is_some_and(|chose| chose.contains(" x)")));
+        for (cell, ((name, wanted), update)) in forced.iter().zip(updates).enumerate() {
+            let chose = chose(2 + cell).expect("a choice");
+            assert!(
+                chose.starts_with(wanted) && chose.contains(update),
+                "{chose}"
+            );
+            assert!(told.contains(&format!("{name}: {chose}")), "{told}");
+        }
+        let summary = fs::read_to_string(folder.path().join("r/summary.csv"));
+        let summary = rows(&summary.expect("summary.csv"));
+        assert_eq!(summary[0]["chose"], "");
+        assert_eq!(Some(summary[1]["chose"].as_str()), chose(1));
+    };
+    check("", ["", ""]);
+    fs::remove_dir_all(folder.path().join("r")).expect("removable");
+    check(
+        "--motion drift:share=50%,frames=6",
+        [
+            "; refit in 6 of 6 updates, not",
+            "; overwritten leaves in 6 of 6 updates, not",
+        ],
+    );
+}
+
+#[test]
 fn a_run_does_not_continue_with_another_motion() {
     let rows = |x: u32| format!("time_s,id,{BOUNDS}\n0,1,{x},0,0,9,1,1\n");
     let folder = folder(&[("motion.csv", rows(1).as_bytes())]);

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 
 use cullbench::culling::Culling;
 use cullbench::geometry::{Aabb, ConvexVolume, Plane};
-use cullbench::index::{Bsp, Bvh, Input, Linear, LinearScalar, Octree, Quadtree};
+use cullbench::index::{Auto, Bsp, Bvh, Input, Linear, LinearScalar, Octree, Quadtree};
 use cullbench::index::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook};
 use cullbench::index::{BuildError, DynIndex, MemoryUsage, Registry, StructureSpec};
 use cullbench::index::{Info, Kind, Moving, RegionIndex, UniformGrid, Wide};
@@ -86,6 +86,7 @@ conforms! {
     bvh: Given<Bvh>;
     wide: Given<Wide>;
     moving: Given<Moving>;
+    auto: Given<Auto>;
     uniform_grid: Given<UniformGrid>;
     bsp_textbook: Given<BspTextbook>;
     octree_textbook: Given<OctreeTextbook>;
@@ -143,6 +144,10 @@ conforms_with! {
     bvh_large_leaves: Bvh = "preset=medium,leaf=255";
     bvh_slowest: Bvh = "preset=very-slow";
     wide_morton: Wide = "order=morton";
+    auto_linear: Auto = "use=linear";
+    auto_wide: Auto = "use=wide";
+    auto_moving: Auto = "use=moving";
+    auto_rebuilt: Auto = "update=rebuild";
     bsp_textbook_deep: BspTextbook = "leaf=1,depth=256";
     octree_textbook_shallow: OctreeTextbook = "leaf=1,depth=3";
     quadtree_textbook_deep: QuadtreeTextbook = "leaf=1,depth=256";
@@ -160,6 +165,7 @@ fn the_suite_has_every_structure_of_the_table() {
         Bvh::INFO.name,
         Wide::INFO.name,
         Moving::INFO.name,
+        Auto::INFO.name,
         UniformGrid::INFO.name,
         BspTextbook::INFO.name,
         OctreeTextbook::INFO.name,

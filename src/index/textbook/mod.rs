@@ -193,7 +193,7 @@ pub struct Textbook<D> {
 }
 
 impl<D: Division> RegionIndex for Textbook<D> {
-    const INFO: Info = Info::new(D::NAME, D::SUMMARY, Kind::Tree, Origin::Ours).textbook();
+    const INFO: Info = Info::new(D::NAME, D::SUMMARY, Kind::Tree, Origin::Ours).on_request();
     type Params = TextbookParams;
 
     fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {

@@ -1,6 +1,7 @@
 //! The wide tree: sixteen children per node, no pointers, one block of 384 bytes
 //! for each node and each leaf. Layout, construction, queries, refit.
 
+mod auto;
 mod block_order;
 mod level_traversal;
 mod levels;
@@ -28,6 +29,7 @@ use crate::kernel::{Isa, prefetch};
 use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
 
+pub use self::auto::{Auto, AutoParams};
 pub use self::block_order::BlockOrder;
 pub use self::memory_bound::Trace;
 pub use self::moving::Moving;
@@ -207,7 +209,7 @@ impl Wide {
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
         let leaves = Layer {
-            balls: seen_by(&self.balls, volume),
+            balls: seen_by(self.balls.as_ref(), volume),
             ..self.layer(0)
         };
         let Scratch {

@@ -40,8 +40,8 @@ const CROWDED: usize = 2 * REGION / LANES;
 /// A tree of resting items and a tree of moving ones; items may come and go.
 #[derive(Default)]
 pub struct Moving {
-    still: Wide,
-    movers: Wide,
+    pub(super) still: Wide,
+    pub(super) movers: Wide,
     /// Blocks of level 1 of the still tree, at least one after the first update.
     regions: Vec<Region>,
     /// Leaves of `movers`. Leaf `r` is the first one of region `r`.
@@ -339,6 +339,7 @@ impl RegionIndex for Moving {
             return false;
         }
         self.prepare(items.len());
+        self.still.balls = None;
         self.now = self.now.wrapping_add(1);
         for (i, &id) in moved.iter().enumerate() {
             match self.positions.ahead(items, moved, i) {

@@ -28,6 +28,7 @@ fn subject(label: &str, build_ms: f64) -> SubjectPart {
         memory_after_bytes: None,
         ageing_ln: BTreeMap::new(),
         counts: BTreeMap::new(),
+        chose: None,
     }
 }
 

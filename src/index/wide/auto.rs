@@ -1,0 +1,425 @@
+//! The structure `auto`: a tree or a scan of its leaves, and how it is updated.
+//!
+//! The build counts the work of a few frusta that look from item to item. Updates are
+//! weighed by what has moved, by the queries between them and by the work that the refitted
+//! tree has come to. All are counts, so every run chooses the same, and no answer depends
+//! on the choice.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+use serde::{Deserialize, Serialize};
+
+use super::{BlockOrder, Moving, WideParams};
+use crate::geometry::{Aabb, ConvexVolume, LANES, Plane};
+use crate::index::linear::{Flat, scan_blocks};
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::kernel::{BASELINE, pairs};
+use crate::query::{Context, Count, ItemId, QueryContext, QueryCost, QueryVolume};
+
+/// Parameters: `auto:use=linear,update=rebuild`.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AutoParams {
+    /// The structure to be: `linear`, `wide` or `moving`; `auto` for the cheapest.
+    #[serde(rename = "use")]
+    pub structure: Use,
+    /// Updates by `refit` or `rebuild`; `auto` for the cheapest.
+    pub update: Update,
+    /// The order of the items: `median` or `morton`.
+    pub order: BlockOrder,
+}
+
+/// Structure that [`Auto`] is to be.
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Use {
+    /// The cheapest of a scan and a tree.
+    #[default]
+    Auto,
+    /// A scan of all items.
+    Linear,
+    /// A tree.
+    Wide,
+    /// A tree of what rests beside a tree of what moves.
+    Moving,
+}
+
+/// Work of [`Auto`] after items have moved.
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Update {
+    /// The cheapest.
+    #[default]
+    Auto,
+    /// New bounds in the same structure.
+    Refit,
+    /// A new structure.
+    Rebuild,
+}
+
+/// Searches by their index in [`Auto::costs`].
+const SEARCHES: [&str; 2] = ["scan of all items", "tree"];
+const SCAN: usize = 0;
+const TREE: usize = 1;
+
+/// Kinds of updates by their index in [`Auto::updates`].
+const UPDATES: [&str; 3] = ["overwritten leaves", "refit", "rebuild"];
+const OVERWRITE: usize = 0;
+const REFIT: usize = 1;
+const REBUILD: usize = 2;
+
+// Times in ns, measured on one processor (AVX-512). Only their ratios choose.
+/// A query, besides what it tests.
+const QUERY_NS: f64 = 51.0;
+/// A tested node, a tested item, an item passed with its subtree; of a tree.
+const TREE_NS: [f64; 3] = [1.65, 0.28, 0.03];
+/// An item of a scan, in the nearest cache.
+const SCAN_NS: f64 = 0.32;
+/// Items that fit the nearest cache.
+///
+/// Beyond it the time of an item grows with the cube root of their number.
+const NEAR: f64 = 32_768.0;
+/// An item that is overwritten.
+const MOVE_NS: f64 = 7.0;
+/// A refit, and a leaf whose bounds it fits.
+const REFIT_NS: [f64; 2] = [100.0, 10.0];
+/// The same of two trees, of a moved item.
+const REFIT_TWO_NS: f64 = 15.0;
+/// An item of a build.
+const BUILD_NS: f64 = 45.0;
+
+/// Fewest leaves for two trees: of fewer, a single tree is refitted faster.
+const TWO_FROM: usize = 1 << 14;
+
+/// Number of frusta whose work is counted.
+const VIEWS: usize = 8;
+/// Time of a counted query / time of a query.
+const COUNTED: f64 = 4.0;
+/// Time of updates and queries / time of counting the work of the refitted tree.
+const RARELY: f64 = 32.0;
+/// Updates that are weighed at once.
+const TOGETHER: u32 = 8;
+/// Most queries that are counted between two weighings; then nothing is written.
+const MOST_ASKED: u32 = 256;
+
+/// A tree, or a scan of its leaves, by counted work.
+#[derive(Default)]
+pub struct Auto {
+    trees: Moving,
+    params: AutoParams,
+    /// Index of the present search, and of that after a build.
+    search: usize,
+    built: usize,
+    /// Modelled time of a query, ns, by search; infinite where that is unknown.
+    costs: [f64; 2],
+    /// The same of the refitted tree, when its work was counted last.
+    aged: f64,
+    /// Queries since the last weighing, at most [`MOST_ASKED`].
+    asked: AtomicU32,
+    /// Updates since the last weighing, items moved, and leaves that these are in.
+    weighing: u32,
+    moved: [f64; 2],
+    /// Present kind of update, and the modelled time it has lost to the best, ns.
+    update: usize,
+    regret: f64,
+    /// Queries and modelled time since work was counted, and time lost to age, ns.
+    since: [f64; 2],
+    lost: f64,
+    /// Updates by kind, and the modelled time of all of them by each kind, ns.
+    updates: [u32; 3],
+    spent: [f64; 3],
+}
+
+impl Auto {
+    /// Returns whether movers get a tree of their own.
+    fn has_two_trees(&self) -> bool {
+        match self.params.structure {
+            Use::Moving => true,
+            Use::Auto => self.trees.still.occupied.len() >= TWO_FROM,
+            _ => false,
+        }
+    }
+
+    /// Frusta of 60 degrees from the centre of an item to that of another one.
+    fn views(&self, items: &[Aabb]) -> Vec<ConvexVolume> {
+        let ids = &self.trees.still.ids[..];
+        let centre = |at: usize| Some(items.get(*ids.get(at % ids.len())? as usize)?.centre());
+        let view = |i: usize| {
+            // Tree order is spread over space: half, a quarter, .. of the items between.
+            let at = i * ids.len() / VIEWS;
+            let (eye, end) = (centre(at)?, centre(at + (ids.len() >> (1 + i % 4)))?);
+            let forward = (end - eye).try_normalize()?;
+            let (right, up) = forward.any_orthonormal_pair();
+            let side = |across| (forward * 0.5 + across * 0.75_f32.sqrt(), eye);
+            let planes = [
+                side(right),
+                side(-right),
+                side(up),
+                side(-up),
+                (-forward, end),
+            ];
+            let planes = planes.map(|(normal, through)| Plane::new(normal, -normal.dot(through)));
+            ConvexVolume::from_planes(&planes).ok()
+        };
+        let views = if ids.is_empty() { 0 } else { VIEWS };
+        (0..views).filter_map(view).collect()
+    }
+
+    /// Modelled time of a query of the trees, ns, by the counted work of some views;
+    /// infinite without a view.
+    fn tree_ns(&self, items: &[Aabb]) -> f64 {
+        let views = self.views(items);
+        let (mut sink, mut cost) = (Count::default(), QueryCost::default());
+        for view in &views {
+            let cx = &mut QueryContext::new(BASELINE, &mut sink, &mut cost);
+            let _ = self.trees.query(view, cx);
+        }
+        let [nodes, tested, passed] = TREE_NS;
+        let work = nodes * cost.nodes_tested as f64
+            + tested * cost.items_tested as f64
+            + passed * cost.items_accepted_untested as f64;
+        match views.len() {
+            0 => f64::INFINITY,
+            views => QUERY_NS + work / views as f64,
+        }
+    }
+
+    /// Chooses the search of a new tree.
+    fn calibrate(&mut self, items: &[Aabb]) {
+        let all = self.trees.still.ids.len() as f64;
+        let scan = QUERY_NS + SCAN_NS * all * (all / NEAR).max(1.0).cbrt();
+        self.costs = [scan, self.tree_ns(items)];
+        self.aged = self.costs[TREE];
+        self.built = match self.params.structure {
+            Use::Linear => SCAN,
+            Use::Auto if scan < self.aged => SCAN,
+            _ => TREE,
+        };
+        self.search = self.built;
+    }
+
+    /// Passes the items of all leaves that the volume sees to the sink.
+    #[inline(always)]
+    fn scan<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        let tree = &self.trees.still;
+        let (ids, occupied) = (&tree.ids, &tree.occupied[..]);
+        let blocks = &tree.blocks[..occupied.len()];
+        if Q::IS_POINT {
+            let isa = cx.isa();
+            let leaves = pairs(blocks, occupied).enumerate();
+            let leaves = leaves.map(|(i, (block, lanes))| (i * LANES, *lanes, block));
+            let (sink, recorder) = cx.parts();
+            return scan_blocks(isa, leaves, ids, (volume, volume.mask()), sink, recorder);
+        }
+        let leaves = Flat::<true> {
+            blocks,
+            ids,
+            occupied,
+            balls: tree.balls.as_ref(),
+        };
+        leaves.scan(0..blocks.len(), volume, cx)
+    }
+
+    /// Replaces the trees; false with nothing changed if they cannot be built.
+    fn rebuild(&mut self, items: &[Aabb]) -> bool {
+        let order = self.params.order;
+        let built = Moving::build(&Input::new(items), &WideParams { order });
+        let Ok(trees) = built else {
+            return false;
+        };
+        self.trees = trees;
+        self.search = self.built;
+        (self.aged, self.since, self.lost) = (self.costs[TREE], [0.0; 2], 0.0);
+        self.updates[REBUILD] += 1;
+        true
+    }
+
+    /// Leaves alone; the nodes above them are stale from then on.
+    fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        if self.trees.movers.ids.is_empty() && self.trees.still.overwrite(items, moved, |_| ()) {
+            self.search = SCAN;
+            self.updates[OVERWRITE] += 1;
+            return true;
+        }
+        let is_built = self.rebuild(items);
+        self.search = SCAN;
+        is_built
+    }
+
+    fn refit_trees(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        if self.search == SCAN {
+            if self.is_aged() || self.has_two_trees() && self.trees.still.vacant > 0 {
+                return self.rebuild(items);
+            }
+            let mut all = self.trees.still.untouched();
+            (0..self.trees.still.occupied.len()).for_each(|leaf| _ = all.mark(leaf));
+            self.trees.still.fit_above(all);
+            self.search = TREE;
+            self.aged = self.tree_ns(items);
+        }
+        let is_refitted = match self.has_two_trees() {
+            true => self.trees.refit(items, moved),
+            false => self.trees.still.take_over(items, moved),
+        };
+        if !is_refitted || self.is_old(items) {
+            return self.rebuild(items);
+        }
+        self.updates[REFIT] += 1;
+        true
+    }
+
+    /// Returns whether queries take half as long again as those of a new tree.
+    fn is_aged(&self) -> bool {
+        self.aged > 1.5 * self.costs[TREE]
+    }
+
+    /// Returns whether age has cost as much as a new tree; rarely counts the work.
+    fn is_old(&mut self, items: &[Aabb]) -> bool {
+        let [asked, spent] = self.since;
+        if self.params.update != Update::Auto || spent < RARELY * COUNTED * VIEWS as f64 * self.aged
+        {
+            return false;
+        }
+        let aged = self.tree_ns(items);
+        self.lost += asked * ((self.aged + aged) / 2.0 - self.costs[TREE]).max(0.0);
+        (self.aged, self.since) = (aged, [0.0; 2]);
+        self.lost > BUILD_NS * items.len() as f64
+    }
+
+    /// Chooses the kind of updates: another one when the present one has lost what a
+    /// change costs, so that a few exceptions change nothing.
+    fn weigh(&mut self, items: usize) {
+        let is_first = self.updates == [0; 3];
+        let updates = f64::from(std::mem::take(&mut self.weighing));
+        let [moved, fitted] = std::mem::take(&mut self.moved);
+        let asked = f64::from(std::mem::take(self.asked.get_mut()));
+        // Queries before the first update are of no frame.
+        let asked = if is_first { 1.0 } else { asked.max(updates) };
+        let (all, leaves) = (items as f64, self.trees.still.occupied.len() as f64);
+        let fit = REFIT_NS[0] * updates
+            + match self.has_two_trees() {
+                true => REFIT_TWO_NS * moved,
+                false => REFIT_NS[1] * fitted,
+            };
+        let tree = match self.search {
+            SCAN => self.costs[TREE],
+            _ => self.aged,
+        };
+        let change = match self.search == SCAN && self.is_aged() || self.has_two_trees() {
+            true => BUILD_NS * all,
+            false => REFIT_NS[1] * leaves,
+        };
+        let costs = [
+            MOVE_NS * moved + asked * self.costs[SCAN],
+            MOVE_NS * moved + fit + asked * tree,
+            BUILD_NS * all * updates + asked * self.costs[self.built],
+        ];
+        for (spent, cost) in self.spent.iter_mut().zip(costs) {
+            *spent += cost;
+        }
+        let best = match (self.params.update, self.params.structure) {
+            (Update::Rebuild, _) => REBUILD,
+            (_, Use::Linear) => OVERWRITE,
+            (Update::Refit, _) => REFIT.min(self.built),
+            (_, Use::Wide | Use::Moving) => REFIT,
+            _ if costs[OVERWRITE] <= costs[REFIT].min(costs[REBUILD]) => OVERWRITE,
+            _ if costs[REFIT] <= costs[REBUILD] => REFIT,
+            _ => REBUILD,
+        };
+        self.regret += costs[self.update] - costs[best];
+        if is_first || self.regret > change {
+            (self.update, self.regret) = (best, 0.0);
+        }
+        self.since = [self.since[0] + asked, self.since[1] + costs[self.update]];
+    }
+}
+
+impl RegionIndex for Auto {
+    const INFO: Info = Info::new(
+        "auto",
+        "a tree or a scan of its leaves, and its updates, by counted work",
+        Kind::Tree,
+        Origin::Ours,
+    )
+    .refits()
+    .threaded_build()
+    .on_request();
+    type Params = AutoParams;
+
+    /// O(n log n), that of [`Wide`](super::Wide), and a few queries.
+    fn build(input: &Input<'_>, params: &AutoParams) -> Result<Self, BuildError> {
+        let order = params.order;
+        let mut auto = Auto {
+            trees: Moving::build(input, &WideParams { order })?,
+            params: *params,
+            ..Auto::default()
+        };
+        auto.calibrate(input.items);
+        Ok(auto)
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        self.trees.memory()
+    }
+
+    #[inline(always)]
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        // A query that counts its work is not one of a frame.
+        if size_of::<C::Recorder>() == 0 {
+            let asked = self.asked.load(Relaxed);
+            if asked < MOST_ASKED {
+                self.asked.store(asked + 1, Relaxed);
+            }
+        }
+        match self.search {
+            SCAN => self.scan(volume, cx),
+            _ if self.trees.movers.ids.is_empty() => self.trees.still.query(volume, cx),
+            _ => self.trees.query(volume, cx),
+        }
+    }
+
+    /// O(moved), or a new build. Items may become or cease to be empty.
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        if moved.is_empty() {
+            return true;
+        }
+        self.trees.still.balls = None;
+        self.weighing += 1;
+        let (count, leaves) = (moved.len() as f64, self.trees.still.occupied.len() as f64);
+        self.moved[0] += count;
+        // About the number of leaves that hold them, if items move anywhere.
+        self.moved[1] += count * leaves / count.hypot(leaves);
+        if self.weighing == TOGETHER || self.updates == [0; 3] {
+            self.weigh(items.len());
+        }
+        match self.update {
+            OVERWRITE => self.overwrite(items, moved),
+            REFIT => self.refit_trees(items, moved),
+            _ => self.rebuild(items),
+        }
+    }
+
+    fn chose(&self) -> Option<String> {
+        let others = |names: &[&str], costs: &[f64], taken: usize| {
+            let others = (0..names.len()).filter(|&i| i != taken && costs[i].is_finite());
+            let ratio = |i: usize| format!("{} ({:.3} x)", names[i], costs[i] / costs[taken]);
+            others.map(ratio).collect::<Vec<_>>().join(", ")
+        };
+        let left_out = others(&SEARCHES, &self.costs, self.built);
+        let mut told = format!("{}, not {left_out}", SEARCHES[self.built]);
+        let count: u32 = self.updates.iter().sum();
+        let most = (0..UPDATES.len()).max_by_key(|&kind| self.updates[kind]);
+        if let Some(most) = most.filter(|_| count > 0) {
+            let left_out = others(&UPDATES, &self.spent, most);
+            let (name, here) = (UPDATES[most], self.updates[most]);
+            told += &format!("; {name} in {here} of {count} updates, not {left_out}");
+        }
+        Some(told)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,249 @@
+//! Answers, forced choices, and choices by what moves, is queried and has aged.
+
+use super::*;
+use crate::index::{FrustumQuery, StructureSpec};
+use glam::Vec3;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+
+const WORLD: u32 = 64;
+
+/// Ids of the items for which the test holds.
+fn scan(items: &[Aabb], sees: impl Fn(&Aabb) -> bool) -> Vec<ItemId> {
+    let seen = items.iter().zip(0..).filter(|(b, _)| sees(b));
+    seen.map(|(_, id)| id).collect()
+}
+
+/// An empty item; its bounds are finite, as those of all items.
+const GONE: Aabb = Aabb::new(Vec3::ONE, Vec3::ZERO);
+
+fn point(rng: &mut Pcg64) -> Vec3 {
+    let mut x = || (rng.next_u32() % (16 * WORLD)) as f32 / 16.0;
+    Vec3::new(x(), x(), x())
+}
+
+fn cubes(rng: &mut Pcg64, count: usize) -> Vec<Aabb> {
+    let cube = |_| Aabb::around(point(rng), Vec3::splat(0.7));
+    (0..count).map(cube).collect()
+}
+
+fn built(items: &[Aabb], params: &str) -> Auto {
+    let spec = StructureSpec::parse(&format!("auto{params}")).unwrap();
+    let params = serde_json::from_value(spec.params).unwrap();
+    Auto::build(&Input::new(items), &params).unwrap()
+}
+
+/// Compares answers to a wedge, a half-space, everything and a point with a scan.
+fn assert_right(index: &Auto, items: &[Aabb], rng: &mut Pcg64, told: &str) {
+    let corner = point(rng);
+    let wedge = [
+        Vec3::new(0.8, 0.1, -0.3),
+        Vec3::new(-0.2, 0.9, 0.4),
+        -Vec3::Z,
+    ];
+    let wedge = wedge.map(|normal| Plane::new(normal, -normal.dot(corner)));
+    for planes in [&wedge[..], &wedge[..1], &[]] {
+        let volume = ConvexVolume::from_planes(planes).unwrap();
+        let mut seen = index.visible(&volume);
+        seen.sort_unstable();
+        let wanted = scan(items, |b| volume.sees(b));
+        assert_eq!(seen, wanted, "{told}");
+        assert_eq!(index.counted(&volume).0.len(), wanted.len(), "{told}");
+    }
+    let p = items[rng.next_u32() as usize % items.len()].min;
+    let mut found = index.locate(p);
+    found.sort_unstable();
+    let wanted = scan(items, |b| !b.is_empty() && b.contains_point(p));
+    assert_eq!(found, wanted, "{told} at {p}");
+}
+
+#[test]
+fn answers_are_those_of_a_scan_whatever_is_chosen_and_moves() {
+    let structures = ["auto", "linear", "wide", "moving"];
+    for (seed, structure) in structures.into_iter().enumerate() {
+        for update in ["auto", "refit", "rebuild"] {
+            let mut rng = Pcg64::seed_from_u64(seed as u64);
+            for count in [0, 1, 17, 300, 5000] {
+                let mut items = cubes(&mut rng, count + 40);
+                // Some are there only later.
+                items[count..].fill(GONE);
+                let told = format!(":use={structure},update={update}");
+                let mut index = built(&items, &told);
+                for round in 0..20u32 {
+                    let share = [300, 1, 40, 1, 300][round as usize / 4];
+                    let some = |_| rng.next_u32() % items.len() as u32;
+                    let moved: Vec<ItemId> = (0..items.len() / share).map(some).collect();
+                    // Only half of the rounds have items that come and go.
+                    let fates = if round % 4 < 2 { 8 } else { 1 };
+                    for &id in &moved {
+                        let b = &mut items[id as usize];
+                        *b = match rng.next_u32() % fates {
+                            1 => GONE,
+                            2 | 3 => Aabb::around(point(&mut rng), Vec3::splat(0.7)),
+                            _ if b.is_empty() => *b,
+                            _ => Aabb::new(b.min + 0.5, b.max + 0.5),
+                        };
+                    }
+                    assert!(index.refit(&items, &moved));
+                    assert_right(&index, &items, &mut rng, &told);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_forced_is_taken_and_said() {
+    let mut rng = Pcg64::seed_from_u64(6);
+    let mut items = cubes(&mut rng, 2000);
+    let (scan, tree) = (
+        "scan of all items, not tree (",
+        "tree, not scan of all items (",
+    );
+    for (params, search, update) in [
+        (":use=linear", scan, "overwritten leaves"),
+        (":use=linear,update=refit", scan, "overwritten leaves"),
+        (":use=linear,update=rebuild", scan, "rebuild"),
+        (":use=wide", tree, "refit"),
+        (":use=moving", tree, "refit"),
+        (":update=rebuild", tree, "rebuild"),
+        (":update=refit", tree, "refit"),
+    ] {
+        let mut index = built(&items, params);
+        assert!(
+            index.chose().unwrap().starts_with(search),
+            "{params}: {:?}",
+            index.chose()
+        );
+        for _ in 0..2 {
+            items[7] = Aabb::around(point(&mut rng), Vec3::ONE);
+            assert!(index.refit(&items, &[7]));
+        }
+        let told = index.chose().unwrap();
+        let update = format!("; {update} in 2 of 2 updates, not ");
+        assert!(
+            told.starts_with(search) && told.contains(&update),
+            "{params}: {told}"
+        );
+        let has_movers = !index.trees.movers.ids.is_empty();
+        assert_eq!(has_movers, params == ":use=moving");
+    }
+    for params in ["auto:use=bvh", "auto:update=fat", "auto:order=random"] {
+        assert!(StructureSpec::parse(params).is_err(), "{params}");
+    }
+}
+
+#[test]
+fn a_world_is_searched_by_its_tree_and_a_heap_as_a_whole() {
+    let mut rng = Pcg64::seed_from_u64(7);
+    let built = |items: &[Aabb]| SEARCHES[built(items, "").built];
+    assert_eq!(built(&cubes(&mut rng, 30_000)), "tree");
+    // Each box reaches through the whole world.
+    let heap = |_| Aabb::around(0.1 * point(&mut rng), Vec3::splat(90.0));
+    let heap: Vec<Aabb> = (0..30_000).map(heap).collect();
+    assert_eq!(built(&heap), "scan of all items");
+    assert_eq!(built(&[GONE, GONE]), "scan of all items");
+}
+
+#[test]
+fn a_view_tests_no_more_than_all_items_and_nodes() {
+    let mut rng = Pcg64::seed_from_u64(8);
+    for half in [0.7, 90.0] {
+        let cube = |_| Aabb::around(point(&mut rng), Vec3::splat(half));
+        let items: Vec<Aabb> = (0..20_000).map(cube).collect();
+        let index = built(&items, ":use=wide");
+        let views = index.views(&items);
+        assert_eq!(views.len(), VIEWS);
+        for view in &views {
+            let tested = index.counted(view).1.comparisons();
+            assert!((1..=22_000).contains(&tested), "{tested}");
+        }
+    }
+}
+
+#[test]
+fn all_moving_is_overwritten_few_are_refitted_and_an_exception_changes_nothing() {
+    let mut rng = Pcg64::seed_from_u64(9);
+    let items = cubes(&mut rng, 20_000);
+    let all: Vec<ItemId> = (0..20_000).collect();
+    let mut index = built(&items, "");
+    let mut update = |moved: usize, times: usize| {
+        for _ in 0..times {
+            assert!(index.refit(&items, &all[..moved]));
+        }
+        UPDATES[index.update]
+    };
+    assert_eq!(update(20, 3), "refit");
+    assert_eq!(update(20_000, 1), "refit");
+    assert_eq!(update(20, 16), "refit");
+    assert_eq!(update(20_000, 50), "overwritten leaves");
+    assert_eq!(update(20, 90), "refit");
+    let told = index.chose().unwrap();
+    assert!(
+        told.contains("; refit in ") && told.contains(" of 160 updates"),
+        "{told}"
+    );
+}
+
+#[test]
+fn many_queries_between_updates_keep_the_tree() {
+    let mut rng = Pcg64::seed_from_u64(11);
+    let items = cubes(&mut rng, 20_000);
+    let all: Vec<ItemId> = (0..20_000).collect();
+    let mut index = built(&items, "");
+    let wedge = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -60.0)]).unwrap();
+    for (queries, wanted) in [
+        (1, "overwritten leaves"),
+        (20, "refit"),
+        (1, "overwritten leaves"),
+    ] {
+        for _ in 0..40 {
+            assert!(index.refit(&items, &all));
+            for _ in 0..queries {
+                index.visible(&wedge);
+            }
+        }
+        assert_eq!(UPDATES[index.update], wanted, "{queries}");
+    }
+}
+
+#[test]
+fn a_tree_that_has_aged_is_built_again() {
+    let mut rng = Pcg64::seed_from_u64(12);
+    let mut items = cubes(&mut rng, 4000);
+    let mut index = built(&items, "");
+    let volume = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -60.0)]).unwrap();
+    for round in 0..2000 {
+        // Two items go anywhere.
+        let moved = [round * 2 % 4000, (round * 2 + 1) % 4000].map(|id| id as ItemId);
+        for id in moved {
+            items[id as usize] = Aabb::around(point(&mut rng), Vec3::splat(0.7));
+        }
+        assert!(index.refit(&items, &moved));
+        for _ in 0..4 {
+            index.visible(&volume);
+        }
+    }
+    let [_, refits, rebuilds] = index.updates;
+    assert!(
+        (1..20).contains(&rebuilds) && refits > 1900,
+        "{:?}",
+        index.updates
+    );
+    assert_right(&index, &items, &mut rng, "aged");
+}
+
+#[test]
+fn queries_between_updates_are_counted_up_to_a_number() {
+    let mut rng = Pcg64::seed_from_u64(10);
+    let items = cubes(&mut rng, 100);
+    let mut index = built(&items, "");
+    for queries in [3, 2 * MOST_ASKED] {
+        for _ in 0..queries {
+            index.locate(Vec3::ONE);
+            index.counted(&Vec3::ONE);
+        }
+        assert_eq!(index.asked.load(Relaxed), queries.min(MOST_ASKED));
+        assert!(index.refit(&items, &[1]));
+    }
+}
