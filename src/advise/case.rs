@@ -1,15 +1,18 @@
 //! Scene, cameras, fastest tree and visible surfaces that all rules read.
 
-use super::options::AdviseOptions;
+use glam::{DVec3, Vec3};
+
+use super::options::{AdviseInput, AdviseOptions, planned};
 use crate::camera::PlaneOptions;
 use crate::culling::{CameraView, Culling, CullingTest};
 use crate::funnel::{Chain, FunnelInput, World};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::measure::{Protocol, Workload, WorkloadError, input_of};
+use crate::input::InputError;
+use crate::measure::{Workload, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::Scene;
+use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
 use crate::visibility::SampleGrid;
 
@@ -35,13 +38,13 @@ pub struct Case<'a> {
 
 impl<'a> Case<'a> {
     pub fn new(
+        all: &AdviseInput<'a>,
         workload: &'a Workload<'a>,
-        path: &'a CameraPath,
-        [spec, scan]: [StructureSpec; 2],
-        options: &AdviseOptions,
-        protocol: &Protocol,
+        [tree, scan]: &[String; 2],
     ) -> Result<Case<'a>, BuildError> {
-        let scene = workload.scene;
+        let AdviseInput { scene, path, .. } = *all;
+        let [spec, scan] = [tree, scan].map(|label| planned(all.structures, label));
+        let (spec, scan) = (spec?, scan?);
         let input = FunnelInput {
             scene,
             path,
@@ -51,7 +54,7 @@ impl<'a> Case<'a> {
             mirror: None,
             chain: &Chain::empty(),
             structures: &[],
-            protocol,
+            protocol: all.protocol,
             claim: None,
             inner_boxes: None,
             execution: spec.execution,
@@ -64,7 +67,7 @@ impl<'a> Case<'a> {
             path,
             spec,
             scan,
-            options: *options,
+            options: *all.options,
             world: World::new(scene, &input, &|_| ())
                 .map_err(|_| "cameras without rays of their own".to_owned()),
         })
@@ -151,6 +154,20 @@ impl<'a> Case<'a> {
         });
         margins.fold(0.0, f64::max)
     }
+}
+
+/// Evenly spread boxes of a scene about another origin, rounded outward once more.
+pub fn part_of(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, InputError> {
+    let at_home = |corner: Vec3| scene.origin + corner.as_dvec3();
+    let boxes = some_of(scene.items.len(), count).map(|id| WorldBox {
+        min: at_home(scene.items[id].min),
+        max: at_home(scene.items[id].max),
+    });
+    let boxes: Vec<WorldBox> = boxes.collect();
+    Ok(Scene {
+        up: scene.up,
+        ..Scene::about(scene.name.clone(), &boxes, origin)?
+    })
 }
 
 /// At most `most` of `count` indices, evenly spread.

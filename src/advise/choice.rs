@@ -5,11 +5,13 @@
 
 use serde::Serialize;
 
+use super::omission::{TIE, is_longer};
+use super::options::{SCAN, TREE};
 use super::trials::{Answered, Trials};
 use crate::culling::{Culling, CullingTest, TESTS};
-use crate::index::{BuildError, Execution, Kind, StructureSpec};
-use crate::measure::{Group, Metric, OverProcesses, ReportCell};
-use crate::statistics::{ALPHA, Estimate, Rate, flat, rate, shows_less_in_sum};
+use crate::index::BuildError;
+use crate::measure::{Metric, OverProcesses, ReportCell};
+use crate::statistics::{ALPHA, Estimate, Rate, flat, rate, ratio, shows_less_in_sum};
 use crate::verify::ErrorCount;
 
 /// Which structure, and all that took part.
@@ -31,6 +33,9 @@ pub struct StructureChoice {
     /// `true` if scans and others were timed.
     #[serde(skip)]
     pub(super) is_open: bool,
+    /// `true` if a scan and another structure tie.
+    #[serde(skip)]
+    pub(super) is_mixed: bool,
 }
 
 /// A structure as measured.
@@ -55,132 +60,151 @@ pub struct StructureRow {
     pub break_even_queries: Option<f64>,
     /// CPU time per region search, ns.
     pub locate_ns: Option<f64>,
+    /// CPU time per frame of the motion, ns.
+    ///
+    /// The query is then the first one of a frame.
+    #[serde(flatten, serialize_with = "flat::frame_ns")]
+    pub frame_ns: Option<Estimate>,
+    /// CPU time of the update of a frame, ns.
+    pub update_ns: Option<f64>,
+    /// The slowest frame, ns.
+    pub worst_frame_ns: Option<f64>,
     #[serde(skip)]
     pub(super) is_failure: bool,
+    #[serde(skip)]
+    pub(super) is_scan: bool,
+    /// `true` if threads share a query.
+    #[serde(skip)]
+    is_shared: bool,
 }
 
 impl StructureRow {
-    fn of(cell: &ReportCell) -> StructureRow {
+    pub(super) fn of(cell: &ReportCell) -> StructureRow {
         let value = |name: &str| cell.metrics.get(name).map(|m| m.value);
         StructureRow {
             structure: cell.structure.clone(),
             status: cell.status.name(),
             reason: cell.reason.clone(),
             query_ns: cell.metrics.get("query_ns").map(Metric::estimate),
+            frame_ns: cell.metrics.get("frame_ns").map(Metric::estimate),
+            update_ns: value("update_ns"),
+            worst_frame_ns: value("worst_frame_ns"),
             speedup: value("speedup"),
             build_ms: value("build_ms"),
             memory_bytes_per_item: value("memory_bytes_per_item"),
             break_even_queries: value("break_even_queries"),
             locate_ns: value("locate_ns"),
             is_failure: cell.status.is_failure(),
+            is_scan: cell.is_scan(),
+            is_shared: cell.params["threads"].as_u64() > Some(1),
         }
     }
 
-    /// CPU time per frustum query, ns.
+    /// CPU time per frame, or per frustum query of a still scene, ns.
     pub fn ns(&self) -> Option<f64> {
-        Some(self.query_ns?.value)
+        Some(self.frame_ns.or(self.query_ns)?.value)
     }
 }
 
 impl StructureChoice {
     /// From what a run measures of all structures on one scene and path.
-    pub fn of(group: &Group) -> StructureChoice {
-        let mut rows: Vec<StructureRow> = group.cells.iter().map(StructureRow::of).collect();
+    pub(super) fn of(cells: &[ReportCell]) -> StructureChoice {
+        let mut rows: Vec<StructureRow> = cells.iter().map(StructureRow::of).collect();
         rows.sort_by(|a, b| or_last(a.ns()).total_cmp(&or_last(b.ns())));
-        let rank = |row: &StructureRow| {
-            let mut cells = group.cells.iter();
-            cells.find(|cell| cell.structure == row.structure)?.rank
+        let first = |metric| fastest(cells, metric).into_iter();
+        let mut first_located = first(Some("locate_ns")).map(|cell| cell.structure.clone());
+        let mut first = first(None).map(|cell| cell.structure.clone());
+        let [name, ties]: [Vec<String>; 2] = [first.by_ref().take(1).collect(), first.collect()];
+        let is = |is_scan| move |row: &StructureRow| row.is_scan == is_scan;
+        let tied = rows
+            .iter()
+            .filter(|row| name.contains(&row.structure) || ties.contains(&row.structure));
+        let has_both = |rows: &[&StructureRow]| {
+            [false, true].map(|kind| rows.iter().any(|row| is(kind)(row))) == [true; 2]
         };
-        let located = |row: &StructureRow| {
-            let mut ranks = group.located.iter();
-            Some(ranks.find(|(structure, _)| *structure == row.structure)?.1)
-        };
-        let mut first = first_ranked(&rows, rank, StructureRow::ns).into_iter();
-        let mut first_located = first_ranked(&rows, located, |row| row.locate_ns).into_iter();
         StructureChoice {
-            name: first.next(),
-            ties: first.collect(),
+            is_scan: rows
+                .first()
+                .is_some_and(|row| row.is_scan && row.ns().is_some()),
+            is_open: has_both(&alone(&rows).collect::<Vec<_>>()),
+            is_mixed: has_both(&tied.collect::<Vec<_>>()),
+            name: name.into_iter().next(),
+            ties,
             region_search: first_located.next(),
             region_search_ties: first_located.collect(),
             rows,
-            is_scan: false,
-            is_open: false,
         }
     }
 
-    /// Notes the kinds of what was timed.
-    pub(super) fn note_kinds(&mut self, structures: &[StructureSpec]) {
-        let is_scan = |label: &str| {
-            let spec = structures.iter().find(|spec| spec.label == label);
-            spec.is_some_and(|spec| spec.info().kind == Kind::Scan)
-        };
-        self.is_scan = self.name.as_deref().is_some_and(is_scan);
-        let timed = self.rows.iter().filter(|row| row.query_ns.is_some());
-        let mut scans = timed.map(|row| is_scan(&row.structure));
-        self.is_open = scans.any(|scan| scan != self.is_scan);
-    }
-
-    /// The fastest tree or grid and the fastest scan, for the rules.
+    /// Labels of the fastest tree or grid and of the fastest scan, for the rules.
     ///
     /// Without any, `wide` and `linear`.
-    pub(super) fn tree_and_scan(
-        &self,
-        structures: &[StructureSpec],
-    ) -> Result<[StructureSpec; 2], BuildError> {
-        let of_row = |row: &StructureRow| structures.iter().find(|s| s.label == row.structure);
-        let fastest = |is_scan: bool, otherwise| {
-            let timed = self.rows.iter().filter(|row| row.query_ns.is_some());
-            let mut timed = timed.filter_map(of_row);
-            let found = timed.find(|s| (s.info().kind == Kind::Scan) == is_scan);
-            let found = found.cloned().map(Ok);
-            found.unwrap_or_else(|| named(otherwise, execution(structures)))
-        };
-        Ok([fastest(false, TREE)?, fastest(true, SCAN)?])
+    pub(super) fn tree_and_scan(&self) -> [String; 2] {
+        [(false, TREE), (true, SCAN)].map(|(is_scan, otherwise)| {
+            let own = alone(&self.rows).find(|row| row.is_scan == is_scan);
+            own.map_or(otherwise, |row| &row.structure).to_owned()
+        })
+    }
+
+    /// Labels of the structure that is taken and of those that may replace it.
+    ///
+    /// In another workload: the fastest tree and scan, of a motion the three fastest too.
+    pub(super) fn contenders(&self, moves: bool) -> Vec<String> {
+        let first = alone(&self.rows).take(if moves { 3 } else { 1 });
+        let of_kind = [false, true].map(|is_scan| {
+            let mut timed = alone(&self.rows);
+            timed.find(|row| row.is_scan == is_scan)
+        });
+        let mut labels: Vec<String> = Vec::new();
+        for row in first.chain(of_kind.into_iter().flatten()) {
+            if !labels.contains(&row.structure) {
+                labels.push(row.structure.clone());
+            }
+        }
+        labels
     }
 }
 
-/// The structures of the first rank, fastest first.
-fn first_ranked(
-    rows: &[StructureRow],
-    rank: impl Fn(&StructureRow) -> Option<usize>,
-    time: impl Fn(&StructureRow) -> Option<f64>,
-) -> Vec<String> {
-    let mut first: Vec<&StructureRow> = rows.iter().filter(|row| rank(row) == Some(1)).collect();
-    first.sort_by(|a, b| or_last(time(a)).total_cmp(&or_last(time(b))));
-    first.iter().map(|row| row.structure.clone()).collect()
+/// Rows with a time on one thread.
+fn alone(rows: &[StructureRow]) -> impl Iterator<Item = &StructureRow> {
+    rows.iter()
+        .filter(|row| row.ns().is_some() && !row.is_shared)
+}
+
+/// Time of a structure / time of another one.
+///
+/// By a given metric, or the one that ranks.
+fn over(own: &ReportCell, other: &ReportCell, metric: Option<&str>) -> Option<Estimate> {
+    let [own, other] = [own, other].map(|cell| cell.ln_ns(metric.unwrap_or(cell.ranked_by())));
+    ratio(&other, &own, &other)
+}
+
+/// [`over`] of the labels of two cells.
+pub(super) fn time_over(cells: &[ReportCell], own: &str, other: &str) -> Option<Estimate> {
+    let cell = |label| cells.iter().find(|cell| cell.structure == label);
+    over(cell(own)?, cell(other)?, None)
+}
+
+/// The fastest structure and those that tie with it.
+///
+/// By a given metric, or the one that ranks.
+pub(super) fn fastest<'c>(cells: &'c [ReportCell], metric: Option<&str>) -> Vec<&'c ReportCell> {
+    let ns = |cell: &ReportCell| cell.value(metric.unwrap_or(cell.ranked_by()));
+    // Wrong answers, and sets of fat bounds, have no rank.
+    let sound = |cell: &&ReportCell| cell.rank.is_some() && ns(cell).is_some();
+    let mut sound: Vec<&ReportCell> = cells.iter().filter(sound).collect();
+    sound.sort_by(|a, b| or_last(ns(a)).total_cmp(&or_last(ns(b))));
+    let Some(&first) = sound.first() else {
+        return sound;
+    };
+    let is_longer = |cell: &ReportCell| is_longer(over(cell, first, metric)?);
+    sound.retain(|cell| cell.structure == first.structure || is_longer(cell) != Some(true));
+    sound
 }
 
 /// Maps a missing time to the end of the order.
 fn or_last(time: Option<f64>) -> f64 {
     time.unwrap_or(f64::INFINITY)
-}
-
-/// The structure that a plan names: one of the list, or of this crate.
-pub(super) fn planned(
-    structures: &[StructureSpec],
-    label: &str,
-) -> Result<StructureSpec, BuildError> {
-    let found = structures.iter().find(|spec| spec.label == label);
-    let otherwise = if label == SCAN { SCAN } else { TREE };
-    let found = found.cloned().map(Ok);
-    found.unwrap_or_else(|| named(otherwise, execution(structures)))
-}
-
-fn execution(structures: &[StructureSpec]) -> Execution {
-    structures.first().map(|s| s.execution).unwrap_or_default()
-}
-
-/// Structures of the rules where the list has no tree, no scan.
-const TREE: &str = "wide";
-const SCAN: &str = "linear";
-
-/// A structure of this crate with its default parameters.
-pub(super) fn named(name: &'static str, execution: Execution) -> Result<StructureSpec, BuildError> {
-    let spec = StructureSpec::parse(name).map_err(|error| BuildError::Params {
-        structure: name,
-        reason: error.to_string(),
-    })?;
-    Ok(spec.by(execution))
 }
 
 /// Which culling test, and all that took part, on the fastest tree.
@@ -239,16 +263,6 @@ pub(super) fn enter_tests(trials: &mut Trials) -> Result<Vec<(CullingTest, usize
 }
 
 impl TestChoice {
-    /// Before any test is timed.
-    pub(super) fn untimed(structure: &str) -> TestChoice {
-        TestChoice {
-            name: None,
-            ties: Vec::new(),
-            structure: structure.to_owned(),
-            rows: Vec::new(),
-        }
-    }
-
     pub(super) fn of(
         structure: String,
         draw_ns: f64,
@@ -299,8 +313,12 @@ impl TestChoice {
 fn near_the_least(rows: &[TestRow]) -> Vec<&'static str> {
     let is_sound = |row: &&TestRow| row.false_negative_ppm.is_none_or(|ppm| ppm.value == 0.0);
     let is_less = |a: &TestRow, b: &TestRow| {
-        let times = [&a.by_process[..], &b.by_process[..]];
-        shows_less_in_sum(times, [&a.by_camera, &b.by_camera], ALPHA)
+        // Several processes have ties.
+        let margin = if a.by_process.len() < 3 { 1.0 } else { TIE };
+        let [time, drawn] = [&a.by_process, &a.by_camera]
+            .map(|own| own.iter().map(|ns| ns * margin).collect::<Vec<f64>>());
+        let times = [&time[..], &b.by_process];
+        shows_less_in_sum(times, [&drawn, &b.by_camera], ALPHA)
     };
     let sound = rows
         .iter()
@@ -328,8 +346,9 @@ const SIMPLEST_FIRST: [CullingTest; 4] = [
 
 #[cfg(test)]
 mod tests {
+    use super::super::options::planned;
     use super::*;
-    use crate::index::Registry;
+    use crate::index::{Registry, UpdatePolicy};
 
     /// A query of about 100 ns in ten processes, each a little off.
     fn row(test: &'static str, query: f64, drawn: f64) -> TestRow {
@@ -346,7 +365,7 @@ mod tests {
         }
     }
 
-    fn structure(structure: &str, query_ns: Option<f64>, locate_ns: Option<f64>) -> StructureRow {
+    fn structure(structure: &str, query_ns: Option<f64>) -> StructureRow {
         StructureRow {
             structure: structure.to_owned(),
             status: "ok",
@@ -356,25 +375,26 @@ mod tests {
             build_ms: None,
             memory_bytes_per_item: None,
             break_even_queries: None,
-            locate_ns,
+            locate_ns: None,
+            frame_ns: None,
+            update_ns: None,
+            worst_frame_ns: None,
             is_failure: false,
+            is_scan: false,
+            is_shared: false,
         }
     }
 
     #[test]
-    fn all_of_the_first_rank_tie_with_the_fastest() {
-        let rows = [
-            structure("bvh", Some(1.0), Some(104.0)),
-            structure("octree", Some(2.0), None),
-            structure("wide", Some(3.0), Some(100.0)),
-            structure("linear", Some(4.0), Some(111.0)),
-        ];
-        let rank = |row: &StructureRow| Some(if row.locate_ns? < 110.0 { 1 } else { 3 });
-        assert_eq!(
-            first_ranked(&rows, rank, |row| row.locate_ns),
-            ["wide", "bvh"]
-        );
-        assert!(first_ranked(&rows[1..2], rank, |row| row.locate_ns).is_empty());
+    fn a_tie_is_a_ratio_whose_interval_holds_a_difference_of_five_percent() {
+        let of = |value: f64, ends| is_longer(Estimate::within(value, ends));
+        assert_eq!(of(1.2, [1.06, 1.3]), Some(true));
+        assert_eq!(of(0.8, [0.7, 0.94]), Some(false));
+        assert_eq!(of(1.2, [1.04, 1.3]), None);
+        assert_eq!(of(1.0, [0.9, 1.1]), None);
+        // Told apart, and by less than another layout of memory makes.
+        assert_eq!(of(1.03, [1.02, 1.04]), None);
+        assert_eq!(of(1.01, [f64::NAN; 2]), Some(true));
     }
 
     #[test]
@@ -416,31 +436,33 @@ mod tests {
 
     #[test]
     fn scans_are_told_from_trees() {
-        let mut choice = StructureChoice {
-            name: None,
-            ties: Vec::new(),
-            region_search_ties: Vec::new(),
-            region_search: None,
-            rows: Vec::new(),
-            is_scan: false,
-            is_open: false,
+        let mut choice = StructureChoice::of(&[]);
+        assert_eq!(choice.tree_and_scan(), ["wide", "linear"]);
+        let row = |name: &str, is_scan| StructureRow {
+            is_scan,
+            ..structure(name, Some(1.0))
         };
+        let shared = StructureRow {
+            is_shared: true,
+            ..row("linear:threads=2", true)
+        };
+        choice.rows = vec![shared, row("linear-scalar", true), row("octree", false)];
+        assert_eq!(choice.tree_and_scan(), ["octree", "linear-scalar"]);
+        assert_eq!(choice.contenders(false), ["linear-scalar", "octree"]);
+        // A plan names what was found, also what the list does not hold.
         let structures = Registry::builtin()
             .structures("octree,linear-scalar")
             .unwrap();
-        let labels = |choice: &StructureChoice| {
-            choice
-                .tree_and_scan(&structures)
-                .unwrap()
-                .map(|spec| spec.label)
-        };
-        assert_eq!(labels(&choice), ["wide", "linear"]);
-        let row = |name: &str| structure(name, Some(1.0), None);
-        choice.rows = vec![row("linear-scalar"), row("octree")];
-        assert_eq!(labels(&choice), ["octree", "linear-scalar"]);
-        // A plan names what was found, also what the list does not hold.
-        for name in ["octree", "linear-scalar", "wide", "linear"] {
+        for name in [
+            "octree",
+            "linear-scalar",
+            "wide",
+            "linear",
+            "octree@every=10",
+        ] {
             assert_eq!(planned(&structures, name).unwrap().label, name);
         }
+        let every = planned(&structures, "octree@every=10").unwrap().policy;
+        assert_eq!(every, UpdatePolicy::Every(10));
     }
 }

@@ -3,7 +3,9 @@
 //! It names a structure, a culling test and the features to leave out.
 
 mod case;
+mod change;
 mod choice;
+mod motion;
 mod omission;
 mod options;
 mod rule;
@@ -12,16 +14,17 @@ mod trials;
 
 use serde::{Deserialize, Serialize};
 
+pub use change::{Axis, Beside, Change, Turn};
 pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
-pub use omission::{Check, LeftOutIf, Omission};
-pub use options::{AdviseError, AdviseOptions};
+pub use motion::{MotionChoice, policy_of};
+pub use omission::{Check, Omission};
+pub use options::{AdviseError, AdviseInput, AdviseOptions};
 
-use crate::culling::{Culling, CullingTest};
-use crate::funnel::check_memory;
-use crate::index::StructureSpec;
-use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, Workload, timed_to_end};
-use crate::path::CameraPath;
-use crate::scene::Scene;
+use crate::culling::CullingTest;
+use crate::measure::{
+    OverProcesses, Part, ProcessTimes, ReportCell, Schedule, SharedWork, timed_to_end,
+};
+use crate::motion::Motion;
 use crate::statistics::Estimate;
 
 use case::Case;
@@ -57,6 +60,12 @@ pub struct Advice {
     pub omissions: Vec<Omission>,
     /// Warnings about the cameras in the scene.
     pub warnings: Vec<String>,
+    /// Update policy; null for a still scene.
+    pub motion: Option<MotionChoice>,
+    /// Gain from threads, where structures were measured with several.
+    pub threads: Vec<SharedWork>,
+    /// From which number of items and shares on another structure is faster.
+    pub changes: Vec<Change>,
 }
 
 impl Advice {
@@ -77,6 +86,7 @@ pub struct TrialPlan {
     schedule: Schedule,
     /// Number of ids, by task and camera.
     expected: Vec<Vec<u64>>,
+    beside: Beside,
 }
 
 /// Compared advice before its times.
@@ -87,48 +97,11 @@ pub struct Prepared {
     rules: Vec<(&'static Rule, Result<Draft, String>)>,
     twin: usize,
     answered: Answered,
-    advice: Advice,
-}
-
-/// Bytes per item of the structures and trees of all rules; 950 were measured.
-const BYTES_PER_ITEM: u64 = 1000;
-
-/// Scene, path and options.
-#[derive(Clone, Copy)]
-pub struct AdviseInput<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// The cameras.
-    pub path: &'a CameraPath,
-    /// Structures to choose from.
-    pub structures: &'a [StructureSpec],
-    /// Costs and limits.
-    pub options: &'a AdviseOptions,
-    /// Rounds and times of a process.
-    pub protocol: &'a Protocol,
-}
-
-impl<'a> AdviseInput<'a> {
-    /// Refuses a scene without items and a path without cameras.
-    ///
-    /// # Errors
-    /// [`AdviseError::Refused`].
-    pub fn check(&self) -> Result<(), AdviseError> {
-        let (scene, path) = (&self.scene.name, &self.path.name);
-        let reason = match (self.scene.items.len(), self.path.cameras.len()) {
-            (0, _) => format!("scene '{scene}' has no items; expected at least one"),
-            (_, 0) => format!("path '{path}' has no cameras; expected at least one"),
-            _ => return Ok(()),
-        };
-        Err(AdviseError::Refused(reason))
-    }
-
-    fn workload(&self) -> Result<Workload<'a>, AdviseError> {
-        let needed = BYTES_PER_ITEM * self.scene.items.len() as u64;
-        check_memory(&self.scene.name, needed)
-            .map_err(|error| AdviseError::Refused(error.to_string()))?;
-        Ok(Workload::new(self.scene, self.path, &Culling::default())?)
-    }
+    /// Cells of the run's tasks, and counts of the workloads beside.
+    cells: Vec<ReportCell>,
+    counted: Vec<Part>,
+    structure: StructureChoice,
+    motion: Option<MotionChoice>,
 }
 
 /// Runs every rule with and without its feature on the fastest tree.
@@ -139,15 +112,22 @@ impl<'a> AdviseInput<'a> {
 /// A camera without a view, a scene that a structure of the rules refuses.
 pub fn prepare(
     input: &AdviseInput,
-    mut structure: StructureChoice,
+    cells: Vec<ReportCell>,
     progress: &dyn Fn(&str),
 ) -> Result<Prepared, AdviseError> {
     let AdviseInput { scene, path, .. } = *input;
     let workload = input.workload()?;
-    let specs = structure.tree_and_scan(input.structures)?;
-    structure.note_kinds(input.structures);
-    let structures = specs.each_ref().map(|spec| spec.label.clone());
-    let case = Case::new(&workload, path, specs, input.options, input.protocol)?;
+    let structure = StructureChoice::of(&cells);
+    let structures = structure.tree_and_scan();
+    let items = scene.items.len() as f64;
+    let visible = cells.iter().find_map(|cell| cell.value("visible_count"));
+    let moved = workload.motion.as_ref().map(Motion::share);
+    let here = [Some(items), visible.map(|count| count / items), moved];
+    let contenders = structure.contenders(moved.is_some());
+    let (motion, policies) = MotionChoice::begun(input, &structure, moved).unzip();
+    let labels = [contenders, policies.unwrap_or_default()];
+    let (beside, counted) = Beside::plan(input, labels, here, progress);
+    let case = Case::new(input, &workload, &structures)?;
     let mut entered = Entered::new(&case, progress)?;
     progress("answers, checked");
     let answered = entered.trials.answered();
@@ -161,21 +141,12 @@ pub fn prepare(
             structures,
             schedule: Schedule::new(path.cameras.len(), &tasks, input.protocol),
             expected: answered.counts.clone(),
+            beside,
         },
-        advice: Advice {
-            scene: scene.name.clone(),
-            path: path.name.clone(),
-            items: scene.items.len(),
-            skipped_items: scene.skipped_items,
-            cameras: path.cameras.len(),
-            options: *input.options,
-            processes: 0,
-            twin: None,
-            test: TestChoice::untimed(&case.spec.label),
-            structure,
-            omissions: Vec::new(),
-            warnings: path.warnings(scene),
-        },
+        structure,
+        motion,
+        cells,
+        counted,
         tests: entered.tests,
         rules: entered.rules,
         twin: entered.twin,
@@ -189,16 +160,7 @@ pub fn prepare(
 /// The errors of [`prepare`], and a scene other than the planned one.
 pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, AdviseError> {
     let workload = input.workload()?;
-    let [tree, scan] = &plan.structures;
-    let specs = [tree, scan].map(|label| choice::planned(input.structures, label));
-    let [tree, scan] = specs;
-    let case = Case::new(
-        &workload,
-        input.path,
-        [tree?, scan?],
-        input.options,
-        input.protocol,
-    )?;
+    let case = Case::new(input, &workload, &plan.structures)?;
     let entered = Entered::new(&case, &|_| ())?;
     let (found, planned) = (entered.trials.len(), plan.expected.len());
     let cameras = plan.expected.iter().map(Vec::len);
@@ -212,26 +174,47 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, Advis
     let tasks = entered.trials.tasks(&plan.expected);
     Ok(ProcessTimes {
         once_ns,
+        parts: plan.beside.times(input)?,
         ..ProcessTimes::of(&timed_to_end(&tasks, &plan.schedule, input.protocol))
     })
 }
 
 impl Prepared {
     /// The advice from the times of all processes.
-    pub fn conclude(self, processes: &[ProcessTimes]) -> Advice {
+    pub fn conclude(self, input: &AdviseInput, processes: &[ProcessTimes]) -> Advice {
+        let AdviseInput { scene, path, .. } = *input;
         let (times, answered) = (OverProcesses::of(processes), &self.answered);
-        let mut advice = self.advice;
-        advice.processes = processes.len();
-        advice.twin = times.ratio(self.twin, BASE);
-        let draw_ns = advice.options.draw_ns;
-        let structure = std::mem::take(&mut advice.test.structure);
-        advice.test = TestChoice::of(structure, draw_ns, &self.tests, answered, &times);
+        let ([tree, _], beside) = (self.plan.structures, &self.plan.beside);
+        let test = TestChoice::of(tree, input.options.draw_ns, &self.tests, answered, &times);
+        let groups = beside.groups(self.counted, processes);
+        // Under further policies the first one is the workload itself.
+        let here = groups.first().filter(|_| beside.has_policies());
+        let here = here.map_or(&self.cells, |group| &group.cells);
+        let changes = beside.changes(here, &groups);
+        let choice = (&self.structure, &test, &changes[..]);
         let settled = self.rules.into_iter().map(|(rule, draft)| match draft {
-            Ok(draft) => rule.settled(draft, answered, &times, (&advice.structure, &advice.test)),
+            Ok(draft) => rule.settled(draft, answered, &times, choice),
             Err(reason) => rule.not_applicable(reason),
         });
-        advice.omissions = settled.collect::<Vec<_>>();
-        advice
+        Advice {
+            scene: scene.name.clone(),
+            path: path.name.clone(),
+            items: scene.items.len(),
+            skipped_items: scene.skipped_items,
+            cameras: path.cameras.len(),
+            options: *input.options,
+            processes: processes.len(),
+            twin: times.ratio(self.twin, BASE),
+            omissions: settled.collect(),
+            test,
+            warnings: path.warnings(scene),
+            motion: self
+                .motion
+                .map(|motion| motion.chosen(&self.structure, here)),
+            structure: self.structure,
+            threads: SharedWork::of(&self.cells),
+            changes,
+        }
     }
 }
 

@@ -5,6 +5,24 @@ use serde::Serialize;
 use crate::statistics::{Estimate, flat};
 use crate::verify::ErrorCount;
 
+/// Two times are a tie unless the interval of their ratio lies beyond this.
+///
+/// Of one machine the layout of memory and code alone makes differences of some percent,
+/// which are the other way round in the next run.
+pub(super) const TIE: f64 = 1.05;
+
+/// Returns true if the first of two times is the longer one, from their ratio.
+///
+/// `None` for a tie. Without an interval the value decides.
+pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
+    match (ratio.lower, ratio.upper) {
+        (Some(lower), Some(upper)) => {
+            (lower > TIE || upper < 1.0 / TIE).then_some(ratio.value > 1.0)
+        }
+        _ => Some(ratio.value > 1.0),
+    }
+}
+
 /// A feature that may be left out, with the decision.
 #[derive(Clone, Debug, Serialize)]
 pub struct Omission {
@@ -21,9 +39,6 @@ pub struct Omission {
     /// Time kept and left out, with all that follows from it, ns.
     #[serde(skip)]
     pub cost_ns: Option<[f64; 2]>,
-    /// `true` if the processes do not tell these two apart.
-    #[serde(skip)]
-    pub is_tie: bool,
     /// Assumption or error that decides, in a few words.
     #[serde(skip)]
     pub note: String,
@@ -50,6 +65,9 @@ pub struct Omission {
     pub reason: String,
     /// Measurements with and without the feature; the first one decides.
     pub checks: Vec<Check>,
+    /// `true` if the processes do not tell the costs with and without it apart.
+    #[serde(rename = "tie")]
+    pub is_tie: bool,
 }
 
 /// Side of its threshold on which a statistic leaves out.
@@ -168,6 +186,15 @@ impl Omission {
             Decision::Keep => Some(!self.is_saving),
             Decision::NotApplicable => None,
         }
+    }
+
+    /// Time with and without the feature, with all that follows from it, ns.
+    pub fn sides_ns(&self) -> [f64; 2] {
+        let mut sides = self.cost_ns.unwrap_or([f64::NAN; 2]);
+        if self.is_saving {
+            sides.reverse();
+        }
+        sides
     }
 
     /// Decides by the clock or the rule; a side that misses more is never taken.

@@ -2,8 +2,13 @@
 
 use serde::Serialize;
 
-use crate::index::BuildError;
-use crate::measure::WorkloadError;
+use crate::culling::Culling;
+use crate::funnel::check_memory;
+use crate::index::{BuildError, Execution, StructureSpec};
+use crate::measure::{Protocol, Workload, WorkloadError};
+use crate::motion::Motion;
+use crate::path::CameraPath;
+use crate::scene::Scene;
 
 /// Costs and limits that the advice depends on.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -45,4 +50,94 @@ pub enum AdviseError {
     /// Nothing to cull, nothing to cull for, or another scene than planned.
     #[error("{0}")]
     Refused(String),
+}
+
+/// Bytes per item of the structures and trees of all rules; 950 were measured.
+const BYTES_PER_ITEM: u64 = 1000;
+
+/// Scene, path and options.
+#[derive(Clone, Copy)]
+pub struct AdviseInput<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The cameras.
+    pub path: &'a CameraPath,
+    /// Structures to choose from.
+    pub structures: &'a [StructureSpec],
+    /// Motion of the items, file or spec; `None` for a still scene.
+    pub motion: Option<&'a str>,
+    /// Queries per frame.
+    pub views: usize,
+    /// Costs and limits.
+    pub options: &'a AdviseOptions,
+    /// Rounds and times of a process.
+    pub protocol: &'a Protocol,
+}
+
+impl<'a> AdviseInput<'a> {
+    /// Refuses a scene without items, a path without cameras, an unfit motion.
+    ///
+    /// # Errors
+    /// [`AdviseError::Refused`].
+    pub fn check(&self) -> Result<(), AdviseError> {
+        self.workload().map(|_| ())
+    }
+
+    pub(super) fn workload(&self) -> Result<Workload<'a>, AdviseError> {
+        let (scene, path) = (&self.scene.name, &self.path.name);
+        let refused = |reason: &dyn ToString| AdviseError::Refused(reason.to_string());
+        if self.scene.items.is_empty() {
+            let reason = format!("scene '{scene}' has no items; expected at least one");
+            return Err(refused(&reason));
+        }
+        if self.path.cameras.is_empty() {
+            let reason = format!("path '{path}' has no cameras; expected at least one");
+            return Err(refused(&reason));
+        }
+        let needed = BYTES_PER_ITEM * self.scene.items.len() as u64;
+        check_memory(scene, needed).map_err(|error| refused(&error))?;
+        let motion = self.motion.map(|motion| Motion::load(motion, self.scene));
+        let motion = motion.transpose().map_err(|error| refused(&error))?;
+        let workload = Workload::new(self.scene, self.path, &Culling::default())?;
+        Ok(workload.moved_by(motion, self.views))
+    }
+}
+
+/// The structure that a plan names.
+///
+/// One of the list, one under a policy of the advice's own (`wide@rebuild`), or one of this
+/// crate.
+pub(super) fn planned(
+    structures: &[StructureSpec],
+    label: &str,
+) -> Result<StructureSpec, BuildError> {
+    let (alone, policy) = label.split_once('@').unwrap_or((label, ""));
+    let named = |name: &str| structures.iter().find(|spec| spec.label == name).cloned();
+    let mut spec = match named(label).or_else(|| named(alone)) {
+        Some(spec) => spec,
+        None => {
+            let execution = structures.first().map(|spec| spec.execution);
+            let name = if alone == SCAN { SCAN } else { TREE };
+            return default_of(name, execution.unwrap_or_default());
+        }
+    };
+    spec.policy = policy.parse().unwrap_or(spec.policy);
+    label.clone_into(&mut spec.label);
+    Ok(spec)
+}
+
+/// Structures of the rules where the list has no tree, no scan.
+pub(super) const TREE: &str = "wide";
+pub(super) const SCAN: &str = "linear";
+
+/// A structure of this crate with its default parameters.
+pub(super) fn default_of(
+    name: &'static str,
+    execution: Execution,
+) -> Result<StructureSpec, BuildError> {
+    let spec = StructureSpec::parse(name).map_err(|error| BuildError::Params {
+        structure: name,
+        reason: error.to_string(),
+    })?;
+    Ok(spec.by(execution))
 }

@@ -1,8 +1,9 @@
 //! A rule of omission: its declaration, both sides as tasks, and the omission that
 //! follows from the facts.
 
+use super::change::Change;
 use super::choice::{StructureChoice, TestChoice};
-use super::omission::{By, Check, Decision, LeftOutIf, Omission};
+use super::omission::{By, Check, Decision, LeftOutIf, Omission, is_longer};
 use super::options::AdviseError;
 use super::trials::{Answered, Sides, Trials};
 use crate::measure::OverProcesses;
@@ -40,20 +41,19 @@ pub fn not_applicable(reason: impl ToString) -> Unfit {
     Unfit::NotApplicable(reason.to_string())
 }
 
-/// Structure and test to take.
-type Choice<'f> = (&'f StructureChoice, &'f TestChoice);
+/// Structure and test to take, and where other structures are faster.
+type Choice<'f> = (&'f StructureChoice, &'f TestChoice, &'f [Change]);
 
 /// Measured facts of a rule.
 pub struct Facts<'f> {
     pub checks: Vec<Check>,
-    /// Time of the first / time of the second of each of [`Draft::pairs`].
-    pub ratios: Vec<f64>,
     /// Times of [`Draft::once`], ns.
     pub once_ns: [f64; 2],
     /// Time of the second of these / time of the first.
     pub once_ratio: Option<Estimate>,
     pub structure: &'f StructureChoice,
     pub test: &'f TestChoice,
+    pub changes: &'f [Change],
 }
 
 impl Facts<'_> {
@@ -109,8 +109,6 @@ impl Finding {
 pub struct Draft {
     /// The first check decides.
     pub sides: Vec<Sides>,
-    /// Further tasks that are compared, two by two.
-    pub pairs: Vec<[usize; 2]>,
     /// Index of the first of two things that are timed once in every process.
     pub once: Option<usize>,
     conclude: Box<dyn FnOnce(&Facts) -> Finding>,
@@ -132,7 +130,6 @@ impl Draft {
     ) -> Draft {
         Draft {
             sides,
-            pairs: Vec::new(),
             once: None,
             conclude: Box::new(conclude),
         }
@@ -145,17 +142,16 @@ impl Draft {
         choice: Choice<'f>,
     ) -> Facts<'f> {
         let sides = std::mem::take(&mut self.sides).into_iter();
-        let ratio = |&[a, b]: &[usize; 2]| times.ratio(a, b).map_or(f64::NAN, |r| r.value);
         let once_ns = |n| self.once.map_or(f64::NAN, |first| times.once_ns(first + n));
         Facts {
             checks: sides.map(|sides| sides.check(answered, times)).collect(),
-            ratios: self.pairs.iter().map(ratio).collect(),
             once_ns: [0, 1].map(once_ns),
             once_ratio: self
                 .once
                 .and_then(|first| times.once_ratio(first + 1, first)),
             structure: choice.0,
             test: choice.1,
+            changes: choice.2,
         }
     }
 }
@@ -190,17 +186,27 @@ impl Rule {
         let predicted = finding.predicted.or(predicted);
         let [statistic, threshold] = [0, 1].map(|i| finding.compared.map(|both| both[i]));
         let first = checks.first();
+        let cost_ns = finding
+            .cost_ns
+            .or(first.map(|c| [c.kept_ns, c.left_out_ns]));
+        // Both costs are times of the first check and what follows from counts.
+        let ratio = first.zip(cost_ns).and_then(|(check, [kept, left_out])| {
+            let measured = check.ratio?;
+            let fixed = kept - check.kept_ns;
+            let of = |ratio: f64| (ratio * check.left_out_ns + fixed) / left_out;
+            Some(Estimate {
+                value: kept / left_out,
+                lower: measured.lower.map(of),
+                upper: measured.upper.map(of),
+            })
+        });
+        let is_tie = ratio.is_some_and(|ratio| is_longer(ratio).is_none());
         let mut omission = Omission {
             rule: self.name,
             left_out: self.left_out,
             feature: self.feature,
             is_saving: self.is_saving,
-            cost_ns: finding
-                .cost_ns
-                .or(first.map(|c| [c.kept_ns, c.left_out_ns])),
-            is_tie: finding
-                .is_tie
-                .unwrap_or(finding.cost_ns.is_none() && first.is_some_and(|c| c.pays.is_none())),
+            cost_ns,
             note: finding.note,
             statistic_name: self.statistic_name,
             statistic: statistic.filter(|x| x.is_finite()),
@@ -212,6 +218,7 @@ impl Rule {
             confirmed: finding.confirmed,
             reason: finding.reason,
             checks,
+            is_tie: finding.is_tie.unwrap_or(is_tie),
         };
         if let Some(predicted) = predicted {
             omission.decide(self.by, predicted);

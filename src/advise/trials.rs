@@ -6,7 +6,7 @@
 use std::ops::Deref;
 
 use super::case::{Case, some_of};
-use super::omission::Check;
+use super::omission::{Check, is_longer};
 use crate::culling::CameraView;
 use crate::index::DynIndex;
 use crate::measure::{Ask, OverProcesses, TimedTask};
@@ -193,15 +193,14 @@ impl Sides {
         let (kept, left_out) = (self.kept, self.left_out);
         let ns = |task| times.ns(task).map_or(f64::NAN, |found| found.value);
         let errors = [kept, left_out].map(|task| answered.errors(task));
+        let ratio = times.ratio(kept, left_out);
         let excess = |errors: &Option<ErrorCount>| errors.as_ref().and_then(ErrorCount::excess);
         let missed = |errors: &Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
-        let faster = times.is_faster(left_out, kept);
-        let slower = times.is_faster(kept, left_out);
         Check {
             on: self.on,
             kept_ns: ns(kept),
             left_out_ns: ns(left_out),
-            ratio: times.ratio(kept, left_out),
+            ratio,
             same_answers: self.same_answers,
             same_expected: self.same_expected,
             kept_excess: excess(&errors[0]),
@@ -210,7 +209,7 @@ impl Sides {
             left_out_false_negative_ppm: missed(&errors[1]),
             errors: errors[0].zip(errors[1]).map(|(kept, left)| [kept, left]),
             judged: answered.judged,
-            pays: (faster || slower).then_some(faster),
+            pays: ratio.and_then(is_longer),
         }
     }
 }

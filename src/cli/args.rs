@@ -13,8 +13,8 @@ use super::command_args::FunnelArgs;
 use super::command_args::SceneCommand;
 use super::command_args::ViewArgs;
 use super::shared_args::{
-    CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs, TableFormat,
-    WhatArgs,
+    CullingArgs, KernelArgs, LensArgs, MotionArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs,
+    TableFormat, WhatArgs,
 };
 use super::{program, text, values};
 
@@ -108,21 +108,12 @@ pub struct ListArgs {
 const RUN_HELP: &str = include_str!("assets/help/run.txt");
 
 #[derive(Args, Debug)]
-#[command(after_help = RUN_HELP)]
+#[command(after_help = RUN_HELP, mut_arg("motion", |arg| arg.conflicts_with("cold")))]
 pub struct RunArgs {
     #[command(flatten)]
     pub what: WhatArgs,
-    /// Move the items: a spec (see `list motions`) or a motion CSV. Measures frames, an
-    /// update and queries each, in place of still scenes; may be repeated
-    #[arg(long, value_name = "MOTION", conflicts_with = "cold")]
-    pub motion: Vec<String>,
-    /// Queries per frame, along the path
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "motion", value_parser = values::whole(1..=1000usize))]
-    pub views: usize,
-    /// Work of a frame, a row for each: refit, rebuild, every=N (rebuilt in every n-th
-    /// frame), fat=M (bounds enlarged by M item sizes: fewer updates, false positives)
-    #[arg(long, value_name = "LIST", requires = "motion")]
-    pub update: Option<String>,
+    #[command(flatten)]
+    pub moves: MotionArgs,
     /// Folder for the page, the report, the samples and the stream [default: a
     /// new one under results/]
     #[arg(long, value_name = "DIR")]
@@ -324,6 +315,8 @@ pub struct PrecisionArgs {
 pub struct AdviseArgs {
     #[command(flatten)]
     pub study: StudyArgs,
+    #[command(flatten)]
+    pub moves: MotionArgs,
     /// Cost of drawing an item that is not visible, ns
     #[arg(long, value_name = "NS", default_value_t = 1000.0, value_parser = values::at_least_zero)]
     pub draw_ns: f64,

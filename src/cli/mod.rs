@@ -8,6 +8,7 @@
 //! or bad input; 3 a regression, in `compare`; 130 interrupted.
 
 mod advise;
+mod advise_table;
 mod against;
 mod against_table;
 mod args;
@@ -28,6 +29,7 @@ mod interrupt;
 mod list;
 mod merge;
 mod plan;
+mod policies;
 mod precision;
 mod precision_conclusions;
 mod precision_tables;

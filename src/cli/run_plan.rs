@@ -8,7 +8,7 @@ use anyhow::{bail, ensure};
 use super::args::RunArgs;
 use super::shared_args::WhatArgs;
 use crate::culling::Culling;
-use crate::index::{Registry, StructureSpec, UpdatePolicy};
+use crate::index::Registry;
 use crate::input::{InputError, note, tell_warnings};
 use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
 use crate::motion::Motion;
@@ -34,11 +34,7 @@ pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
     if let Some(processes) = args.processes {
         planned.plan.effort.processes = processes;
     }
-    planned.plan.motions.clone_from(&args.motion);
-    if let Some(list) = &args.update {
-        planned.plan.structures = under_policies(list, &planned.plan.structures)?;
-    }
-    planned.plan.views_per_frame = args.views;
+    args.moves.enter(&mut planned.plan)?;
     planned.check_motions()?;
     if let Some(text) = &args.shard {
         let (i, n) = shard(text)?;
@@ -91,41 +87,6 @@ pub fn plan_of(
         from_suite: args.scene.is_empty() && args.path.is_empty(),
         whole: Vec::new(),
     })
-}
-
-/// The structures under each policy of a comma-separated list, `wide@every=10`.
-///
-/// Labels stay as they are under [`UpdatePolicy::Refit`]. A structure that does not
-/// refit is built again in any case: it appears once beside fat bounds.
-fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSpec>, SpecError> {
-    let mut policies: Vec<UpdatePolicy> = Vec::new();
-    for text in list.split(',').map(str::trim) {
-        let policy = text.parse()?;
-        if policies.contains(&policy) {
-            return Err(SpecError::new(format_args!(
-                "--update '{text}' is named twice; expected each once"
-            )));
-        }
-        policies.push(policy);
-    }
-    let mut all = Vec::new();
-    for spec in specs {
-        let refits = spec.info().capabilities.refits;
-        let mut has_rebuilt = false;
-        for &policy in &policies {
-            let mut own = spec.clone();
-            own.policy = policy;
-            match policy {
-                UpdatePolicy::Fat(_) => own.label += &format!("@{policy}"),
-                _ if !refits && has_rebuilt => continue,
-                _ if !refits => (own.policy, has_rebuilt) = (UpdatePolicy::Refit, true),
-                UpdatePolicy::Refit => (),
-                _ => own.label += &format!("@{policy}"),
-            }
-            all.push(own);
-        }
-    }
-    Ok(all)
 }
 
 /// "2/4": the second of four shares.
@@ -308,33 +269,4 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputErro
         }
     }
     Ok(scenes)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn policies_make_rows_and_mistakes_are_named() {
-        let specs = Registry::builtin()
-            .structures("wide,octree-textbook")
-            .unwrap();
-        let labels = |list: &str| -> Result<Vec<String>, String> {
-            let all = under_policies(list, &specs).map_err(|e| e.to_string())?;
-            Ok(all.into_iter().map(|spec| spec.label).collect())
-        };
-        let all = "wide,wide@rebuild,wide@every=10,wide@fat=0.1,octree-textbook,\
-                   octree-textbook@fat=0.1";
-        let found = labels("refit,rebuild,every=10,fat=10%").unwrap();
-        assert_eq!(found.join(","), all);
-        assert_eq!(
-            labels("rebuild").unwrap(),
-            ["wide@rebuild", "octree-textbook"]
-        );
-        for bad in ["", "often", "every", "every=1", "fat=0", "fat=x", "refit=1"] {
-            let error = labels(bad).unwrap_err();
-            assert!(error.contains("expected refit, rebuild"), "{bad}: {error}");
-        }
-        assert!(labels("refit,refit").unwrap_err().contains("named twice"));
-    }
 }

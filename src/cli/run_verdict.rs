@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::text;
-use crate::measure::{Status, YARDSTICK};
+use crate::measure::{SharedWork, Status, YARDSTICK};
 use crate::report::{Comparison, Mean, Overall, ReportCell, times_as_fast};
 
 /// "a", "a and b", "a, b and c".
@@ -42,27 +42,28 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     told.join(" ")
 }
 
-/// Wall times where threads share a query, or the views of all cameras.
+/// Gains from threads that share a query, or the views of all cameras.
 fn shared(comparison: &Comparison) -> Option<String> {
-    let wall = |cell: &ReportCell, name: &str| cell.metrics.get(name).map(|m| m.value);
-    let told = comparison.sound().filter_map(|cell| {
-        let label = &cell.structure;
-        let own = label
-            .rsplit_once("threads=")
-            .map(|(alone, _)| &alone[..alone.len() - 1]);
-        let (what, shared) = match own {
-            Some(_) => ("", wall(cell, "query_wall_ns")?),
-            None => (" with shared views", wall(cell, "views_wall_ns")?),
+    gains(&SharedWork::of(comparison.sound()))
+}
+
+/// Wall time, gain and CPU time of work that threads share.
+pub fn gains(shared: &[SharedWork]) -> Option<String> {
+    let told = shared.iter().map(|work| {
+        let what = if work.shares_views {
+            " with shared views"
+        } else {
+            ""
         };
-        let alone = own.map_or(Some(cell), |own| {
-            comparison.sound().find(|c| c.structure == own)
+        let cpu = text::some(work.cpu_ratio, |ratio| {
+            format!(", {} the CPU time", times(ratio))
         });
-        let gain = wall(alone?, "query_wall_ns")? / shared;
-        Some(format!(
-            "{label}{what} {} ({})",
-            text::time(shared),
-            times(gain)
-        ))
+        let wall = text::time(work.wall_ns);
+        format!(
+            "{}{what} {wall} ({}{cpu})",
+            work.structure,
+            times(work.wall_gain)
+        )
     });
     let told: Vec<String> = told.collect();
     let ranked = "CPU time of all threads ranks; wall time per view, and one thread's / it:";

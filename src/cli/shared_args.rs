@@ -2,6 +2,7 @@
 //!
 //! Scenes, lenses, culling tests, instruction sets, and the processes of a study.
 
+use super::policies::under_policies;
 use super::values;
 use crate::camera::{
     DEFAULT_EPSILON, MATRIX_CONVENTIONS, PLANE_METHODS, PlaneMethod, PlaneOptions,
@@ -9,7 +10,7 @@ use crate::camera::{
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, TESTS};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
-use crate::measure::{Machine, Protocol};
+use crate::measure::{Machine, Plan, Protocol};
 use crate::path::LensDefaults;
 use crate::scene::{ITEM_KINDS, ItemKind, LoadOptions, UP_AXES, UpAxis};
 use crate::spec::SpecError;
@@ -87,6 +88,34 @@ pub struct WhatArgs {
     pub culling: CullingArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
+}
+
+/// Motion of the items, and the frames of it.
+#[derive(Args, Debug)]
+pub struct MotionArgs {
+    /// Move the items: a spec (see `list motions`) or a motion CSV. Measures frames, an
+    /// update and queries each, in place of still scenes; run: may be repeated
+    #[arg(long, value_name = "MOTION")]
+    pub motion: Vec<String>,
+    /// Queries per frame, along the path
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "motion", value_parser = values::whole(1..=1000usize))]
+    pub views: usize,
+    /// Work of a frame, a row for each: refit, rebuild, every=N (rebuilt in every n-th
+    /// frame), fat=M (bounds enlarged by M item sizes: fewer updates, false positives)
+    #[arg(long, value_name = "LIST", requires = "motion")]
+    pub update: Option<String>,
+}
+
+impl MotionArgs {
+    /// Enters motions, queries per frame and policies into a plan.
+    pub fn enter(&self, plan: &mut Plan) -> Result<(), SpecError> {
+        plan.motions.clone_from(&self.motion);
+        plan.views_per_frame = self.views;
+        if let Some(list) = &self.update {
+            plan.structures = under_policies(list, &plan.structures)?;
+        }
+        Ok(())
+    }
 }
 
 /// Instruction set and threads; answers do not depend on them.

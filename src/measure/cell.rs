@@ -127,6 +127,12 @@ impl ReportCell {
         self.metrics.get(self.ranked_by())
     }
 
+    /// ln of a time in each process, ns, by its metric; empty without one.
+    pub fn ln_ns(&self, metric: &str) -> Vec<f64> {
+        let own = self.times.by_process.get(metric).into_iter().flatten();
+        own.map(|ns| ns.ln()).collect()
+    }
+
     /// A metric's value, if the cell has it.
     pub fn value(&self, metric: &str) -> Option<f64> {
         self.metrics.get(metric).map(|m| m.value)

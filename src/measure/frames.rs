@@ -48,10 +48,9 @@ struct Entry<'a> {
     rounds: Vec<Vec<Laps>>,
 }
 
-/// Measures a group in this process, [`measure_part`] for a still scene.
-///
-/// `None` if stopped.
-pub(super) fn measure_queries_or_frames(
+/// Measures a group in this process: queries of a still scene, or frames; `None` if
+/// stopped.
+pub fn measure_queries_or_frames(
     workload: &Workload,
     subjects: &[Subject],
     plan: GroupPlan<'_>,

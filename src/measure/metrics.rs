@@ -68,6 +68,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, summary }
     "ageing_100", "1", "as ageing_1, after 100 frames";
     "ageing_1000", "1", "as ageing_1, after 1,000 frames";
     "memory_after_bytes_per_item", "bytes", "as memory_bytes_per_item, after the last frame";
+    "views_ns", "ns", "CPU time of all threads per view where they share the views of all timed cameras; as query_ns";
 };
 
 /// Metrics of wall time, each with its task.

@@ -26,6 +26,7 @@
 //! | `frames`, `moving` | groups whose items move: update and queries, frame by frame |
 //! | `update`, `refitted`, `bounds` | updates of moved items; lower bounds |
 //! | `results`, `cell`, `metrics` | cells of a report from parts |
+//! | `shared_work` | gain from threads |
 //! | `over_processes` | times of a study's tasks over several processes |
 //! | `guarded`, `progress`, `environment` | panics as verdicts; progress; machine and toolchain |
 
@@ -48,6 +49,7 @@ mod progress;
 mod refitted;
 mod results;
 mod schedule;
+mod shared_work;
 mod task;
 mod timing;
 mod update;
@@ -68,6 +70,7 @@ pub use experiment::{
     Effort, ExperimentError, Extras, Plan, PlannedScene, SceneGroup, Share, measure_group,
     measure_scene,
 };
+pub use frames::measure_queries_or_frames;
 pub use group::{GroupPlan, NO_ITEMS, measure_part};
 pub use guarded::guarded;
 pub use index_under_test::{Built, Subject};
@@ -78,6 +81,7 @@ pub use process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
 pub use progress::{Notice, TIMING};
 pub use results::{Group, YARDSTICK};
 pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, Tasks, cameras_within};
+pub use shared_work::SharedWork;
 pub use task::{Ask, AskMany, TimedTask};
 pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
 pub use update::{UPDATE_SHARES, move_share};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 #[cfg(doc)]
 use super::Tasks;
-use super::{Timed, Verdict};
+use super::{Part, Timed, Verdict};
 use crate::statistics::{ALPHA, Estimate, is_less, one_run, ratio};
 
 /// Times of the tasks of a schedule in one process, in the order of the schedule.
@@ -21,6 +21,9 @@ pub struct ProcessTimes {
     pub once_ns: Vec<f64>,
     /// Per task and camera: median CPU ns over the rounds; empty unless requested.
     pub by_camera: Vec<Vec<f64>>,
+    /// Groups of cells that are measured beside the tasks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<Part>,
 }
 
 impl ProcessTimes {
@@ -154,7 +157,7 @@ mod tests {
         ProcessTimes {
             ln_ns: ln_ns.map(|ln_ns| Ok(Some(ln_ns))).into(),
             once_ns: vec![once, 2.0 * once],
-            by_camera: Vec::new(),
+            ..ProcessTimes::default()
         }
     }
 

@@ -30,10 +30,11 @@ const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
 
 /// Metrics of each task: its time, and its speed-up over the yardstick.
 /// The last speed-up counts: that of whole frames where items move.
-const TIME_METRICS: [(TaskKind, &str, Option<&str>); 6] = [
+const TIME_METRICS: [(TaskKind, &str, Option<&str>); 7] = [
     (TaskKind::Query, "query_ns", Some("speedup")),
     (TaskKind::Locate, "locate_ns", Some("locate_speedup")),
     (TaskKind::LocateBatched, "locate_batched_ns", None),
+    (TaskKind::Views, "views_ns", None),
     (TaskKind::Update, "update_ns", None),
     (TaskKind::Further, "further_query_ns", None),
     (TaskKind::Frame, "frame_ns", Some("speedup")),
@@ -53,7 +54,7 @@ const TAIL_METRICS: [(&str, f64); 4] = [
 /// Label of the structure that speed-ups refer to.
 pub const YARDSTICK: &str = "linear";
 
-/// All cells of a group, and the results of lower bounds, twin and region search.
+/// All cells of a group, and the results of lower bounds and the twin.
 #[non_exhaustive]
 pub struct Group {
     /// Cells of the structures, in the order of the plan.
@@ -64,8 +65,6 @@ pub struct Group {
     ///
     /// The interval should contain 1.
     pub twin: Option<(String, Estimate)>,
-    /// Ranks of the structures by their times of region search, by label.
-    pub located: Vec<(String, usize)>,
 }
 
 impl Group {
@@ -81,16 +80,12 @@ impl Group {
             .filter(|s| !s.label.ends_with(TWIN))
             .map(|subject| merged.cell(subject))
             .collect();
-        for (i, rank) in merged.ranks(&cells, merged.ranked()) {
+        for (i, rank) in merged.ranks(&cells) {
             cells[i].rank = Some(rank);
         }
-        let located = merged.ranks(&cells, TaskKind::Locate).into_iter();
         Group {
             bounds: first.bounds.iter().map(|name| merged.bound(name)).collect(),
             twin: merged.twin(),
-            located: located
-                .map(|(i, rank)| (cells[i].structure.clone(), rank))
-                .collect(),
             cells,
         }
     }
@@ -430,15 +425,15 @@ impl<'p> MergedParts<'p> {
         Some((original.to_owned(), self.ratio(twin, original)?))
     }
 
-    /// Index and rank of each ok cell that has times of a task.
-    fn ranks(&self, cells: &[ReportCell], task: TaskKind) -> Vec<(usize, usize)> {
+    /// Index and rank of each ok cell that has times.
+    fn ranks(&self, cells: &[ReportCell]) -> Vec<(usize, usize)> {
         let ok = cells.iter().enumerate();
         let ok = ok.filter(|(_, cell)| cell.status == Status::Ok);
         // Fat bounds answer another question: no rank beside exact ones.
         let is_exact = |cell: &ReportCell| cell.value("false_positive_count").unwrap_or(0.0) == 0.0;
         let ok = ok.filter(|(_, c)| c.path.motion.is_empty() || is_exact(c));
         let timed = ok.filter_map(|(i, cell)| {
-            let [reference, own] = self.paired(&cell.structure, task)?;
+            let [reference, own] = self.paired(&cell.structure, self.ranked())?;
             let relative = own.iter().zip(reference).map(|(own, r)| own - r);
             Some((i, relative.collect()))
         });

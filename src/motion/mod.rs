@@ -151,6 +151,30 @@ impl Motion {
         self.frames
     }
 
+    /// Share of the items that move in a frame, mean.
+    pub fn share(&self) -> f64 {
+        let moves = match &self.source {
+            Source::Generated { movers, .. } => (self.frames * movers) as f64,
+            Source::Recorded(recorded) => recorded.moves() as f64,
+        };
+        moves / (self.frames * self.items).max(1) as f64
+    }
+
+    /// The spec of this motion with at most `frames` frames.
+    ///
+    /// With another share of movers if given; `None` of a recorded motion.
+    pub fn respecified(&self, share: Option<f64>, frames: usize) -> Option<String> {
+        let spec = match self.source {
+            Source::Generated { .. } => Spec::parse(&self.name).ok()?,
+            Source::Recorded(_) => return None,
+        };
+        let is_kept = |key: &str| key != "frames" && (share.is_none() || key != "share");
+        let kept = spec.given().filter(|(key, _)| is_kept(key));
+        let mut text = format!("{}:frames={}", spec.name(), self.frames.min(frames));
+        kept.for_each(|(key, value)| text += &format!(",{key}={value}"));
+        Some(text + &share.map_or_else(String::new, |share| format!(",share={share}")))
+    }
+
     /// SHA-256 of what the frames follow from, beside the scene.
     pub fn digest(&self) -> String {
         let mut hash = hmac_sha256::Hash::new();

@@ -26,6 +26,11 @@ impl Recorded {
         self.ends.len()
     }
 
+    /// Number of rows of all frames.
+    pub(super) fn moves(&self) -> usize {
+        self.ids.len()
+    }
+
     /// Ids, ascending, and their bounds.
     pub(super) fn frame(&self, n: usize) -> (&[ItemId], &[Aabb]) {
         let first = n.checked_sub(1).map_or(0, |before| self.ends[before]);

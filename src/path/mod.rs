@@ -50,6 +50,25 @@ impl CameraPath {
         self
     }
 
+    /// The path with far planes scaled so that a share of the items is visible.
+    ///
+    /// A known scale is not searched for.
+    ///
+    /// # Errors
+    /// A share that no scale reaches.
+    pub fn seeing(
+        mut self,
+        scene: &Scene,
+        share: f64,
+        scale: Option<f64>,
+    ) -> Result<CameraPath, PathError> {
+        let find = || calibrate::for_visible_share(&self.name, scene, &self.cameras, share);
+        let scale = scale.map_or_else(find, Ok)?;
+        self.cameras = calibrate::scaled(&self.name, &self.cameras, scale)?;
+        self.lens_scale = Some(scale);
+        Ok(self)
+    }
+
     /// Label of a camera in messages: its line in the file, or its index.
     pub fn place(&self, index: usize) -> String {
         match self.lines.get(index) {
@@ -296,19 +315,16 @@ fn read(
         let reason = "no camera in it; expected at least one";
         return Err(PathError::unfit(source, reason));
     }
-    let mut path = CameraPath {
+    let path = CameraPath {
         name: source.to_owned(),
         cameras,
         lines: Vec::new(),
         lens_scale: None,
     };
-    if let Some(share) = optics.visible {
-        let find = || calibrate::for_visible_share(source, scene, &path.cameras, share);
-        let scale = scale.map_or_else(find, Ok)?;
-        path.cameras = calibrate::scaled(source, &path.cameras, scale)?;
-        path.lens_scale = Some(scale);
+    match optics.visible {
+        Some(share) => path.seeing(scene, share, scale),
+        None => Ok(path),
     }
-    Ok(path)
 }
 
 /// Refuses more cameras than there is memory for.

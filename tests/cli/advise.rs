@@ -49,19 +49,19 @@ pub fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
 #[test]
 fn json_has_the_documented_fields() {
     let top = "scene path items skipped_items cameras options processes twin structure test omissions \
-         warnings";
+         warnings motion threads changes";
     let options = "draw_ns shade_ns tolerance moved queries_per_update";
     let structure = "name ties region_search region_search_ties rows";
     let times = "query_ns query_ns_lower query_ns_upper";
     let structure_row = format!(
         "structure status reason {times} speedup build_ms memory_bytes_per_item \
-         break_even_queries locate_ns"
+         break_even_queries locate_ns frame_ns frame_ns_lower frame_ns_upper update_ns worst_frame_ns"
     );
     let test = "name ties structure rows";
     let test_row =
         format!("test {times} excess false_negative_ppm false_positives_per_query total_ns");
     let omission = "rule left_out statistic_name statistic threshold left_out_if predicted saving \
-         decision confirmed reason checks";
+         decision confirmed reason checks tie";
     let check = "on kept_ns left_out_ns ratio ratio_lower ratio_upper same_answers same_expected \
          kept_excess left_out_excess kept_false_negative_ppm left_out_false_negative_ppm";
     let told = include_str!("../../docs/METHODOLOGY.md");
@@ -97,6 +97,129 @@ fn json_has_the_documented_fields() {
         (number(advice, "items"), number(advice, "cameras")),
         (900.0, 6.0)
     );
+    assert!(advice["motion"].is_null() && array(advice, "threads").is_empty());
+    let moving = moving();
+    one(
+        &moving["motion"],
+        "name share_moved views policy policy_ties policies ruled_out",
+    );
+    one(
+        &array(moving, "threads")[0],
+        "structure shares_views wall_ns wall_gain cpu_ratio",
+    );
+    for advice in [advice, moving] {
+        for change in array(advice, "changes") {
+            one(change, "axis here measured below above");
+            for turn in ["below", "above"].map(|side| &change[side]) {
+                if !turn.is_null() {
+                    one(turn, "structure at lower upper");
+                    let at = ["lower", "at", "upper"].map(|name| number(turn, name));
+                    assert!(at.is_sorted() && at[0] > 0.0, "{turn}");
+                    assert_ne!(turn["structure"], advice["structure"]["name"]);
+                }
+            }
+        }
+    }
+}
+
+/// Options of frames of moving items, and of two threads.
+const MOVING: &str = "--scene city:n=400 --path orbit:frames=4 --structure linear,wide,octree-textbook \
+     --motion drift:share=10%,frames=12 --views 2 --update refit,every=5 --threads 1,2";
+
+/// Advice about moving items.
+fn moving() -> &'static Value {
+    static OUTCOME: OnceLock<Value> = OnceLock::new();
+    OUTCOME.get_or_init(|| advice(Path::new("."), &format!("advise {MOVING}")))
+}
+
+#[test]
+fn advice_on_moving_items_has_the_rows_of_a_run() {
+    let planned = works(Path::new("."), &format!("run --plan {MOVING}"));
+    let planned: BTreeSet<String> = planned
+        .lines()
+        .map(|line| {
+            json(line)["structure"]
+                .as_str()
+                .expect("a label")
+                .to_owned()
+        })
+        .collect();
+    let rows = array(&moving()["structure"], "rows");
+    let label = |row: &Value| row["structure"].as_str().expect("a label").to_owned();
+    assert_eq!(rows.iter().map(label).collect::<BTreeSet<_>>(), planned);
+    assert!(planned.contains("wide@every=5") && planned.contains("linear:threads=2"));
+    let times: Vec<f64> = rows.iter().map(|row| number(row, "frame_ns")).collect();
+    assert!(times.is_sorted(), "{times:?}");
+    assert_eq!(moving()["structure"]["name"], rows[0]["structure"]);
+    for row in rows {
+        let parts = number(row, "update_ns") + number(row, "query_ns");
+        assert!(parts <= number(row, "frame_ns") * 1.001, "{row}");
+    }
+    let motion = &moving()["motion"];
+    assert_eq!(
+        (number(motion, "share_moved"), number(motion, "views")),
+        (0.1, 2.0)
+    );
+    assert_eq!(rule(moving(), "rebuild")["decision"], "not_applicable");
+    let shared = &array(moving(), "threads")[0];
+    assert_eq!(
+        (&shared["structure"], &shared["shares_views"]),
+        (&"linear:threads=2".into(), &false.into())
+    );
+}
+
+#[test]
+fn other_numbers_of_items_and_shares_are_measured() {
+    let of = |advice: &Value| -> Vec<(String, Vec<f64>)> {
+        let own = array(advice, "changes").iter().map(|change| {
+            let measured = array(change, "measured")
+                .iter()
+                .map(|x| x.as_f64().expect("a number"));
+            let here = [number(change, "here")];
+            (
+                change["axis"].as_str().expect("an axis").to_owned(),
+                measured.chain(here).collect(),
+            )
+        });
+        own.collect()
+    };
+    let (still, moving) = (of(small()), of(moving()));
+    let axes = |of: &[(String, Vec<f64>)]| {
+        of.iter()
+            .map(|row| row.0.clone())
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    assert_eq!(axes(&still), "items share_in_view");
+    assert_eq!(axes(&moving), "items share_in_view share_moved");
+    assert_eq!(still[0].1, [90.0, 900.0, 900.0]);
+    assert_eq!(moving[0].1, [40.0, 400.0, 400.0]);
+    // Of 400 items none moves at 0.01 %, one at 0.1 %.
+    assert_eq!(moving[2].1, [0.0025, 1.0, 0.1]);
+    for (axis, [low, high, here]) in still
+        .iter()
+        .chain(&moving)
+        .map(|(a, v)| (a, [v[0], v[1], v[2]]))
+    {
+        assert!(
+            low < high && low <= here && here <= high,
+            "{axis}: {low} {high} {here}"
+        );
+    }
+}
+
+#[test]
+fn policies_are_weighed_without_being_named() {
+    let line = "advise --scene uniform:n=300 --path orbit:frames=4 --structure wide --motion swarm:frames=10";
+    let told = works(Path::new("."), &format!("{line} --processes 1"));
+    for part in [
+        "In motion, 100 % of the items and 1 query per frame: ",
+        "A frame takes ",
+        "every=10 ",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    assert!(!told.contains("Another structure"), "{told}");
 }
 
 #[test]
@@ -420,6 +543,13 @@ fn mistakes_are_one_line() {
         ("--moved some", "--moved is 'some'"),
         ("--processes 0", "0 | --processes"),
         ("--fovy 0", "--fovy is '0'"),
+        ("--update refit", "--motion"),
+        ("--motion drfit", "drfit | did you mean 'drift'"),
+        (
+            "--motion drift --motion doors",
+            "--motion 'doors' | one motion",
+        ),
+        ("--motion drift --update often", "--update 'often'"),
     ] {
         all_refused(&folder, &[format!("{line} {more}")], wanted);
     }

@@ -7,8 +7,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use super::super::case::{Case, some_of};
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Rule, Unfit, not_applicable};
+use super::super::rule::{Draft, Unfit, not_applicable};
 use super::super::trials::{Sides, Trials, mean};
 use super::removal::{PROBED, Removal, weighed};
 use crate::funnel::World;
@@ -17,17 +16,6 @@ use crate::query::ItemId;
 use crate::scene::{ItemShape, Surfaces};
 use crate::visibility::triangle::{
     Clusters, Cone, Eye, MOST_TRIANGLES, SafeCones, Selection, TriangleCull,
-};
-
-pub(super) const RULE: Rule = Rule {
-    name: "cones",
-    left_out: "normal cones of clusters of triangles",
-    feature: "normal cones",
-    is_saving: false,
-    statistic_name: "share of the triangles of the items in the view whose cluster faces away",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
 };
 
 /// Items of a camera whose triangles are looked at, evenly spread.
@@ -50,7 +38,7 @@ struct Seen {
 /// Enters both sides on a few cameras, which stand for those that follow them.
 ///
 /// An answer has the item of each cluster with a triangle left.
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let world = case.world.as_ref().map_err(not_applicable)?;
     let cameras = case.cameras();

@@ -2,23 +2,11 @@
 //! nothing either, and let through a margin that is mostly far too thin to hold
 //! an item.
 
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::culling::{Arithmetic, Culling, CullingTest};
 
-pub(super) const RULE: Rule = Rule {
-    name: "f64-kernel",
-    left_out: "the plane test in f64",
-    feature: "double precision",
-    is_saving: false,
-    statistic_name: "margin for rounding to f32 / depth of the view",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
-};
-
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let in_f64 = Culling {
         arithmetic: Arithmetic::F64,

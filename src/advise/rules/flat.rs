@@ -2,26 +2,15 @@
 //! leaves are wide, an octree's third split parts nothing. Bounds stay
 //! three-dimensional either way.
 
-use super::super::choice::named;
-use super::super::omission::{By, Decision, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Unfit};
+use super::super::omission::Decision;
+use super::super::options::default_of;
+use super::super::rule::{Draft, Finding, Unfit};
 use super::super::trials::{Sides, Trials};
 
-pub(super) const RULE: Rule = Rule {
-    name: "third-dimension",
-    left_out: "the third dimension of cells",
-    feature: "third dimension",
-    is_saving: false,
-    statistic_name: "height of the scene",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Time,
-    prepare,
-};
-
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let (scene, by) = (case.scene(), case.spec.execution);
-    let (octree, quadtree) = (named("octree", by)?, named("quadtree", by)?);
+    let (octree, quadtree) = (default_of("octree", by)?, default_of("quadtree", by)?);
     let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
     let extent = scene.bounds.max.as_dvec3() - scene.bounds.min.as_dvec3();
     let mut extents = extent.to_array();
@@ -40,6 +29,7 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
         let taken = facts.structure.name.as_deref().unwrap_or_default();
         let flat = taken.starts_with("quadtree");
         let is_either = flat || taken.starts_with("octree");
+        let is_either = is_either && facts.structure.ties.is_empty();
         Finding {
             saving: facts.saving(),
             decision: is_either.then_some(Decision::of(flat)),

@@ -2,22 +2,10 @@
 //! straightened drift by some 2e-8 a step. A frame that is built for each
 //! camera, or takes few steps, does not need it. Checked by walking.
 
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::Trials;
 use crate::drift::rotations;
 use crate::statistics::Estimate;
-
-pub(super) const RULE: Rule = Rule {
-    name: "frame-correction",
-    left_out: "correcting an f32 camera frame between steps",
-    feature: "basis correction",
-    is_saving: false,
-    statistic_name: "drift after all steps of the path, radians",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
-};
 
 /// Drift of an f32 frame per step, radians: docs/NUMERICS.md.
 const DRIFT: f64 = 2e-8;
@@ -26,7 +14,7 @@ const MUCH_LESS: f64 = 0.1;
 const KEPT: &str = "f32-polar-100";
 const LEFT_OUT: &str = "f32";
 
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let tolerance = trials.case.options.tolerance;
     let steps = trials.case.workload.cameras.len() as u64;
     let rotations = rotations(&[KEPT, LEFT_OUT], steps);

@@ -3,8 +3,7 @@
 
 use std::rc::Rc;
 
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Unfit};
+use super::super::rule::{Draft, Finding, Unfit};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::culling::CameraView;
 use crate::geometry::{Aabb, ConvexVolume, FrustumPlane};
@@ -12,21 +11,10 @@ use crate::index::DynIndex;
 use crate::query::Predicate;
 use crate::shown::counted;
 
-pub(super) const RULE: Rule = Rule {
-    name: "needless-planes",
-    left_out: "planes that the whole scene is inside of",
-    feature: "every plane",
-    is_saving: false,
-    statistic_name: "share of all planes that the n-vertex of the scene's bounds is inside of",
-    left_out_if: LeftOutIf::AtLeast,
-    by: By::Time,
-    prepare,
-};
-
 /// Share of the planes below which the saving is lost in noise.
 const THRESHOLD: f64 = 0.01;
 
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let bounds = &case.scene().bounds;
     let (mut needless, mut far, mut all) = (0, 0, 0);

@@ -2,34 +2,11 @@
 //! left out where it looks down on them. Predicted from a few of the cameras.
 
 use super::super::case::{BUFFER, Case};
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Rule, Unfit, not_applicable};
+use super::super::rule::{Draft, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use super::removal::{PROBED, of_items};
 use crate::funnel::{OCCLUSION_ROWS, Run};
 use crate::visibility::SampleGrid;
-
-pub(super) const RULE: Rule = Rule {
-    name: "occlusion",
-    left_out: "occlusion culling",
-    feature: "occlusion culling",
-    is_saving: false,
-    statistic_name: "share of the items in the view that others hide",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
-};
-
-pub(super) const BUFFER_RULE: Rule = Rule {
-    name: "occlusion-buffer",
-    left_out: "half of the occlusion buffer's columns and rows",
-    feature: "320x180 buffer",
-    is_saving: false,
-    statistic_name: "share of the items left by 160x90 that 320x180 removes as well",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare: prepare_buffer,
-};
 
 /// The buffer with half of the columns and rows of [`BUFFER`].
 const SMALL: SampleGrid = SampleGrid::new(BUFFER.width / 2, BUFFER.height / 2);
@@ -49,7 +26,7 @@ fn masked_inner<'c>(case: &'c Case, buffer: SampleGrid) -> Result<Run<'c>, Unfit
 ///
 /// Rays to a few items predicted 68 % of a wood, of which 28 % is removed: many items there
 /// hide a part of a pixel or of an item.
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let run = masked_inner(case, BUFFER)?;
     let kept = trials.unjudged(move |n, out| run(n, None, out));
@@ -60,7 +37,7 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     Ok(of_items(trials, Sides::new(on, kept, BASE), predicted))
 }
 
-fn prepare_buffer(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare_buffer(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let [large, small] = [masked_inner(case, BUFFER)?, masked_inner(case, SMALL)?];
     let kept = trials.unjudged(move |n, out| large(n, None, out));

@@ -4,24 +4,12 @@
 
 use std::rc::Rc;
 
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Unfit};
+use super::super::rule::{Draft, Finding, Unfit};
 use super::super::trials::{Sides, Trials};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
 use crate::index::{FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume};
-
-pub(super) const RULE: Rule = Rule {
-    name: "plane-masks",
-    left_out: "tests of planes that a node above is inside of (by masks)",
-    feature: "plane masks",
-    is_saving: true,
-    statistic_name: "share of the plane tests that masks save",
-    left_out_if: LeftOutIf::AtLeast,
-    by: By::Time,
-    prepare,
-};
 
 /// Share of the plane tests that has to go: a small tree saves a few percent,
 /// and carrying masks is not free.
@@ -29,7 +17,7 @@ const THRESHOLD: f64 = 0.1;
 /// Cameras whose plane tests are counted.
 const COUNTED: usize = 64;
 
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let kernel = case.spec.execution.kernel;
     let tree = Rc::new(Wide::build(

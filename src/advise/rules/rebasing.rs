@@ -4,25 +4,13 @@
 
 use glam::DVec3;
 
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::case::part_of;
+use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::culling::Culling;
 use crate::measure::Workload;
-use crate::scene::{Scene, WorldBox};
 
-pub(super) const RULE: Rule = Rule {
-    name: "rebasing",
-    left_out: "rebasing the scene",
-    feature: "rebasing",
-    is_saving: false,
-    statistic_name: "margin for rounding in world coordinates / depth of the view",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
-};
-
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let scene = case.scene();
     let is_moved = scene.origin != DVec3::ZERO;
@@ -32,7 +20,7 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
         let bounds = scene.world_bounds();
         bounds.min / 2.0 + bounds.max / 2.0
     };
-    let other = about(scene, elsewhere).map_err(not_applicable)?;
+    let other = part_of(scene, elsewhere, scene.items.len()).map_err(not_applicable)?;
     let workload = Workload::new(&other, case.path, &Culling::default());
     let views = workload.map_err(not_applicable)?.views;
     let there = trials.index(case.spec.build(&other.items)?, views);
@@ -56,15 +44,4 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let finding = Finding::new(margin, case.options.tolerance, reason)
         .noted(format!("f32 errs by {margin:.0e} of depth"));
     Ok(Draft::new(vec![sides], finding))
-}
-
-/// The scene's boxes about another origin, rounded outward once more.
-fn about(scene: &Scene, origin: DVec3) -> Result<Scene, String> {
-    let at_home = |corner: glam::Vec3| scene.origin + corner.as_dvec3();
-    let boxes = scene.items.iter().map(|item| WorldBox {
-        min: at_home(item.min),
-        max: at_home(item.max),
-    });
-    let boxes: Vec<WorldBox> = boxes.collect();
-    Scene::about(scene.name.clone(), &boxes, origin).map_err(|error| error.to_string())
 }

@@ -2,25 +2,18 @@
 //! but what it leaves answers more slowly. Weighed for a share of items that
 //! move and a number of queries between two updates.
 
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::{Sides, Trials};
 use crate::measure::{Stopwatch, input_of, move_share};
 
-pub(super) const RULE: Rule = Rule {
-    name: "rebuild",
-    left_out: "a rebuild after items have moved",
-    feature: "rebuilds",
-    is_saving: false,
-    statistic_name: "what queries on the refitted tree cost more until the next update, ns",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
-};
-
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let scene = case.scene();
+    if case.workload.motion.is_some() {
+        return Err(not_applicable(
+            "the frames of the motion decide on rebuilds",
+        ));
+    }
     let mut items = scene.items.clone();
     let moved = move_share(&mut items, case.options.moved);
     let mut refitted = case.spec.build(input_of(scene, &scene.items))?;

@@ -6,25 +6,13 @@
 use std::cell::RefCell;
 
 use super::super::case::some_of;
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Rule, Unfit, not_applicable};
+use super::super::rule::{Draft, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use super::removal::{PROBED, PROBES, of_items};
 use crate::funnel::{PORTAL_CLIP, left_out_of};
 use crate::visibility::region::{EyePlace, IdSet, Scratch, seen_by_samples};
 
-pub(super) const RULE: Rule = Rule {
-    name: "regions",
-    left_out: "the region stage (portals)",
-    feature: "portals",
-    is_saving: false,
-    statistic_name: "share of the items in the view that lie in no region that is seen",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
-};
-
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let scene = case.scene();
     let none = || match left_out_of(scene) {

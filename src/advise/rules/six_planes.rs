@@ -4,23 +4,12 @@
 
 use super::super::case::Case;
 use super::super::choice::TestChoice;
-use super::super::omission::{By, Decision, LeftOutIf};
-use super::super::rule::{Draft, Finding, Rule, Unfit, not_applicable};
+use super::super::omission::{Decision, LeftOutIf};
+use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::culling::{Culling, CullingTest};
 
-pub(super) const RULE: Rule = Rule {
-    name: "six-planes",
-    left_out: "axes beyond the six planes",
-    feature: "axes beyond planes",
-    is_saving: false,
-    statistic_name: "cost of drawing what six planes let through, ns a query",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
-};
-
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let exact = Culling {
         test: CullingTest::Exact,
@@ -65,7 +54,7 @@ fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
 fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
     let predicted = finding
         .compared
-        .and_then(|both| RULE.left_out_if.holds(both));
+        .and_then(|both| LeftOutIf::AtMost.holds(both));
     let (Some(predicted), Some(taken)) = (predicted, choice.name) else {
         return finding;
     };
@@ -109,6 +98,8 @@ fn predicted_excess(case: &Case) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::omission::By;
+    use super::super::super::rule::some_rule;
     use super::*;
 
     #[test]
@@ -132,7 +123,8 @@ mod tests {
                     rows: Vec::new(),
                 };
                 let settled = |choice: &TestChoice| {
-                    RULE.omission(following(finding.clone(), choice), Vec::new())
+                    let rule = some_rule(LeftOutIf::AtMost, By::Rule);
+                    rule.omission(following(finding.clone(), choice), Vec::new())
                 };
                 let omission = settled(&choice);
                 let found = (omission.decision, omission.confirmed);

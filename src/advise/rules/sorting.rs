@@ -9,8 +9,7 @@ use std::rc::Rc;
 use glam::DVec3;
 
 use super::super::case::some_of;
-use super::super::omission::{By, LeftOutIf};
-use super::super::rule::{Draft, Rule, Unfit, not_applicable};
+use super::super::rule::{Draft, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials, mean};
 use super::removal::{PROBED, PROBES, Removal, weighed};
 use crate::camera::Camera;
@@ -20,22 +19,11 @@ use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Tests, draw, draw_s
 use crate::visibility::truth::{RayIndex, SurfaceIndex};
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
-pub(super) const RULE: Rule = Rule {
-    name: "sorting",
-    left_out: "sorting what is left from front to back",
-    feature: "depth sorting",
-    is_saving: false,
-    statistic_name: "share of the shaded fragments that an early z-test saves once items are sorted",
-    left_out_if: LeftOutIf::AtMost,
-    by: By::Rule,
-    prepare,
-};
-
 /// Samples of the counted images, and of the image for which they stand.
 const COUNTED: SampleGrid = SampleGrid::new(160, 90);
 const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 
-fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let scene = case.scene();
     let world = case.world.as_ref().map_err(not_applicable)?;

@@ -1,0 +1,368 @@
+//! Changes of the workload that the advice depends on.
+//!
+//! The structures that are in question are measured on parts of the scene, with other
+//! shares of the items in view, and with other shares of movers, by the tasks of a run.
+
+use serde::{Deserialize, Serialize};
+
+use super::case::part_of;
+use super::choice::{fastest, time_over};
+use super::omission::is_longer;
+use super::options::{AdviseError, AdviseInput, planned};
+use crate::culling::{Culling, CullingTest};
+use crate::index::StructureSpec;
+use crate::measure::{
+    Group, GroupPlan, Known, Part, PathInfo, ProcessTimes, ReportCell, SceneInfo, Subject,
+    Workload, measure_queries_or_frames,
+};
+use crate::motion::Motion;
+
+/// Axis along which a workload is changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    /// Number of items: evenly spread parts of the scene.
+    Items,
+    /// Share of the items in view: far and near planes scaled.
+    ShareInView,
+    /// Share of the items that move in a frame.
+    ShareMoved,
+}
+
+/// Axes, each with the values that are measured beside that of the workload.
+///
+/// Of items the parts of the whole.
+const AXES: [(Axis, [f64; 6]); 3] = [
+    (Axis::Items, [4e-1, 1e-1, 2e-2, 4e-3, 1e-3, 2e-4]),
+    (Axis::ShareInView, [0.001, 0.005, 0.02, 0.1, 0.4, 0.9]),
+    (Axis::ShareMoved, [0.0001, 0.001, 0.01, 0.1, 0.4, 1.0]),
+];
+/// The smallest part of a scene, items.
+const LEAST: f64 = 32.0;
+/// Values nearer than this to that of the workload, as a ratio, are not measured.
+const APART: f64 = 2.0;
+/// Most frames of a changed workload.
+const FRAMES: usize = 20;
+
+/// A structure that is faster from some value on.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Turn {
+    /// The fastest structure there.
+    pub structure: String,
+    /// Value on the axis at which both take the same time, between the two measured
+    /// values `lower` and `upper`: on one side of them the advice holds.
+    pub at: f64,
+    /// Smaller of the two.
+    pub lower: f64,
+    /// Larger of the two.
+    pub upper: f64,
+}
+
+/// Dependence of the structure to take on one axis.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Change {
+    /// Number of items, share in view, or share moved.
+    pub axis: Axis,
+    /// Value of the workload.
+    pub here: f64,
+    /// Smallest and largest measured value.
+    pub measured: [f64; 2],
+    /// Turn below `here`; null if the advice holds down to the smallest value.
+    pub below: Option<Turn>,
+    /// Turn above `here`; likewise.
+    pub above: Option<Turn>,
+}
+
+/// A workload of the axes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Changed {
+    /// `None`: the workload itself.
+    axis: Option<Axis>,
+    /// Value on the axis, requested and reached.
+    value: f64,
+    reached: f64,
+    lens_scale: Option<f64>,
+    known: Option<Known>,
+}
+
+/// Workloads to be measured beside the rules, the same for all processes.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Beside {
+    /// Labels of the structures in question.
+    contenders: Vec<String>,
+    /// Labels under further policies, on the workload itself.
+    policies: Vec<String>,
+    /// Values of the workload itself; `None` on an axis that it does not have.
+    here: [Option<f64>; 3],
+    changed: Vec<Changed>,
+}
+
+impl Beside {
+    /// Plans the workloads; returns the results of the count pass, too.
+    pub(super) fn plan(
+        input: &AdviseInput,
+        [contenders, policies]: [Vec<String>; 2],
+        here: [Option<f64>; 3],
+        progress: &dyn Fn(&str),
+    ) -> (Beside, Vec<Part>) {
+        let mut beside = Beside {
+            contenders,
+            policies,
+            here,
+            changed: Vec::new(),
+        };
+        let mut wanted = vec![(None, 0.0)];
+        wanted.truncate(usize::from(!beside.policies.is_empty()));
+        // A choice needs two.
+        let axes = AXES.into_iter().zip(here);
+        for ((axis, values), here) in axes.filter(|_| beside.contenders.len() > 1) {
+            let Some(here) = here else { continue };
+            let whole = if axis == Axis::Items { here } else { 1.0 };
+            let values = values.map(|value| value * whole).into_iter();
+            let values = values.filter(|value| axis != Axis::Items || *value >= LEAST);
+            let values = values.filter(|value| (value / here).max(here / value) >= APART);
+            wanted.extend(values.map(|value| (Some(axis), value)));
+        }
+        progress("other numbers of items, shares in view and shares moved");
+        let mut parts = Vec::new();
+        for (axis, value) in wanted {
+            let mut changed = Changed {
+                axis,
+                value,
+                reached: value,
+                lens_scale: None,
+                known: None,
+            };
+            // No such workload: a share that the cameras do not reach, a recorded motion.
+            let Some((reached, part)) = changed.measured(input, &beside) else {
+                continue;
+            };
+            changed.known.clone_from(&part.known);
+            changed.lens_scale = part.known.as_ref().and_then(|known| known.lens_scale);
+            changed.reached = reached;
+            beside.changed.push(changed);
+            parts.push(part);
+        }
+        (beside, parts)
+    }
+
+    /// True if the first workload is the one without a change, under further policies.
+    pub(super) fn has_policies(&self) -> bool {
+        !self.policies.is_empty() && self.changed.first().is_some_and(|c| c.axis.is_none())
+    }
+
+    /// Measures the workloads in one process.
+    pub(super) fn times(&self, input: &AdviseInput) -> Result<Vec<Part>, AdviseError> {
+        let changed = self.changed.iter();
+        let parts = changed.map(|changed| Some(changed.measured(input, self)?.1));
+        let reason = "another scene or motion than the advice was planned for";
+        let parts: Option<Vec<Part>> = parts.collect();
+        parts.ok_or_else(|| AdviseError::Refused(reason.to_owned()))
+    }
+
+    /// The group of each workload, from the count pass and all processes.
+    pub(super) fn groups(&self, counted: Vec<Part>, processes: &[ProcessTimes]) -> Vec<Group> {
+        let groups = counted.into_iter().enumerate().map(|(n, counted)| {
+            let timed = processes
+                .iter()
+                .filter_map(|times| times.parts.get(n).cloned());
+            Group::of(&[counted].into_iter().chain(timed).collect::<Vec<_>>())
+        });
+        groups.collect()
+    }
+
+    /// The dependence on each axis of which something was measured.
+    ///
+    /// `here` are the cells of the workload itself.
+    pub(super) fn changes(&self, here: &[ReportCell], groups: &[Group]) -> Vec<Change> {
+        let axes = AXES.iter().zip(self.here);
+        let changes = axes.filter_map(|(&(axis, _), value)| {
+            let (taken, value) = (self.contenders.first()?, value?);
+            let own = self.changed.iter().zip(groups);
+            let own = own.filter(|(changed, _)| changed.axis == Some(axis));
+            let mut points: Vec<(f64, &[ReportCell])> = own
+                .map(|(c, group)| (c.reached, &group.cells[..]))
+                .collect();
+            points.push((value, here));
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let middle = points.iter().position(|point| point.0 == value)?;
+            let [down, up] = [
+                points[..=middle].iter().rev().collect(),
+                points[middle..].iter().collect(),
+            ];
+            (points.len() > 1).then(|| Change {
+                axis,
+                here: value,
+                measured: [points[0].0, points[points.len() - 1].0],
+                below: turn(taken, down),
+                above: turn(taken, up),
+            })
+        });
+        changes.collect()
+    }
+}
+
+/// Mean share of the items that a query returns.
+fn share_in_view(known: &Known, items: usize) -> f64 {
+    let counts = known.visible.iter().map(|answer| answer.count as f64);
+    counts.sum::<f64>() / (known.visible.len() * items).max(1) as f64
+}
+
+/// The first of the points at which another structure is faster than the one taken.
+fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
+    points.windows(2).find_map(|pair| {
+        let [&(before, cells), &(value, there)] = [pair[0], pair[1]];
+        let first = fastest(there, None);
+        let winner = first.first()?;
+        let ratio_at = |cells| time_over(cells, taken, &winner.structure);
+        let ratio = ratio_at(there)?;
+        if is_longer(ratio) != Some(true) {
+            return None;
+        }
+        // Between both values by the logarithms of value and ratio.
+        let earlier = ratio_at(cells).map_or(0.0, |ratio| ratio.value.ln());
+        let along = (earlier / (earlier - ratio.value.ln())).clamp(0.0, 1.0);
+        Some(Turn {
+            structure: winner.structure.clone(),
+            at: (before * (value / before).powf(along)).clamp(before.min(value), before.max(value)),
+            lower: before.min(value),
+            upper: before.max(value),
+        })
+    })
+}
+
+impl Changed {
+    /// Measures the workload: in the count pass alone if nothing is known.
+    ///
+    /// `None` if there is no such workload.
+    fn measured(&self, input: &AdviseInput, beside: &Beside) -> Option<(f64, Part)> {
+        let is = |axis| self.axis == Some(axis);
+        let count = self.value.round() as usize;
+        let part = is(Axis::Items).then(|| part_of(input.scene, input.scene.origin, count));
+        let part = part.transpose().ok()?;
+        let scene = part.as_ref().unwrap_or(input.scene);
+        let mut path = input.path.clone();
+        if is(Axis::ShareInView) {
+            path = path.seeing(scene, self.value, self.lens_scale).ok()?;
+        }
+        let mut motion = None;
+        if let Some(source) = input.motion {
+            let own = Motion::load(source, scene).ok()?;
+            let share = is(Axis::ShareMoved).then_some(self.value);
+            motion = Some(match (self.axis, own.respecified(share, FRAMES)) {
+                (None, _) | (Some(Axis::ShareInView), None) => own,
+                (_, spec) => Motion::load(&spec?, scene).ok()?,
+            });
+        }
+        let workload = Workload::new(scene, &path, &Culling::default()).ok()?;
+        let workload = workload.moved_by(motion, input.views);
+        let labels = beside.contenders.iter();
+        let further = beside.policies.iter().filter(|_| self.axis.is_none());
+        let specs = labels
+            .chain(further)
+            .map(|label| planned(input.structures, label));
+        let specs: Vec<StructureSpec> = specs.collect::<Result<_, _>>().ok()?;
+        let build = |spec| Subject::build(spec, false, scene, CullingTest::SixPlane);
+        let subjects: Vec<Subject> = specs.into_iter().map(build).collect();
+        let plan = GroupPlan {
+            scene: &SceneInfo::of(scene),
+            path: PathInfo::of(&path.name, &workload, false),
+            process: u32::from(self.known.is_some()),
+            protocol: *input.protocol,
+            bounds: &[],
+            known: self.known.as_ref(),
+            plan_only: self.known.is_none(),
+            locate: false,
+        };
+        let measured = measure_queries_or_frames(&workload, &subjects, plan, &|_, _| (), &|| false);
+        let (part, items) = (measured?.0, scene.items.len());
+        let moved = workload.motion.as_ref().map(Motion::share);
+        let reached = match self.axis {
+            Some(Axis::Items) => Some(items as f64),
+            Some(Axis::ShareInView) => part.known.as_ref().map(|known| share_in_view(known, items)),
+            _ => moved,
+        };
+        Some((reached.unwrap_or(self.value), part))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::{GroupKey, Status};
+
+    /// Cells of structures with their times, ns; ten processes, each a little off.
+    fn cells(times: &[(&str, f64)]) -> Vec<ReportCell> {
+        let key = GroupKey::of("scene", "path", false, &Culling::default(), "");
+        let cell = |&(structure, ns): &(&str, f64)| {
+            let text = serde_json::json!({
+                "scene": SceneInfo::unknown("scene"), "path": PathInfo::unknown(&key),
+                "structure": structure, "params": null, "test": "six-plane",
+                "status": Status::Ok, "reason": null, "rank": 1, "metrics": {
+                    "query_ns": { "value": ns, "lower": null, "upper": null, "unit": "ns" }
+                }, "error": null, "left_out": [], "samples_ref": null,
+            });
+            let mut cell: ReportCell = serde_json::from_value(text).unwrap();
+            let off = |n: usize| 1.0 + 0.002 * ((n * structure.len()) % 7) as f64;
+            let own = (0..10).map(|n| ns * off(n)).collect();
+            cell.times.by_process.insert("query_ns".to_owned(), own);
+            cell
+        };
+        times.iter().map(cell).collect()
+    }
+
+    #[test]
+    fn advice_turns_where_another_structure_is_faster_by_more_than_a_tie() {
+        let of = |tree: f64| cells(&[("wide", tree), ("linear", 100.0)]);
+        let [here, tie, slower] = [of(50.0), of(103.0), of(200.0)];
+        let found = |points: &[(f64, &[ReportCell])]| turn("wide", points.iter().collect());
+        // Half of the time at 400 items, twice the time at 100: equal at 200.
+        let first = found(&[(400.0, &here), (100.0, &slower), (10.0, &of(900.0))]).unwrap();
+        assert_eq!(
+            (&first.structure[..], first.lower, first.upper),
+            ("linear", 100.0, 400.0)
+        );
+        assert!((first.at / 200.0 - 1.0).abs() < 0.01, "{first:?}");
+        // A tie is no other advice; what was slower from the start is its own end.
+        assert_eq!(found(&[(400.0, &here), (100.0, &tie)]), None);
+        let late = found(&[(400.0, &here), (100.0, &tie), (25.0, &slower)]).unwrap();
+        assert_eq!((late.lower, late.upper), (25.0, 100.0));
+        assert!(25.0 < late.at && late.at <= 100.0, "{late:?}");
+        assert_eq!(found(&[(400.0, &here)]), None);
+    }
+
+    #[test]
+    fn each_axis_has_the_values_about_the_workload() {
+        let group = |tree: f64| Group {
+            cells: cells(&[("wide", tree), ("linear", 100.0)]),
+            bounds: Vec::new(),
+            twin: None,
+        };
+        let changed = |axis, reached| Changed {
+            axis: Some(axis),
+            value: reached,
+            reached,
+            lens_scale: None,
+            known: None,
+        };
+        let beside = Beside {
+            contenders: vec!["wide".to_owned()],
+            here: [Some(400.0), Some(0.02), None],
+            changed: vec![
+                changed(Axis::Items, 100.0),
+                changed(Axis::ShareInView, 0.5),
+                changed(Axis::ShareInView, 0.001),
+            ],
+            ..Beside::default()
+        };
+        let groups = [group(200.0), group(150.0), group(10.0)];
+        let here = group(50.0).cells;
+        let changes = beside.changes(&here, &groups);
+        let axes: Vec<Axis> = changes.iter().map(|change| change.axis).collect();
+        assert_eq!(axes, [Axis::Items, Axis::ShareInView]);
+        assert_eq!(changes[1].measured, [0.001, 0.5]);
+        let sides = |c: &Change| [c.below.is_some(), c.above.is_some()];
+        assert_eq!(sides(&changes[0]), [true, false]);
+        assert_eq!(sides(&changes[1]), [false, true]);
+    }
+}

@@ -1,0 +1,110 @@
+//! Update policies of the structure to take, under the motion of the items.
+
+use serde::Serialize;
+
+use super::choice::{StructureChoice, StructureRow};
+use super::options::AdviseInput;
+use crate::index::UpdatePolicy;
+use crate::measure::ReportCell;
+
+/// Policies measured beside the refit, unless their builds alone take longer.
+const POLICIES: [UpdatePolicy; 3] = [
+    UpdatePolicy::Rebuild,
+    UpdatePolicy::Every(10),
+    UpdatePolicy::Every(50),
+];
+/// A policy is ruled out where its builds alone take this many times a frame.
+const RULED_OUT: f64 = 1.5;
+
+/// The policy to update the structure by.
+#[derive(Clone, Debug, Serialize)]
+pub struct MotionChoice {
+    /// The motion: file or spec.
+    pub name: String,
+    /// Share of the items that move in a frame.
+    pub share_moved: f64,
+    /// Queries per frame.
+    pub views: usize,
+    /// The fastest policy of the structure that is taken; null without a structure.
+    pub policy: Option<String>,
+    /// Others that the processes do not tell from it.
+    pub policy_ties: Vec<String>,
+    /// Measured policies of the structure, fastest first.
+    pub policies: Vec<StructureRow>,
+    /// Policies that are not measured, each with the time of its builds per frame, ns.
+    pub ruled_out: Vec<(String, f64)>,
+    /// `false` if the structure is built again in every frame.
+    #[serde(skip)]
+    refits: bool,
+}
+
+impl MotionChoice {
+    /// The choice before it is made, and labels of the policies to be measured.
+    ///
+    /// `None` for a still scene. Policies of `--update` are rows of the run instead.
+    pub(super) fn begun(
+        input: &AdviseInput,
+        structure: &StructureChoice,
+        share_moved: Option<f64>,
+    ) -> Option<(MotionChoice, Vec<String>)> {
+        let (mut ruled_out, mut measured) = (Vec::new(), Vec::new());
+        let are_rows = input
+            .structures
+            .iter()
+            .any(|s| s.policy != UpdatePolicy::Refit);
+        let spec = input
+            .structures
+            .iter()
+            .find(|s| structure.name.as_ref() == Some(&s.label));
+        let refits = spec.is_none_or(|spec| spec.info().capabilities.refits);
+        let spec = spec.filter(|_| refits && !structure.is_scan);
+        for policy in POLICIES.into_iter().filter(|_| !are_rows) {
+            let frames = match policy {
+                UpdatePolicy::Every(frames) => f64::from(frames),
+                _ => 1.0,
+            };
+            let (Some(spec), Some(row)) = (spec, structure.rows.first()) else {
+                continue;
+            };
+            let builds = row.build_ms.unwrap_or(0.0) * 1e6 / frames;
+            match builds > RULED_OUT * row.ns().unwrap_or(f64::INFINITY) {
+                true => ruled_out.push((policy.to_string(), builds)),
+                false => measured.push(format!("{}@{policy}", spec.label)),
+            }
+        }
+        let begun = MotionChoice {
+            name: input.motion?.to_owned(),
+            share_moved: share_moved?,
+            views: input.views,
+            policy: None,
+            policy_ties: Vec::new(),
+            policies: Vec::new(),
+            ruled_out,
+            refits,
+        };
+        Some((begun, measured))
+    }
+
+    /// Chooses among the cells of the structure that is taken, under several policies.
+    pub(super) fn chosen(self, structure: &StructureChoice, cells: &[ReportCell]) -> MotionChoice {
+        let alone = |label: &str| label.split('@').next().map(str::to_owned);
+        let taken = structure.name.as_deref().and_then(alone);
+        let own = cells.iter().filter(|cell| alone(&cell.structure) == taken);
+        let own = StructureChoice::of(&own.cloned().collect::<Vec<_>>());
+        let policy = |label: &String| match policy_of(label) {
+            "refit" if !self.refits => "rebuild".to_owned(),
+            policy => policy.to_owned(),
+        };
+        MotionChoice {
+            policy: own.name.as_ref().map(policy),
+            policy_ties: own.ties.iter().map(policy).collect(),
+            policies: own.rows,
+            ..self
+        }
+    }
+}
+
+/// The policy in a label, `wide@every=10`.
+pub fn policy_of(label: &str) -> &str {
+    label.split_once('@').map_or("refit", |(_, policy)| policy)
+}

@@ -1,0 +1,376 @@
+//! Advice on a terminal: structure, policy, test, features, and the evidence.
+
+use std::io::{self, Write};
+
+use super::run_verdict::gains;
+use super::table::{Column, Table};
+use super::text::{self, some};
+use crate::advise::{
+    Advice, Axis, Check, Omission, StructureChoice, StructureRow, TestChoice, TestRow, Turn,
+    policy_of,
+};
+use crate::measure::YARDSTICK;
+use crate::statistics::Estimate;
+
+/// The advice, and before it the evidence where it is wanted.
+pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
+    let mut out = text::terminal();
+    let width = text::width();
+    let mut say = |line: &str| writeln!(out, "{}", text::wrapped(line, width));
+    say(&format!(
+        "{}: {}; {}: {}\n{}\n",
+        text::plain(&advice.scene),
+        text::counted(advice.items, "item"),
+        text::plain(&advice.path),
+        text::counted(advice.cameras, "camera"),
+        text::over(advice.processes, advice.twin.as_ref())
+    ))?;
+    for line in evidence(advice, width).iter().filter(|_| all_columns) {
+        say(line)?;
+    }
+    for row in &advice.structure.rows {
+        if let Some(reason) = &row.reason {
+            say(&format!("{}: {}: {reason}", row.structure, row.status))?;
+        }
+    }
+    say(&(taken(advice) + "\n"))?;
+    let threads = gains(&advice.threads).map(|gains| format!("Threads: {gains}"));
+    let changes = Some(changes(advice)).filter(|_| !advice.changes.is_empty());
+    for paragraph in [in_motion(advice), threads, changes].into_iter().flatten() {
+        say(&(paragraph + "\n"))?;
+    }
+    let rules = rule_table(advice).within(width, &["gain", "cost", ""]);
+    say(rules.bare().trim_end())?;
+    let no = |rule: &Omission| not_for(advice, rule);
+    type Holds<'h> = &'h dyn Fn(&Omission) -> bool;
+    let lines: [(&str, Holds); 4] = [
+        ("Does not apply: ", &|rule| no(rule).is_some()),
+        (
+            "Pays from: over views of the whole path; funnel times 8 of them, or --frames: ",
+            &|rule| rule.note.contains("pays from"),
+        ),
+        ("WRONG: answers with and without differ: ", &|rule| {
+            rule.checks.iter().any(Check::is_wrong)
+        }),
+        ("\nPredicted otherwise, decided as measured: ", &|rule| {
+            rule.confirmed == Some(false) && no(rule).is_none()
+        }),
+    ];
+    for (what, is_in) in lines {
+        let named = advice.omissions.iter().filter(|rule| is_in(rule));
+        let why = |rule: &Omission| some(no(rule), |why| format!(" ({why})"));
+        let names: Vec<String> = named
+            .map(|rule| rule.feature.to_owned() + &why(rule))
+            .collect();
+        if !names.is_empty() {
+            say(&(what.to_owned() + &names.join(", ")))?;
+        }
+    }
+    if !all_columns {
+        say("\nevidence: --all-columns")?;
+    }
+    out.flush()
+}
+
+/// Structure and test to take, in a sentence.
+fn taken(advice: &Advice) -> String {
+    let choice = &advice.structure;
+    let Some(name) = &choice.name else {
+        return "No structure answered right".to_owned();
+    };
+    let row = choice.rows.iter().find(|row| row.structure == *name);
+    let next = choice.rows.iter().find(|row| {
+        row.query_ns.is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
+    });
+    let faster = next.and_then(|next| {
+        let times = text::significant(next.ns()? / row?.ns()?);
+        Some(format!("{times} x {}, the next", next.structure))
+    });
+    let is_next = next.is_some_and(|next| next.structure == YARDSTICK);
+    let linear = row.and_then(|row| row.speedup);
+    let linear = linear.filter(|_| !choice.is_scan && !is_next);
+    let linear = linear.map(|times| format!("{} x linear", text::significant(times)));
+    let figures = bracketed(linear.into_iter().chain(faster), ", ");
+    let test = some(advice.test.name, |test| {
+        format!(", test {test}{}", ties(&advice.test.ties))
+    });
+    let repaid = some(row.and_then(|row| row.break_even_queries), |n| {
+        format!(
+            " Its build is repaid after {}.",
+            text::counted(n as usize, "query")
+        )
+    });
+    let search = some(choice.region_search.as_ref(), |name| {
+        format!(
+            " For region search: {name}{}.",
+            ties(&choice.region_search_ties)
+        )
+    });
+    format!(
+        "Take structure {name}{figures}{}{test}.{repaid}{search}",
+        ties(&choice.ties)
+    )
+}
+
+/// Policy to update by, with the times of a frame.
+fn in_motion(advice: &Advice) -> Option<String> {
+    let motion = advice.motion.as_ref()?;
+    let policy = motion.policy.as_ref()?;
+    let (row, others) = motion.policies.split_first()?;
+    let frame = row.ns()?;
+    let longer = others.iter().filter_map(|row| {
+        let longer = text::significant(row.ns()? / frame);
+        Some(format!(
+            "{} takes {longer} x as long",
+            policy_of(&row.structure)
+        ))
+    });
+    let ruled_out = motion.ruled_out.iter().map(|(policy, builds)| {
+        let longer = text::significant(builds / frame);
+        format!("{policy} at least {longer} x, its builds alone")
+    });
+    let others = bracketed(longer.chain(ruled_out), "; ");
+    Some(format!(
+        "In motion, {} of the items and {} per frame: {policy}{}{others}. A frame takes {}, of which \
+         the update {}; the worst one {}.",
+        share(motion.share_moved),
+        text::counted(motion.views, "query"),
+        ties(&motion.policy_ties),
+        text::time(frame),
+        some(row.update_ns, text::time),
+        some(row.worst_frame_ns, text::time),
+    ))
+}
+
+/// From where on other structures are faster, a line per axis.
+fn changes(advice: &Advice) -> String {
+    let mut told = "Another structure is faster".to_owned();
+    for change in &advice.changes {
+        let (what, show): (_, fn(f64) -> String) = match change.axis {
+            Axis::Items => ("number of items", |items| {
+                text::count(items.round() as usize)
+            }),
+            Axis::ShareInView => ("share in view", share),
+            Axis::ShareMoved => ("share moved", share),
+        };
+        let turns = [("below", &change.below), ("above", &change.above)];
+        let turns = turns.into_iter().filter_map(|(side, turn)| {
+            let Turn {
+                structure,
+                at,
+                lower,
+                upper,
+            } = turn.as_ref()?;
+            let [at, lower, upper] = [*at, *lower, *upper].map(show);
+            Some(format!("{side} {at} ({lower} to {upper}) {structure}"))
+        });
+        let turns: Vec<String> = turns.collect();
+        let [low, high] = change.measured.map(show);
+        told += &match turns.is_empty() {
+            true => format!("\n  {what}: not within {low} to {high}, which were measured"),
+            false => format!(
+                "\n  {what}: {}; measured from {low} to {high}",
+                turns.join(", ")
+            ),
+        };
+    }
+    told
+}
+
+/// A share in percent, with three digits.
+fn share(share: f64) -> String {
+    format!("{} %", text::short(share * 100.0))
+}
+
+/// Reason for which a feature is neither needed nor not needed.
+fn not_for(advice: &Advice, omission: &Omission) -> Option<String> {
+    let of_nodes = ["plane-masks", "third-dimension", "rebuild"].contains(&omission.rule);
+    match omission.is_needed() {
+        None => Some(omission.reason.clone()),
+        Some(_) if of_nodes && advice.structure.is_scan => advice
+            .structure
+            .name
+            .as_ref()
+            .map(|name| format!("{name} has no nodes")),
+        Some(_) => None,
+    }
+}
+
+/// Features that are needed and those that are not, with the cost of both.
+fn rule_table(advice: &Advice) -> Table {
+    let mut table = Table::of("Rule | >with | >without | >x | ");
+    for (needed, title, ratio) in [(true, "Needed", "gain"), (false, "Not needed", "cost")] {
+        let is_there =
+            |rule: &&Omission| rule.is_needed() == Some(needed) && not_for(advice, rule).is_none();
+        for (n, rule) in advice.omissions.iter().filter(is_there).enumerate() {
+            if n == 0 {
+                table.add_row([title, "with", "without", ratio, ""]);
+            }
+            let [with, without] = rule.sides_ns();
+            let ratio = if needed {
+                without / with
+            } else {
+                with / without
+            };
+            let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+            let shown = |ns| some(finite(ns), text::time);
+            let ratio = match rule.is_tie {
+                true => "tie".to_owned(),
+                false => some(finite(ratio), |x| format!("{} x", text::significant(x))),
+            };
+            let feature = format!("  {}", rule.feature);
+            table.add_row([
+                feature,
+                shown(with),
+                shown(without),
+                ratio,
+                rule.note.clone(),
+            ]);
+        }
+    }
+    if !table.rows.is_empty() {
+        table.header = table.rows.remove(0);
+    }
+    table
+}
+
+/// Every structure, test and feature with its times.
+fn evidence(advice: &Advice, width: usize) -> Vec<String> {
+    let reasons = advice.omissions.iter().map(|feature| {
+        let contradicted = match feature.confirmed {
+            Some(false) => " (predicted otherwise)",
+            _ => "",
+        };
+        let reason = format!("{}{contradicted}", feature.reason);
+        [feature.feature.to_owned(), reason]
+    });
+    vec![
+        "Structures, all answers checked:".to_owned(),
+        structure_table(&advice.structure).fitted(width),
+        format!(
+            "Culling tests on {}, with {} ns to draw an item that cannot be seen:",
+            advice.test.structure, advice.options.draw_ns
+        ),
+        test_table(&advice.test).fitted(width),
+        "Features, measured with and without:".to_owned(),
+        check_table(&advice.omissions).fitted(width),
+        "The statistic decides; where both sides answer the same, the clock does if a paired test \
+         over the processes tells them apart."
+            .to_owned(),
+        text::entries(&reasons.collect::<Vec<_>>(), width),
+    ]
+}
+
+fn ties(names: &[impl AsRef<str>]) -> String {
+    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
+    let tie = (!names.is_empty()).then(|| format!("a tie with {}", names.join(", ")));
+    bracketed(tie.into_iter(), "")
+}
+
+/// Texts in brackets, if there are any.
+fn bracketed(texts: impl Iterator<Item = String>, between: &str) -> String {
+    let texts: Vec<String> = texts.collect();
+    some(texts.first(), |_| format!(" ({})", texts.join(between)))
+}
+
+fn structure_table(choice: &StructureChoice) -> Table {
+    let columns: &[Column<&StructureRow>] = &[
+        ("structure", |row| row.structure.clone()),
+        (">query [95 % interval]", |row| {
+            some(row.query_ns, text::time_within)
+        }),
+        (">speed-up", |row| some(row.speedup, text::significant)),
+        (">build", |row| {
+            some(row.build_ms, |ms| text::time(ms * 1e6))
+        }),
+        (">B/item", |row| {
+            some(row.memory_bytes_per_item, |bytes| format!("{bytes:.1}"))
+        }),
+        (">break-even queries", |row| {
+            some(row.break_even_queries, |n| text::count(n as usize))
+        }),
+        (">locate", |row| some(row.locate_ns, text::time)),
+        (">frame", |row| some(row.frame_ns, text::time_within)),
+        (">update", |row| some(row.update_ns, text::time)),
+        (">worst frame", |row| some(row.worst_frame_ns, text::time)),
+        ("status", |row| row.status.to_owned()),
+    ];
+    Table::with(&choice.rows, columns).without_empty_columns()
+}
+
+fn test_table(choice: &TestChoice) -> Table {
+    let columns: &[Column<(bool, &TestRow)>] = &[
+        ("", |(is_chosen, _)| {
+            if *is_chosen { "*" } else { "" }.to_owned()
+        }),
+        ("test", |(_, row)| row.test.to_owned()),
+        (">query [95 % interval]", |(_, row)| {
+            some(row.query_ns, text::time_within)
+        }),
+        (">false positives %", |(_, row)| {
+            text::rate(row.excess, 100.0)
+        }),
+        (">missed ppm", |(_, row)| {
+            text::rate(row.false_negative_ppm, 1.0)
+        }),
+        (">false positives per query", |(_, row)| {
+            some(row.false_positives_per_query, text::significant)
+        }),
+        (">query and drawing", |(_, row)| {
+            some(row.total_ns, text::time)
+        }),
+    ];
+    let rows = choice.rows.iter();
+    Table::with(
+        rows.map(|row| (choice.name == Some(row.test), row)),
+        columns,
+    )
+}
+
+/// Every measurement with and without a feature.
+fn check_table(features: &[Omission]) -> Table {
+    let columns: &[Column<(&Omission, &Check)>] = &[
+        ("feature", |(rule, _)| rule.feature.to_owned()),
+        ("measured on", |(_, check)| check.on.clone()),
+        (">with / without", |(rule, check)| {
+            some(check.ratio, |ratio| {
+                text::within(match rule.is_saving {
+                    false => ratio,
+                    true => Estimate {
+                        value: ratio.value.recip(),
+                        lower: ratio.upper.map(f64::recip),
+                        upper: ratio.lower.map(f64::recip),
+                    },
+                })
+            })
+        }),
+        (">false positives %, both", |(rule, check)| {
+            let mut both = [check.kept_excess, check.left_out_excess];
+            if rule.is_saving {
+                both.reverse();
+            }
+            let percent = |share: f64| format!("{:.3}", share * 100.0);
+            some(both[0].zip(both[1]), |(with, without)| {
+                format!("{} / {}", percent(with), percent(without))
+            })
+        }),
+        ("answers", |(_, check)| {
+            let missed = [
+                check.kept_false_negative_ppm,
+                check.left_out_false_negative_ppm,
+            ];
+            let missed = missed.into_iter().flatten().any(|ppm| ppm > 0.0);
+            match (check.same_answers, check.is_wrong(), missed) {
+                (_, true, _) => "WRONG: not the same",
+                (_, _, true) => "some missed",
+                (true, ..) => "the same",
+                (false, ..) => "other extras",
+            }
+            .to_owned()
+        }),
+    ];
+    let checks = features
+        .iter()
+        .flat_map(|rule| rule.checks.iter().map(move |check| (rule, check)));
+    Table::with(checks, columns)
+}
