@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::{PathError, Pose, Stage};
 use crate::camera::Frame;
+use crate::input::note;
 use crate::scene::{CameraPlace, PlaceView};
 use crate::spec::Spec;
 
@@ -185,6 +186,12 @@ pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathEr
             "scene '{name}' has no animated camera; expected a glTF file with one"
         )));
     };
+    if animation.others > 0 {
+        let others = animation.others;
+        note(&format!(
+            "path 'animation' follows the first animated camera, not the {others} others"
+        ));
+    }
     let [first, last] = animation.seconds;
     let step = (last - first) / stage.count.saturating_sub(1).max(1) as f64;
     let times = (0..stage.count).map(|frame| first + step * frame as f64);

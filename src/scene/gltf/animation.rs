@@ -24,6 +24,8 @@ pub struct CameraAnimation {
     lens: Option<PlaceView>,
     /// Seconds of the first and of the last key.
     pub seconds: [f64; 2],
+    /// Number of further cameras that an animation moves.
+    pub others: usize,
 }
 
 impl CameraAnimation {
@@ -158,14 +160,15 @@ impl File<'_> {
         }
         let mut parents = vec![None; self.root.nodes.len()];
         let mut moved = vec![false; parents.len()];
-        let camera = order.iter().find(|&&(node, parent)| {
+        let mut animated = order.iter().filter(|&&(node, parent)| {
             parents[node] = parent;
             moved[node] = channels.contains_key(&node) || parent.is_some_and(|node| moved[node]);
             moved[node] && self.root.nodes[node].camera.is_some()
         });
-        let Some(&(camera, _)) = camera else {
+        let Some(&(camera, _)) = animated.next() else {
             return Ok(None);
         };
+        let others = animated.count();
         let mut nodes: Vec<usize> = successors(Some(camera), |node| parents[*node]).collect();
         nodes.reverse();
         let own = nodes.iter().filter_map(|node| channels.get(node)).flatten();
@@ -199,6 +202,7 @@ impl File<'_> {
             chain,
             lens: self.lens_of(camera)?,
             seconds,
+            others,
         }))
     }
 

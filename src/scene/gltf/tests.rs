@@ -157,6 +157,12 @@ fn cameras_have_their_lens_and_move_as_animated() {
     let mut stepped = animated();
     stepped["animations"][0]["samplers"][0]["interpolation"] = json!("STEP");
     assert_eq!(forward(&read(&stepped).unwrap(), 2.9), DVec3::NEG_Z);
+    let mut two = animated();
+    let nodes = two["nodes"].as_array_mut().unwrap();
+    nodes[2]["children"] = json!([nodes.len()]);
+    let second = json!({"camera": nodes[2]["camera"]});
+    nodes.push(second);
+    assert_eq!(read(&two).unwrap().animation.expect("one").others, 1);
     let mut parallel = animated();
     let lens = json!({"xmag": 3, "ymag": 2, "znear": 0, "zfar": 9});
     parallel["cameras"] = json!([{"type": "orthographic", "orthographic": lens}]);
