@@ -3,8 +3,6 @@
 //! Four rows decide nearly every item by one sum per plane. Items within the rounding
 //! errors of a plane get the test of [`Spheres::drops`], so the sets are the same.
 
-use glam::DVec4;
-
 use super::{Aabb, Ball, BoxBlock, LANES, LaneMask, PlaneMask, Spheres};
 use crate::kernel::{Isa, prefetch};
 
@@ -77,129 +75,22 @@ impl BallBlocks {
 }
 
 /// A plane of length 1 in vectors: normal and offset.
-type Unit<I> = [<I as Isa>::Floats; 4];
+pub(super) type Unit<I> = [<I as Isa>::Floats; 4];
 
 #[inline(always)]
-fn splat<I: Isa>(isa: I, [x, y, z, d]: [f32; 4]) -> Unit<I> {
+pub(super) fn splat<I: Isa>(isa: I, [x, y, z, d]: [f32; 4]) -> Unit<I> {
     [isa.splat(x), isa.splat(y), isa.splat(z), isa.splat(d)]
 }
 
 /// The distances of centres from a plane.
 #[inline(always)]
-fn distances<I: Isa>(isa: I, [a, b, c, d]: Unit<I>, [x, y, z]: [I::Floats; 3]) -> I::Floats {
+pub(super) fn distances<I: Isa>(
+    isa: I,
+    [a, b, c, d]: Unit<I>,
+    [x, y, z]: [I::Floats; 3],
+) -> I::Floats {
     let sum = isa.add(isa.mul(a, x), isa.mul(b, y));
     isa.add(isa.add(sum, isa.mul(c, z)), d)
-}
-
-/// One plane of a sphere test in vectors, for many blocks.
-#[derive(Clone, Copy)]
-pub struct BallPlane<'a, I: Isa> {
-    spheres: &'a Spheres,
-    index: u32,
-    plane: Unit<I>,
-}
-
-impl<'a, I: Isa> BallPlane<'a, I> {
-    /// The plane of that bit.
-    #[inline(always)]
-    pub fn new(isa: I, spheres: &'a Spheres, index: u32) -> Self {
-        let plane = splat(isa, spheres.plane_of_bit(index).1.unit);
-        BallPlane {
-            spheres,
-            index,
-            plane,
-        }
-    }
-
-    /// [`Spheres::kept_boxes`] for this plane alone.
-    #[inline(always)]
-    pub fn kept_boxes(&self, isa: I, block: &BoxBlock) -> LaneMask {
-        self.spheres.kept_boxes(isa, block, 1 << self.index)
-    }
-
-    /// [`Spheres::kept_balls`] for this plane alone.
-    #[inline(always)]
-    pub fn kept_balls(&self, isa: I, balls: &Balls, (at, block): (usize, &BoxBlock)) -> LaneMask {
-        let (centres, radii) = balls.load(isa, at);
-        let farthest = isa.add(distances(isa, self.plane, centres), radii);
-        let question = || (self.spheres, 1 << self.index, block);
-        decide(isa, farthest, balls.doubt, question)
-    }
-}
-
-/// The six planes of a view frustum in vectors: three sums in place of six.
-///
-/// The lesser of the distances from two planes is `s - |t|`, where s and t are half the sum
-/// and half the difference of both. For the planes of a symmetric frustum, s of each pair of
-/// sides is linear in t of near and far plane.
-#[derive(Clone, Copy)]
-pub struct BallFrustum<'a, I: Isa> {
-    spheres: &'a Spheres,
-    depth: Unit<I>,
-    half_depth: I::Floats,
-    /// Factor of the depth, offset, and t, of each pair of sides.
-    sides: [([I::Floats; 2], Unit<I>); 2],
-}
-
-impl<'a, I: Isa> BallFrustum<'a, I> {
-    /// Largest part of s that is not linear in the depth, per unit of coordinates: with
-    /// the roundings of the sums, less than half of [`Spheres::doubt`].
-    const RESIDUAL: f64 = 3e-6;
-
-    /// `None` for other planes than those of a symmetric frustum with a far plane.
-    #[inline(always)]
-    pub fn new(isa: I, spheres: &'a Spheres) -> Option<Self> {
-        if spheres.planes().mask() != 0b11_1111 {
-            return None;
-        }
-        let plane = |index: u32| {
-            let [x, y, z, d] = spheres.plane_of_bit(index).1.unit;
-            DVec4::new(x.into(), y.into(), z.into(), d.into())
-        };
-        let halves = |pair: u32| {
-            let (a, b) = (plane(2 * pair), plane(2 * pair + 1));
-            ((a + b) * 0.5, (a - b) * 0.5)
-        };
-        let vector = |t: DVec4| splat(isa, t.as_vec4().to_array());
-        let (still, depth) = halves(2);
-        let mut residual = still.truncate().length();
-        let axis = depth.truncate();
-        let mut side = |pair: u32| {
-            let (s, t) = halves(pair);
-            let factor = s.truncate().dot(axis) / axis.length_squared();
-            let rest = s - depth * factor;
-            residual = residual.max(rest.truncate().length());
-            let linear = [isa.splat(factor as f32), isa.splat(rest.w as f32)];
-            (linear, vector(t))
-        };
-        let sides = [side(0), side(1)];
-        (residual <= Self::RESIDUAL).then(|| BallFrustum {
-            spheres,
-            depth: vector(depth),
-            half_depth: isa.splat(still.w as f32),
-            sides,
-        })
-    }
-
-    /// [`Spheres::kept_boxes`] for all planes.
-    #[inline(always)]
-    pub fn kept_boxes(&self, isa: I, block: &BoxBlock) -> LaneMask {
-        self.spheres.kept_boxes(isa, block, 0b11_1111)
-    }
-
-    /// [`Spheres::kept_balls`] for all planes.
-    #[inline(always)]
-    pub fn kept_balls(&self, isa: I, balls: &Balls, (at, block): (usize, &BoxBlock)) -> LaneMask {
-        let (centres, radii) = balls.load(isa, at);
-        let depth = distances(isa, self.depth, centres);
-        let mut least = isa.sub_abs(self.half_depth, depth);
-        for ([factor, rest], t) in self.sides {
-            let s = isa.add(isa.mul(factor, depth), rest);
-            least = isa.min(isa.sub_abs(s, distances(isa, t, centres)), least);
-        }
-        let question = || (self.spheres, 0b11_1111, block);
-        decide(isa, isa.add(least, radii), 2.0 * balls.doubt, question)
-    }
 }
 
 /// The lanes whose distance is not below the least.
@@ -212,7 +103,7 @@ fn above<I: Isa>(isa: I, distances: I::Floats, least: f32) -> LaneMask {
 
 /// The lanes that are kept, by the distances of their farthest points.
 #[inline(always)]
-fn decide<'s, I: Isa>(
+pub(super) fn decide<'s, I: Isa>(
     isa: I,
     farthest: I::Floats,
     doubt: f32,
@@ -229,7 +120,7 @@ fn decide<'s, I: Isa>(
 
 impl Balls<'_> {
     #[inline(always)]
-    fn load<I: Isa>(&self, isa: I, at: usize) -> ([I::Floats; 3], I::Floats) {
+    pub(super) fn load<I: Isa>(&self, isa: I, at: usize) -> ([I::Floats; 3], I::Floats) {
         let [x, y, z, radius] = &self.blocks[at].rows;
         ([isa.load(x), isa.load(y), isa.load(z)], isa.load(radius))
     }
@@ -307,7 +198,7 @@ impl Spheres {
 mod tests {
     use super::*;
     use crate::geometry::arbitrary::{any_box, number, vector};
-    use crate::geometry::{ConvexVolume, Plane, sphere_cube};
+    use crate::geometry::{BallFrustum, ConvexVolume, Plane, Planes, sphere_cube};
     use crate::kernel::{BASELINE, Plain};
     use glam::{EulerRot, Quat, Vec3};
     use proptest::prelude::*;

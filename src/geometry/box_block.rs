@@ -407,7 +407,7 @@ pub fn blocks_of(first: usize, end: usize) -> impl Iterator<Item = (usize, LaneM
 #[cfg(test)]
 mod tests {
     use super::super::arbitrary::{any_box, number};
-    use super::super::{BroadcastPlanes, ConvexVolume};
+    use super::super::{BroadcastPlanes, ConvexVolume, Planes};
     use super::*;
     use crate::kernel::BASELINE;
     use proptest::prelude::*;
@@ -447,7 +447,7 @@ mod tests {
                 let ready = BroadcastPlanes::new(BASELINE, &volume, volume.mask());
                 prop_assert_eq!(ready.is_some(), volume.mask().count_ones() <= 6);
                 if let Some(ready) = ready {
-                    prop_assert_eq!(ready.admitted(BASELINE, block), admitted);
+                    prop_assert_eq!(ready.kept(BASELINE, block), admitted);
                 }
                 for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
                     let b = &boxes[start + lane];

@@ -1,9 +1,47 @@
 //! Planes as the block kernels read them: which rows of a block are a plane's
 //! corners, and its numbers in vectors for many blocks.
 
+use glam::DVec4;
+
+use super::balls::{Unit, decide, distances, splat};
 use super::box_block::{BoxBlock, sums_at};
-use super::{BoxCorner, ConvexVolume, PlaneMask};
+use super::{Balls, BoxCorner, ConvexVolume, PlaneMask, Spheres};
 use crate::kernel::{Isa, LaneMask};
+
+/// Planes of a volume, prepared for many blocks without other open planes.
+pub trait Planes<I: Isa>: Copy {
+    /// True if four blocks at once are faster than one after another.
+    const IN_FOURS: bool = false;
+
+    /// True if the planes test spheres where a structure has them.
+    const SPHERES: bool = false;
+
+    /// Those of the lanes that the planes do not drop.
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask;
+
+    /// [`Planes::kept`] of a block with that index, whose spheres are in `balls`.
+    #[inline(always)]
+    fn kept_balls(&self, isa: I, _balls: &Balls, (_, block): (usize, &BoxBlock)) -> LaneMask {
+        self.kept(isa, block)
+    }
+
+    /// [`Planes::kept`] of four blocks.
+    #[inline(always)]
+    fn kept_of_four(&self, isa: I, [a, b, c, d]: &[BoxBlock; 4]) -> [LaneMask; 4] {
+        [
+            self.kept(isa, a),
+            self.kept(isa, b),
+            self.kept(isa, c),
+            self.kept(isa, d),
+        ]
+    }
+
+    /// Prefetches the rows of a block that the test reads.
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock) {
+        block.prefetch();
+    }
+}
 
 /// One plane as the block kernels read it, in vectors, for many blocks.
 ///
@@ -38,16 +76,16 @@ impl<I: Isa> BroadcastPlane<I> {
         let sum = isa.add(sum, isa.mul(c, isa.load(z)));
         isa.keep(kept, sum, self.minus_d)
     }
+}
 
-    /// [`BoxBlock::admitted_by`] for this plane alone.
+/// [`BoxBlock::admitted_by`] for this plane alone.
+impl<I: Isa> Planes<I> for BroadcastPlane<I> {
     #[inline(always)]
-    pub fn admitted(&self, isa: I, block: &BoxBlock) -> LaneMask {
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
         isa.kept(self.keep(isa, isa.keep_all(), block))
     }
-
-    /// Prefetches the rows that [`BroadcastPlane::admitted`] reads.
     #[inline(always)]
-    pub fn prefetch(&self, block: &BoxBlock) {
+    fn prefetch(&self, block: &BoxBlock) {
         block.prefetch_corner(self.p_vertex);
     }
 }
@@ -76,15 +114,132 @@ impl<I: Isa> BroadcastPlanes<I> {
         }
         (left == 0).then_some(BroadcastPlanes(planes))
     }
+}
 
-    /// [`BoxBlock::admitted_by`] for these planes.
+/// [`BoxBlock::admitted_by`] for these planes.
+impl<I: Isa> Planes<I> for BroadcastPlanes<I> {
     #[inline(always)]
-    pub fn admitted(&self, isa: I, block: &BoxBlock) -> LaneMask {
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
         let mut kept = isa.keep_all();
         for plane in &self.0 {
             kept = plane.keep(isa, kept, block);
         }
         isa.kept(kept)
+    }
+}
+
+/// One plane of a sphere test in vectors, for many blocks.
+#[derive(Clone, Copy)]
+pub struct BallPlane<'a, I: Isa> {
+    spheres: &'a Spheres,
+    index: u32,
+    plane: Unit<I>,
+}
+
+impl<'a, I: Isa> BallPlane<'a, I> {
+    /// The plane of that bit.
+    #[inline(always)]
+    pub fn new(isa: I, spheres: &'a Spheres, index: u32) -> Self {
+        let plane = splat(isa, spheres.plane_of_bit(index).1.unit);
+        BallPlane {
+            spheres,
+            index,
+            plane,
+        }
+    }
+}
+
+/// The test of [`Spheres`] for this plane alone.
+impl<I: Isa> Planes<I> for BallPlane<'_, I> {
+    const SPHERES: bool = true;
+
+    #[inline(always)]
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.spheres.kept_boxes(isa, block, 1 << self.index)
+    }
+    #[inline(always)]
+    fn kept_balls(&self, isa: I, balls: &Balls, (at, block): (usize, &BoxBlock)) -> LaneMask {
+        let (centres, radii) = balls.load(isa, at);
+        let farthest = isa.add(distances(isa, self.plane, centres), radii);
+        let question = || (self.spheres, 1 << self.index, block);
+        decide(isa, farthest, balls.doubt, question)
+    }
+}
+
+/// The six planes of a view frustum in vectors: three sums in place of six.
+///
+/// The lesser of the distances from two planes is `s - |t|`, where s and t are half the sum
+/// and half the difference of both. For the planes of a symmetric frustum, s of each pair of
+/// sides is linear in t of near and far plane.
+#[derive(Clone, Copy)]
+pub struct BallFrustum<'a, I: Isa> {
+    spheres: &'a Spheres,
+    depth: Unit<I>,
+    half_depth: I::Floats,
+    /// Factor of the depth, offset, and t, of each pair of sides.
+    sides: [([I::Floats; 2], Unit<I>); 2],
+}
+
+impl<'a, I: Isa> BallFrustum<'a, I> {
+    /// Largest part of s that is not linear in the depth, per unit of coordinates: with
+    /// the roundings of the sums, less than half of [`Spheres::doubt`].
+    const RESIDUAL: f64 = 3e-6;
+
+    /// `None` for other planes than those of a symmetric frustum with a far plane.
+    #[inline(always)]
+    pub fn new(isa: I, spheres: &'a Spheres) -> Option<Self> {
+        if spheres.planes().mask() != 0b11_1111 {
+            return None;
+        }
+        let plane = |index: u32| {
+            let [x, y, z, d] = spheres.plane_of_bit(index).1.unit;
+            DVec4::new(x.into(), y.into(), z.into(), d.into())
+        };
+        let halves = |pair: u32| {
+            let (a, b) = (plane(2 * pair), plane(2 * pair + 1));
+            ((a + b) * 0.5, (a - b) * 0.5)
+        };
+        let vector = |t: DVec4| splat(isa, t.as_vec4().to_array());
+        let (still, depth) = halves(2);
+        let mut residual = still.truncate().length();
+        let axis = depth.truncate();
+        let mut side = |pair: u32| {
+            let (s, t) = halves(pair);
+            let factor = s.truncate().dot(axis) / axis.length_squared();
+            let rest = s - depth * factor;
+            residual = residual.max(rest.truncate().length());
+            let linear = [isa.splat(factor as f32), isa.splat(rest.w as f32)];
+            (linear, vector(t))
+        };
+        let sides = [side(0), side(1)];
+        (residual <= Self::RESIDUAL).then(|| BallFrustum {
+            spheres,
+            depth: vector(depth),
+            half_depth: isa.splat(still.w as f32),
+            sides,
+        })
+    }
+}
+
+/// The test of [`Spheres`] for all planes.
+impl<I: Isa> Planes<I> for BallFrustum<'_, I> {
+    const SPHERES: bool = true;
+
+    #[inline(always)]
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.spheres.kept_boxes(isa, block, 0b11_1111)
+    }
+    #[inline(always)]
+    fn kept_balls(&self, isa: I, balls: &Balls, (at, block): (usize, &BoxBlock)) -> LaneMask {
+        let (centres, radii) = balls.load(isa, at);
+        let depth = distances(isa, self.depth, centres);
+        let mut least = isa.sub_abs(self.half_depth, depth);
+        for ([factor, rest], t) in self.sides {
+            let s = isa.add(isa.mul(factor, depth), rest);
+            least = isa.min(isa.sub_abs(s, distances(isa, t, centres)), least);
+        }
+        let question = || (self.spheres, 0b11_1111, block);
+        decide(isa, isa.add(least, radii), 2.0 * balls.doubt, question)
     }
 }
 

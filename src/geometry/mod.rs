@@ -17,9 +17,9 @@ mod relative_volume;
 mod spheres;
 
 pub use aabb::Aabb;
-pub use balls::{BallBlock, BallBlocks, BallFrustum, BallPlane, Balls};
+pub use balls::{BallBlock, BallBlocks, Balls};
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, ROWS, blocks_of, xor_of_bits};
-pub use broadcast::{BroadcastPlane, BroadcastPlanes};
+pub use broadcast::{BallFrustum, BallPlane, BroadcastPlane, BroadcastPlanes, Planes};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use convex_volume_f64::ConvexVolumeF64;
 pub use p_vertex::{ALL_ROWS, BoxCorner, RowMask};

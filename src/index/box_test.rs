@@ -17,7 +17,10 @@ use crate::query::{Bits, Context, ItemId, NoRecorder, QueryVolume, Recorder, Sin
 /// A query as a test of one box at a time. Boxes are finite and not empty.
 pub trait BoxTest {
     /// True if `admits` is `!rejects`.
-    const NODES_AS_ITEMS: bool;
+    #[inline(always)]
+    fn nodes_as_items(&self) -> bool {
+        true
+    }
     /// No item within this box belongs to the answer.
     fn rejects(&self, node: &Aabb) -> bool;
     /// Every item within this box belongs to the answer.
@@ -44,8 +47,6 @@ pub trait BoxTest {
 pub struct AtOnce(pub PlaneRows);
 
 impl BoxTest for AtOnce {
-    const NODES_AS_ITEMS: bool = true;
-
     #[inline(always)]
     fn rejects(&self, node: &Aabb) -> bool {
         self.0.exclude(node)
@@ -71,50 +72,29 @@ impl BoxTest for AtOnce {
     }
 }
 
-/// Any other volume, plane by plane: correct, not fast. Behind a pointer, so that a
-/// traversal is compiled once for all such volumes.
-pub struct PlaneByPlane<'a>(pub &'a dyn Planes);
+/// Any other volume, plane by plane: correct, not fast.
+///
+/// Searched for as `dyn` [`BoxTest`]: a traversal is compiled once for all of them.
+struct PlaneByPlane<'a, Q>(&'a Q);
 
-/// A volume without its type.
-pub trait Planes {
-    fn exclude(&self, node: &Aabb) -> bool;
-    fn contain(&self, node: &Aabb) -> bool;
-    fn keep(&self, item: &Aabb) -> bool;
-    fn count(&self) -> u32;
-}
-
-impl<Q: QueryVolume> Planes for Q {
-    fn exclude(&self, node: &Aabb) -> bool {
-        Bits(self.mask()).any(|plane| self.excludes(plane, node))
+impl<Q: QueryVolume> BoxTest for PlaneByPlane<'_, Q> {
+    fn nodes_as_items(&self) -> bool {
+        false
     }
-    fn contain(&self, node: &Aabb) -> bool {
-        Bits(self.mask()).all(|plane| self.contains(plane, node))
-    }
-    fn keep(&self, item: &Aabb) -> bool {
-        self.admits(item, self.mask(), &mut NoRecorder)
-    }
-    fn count(&self) -> u32 {
-        Q::planes_open(self.mask())
-    }
-}
-
-impl BoxTest for PlaneByPlane<'_> {
-    const NODES_AS_ITEMS: bool = false;
-
     fn rejects(&self, node: &Aabb) -> bool {
-        self.0.exclude(node)
+        Bits(self.0.mask()).any(|plane| self.0.excludes(plane, node))
     }
     fn accepts(&self, node: &Aabb) -> bool {
-        self.0.contain(node)
+        Bits(self.0.mask()).all(|plane| self.0.contains(plane, node))
     }
     fn admits(&self, item: &Aabb) -> bool {
-        self.0.keep(item)
+        self.0.admits(item, self.0.mask(), &mut NoRecorder)
     }
     fn centres(&self, _: Vec3, scene: &Aabb) -> Aabb {
         *scene
     }
     fn planes(&self) -> u32 {
-        self.0.count()
+        Q::planes_open(self.0.mask())
     }
 }
 
@@ -122,8 +102,6 @@ impl BoxTest for PlaneByPlane<'_> {
 pub struct Holding(pub Vec3);
 
 impl BoxTest for Holding {
-    const NODES_AS_ITEMS: bool = true;
-
     #[inline(always)]
     fn rejects(&self, node: &Aabb) -> bool {
         !node.contains_point(self.0)
@@ -159,7 +137,7 @@ impl<'a, R: Recorder> Tally<'a, R> {
     }
 
     #[inline(always)]
-    pub fn node(&self, test: &impl BoxTest) {
+    pub fn node(&self, test: &(impl BoxTest + ?Sized)) {
         self.count(|recorder| {
             recorder.nodes_tested(1);
             recorder.planes_tested(test.planes());
@@ -167,7 +145,7 @@ impl<'a, R: Recorder> Tally<'a, R> {
     }
 
     #[inline(always)]
-    pub fn item(&self, test: &impl BoxTest) {
+    pub fn item(&self, test: &(impl BoxTest + ?Sized)) {
         self.count(|recorder| {
             recorder.items_tested(1);
             recorder.planes_tested(test.planes());
@@ -208,7 +186,7 @@ pub trait BoxTested: Sized + Send + Sync {
     fn used(&self) -> MemoryUsage;
 
     /// Passes every item that the test admits to the sink.
-    fn search<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,
@@ -243,7 +221,7 @@ impl<X: BoxTested> RegionIndex for X {
         }
         match volume.rows() {
             Some(rows) => self.search(&AtOnce(rows), sink, recorder),
-            None => self.search(&PlaneByPlane(volume), sink, recorder),
+            None => self.search::<dyn BoxTest, _, _>(&PlaneByPlane(volume), sink, recorder),
         }
     }
 }

@@ -86,7 +86,7 @@ impl UniformGrid {
     }
 
     #[inline(always)]
-    fn cell<T: BoxTest, S: Sink, R: Recorder>(
+    fn cell<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         cell: usize,
         test: &T,
@@ -180,7 +180,7 @@ impl BoxTested for UniformGrid {
     }
 
     #[inline(always)]
-    fn search<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,

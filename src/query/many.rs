@@ -12,19 +12,6 @@ use crate::kernel::extend;
 pub trait ManySink {
     /// Takes the answer of the point with this index in the batch.
     fn accept(&mut self, point: u32, ids: &[ItemId]) -> ControlFlow<()>;
-
-    /// Takes the answers of several points at once, from the point `first` on: all ids,
-    /// and the end of each point's ids. By default, one call of [`ManySink::accept`] per
-    /// point.
-    #[inline(always)]
-    fn accept_rows(&mut self, first: u32, ids: &[ItemId], ends: &[u32]) -> ControlFlow<()> {
-        let mut from = 0;
-        for (&end, point) in ends.iter().zip(first..) {
-            self.accept(point, &ids[from..end as usize])?;
-            from = end as usize;
-        }
-        ControlFlow::Continue(())
-    }
 }
 
 /// Collects answers as compressed rows: all ids, and the end of each point's ids.
@@ -90,30 +77,11 @@ impl ManySink for Located {
         self.ends.push(self.ids.len());
         ControlFlow::Continue(())
     }
-
-    #[inline(always)]
-    fn accept_rows(&mut self, first: u32, ids: &[ItemId], ends: &[u32]) -> ControlFlow<()> {
-        debug_assert_eq!(first as usize, self.ends.len(), "every point, in order");
-        let before = self.ids.len();
-        self.ids.extend_from_slice(ids);
-        self.ends
-            .extend(ends.iter().map(|&end| before + end as usize));
-        ControlFlow::Continue(())
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Leaves rows to the default.
-    struct OneByOne(Located);
-
-    impl ManySink for OneByOne {
-        fn accept(&mut self, point: u32, ids: &[ItemId]) -> ControlFlow<()> {
-            self.0.accept(point, ids)
-        }
-    }
 
     #[test]
     fn rows_end_where_they_should_and_may_be_empty() {
@@ -124,19 +92,6 @@ mod tests {
         assert_eq!(located.ends(), [0, 1, 1, 4, 4]);
         let rows: Vec<&[ItemId]> = located.iter().collect();
         assert_eq!(rows, [&[][..], &[5], &[], &[7, 3, 9], &[]]);
-        let rows = located.clone();
-        located.clear();
-        assert!(located.accept_rows(0, &[5], &[0, 1]).is_continue());
-        assert!(located.accept_rows(2, &[7, 3, 9], &[0, 3, 3]).is_continue());
-        assert_eq!(located, rows);
-        let mut one_by_one = OneByOne(Located::default());
-        assert!(one_by_one.accept_rows(0, &[5], &[0, 1]).is_continue());
-        assert!(
-            one_by_one
-                .accept_rows(2, &[7, 3, 9], &[0, 3, 3])
-                .is_continue()
-        );
-        assert_eq!(one_by_one.0, rows);
         located.clear();
         assert!(located.is_empty() && located.ids().is_empty());
     }

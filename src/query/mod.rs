@@ -4,16 +4,15 @@
 mod context;
 mod dispatched;
 mod many;
-mod planes;
 mod predicate;
 mod recorder;
 mod sink;
 mod volume;
 
+pub use crate::geometry::Planes;
 pub use context::{Context, QueryContext};
 pub(crate) use dispatched::Dispatched;
 pub use many::{Located, ManySink};
-pub use planes::Planes;
 pub(crate) use predicate::Bits;
 pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};

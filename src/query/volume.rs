@@ -6,11 +6,10 @@ use glam::Vec3;
 
 use crate::geometry::{
     ALL_ROWS, Aabb, BallFrustum, BallPlane, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes,
-    ConvexVolume, ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, RelativeVolume, RowMask,
-    Spheres,
+    ConvexVolume, ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, Planes, RelativeVolume,
+    RowMask, Spheres,
 };
 
-use super::planes::Planes;
 use super::predicate::Bits;
 use super::{Containment, NoRecorder, Predicate};
 use crate::kernel::Isa;

@@ -75,7 +75,7 @@ impl BoxTested for PeerBevyStyle {
     }
 
     #[inline(always)]
-    fn search<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,

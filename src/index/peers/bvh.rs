@@ -52,12 +52,12 @@ fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
 
 /// A test for the crate, which does not distinguish boxes of nodes and items.
 /// Returned items are tested once more if the two tests can differ.
-struct Query<'a, 'r, T, R> {
+struct Query<'a, 'r, T: ?Sized, R> {
     test: &'a T,
     tally: &'a Tally<'r, R>,
 }
 
-impl<T: BoxTest, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, '_, T, R> {
+impl<T: BoxTest + ?Sized, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, '_, T, R> {
     #[inline(always)]
     fn intersects_aabb(&self, b: &CrateAabb<f32, 3>) -> bool {
         self.tally.node(self.test);
@@ -165,7 +165,7 @@ impl BoxTested for PeerBvh {
     }
 
     #[inline(always)]
-    fn search<Q: BoxTest, S: Sink, R: Recorder>(
+    fn search<Q: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         test: &Q,
         sink: &mut S,
@@ -178,7 +178,7 @@ impl BoxTested for PeerBvh {
         };
         for shape in self.tree.traverse(&query, &self.shapes) {
             tally.count(|recorder| recorder.items_tested(1));
-            if Q::NODES_AS_ITEMS || test.admits(&shape.item.bounds) {
+            if test.nodes_as_items() || test.admits(&shape.item.bounds) {
                 sink.accept(std::slice::from_ref(&shape.item.id))?;
             }
         }

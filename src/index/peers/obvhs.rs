@@ -58,7 +58,7 @@ fn bounds_of(node: &Bvh2Node) -> Aabb {
 impl PeerObvhs {
     /// Tests the items of a leaf that was not rejected.
     #[inline(always)]
-    fn leaf<T: BoxTest, S: Sink, R: Recorder>(
+    fn leaf<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         node: &Bvh2Node,
         test: &T,
@@ -180,7 +180,7 @@ impl BoxTested for PeerObvhs {
 
     /// Pops pairs of children from a stack, as the crate's own `point_traverse` does.
     #[inline(always)]
-    fn search<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,

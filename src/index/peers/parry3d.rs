@@ -128,7 +128,7 @@ impl BoxTested for PeerParry3d {
 
     /// Traverses an accepted subtree once more, without tests.
     #[inline(always)]
-    fn search<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,

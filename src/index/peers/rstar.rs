@@ -98,7 +98,7 @@ impl BoxTested for PeerRstar {
     /// Walks the nodes in the order of the crate's iterator; the subtree of an accepted
     /// node is not tested further.
     #[inline(always)]
-    fn search<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,
