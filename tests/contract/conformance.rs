@@ -258,7 +258,7 @@ fn memory_and_counters_fit_the_items() {
         // the whole scene, but two of its halves.
         let looks = match row.info.name {
             _ if row.info.kind == Kind::Scan => 5000..=5000,
-            "wide" | "moving" => 1..=16,
+            "wide" | "moving" | "auto" => 1..=16,
             name if PEERS.contains(&name) => 1..=2,
             _ => 1..=1,
         };
