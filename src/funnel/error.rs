@@ -26,11 +26,20 @@ pub enum FunnelError {
     Refused(String),
 }
 
-/// Refuses a step that needs more memory than is free; unknown memory is no reason.
+/// Refuses a step that needs more memory than is free.
 pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), FunnelError> {
-    match available_bytes().filter(|available| needed > *available) {
+    check_fits([step, "fewer items or views"], needed, available_bytes())
+}
+
+/// Refuses what needs more memory than is available; unknown memory is no reason.
+pub fn check_fits(
+    [what, expected]: [&str; 2],
+    needed: u64,
+    available: Option<u64>,
+) -> Result<(), FunnelError> {
+    match available.filter(|available| needed > *available) {
         Some(available) => Err(FunnelError::Refused(format!(
-            "{step}: about {} needed, {} are free; expected fewer items or views",
+            "{what}: about {} needed, {} are free; expected {expected}",
             gigabytes(needed),
             gigabytes(available)
         ))),

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::Oracle;
-use super::number::{HalfSpace, Number, Precision};
+use super::evaluate::{HalfSpace, Number, Precision};
 use crate::arithmetic::Expansion;
 use crate::arithmetic::exact::{self, ExactVector};
 use crate::camera::{Lens, LensKind, Pose, ViewProjection};

@@ -19,7 +19,7 @@
 
 use std::cell::OnceCell;
 
-use super::number::{HalfSpace, Number, Precision};
+use super::evaluate::{HalfSpace, Number, Precision};
 use super::rough::{RoughSpaces, may_agree};
 
 /// Extent of a volume, independent of the box.

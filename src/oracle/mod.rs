@@ -6,14 +6,13 @@
 mod camera;
 mod certificates;
 mod evaluate;
-mod number;
 mod rough;
 
-use crate::geometry::{Aabb, ConvexVolume};
 use certificates::{Certificates, Extent, certificates};
-use evaluate::{Corners, Exact, Filter, inner_point};
+use evaluate::{Corners, Exact, Filter, HalfSpace, Precision, inner_point};
 use glam::DVec3;
-use number::{HalfSpace, Precision};
+
+use crate::geometry::{Aabb, ConvexVolume};
 
 pub use crate::camera::Pose;
 

@@ -3,7 +3,7 @@
 //! Each has a bound of its error, so exact sums are only formed where rounding could
 //! matter.
 
-use super::number::HalfSpace;
+use super::evaluate::HalfSpace;
 
 /// A result in f64 errs by less than this part of its size. No sum below has
 /// a longer history than coefficients rounded twice, five products and six

@@ -58,7 +58,6 @@ pub struct Rays {
     camera: Camera,
     /// Left, right, bottom, top: slopes, or offsets of an orthographic lens.
     window: [f64; 4],
-    near: f64,
     far: f64,
 }
 
@@ -72,7 +71,6 @@ impl Rays {
         Ok(Rays {
             camera,
             window: camera.lens.window(),
-            near: camera.lens.near(),
             far: camera.lens.far().unwrap_or(f64::INFINITY),
         })
     }
@@ -96,7 +94,7 @@ impl Rays {
         let up = top + (bottom - top) * y;
         let frame = &self.camera.frame;
         let aside = frame.u() * across + frame.v() * up;
-        let (near, far) = (self.near, self.far);
+        let (near, far) = (self.camera.lens.near(), self.far);
         let (origin, direction) = match self.camera.lens.is_orthographic() {
             true => (frame.eye + aside, frame.forward()),
             false => (frame.eye, aside + frame.forward()),

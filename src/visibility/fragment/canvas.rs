@@ -1,13 +1,213 @@
-//! Samples of an image: their rays, and the stencil-test.
+//! Samples of an image: their rays, rectangles of bodies, and the stencil-test.
 
-use glam::DVec3;
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
 
 use super::order::{Part, Piece};
-use super::screen::{Rectangle, Screen};
+use crate::kernel::each;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::truth::{Body, Crossing, Probe, SolidBox};
 use crate::visibility::{Rays, SampleGrid, Solids};
+
+/// Columns and rows of samples.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Rectangle {
+    /// From the left.
+    pub columns: Range<u32>,
+    /// From the top.
+    pub rows: Range<u32>,
+}
+
+impl Rectangle {
+    /// How many samples it holds.
+    pub fn samples(&self) -> u64 {
+        self.columns.len() as u64 * self.rows.len() as u64
+    }
+}
+
+/// Part of a corner's distance that the slope of its line of sight is widened by.
+/// With u = 2^-53 and D the sum of the components of `corner - eye`, the difference
+/// is true to u D, each product of three terms to 4 u D, so a slope `s = x / w` to
+/// 9 u (1 + |s|) D / w. This is 512 u.
+const ROUNDED: f64 = 1.0 / (1u64 << 44) as f64;
+
+/// The same where an edge was cut at the near plane: its ends differ in depth by at
+/// least [`LEVEL`] D, so the place of the cut is true to 2^20 * 16 u of D.
+const CUT: f64 = 1.0 / (1u64 << 28) as f64;
+
+/// An edge that crosses the near plane with less difference than this part of D is
+/// not cut: its box is taken to cover everything.
+const LEVEL: f64 = 1.0 / (1u64 << 20) as f64;
+
+/// Upper bound of the errors of rays and axes of a camera, in slopes.
+const AXES: f64 = 1e-12;
+
+/// A camera's image, ready to place boxes in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Screen {
+    grid: SampleGrid,
+    window: [f64; 4],
+    eye: DVec3,
+    axes: [DVec3; 3],
+    /// Least depth that is drawn; just before the near plane.
+    near: f64,
+    far: f64,
+    parallel: bool,
+    /// Error of the eye, world units.
+    eye_off: f64,
+}
+
+/// Bounds of what was placed so far.
+struct Extent {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Extent {
+    fn add(&mut self, place: [f64; 2], pad: f64) {
+        for (axis, at) in place.into_iter().enumerate() {
+            let pad = pad * (1.0 + at.abs());
+            self.low[axis] = self.low[axis].min(at - pad);
+            self.high[axis] = self.high[axis].max(at + pad);
+        }
+    }
+}
+
+impl Screen {
+    /// The image of a camera.
+    pub fn of(rays: &Rays, grid: SampleGrid) -> Screen {
+        let camera = rays.camera();
+        let (frame, lens) = (&camera.frame, &camera.lens);
+        let (near, far) = (lens.near(), lens.far().unwrap_or(f64::INFINITY));
+        Screen {
+            grid,
+            window: rays.window(),
+            eye: frame.eye,
+            axes: [frame.u(), frame.v(), frame.forward()],
+            near: near - near.abs() * 1e-9,
+            far: far + far.abs() * 1e-9,
+            parallel: lens.is_orthographic(),
+            eye_off: 0.0,
+        }
+    }
+
+    /// The image of the same camera seen in a mirror, the plane across an axis.
+    pub(super) fn mirrored(&self, axis: usize, at: f64) -> Screen {
+        let mut screen = *self;
+        screen.eye[axis] = 2.0 * at - self.eye[axis];
+        screen.axes.iter_mut().for_each(|of| of[axis] = -of[axis]);
+        // One rounding of the reflected eye.
+        screen.eye_off = self.eye_off + screen.eye[axis].abs() * f64::EPSILON;
+        screen
+    }
+
+    /// Columns and rows.
+    pub fn grid(&self) -> SampleGrid {
+        self.grid
+    }
+
+    /// A rectangle that holds every sample whose ray meets the box; `None` if there
+    /// is none for certain.
+    pub fn rectangle(&self, b: &WorldBox) -> Option<Rectangle> {
+        let mut corners = [[0.0; 4]; 8];
+        for (i, corner) in corners.iter_mut().enumerate() {
+            let pick = |k: usize| if i >> k & 1 == 1 { b.max[k] } else { b.min[k] };
+            *corner = self.place(DVec3::new(pick(0), pick(1), pick(2)) - self.eye, 0.0);
+        }
+        self.hull(&corners, |from, to| (from ^ to).is_power_of_two())
+    }
+
+    /// The same of a triangle; its corners are about an origin.
+    pub fn triangle(&self, corners: [Vec3; 3], origin: DVec3) -> Option<Rectangle> {
+        let shift = origin - self.eye;
+        let mut placed = [[0.0; 4]; 3];
+        for (corner, placed) in corners.iter().zip(&mut placed) {
+            let corner = corner.as_dvec3();
+            // One rounding of the shift and one of the sum.
+            let off = 2.0 * f64::EPSILON * (corner.abs() + shift.abs()).element_sum();
+            *placed = self.place(corner + shift, off);
+        }
+        self.hull(&placed, |from, to| from != to)
+    }
+
+    /// A point about the eye: across, up, depth, and the size that its errors are
+    /// relative to, where the point itself may be `off`.
+    #[inline]
+    fn place(&self, at: DVec3, off: f64) -> [f64; 4] {
+        let [x, y, w] = each(self.axes, |axis| at.dot(axis));
+        // Of a point too far to be resolved, the depth is off too.
+        let size = at.abs().element_sum() + (self.eye_off + off) / ROUNDED;
+        [x, y, w, size]
+    }
+
+    /// A rectangle that holds the convex hull of some corners.
+    ///
+    /// `is_edge` is true for any two corners between which the hull has an edge.
+    fn hull<const N: usize>(
+        &self,
+        corners: &[[f64; 4]; N],
+        is_edge: impl Fn(usize, usize) -> bool,
+    ) -> Option<Rectangle> {
+        let mut extent = Extent {
+            low: [f64::INFINITY; 2],
+            high: [f64::NEG_INFINITY; 2],
+        };
+        let least = corners.iter().map(|c| c[2] - c[3] * ROUNDED);
+        if least.fold(f64::INFINITY, f64::min) > self.far {
+            return None;
+        }
+        if self.parallel {
+            corners
+                .iter()
+                .for_each(|&[x, y, _, size]| extent.add([x, y], size * ROUNDED + AXES));
+            return self.cells(&extent);
+        }
+        if corners.iter().all(|c| c[2] + c[3] * ROUNDED < self.near) {
+            return None;
+        }
+        for (i, &[x, y, w, size]) in corners.iter().enumerate() {
+            if w >= self.near {
+                extent.add([x / w, y / w], size / w * ROUNDED + AXES);
+                continue;
+            }
+            for (to, &[to_x, to_y, to_w, to_size]) in corners.iter().enumerate() {
+                let size = size.max(to_size);
+                if !is_edge(i, to) || to_w + size * ROUNDED < self.near {
+                    continue;
+                }
+                if to_w - w < size * LEVEL {
+                    return self.cells(&Extent {
+                        low: [f64::NEG_INFINITY; 2],
+                        high: [f64::INFINITY; 2],
+                    });
+                }
+                let part = (self.near - w) / (to_w - w);
+                let at = |a: f64, b: f64| (a + (b - a) * part) / self.near;
+                extent.add([at(x, to_x), at(y, to_y)], size / self.near * CUT + AXES);
+            }
+        }
+        self.cells(&extent)
+    }
+
+    fn cells(&self, extent: &Extent) -> Option<Rectangle> {
+        let [left, right, bottom, top] = self.window;
+        let cells = |low: f64, high: f64, from: f64, to: f64, count: u32| {
+            let n = f64::from(count);
+            let at = |slope: f64| (slope - from) / (to - from) * n - 0.5;
+            let (a, b) = (at(low), at(high));
+            // A pixel's thousandth for the rounding of this and of the rays.
+            let first = (a.min(b) - 1e-3).ceil().clamp(0.0, n) as u32;
+            let last = (a.max(b) + 1e-3).floor().clamp(-1.0, n - 1.0) + 1.0;
+            first..last as u32
+        };
+        let SampleGrid { width, height } = self.grid;
+        let columns = cells(extent.low[0], extent.high[0], left, right, width);
+        let rows = cells(extent.low[1], extent.high[1], top, bottom, height);
+        (!columns.is_empty() && !rows.is_empty()).then_some(Rectangle { columns, rows })
+    }
+}
 
 /// Some of the samples of an image.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -238,12 +238,7 @@ impl Drawn<Facet> {
     }
 
     fn add(&mut self, canvas: &Canvas<Facet>, surfaces: &Surfaces, triangle: u32, item: usize) {
-        let facet = Facet {
-            corners: surfaces.corners(triangle),
-            item: item as ItemId,
-            two_sided: surfaces.two_sided[item],
-            hides: surfaces.kinds[item] == SurfaceKind::Opaque,
-        };
+        let facet = Facet::of(surfaces, item, surfaces.corners(triangle));
         let Facet { item, hides, .. } = facet;
         let rectangle = canvas.screen().triangle(facet.corners, surfaces.origin);
         let visited = canvas.scan(rectangle, None, |sample, probe| {

@@ -13,14 +13,12 @@ mod cut_outs;
 mod draw;
 mod errors;
 pub mod order;
-mod screen;
 
-pub use canvas::{Canvas, Fragment, Stencil};
+pub use canvas::{Canvas, Fragment, Rectangle, Screen, Stencil};
 pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface, holes_of};
 pub use draw::{Drawn, Tally, Tests, draw};
 pub use errors::{OrderErrors, TooManyPairs, draw_surfaces, order_errors};
 pub use order::{DepthOrder, Part, Piece, ToOrder};
-pub use screen::{Rectangle, Screen};
 
 #[cfg(test)]
 mod tests;

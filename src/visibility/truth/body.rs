@@ -84,6 +84,18 @@ pub struct Facet {
     pub hides: bool,
 }
 
+impl Facet {
+    /// A triangle of an item of surfaces; an opaque one hides what is behind it.
+    pub fn of(surfaces: &Surfaces, item: usize, corners: [Vec3; 3]) -> Facet {
+        Facet {
+            corners,
+            item: item as ItemId,
+            two_sided: surfaces.two_sided[item],
+            hides: surfaces.kinds[item] == SurfaceKind::Opaque,
+        }
+    }
+}
+
 impl Body for Facet {
     type Probe = TriangleProbe;
     type At = <TriangleProbe as Along>::At;
@@ -149,12 +161,8 @@ impl Facets {
     /// All triangles of surfaces; opaque ones hide what is behind them.
     pub fn of(surfaces: &Surfaces) -> Facets {
         let of_item = |item: usize| {
-            surfaces.of(item).map(move |corners| Facet {
-                corners,
-                item: item as ItemId,
-                two_sided: surfaces.two_sided[item],
-                hides: surfaces.kinds[item] == SurfaceKind::Opaque,
-            })
+            let corners = surfaces.of(item);
+            corners.map(move |corners| Facet::of(surfaces, item, corners))
         };
         let all: Vec<Facet> = (0..surfaces.items()).flat_map(of_item).collect();
         Bodies {
