@@ -27,7 +27,8 @@ pub struct Occluder {
 /// last ones: the children of box `j` of a level are block `j` of the level below.
 #[derive(Clone, Debug)]
 pub struct OccluderScene {
-    origin: DVec3,
+    /// World position of the zero of the boxes.
+    pub(super) origin: DVec3,
     /// Level 0 holds the items' outer boxes; the last level is one block.
     levels: Vec<Vec<BoxBlock>>,
     /// In tree order, as what hides.
@@ -38,7 +39,8 @@ pub struct OccluderScene {
     first_occluders: Vec<u32>,
     /// How many of the boxes are items; those behind them only hide.
     items: usize,
-    bounds: WorldBox,
+    /// The union of the boxes as they were written.
+    pub(super) bounds: WorldBox,
 }
 
 impl OccluderScene {
@@ -133,16 +135,6 @@ impl OccluderScene {
     pub fn item(&self, position: usize) -> Option<ItemId> {
         let id = self.ids[position];
         ((id as usize) < self.items).then_some(id)
-    }
-
-    /// World position of the zero of the boxes.
-    pub fn origin(&self) -> DVec3 {
-        self.origin
-    }
-
-    /// The union of the boxes as they were written.
-    pub fn bounds(&self) -> &WorldBox {
-        &self.bounds
     }
 
     /// Number of levels, at least one.

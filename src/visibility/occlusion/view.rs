@@ -152,7 +152,7 @@ impl<'v> View<'v> {
         ];
         let reach = |l: &Linear| l.x.abs() * padded[0] + l.y.abs() * padded[1] + l.c.abs();
         let reach: f64 = lines.iter().map(reach).sum();
-        let eye = frame.eye - scene.origin();
+        let eye = frame.eye - scene.origin;
         // Parallel rays begin at points of their own, which were rounded in world
         // coordinates; one that all rays share is exact there.
         let in_world = if parallel {
@@ -227,7 +227,7 @@ fn before_near(rays: &Rays, near: f64, eye: DVec3, far_from_zero: f64) -> [DVec3
 /// The faces of the scene's bounds that no ray passes and comes back through:
 /// those that the eye is not beyond, or that parallel rays do not leave by.
 fn open_faces(eye: DVec3, forward: DVec3, parallel: bool, scene: &OccluderScene) -> Faces {
-    let bounds = scene.bounds();
+    let bounds = &scene.bounds;
     (0..3).fold(0, |faces, axis| {
         let (low, high) = match parallel {
             true => (forward[axis] <= 0.0, forward[axis] >= 0.0),
