@@ -149,6 +149,9 @@ fn of_portals<'w>(world: &World, row: &RegionRow) -> Bound<'w> {
     })
 }
 
+/// Reads and writes of a traced frame.
+type Reads = fn(&OccluderScene, &FrameTrace, &mut MaskedInner);
+
 fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
     let trace = |view: usize| -> (&OccluderScene, FrameTrace) {
         let occluders = world.occluders(view);
@@ -157,7 +160,7 @@ fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
         (occluders, FrameTrace::of(occluders, &view, world.kernel))
     };
     let traces: Rc<[_]> = world.views().map(trace).collect();
-    let bounds: [(&str, fn(&OccluderScene, &FrameTrace, &mut MaskedInner)); 3] = [
+    let bounds: [(&str, Reads); 3] = [
         (
             "read the occluders that are drawn",
             |occluders, trace, _| {
