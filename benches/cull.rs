@@ -1,4 +1,4 @@
-//! Criterion benchmarks: groups `build`, `cull`, `locate`, `update` and `aged` over
+//! Criterion benchmarks: groups `build`, `cull`, `locate` and `update` over
 //! scenes and structures, and `kernels` by themselves, named `group/structure/scene`, so that critcmp can compare two
 //! runs. Loops over the same tables and walks the same road as `run`; it
 //! measures single structures, ratios belong to `floors` and to `run`.
@@ -127,51 +127,6 @@ fn update(c: &mut Criterion) {
     group.finish();
 }
 
-/// Queries of the whole path after updates, each of which swaps items, 1 % of all:
-/// they jump, and the scene as a whole stays the same.
-fn aged(c: &mut Criterion) {
-    let mut group = c.benchmark_group("aged");
-    group.sample_size(10);
-    for (source, way) in &WORKLOADS[..2] {
-        let scene = load(source);
-        let cameras = path::load(way, &scene, &Default::default()).expect(way);
-        let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(way);
-        for row in Registry::builtin().rows() {
-            let (name, count) = (row.info.name, scene.items.len());
-            if !row.info.capabilities.refits {
-                continue;
-            }
-            let spec = StructureSpec::parse(name).expect(name);
-            let mut items = scene.items.clone();
-            let mut index = spec.build(&items).expect(name);
-            for updates in [0, 200] {
-                for update in 0..updates {
-                    let mut moved = Vec::new();
-                    for i in 0..count / 200 {
-                        let first = update * 7919 + i * 197;
-                        let (a, b) = (first % count, (first * 31 + i) % count);
-                        items.swap(a, b);
-                        moved.extend([a as u32, b as u32]);
-                    }
-                    let input = Input::new(&items);
-                    spec.update(&mut index, input, &moved).expect(name);
-                }
-                let mut out = Vec::new();
-                group.bench_function(BenchmarkId::new(name, format!("{source}/{updates}")), |b| {
-                    b.iter(|| {
-                        for view in &workload.views {
-                            out.clear();
-                            index.query(view.as_any(), &mut out);
-                            black_box(&out);
-                        }
-                    });
-                });
-            }
-        }
-    }
-    group.finish();
-}
-
 /// The plane test, box by box and sixteen at a time, over the same boxes.
 fn kernels(c: &mut Criterion) {
     let mut group = c.benchmark_group("kernels");
@@ -210,6 +165,6 @@ criterion_group! {
     config = Criterion::default()
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(1));
-    targets = build, cull, locate, update, aged, kernels
+    targets = build, cull, locate, update, kernels
 }
 criterion_main!(benches);

@@ -226,7 +226,7 @@ impl Auto {
     /// Replaces the trees; false with nothing changed if they cannot be built.
     fn rebuild(&mut self, items: &[Aabb]) -> bool {
         let order = self.params.order;
-        let built = Moving::build(&Input::new(items), &WideParams { order });
+        let built = Moving::resting(&Input::new(items), &WideParams { order });
         let Ok(trees) = built else {
             return false;
         };
@@ -353,7 +353,7 @@ impl RegionIndex for Auto {
     fn build(input: &Input<'_>, params: &AutoParams) -> Result<Self, BuildError> {
         let order = params.order;
         let mut auto = Auto {
-            trees: Moving::build(input, &WideParams { order })?,
+            trees: Moving::resting(input, &WideParams { order })?,
             params: *params,
             ..Auto::default()
         };

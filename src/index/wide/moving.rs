@@ -1,18 +1,18 @@
 //! The structure `moving`: a tree of what rests beside a tree of what moves.
 //!
-//! The still tree is a [`Wide`]. An item that moves leaves its lane there vacant, and no
-//! bounds change. Movers are in a second [`Wide`], each leaf of which belongs to one
-//! region: the 256 lanes below a block of level 1 of the still tree. A mover is
-//! overwritten in place within the bounds that its region had at the build, and goes
-//! to a leaf of another region beyond. So bounds do not grow, however many updates come.
-//!
-//! Movers that rest return: each update rebuilds a few regions of the still tree.
+//! The still tree is a [`Wide`]. An item that moves now and then is overwritten in its
+//! leaf there, or goes to a vacant lane of the leaf that is nearest: leaves keep the cells
+//! of space that they had at the build, their homes, and outgrow them by a margin at most.
+//! Items that move in update after update, and those that find no lane, are in a second
+//! [`Wide`], each leaf of which belongs to a region: some neighbouring homes, fewer where
+//! there are more movers. So bounds do not grow, however many updates come.
 
 use std::ops::ControlFlow;
 
-use super::block_order::{BlockOrder, block_ordered};
+use glam::Vec3;
+
 use super::{SCRATCH, Wide, WideParams};
-use crate::geometry::{Aabb, LANES};
+use crate::geometry::{Aabb, BoxBlock, LANES};
 use crate::index::frontier::{put_back, take};
 use crate::index::items::{ABSENT, Dirty, Positions};
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
@@ -25,47 +25,66 @@ const MOST_ITEMS: usize = 1 << 28;
 /// Mark of a position among the movers.
 const MOVER: usize = 1 << 31;
 
-/// Lanes of a region of the still tree.
-const REGION: usize = LANES * LANES;
-
 /// Updates without a move after which an item rests.
 const REST: u8 = 8;
 
-/// Fewest resting movers that a region is rebuilt for, unless all of them rest.
-const WORTH_REBUILD: usize = LANES;
+/// Most growth of a leaf of the still tree on a side, in longest edges of its home.
+const GROWTH: f32 = 0.25;
 
-/// Leaves of movers from which on a region is crowded: it holds twice its items.
-const CROWDED: usize = 2 * REGION / LANES;
+/// The same of a region for the centres of its movers.
+const REGION_GROWTH: f32 = 0.125;
+
+/// Leaves of movers from which on a region is crowded.
+const CROWDED: usize = 32;
+
+/// Most moved items per region before there are new regions.
+const COARSE: usize = 32;
+
+/// Number of the first update, so that all items rest before it.
+const FIRST: u8 = 2 * REST;
 
 /// A tree of resting items and a tree of moving ones; items may come and go.
 #[derive(Default)]
 pub struct Moving {
     pub(super) still: Wide,
     pub(super) movers: Wide,
-    /// Blocks of level 1 of the still tree, at least one after the first update.
+    /// The blocks above the leaves of `still` as they were built.
+    homes: Vec<BoxBlock>,
     regions: Vec<Region>,
-    /// Leaves of `movers`. Leaf `r` is the first one of region `r`.
+    /// Region of each leaf of `still`; at least one.
+    region_of: Vec<u32>,
+    /// Smallest span of a region.
+    finest: usize,
+    /// Leaves of `movers`.
     leaves: Vec<MoverLeaf>,
     free_leaves: Vec<u32>,
     /// Position in `still`, or in `movers` and marked [`MOVER`].
     positions: Positions,
+    /// Number of the last update that moved each item.
+    moved: Vec<u8>,
     /// Leaves of movers beyond [`CROWDED`] of their region.
     crowded: usize,
     /// Number of the update.
     now: u8,
-    /// The region that is looked at next.
+    /// The leaf of movers that is looked at next.
     next: usize,
-    changed_still: Dirty,
-    changed_movers: Dirty,
+    changed: Dirty,
 }
 
-/// A region: its movers fill leaf after leaf.
+/// Neighbouring leaves of the still tree.
+///
+/// Its movers fill leaf after leaf: a single one unless its span is the finest.
+#[derive(Clone, Copy)]
 struct Region {
-    /// Bounds at the build.
-    home: Aabb,
-    movers: u32,
+    /// Centres of movers that do not leave it.
+    cell: Aabb,
+    /// Its first leaf in the still tree, a multiple of `span`.
+    first: usize,
+    /// Number of its leaves in the still tree, a power of two.
+    span: usize,
+    movers: usize,
     /// Leaf of the last mover.
-    last: u32,
+    last: usize,
 }
 
 /// A leaf of movers.
@@ -74,74 +93,146 @@ struct MoverLeaf {
     region: u32,
     /// The leaf of this region that was filled before.
     before: u32,
-    /// Number of the update that moved each lane.
-    moved: [u8; LANES],
+}
+
+/// A box enlarged on each side by a multiple of its longest edge.
+#[inline(always)]
+fn grown(b: Aabb, by: f32) -> Aabb {
+    let margin = Vec3::splat(b.extent().max_element() * by);
+    Aabb::new(b.min - margin, b.max + margin)
 }
 
 impl Moving {
-    /// Makes regions and positions, at the first update.
-    fn prepare(&mut self, items: usize) {
-        self.positions.prepare(&self.still.ids, items);
-        if self.regions.is_empty() {
-            let all = Aabb::new(Aabb::EMPTY.max, Aabb::EMPTY.min);
-            let home = |region: usize| match self.still.levels.get(2) {
-                Some(level) => self.still.blocks[level.first + region / LANES].get(region % LANES),
-                None => all,
-            };
-            let count = self.still.levels.get(1).map_or(1, |level| level.blocks);
-            let regions = (0..count).map(|region| Region {
-                home: home(region),
-                movers: 0,
-                last: region as u32,
-            });
-            self.regions = regions.collect();
-            let leaf = |region: usize| MoverLeaf {
-                region: region as u32,
-                ..MoverLeaf::default()
-            };
-            self.leaves = (0..count).map(leaf).collect();
-            self.movers = Wide::unfilled(&vec![ABSENT; count * LANES]);
+    /// The still tree alone; the first update does the rest.
+    pub(super) fn resting(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
+        let count = input.items.len();
+        if count > MOST_ITEMS {
+            let most = MOST_ITEMS;
+            return Err(BuildError::TooManyItems { count, most });
         }
-        self.changed_still = self.still.untouched();
-        self.changed_movers = self.movers.untouched();
+        Ok(Moving {
+            still: Wide::build(input, params)?,
+            ..Moving::default()
+        })
     }
 
-    /// The region that takes a box in: `near` if the centre lies in its home.
-    fn region_for(&self, near: usize, bounds: &Aabb) -> usize {
+    /// Makes homes and regions, once, and room for as many items.
+    fn prepare(&mut self, items: usize) {
+        self.positions.prepare(&self.still.ids, items);
+        self.moved.resize(items.max(self.moved.len()), REST);
+        if self.regions.is_empty() {
+            let leaves = self.still.levels.first().map_or(0, |level| level.blocks);
+            self.homes = self.still.blocks[leaves..].to_vec();
+            self.region_of = vec![0; leaves.max(1)];
+            self.now = FIRST;
+            self.divide(items / 100);
+        }
+    }
+
+    /// Divides the still tree into regions for a number of movers, six to eleven each.
+    ///
+    /// The leaves of movers are in the order of space, with room for eight times as many
+    /// regions.
+    fn divide(&mut self, movers: usize) {
+        let leaves = self.region_of.len();
+        let span = (6 * leaves / movers.max(1)).max(1).next_power_of_two();
+        self.finest = (span / 8).max(1);
+        let first_free = leaves.div_ceil(self.finest);
+        let count = first_free + first_free / 8 + 1;
+        let new = Wide::unfilled(&vec![ABSENT; count * LANES]);
+        let before = std::mem::replace(&mut self.movers, new);
+        self.changed = self.movers.untouched();
+        self.regions.clear();
+        self.leaves = vec![MoverLeaf::default(); count];
+        self.free_leaves = (first_free as u32..count as u32).rev().collect();
+        (self.crowded, self.next) = (0, 0);
+        for first in (0..leaves).step_by(span) {
+            self.add_region(first, span);
+        }
+        for (at, &id) in before.ids.iter().enumerate() {
+            if id != ABSENT {
+                let bounds = before.blocks[at / LANES].get(at % LANES);
+                self.add(self.leaf_for(&bounds), id, &bounds);
+            }
+        }
+    }
+
+    /// Adds a region without movers; returns its index.
+    fn add_region(&mut self, first: usize, span: usize) -> usize {
+        let (region, last) = (self.regions.len(), first / self.finest);
+        let end = self.region_of.len().min(first + span);
+        self.region_of[first..end].fill(region as u32);
+        self.leaves[last].region = region as u32;
+        self.regions.push(Region {
+            cell: grown(self.home(first, span), REGION_GROWTH),
+            first,
+            span,
+            movers: 0,
+            last,
+        });
+        region
+    }
+
+    /// Bounds at the build of some leaves of the still tree, whose number is a power of
+    /// two; all of space for the whole tree.
+    #[inline(always)]
+    fn home(&self, first: usize, span: usize) -> Aabb {
+        if span >= self.region_of.len() {
+            return Aabb::new(Aabb::EMPTY.max, Aabb::EMPTY.min);
+        }
+        let level = (span.ilog2() / LANES.ilog2()) as usize;
+        let below = LANES.pow(level as u32);
+        let (lane, lanes) = (first / below, span / below);
+        let block = &self.homes[self.first_home(level + 1) + lane / LANES];
+        let lanes = (lane..lane + lanes).map(|lane| block.get(lane % LANES));
+        lanes.fold(Aabb::EMPTY, |all, b| all.union(&b))
+    }
+
+    /// Index of the first of the [homes](Self::homes) on a level.
+    #[inline(always)]
+    fn first_home(&self, level: usize) -> usize {
+        self.still.levels[level].first - self.still.levels[0].blocks
+    }
+
+    /// The leaf of the still tree whose home is nearest to the centre of a box.
+    fn leaf_for(&self, bounds: &Aabb) -> usize {
         let centre = bounds.centre();
-        if self.regions[near].home.contains_point(centre) {
-            return near;
+        let mut at = 0;
+        for level in (1..self.still.levels.len()).rev() {
+            at = at * LANES + self.homes[self.first_home(level) + at].nearest(centre);
         }
-        let mut region = 0;
-        for level in self.still.levels.iter().skip(2).rev() {
-            let block = &self.still.blocks[level.first + region];
-            region = region * LANES + block.nearest(centre);
-        }
-        region.min(self.regions.len() - 1)
+        at.min(self.region_of.len() - 1)
     }
 
     /// Takes over the new bounds of an item.
     fn update(&mut self, id: ItemId, bounds: &Aabb) {
-        let at = self.positions.of(id);
-        let near = match at {
-            Some(at) if at & MOVER != 0 => self.leaves[(at & !MOVER) / LANES].region as usize,
-            Some(at) => at / REGION,
-            None => 0,
-        };
-        let region = (!bounds.is_empty()).then(|| self.region_for(near, bounds));
-        match at {
+        let moved = std::mem::replace(&mut self.moved[id as usize], self.now);
+        let rested = self.now.wrapping_sub(moved) >= REST;
+        let mut near = None;
+        match self.positions.of(id) {
             Some(at) if at & MOVER != 0 => {
-                let (leaf, lane) = ((at & !MOVER) / LANES, at % LANES);
-                if region == Some(near) {
-                    self.movers.blocks[leaf].set(lane, bounds);
-                    self.leaves[leaf].moved[lane] = self.now;
-                    self.changed_movers.mark(leaf);
+                let (at, leaf) = (at & !MOVER, (at & !MOVER) / LANES);
+                let region = self.leaves[leaf].region;
+                let cell = &self.regions[region as usize].cell;
+                near = (!cell.contains_point(bounds.centre())).then(|| self.leaf_for(bounds));
+                let stays = near.is_none_or(|near| self.region_of[near] == region);
+                if stays && !bounds.is_empty() {
+                    self.movers.blocks[leaf].set(at % LANES, bounds);
+                    self.changed.mark(leaf);
                     return;
                 }
-                self.remove(at & !MOVER);
+                self.remove(at);
             }
-            // The box may stay: nothing reads a vacant lane.
             Some(at) => {
+                let (leaf, lane) = (at / LANES, at % LANES);
+                // Not all at once, for the sake of the slowest update.
+                let leaves = !rested && (id as u8).wrapping_add(self.now).is_multiple_of(REST);
+                if !leaves && !bounds.is_empty() && self.fits(leaf, bounds) {
+                    self.still.blocks[leaf].set(lane, bounds);
+                    self.still.grow(leaf, bounds);
+                    return;
+                }
+                // The box may stay: nothing reads a vacant lane.
                 self.still.ids.set(at, ABSENT);
                 self.still.occupied[at / LANES] &= !(1 << (at % LANES));
                 self.still.vacant += 1;
@@ -149,133 +240,151 @@ impl Moving {
             None => {}
         }
         self.positions.set(id, ABSENT);
-        if let Some(region) = region {
-            self.add(region, id, bounds);
+        if !bounds.is_empty() {
+            let near = near.unwrap_or_else(|| self.leaf_for(bounds));
+            if !(rested && self.rest(near, id, bounds)) {
+                self.add(near, id, bounds);
+            }
         }
     }
 
-    /// Adds a mover to a region.
-    fn add(&mut self, region: usize, id: ItemId, bounds: &Aabb) {
-        let movers = self.regions[region].movers as usize;
-        let lane = movers % LANES;
-        if lane == 0 && movers > 0 {
+    /// Returns whether a leaf of the still tree may hold a box.
+    #[inline(always)]
+    fn fits(&self, leaf: usize, bounds: &Aabb) -> bool {
+        grown(self.home(leaf, 1), GROWTH).contains(bounds)
+    }
+
+    /// Puts an item into a leaf of the still tree, the nearest one or one beside it;
+    /// false if none that may hold it has a vacant lane.
+    fn rest(&mut self, near: usize, id: ItemId, bounds: &Aabb) -> bool {
+        let first = near - near % LANES;
+        let beside = first..self.region_of.len().min(first + LANES);
+        for leaf in std::iter::once(near).chain(beside) {
+            if !self.fits(leaf, bounds) {
+                continue;
+            }
+            let lanes = self.still.occupied.get(leaf).copied();
+            let lane = lanes.map_or(LANES, |lanes| lanes.trailing_ones() as usize);
+            let at = leaf * LANES + lane;
+            if lane < LANES && at < self.still.ids.len() {
+                self.still.put(at, id, bounds);
+                self.still.grow(leaf, bounds);
+                self.positions.set(id, at as u32);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Adds a mover to the region of a leaf of the still tree.
+    fn add(&mut self, near: usize, id: ItemId, bounds: &Aabb) {
+        let mut region = self.region_of[near] as usize;
+        while self.regions[region].movers == LANES && self.regions[region].span > self.finest {
+            self.split(region);
+            region = self.region_of[near] as usize;
+        }
+        self.append(region, id, bounds);
+    }
+
+    /// Adds a mover behind the last one of a region.
+    fn append(&mut self, region: usize, id: ItemId, bounds: &Aabb) {
+        let movers = self.regions[region].movers;
+        if movers > 0 && movers.is_multiple_of(LANES) {
             let leaf = self.free_leaf();
-            let before = std::mem::replace(&mut self.regions[region].last, leaf as u32);
+            let before = std::mem::replace(&mut self.regions[region].last, leaf) as u32;
             let region = region as u32;
-            self.leaves[leaf] = MoverLeaf {
-                region,
-                before,
-                ..MoverLeaf::default()
-            };
+            self.leaves[leaf] = MoverLeaf { region, before };
             self.crowded += usize::from(movers / LANES >= CROWDED);
         }
         self.regions[region].movers += 1;
-        let leaf = self.regions[region].last as usize;
-        self.put(leaf * LANES + lane, id, bounds, self.now);
+        self.put(
+            self.regions[region].last * LANES + movers % LANES,
+            id,
+            bounds,
+        );
+    }
+
+    /// Halves a region of a single leaf of movers.
+    fn split(&mut self, region: usize) {
+        let Region {
+            first, span, last, ..
+        } = self.regions[region];
+        let half = span / 2;
+        self.regions[region].span = half;
+        self.regions[region].cell = grown(self.home(first, half), REGION_GROWTH);
+        if first + half >= self.region_of.len() {
+            return;
+        }
+        let upper = self.add_region(first + half, half);
+        // Backwards, as the last mover takes the place of a removed one.
+        for at in (last * LANES..(last + 1) * LANES).rev() {
+            let bounds = self.movers.blocks[last].get(at % LANES);
+            if self.region_of[self.leaf_for(&bounds)] as usize == upper {
+                let id = self.movers.ids[at];
+                self.remove(at);
+                self.append(upper, id, &bounds);
+            }
+        }
     }
 
     /// Removes the mover at a position; the last one of its region takes its place.
     fn remove(&mut self, position: usize) {
         let region = &mut self.regions[self.leaves[position / LANES].region as usize];
         region.movers -= 1;
-        let (left, leaf) = (region.movers as usize, region.last as usize);
+        let (left, leaf) = (region.movers, region.last);
         let last = leaf * LANES + left % LANES;
         if left > 0 && left.is_multiple_of(LANES) {
-            region.last = self.leaves[leaf].before;
+            region.last = self.leaves[leaf].before as usize;
             self.free_leaves.push(leaf as u32);
             self.crowded -= usize::from(left / LANES >= CROWDED);
         }
         if last != position {
             let bounds = self.movers.blocks[leaf].get(last % LANES);
-            let moved = self.leaves[leaf].moved[last % LANES];
-            self.put(position, self.movers.ids[last], &bounds, moved);
+            self.put(position, self.movers.ids[last], &bounds);
         }
         self.movers.put(last, ABSENT, &Aabb::EMPTY);
-        self.changed_movers.mark(leaf);
+        self.changed.mark(leaf);
     }
 
-    /// Sets the mover at a position, last moved by an update.
-    fn put(&mut self, position: usize, id: ItemId, bounds: &Aabb, moved: u8) {
-        let (leaf, lane) = (position / LANES, position % LANES);
+    /// Sets the mover at a position.
+    fn put(&mut self, position: usize, id: ItemId, bounds: &Aabb) {
         self.movers.put(position, id, bounds);
         self.positions.set(id, (MOVER | position) as u32);
-        self.leaves[leaf].moved[lane] = moved;
-        self.changed_movers.mark(leaf);
+        self.changed.mark(position / LANES);
     }
 
-    /// A leaf of movers that no region uses; twice as many leaves if there is none.
+    /// A leaf of movers that no region begins with; more of them if all are in use.
     fn free_leaf(&mut self) -> usize {
         if self.free_leaves.is_empty() {
             let count = self.leaves.len();
+            let more = count + count.div_ceil(2);
             let mut ids = self.movers.ids.to_vec();
-            ids.resize(2 * ids.len(), ABSENT);
+            ids.resize(more * LANES, ABSENT);
             let smaller = std::mem::replace(&mut self.movers, Wide::unfilled(&ids));
             self.movers.blocks[..count].copy_from_slice(&smaller.blocks[..count]);
-            self.leaves.resize(2 * count, MoverLeaf::default());
-            self.free_leaves
-                .extend((count as u32..2 * count as u32).rev());
-            self.changed_movers = self.movers.untouched();
-            (0..count).for_each(|leaf| _ = self.changed_movers.mark(leaf));
+            self.leaves.resize(more, MoverLeaf::default());
+            self.free_leaves.extend((count as u32..more as u32).rev());
+            self.changed = self.movers.untouched();
+            (0..count).for_each(|leaf| _ = self.changed.mark(leaf));
         }
         self.free_leaves.pop().map_or(0, |leaf| leaf as usize)
     }
 
-    /// Returns resting movers to the still tree, in a few regions: a rebuilt one for
-    /// every 512 moved items, so that it costs less than they do.
-    fn settle(&mut self, items: &[Aabb], moved: usize) {
-        let mut rebuilds = moved / 512 + 1;
-        for _ in 0..(moved / 64 + 16).min(self.regions.len()) {
-            let region = self.next;
-            self.next = (region + 1) % self.regions.len();
-            rebuilds -= usize::from(self.rebuild(region, items));
-            if rebuilds == 0 {
-                return;
-            }
-        }
-    }
-
-    /// Rebuilds a region with its movers that rest; false if it is not worth it.
-    fn rebuild(&mut self, region: usize, items: &[Aabb]) -> bool {
-        let places = region * REGION..self.still.ids.len().min((region + 1) * REGION);
-        let movers = self.regions[region].movers as usize;
-        let mut resting = Vec::new();
-        let mut leaf = self.regions[region].last as usize;
-        for first in (0..movers).step_by(LANES).rev() {
-            for lane in 0..LANES.min(movers - first) {
-                if self.now.wrapping_sub(self.leaves[leaf].moved[lane]) >= REST {
-                    resting.push(self.movers.ids[leaf * LANES + lane]);
+    /// Returns resting movers of a few leaves to the still tree.
+    fn settle(&mut self, moved: usize) {
+        for _ in 0..(moved / 256 + 1).min(self.leaves.len()) {
+            let leaf = self.next;
+            self.next = (leaf + 1) % self.leaves.len();
+            for at in (leaf * LANES..(leaf + 1) * LANES).rev() {
+                let id = self.movers.ids[at];
+                if id != ABSENT && self.now.wrapping_sub(self.moved[id as usize]) >= REST {
+                    let bounds = self.movers.blocks[leaf].get(at % LANES);
+                    if self.rest(self.leaf_for(&bounds), id, &bounds) {
+                        self.remove(at);
+                    }
                 }
             }
-            leaf = self.leaves[leaf].before as usize;
         }
-        let is_worth = |resting: usize| resting > 0 && resting >= movers.min(WORTH_REBUILD);
-        if !is_worth(resting.len()) {
-            return false;
-        }
-        let here = self.still.ids.get(places.clone()).unwrap_or_default();
-        let mut ids: Vec<ItemId> = here.iter().copied().filter(|&id| id != ABSENT).collect();
-        resting.truncate(here.len() - ids.len());
-        if !is_worth(resting.len()) {
-            return false;
-        }
-        for &id in &resting {
-            if let Some(at) = self.positions.of(id) {
-                self.remove(at & !MOVER);
-            }
-        }
-        ids.append(&mut resting);
-        let ids = block_ordered(items, ids, BlockOrder::Median, 1);
-        for (i, position) in places.enumerate() {
-            match ids.get(i) {
-                Some(&id) => {
-                    self.still.put(position, id, &items[id as usize]);
-                    self.positions.set(id, position as u32);
-                }
-                None => self.still.put(position, ABSENT, &Aabb::EMPTY),
-            }
-            self.changed_still.mark(position / LANES);
-        }
-        true
     }
 }
 
@@ -292,15 +401,9 @@ impl RegionIndex for Moving {
 
     /// O(n log n), that of [`Wide`].
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
-        let count = input.items.len();
-        if count > MOST_ITEMS {
-            let most = MOST_ITEMS;
-            return Err(BuildError::TooManyItems { count, most });
-        }
-        Ok(Moving {
-            still: Wide::build(input, params)?,
-            ..Moving::default()
-        })
+        let mut trees = Moving::resting(input, params)?;
+        trees.prepare(input.items.len());
+        Ok(trees)
     }
 
     fn memory(&self) -> MemoryUsage {
@@ -308,10 +411,15 @@ impl RegionIndex for Moving {
         MemoryUsage {
             node_bytes: still.node_bytes
                 + movers.node_bytes
+                + size_of_val(&self.homes[..])
                 + size_of_val(&self.regions[..])
+                + size_of_val(&self.region_of[..])
                 + size_of_val(&self.leaves[..])
                 + size_of_val(&self.free_leaves[..]),
-            item_bytes: still.item_bytes + movers.item_bytes + self.positions.bytes(),
+            item_bytes: still.item_bytes
+                + movers.item_bytes
+                + self.positions.bytes()
+                + self.moved.len(),
         }
     }
 
@@ -333,13 +441,18 @@ impl RegionIndex for Moving {
     }
 
     /// O(moved). Items may become or cease to be empty. A rebuild is needed where most
-    /// items have gathered in a few regions.
+    /// items have gathered in a few places.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         if self.crowded * LANES > items.len() / 8 || items.len() > MOST_ITEMS {
             return false;
         }
-        self.prepare(items.len());
         self.still.balls = None;
+        self.prepare(items.len());
+        self.changed = self.movers.untouched();
+        let regions = self.regions.len();
+        if moved.len() > COARSE * regions && regions < self.region_of.len() {
+            self.divide(moved.len());
+        }
         self.now = self.now.wrapping_add(1);
         for (i, &id) in moved.iter().enumerate() {
             match self.positions.ahead(items, moved, i) {
@@ -347,147 +460,21 @@ impl RegionIndex for Moving {
                     self.movers.blocks[(at & !MOVER) / LANES].prefetch();
                     prefetch(&self.leaves[(at & !MOVER) / LANES]);
                 }
-                Some(at) => prefetch(&self.still.ids[at]),
+                Some(at) => {
+                    self.still.blocks[at / LANES].prefetch();
+                    if let Some(block) = self.homes.get(at / LANES / LANES) {
+                        block.prefetch();
+                    }
+                }
                 None => {}
             }
             self.update(id, &items[id as usize]);
         }
-        self.settle(items, moved.len());
-        self.still
-            .fit_above(std::mem::take(&mut self.changed_still));
-        self.movers
-            .fit_above(std::mem::take(&mut self.changed_movers));
+        self.settle(moved.len());
+        self.movers.fit_above(std::mem::take(&mut self.changed));
         true
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::{ConvexVolume, Plane};
-    use crate::index::Query;
-    use crate::kernel::Kernel;
-    use crate::query::NoRecorder;
-    use glam::Vec3;
-    use rand::{Rng, SeedableRng};
-    use rand_pcg::Pcg64;
-
-    const WORLD: u32 = 64;
-
-    /// An empty item; its bounds are finite, as those of all items.
-    const GONE: Aabb = Aabb::new(Vec3::ONE, Vec3::ZERO);
-
-    fn point(rng: &mut Pcg64) -> Vec3 {
-        let mut x = || (rng.next_u32() % (16 * WORLD)) as f32 / 16.0;
-        Vec3::new(x(), x(), x())
-    }
-
-    fn cubes(rng: &mut Pcg64, count: usize) -> Vec<Aabb> {
-        let cube = |_| Aabb::around(point(rng), Vec3::splat(0.7));
-        (0..count).map(cube).collect()
-    }
-
-    /// Compares the answers of all kernels with a scan, and the lanes with the items.
-    fn assert_right(index: &Moving, items: &[Aabb], rng: &mut Pcg64) {
-        fn ask(index: &Moving, volume: &impl QueryVolume, kernel: Kernel) -> Vec<ItemId> {
-            let (sink, recorder) = (&mut Vec::new(), &mut NoRecorder);
-            let _ = kernel.run(Query {
-                index,
-                volume,
-                sink,
-                recorder,
-            });
-            sink.sort_unstable();
-            std::mem::take(sink)
-        }
-        fn seen(items: &[Aabb], sees: impl Fn(&Aabb) -> bool) -> Vec<ItemId> {
-            let seen = items.iter().zip(0..).filter(|(b, _)| sees(b));
-            seen.map(|(_, id)| id).collect()
-        }
-        let corner = point(rng);
-        let wedge = [
-            Plane::new(Vec3::new(0.8, 0.1, -0.3), 0.0),
-            Plane::new(Vec3::new(-0.2, 0.9, 0.4), 0.0),
-            Plane::new(-Vec3::Z, corner.z),
-        ];
-        let wedge = wedge.map(|p| Plane::new(p.normal, p.d - p.normal.dot(corner)));
-        let volumes = [&wedge[..], &wedge[..1], &[]].map(ConvexVolume::from_planes);
-        for kernel in Kernel::available() {
-            for volume in volumes.iter().flatten() {
-                let scan = seen(items, |b| !b.is_empty() && volume.sees(b));
-                assert_eq!(ask(index, volume, kernel), scan, "{kernel}");
-            }
-            let p = items[rng.next_u32() as usize % items.len()].min;
-            let scan = seen(items, |b| b.contains_point(p));
-            assert_eq!(ask(index, &p, kernel), scan, "{kernel} at {p}");
-        }
-        for tree in [&index.still, &index.movers] {
-            let held = tree.ids.iter().filter(|&&id| id != ABSENT).count();
-            assert_eq!(tree.ids.len() - tree.vacant, held);
-        }
-        let movers: u32 = index.regions.iter().map(|r| r.movers).sum();
-        let held = index.movers.ids.len() - index.movers.vacant;
-        assert_eq!(movers as usize, held);
-    }
-
-    #[test]
-    fn answers_are_those_of_a_scan_whatever_moves_comes_and_goes() {
-        let mut rng = Pcg64::seed_from_u64(7);
-        for count in [0, 1, 20, 300, 3000] {
-            let mut items = cubes(&mut rng, count + 40);
-            // Some are there only later.
-            items[count..].fill(GONE);
-            let mut index = Moving::build(&Input::new(&items), &Default::default()).unwrap();
-            for round in 0..60u32 {
-                let share = [3, 40, 1, 300][round as usize / 15];
-                let some = |_| rng.next_u32() % items.len() as u32;
-                let moved: Vec<ItemId> = (0..items.len() / share).map(some).collect();
-                for &id in &moved {
-                    let b = &mut items[id as usize];
-                    *b = match rng.next_u32() % 8 {
-                        0 => GONE,
-                        1 | 2 => Aabb::around(point(&mut rng), Vec3::splat(0.7)),
-                        _ if b.is_empty() => Aabb::around(Vec3::splat(9.0), Vec3::ONE),
-                        _ => Aabb::new(b.min + 0.5, b.max + 0.5),
-                    };
-                }
-                if !index.refit(&items, &moved) {
-                    index = Moving::build(&Input::new(&items), &Default::default()).unwrap();
-                }
-                assert_right(&index, &items, &mut rng);
-            }
-        }
-    }
-
-    #[test]
-    fn movers_that_rest_return_to_the_still_tree() {
-        let mut rng = Pcg64::seed_from_u64(8);
-        let mut items = cubes(&mut rng, 5000);
-        let mut index = Moving::build(&Input::new(&items), &Default::default()).unwrap();
-        let all: Vec<ItemId> = (0..5000).collect();
-        for b in &mut items {
-            *b = Aabb::new(b.min + 0.1, b.max + 0.1);
-        }
-        assert!(index.refit(&items, &all));
-        assert_eq!(index.still.vacant, index.still.ids.len());
-        for _ in 0..64 {
-            assert!(index.refit(&items, &[17]));
-        }
-        let movers = index.movers.ids.len() - index.movers.vacant;
-        assert!(movers < 500, "{movers} movers");
-        assert_right(&index, &items, &mut rng);
-    }
-
-    #[test]
-    fn a_crowd_in_one_place_needs_a_rebuild() {
-        let mut rng = Pcg64::seed_from_u64(9);
-        let mut items = cubes(&mut rng, 5000);
-        let mut index = Moving::build(&Input::new(&items), &Default::default()).unwrap();
-        let all: Vec<ItemId> = (0..5000).collect();
-        items.fill(Aabb::around(Vec3::splat(9.0), Vec3::ONE));
-        assert!(index.refit(&items, &all));
-        assert_right(&index, &items, &mut rng);
-        assert!(!index.refit(&items, &all));
-        assert_right(&index, &items, &mut rng);
-    }
-}
+mod tests;

@@ -67,6 +67,19 @@ impl Wide {
         self.blocks[leaf].set(lane, bounds);
     }
 
+    /// Enlarges the bounds above a leaf to hold a box.
+    pub(super) fn grow(&mut self, mut at: usize, bounds: &Aabb) {
+        for level in self.levels.iter().skip(1) {
+            let block = &mut self.blocks[level.first + at / LANES];
+            let held = block.get(at % LANES);
+            if held.contains(bounds) {
+                return;
+            }
+            block.set(at % LANES, &held.union(bounds));
+            at /= LANES;
+        }
+    }
+
     /// Fits the blocks above some leaves to the boxes of these leaves.
     pub(super) fn fit_above(&mut self, mut changed: Dirty) {
         for pair in self.levels.windows(2) {
