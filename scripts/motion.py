@@ -68,8 +68,8 @@ def fastest(cells):
     cells = sorted((c for c in cells if c["status"] == "ok"), key=lambda c: float(c["frame_ns"]))
     first = cells[0]
     tied = [c["structure"] for c in cells if float(c["frame_ns"]) < 1.05 * float(first["frame_ns"])]
-    return (f"{', '.join(tied)}: {number(float(first['frame_ns']) / 1000)} us, "
-            f"worst {number(float(first['worst_frame_ns']) / 1000)}")
+    return (f"{', '.join(tied)} {number(float(first['frame_ns']) / 1000)} "
+            f"({number(float(first['worst_frame_ns']) / 1000)})")
 
 
 def lines():
@@ -90,8 +90,9 @@ def lines():
 
 HEAD = """## What moves
 
-Written by `scripts/motion.py` from [results/motion](../results/motion) ({cpu}, {date}): 100,000 items, views of 2 %. The fastest structures by frame (ties within 5 %), and the worst frame
-of the first. *Ageing*: query time after 100 frames / that of a fresh build: {others}.
+Written by `scripts/motion.py` from [results/motion](../results/motion) ({cpu}, {date}): 100,000
+items, views of 2 %, 100 frames. The fastest structures by frame (ties within 5 %), with the us of
+the first (its worst frame). *Ageing*: query time after 100 frames / that of a fresh build: {others}.
 
 | moved per frame | scene | one view | sixteen views | ageing |
 |---|---|---|---|---|
