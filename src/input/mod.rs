@@ -11,5 +11,15 @@ pub use error::{InputError, bare};
 pub use file::{held_files, hold_files, is_readable, pipes, read_file, stand_in};
 pub(crate) use note::{note, warn};
 pub use note::{tell_notes, tell_warnings};
-pub(crate) use table::finite;
 pub use table::{Row, TableReader};
+
+/// A finite f64, or what was expected.
+pub(crate) fn finite(text: &str) -> Result<f64, &'static str> {
+    let number = |text: &str| text.parse::<f64>().ok();
+    let is_comma = || text.contains(',') && number(&text.replacen(',', ".", 1)).is_some();
+    match number(text) {
+        Some(value) if value.is_finite() => Ok(value),
+        None if is_comma() => Err("a decimal point, not a decimal comma"),
+        _ => Err("a finite number"),
+    }
+}

@@ -5,7 +5,7 @@
 
 use std::collections::HashSet;
 
-use super::{InputError, note};
+use super::{InputError, finite, note};
 use crate::shown::{counted, first_of, shortened};
 use crate::spec::nearest;
 
@@ -233,17 +233,6 @@ fn delimiter(head: &[u8]) -> u8 {
     // The last of several that are equally frequent.
     let all = [b'|', b'\t', b';', b','];
     all.into_iter().max_by_key(count).unwrap_or(b',')
-}
-
-/// A finite f64, or what was expected.
-pub(crate) fn finite(text: &str) -> Result<f64, &'static str> {
-    let number = |text: &str| text.parse::<f64>().ok();
-    let is_comma = || text.contains(',') && number(&text.replacen(',', ".", 1)).is_some();
-    match number(text) {
-        Some(value) if value.is_finite() => Ok(value),
-        None if is_comma() => Err("a decimal point, not a decimal comma"),
-        _ => Err("a finite number"),
-    }
 }
 
 /// Names of columns, cut down to what fits an error line.
