@@ -308,13 +308,10 @@ mod tests {
     fn bad_line(text: &str) -> u64 {
         let mut table = TableReader::open(text.as_bytes(), "t.csv").unwrap();
         while let Some(row) = table.next_row() {
-            match row.and_then(|row| row.finite_number(0)) {
-                Err(error) => {
-                    let error = error.to_string();
-                    let line = error.strip_prefix("t.csv, line ").unwrap_or_default();
-                    return line.split(':').next().unwrap_or_default().parse().unwrap();
-                }
-                Ok(_) => {}
+            if let Err(error) = row.and_then(|row| row.finite_number(0)) {
+                let error = error.to_string();
+                let line = error.strip_prefix("t.csv, line ").unwrap_or_default();
+                return line.split(':').next().unwrap_or_default().parse().unwrap();
             }
         }
         0
