@@ -26,7 +26,7 @@ impl InputError {
         }
     }
 
-    /// An error in a place of a file: "line 3", "byte 17", "cases[3].near".
+    /// An error in a place of a file: `line 3`, `byte 17`, `cases[3].near`.
     pub fn at(
         file: impl Display,
         place: impl Display,
