@@ -319,10 +319,7 @@ impl CompareTable {
                 let more = text::counted(more, "more process");
                 format!("about {more} in each run (run --processes)")
             }
-            (Basis::Reports, _) => {
-                let threshold = text::percent(self.changes.threshold);
-                format!("a resolution of {threshold} (run --processes 20 may do)")
-            }
+            (Basis::Reports, _) => "finer runs, perhaps with --processes 20,".to_owned(),
         };
         Some(format!(
             "{cells}: {decides} would decide, or compare --against BINARY, which runs both programs in \

@@ -207,7 +207,7 @@ fn one_process_and_few_structures_are_inconclusive() {
         "0 slower, 10 inconclusive",
         "10 processes vs 1 process,",
         "10 inconclusive cells: ",
-        "(run --processes 20)",
+        "finer runs, perhaps with --processes 20,",
         "compare --against BINARY",
         "under three processes on a side",
     ] {

@@ -131,7 +131,7 @@ fn every_command_takes_matrices() {
         &format!("run {on} --up=z --structure linear,bvh --processes 2 --out run"),
     );
     assert!(run.contains("0 wrong"), "{run}");
-    let next = "advise --scene boxes.csv --path m.csv --matrix-convention column-d3d --up=z";
+    let next = "advise --scene boxes.csv --path m.csv --up=z --matrix-convention=column-d3d";
     let joined = run.replace(" \\\n       ", "");
     assert!(joined.contains(next), "{run}");
     let verified = works(
