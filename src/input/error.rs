@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
-use crate::shown::expected_by;
+use crate::shown::{expected_by, plain};
 use crate::spec::SpecError;
 
 /// Error of reading or writing a file or a text, in one line.
@@ -64,7 +64,7 @@ impl InputError {
             let source = bare(error);
             let expected = expected_by(&source, what);
             InputError {
-                text: format!("{}: {source}{expected}", path.display()),
+                text: plain(&format!("{}: {source}{expected}", path.display())),
                 source: Some(source),
             }
         }

@@ -224,15 +224,14 @@ impl Row<'_> {
     }
 }
 
-/// Most frequent delimiter of the first line that is not empty, outside of quotes.
+/// First delimiter of the first line that is not empty, outside of quotes.
+///
+/// Not the most frequent one: labels may hold any number of the others.
 fn delimiter(head: &[u8]) -> u8 {
     let mut lines = head.split(|byte| matches!(byte, b'\n' | b'\r'));
     let header = lines.find(|line| !line.is_empty()).unwrap_or_default();
-    let names = header.split(|byte| *byte == b'"').step_by(2);
-    let count = |one: &u8| names.clone().flatten().filter(|byte| *byte == one).count();
-    // The last of several that are equally frequent.
-    let all = [b'|', b'\t', b';', b','];
-    all.into_iter().max_by_key(count).unwrap_or(b',')
+    let mut names = header.split(|byte| *byte == b'"').step_by(2).flatten();
+    *names.find(|byte| b",;\t|".contains(byte)).unwrap_or(&b',')
 }
 
 /// Names of columns, cut down to what fits an error line.
@@ -315,6 +314,18 @@ mod tests {
             }
         }
         0
+    }
+
+    #[test]
+    fn the_first_delimiter_of_the_header_separates() {
+        for (header, wanted) in [
+            ("x,y,a\t\t\t\tb", b','),
+            ("x;y,;,,,", b';'),
+            ("\"a,b\"\tx\ty", b'\t'),
+            ("x", b','),
+        ] {
+            assert_eq!(delimiter(header.as_bytes()), wanted, "{header:?}");
+        }
     }
 
     #[test]
