@@ -31,7 +31,7 @@ pub enum Axis {
 
 /// Axes, each with the values that are measured beside that of the workload.
 ///
-/// Of items the parts of the whole.
+/// Numbers of items are parts of the whole.
 const AXES: [(Axis, [f64; 6]); 3] = [
     (Axis::Items, [4e-1, 1e-1, 2e-2, 4e-3, 1e-3, 2e-4]),
     (Axis::ShareInView, [0.001, 0.005, 0.02, 0.1, 0.4, 0.9]),

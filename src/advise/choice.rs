@@ -173,7 +173,7 @@ fn alone(rows: &[StructureRow]) -> impl Iterator<Item = &StructureRow> {
 
 /// Time of a structure / time of another one.
 ///
-/// By a given metric, or the one that ranks.
+/// The times are those of a given metric, or of the one that ranks.
 fn over(own: &ReportCell, other: &ReportCell, metric: Option<&str>) -> Option<Estimate> {
     let [own, other] = [own, other].map(|cell| cell.ln_ns(metric.unwrap_or(cell.ranked_by())));
     ratio(&other, &own, &other)
@@ -187,7 +187,7 @@ pub(super) fn time_over(cells: &[ReportCell], own: &str, other: &str) -> Option<
 
 /// The fastest structure and those that tie with it.
 ///
-/// By a given metric, or the one that ranks.
+/// The times are those of a given metric, or of the one that ranks.
 pub(super) fn fastest<'c>(cells: &'c [ReportCell], metric: Option<&str>) -> Vec<&'c ReportCell> {
     let ns = |cell: &ReportCell| cell.value(metric.unwrap_or(cell.ranked_by()));
     // Wrong answers, and sets of fat bounds, have no rank.

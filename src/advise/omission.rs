@@ -7,8 +7,8 @@ use crate::verify::ErrorCount;
 
 /// Two times are a tie unless the interval of their ratio lies beyond this.
 ///
-/// Of one machine the layout of memory and code alone makes differences of some percent,
-/// which are the other way round in the next run.
+/// The layout of memory and code alone makes differences of some percent, which the next
+/// run on the same machine may reverse.
 pub(super) const TIE: f64 = 1.05;
 
 /// Returns true if the first of two times is the longer one, from their ratio.

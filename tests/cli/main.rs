@@ -5,6 +5,7 @@
 #![cfg(feature = "cli")]
 
 mod advise;
+mod advise_motion;
 mod advise_stages;
 mod bad_input;
 mod bad_usage;

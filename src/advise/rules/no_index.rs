@@ -1,6 +1,6 @@
 //! The index itself: below some number of items a scan is as fast.
 //!
-//! Where both cross follows from the parts of the scene that are measured beside
+//! That number follows from the parts of the scene that are measured beside it
 //! ([`Axis::Items`]).
 
 use super::super::change::Axis;

@@ -1,0 +1,109 @@
+//! `advise` on moving items, and where its advice changes.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+use super::advise::{advice, rule, small};
+use super::process::*;
+
+const MOVING: &str = "--scene city:n=400 --path orbit:frames=4 --structure linear,wide,octree-textbook \
+     --motion drift:share=10%,frames=12 --views 2 --update refit,every=5 --threads 1,2";
+
+/// Advice about moving items.
+pub fn moving() -> &'static Value {
+    static OUTCOME: OnceLock<Value> = OnceLock::new();
+    OUTCOME.get_or_init(|| advice(Path::new("."), &format!("advise {MOVING}")))
+}
+
+#[test]
+fn advice_on_moving_items_has_the_rows_of_a_run() {
+    let planned = works(Path::new("."), &format!("run --plan {MOVING}"));
+    let planned: BTreeSet<String> = planned
+        .lines()
+        .map(|line| {
+            json(line)["structure"]
+                .as_str()
+                .expect("a label")
+                .to_owned()
+        })
+        .collect();
+    let rows = array(&moving()["structure"], "rows");
+    let label = |row: &Value| row["structure"].as_str().expect("a label").to_owned();
+    assert_eq!(rows.iter().map(label).collect::<BTreeSet<_>>(), planned);
+    assert!(planned.contains("wide@every=5") && planned.contains("linear:threads=2"));
+    let times: Vec<f64> = rows.iter().map(|row| number(row, "frame_ns")).collect();
+    assert!(times.is_sorted(), "{times:?}");
+    assert_eq!(moving()["structure"]["name"], rows[0]["structure"]);
+    for row in rows {
+        let parts = number(row, "update_ns") + number(row, "query_ns");
+        assert!(parts <= number(row, "frame_ns") * 1.001, "{row}");
+    }
+    let motion = &moving()["motion"];
+    assert_eq!(
+        (number(motion, "share_moved"), number(motion, "views")),
+        (0.1, 2.0)
+    );
+    assert_eq!(rule(moving(), "rebuild")["decision"], "not_applicable");
+    let shared = &array(moving(), "threads")[0];
+    assert_eq!(
+        (&shared["structure"], &shared["shares_views"]),
+        (&"linear:threads=2".into(), &false.into())
+    );
+}
+
+#[test]
+fn other_numbers_of_items_and_shares_are_measured() {
+    let of = |advice: &Value| -> Vec<(String, Vec<f64>)> {
+        let own = array(advice, "changes").iter().map(|change| {
+            let measured = array(change, "measured")
+                .iter()
+                .map(|x| x.as_f64().expect("a number"));
+            let here = [number(change, "here")];
+            (
+                change["axis"].as_str().expect("an axis").to_owned(),
+                measured.chain(here).collect(),
+            )
+        });
+        own.collect()
+    };
+    let (still, moving) = (of(small()), of(moving()));
+    let axes = |of: &[(String, Vec<f64>)]| {
+        of.iter()
+            .map(|row| row.0.clone())
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    assert_eq!(axes(&still), "items share_in_view");
+    assert_eq!(axes(&moving), "items share_in_view share_moved");
+    assert_eq!(still[0].1, [90.0, 900.0, 900.0]);
+    assert_eq!(moving[0].1, [40.0, 400.0, 400.0]);
+    // Of 400 items none moves at 0.01 %, one at 0.1 %.
+    assert_eq!(moving[2].1, [0.0025, 1.0, 0.1]);
+    for (axis, [low, high, here]) in still
+        .iter()
+        .chain(&moving)
+        .map(|(a, v)| (a, [v[0], v[1], v[2]]))
+    {
+        assert!(
+            low < high && low <= here && here <= high,
+            "{axis}: {low} {high} {here}"
+        );
+    }
+}
+
+#[test]
+fn policies_are_weighed_without_being_named() {
+    let line = "advise --scene uniform:n=300 --path orbit:frames=4 --structure wide --motion swarm:frames=10";
+    let told = works(Path::new("."), &format!("{line} --processes 1"));
+    for part in [
+        "In motion, 100 % of the items and 1 query per frame: ",
+        "A frame takes ",
+        "every=10 ",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    assert!(!told.contains("Another structure"), "{told}");
+}
