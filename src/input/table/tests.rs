@@ -1,3 +1,5 @@
+//! Tables read in pieces: separators, quoted fields, line numbers, what is refused.
+
 use super::*;
 
 /// The line of the first row whose field `x` is no number.
