@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""The mechanical part of the rules for prose: how doc comments begin, and phrases for which there
-is a plainer one. Reads comments and strings of all Rust code, docs, README and CHANGELOG. Prints
-every occurrence and fails if there is any. Standard library only.
+"""The mechanical part of the rules for prose: how doc comments begin, phrases for which there is a
+plainer one, and links to files that are not in the repository. Reads comments and strings of all
+Rust code, docs, README and CHANGELOG. Prints every occurrence and fails if there is any. Standard
+library only.
 """
 
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -45,6 +47,7 @@ PHRASES = {
 }
 OPENER = re.compile(r"(What|Whether|Of|As|By|That|Where)\b")
 DOC = re.compile(r"\s*(///|//!)(?!/)\s?(.*)")
+LINK = re.compile(r"\]\((?![a-z]+:|#)([^)#\s]+)")
 GAP = r"\s*\\?\s+(?://[/!]?\s*)?"
 
 
@@ -56,7 +59,7 @@ def compiled(phrase):
 def files():
     for folder, pattern in FOLDERS:
         yield from sorted((ROOT / folder).rglob(pattern))
-    yield from (ROOT / name for name in ["README.md", "CHANGELOG.md"])
+    yield from (ROOT / name for name in ["README.md", "CHANGELOG.md", "results/README.md"])
 
 
 def summaries(lines):
@@ -80,6 +83,8 @@ def prose(path, text):
 
 def occurrences():
     phrases = {phrase: compiled(phrase) for phrase in PHRASES}
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True)
+    committed = [ROOT / file for file in listed.stdout.decode().split("\0") if file]
     for path in files():
         text = path.read_text(encoding="utf-8")
         name = path.relative_to(ROOT)
@@ -89,6 +94,11 @@ def occurrences():
                     yield "doc-opener", name, number, first
                 if len(first) > LONGEST_SUMMARY:
                     yield "doc-length", name, number, first
+        elif path.suffix == ".md":
+            for link in LINK.finditer(text):
+                target = (path.parent / link[1]).resolve()
+                if not any(target == file or target in file.parents for file in committed):
+                    yield "link", name, text.count("\n", 0, link.start()) + 1, link[1]
         text = prose(path, text)
         for phrase, expression in phrases.items():
             for found in expression.finditer(text):
@@ -99,6 +109,7 @@ def occurrences():
 def advice(rule):
     return {
         "doc-opener": "begin with a noun phrase or a verb; not What, Whether, Of, As, By, ..",
+        "link": "link to a file that git has",
         "doc-length": f"the first line has at most {LONGEST_SUMMARY} characters",
     }.get(rule) or f"write: {PHRASES[rule]}"
 
