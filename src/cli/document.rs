@@ -21,8 +21,13 @@ pub enum Block {
 }
 
 impl Block {
-    pub fn line(text: &str) -> Block {
-        Block::Line(text.to_owned())
+    pub fn line(text: impl Into<String>) -> Block {
+        Block::Line(text.into())
+    }
+
+    /// A heading of the second level.
+    pub fn heading(text: impl Into<String>) -> Block {
+        Block::Heading(2, text.into())
     }
 }
 

@@ -1,7 +1,7 @@
 //! `cullbench drift`: tables of the errors of camera updates (turn, orbit, chase),
 //! of the cost of a step of each, and recommendations.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::args::DriftArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
@@ -15,7 +15,6 @@ use super::{Ending, expect_places, print, write_text};
 use crate::drift::{
     self, ARMS, ArmChoice, ArmKind, ArmOptions, ArmPoint, ArmReport, DriftOptions, DriftReport,
     ORBIT_RADIUS, OrbitDrift, Rated, Recommendation, RotationDrift, SWING_DEG, StabilityLimit,
-    TurnDrift,
 };
 use crate::measure::{ProcessTimes, Protocol, Schedule};
 
@@ -89,23 +88,6 @@ pub fn time(args: &DriftArgs, plan: &Schedule, timing: &Timing) -> ProcessTimes 
     drift::time(&options(args), plan, &protocol(args, timing.process))
 }
 
-/// A table of one figure: a row per method, a column per number of steps or turns.
-fn grid<T>(
-    title: &str,
-    head: impl Fn(u64) -> String,
-    all: &[T],
-    of: impl Fn(&T) -> (&'static str, u64, String),
-) -> Table {
-    let columns: BTreeSet<u64> = all.iter().map(|row| of(row).1).collect();
-    let columns = columns.into_iter().map(head);
-    let mut table = Table::of_numbers([title.to_owned()].into_iter().chain(columns));
-    for own in all.chunk_by(|a, b| of(a).0 == of(b).0) {
-        let cells = own.iter().map(|row| of(row).2);
-        table.add_row([of(&own[0]).0.to_owned()].into_iter().chain(cells));
-    }
-    table
-}
-
 /// A number of steps.
 fn steps(count: u64) -> String {
     format!("{:e}", count as f64)
@@ -128,37 +110,34 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
         ..3 => "times without intervals (--processes 10 gives them)",
         _ => "times with 95 % intervals",
     };
-    let mut blocks = vec![Block::Line(format!(
+    let mut blocks = vec![Block::line(format!(
         "Camera updates after {steps} steps: {}, {} in each; {times}.",
         text::counted(report.processes, "process"),
         text::counted(report.rounds, "round"),
     ))];
-    blocks.push(Block::Heading(
-        2,
-        format!(
-            "Camera bases turned by yaw {}, pitch {} and roll {} degrees per step",
-            turn.yaw_deg, turn.pitch_deg, turn.roll_deg
-        ),
-    ));
-    if all {
-        blocks.extend(rotations(report));
-    }
-    let of_bases = rated(&report.rotation_methods, "error", report.tolerance_rad, all);
-    blocks.push(Block::Table(of_bases));
-    let swing = format!("Orbits: an eye carried around by {SWING_DEG:.3} degrees per step");
-    blocks.push(Block::Heading(2, swing));
-    if all {
-        blocks.extend(orbits(report));
-    }
-    let of_orbits = rated(
-        &report.orbit_methods,
-        "error / radius",
-        report.tolerance_rad,
-        all,
+    let turns = format!(
+        "Camera bases turned by yaw {}, pitch {} and roll {} degrees per step",
+        turn.yaw_deg, turn.pitch_deg, turn.roll_deg
     );
-    blocks.push(Block::Table(of_orbits));
+    let swing = format!("Orbits: an eye carried around by {SWING_DEG:.3} degrees per step");
+    for (heading, methods, error, tables) in [
+        (
+            turns,
+            &report.rotation_methods,
+            "error",
+            rotations as Tables,
+        ),
+        (swing, &report.orbit_methods, "error / radius", orbits),
+    ] {
+        blocks.push(Block::Heading(2, heading));
+        if all {
+            blocks.extend(tables(report));
+        }
+        let rated = rated(methods, error, report.tolerance_rad, all);
+        blocks.push(Block::Table(rated));
+    }
     blocks.extend(arm_blocks(&report.arm, all));
-    blocks.push(Block::Heading(2, "Conclusions:".to_owned()));
+    blocks.push(Block::heading("Conclusions:"));
     let bases = (&report.rotation_methods, &report.recommended_rotation);
     let eyes = (&report.orbit_methods, &report.recommended_orbit);
     for (what, (methods, choice)) in [("a camera base", bases), ("an orbit", eyes)] {
@@ -167,10 +146,13 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
     blocks.extend(arm_conclusions(&report.arm).map(Block::Line));
     if !all {
         let more = "errors by number of steps, orders, stability: --all";
-        blocks.extend(["", more].map(|line| Block::Line(line.to_owned())));
+        blocks.extend(["", more].map(Block::line));
     }
     blocks
 }
+
+/// Tables of errors after each number of steps.
+type Tables = fn(&DriftReport) -> Vec<Block>;
 
 /// Errors of bases after each number of steps.
 fn rotations(report: &DriftReport) -> Vec<Block> {
@@ -179,7 +161,6 @@ fn rotations(report: &DriftReport) -> Vec<Block> {
          corrections. The orbit has radius {ORBIT_RADIUS}; the eye hangs on the base.",
         report.period_steps
     );
-    let (all, turns) = (&report.rotation, &report.one_degree_turns);
     let figures: [Errors<RotationDrift>; 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
         ("angular error in rad after", |d| d.angle_error_rad),
@@ -188,33 +169,45 @@ fn rotations(report: &DriftReport) -> Vec<Block> {
         }),
         ("radius error of an orbit after", |d| d.orbit_radius_error),
     ];
-    let tables = figures.iter().map(|(title, figure)| {
-        let of = |d: &RotationDrift| (d.method, d.steps, scientific(figure(d)));
-        Block::Table(grid(title, steps, all, of))
+    let by_turns = report.one_degree_turns.iter().map(|d| {
+        let turns = text::counted(d.turns as usize, "turn");
+        [
+            d.method.to_owned(),
+            turns,
+            format!("{:.3e}", d.angle_error_rad),
+        ]
     });
-    let title = "by 1 degree per step: error in rad after";
-    let head = |turns| text::counted(turns as usize, "turn");
-    let of = |d: &TurnDrift| (d.method, d.turns, format!("{:.3e}", d.angle_error_rad));
-    let by_degrees = Block::Table(grid(title, head, turns, of));
-    [Block::Line(note)]
-        .into_iter()
-        .chain(tables)
-        .chain([by_degrees])
-        .collect()
+    let by_turns = Table::grid("by 1 degree per step: error in rad after", by_turns);
+    let mut blocks = vec![Block::Line(note)];
+    blocks.extend(errors(&figures, &report.rotation, |d| (d.method, d.steps)));
+    blocks.push(Block::Table(by_turns));
+    blocks
+}
+
+/// Errors of carried eyes after each number of steps.
+fn orbits(report: &DriftReport) -> Vec<Block> {
+    let figures: [Errors<OrbitDrift>; 2] = [
+        ("position error after", |d| d.position_error),
+        ("radius error after", |d| d.radius_error),
+    ];
+    errors(&figures, &report.orbit, |d| (d.method, d.steps)).collect()
 }
 
 /// Title of a table of errors, and its cell.
 type Errors<T> = (&'static str, fn(&T) -> f64);
 
-/// Errors of carried eyes after each number of steps.
-fn orbits(report: &DriftReport) -> impl Iterator<Item = Block> {
-    let figures: [Errors<OrbitDrift>; 2] = [
-        ("position error after", |d| d.position_error),
-        ("radius error after", |d| d.radius_error),
-    ];
-    figures.into_iter().map(|(title, figure)| {
-        let of = |d: &OrbitDrift| (d.method, d.steps, scientific(figure(d)));
-        Block::Table(grid(title, steps, &report.orbit, of))
+/// A table per error: a row per method, a column per number of steps.
+fn errors<T>(
+    figures: &[Errors<T>],
+    rows: &[T],
+    of: fn(&T) -> (&'static str, u64),
+) -> impl Iterator<Item = Block> {
+    figures.iter().map(move |(title, error)| {
+        let cells = rows.iter().map(|row| {
+            let (method, count) = of(row);
+            [method.to_owned(), steps(count), scientific(error(row))]
+        });
+        Block::Table(Table::grid(title, cells))
     })
 }
 
@@ -262,10 +255,9 @@ fn recommended(what: &str, methods: &[Rated], choice: &Recommendation) -> String
 
 /// Method of each arm; with `all` errors, orders and limits of stability as well.
 pub fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
-    let heading = "Spring arms, critically damped, behind a moving target";
     let mut blocks = vec![
-        Block::Heading(2, heading.to_owned()),
-        Block::Line(format!(
+        Block::heading("Spring arms, critically damped, behind a moving target"),
+        Block::line(format!(
             "The target is known where frames end. Errors are the largest at the end of a frame in \
              {} s, times are thread CPU time per simulated second.",
             report.seconds
@@ -282,11 +274,10 @@ pub fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
         }
     }
     if all {
-        blocks.push(Block::Line(
+        blocks.push(Block::line(
             "Orders are the powers of the step by which a method's own error falls from each \
              number of steps to the next; ! is half a power or more below the classical order: \
-             steps are not far below 1/omega, or the arm meets the stop."
-                .to_owned(),
+             steps are not far below 1/omega, or the arm meets the stop.",
         ));
         blocks.push(Block::Table(stability(&report.stability)));
     }
@@ -343,19 +334,13 @@ fn by_stiffness(
     let shown = (arm, rate(report));
     let points = report.points.iter();
     let points = points.filter(|p| (p.setting.arm, p.setting.rate_hz) == shown);
-    let settings: Vec<_> = points.collect();
-    let settings: Vec<_> = settings.chunk_by(|a, b| a.setting == b.setting).collect();
-    let stiffness = |own: &&[&ArmPoint]| format!("k={:e}", own[0].setting.stiffness);
-    let columns = settings.iter().map(stiffness);
-    let mut table = Table::new([title.to_owned()].into_iter().chain(columns), &[]);
-    for method in report.methods {
-        let cells = settings.iter().map(|all| {
-            let own = all.iter().copied().filter(|p| p.method == method.name);
-            cell(&own.collect::<Vec<_>>())
-        });
-        table.add_row([method.name.to_owned()].into_iter().chain(cells));
-    }
-    table
+    let points: Vec<&ArmPoint> = points.collect();
+    let is_same = |a: &&ArmPoint, b: &&ArmPoint| (a.setting, a.method) == (b.setting, b.method);
+    let cells = points.chunk_by(is_same).map(|own| {
+        let stiffness = format!("k={:e}", own[0].setting.stiffness);
+        [own[0].method.to_owned(), stiffness, cell(own)]
+    });
+    Table::grid(title, cells)
 }
 
 /// "x4: 1.2e-4, 3.21 us" of the cheapest that is precise enough, or the nearest.
@@ -388,26 +373,27 @@ fn orders(points: &[&ArmPoint]) -> String {
 }
 
 fn stability(limits: &[StabilityLimit]) -> Table {
-    let methods: Vec<_> = limits.chunk_by(|a, b| a.method == b.method).collect();
-    let ratios = methods.iter().take(1).flat_map(|own| own.iter());
-    let ratios = ratios.map(|limit| format!("zeta={}", limit.damping_ratio));
-    let first = ["stable while omega h <".to_owned()].into_iter();
-    let left = ["left per step at 16.7, zeta=1".to_owned()];
-    let mut table = Table::of_numbers(first.chain(ratios).chain(left));
-    for own in methods {
-        let limit = |limit: &StabilityLimit| match limit.limit_omega_h {
-            Some(limit) => format!("{limit:.4}"),
-            None => "always".to_owned(),
-        };
-        let critical = own.iter().find(|limit| limit.damping_ratio == 1.0);
-        let left = critical.map(|limit| match limit.stiffest_left_per_step {
-            share if share.abs() > 1.0 => format!("{share:.1e}, unstable"),
-            share => format!("{share:.1e}"),
-        });
-        let first = [own[0].method.to_owned()].into_iter();
-        table.add_row(first.chain(own.iter().map(limit)).chain(left));
-    }
-    table
+    let cells = limits.iter().map(|limit| {
+        let shown = limit.limit_omega_h.map(|limit| format!("{limit:.4}"));
+        let shown = shown.unwrap_or("always".to_owned());
+        [
+            limit.method.to_owned(),
+            format!("zeta={}", limit.damping_ratio),
+            shown,
+        ]
+    });
+    let critical = limits.iter().filter(|limit| limit.damping_ratio == 1.0);
+    let left = critical.map(|limit| {
+        let share = limit.stiffest_left_per_step;
+        let unstable = if share.abs() > 1.0 { ", unstable" } else { "" };
+        let head = "left per step at 16.7, zeta=1".to_owned();
+        [
+            limit.method.to_owned(),
+            head,
+            format!("{share:.1e}{unstable}"),
+        ]
+    });
+    Table::grid("stable while omega h <", cells.chain(left))
 }
 
 /// The method of each arm; with `all` the reasons too.

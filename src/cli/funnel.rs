@@ -17,7 +17,7 @@ use super::figure::{Axis, Figure};
 use super::plan::Plan;
 use super::processes::{Job, Timing};
 use super::shared_args::{StudyArgs, TableFormat};
-use super::sheet::class;
+use super::sheet::Class;
 use super::study::{Setting, Study};
 use super::{Ending, expect_folder, expect_places, funnel_table, print, text, write_text};
 use crate::funnel::{
@@ -341,48 +341,38 @@ fn passed(report: &FunnelReport) -> Figure {
     rows(caption, &axis, None, &stages)
 }
 
-/// Every fate, with its colour and its words.
-const FATES: [(Fate, &str, &str, bool); 6] = [
-    (
-        Fate::Removed(StageKind::Region),
-        "#e4e4e4",
-        "region: not reached through portals",
-        false,
-    ),
-    (
-        Fate::Removed(StageKind::Object),
-        "#c0c8d0",
-        "object: outside of the frustum",
-        false,
-    ),
-    (
-        Fate::Removed(StageKind::Occlusion),
-        "#ecb566",
-        "occlusion: behind others",
-        false,
-    ),
-    (Fate::Kept, "#56b4e9", "drawn, and not visible", true),
-    (Fate::Visible, "#009e73", "visible", true),
-    (Fate::Lost, "#d50000", "visible, and removed", true),
+/// Every fate of an item, and its class in the picture.
+const FATES: [Fate; 6] = [
+    Fate::Removed(StageKind::Region),
+    Fate::Removed(StageKind::Object),
+    Fate::Removed(StageKind::Occlusion),
+    Fate::Kept,
+    Fate::Visible,
+    Fate::Lost,
 ];
+const FATE_CLASSES: &[Class] = rows! { Class { colour, words, is_key }
+    "#e4e4e4", "region: not reached through portals", false;
+    "#c0c8d0", "object: outside of the frustum", false;
+    "#ecb566", "occlusion: behind others", false;
+    "#56b4e9", "drawn, and not visible", true;
+    "#009e73", "visible", true;
+    "#d50000", "visible, and removed", true;
+};
 
 /// The picture as SVG.
 pub fn draw(report: &FunnelReport, scene: &Scene) -> String {
     let view = &report.plan_view;
     let class_of = |item: usize| {
-        let class = FATES
-            .iter()
-            .position(|(fate, ..)| view.fates.get(item) == Some(fate));
+        let fate = view.fates.get(item);
+        let class = FATES.iter().position(|own| Some(own) == fate);
         class.unwrap_or(0)
     };
+    let (name, path) = (&report.scene, &report.path);
     Plan {
-        caption: format!(
-            "{}, {}: the first view from above",
-            report.scene, report.path
-        ),
+        caption: format!("{name}, {path}: the first view from above"),
         scene,
         camera: view.camera.as_ref(),
-        classes: &FATES.map(|(_, colour, words, is_key)| class(colour, words, is_key)),
+        classes: FATE_CLASSES,
         class_of: &class_of,
         cells: None,
     }

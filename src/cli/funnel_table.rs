@@ -3,12 +3,11 @@
 
 use super::document::Block;
 use super::table::{Column, Table};
-use super::text;
+use super::text::{self, some};
 use crate::funnel::{
     BoundRow, FragmentCounts, FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow,
 };
 use crate::shown::shortened;
-use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 use crate::visibility::{Guarantee, Level};
 
 /// The chain and what it is worth; with `all` every other back end too.
@@ -47,20 +46,15 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         let name = row.back_end.name;
         let line =
             format!("{name} searches a tree of its own: its time includes the object stage.");
-        blocks.extend([Block::Line(String::new()), Block::Line(line)]);
+        blocks.extend([Block::line(""), Block::Line(line)]);
     }
     if all {
-        let heading = "Every back end of every stage".to_owned();
-        blocks.extend([
-            Block::Heading(2, heading),
-            Block::Table(stages(report, true)),
-        ]);
-        blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
-        blocks.extend(report.ground.as_ref().map(ground));
-        blocks.extend(report.solid_blocks.as_ref().map(solid_blocks));
+        blocks.push(Block::heading("Every back end of every stage"));
+        blocks.push(Block::Table(stages(report, true)));
     }
     // Not every scene has all of them.
     for (heading, table) in [
+        ("Occluders: boxes that hide others", occluders(report)),
         (
             "Samples and fragments of the remaining items",
             fragments(report),
@@ -75,14 +69,14 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         ("With and without each stage of the chain", gains(report)),
     ] {
         if !table.rows.is_empty() && (all || heading.contains("mirror")) {
-            blocks.extend([Block::Heading(2, heading.into()), Block::Table(table)]);
+            blocks.extend([Block::heading(heading), Block::Table(table)]);
         }
     }
-    blocks.push(Block::Line(String::new()));
+    blocks.push(Block::line(""));
     if all && report.stages.iter().any(|row| row.fragments.is_some()) {
         let line = "The time of the fragment stage is that of an exact test along the ray of each \
                     sample, on one thread. A GPU does this in hardware.";
-        blocks.push(Block::Line(line.into()));
+        blocks.push(Block::line(line));
     }
     blocks.extend(saved_load(&report.level).map(Block::Line));
     let left_out = report.left_out.iter();
@@ -100,7 +94,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     blocks.extend(told.map(Block::Line));
     if !all {
         let more = "every other back end, draw orders, picking, lower bounds: --all";
-        blocks.extend(["", more].map(|line| Block::Line(line.to_owned())));
+        blocks.extend(["", more].map(Block::line));
     }
     blocks
 }
@@ -131,10 +125,10 @@ fn stages(report: &FunnelReport, all: bool) -> Table {
         }
         cells.push(text::time_plus_minus(row.time));
         cells.push(match gain(report, stage) {
-            _ if all => text::some(row.ns_per_removed, text::time),
+            _ if all => some(row.ns_per_removed, text::time),
             // Another stage does it in its own traversal.
             None if stage == StageKind::Object => "in occlusion".to_owned(),
-            gain => text::some(gain, worth),
+            gain => some(gain, worth),
         });
         table.add_row(cells);
     }
@@ -181,51 +175,31 @@ fn saved_load(level: &Level) -> Option<String> {
     })
 }
 
-/// Line on the occluders inside a mesh.
-fn inner_boxes(row: &InnerRow) -> Block {
-    let held = text::some(row.volume_share, |share| {
-        let [held, lost] = [share, 1.0 - share].map(|share| share * 100.0);
-        format!(", {held:.1} % of the volume of these (loss {lost:.1} %)")
-    });
-    let inside = match row.boxed_count {
-        0 => "any".to_owned(),
-        boxed => text::count(boxed),
+/// Boxes that were found in the solid of a scene.
+fn occluders(report: &FunnelReport) -> Table {
+    let mut table = Table::of("where | >boxes | >of the volume, % | >found in");
+    let mut add = |place: String, boxes: usize, share: Option<f64>, ns: f64| {
+        let share = some(share, |share| format!("{:.1}", share * 100.0));
+        table.add_row([place, text::count(boxes), share, text::time(ns)]);
     };
-    let items = text::counted(row.item_count, "item");
-    let place = format!("proven inside {inside} of {items}{held}");
-    occluders("Occluders", row.box_count, &place, row.build_ns)
-}
-
-/// Line on the occluders below the ground.
-fn ground(row: &GroundRow) -> Block {
-    let held = text::some(row.volume_share, |share| {
-        let held = share * 100.0;
-        format!(", {held:.1} % of the volume between the ground and its lowest place")
-    });
-    let items = text::counted(row.item_count, "item");
-    occluders(
-        "Ground",
-        row.box_count,
-        &format!("below {items}{held}"),
-        row.build_ns,
-    )
-}
-
-/// Line on the occluders in the solid of a map.
-fn solid_blocks(row: &BlocksRow) -> Block {
-    let place = "in the solid between the rooms of the map, below floors and above ceilings";
-    match row.unclosed_sector_count {
-        0 => occluders("Occluders", row.box_count, place, row.build_ns),
-        unclosed => Block::Line(format!(
-            "Occluders: none, since the linedefs of {} are not closed or contradict others.",
-            text::counted(unclosed, "sector")
-        )),
+    if let Some(row) = &report.inner_boxes {
+        let of = text::counted(row.item_count, "item");
+        let place = format!("inside {} of {of}", text::count(row.boxed_count));
+        add(place, row.box_count, row.volume_share, row.build_ns);
     }
-}
-
-fn occluders(what: &str, boxes: usize, place: &str, build_ns: f64) -> Block {
-    let (boxes, time) = (text::counted(boxes, "box"), text::time(build_ns));
-    Block::Line(format!("{what}: {boxes} {place}; found in {time}."))
+    if let Some(row) = &report.ground {
+        let place = format!("below {} of ground", text::counted(row.item_count, "item"));
+        add(place, row.box_count, row.volume_share, row.build_ns);
+    }
+    if let Some(row) = &report.solid_blocks {
+        let unclosed = match row.unclosed_sector_count {
+            0 => String::new(),
+            count => format!(": {} not closed", text::counted(count, "sector")),
+        };
+        let place = format!("solid between the rooms of the map{unclosed}");
+        add(place, row.box_count, None, row.build_ns);
+    }
+    table
 }
 
 /// Basis of the times.
@@ -292,9 +266,7 @@ fn orders(report: &FunnelReport) -> Table {
         ("order", |row| row.name.to_owned()),
         (">fragments", |row| count(row.fragment_count)),
         (">shaded", |row| count(row.shaded_count)),
-        (">overdraw", |row| {
-            text::some(row.overdraw, text::significant)
-        }),
+        (">overdraw", |row| some(row.overdraw, text::significant)),
         (">pairs", |row| count(row.pair_count)),
         (">wrong", |row| count(row.wrong_pair_count)),
         (">wrong samples", |row| count(row.wrong_sample_count)),
@@ -309,9 +281,7 @@ fn picks(report: &FunnelReport) -> Table {
         ("by", |row| format!("{}{}", row.name, doubt(row.guarantee))),
         (">cursors", |row| row.ray_count.to_string()),
         (">wrong", |row| row.wrong_count.to_string()),
-        (">time per cursor", |row| {
-            text::some(row.ns_per_ray, text::time)
-        }),
+        (">time per cursor", |row| some(row.ns_per_ray, text::time)),
     ];
     Table::with(&report.picks, columns)
 }
@@ -322,7 +292,7 @@ fn bounds(report: &FunnelReport) -> Table {
         ("of", |row| row.back_end.to_owned()),
         (">time", |row| text::time_plus_minus(row.time)),
         (">ratio", |row| {
-            text::some(row.ratio, |ratio| text::significant(ratio.value))
+            some(row.ratio, |ratio| text::significant(ratio.value))
         }),
     ];
     Table::with(&report.bounds, columns)
@@ -334,8 +304,8 @@ fn gains(report: &FunnelReport) -> Table {
             let back_end = shortened(&gain.back_end, 24);
             format!("{} ({back_end})", gain.stage.name())
         }),
-        (">time with", |gain| text::some(gain.with_ns, text::time)),
-        (">without", |gain| text::some(gain.without_ns, text::time)),
+        (">time with", |gain| some(gain.with_ns, text::time)),
+        (">without", |gain| some(gain.without_ns, text::time)),
         (">left with", |gain| count(gain.with_count)),
         (">without", |gain| count(gain.without_count)),
         (">worth it from", |gain| worth(gain)),

@@ -4,10 +4,9 @@
 
 use std::fmt::Write;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use super::sheet::{Cells, Class};
-use super::sheet::{Rect, SIDE, Sheet, at, centre, longest, union, united};
+use super::sheet::{Cells, Class, Rect, SIDE, Sheet, centre, longest, union};
 use super::text;
 use crate::camera::Camera;
 use crate::scene::{Regions, Scene, UpAxis};
@@ -44,7 +43,8 @@ impl Plan<'_> {
         let up = self.scene.up;
         let eye = self.camera.map(|camera| up.to_z_up(camera.frame.eye));
         let corners = outlines.iter().flat_map(|outline| &outline.corners);
-        let cells = corners.map(|&corner| at(corner));
+        let cells = corners.map(|&corner| [corner; 2]);
+        let eye = eye.map(DVec3::truncate);
         let sheet = Sheet::over(window(&items, cells, eye));
         outline_floors(&mut items, &sheet);
         let mut body = String::new();
@@ -93,7 +93,7 @@ impl Plan<'_> {
                 true => -1.0,
                 false => eye.clamp(min, max).distance(eye),
             };
-            all.push((distance, [min.x, min.y, max.x, max.y], class));
+            all.push((distance, [min.truncate(), max.truncate()], class));
         }
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let far = all.len().saturating_sub(MOST_DRAWN);
@@ -152,12 +152,12 @@ impl Plan<'_> {
         let mut path = String::new();
         if let Regions::Bsp(map) = &self.scene.regions {
             for line in &map.lines {
-                let [a, b] = line.ends.map(|end| sheet.at(end.map(f64::from)));
+                let [a, b] = line.ends.map(|end| sheet.at(end.map(f64::from).into()));
                 let _ = write!(path, "M{} {}L{} {}", a[0], a[1], b[0], b[1]);
             }
         } else if let Some(camera) = self.camera {
             for (min, max) in self.rooms(camera) {
-                sheet.push_rect([min.x, min.y, max.x, max.y], &mut path);
+                sheet.push_rect([min.truncate(), max.truncate()], &mut path);
             }
         }
         if !path.is_empty() {
@@ -206,14 +206,16 @@ fn counted<'c>(
 ///
 /// All cells, the eye if it is near, and the items, but for a few that are much larger
 /// than all others together.
-fn window(items: &[Drawn], cells: impl Iterator<Item = Rect>, eye: Option<DVec3>) -> Rect {
-    let bounds = united(items.iter().map(|item| item.rect)).unwrap_or_default();
-    let middles = united(items.iter().map(|item| at(centre(item.rect))));
+fn window(items: &[Drawn], cells: impl Iterator<Item = Rect>, eye: Option<DVec2>) -> Rect {
+    let bounds = items.iter().map(|item| item.rect).reduce(union);
+    let bounds = bounds.unwrap_or_default();
+    let middles = items.iter().map(|item| [centre(item.rect); 2]);
+    let middles = middles.reduce(union);
     let close = middles
         .filter(|middles| longest(*middles) > 0.0 && longest(*middles) < longest(bounds) / 3.0);
     let mut window = cells.fold(close.unwrap_or(bounds), union);
     if let Some(eye) = eye {
-        let with = union(window, at([eye.x, eye.y]));
+        let with = union(window, [eye; 2]);
         if longest(with) <= 2.0 * longest(window) {
             window = with;
         }
@@ -229,12 +231,10 @@ fn outline_floors(items: &mut [Drawn], sheet: &Sheet) {
         .map(|item| (centre(item.rect), longest(item.rect)))
         .collect();
     for item in items.iter_mut().filter(|item| large(item.rect)) {
-        let [x0, y0, x1, y1] = item.rect;
-        let length = longest(item.rect);
-        let covers = |&&([x, y], own): &&([f64; 2], f64)| {
-            own < length && x0 < x && x < x1 && y0 < y && y < y1
-        };
-        let area = (x1 - x0) * (y1 - y0) * sheet.scale * sheet.scale;
+        let ([low, high], length) = (item.rect, longest(item.rect));
+        let covers =
+            |&&(p, own): &&(DVec2, f64)| own < length && low.cmplt(p).all() && p.cmplt(high).all();
+        let area = (high - low).element_product() * sheet.scale * sheet.scale;
         item.is_outlined =
             area > SIDE * SIDE / 50.0 || middles.iter().filter(covers).nth(1).is_some();
     }
@@ -253,7 +253,7 @@ fn draw_camera(camera: &Camera, up: UpAxis, sheet: &Sheet, body: &mut String) {
     let mut path = String::new();
     if let Some(corners) = corners {
         let corners = corners.map(|corner| up.to_z_up(corner));
-        let corners = corners.map(|corner| sheet.at([corner.x, corner.y]));
+        let corners = corners.map(|corner| sheet.at(corner.truncate()));
         // Bit 0 is right, bit 1 top, bit 2 far.
         for (from, to) in (0..8).flat_map(|a| [1, 2, 4].map(|bit| (a, a | bit))) {
             let ([x0, y0], [x1, y1]) = (corners[from], corners[to]);
@@ -265,13 +265,12 @@ fn draw_camera(camera: &Camera, up: UpAxis, sheet: &Sheet, body: &mut String) {
     }
     let _ = writeln!(body, "<path fill=\"none\" stroke=\"#000\" d=\"{path}\"/>");
     let eye = up.to_z_up(frame.eye);
-    let [x, y] = sheet.at([eye.x, eye.y]);
+    let [x, y] = sheet.at(eye.truncate());
     let _ = writeln!(body, "<circle cx=\"{x}\" cy=\"{y}\" r=\"4\"/>");
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::sheet::class;
     use super::*;
     use crate::scene::WorldBox;
 
@@ -286,7 +285,11 @@ mod tests {
             flat(49.0, 49.0, 0.0),
         ];
         let scene = Scene::from_boxes("a<b", &boxes).expect("boxes");
-        let class = |colour| class(colour, "of it", false);
+        let class = |colour| Class {
+            colour,
+            words: "of it",
+            is_key: false,
+        };
         let plan = Plan {
             caption: scene.name.clone(),
             scene: &scene,
@@ -313,8 +316,8 @@ mod tests {
 
     #[test]
     fn a_few_items_beyond_all_others_do_not_shrink_them() {
-        let item = |rect| Drawn {
-            rect,
+        let item = |[x0, y0, x1, y1]: [f64; 4]| Drawn {
+            rect: [DVec2::new(x0, y0), DVec2::new(x1, y1)],
             class: 0,
             is_outlined: false,
         };
@@ -322,10 +325,13 @@ mod tests {
         let items = [sky, item([0.0, 0.0, 1.0, 1.0]), item([5.0, 3.0, 6.0, 4.0])];
         assert_eq!(
             window(&items, std::iter::empty(), None),
-            [0.0, 0.0, 5.5, 3.5]
+            [DVec2::ZERO, DVec2::new(5.5, 3.5)]
         );
-        let eye = |x| Some(DVec3::new(x, 0.0, 0.0));
-        assert_eq!(window(&items[1..2], std::iter::empty(), eye(1.5))[2], 1.5);
-        assert_eq!(window(&items[1..2], std::iter::empty(), eye(90.0))[2], 1.0);
+        let eye = |x| Some(DVec2::new(x, 0.0));
+        assert_eq!(window(&items[1..2], std::iter::empty(), eye(1.5))[1].x, 1.5);
+        assert_eq!(
+            window(&items[1..2], std::iter::empty(), eye(90.0))[1].x,
+            1.0
+        );
     }
 }

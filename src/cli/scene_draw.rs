@@ -4,9 +4,11 @@
 
 use std::path::Path;
 
+use glam::Vec3;
+
 use super::command_args::SceneDrawArgs;
 use super::plan::Plan;
-use super::sheet::{Cells, Class, class};
+use super::sheet::{Cells, Class};
 use super::{Ending, expect_places, load_scene, tell, text, write_text};
 use crate::culling::{CameraView, Culling};
 use crate::geometry::Aabb;
@@ -18,36 +20,40 @@ use crate::scene::Scene;
 use crate::spec::SpecError;
 
 /// Items of a scene without a camera.
-const ITEMS: [Class; 1] = [class("#9fb4c4", "items", false)];
+const ITEMS: &[Class] = rows! { Class { colour, words, is_key }
+    "#9fb4c4", "items", false;
+};
 
 /// Items of a scene with a camera.
-const SEEN: [Class; 2] = [
-    class("#c8cdd2", "outside of the frustum", false),
-    class("#009e73", "visible", true),
-];
+const SEEN: &[Class] = rows! { Class { colour, words, is_key }
+    "#c8cdd2", "outside of the frustum", false;
+    "#009e73", "visible", true;
+};
 
 /// Items by what the query of a structure did with them.
-const VERDICTS: [Class; 4] = [
-    class("#c8cdd2", "outside, rejected with their cell", false),
-    class("#cc79a7", "outside, tested one by one", false),
-    class("#009e73", "visible, tested one by one", true),
-    class("#005c43", "visible, accepted with their cell", true),
-];
+const VERDICTS: &[Class] = rows! { Class { colour, words, is_key }
+    "#c8cdd2", "outside, rejected with their cell", false;
+    "#cc79a7", "outside, tested one by one", false;
+    "#009e73", "visible, tested one by one", true;
+    "#005c43", "visible, accepted with their cell", true;
+};
 const REJECTED: usize = 0;
 const OUTSIDE: usize = 1;
 const VISIBLE: usize = 2;
 const ACCEPTED: usize = 3;
 
 /// Cells without a camera.
-const CELLS: [Class; 1] = [class("#0072b2", "cells", false)];
+const CELLS: &[Class] = rows! { Class { colour, words, is_key }
+    "#0072b2", "cells", false;
+};
 
 /// Cells by the verdict of a query.
-const CELL_VERDICTS: [Class; 4] = [
-    class("#b0b0b0", "cells not reached", false),
-    class("#d55e00", "cells rejected, outside", true),
-    class("#009e73", "cells accepted, inside", true),
-    class("#0072b2", "cells opened, across a plane", false),
-];
+const CELL_VERDICTS: &[Class] = rows! { Class { colour, words, is_key }
+    "#b0b0b0", "cells not reached", false;
+    "#d55e00", "cells rejected, outside", true;
+    "#009e73", "cells accepted, inside", true;
+    "#0072b2", "cells opened, across a plane", false;
+};
 
 pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending> {
     let inputs = [Some(&args.scene), args.camera.as_ref()];
@@ -93,31 +99,27 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
         }
         _ => vec![0; scene.items.len()],
     };
-    let class_of_cell = |cell: usize| {
-        let verdict = |verdicts: &Vec<Option<Containment>>| match verdicts[cell] {
-            None => 0,
-            Some(Containment::Outside) => 1,
-            Some(Containment::Inside) => 2,
-            Some(Containment::Straddles) => 3,
-        };
-        verdicts.as_ref().map_or(0, verdict)
+    let class_of_cell = |cell: usize| match verdicts.as_ref().and_then(|all| all[cell]) {
+        None => 0,
+        Some(Containment::Outside) => 1,
+        Some(Containment::Inside) => 2,
+        Some(Containment::Straddles) => 3,
     };
     let plan = Plan {
         caption: caption.join("; "),
         scene: &scene,
         camera: camera.as_ref(),
         classes: match (&view, &index) {
-            (None, _) => &ITEMS,
-            (_, None) => &SEEN,
-            _ => &VERDICTS,
+            (None, _) => ITEMS,
+            (_, None) => SEEN,
+            _ => VERDICTS,
         },
         class_of: &|item| class_of[item],
         cells: index.is_some().then(|| Cells {
             cells: &cells,
-            classes: if view.is_some() {
-                &CELL_VERDICTS
-            } else {
-                &CELLS
+            classes: match view {
+                Some(_) => CELL_VERDICTS,
+                None => CELLS,
             },
             class_of: &class_of_cell,
             depth: args.depth,
@@ -140,14 +142,8 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
 fn divided(registry: &Registry, text: &str) -> Result<StructureSpec, SpecError> {
     let spec = registry.structure(text)?;
     // More boxes than the largest block holds.
-    let boxes: Vec<Aabb> = (0..64)
-        .map(|i| {
-            Aabb::new(
-                glam::Vec3::splat(i as f32),
-                glam::Vec3::splat(i as f32 + 0.5),
-            )
-        })
-        .collect();
+    let cube = |i: u8| Aabb::around(Vec3::splat(i.into()), Vec3::splat(0.25));
+    let boxes: Vec<Aabb> = (0..64).map(cube).collect();
     let has_cells = |row: &&Row| {
         let spec = registry.structure(row.info.name);
         let index = spec.ok().and_then(|spec| spec.build(&boxes).ok());

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::figure::round_values;
 use super::text;
@@ -11,8 +11,8 @@ use crate::geometry::{Aabb, Plane};
 use crate::index::TreeCell;
 use crate::scene::{Scene, UpAxis};
 
-/// Low and high x and y.
-pub type Rect = [f64; 4];
+/// Low and high corner.
+pub type Rect = [DVec2; 2];
 
 /// Longer side of the drawing in pixels.
 pub const SIDE: f64 = 800.0;
@@ -21,29 +21,16 @@ const LEFT: f64 = 84.0;
 const TOP: f64 = 36.0;
 const LINE: f64 = 20.0;
 
-pub fn centre([x0, y0, x1, y1]: Rect) -> [f64; 2] {
-    [x0 + (x1 - x0) / 2.0, y0 + (y1 - y0) / 2.0]
+pub fn centre([low, high]: Rect) -> DVec2 {
+    low + (high - low) / 2.0
 }
 
 pub fn union(a: Rect, b: Rect) -> Rect {
-    [
-        a[0].min(b[0]),
-        a[1].min(b[1]),
-        a[2].max(b[2]),
-        a[3].max(b[3]),
-    ]
+    [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-pub fn united(all: impl IntoIterator<Item = Rect>) -> Option<Rect> {
-    all.into_iter().reduce(union)
-}
-
-pub fn longest([x0, y0, x1, y1]: Rect) -> f64 {
-    (x1 - x0).max(y1 - y0)
-}
-
-pub fn at([x, y]: [f64; 2]) -> Rect {
-    [x, y, x, y]
+pub fn longest([low, high]: Rect) -> f64 {
+    (high - low).max_element()
 }
 
 /// A number of pixels with one decimal.
@@ -56,7 +43,7 @@ pub struct Sheet {
     window: Rect,
     /// Pixels per unit.
     pub scale: f64,
-    size: [f64; 2],
+    size: DVec2,
 }
 
 impl Sheet {
@@ -64,38 +51,35 @@ impl Sheet {
     ///
     /// Never without extent, and at most three times as long as wide.
     pub fn over(window: Rect) -> Sheet {
-        let [x, y] = centre(window);
-        let length = longest(window);
-        let least = x.abs().max(y.abs()) * 1e-9;
+        let (middle, length) = (centre(window), longest(window));
+        let least = middle.abs().max_element() * 1e-9;
         let length = match length.is_finite() && length > least {
             true => length,
             false => least.max(1.0),
         };
-        let sides = [window[2] - window[0], window[3] - window[1]];
-        let [w, h] = sides.map(|side| 1.06 * side.max(length / 3.0).min(length));
-        let scale = SIDE / w.max(h);
+        let sides = (window[1] - window[0]).max(DVec2::splat(length / 3.0));
+        let sides = 1.06 * sides.min(DVec2::splat(length));
+        let scale = SIDE / sides.max_element();
         Sheet {
-            window: [x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0],
+            window: [middle - sides / 2.0, middle + sides / 2.0],
             scale,
-            size: [w * scale, h * scale],
+            size: sides * scale,
         }
     }
 
     /// Pixels of a point: y is up in the scene and down on the sheet.
-    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let place = [
-            (x - self.window[0]) * self.scale,
-            (self.window[3] - y) * self.scale,
-        ];
-        place.map(px)
+    pub fn at(&self, p: DVec2) -> [f64; 2] {
+        let [low, high] = self.window;
+        [(p.x - low.x) * self.scale, (high.y - p.y) * self.scale].map(px)
     }
 
     /// Adds a rectangle to a path, at least one pixel wide and high, cut off beyond the
     /// sheet.
-    pub fn push_rect(&self, [x0, y0, x1, y1]: Rect, path: &mut String) {
+    pub fn push_rect(&self, [low, high]: Rect, path: &mut String) {
+        let [first, last] = self.window;
         let sides = [
-            (x0 - self.window[0], x1 - self.window[0], self.size[0]),
-            (self.window[3] - y1, self.window[3] - y0, self.size[1]),
+            (low.x - first.x, high.x - first.x, self.size.x),
+            (last.y - high.y, last.y - low.y, self.size.y),
         ];
         let [(x, w), (y, h)] = sides.map(|(low, high, size)| {
             let [low, high] = [low, high].map(|v| (v * self.scale).clamp(-9.0, size + 9.0));
@@ -114,7 +98,7 @@ impl Sheet {
         legend: &[(String, String)],
         notes: &[String],
     ) -> String {
-        let [w, h] = self.size.map(px);
+        let [w, h] = self.size.to_array().map(px);
         let width = LEFT + w.max(0.6 * SIDE) + 20.0;
         let rows = legend.len().div_ceil(2);
         let below = TOP + h + 56.0;
@@ -129,22 +113,20 @@ impl Sheet {
             html(caption),
         );
         let bottom = TOP + h;
-        for (value, label) in ticks(self.window[0], self.window[2]) {
-            let x = px(LEFT + self.at([value, 0.0])[0]);
-            let _ = writeln!(
-                svg,
-                "<path stroke=\"#888\" d=\"M{x} {bottom}v5\"/><text x=\"{x}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
-                bottom + 19.0
-            );
-        }
-        for (value, label) in ticks(self.window[1], self.window[3]) {
-            let y = px(TOP + self.at([0.0, value])[1]);
-            let _ = writeln!(
-                svg,
-                "<path stroke=\"#888\" d=\"M{LEFT} {y}h-5\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
-                LEFT - 8.0,
-                y + 4.0
-            );
+        for axis in [0, 1] {
+            for (value, label) in ticks(self.window[0][axis], self.window[1][axis]) {
+                let [x, y] = self.at(DVec2::splat(value));
+                let [x, y] = [px(LEFT + x), px(TOP + y)];
+                let (mark, x, y, anchor) = match axis {
+                    0 => (format!("{x} {bottom}v5"), x, bottom + 19.0, "middle"),
+                    _ => (format!("{LEFT} {y}h-5"), LEFT - 8.0, y + 4.0, "end"),
+                };
+                let _ = writeln!(
+                    svg,
+                    "<path stroke=\"#888\" d=\"M{mark}\"/><text x=\"{x}\" y=\"{y:.1}\" \
+                     text-anchor=\"{anchor}\">{label}</text>"
+                );
+            }
         }
         let _ = writeln!(
             svg,
@@ -197,15 +179,6 @@ pub struct Class {
     pub is_key: bool,
 }
 
-/// A row of a table of classes.
-pub const fn class(colour: &'static str, words: &'static str, is_key: bool) -> Class {
-    Class {
-        colour,
-        words,
-        is_key,
-    }
-}
-
 /// Cells with a class each.
 pub struct Cells<'p> {
     pub cells: &'p [TreeCell<'p>],
@@ -221,7 +194,7 @@ pub struct Outline {
     /// Bounds of its items.
     rect: Rect,
     /// Its corners: those of its bounds, or cut by planes.
-    pub corners: Vec<[f64; 2]>,
+    pub corners: Vec<DVec2>,
 }
 
 impl Cells<'_> {
@@ -229,15 +202,15 @@ impl Cells<'_> {
     pub fn outlines(&self, scene: &Scene) -> Vec<Outline> {
         let up = scene.up;
         let origin = up.to_z_up(scene.origin);
-        let mut around: Vec<Vec<[f64; 2]>> = Vec::new();
+        let mut around: Vec<Vec<DVec2>> = Vec::new();
         let mut outlines = Vec::new();
         for (cell, drawn) in self.cells.iter().enumerate() {
             if drawn.level > self.depth {
                 continue;
             }
-            let bounds = &drawn.bounds;
-            let [min, max] = [bounds.min, bounds.max].map(|corner| up.to_z_up(corner));
-            let rect = flat(&Aabb::new(min, max), origin);
+            let [min, max] = [drawn.bounds.min, drawn.bounds.max].map(|p| up.to_z_up(p));
+            let (min, max) = Aabb::new(min, max).in_world(origin);
+            let rect = [min.truncate(), max.truncate()];
             around.truncate(drawn.level as usize);
             let corners = match (drawn.half_space, around.last()) {
                 (Some(side), Some(parent)) => cut(parent, &turned(&side, up), origin),
@@ -304,22 +277,16 @@ impl Cells<'_> {
 
     /// Cells and planes that are not drawn.
     pub fn notes(&self, up: UpAxis) -> Vec<String> {
-        let below = self
-            .cells
-            .iter()
-            .filter(|cell| cell.level > self.depth)
-            .count();
-        let planes = self.cells.iter().filter(|cell| cell.level <= self.depth);
-        let level = planes.filter(|cell| {
-            cell.half_space
-                .is_some_and(|side| !is_upright(&turned(&side, up)))
-        });
-        let level = level.count();
+        let (drawn, below): (Vec<&TreeCell<'_>>, Vec<_>) =
+            (self.cells.iter()).partition(|cell| cell.level <= self.depth);
+        let is_level = |side: &Plane| !is_upright(&turned(side, up));
+        let sides = drawn.iter().filter_map(|cell| cell.half_space.as_ref());
+        let level = sides.filter(|side| is_level(side)).count();
         let mut notes = vec!["thicker outlines: upper levels".to_owned()];
-        if below > 0 {
+        if !below.is_empty() {
             notes.push(format!(
                 "not drawn: {} below level {}",
-                text::counted(below, "cell"),
+                text::counted(below.len(), "cell"),
                 self.depth
             ));
         }
@@ -342,34 +309,27 @@ pub fn is_upright(plane: &Plane) -> bool {
     plane.normal.z.abs() <= 1e-6 * plane.normal.length()
 }
 
-pub fn flat(b: &Aabb, origin: DVec3) -> Rect {
-    let (min, max) = b.in_world(origin);
-    [min.x, min.y, max.x, max.y]
-}
-
-pub fn corners_of([x0, y0, x1, y1]: Rect) -> [[f64; 2]; 4] {
-    [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+pub fn corners_of([a, b]: Rect) -> [DVec2; 4] {
+    [a, DVec2::new(b.x, a.y), b, DVec2::new(a.x, b.y)]
 }
 
 /// The part of a polygon in a half-space about an origin.
 ///
 /// All of it if the plane is not upright. By Sutherland and Hodgman 1974, "Reentrant
 /// polygon clipping".
-pub fn cut(polygon: &[[f64; 2]], side: &Plane, origin: DVec3) -> Vec<[f64; 2]> {
+pub fn cut(polygon: &[DVec2], side: &Plane, origin: DVec3) -> Vec<DVec2> {
     if !is_upright(side) {
         return polygon.to_vec();
     }
-    let normal = side.normal.as_dvec3();
-    let value = |p: [f64; 2]| {
-        normal.x * (p[0] - origin.x) + normal.y * (p[1] - origin.y) + f64::from(side.d)
-    };
+    let (normal, origin) = (side.normal.as_dvec3().truncate(), origin.truncate());
+    let value = |p: DVec2| normal.dot(p - origin) + f64::from(side.d);
     let mut part = Vec::new();
     for (i, &to) in polygon.iter().enumerate() {
         let from = polygon[(i + polygon.len() - 1) % polygon.len()];
         let (before, here) = (value(from), value(to));
         if (before < 0.0) != (here < 0.0) {
             let share = before / (before - here);
-            part.push([0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * share));
+            part.push(from + (to - from) * share);
         }
         if here >= 0.0 {
             part.push(to);
@@ -394,11 +354,11 @@ mod tests {
 
     #[test]
     fn an_upright_plane_cuts_a_cell_and_a_level_one_does_not() {
-        let square = corners_of([10.0, 10.0, 12.0, 12.0]);
+        let square = corners_of([10.0, 12.0].map(DVec2::splat));
         let origin = DVec3::splat(10.0);
         let half = Plane::new(glam::Vec3::X, -0.5);
         let part = cut(&square, &half, origin);
-        let (low, high) = ([10.5, 10.0], [10.5, 12.0]);
+        let [low, high] = [10.0, 12.0].map(|y| DVec2::new(10.5, y));
         assert!(
             part.len() == 4 && part.contains(&low) && part.contains(&high),
             "{part:?}"

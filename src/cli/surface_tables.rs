@@ -8,7 +8,7 @@ use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::Block;
 use super::figure::{Axis, Figure, is_drawn, left_out, picture};
 use super::run_figures::ends;
-use super::table::Table;
+use super::table::{Column, Table};
 use super::{run_figures, text};
 use crate::report::{
     Crossing, Growth, Overall, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
@@ -30,18 +30,15 @@ fn title(surface: &Surface) -> String {
 /// fastest, and its speed-up vs linear.
 fn winners(surface: &Surface) -> Table {
     let classes = surface.classes();
-    let header = ["items \\ visible".to_owned()].into_iter();
-    let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| share(*c))));
-    for size in surface.sizes() {
-        let mut row = vec![text::count(size)];
-        for class in &classes {
+    let cells = surface.sizes().into_iter().flat_map(|size| {
+        classes.iter().map(move |class| {
             let here = |p: &&Place| p.items == size && p.class == *class;
             let told = surface.places.iter().filter(here).map(winner);
-            row.push(told.collect::<Vec<_>>().join("; "));
-        }
-        table.add_row(row);
-    }
-    table
+            let told = told.collect::<Vec<_>>().join("; ");
+            [text::count(size), share(*class), told]
+        })
+    });
+    Table::grid("items \\ visible", cells)
 }
 
 /// "wide = bvh: 12.3 (at 34.70 %)": those of one rank share the place, the fastest
@@ -69,23 +66,20 @@ fn winner(place: &Place) -> String {
 /// From how many items on each structure beats the linear scan.
 fn crossings(surface: &Surface) -> Option<Table> {
     let classes = surface.classes();
-    let header = ["faster than linear from".to_owned()].into_iter();
-    let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| share(*c))));
-    for structure in surface.no_scans() {
-        let told = classes
-            .iter()
-            .map(|class| match surface.crossing(structure, *class) {
+    let cells = surface.no_scans().into_iter().flat_map(|structure| {
+        classes.iter().map(move |class| {
+            let told = match surface.crossing(structure, *class) {
                 None => String::new(),
                 Some(Crossing::Below(items)) => format!("<= {}", text::count(items)),
                 Some(Crossing::At(items)) => format!("~ {}", text::count(two_digits(items))),
                 Some(Crossing::Above(items)) => format!("> {}", text::count(items)),
-            });
-        let told: Vec<String> = told.collect();
-        if told.iter().any(|cell| !cell.is_empty()) {
-            let name = [structure.to_owned()].into_iter();
-            table.add_row(name.chain(told));
-        }
-    }
+            };
+            [structure.to_owned(), share(*class), told]
+        })
+    });
+    let mut table = Table::grid("faster than linear from", cells);
+    let has_text = |row: &Vec<String>| row[1..].iter().any(|cell| !cell.is_empty());
+    table.rows.retain(has_text);
     (!table.rows.is_empty()).then_some(table)
 }
 
@@ -98,29 +92,21 @@ fn two_digits(items: f64) -> usize {
 /// After how many queries each build is repaid against the linear scan.
 fn break_even(surface: &Surface) -> Option<Table> {
     let structures = surface.no_scans();
-    let header = ["items, visible"]
-        .into_iter()
-        .chain(structures.iter().copied());
-    let mut table = Table::of_numbers(header);
-    for place in &surface.places {
-        let told = structures.iter().map(|structure| {
+    let cells = surface.places.iter().flat_map(|place| {
+        structures.iter().map(move |structure| {
             let cell = place.cell(structure);
-            match cell.map(|c| (c.value("break_even_queries"), c.value("speedup"))) {
+            let told = match cell.map(|c| (c.value("break_even_queries"), c.value("speedup"))) {
                 None => String::new(),
                 Some((Some(queries), _)) => text::count(queries as usize),
                 // Built no more dearly than the scan's own copy of the items.
                 Some((None, Some(ratio))) if ratio > 1.0 => "0".to_owned(),
                 Some(_) => "never".to_owned(),
-            }
-        });
-        let name = format!(
-            "{}, {}",
-            text::count(place.items),
-            text::percent(place.share)
-        );
-        table.add_row([name].into_iter().chain(told));
-    }
-    (!structures.is_empty()).then_some(table)
+            };
+            let (items, visible) = (text::count(place.items), text::percent(place.share));
+            [format!("{items}, {visible}"), (*structure).to_owned(), told]
+        })
+    });
+    (!structures.is_empty()).then(|| Table::grid("items, visible", cells))
 }
 
 /// Crossovers and growth of a report, in tables and figures; a surface has as many
@@ -129,7 +115,7 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
     let mut blocks = Vec::new();
     let is_shown = |surface: &&Surface| surface.spans() && surface.sizes().len() >= sizes;
     for surface in surfaces(comparisons(report)).iter().filter(is_shown) {
-        blocks.push(Block::Heading(2, format!("Crossover: {}", title(surface))));
+        blocks.push(Block::heading(format!("Crossover: {}", title(surface))));
         blocks.push(Block::line(
             "The fastest structure (= if differences are not significant) and its speed-up vs \
              linear; none if a scan wins. Shares are rounded on a log scale to 1, 1.5, 2, 3, 5, \
@@ -147,42 +133,32 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
     }
     let growths = growths(report);
     if !growths.is_empty() {
-        let heading = "Growth at a fixed number of visible items".to_owned();
-        blocks.extend([
-            Block::Heading(2, heading),
-            Block::Table(of_growths(&growths)),
-        ]);
+        blocks.push(Block::heading("Growth at a fixed number of visible items"));
+        blocks.push(Block::Table(of_growths(&growths)));
     }
     blocks
 }
 
 /// How cost grows at a fixed number of visible items.
 fn of_growths(growths: &[Growth]) -> Table {
-    let mut table = Table::of(
-        "world, path, cache, test | structure | >visible | >items | >query time ~ N^e, e =",
-    );
-    for growth in growths {
-        let sizes = growth.sizes.first().zip(growth.sizes.last());
-        let e = growth.exponent;
-        table.add_row([
-            format!(
-                "{}, {}, {}, {}",
-                growth.world, growth.path, growth.cache, growth.test
-            ),
-            growth.structure.to_owned(),
-            text::count(growth.visible.round() as usize),
-            sizes.map_or(String::new(), |(least, most)| {
-                format!("{} - {}", text::count(*least), text::count(*most))
-            }),
-            format!(
-                "{:.2} [{:.2}, {:.2}]",
-                e.value,
-                e.lower.unwrap_or(f64::NAN),
-                e.upper.unwrap_or(f64::NAN)
-            ),
-        ]);
-    }
-    table
+    let columns: &[Column<&Growth>] = &[
+        ("world, path, cache, test", |g| {
+            format!("{}, {}, {}, {}", g.world, g.path, g.cache, g.test)
+        }),
+        ("structure", |g| g.structure.to_owned()),
+        (">visible", |g| text::count(g.visible.round() as usize)),
+        (">items", |g| {
+            let sizes = g.sizes.first().zip(g.sizes.last());
+            let sizes = sizes.map(|(least, most)| [*least, *most].map(text::count));
+            text::some(sizes, |sizes| sizes.join(" - "))
+        }),
+        (">query time ~ N^e, e =", |g| {
+            let [lower, upper] =
+                [g.exponent.lower, g.exponent.upper].map(|e| e.unwrap_or(f64::NAN));
+            format!("{:.2} [{lower:.2}, {upper:.2}]", g.exponent.value)
+        }),
+    ];
+    Table::with(growths, columns)
 }
 
 /// Time against the number of items, a line per structure, named at its right end.

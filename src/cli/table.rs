@@ -50,6 +50,33 @@ impl Table {
         table
     }
 
+    /// A table of cells with the names of their rows and columns.
+    ///
+    /// Both are in the order in which they first occur; cells are numbers.
+    pub fn grid(title: &str, cells: impl IntoIterator<Item = [String; 3]>) -> Table {
+        let mut table = Table::new([title], &[]);
+        for [name, head, cell] in cells {
+            let column = table.header.iter().position(|own| *own == head);
+            let column = column.unwrap_or(table.header.len());
+            if column == table.header.len() {
+                table.header.push(head);
+            }
+            let row = table.rows.iter().position(|own| own[0] == name);
+            let row = row.unwrap_or(table.rows.len());
+            if row == table.rows.len() {
+                table.rows.push(vec![name]);
+            }
+            let row = &mut table.rows[row];
+            row.resize(row.len().max(column + 1), String::new());
+            row[column] = cell;
+        }
+        let width = table.header.len();
+        let rows = table.rows.iter_mut();
+        rows.for_each(|row| row.resize(width, String::new()));
+        table.right = (1..width).collect();
+        table
+    }
+
     /// The first column holds names, all others numbers.
     pub fn of_numbers(header: impl IntoIterator<Item = impl Into<String>>) -> Table {
         let mut table = Table::new(header, &[]);

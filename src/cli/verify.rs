@@ -183,20 +183,9 @@ fn workloads<'a>(
         Workload::new(scene, cameras, culling)?,
     )];
     // The first kind is the camera itself.
+    let none = cameras.clone().at_most(0);
     for kind in &VOLUME_KINDS[1..] {
-        let workload = Workload {
-            scene,
-            path: cameras.name.clone(),
-            culling: Culling::default(),
-            items: CullingTest::SixPlane.items(&scene.items),
-            cameras: Vec::new(),
-            views: Vec::new(),
-            points: Vec::new(),
-            lens_scale: None,
-            sought: Vec::new(),
-            motion: None,
-            views_per_frame: 1,
-        };
+        let workload = Workload::new(scene, &none, &Culling::default())?;
         all.push(((*kind).to_owned(), workload));
     }
     for (i, camera) in cameras.cameras.iter().enumerate() {

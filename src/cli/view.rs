@@ -157,34 +157,25 @@ fn fates(
     truth: Option<&Truth>,
     front: Option<&[ItemId]>,
 ) -> Vec<Fate> {
-    let mut fates = vec![Fate::Culled; items];
-    let mut in_front = vec![front.is_none(); items];
     // Floors and ceilings of a map come behind its items.
-    let front = front.unwrap_or_default().iter().map(|&id| id as usize);
-    front
-        .filter(|&id| id < items)
-        .for_each(|id| in_front[id] = true);
-    answer
-        .iter()
-        .for_each(|&id| fates[id as usize] = Fate::Visible);
-    let verdicts = truth.map(Truth::verdicts).unwrap_or_default();
-    for (fate, verdict) in fates.iter_mut().zip(verdicts) {
-        *fate = match (*fate, verdict) {
-            (Fate::Visible, Verdict::Out) => Fate::FalsePositive,
-            (Fate::Culled, Verdict::In) => Fate::Lost,
-            (fate, _) => fate,
-        };
-    }
-    for (fate, _) in fates
-        .iter_mut()
-        .zip(in_front)
-        .filter(|(_, is_front)| !is_front)
-    {
-        if *fate == Fate::Visible {
-            *fate = Fate::Hidden;
+    let set = |ids: &[ItemId]| {
+        let mut set = vec![false; items];
+        let own = ids.iter().map(|&id| id as usize).filter(|&id| id < items);
+        own.for_each(|id| set[id] = true);
+        set
+    };
+    let (returned, in_front) = (set(answer), front.map(set));
+    let fate = |item: usize| {
+        let is_hidden = in_front.as_ref().is_some_and(|front| !front[item]);
+        match (returned[item], truth.map(|truth| truth.verdicts()[item])) {
+            (true, Some(Verdict::Out)) => Fate::FalsePositive,
+            (true, _) if is_hidden => Fate::Hidden,
+            (true, _) => Fate::Visible,
+            (false, Some(Verdict::In)) => Fate::Lost,
+            (false, _) => Fate::Culled,
         }
-    }
-    fates
+    };
+    (0..items).map(fate).collect()
 }
 
 /// The result in sentences.
