@@ -41,7 +41,7 @@ impl Pool {
 /// Does every job on `threads` threads, of which this is one: a free thread
 /// takes the next. With one thread the jobs are done in order, here.
 ///
-/// Where the system gives fewer threads, those do the work. A thread costs some
+/// If the system gives fewer threads, those do the work. A thread costs some
 /// 20 to 50 us to start: jobs are worth it from a fraction of a millisecond on.
 ///
 /// # Panics

@@ -106,7 +106,7 @@ impl Camera {
     /// always safe.
     ///
     /// # Errors
-    /// As [`Camera::volume`]; more planes than a volume has.
+    /// The errors of [`Camera::volume`]; more planes than a volume has.
     pub fn volume_with(
         &self,
         more: &[PlaneF64],

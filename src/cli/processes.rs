@@ -292,7 +292,7 @@ impl Workers {
     /// Workers of a study, which waits as long as they take.
     ///
     /// # Errors
-    /// As [`Workers::new`]; an argument that is no text.
+    /// The errors of [`Workers::new`]; an argument that is no text.
     pub fn of_study() -> anyhow::Result<Workers> {
         Workers::new(typed_args()?, Duration::MAX, &std::env::temp_dir())
     }
@@ -352,7 +352,7 @@ impl Workers {
     /// Runs a job that needs every process; its messages.
     ///
     /// # Errors
-    /// As [`see_through`]; a process that does not finish.
+    /// The errors of [`see_through`]; a process that does not finish.
     pub fn found(&self, process: u32, job: Job, step: &dyn Fn(&str)) -> anyhow::Result<Vec<Said>> {
         let mut found = Vec::new();
         let mut keep = |said| {

@@ -49,7 +49,7 @@ named! {
     #[non_exhaustive]
     pub enum Arithmetic, ARITHMETICS {
         ///
-        /// By default moved outward by epsilon.
+        /// Moved outward by epsilon by default.
         #[default]
         F32 = "f32", "f32 planes in scene coordinates (default)";
         F64 = "f64", "f64 planes, no epsilon";

@@ -149,7 +149,7 @@ impl Registry {
     /// Adds a row.
     ///
     /// # Panics
-    /// As [`Registry::with`].
+    /// The panics of [`Registry::with`].
     pub fn with_row(mut self, row: Row) -> Registry {
         let name = row.info.name;
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
@@ -231,7 +231,7 @@ impl Registry {
     /// `default` those that are not [on request](Info::on_request).
     ///
     /// # Errors
-    /// As [`Registry::structure`]; an empty list, a structure named twice.
+    /// The errors of [`Registry::structure`]; an empty list, a structure named twice.
     pub fn structures(&self, list: &str) -> Result<Vec<StructureSpec>, SpecError> {
         let mut chosen: Vec<StructureSpec> = Vec::new();
         for text in Spec::split_list(list) {
@@ -303,7 +303,7 @@ impl StructureSpec {
     /// Builds the structure, with the threads of [`StructureSpec::execution`].
     ///
     /// # Errors
-    /// As [`RegionIndex::build`]; a panic of the structure's code; too little memory.
+    /// The errors of [`RegionIndex::build`]; a panic of the structure's code; too little memory.
     pub fn build<'a>(&self, input: impl Into<Input<'a>>) -> Result<Box<dyn DynIndex>, BuildError> {
         let input = input.into();
         let count = input.items.len();

@@ -22,7 +22,7 @@ use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
 use crate::input::InputError;
 use crate::motion::Motion;
-use crate::path::{self, LensDefaults, PathError};
+use crate::path::{self, LensDefaults};
 use crate::scene::{self, LoadOptions, Scene};
 
 /// Updates are measured in every n-th process, because they cost many builds.
@@ -235,12 +235,9 @@ impl Plan {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
-    /// The scene cannot be read.
+    /// The scene or the path cannot be read, or the path has no cameras in this scene.
     #[error(transparent)]
-    Scene(#[from] InputError),
-    /// The path cannot be read or has no cameras in this scene.
-    #[error(transparent)]
-    Path(#[from] PathError),
+    Input(#[from] InputError),
     /// A camera of the path cannot be culled with.
     #[error(transparent)]
     Workload(#[from] WorkloadError),

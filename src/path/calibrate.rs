@@ -1,8 +1,9 @@
 //! Search for the far plane at which a given share of a sample is visible.
 
-use super::PathError;
+use super::unfit;
 use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions, Surroundings};
 use crate::geometry::Aabb;
+use crate::input::InputError;
 use crate::scene::Scene;
 
 /// Maximum numbers of items and cameras sampled per step of the search.
@@ -28,15 +29,15 @@ pub(super) fn for_visible_share(
     scene: &Scene,
     cameras: &[Camera],
     share: f64,
-) -> Result<f64, PathError> {
+) -> Result<f64, InputError> {
     let needed = (LEAST_SEEN / share).ceil() as usize;
     let items = every_nth(&scene.items, MOST_ITEMS.max(needed));
     let sample = every_nth(cameras, MOST_CAMERAS);
     let around = scene.surroundings();
-    let visible = |scale: f64| -> Result<f64, PathError> {
+    let visible = |scale: f64| -> Result<f64, InputError> {
         let mut seen = 0;
         for camera in &sample {
-            seen += count(camera, scale, &items, &around).map_err(|e| PathError::unfit(path, e))?;
+            seen += count(camera, scale, &items, &around).map_err(|e| unfit(path, e))?;
         }
         Ok(seen as f64 / (items.len() * sample.len()).max(1) as f64)
     };
@@ -46,7 +47,7 @@ pub(super) fn for_visible_share(
             "visible={share} cannot be reached: {found} of '{scene}' is visible along it; \
              expected a {wanted} share"
         );
-        PathError::unfit(path, reason)
+        unfit(path, reason)
     };
     let (mut low, mut high) = (1e-4, 4.0);
     let most = visible(high)?;
@@ -76,11 +77,13 @@ pub(super) fn for_visible_share(
 }
 
 /// The cameras with far and near scaled alike.
-pub(super) fn scaled(path: &str, cameras: &[Camera], scale: f64) -> Result<Vec<Camera>, PathError> {
+pub(super) fn scaled(
+    path: &str,
+    cameras: &[Camera],
+    scale: f64,
+) -> Result<Vec<Camera>, InputError> {
     let scaled = cameras.iter().map(|camera| rescaled(camera, scale));
-    scaled
-        .collect::<Result<_, _>>()
-        .map_err(|e| PathError::unfit(path, e))
+    scaled.collect::<Result<_, _>>().map_err(|e| unfit(path, e))
 }
 
 fn count(

@@ -4,16 +4,16 @@
 
 use glam::DVec3;
 
-use super::{PathError, Pose, Stage};
+use super::{Pose, Stage, unfit};
 use crate::camera::Frame;
-use crate::input::note;
+use crate::input::{InputError, note};
 use crate::scene::{CameraPlace, PlaceView};
 use crate::spec::Spec;
 
 /// A circle about the scene: everything turns past.
 ///
 /// `radius` is in half diagonals, `height` (of the eye above the centre) in radii.
-pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
     let radius = spec.number_between("radius", 0.6, 0.0, 1e6)? * stage.radius();
     let height = spec.number("height", 0.35)? * radius;
     let pose = |turn: f64| {
@@ -26,7 +26,7 @@ pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathErr
 
 /// A closed flight through `waypoints` seeded points within the scene's middle: the
 /// coherent path of a game or a film camera.
-pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
     let count = spec.whole("waypoints", 8, 10_000)?.max(4) as usize;
     let mut rng = stage.rng();
     let (low, extent) = (stage.bounds.min, stage.extent());
@@ -77,10 +77,10 @@ fn spline(points: &[DVec3], at: f64) -> DVec3 {
 }
 
 /// A turn in place by the camera's own yaw: the eye rests, the view changes.
-pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
     let eye = stage.centre().with_z(stage.flight_level(0.3));
     let level = Frame::looking_along(eye, DVec3::X, DVec3::Z);
-    let mut frame = level.map_err(|error| PathError::unfit("spin", error))?;
+    let mut frame = level.map_err(|error| unfit("spin", error))?;
     let step = 360.0 / stage.count as f64;
     let poses = (0..stage.count).map(|_| {
         let pose = Pose::new(frame.eye, frame.forward());
@@ -94,7 +94,7 @@ pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> 
 ///
 /// The eye moves along the look, then rests while the field of view narrows. `power` is
 /// the magnification at the end.
-pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
     let power = spec.number_between("power", 8.0, 1.0, 1e6)?;
     let forward = DVec3::new(0.8, 0.5, -0.3).normalize();
     let from = stage.centre() - forward * stage.radius();
@@ -111,7 +111,7 @@ pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathErro
 }
 
 /// Unrelated views: the eye jumps, so nothing of the last frame helps.
-pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
     let mut rng = stage.rng();
     let poses = (0..stage.count).map(|_| {
         let share = rng.point();
@@ -132,7 +132,7 @@ pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathErr
 /// The whole scene from outside: everything is visible, so the cost of the answer
 /// itself shows. Eyes on a Fibonacci spiral over the sphere, far enough away for any
 /// field of view above 30 degrees to take in the scene's bounding sphere.
-pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
     const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
     // 1/sin(15 degrees) = 3.86 radii.
     let distance = 4.0 * stage.radius();
@@ -153,13 +153,13 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathErro
 /// The scene's own camera places: things of Doom maps, cameras of glTF.
 ///
 /// Roll and lens are the file's, where it states them.
-pub(super) fn places(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+pub(super) fn places(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
     if stage.scene.places.is_empty() {
         let reason = format!(
             "scene '{}' has no camera places of its own; expected one with places, such as a Doom map",
             stage.scene.name
         );
-        return Err(PathError::unfit("places", reason));
+        return Err(unfit("places", reason));
     }
     let places = stage.scene.places.iter();
     Ok(places.map(|place| pose(stage, place)).collect())
@@ -178,8 +178,8 @@ pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
 }
 
 /// The camera that the animation of a scene's file moves, at even times.
-pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
-    let unfit = |reason: String| PathError::unfit("animation", reason);
+pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
+    let unfit = |reason: String| unfit("animation", reason);
     let Some(animation) = &stage.scene.animation else {
         let name = &stage.scene.name;
         return Err(unfit(format!(

@@ -9,6 +9,7 @@ mod recorded;
 mod street;
 mod walk;
 
+use std::fmt::Display;
 use std::path::Path;
 
 use glam::DVec3;
@@ -61,7 +62,7 @@ impl CameraPath {
         scene: &Scene,
         share: f64,
         scale: Option<f64>,
-    ) -> Result<CameraPath, PathError> {
+    ) -> Result<CameraPath, InputError> {
         let find = || calibrate::for_visible_share(&self.name, scene, &self.cameras, share);
         let scale = scale.map_or_else(find, Ok)?;
         self.cameras = calibrate::scaled(&self.name, &self.cameras, scale)?;
@@ -118,7 +119,7 @@ pub struct PathFamily {
     pub summary: &'static str,
     /// Parameters beyond [`PATH_PARAMS`], for the help.
     pub params: &'static str,
-    frames: fn(&Stage, &mut Spec) -> Result<Vec<Pose>, PathError>,
+    frames: fn(&Stage, &mut Spec) -> Result<Vec<Pose>, InputError>,
 }
 
 /// All generated families, in the order of the help.
@@ -145,33 +146,9 @@ pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=1.7
      far=the scene's diagonal (or inf), visible (choose far so that this share of the items \
      is visible on average, e.g. visible=2%, or this many of them, e.g. visible=2000)";
 
-/// A path that cannot be made or read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PathError {
-    /// A file that cannot be read.
-    #[error(transparent)]
-    Input(#[from] InputError),
-    /// The name or a parameter is wrong.
-    #[error(transparent)]
-    Spec(#[from] SpecError),
-    /// A path that this scene cannot have, or one of its cameras that is none.
-    #[error("{place}: {reason}")]
-    Unfit {
-        /// The path, and the camera if it is one of them.
-        place: String,
-        /// The value found and the one expected.
-        reason: String,
-    },
-}
-
-impl PathError {
-    fn unfit(path: &str, reason: impl ToString) -> PathError {
-        PathError::Unfit {
-            place: format!("path '{path}'"),
-            reason: reason.to_string(),
-        }
-    }
+/// The error of a path that a scene cannot have: what was found and expected.
+fn unfit(path: &str, reason: impl Display) -> InputError {
+    InputError::new(format_args!("path '{path}': {reason}"))
 }
 
 /// Scene, length and seed of a path.
@@ -258,7 +235,11 @@ impl Scene {
 ///
 /// # Errors
 /// One line that names what was found and what was expected.
-pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<CameraPath, PathError> {
+pub fn load(
+    source: &str,
+    scene: &Scene,
+    defaults: &LensDefaults,
+) -> Result<CameraPath, InputError> {
     load_scaled(source, scene, defaults, None)
 }
 
@@ -272,7 +253,7 @@ pub fn load_scaled(
     scene: &Scene,
     defaults: &LensDefaults,
     scale: Option<f64>,
-) -> Result<CameraPath, PathError> {
+) -> Result<CameraPath, InputError> {
     let path = read(source, scene, defaults, scale)?;
     path.warnings(scene).iter().for_each(|text| warn(text));
     Ok(path)
@@ -283,7 +264,7 @@ fn read(
     scene: &Scene,
     defaults: &LensDefaults,
     scale: Option<f64>,
-) -> Result<CameraPath, PathError> {
+) -> Result<CameraPath, InputError> {
     // A name has neither a slash nor a dot before its parameters.
     let name = source.split(':').next().unwrap_or_default();
     let file = Path::new(source);
@@ -313,7 +294,7 @@ fn read(
     let cameras = optics.cameras(source, scene.up, &poses)?;
     if cameras.is_empty() {
         let reason = "no camera in it; expected at least one";
-        return Err(PathError::unfit(source, reason));
+        return Err(unfit(source, reason));
     }
     let path = CameraPath {
         name: source.to_owned(),
@@ -328,7 +309,7 @@ fn read(
 }
 
 /// Refuses more cameras than there is memory for.
-fn fits(source: &str, cameras: u64) -> Result<(), PathError> {
+fn fits(source: &str, cameras: u64) -> Result<(), InputError> {
     /// Fewer are made without a look at the memory.
     const ANYWHERE: u64 = 10_000;
     /// Bytes of a camera with its views and answers: 2,800 were measured.
@@ -343,7 +324,7 @@ fn fits(source: &str, cameras: u64) -> Result<(), PathError> {
             let reason = format!(
                 "{cameras} cameras need about {needed}, {available} are free; expected fewer"
             );
-            Err(PathError::unfit(source, reason))
+            Err(unfit(source, reason))
         }
         _ => Ok(()),
     }
@@ -402,7 +383,7 @@ impl Optics {
         })
     }
 
-    fn cameras(&self, path: &str, up: UpAxis, poses: &[Pose]) -> Result<Vec<Camera>, PathError> {
+    fn cameras(&self, path: &str, up: UpAxis, poses: &[Pose]) -> Result<Vec<Camera>, InputError> {
         let camera = |pose: &Pose| -> Result<Camera, CameraError> {
             let upward = pose
                 .view
@@ -418,16 +399,13 @@ impl Optics {
             Ok(camera)
         };
         let numbered = poses.iter().enumerate().map(|(index, pose)| {
-            camera(pose).map_err(|error| PathError::Unfit {
-                place: format!("path '{path}', camera {index}"),
-                reason: error.to_string(),
+            camera(pose).map_err(|error| {
+                InputError::new(format_args!("path '{path}', camera {index}: {error}"))
             })
         });
         numbered.collect()
     }
-}
 
-impl Optics {
     /// The lens of a place, where neither parameters nor a share of items replace it.
     fn lens(&self, own: Option<PlaceView>) -> Result<Lens, CameraError> {
         let Some(own) = own else {

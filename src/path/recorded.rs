@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{CameraPath, PathError};
+use super::CameraPath;
 use crate::camera::{
     Camera, CameraError, FARTHEST, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
     MatrixConvention, look_at,
@@ -96,7 +96,7 @@ pub fn read_cameras_csv(
     bytes: &[u8],
     file: &str,
     defaults: &LensDefaults,
-) -> Result<CameraPath, PathError> {
+) -> Result<CameraPath, InputError> {
     let mut table = TableReader::open(bytes, file)?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
     let read: CameraReader = if is_matrix {
@@ -306,7 +306,7 @@ mod tests {
     use crate::scene::read_boxes_csv;
     use std::sync::Mutex;
 
-    fn read(text: &str) -> Result<CameraPath, PathError> {
+    fn read(text: &str) -> Result<CameraPath, InputError> {
         read_cameras_csv(text.as_bytes(), "c.csv", &LensDefaults::default())
     }
 

@@ -3,7 +3,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{PathError, Pose, Stage};
+use super::{Pose, Stage, unfit};
+use crate::input::InputError;
 use crate::scene::{Regions, SeededRng, Tiling, WadMap};
 use crate::spec::Spec;
 
@@ -31,7 +32,7 @@ struct Plan {
     walls: Vec<[DVec2; 2]>,
 }
 
-pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
     let (plan, natural) = match &stage.scene.regions {
         Regions::Tiling(tiling) => (Plan::of_rooms(stage, tiling), 1.7),
         Regions::Bsp(map) => (Plan::of_map(map), 41.0),
@@ -44,7 +45,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathEr
             "scene '{}' has no doors; expected rooms or a Doom map (the path 'street' needs none)",
             stage.scene.name
         );
-        return Err(PathError::unfit("walk", reason));
+        return Err(unfit("walk", reason));
     }
     let way = plan.way(doors, height, &mut stage.rng());
     let mut lengths = vec![0.0];

@@ -305,7 +305,7 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
 /// Writes the page of a run into its folder; replaces links.
 ///
 /// # Errors
-/// What the file system says.
+/// Errors of the file system.
 pub fn save_page(folder: &Path, page: &str) -> Result<(), InputError> {
     replace_atomically(&folder.join(PAGE), |out| out.write_all(page.as_bytes()))
 }

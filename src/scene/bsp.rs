@@ -19,10 +19,47 @@ pub struct BspNode {
     pub children: [BspChild; 2],
 }
 
+/// End of a branch of a map's tree, or its next node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum BspChild {
+    /// Index of a node.
     Node(u32),
-    Leaf(u32),
+    /// Index of a leaf, of a Quake III map among the open ones.
+    Leaf(ItemId),
+    /// A leaf within the solid.
+    Solid,
+}
+
+/// The leaf that a descent ends in.
+///
+/// `below` has the child of a node on the side of the point.
+pub fn descend(mut at: BspChild, below: impl Fn(u32) -> BspChild) -> Option<ItemId> {
+    loop {
+        match at {
+            BspChild::Node(node) => at = below(node),
+            BspChild::Leaf(leaf) => return Some(leaf),
+            BspChild::Solid => return None,
+        }
+    }
+}
+
+/// The planes of a map's nodes, for structures that can use them.
+pub fn plane_tree(
+    root: BspChild,
+    nodes: impl Iterator<Item = (Plane, [BspChild; 2])>,
+) -> PlaneTree {
+    let below = |child| match child {
+        BspChild::Node(node) => Some(node),
+        _ => None,
+    };
+    let nodes = nodes.map(|(plane, children)| PlaneTreeNode {
+        plane,
+        children: children.map(below),
+    });
+    PlaneTree {
+        nodes: nodes.collect(),
+        root: below(root),
+    }
 }
 
 impl BspNode {
@@ -53,24 +90,19 @@ impl BspNode {
     }
 }
 
-/// A node and the side of it that leads down.
-type Parent = Option<(u32, usize)>;
-
-/// A BSP tree with links up from its leaves.
+/// A BSP tree with the bounds of its leaves.
 #[derive(Clone, Debug)]
 pub struct BspTree {
     nodes: Vec<BspNode>,
     root: BspChild,
     /// Bounds of each leaf, at height zero.
     pub boxes: Vec<Aabb>,
-    node_parents: Vec<Parent>,
-    leaf_parents: Vec<Parent>,
     /// Least and greatest coordinate of the square that the leaves divide.
     extent: [f64; 2],
 }
 
 impl BspTree {
-    /// Links the tree and bounds its leaves within the closed square
+    /// Bounds the leaves of a tree within the closed square
     /// `[low, high]^2`, outside of which no point has a leaf. O(nodes * depth).
     ///
     /// # Errors
@@ -81,41 +113,37 @@ impl BspTree {
         leaf_count: usize,
         [low, high]: [f64; 2],
     ) -> Result<BspTree, String> {
-        let mut node_parents = vec![None; nodes.len()];
-        let mut leaf_parents = vec![None; leaf_count];
+        let mut reached = [vec![false; nodes.len()], vec![false; leaf_count]];
         // A leaf that no node has is nowhere.
         let mut boxes = vec![planar_bounds(&[]); leaf_count];
         let corners = [(low, low), (high, low), (high, high), (low, high)];
         let square = corners.map(DVec2::from).to_vec();
-        let mut open = vec![(root, None, square)];
-        while let Some((child, parent, polygon)) = open.pop() {
-            let (parents, index) = match child {
-                BspChild::Node(n) => (&mut node_parents, n),
-                BspChild::Leaf(l) => (&mut leaf_parents, l),
+        let mut open = vec![(root, square)];
+        while let Some((child, polygon)) = open.pop() {
+            let (of, index) = match child {
+                BspChild::Node(node) => (0, node),
+                BspChild::Leaf(leaf) => (1, leaf),
+                BspChild::Solid => continue,
             };
-            match parents.get_mut(index as usize) {
+            match reached[of].get_mut(index as usize) {
                 None => return Err(format!("{child:?} does not exist")),
-                Some(Some(_)) => return Err(format!("{child:?} is reached twice")),
-                Some(fresh) => *fresh = Some(parent),
+                Some(true) => return Err(format!("{child:?} is reached twice")),
+                Some(fresh) => *fresh = true,
             }
             match child {
-                BspChild::Leaf(leaf) => boxes[leaf as usize] = planar_bounds(&polygon),
-                BspChild::Node(n) => {
-                    let node = nodes[n as usize];
-                    for side in [1, 0] {
-                        let part = clip(&polygon, &node, side);
-                        open.push((node.children[side], Some((n, side)), part));
-                    }
+                BspChild::Node(node) => {
+                    let node = &nodes[node as usize];
+                    let parts =
+                        [1, 0].map(|side| (node.children[side], clip(&polygon, node, side)));
+                    open.extend(parts);
                 }
+                _ => boxes[index as usize] = planar_bounds(&polygon),
             }
         }
-        let known = |parents: Vec<Option<Parent>>| parents.into_iter().map(Option::flatten);
         Ok(BspTree {
             nodes,
             root,
             boxes,
-            node_parents: known(node_parents).collect(),
-            leaf_parents: known(leaf_parents).collect(),
             extent: [low, high],
         })
     }
@@ -123,59 +151,25 @@ impl BspTree {
     /// The partition lines as upright planes, for structures that can use them.
     /// Ties do not matter to those: they keep their own bounds.
     pub fn plane_tree(&self) -> PlaneTree {
-        let below = |child: BspChild| match child {
-            BspChild::Node(node) => Some(node),
-            BspChild::Leaf(_) => None,
-        };
-        let node = |node: &BspNode| {
+        let nodes = self.nodes.iter().map(|node| {
             // Right of the direction is the front.
             let normal = -node.direction.perp().as_vec2().extend(0.0);
-            PlaneTreeNode {
-                plane: Plane::through(node.start.as_vec2().extend(0.0), normal),
-                children: node.children.map(below),
-            }
-        };
-        PlaneTree {
-            nodes: self.nodes.iter().map(node).collect(),
-            root: below(self.root),
-        }
+            let start = node.start.as_vec2().extend(0.0);
+            (Plane::through(start, normal), node.children)
+        });
+        plane_tree(self.root, nodes)
     }
 
     /// The leaf that holds the point, by descent from the root; `None` outside the
-    /// square. O(depth).
+    /// closed square. O(depth).
     pub fn descend(&self, p: DVec2) -> Option<ItemId> {
-        if !self.covers(p) {
-            return None;
-        }
-        let mut at = self.root;
-        loop {
-            match at {
-                BspChild::Leaf(leaf) => return Some(leaf),
-                BspChild::Node(n) => {
-                    let node = &self.nodes[n as usize];
-                    at = node.children[node.side(p)];
-                }
-            }
-        }
-    }
-
-    /// Tests whether the point lies in the closed square that the leaves divide.
-    pub fn covers(&self, p: DVec2) -> bool {
         let [low, high] = self.extent.map(DVec2::splat);
-        p.cmpge(low).all() && p.cmple(high).all()
-    }
-
-    /// Tests whether the leaf holds the point: the same side tests as
-    /// [`BspTree::descend`], from the leaf up to the root. O(depth).
-    pub fn holds(&self, leaf: ItemId, p: DVec2) -> bool {
-        let mut above = self.leaf_parents[leaf as usize];
-        while let Some((node, side)) = above {
-            if self.nodes[node as usize].side(p) != side {
-                return false;
-            }
-            above = self.node_parents[node as usize];
-        }
-        true
+        let is_within = p.cmpge(low).all() && p.cmple(high).all();
+        let below = |node: u32| {
+            let node = &self.nodes[node as usize];
+            node.children[node.side(p)]
+        };
+        is_within.then(|| descend(self.root, below)).flatten()
     }
 }
 
@@ -303,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_tile_the_square_and_ties_have_one_owner() {
+    fn cells_tile_the_square() {
         let nodes = vec![
             BspNode {
                 children: [BspChild::Leaf(0), BspChild::Node(1)],
@@ -318,9 +312,7 @@ mod tests {
         for x in -16..=16 {
             for y in -16..=16 {
                 let p = DVec2::new(x.into(), y.into());
-                let owners: Vec<u32> = (0..3).filter(|&leaf| bsp.holds(leaf, p)).collect();
-                assert_eq!(owners, [bsp.descend(p).unwrap()], "{p}");
-                let bounds = bsp.boxes[owners[0] as usize];
+                let bounds = bsp.boxes[bsp.descend(p).unwrap() as usize];
                 assert!(
                     bounds.contains_point(p.as_vec2().extend(0.0)),
                     "{p} {bounds:?}"

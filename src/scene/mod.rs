@@ -40,11 +40,12 @@ use crate::query::ItemId;
 
 pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
+pub use bsp::BspChild;
 pub use disputes::{Dispute, Linedef};
 pub(crate) use families::CityGrid;
 pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
 pub use gltf::{CameraAnimation, read_gltf};
-pub use ibsp::{LeafChild, LeafNode, LeafTree, QuakeMap, read_ibsp};
+pub use ibsp::{LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
 pub use obj::read_obj;
@@ -81,6 +82,11 @@ impl WorldBox {
         boxes.into_iter().fold(none, |all, b| {
             WorldBox::new(all.min.min(b.min), all.max.max(b.max))
         })
+    }
+
+    /// The box of a point.
+    pub fn at(point: DVec3) -> Self {
+        WorldBox::new(point, point)
     }
 
     /// Tests whether two closed boxes have a point in common.
@@ -150,6 +156,17 @@ impl Regions {
         let boxes = self.boxes(items).iter().zip(0..);
         let holding = boxes.filter(|(b, _)| b.contains_point(p));
         holding.map(|(_, id)| id).collect()
+    }
+
+    /// The leaf of a map that holds a point relative to the scene's origin.
+    ///
+    /// `None` where the regions are boxes.
+    pub fn leaf_at(&self, p: DVec3) -> Option<Option<ItemId>> {
+        match self {
+            Regions::Bsp(map) => Some(map.tree.descend(p.truncate())),
+            Regions::Leaves(map) => Some(map.tree.descend(p)),
+            _ => None,
+        }
     }
 
     /// Description for `scene info`.

@@ -219,7 +219,7 @@ impl Obj<'_> {
         let boxes = ranges.iter().map(|&(first, end)| {
             let points = self.corners[first..end].iter().flatten();
             let points = points.map(|&corner| self.points[corner as usize]);
-            WorldBox::union_of(points.map(|p| WorldBox::new(p, p)))
+            WorldBox::union_of(points.map(WorldBox::at))
         });
         let boxes: Vec<WorldBox> = boxes.collect();
         let origin = choose_origin(boxes.iter().copied());
@@ -304,7 +304,7 @@ f 1 2 3 4";
         // As written, so 1000000.1 and not its neighbour by addition.
         let written = [1_000_000.1, 1_000_001.7];
         for (item, b) in scene.items.iter().enumerate() {
-            let all = WorldBox::union_of(points.map(|p| WorldBox::new(p, p)));
+            let all = WorldBox::union_of(points.map(WorldBox::at));
             for axis in 0..3 {
                 let exact = match axis {
                     0 => written,

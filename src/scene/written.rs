@@ -114,17 +114,9 @@ impl Scene {
     }
 
     fn keep_holding(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
-        match &self.regions {
-            Regions::Bsp(map) => {
-                let at = (p.world - self.origin).truncate();
-                let covers = map.tree.covers(at);
-                retain_from(first, found, |region| covers && map.tree.holds(region, at));
-            }
-            Regions::Leaves(map) => {
-                let leaf = map.tree.descend(p.world - self.origin);
-                retain_from(first, found, |region| Some(region) == leaf);
-            }
-            _ => retain_from(first, found, |id| self.holds(id, p.world)),
+        match self.regions.leaf_at(p.world - self.origin) {
+            Some(leaf) => retain_from(first, found, |region| Some(region) == leaf),
+            None => retain_from(first, found, |id| self.holds(id, p.world)),
         }
     }
 
@@ -137,12 +129,7 @@ impl Scene {
     /// Reference answer of region search: the map's own descent, or an exact test of
     /// every box. Ascending ids.
     pub fn holding(&self, p: &Sought) -> Vec<ItemId> {
-        if let Regions::Bsp(map) = &self.regions {
-            let at = (p.world - self.origin).truncate();
-            return map.tree.descend(at).into_iter().collect();
-        }
-        if let Regions::Leaves(map) = &self.regions {
-            let leaf = map.tree.descend(p.world - self.origin);
+        if let Some(leaf) = self.regions.leaf_at(p.world - self.origin) {
             return leaf.into_iter().collect();
         }
         let count = self.regions.boxes(&self.items).len() as ItemId;
@@ -159,7 +146,7 @@ impl Scene {
     /// Tests whether a region that is a box holds a point of the world.
     fn holds(&self, id: ItemId, p: DVec3) -> bool {
         let boxes = self.regions.boxes(&self.items);
-        self.meets(boxes, self.region_originals(), id, &WorldBox::new(p, p))
+        self.meets(boxes, self.region_originals(), id, &WorldBox::at(p))
     }
 
     fn overlaps(&self, id: ItemId, by: &WorldBox) -> bool {
@@ -200,15 +187,7 @@ fn side(p: f64, origin: f64, bound: f32) -> i32 {
 
 /// `Vec::retain` of the ids from `first` on.
 fn retain_from(first: usize, ids: &mut Vec<ItemId>, keep: impl Fn(ItemId) -> bool) {
-    let mut kept = first;
-    for at in first..ids.len() {
-        let id = ids[at];
-        if keep(id) {
-            ids[kept] = id;
-            kept += 1;
-        }
-    }
-    ids.truncate(kept);
+    ids.extract_if(first.., |id| !keep(*id)).for_each(drop);
 }
 
 impl Scene {

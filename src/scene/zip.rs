@@ -53,38 +53,38 @@ pub fn unpack<'w>(
     let archive = open(bytes, file)?;
     let entries = entries(&archive, file)?;
     let (name, record, map) = chosen(&entries, file, wanted)?;
-    let damaged = |found: &dyn Display, expected: &str| {
+    let refused = |found: &dyn Display, expected: &str| {
         let place = format!("entry {}", shortened(name, 80));
         InputError::at(file, &place, found.to_string(), expected)
     };
     if record.flags().is_encrypted() {
-        return Err(damaged(&"encrypted", "an entry without a password"));
+        return Err(refused(&"encrypted", "an entry without a password"));
     }
     let stated = record.uncompressed_size_hint();
     let needed = stated.saturating_mul(GROWTH);
     let label = format!("{file}#{}", plain(name));
     memory::check_fits(&label, needed, 0, stated)?;
     let packed = archive.get_entry(record.wayfinder());
-    let packed = packed.map_err(|e| damaged(&e, "an entry within the file"))?;
+    let packed = packed.map_err(|e| refused(&e, "an entry within the file"))?;
     let limit = usize::try_from(stated).unwrap_or(usize::MAX);
     let unpacked = match record.compression_method() {
         CompressionMethod::STORE => packed.data().to_vec(),
         CompressionMethod::DEFLATE => decompress_to_vec_with_limit(packed.data(), limit)
-            .map_err(|e| damaged(&e, &format!("{stated} bytes, deflated")))?,
+            .map_err(|e| refused(&e, &format!("{stated} bytes, deflated")))?,
         method => {
             let found = format!("packed by method {method}");
-            return Err(damaged(&found, "stored (0) or deflated (8)"));
+            return Err(refused(&found, "stored (0) or deflated (8)"));
         }
     };
     let claim = packed.claim_verifier();
     if unpacked.len() as u64 != stated {
         let found = format!("{} bytes", unpacked.len());
-        return Err(damaged(&found, &format!("{stated}, as the archive states")));
+        return Err(refused(&found, &format!("{stated}, as the archive states")));
     }
     let found = crc32(&unpacked);
     if found != claim.crc {
         let expected = format!("{:08x}, as the archive states", claim.crc);
-        return Err(damaged(&format!("CRC-32 {found:08x}"), &expected));
+        return Err(refused(&format!("CRC-32 {found:08x}"), &expected));
     }
     Ok(Entry {
         name: plain(name),
@@ -96,8 +96,11 @@ pub fn unpack<'w>(
 type Archive<'a> = ZipSliceArchive<&'a [u8]>;
 
 fn open<'a>(bytes: &'a [u8], file: &str) -> Result<Archive<'a>, InputError> {
-    let archive = ZipArchive::from_slice(bytes);
-    archive.map_err(|e| InputError::at(file, "directory", e.to_string(), "a zip archive"))
+    ZipArchive::from_slice(bytes).map_err(|error| damaged(file, error))
+}
+
+fn damaged(file: &str, error: rawzip::Error) -> InputError {
+    InputError::at(file, "directory", error, "a zip archive")
 }
 
 /// Names and records in the order of the directory, without folders.
@@ -106,9 +109,7 @@ fn entries<'a>(
     file: &str,
 ) -> Result<Vec<(String, ZipFileHeaderRecord<'a>)>, InputError> {
     let (mut all, mut records) = (Vec::new(), archive.entries());
-    let damaged =
-        |e: rawzip::Error| InputError::at(file, "directory", e.to_string(), "a zip archive");
-    while let Some(record) = records.next_entry().map_err(damaged)? {
+    while let Some(record) = records.next_entry().map_err(|error| damaged(file, error))? {
         let path = record.file_path();
         if !record.is_dir() {
             let name = String::from_utf8_lossy(path.as_ref()).into_owned();

@@ -49,7 +49,7 @@ impl Rate {
 /// The ratio of the sums, with the standard error of a ratio of cluster totals,
 /// `n/(n-1) sum (y - R x)^2 / (sum x)^2`, and Student's t of n - 1 degrees of
 /// freedom (Cochran 1977, "Sampling Techniques", 3rd ed., secs. 2.11 and 9A.1).
-/// Where nothing was seen in `x` units the upper end is 3/x (Hanley and
+/// If nothing was seen in `x` units the upper end is 3/x (Hanley and
 /// Lippman-Hand 1983, "If nothing goes wrong, is everything all right?", JAMA
 /// 249, p. 1743), and it is never nearer than that: units count as independent
 /// there, since nothing says otherwise.

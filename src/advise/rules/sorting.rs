@@ -123,9 +123,8 @@ impl Drawn {
 
     /// Predicted share that sorting saves.
     ///
-    /// Of n layers in random order 1 + 1/2 + ... + 1/n
-    /// are nearer than all before them (Knuth, The Art of Computer Programming, 1.2.10) and
-    /// shaded, in order only one.
+    /// In random order 1 + 1/2 + ... + 1/n of n layers are nearer than all before them
+    /// (Knuth, The Art of Computer Programming, 1.2.10) and shaded, in order only one.
     fn predicted(&self, few: &[(Rays, Vec<ItemId>)]) -> f64 {
         let (mut shaded, mut covered) = (0.0, 0.0);
         for (rays, _) in few {

@@ -70,7 +70,7 @@ const LARGEST: f32 = 1e18;
 
 /// The crate's tree over shapes scaled down, its nodes then fitted to the shapes.
 ///
-/// Where areas overflow, the crate's builder finds no cheapest split and
+/// If areas overflow, the crate's builder finds no cheapest split and
 /// leaves both children with empty boxes; where widths overflow, it panics.
 fn scaled_tree(shapes: &mut [Shape]) -> Bvh<f32, 3> {
     let smaller = |shape: &Shape| {

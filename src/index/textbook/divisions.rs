@@ -25,7 +25,7 @@ pub type OctreeTextbook = Textbook<OctreeCells>;
 /// retrieval on composite keys") as the lecture on visibility means it (slides
 /// "Visibility", "Region search"), over boxes.
 ///
-/// As in [`OctreeTextbook`], an item lies with the smallest cell that contains it. Cells
+/// An item lies with the smallest cell that contains it ([`OctreeTextbook`]). Cells
 /// are columns through the whole scene, over the two axes in which it is widest. Takes
 /// O(log n + answers) per query where the scene is flat and items are small against their
 /// cells; nothing is culled by height.

@@ -37,12 +37,15 @@ impl CameraAnimation {
     }
 }
 
+/// Translation, rotation and scale, where they are stated.
+pub type Parts = [Option<DVec4>; 3];
+
 /// Transform of a node over time.
 #[derive(Clone, Debug)]
 struct Motion {
     still: DAffine3,
-    /// Translation, rotation and scale of the node, and their keys.
-    parts: [(Option<DVec4>, Option<Track>); 3],
+    parts: Parts,
+    tracks: [Option<Track>; 3],
 }
 
 #[derive(Clone, Debug)]
@@ -54,15 +57,13 @@ struct Track {
 
 impl Motion {
     fn at(&self, time: f64) -> DAffine3 {
-        if self.parts.iter().all(|(_, track)| track.is_none()) {
+        if self.tracks.iter().all(Option::is_none) {
             return self.still;
         }
-        let [moved, turned, scaled] = array::from_fn(|part| match &self.parts[part] {
-            (_, Some(track)) => Some(track.at(time, part == 1)),
-            (still, None) => *still,
-        });
-        let three = |value: Option<DVec4>| value.map(|v| v.truncate().to_array());
-        transform(three(moved), turned.map(|v| v.to_array()), three(scaled))
+        transform(array::from_fn(|part| match &self.tracks[part] {
+            Some(track) => Some(track.at(time, part == 1)),
+            None => self.parts[part],
+        }))
     }
 }
 
@@ -98,16 +99,12 @@ pub fn place_of(world: DAffine3, lens: Option<PlaceView>) -> Option<CameraPlace>
     })
 }
 
-/// An affine transform of the parts that a node states.
-pub fn transform(
-    translation: Option<[f64; 3]>,
-    rotation: Option<[f64; 4]>,
-    scale: Option<[f64; 3]>,
-) -> DAffine3 {
+/// An affine transform of its parts.
+pub fn transform([moved, turned, scaled]: Parts) -> DAffine3 {
     DAffine3::from_scale_rotation_translation(
-        scale.map_or(DVec3::ONE, DVec3::from),
-        rotation.map_or(DQuat::IDENTITY, |r| DQuat::from_array(r).normalize()),
-        translation.map_or(DVec3::ZERO, DVec3::from),
+        scaled.map_or(DVec3::ONE, DVec4::truncate),
+        turned.map_or(DQuat::IDENTITY, |r| DQuat::from_vec4(r).normalize()),
+        moved.map_or(DVec3::ZERO, DVec4::truncate),
     )
 }
 
@@ -149,12 +146,12 @@ impl File<'_> {
         &self,
         order: &[(usize, Option<usize>)],
     ) -> Result<Option<CameraAnimation>, InputError> {
-        let mut channels: HashMap<usize, Vec<(usize, usize, &Channel)>> = HashMap::new();
+        let mut channels: HashMap<usize, Vec<(usize, usize, usize, &Channel)>> = HashMap::new();
         for (clip, animation) in self.root.animations.iter().enumerate() {
             for (number, channel) in animation.channels.iter().enumerate() {
-                if part(channel).is_some() {
+                if let Some(part) = part(channel) {
                     let own = channels.entry(channel.target.node.value()).or_default();
-                    own.push((clip, number, channel));
+                    own.push((clip, number, part, channel));
                 }
             }
         }
@@ -175,28 +172,20 @@ impl File<'_> {
         let first = own.map(|(clip, ..)| *clip).min();
         let (mut chain, mut seconds) = (Vec::new(), [f64::INFINITY, f64::NEG_INFINITY]);
         for index in nodes {
-            let node = &self.root.nodes[index];
-            let three = |v: [f32; 3]| DVec3::from(v.map(f64::from)).extend(0.0);
-            let mut parts = [
-                (node.translation.map(three), None),
-                (
-                    node.rotation.as_ref().map(|r| r.0.map(f64::from).into()),
-                    None,
-                ),
-                (node.scale.map(three), None),
-            ];
-            for (clip, number, channel) in channels.get(&index).into_iter().flatten() {
-                if let (true, Some(part)) = (Some(*clip) == first, part(channel)) {
-                    let place = format!("animations[{clip}].channels[{number}]");
-                    let track = self.track(*clip, channel, part, &place)?;
-                    let ends = [track.times.first(), track.times.last()];
-                    seconds[0] = seconds[0].min(*ends[0].expect("keys"));
-                    seconds[1] = seconds[1].max(*ends[1].expect("keys"));
-                    parts[part].1 = Some(track);
-                }
+            let mut tracks = [None, None, None];
+            let own = channels.get(&index).into_iter().flatten();
+            for &(clip, number, part, channel) in own.filter(|own| Some(own.0) == first) {
+                let place = format!("animations[{clip}].channels[{number}]");
+                let track = self.track(clip, channel, part, &place)?;
+                seconds[0] = seconds[0].min(track.times[0]);
+                seconds[1] = seconds[1].max(track.times[track.times.len() - 1]);
+                tracks[part] = Some(track);
             }
-            let still = self.local(index)?;
-            chain.push(Motion { still, parts });
+            chain.push(Motion {
+                still: self.local(index)?,
+                parts: self.parts(index),
+                tracks,
+            });
         }
         Ok(Some(CameraAnimation {
             chain,
@@ -215,14 +204,10 @@ impl File<'_> {
     ) -> Result<Track, InputError> {
         let samplers = &self.root.animations[clip].samplers;
         let sampler = self.get(samplers, channel.sampler, place)?;
-        let numbers = |accessor, width| match self.values(accessor, width, place)? {
-            Ok(values) => Ok(values),
-            Err(reason) => Err(self.error(place.to_owned(), reason, "plain accessors")),
-        };
         let width = if part == 1 { 4 } else { 3 };
-        let (times, values) = (numbers(sampler.input, 1)?, numbers(sampler.output, width)?);
-        let value = |v: &[f64]| DVec4::new(v[0], v[1], v[2], v.get(3).copied().unwrap_or(0.0));
-        let mut values: Vec<DVec4> = values.chunks_exact(width).map(value).collect();
+        let times = self.vectors(sampler.input, 1, place)?;
+        let times: Vec<f64> = times.iter().map(|time| time.x).collect();
+        let mut values = self.vectors(sampler.output, width, place)?;
         let Checked::Valid(interpolation) = sampler.interpolation else {
             return Err(self.error(place.to_owned(), "an unknown interpolation", "LINEAR"));
         };

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use glam::DVec4;
 use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root, Value};
@@ -114,6 +115,23 @@ impl<'f> File<'f> {
             let expected = format!("an index below {}", all.len());
             self.error(place.to_owned(), format!("index {index}"), &expected)
         })
+    }
+
+    /// Vectors of an accessor, `width` numbers each.
+    pub fn vectors(
+        &self,
+        index: Index<Accessor>,
+        width: usize,
+        place: &str,
+    ) -> Result<Vec<DVec4>, InputError> {
+        let values = self.values(index, width, place)?;
+        let values = values.map_err(|why| self.error(place.to_owned(), why, "plain accessors"))?;
+        let vector = |numbers: &[f64]| {
+            let mut vector = [0.0; 4];
+            vector[..width].copy_from_slice(numbers);
+            DVec4::from(vector)
+        };
+        Ok(values.chunks_exact(width).map(vector).collect())
     }
 
     /// Numbers of an accessor, `width` for each element, normalised where it says so;

@@ -11,11 +11,12 @@ mod mesh;
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat4, DVec3, Vec3};
+use glam::{BVec3, DAffine3, DMat4, DVec3, Vec3};
 use gltf::json::{Index, Value};
+use serde::Deserialize;
 
 pub use self::animation::CameraAnimation;
-use self::animation::{place_of, transform};
+use self::animation::{Parts, place_of, transform};
 use self::file::{File, component, normalised};
 use self::mesh::{Mesh, Triangles, positions};
 use super::{
@@ -104,10 +105,8 @@ impl File<'_> {
     /// Nodes with a mesh, places of cameras, and all nodes, depth first.
     fn placed(&self) -> Result<(Vec<Placed>, Vec<CameraPlace>, Order), InputError> {
         let nodes = &self.root.nodes;
-        let roots: Vec<usize> = match self.root.scene.or(match self.root.scenes.is_empty() {
-            true => None,
-            false => Some(Index::new(0)),
-        }) {
+        let first = (!self.root.scenes.is_empty()).then(|| Index::new(0));
+        let roots: Vec<usize> = match self.root.scene.or(first) {
             Some(scene) => {
                 let scene = self.get(&self.root.scenes, scene, "scene")?;
                 scene.nodes.iter().map(|node| node.value()).collect()
@@ -125,11 +124,8 @@ impl File<'_> {
         };
         let (mut placed, mut places, mut order) = (Vec::new(), Vec::new(), Vec::new());
         let mut reached = vec![false; nodes.len()];
-        let mut open: Vec<(usize, Option<usize>, DAffine3)> = roots
-            .iter()
-            .rev()
-            .map(|&root| (root, None, DAffine3::IDENTITY))
-            .collect();
+        let roots = roots.into_iter().rev();
+        let mut open: Vec<_> = roots.map(|r| (r, None, DAffine3::IDENTITY)).collect();
         while let Some((index, above, parent)) = open.pop() {
             let place = format!("nodes[{index}]");
             let node = self.get(nodes, Index::new(index as u32), &place)?;
@@ -147,14 +143,11 @@ impl File<'_> {
                     let expected = format!("at most {MOST_ITEMS} items in the file");
                     return Err(self.error(place, found, &expected));
                 }
-                for instance in instances {
-                    let world = world * instance;
-                    placed.push(Placed {
-                        node: index,
-                        mesh,
-                        world,
-                    });
-                }
+                placed.extend(instances.into_iter().map(|instance| Placed {
+                    node: index,
+                    mesh,
+                    world: world * instance,
+                }));
             }
             if node.camera.is_some() {
                 places.extend(place_of(world, self.lens_of(index)?));
@@ -170,11 +163,7 @@ impl File<'_> {
         let node = &self.root.nodes[index];
         let found = match node.matrix {
             Some(matrix) => DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from))),
-            None => transform(
-                node.translation.map(|t| t.map(f64::from)),
-                node.rotation.as_ref().map(|r| r.0.map(f64::from)),
-                node.scale.map(|s| s.map(f64::from)),
-            ),
+            None => transform(self.parts(index)),
         };
         match found.is_finite() {
             true => Ok(found),
@@ -186,6 +175,14 @@ impl File<'_> {
         }
     }
 
+    /// The parts of the transform of a node that it states.
+    fn parts(&self, index: usize) -> Parts {
+        let node = &self.root.nodes[index];
+        let three = |v: [f32; 3]| DVec3::from(v.map(f64::from)).extend(0.0);
+        let turned = node.rotation.as_ref().map(|r| r.0.map(f64::from).into());
+        [node.translation.map(three), turned, node.scale.map(three)]
+    }
+
     /// Instances of a node by EXT_mesh_gpu_instancing; the node itself without them.
     fn instances(&self, index: usize) -> Result<Vec<DAffine3>, InputError> {
         let extensions = self.root.nodes[index].extensions.as_ref();
@@ -194,32 +191,19 @@ impl File<'_> {
             return Ok(vec![DAffine3::IDENTITY]);
         };
         let place = format!("nodes[{index}].extensions.EXT_mesh_gpu_instancing");
-        let column = |name: &str, width: usize| -> Result<Option<Vec<f64>>, InputError> {
-            let Some(accessor) = attributes[name].as_u64() else {
-                return Ok(None);
-            };
-            let accessor = Index::new(u32::try_from(accessor).unwrap_or(u32::MAX));
-            match self.values(accessor, width, &place)? {
-                Ok(values) => Ok(Some(values)),
-                Err(reason) => Err(self.error(place.clone(), reason, "plain accessors")),
-            }
+        let column = |(name, width)| {
+            let accessor = attributes[name].as_u64();
+            let accessor = accessor.map(|at| Index::new(u32::try_from(at).unwrap_or(u32::MAX)));
+            accessor
+                .map(|at| self.vectors(at, width, &place))
+                .transpose()
         };
-        let [moved, turned, scaled] = [("TRANSLATION", 3), ("ROTATION", 4), ("SCALE", 3)]
-            .map(|(name, width)| column(name, width));
-        let (moved, turned, scaled) = (moved?, turned?, scaled?);
-        let counts = [(&moved, 3), (&turned, 4), (&scaled, 3)];
-        let count = counts
-            .iter()
-            .filter_map(|(all, width)| Some(all.as_ref()?.len() / width));
-        let of = |all: &Option<Vec<f64>>, i: usize| {
-            Some(<[f64; 3]>::try_from(&all.as_ref()?[3 * i..3 * i + 3]).expect("three"))
-        };
-        let all = (0..count.min().unwrap_or(0)).map(|i| {
-            let rotation = turned.as_ref().map(|all| &all[4 * i..4 * i + 4]);
-            let rotation = rotation.map(|r| r.try_into().expect("four"));
-            transform(of(&moved, i), rotation, of(&scaled, i))
-        });
-        Ok(all.collect())
+        let [moved, turned, scaled] =
+            [("TRANSLATION", 3), ("ROTATION", 4), ("SCALE", 3)].map(column);
+        let columns = [moved?, turned?, scaled?];
+        let count = columns.iter().flatten().map(Vec::len).min();
+        let of = |i: usize| columns.each_ref().map(|column| Some(column.as_ref()?[i]));
+        Ok((0..count.unwrap_or(0)).map(|i| transform(of(i))).collect())
     }
 
     /// The scene of all triangles.
@@ -253,7 +237,7 @@ impl File<'_> {
         };
         let boxes = placed
             .iter()
-            .map(|item| WorldBox::union_of(world(item).map(|p| WorldBox::new(p, p))));
+            .map(|item| WorldBox::union_of(world(item).map(WorldBox::at)));
         let mut surfaces = Surfaces::about(choose_origin(boxes));
         let mut local: Vec<Vec3> = Vec::new();
         for item in placed {
@@ -287,25 +271,18 @@ impl File<'_> {
             let positions = positions(primitive).ok_or_else(|| missing(place.clone()))?;
             let accessor = self.get(&self.root.accessors, positions, &place)?;
             let corner = |value: &Option<Value>| -> Option<DVec3> {
-                let numbers = value.as_ref()?.as_array()?.iter();
-                let numbers: Vec<f64> = numbers.map(Value::as_f64).collect::<Option<_>>()?;
-                let corner = <[f64; 3]>::try_from(numbers).ok()?;
+                let corner = <[f64; 3]>::deserialize(value.as_ref()?).ok()?;
                 let kind = component(accessor)?;
-                Some(
-                    corner
-                        .map(|n| normalised(n, kind, accessor.normalized))
-                        .into(),
-                )
+                let corner = corner.map(|n| normalised(n, kind, accessor.normalized));
+                Some(corner.into())
             };
             let ends = corner(&accessor.min).zip(corner(&accessor.max));
             let (min, max) =
                 ends.ok_or_else(|| missing(format!("accessors[{}]", positions.value())))?;
             let corners = (0..8).map(|i| {
-                let pick = |k: usize| if i >> k & 1 == 0 { min[k] } else { max[k] };
-                let p = item
-                    .world
-                    .transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
-                WorldBox::new(p, p)
+                let is_low = BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0);
+                let corner = DVec3::select(is_low, min, max);
+                WorldBox::at(item.world.transform_point3(corner))
             });
             all = WorldBox::union_of(corners.chain([all]));
         }

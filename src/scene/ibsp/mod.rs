@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 
 use self::faces::{PER_PATCH, bounds_of, brush, brush_box, patch};
 use self::lumps::lump;
-pub use self::tree::{LeafChild, LeafNode, LeafTree};
+pub use self::tree::{LeafNode, LeafTree};
 use super::records::Table;
 use super::{
     CameraPlace, ItemKind, Labels, LoadOptions, Regions, Scene, SurfaceKind, Surfaces, WorldBox,
@@ -210,24 +210,18 @@ fn check_counts(
     name: &str,
     options: &LoadOptions,
 ) -> Result<(), InputError> {
-    let (mut points, mut ends, mut faces) = (0u64, 0u64, 0u64);
-    for i in 0..surfaces.len() {
-        points += surfaces.range(i, 12, vertices)?.len() as u64;
-        ends += surfaces.range(i, 20, corners)?.len() as u64;
-    }
-    for i in 0..brushes.len() {
-        faces += brushes.range(i, 0, sides)?.len() as u64;
-    }
-    let most = [
-        vertices.len() as u64,
-        MOST_CORNERS * vertices.len() as u64,
-        sides.len() as u64,
+    let total = |table: &Table, at, of: &Table| -> Result<u64, InputError> {
+        let counts = (0..table.len()).map(|i| Ok(table.range(i, at, of)?.len() as u64));
+        counts.sum()
+    };
+    let [points, ends] = [
+        total(surfaces, 12, vertices)?,
+        total(surfaces, 20, corners)?,
     ];
-    if [points, ends, faces]
-        .iter()
-        .zip(most)
-        .any(|(&count, most)| count > most)
-    {
+    let faces = total(brushes, 0, sides)?;
+    let most = [1, MOST_CORNERS].map(|each| each * vertices.len() as u64);
+    let most = [most[0], most[1], sides.len() as u64];
+    if points > most[0] || ends > most[1] || faces > most[2] {
         let found = format!("{points} vertices, {ends} indices and {faces} sides in all");
         return Err(surfaces.error(0, 0, found, format!("at most {most:?}")));
     }

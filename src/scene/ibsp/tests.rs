@@ -59,7 +59,7 @@ fn surfaces_brushes_leaves_and_places_are_read() {
     let map = map_of(&scene);
     let ends = map.tree.nodes.iter().flat_map(|node| node.children);
     let leaves = ends
-        .filter(|end| !matches!(end, LeafChild::Node(_)))
+        .filter(|end| !matches!(end, super::super::BspChild::Node(_)))
         .count();
     assert_eq!((leaves, map.tree.nodes.len()), (21, 20));
     assert_eq!((&map.tree.clusters[..], map.clusters), (&[0, 2, 1][..], 3));

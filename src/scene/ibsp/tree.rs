@@ -3,9 +3,10 @@
 use glam::{DVec3, Vec3};
 
 use crate::arithmetic::Expansion;
-use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
+use crate::geometry::{Aabb, Plane, PlaneTree};
 use crate::input::InputError;
 use crate::query::ItemId;
+use crate::scene::bsp::{BspChild, descend, plane_tree};
 use crate::scene::records::Table;
 
 /// Most nodes on the way to a leaf; maps have less than a hundred.
@@ -15,17 +16,6 @@ const FARTHEST: f64 = 1e10;
 /// Map units by which boxes are grown: map compilers cut their fractions off.
 const GROWTH: f64 = 1.0;
 
-/// End of a branch, or its next node.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum LeafChild {
-    /// Index of a node.
-    Node(u32),
-    /// Index of an open leaf among the open ones.
-    Open(ItemId),
-    /// A leaf within the solid.
-    Solid,
-}
-
 /// A dividing plane.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LeafNode {
@@ -34,7 +24,7 @@ pub struct LeafNode {
     /// Distance from zero: points of the plane have `normal . p = distance`.
     pub distance: f32,
     /// Front, with the plane itself, then back.
-    pub children: [LeafChild; 2],
+    pub children: [BspChild; 2],
 }
 
 /// A tree whose open leaves are the regions of a map.
@@ -79,7 +69,7 @@ impl LeafTree {
             boxes: Vec::new(),
             clusters: Vec::new(),
         };
-        let mut children = vec![LeafChild::Solid; leaves.len()];
+        let mut children = vec![BspChild::Solid; leaves.len()];
         for leaf in (0..leaves.len()).filter(|&leaf| reached[leaf]) {
             let cluster = leaves.int(leaf, 0);
             let [min, max] = [8, 20].map(|at| leaves.whole(leaf, at).as_dvec3());
@@ -91,7 +81,7 @@ impl LeafTree {
                 let found = format!("cluster {cluster} in leafs {leaf}");
                 return Err(leaves.error(leaf, 0, found, format!("less than {most}")));
             }
-            children[leaf] = LeafChild::Open(tree.boxes.len() as ItemId);
+            children[leaf] = BspChild::Leaf(tree.boxes.len() as ItemId);
             let grown = Aabb::rounded_outward(min - GROWTH, max + GROWTH, DVec3::ZERO);
             tree.boxes.push(grown);
             tree.clusters.push(cluster as u32);
@@ -100,13 +90,13 @@ impl LeafTree {
             let plane = nodes.index(node, 0, planes)?;
             let child = |at| match nodes.int(node, at) {
                 leaf if leaf < 0 => children.get(!leaf as usize).copied(),
-                node => Some(LeafChild::Node(node as u32)),
+                node => Some(BspChild::Node(node as u32)),
             };
             tree.nodes.push(LeafNode {
                 normal: planes.vector(plane, 0)?,
                 distance: planes.float(plane, 12)?,
                 // Nodes that nothing leads to may lead anywhere.
-                children: [4, 8].map(|at| child(at).unwrap_or(LeafChild::Solid)),
+                children: [4, 8].map(|at| child(at).unwrap_or(BspChild::Solid)),
             });
         }
         Ok(tree)
@@ -117,14 +107,10 @@ impl LeafTree {
         if p.abs().max_element() > FARTHEST {
             return None;
         }
-        let mut at = LeafChild::Node(0);
-        while let LeafChild::Node(node) = at {
+        let leaf = descend(BspChild::Node(0), |node| {
             let node = &self.nodes[node as usize];
-            at = node.children[node.side(p)];
-        }
-        let LeafChild::Open(leaf) = at else {
-            return None;
-        };
+            node.children[node.side(p)]
+        })?;
         let [min, max] = [self.boxes[leaf as usize].min, self.boxes[leaf as usize].max];
         let holds = p.cmpge(min.as_dvec3()) & p.cmple(max.as_dvec3());
         holds.all().then_some(leaf)
@@ -132,17 +118,9 @@ impl LeafTree {
 
     /// The planes, for structures that can use them.
     pub fn plane_tree(&self) -> PlaneTree {
-        let node = |node: &LeafNode| PlaneTreeNode {
-            plane: Plane::new(node.normal, -node.distance),
-            children: node.children.map(|child| match child {
-                LeafChild::Node(node) => Some(node),
-                _ => None,
-            }),
-        };
-        PlaneTree {
-            nodes: self.nodes.iter().map(node).collect(),
-            root: Some(0),
-        }
+        let nodes = self.nodes.iter();
+        let nodes = nodes.map(|n| (Plane::new(n.normal, -n.distance), n.children));
+        plane_tree(BspChild::Node(0), nodes)
     }
 }
 

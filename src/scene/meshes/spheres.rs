@@ -1,7 +1,7 @@
 //! Spheres and a statue, both from the geodesic sphere.
 //!
-//! That is an icosahedron whose faces are cut into f² triangles, pushed out to the sphere.
-//! Neighbouring faces share the points of their edge.
+//! A geodesic sphere is an icosahedron whose faces are cut into f² triangles, pushed out to
+//! the sphere. Neighbouring faces share the points of their edge.
 
 use std::collections::HashMap;
 
@@ -99,43 +99,20 @@ impl Body {
 /// Golden ratio.
 const PHI: f64 = 1.618_033_988_749_895;
 
-const CORNERS: [[f64; 3]; 12] = [
-    [-1.0, PHI, 0.0],
-    [1.0, PHI, 0.0],
-    [-1.0, -PHI, 0.0],
-    [1.0, -PHI, 0.0],
-    [0.0, -1.0, PHI],
-    [0.0, 1.0, PHI],
-    [0.0, -1.0, -PHI],
-    [0.0, 1.0, -PHI],
-    [PHI, 0.0, -1.0],
-    [PHI, 0.0, 1.0],
-    [-PHI, 0.0, -1.0],
-    [-PHI, 0.0, 1.0],
-];
+/// A corner of the icosahedron.
+///
+/// The four of a golden rectangle in each of three planes.
+fn vertex(at: usize) -> DVec3 {
+    let sign = |bit: usize| if at & bit == 0 { -1.0 } else { 1.0 };
+    let mut vertex = [sign(1), -PHI * sign(2), 0.0];
+    vertex.rotate_right(at / 4);
+    vertex.into()
+}
 
-/// Counter-clockwise from outside.
-const FACES: [[usize; 3]; 20] = [
-    [0, 11, 5],
-    [0, 5, 1],
-    [0, 1, 7],
-    [0, 7, 10],
-    [0, 10, 11],
-    [1, 5, 9],
-    [5, 11, 4],
-    [11, 10, 2],
-    [10, 7, 6],
-    [7, 1, 8],
-    [3, 9, 4],
-    [3, 4, 2],
-    [3, 2, 6],
-    [3, 6, 8],
-    [3, 8, 9],
-    [4, 9, 5],
-    [2, 4, 11],
-    [6, 2, 10],
-    [8, 6, 7],
-    [9, 8, 1],
+/// Three corners a face, counter-clockwise from outside.
+const FACES: [usize; 60] = [
+    0, 11, 5, 0, 5, 1, 0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4, 11, 10, 2, 10, 7, 6, 7, 1,
+    8, 3, 9, 4, 3, 4, 2, 3, 2, 6, 3, 6, 8, 3, 8, 9, 4, 9, 5, 2, 4, 11, 6, 2, 10, 8, 6, 7, 9, 8, 1,
 ];
 
 /// Unit directions and the triangles between them: 20 f² triangles and 10 f² + 2
@@ -148,7 +125,7 @@ pub fn icosphere(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         points: Vec::new(),
     };
     let mut triangles = Vec::new();
-    for face in FACES {
+    for &face in FACES.as_chunks().0 {
         for j in 0..f {
             for i in 0..f - j {
                 let mut at = |i: u32, j: u32| sphere.point(face, [f - i - j, i, j]);
@@ -182,7 +159,7 @@ impl Sphere {
         *self.ids.entry(key).or_insert_with(|| {
             let parts = key.iter().filter(|(_, weight)| *weight > 0);
             let sum = parts.fold(DVec3::ZERO, |sum, &(corner, weight)| {
-                sum + DVec3::from(CORNERS[corner]) * (f64::from(weight) / frequency)
+                sum + vertex(corner) * (f64::from(weight) / frequency)
             });
             self.points.push(sum.normalize());
             next

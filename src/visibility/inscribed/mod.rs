@@ -251,7 +251,7 @@ pub fn is_in(part: &[[Vec3; 3]], inner: &Aabb) -> bool {
 
 /// Returns `true` if a triangle and an open box have no point in common, exactly.
 ///
-/// By the thirteen separating axes (Akenine-Möller 2001) as comparisons and orientations.
+/// Uses the thirteen separating axes (Akenine-Möller 2001) as comparisons and orientations.
 fn is_outside(corners: [Vec3; 3], b: &Aabb) -> bool {
     let [p, q, r] = corners;
     let (low, high) = (p.min(q).min(r), p.max(q).max(r));

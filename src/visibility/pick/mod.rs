@@ -166,7 +166,7 @@ impl CursorRectangle {
     /// Its planes in the f32 of a scene, moved outward by what they may be off.
     ///
     /// # Errors
-    /// As [`CursorRectangle::camera`] and [`Camera::volume`].
+    /// The errors of [`CursorRectangle::camera`] and [`Camera::volume`].
     pub fn volume(&self, rays: &Rays, around: &Surroundings) -> Result<ConvexVolume, CameraError> {
         self.camera(rays)?.volume(&PlaneOptions::default(), around)
     }

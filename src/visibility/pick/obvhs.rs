@@ -1,6 +1,6 @@
 //! Ray traversals of the crate obvhs: boxes, or its own triangles, as primitives.
 //!
-//! By its eight-wide tree with quantised nodes. Rays and bodies are rounded to f32, without
+//! Its eight-wide tree has quantised nodes. Rays and bodies are rounded to f32, without
 //! bounds on rounding.
 
 use std::ops::Range;

@@ -131,7 +131,7 @@ impl RegionItems {
     /// The items that touch or meet each region; both are closed.
     ///
     /// An item that touches a region's box is listed, and one that [meets](super::Ground::more_at) the region elsewhere.
-    /// Where regions have no height of their own (a map's), boxes of regions are taken
+    /// If regions have no height of their own (a map's), boxes of regions are taken
     /// to extend without end up and down. O(n log n) for items much smaller than regions.
     pub fn of(graph: &RegionGraph, scene: &Scene) -> RegionItems {
         let regions = 0..graph.len() as u32;

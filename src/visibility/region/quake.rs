@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::graph::{Ground, RegionGraph};
 use super::id_set::{IdSet, RegionId};
 use super::row::Pvs;
-use crate::scene::{LeafChild, LeafNode, QuakeMap, WorldBox};
+use crate::scene::{BspChild, LeafNode, QuakeMap, WorldBox};
 use crate::visibility::Ray;
 
 /// Farthest depth at which rays are followed: beyond every map.
@@ -49,15 +49,15 @@ fn sides(node: &LeafNode, b: &WorldBox) -> [bool; 2] {
 
 impl Ground for LeafGround {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
-        let (mut inside, mut open) = (true, vec![LeafChild::Node(0)]);
+        let (mut inside, mut open) = (true, vec![BspChild::Node(0)]);
         while let Some(at) = open.pop() {
             match at {
-                LeafChild::Solid => inside = false,
-                LeafChild::Open(leaf) if self.is_in_leaf(b, leaf) => {
+                BspChild::Solid => inside = false,
+                BspChild::Leaf(leaf) if self.is_in_leaf(b, leaf) => {
                     out.push(self.0.tree.clusters[leaf as usize]);
                 }
-                LeafChild::Open(_) => {}
-                LeafChild::Node(node) => {
+                BspChild::Leaf(_) => {}
+                BspChild::Node(node) => {
                     let node = self.node(node);
                     let met = node.children.into_iter().zip(sides(node, b));
                     open.extend(met.filter_map(|(child, is_met)| is_met.then_some(child)));
@@ -74,14 +74,14 @@ impl Ground for LeafGround {
 
     fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
         let far = ray.far.min(FARTHEST);
-        let mut open = vec![(LeafChild::Node(0), ray.near, far)];
+        let mut open = vec![(BspChild::Node(0), ray.near, far)];
         while let Some((at, near, far)) = open.pop() {
             match at {
-                LeafChild::Solid => return,
-                LeafChild::Open(leaf) => {
+                BspChild::Solid => return,
+                BspChild::Leaf(leaf) => {
                     seen.insert(self.0.tree.clusters[leaf as usize]);
                 }
-                LeafChild::Node(node) => {
+                BspChild::Node(node) => {
                     let node = self.node(node);
                     let [a, b] = [near, far].map(|depth| value(node, ray.at(depth)));
                     let first = usize::from(a < 0.0);

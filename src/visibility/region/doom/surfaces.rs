@@ -34,7 +34,7 @@ impl DoomMap {
     /// Beyond the scene's items follows one for each sector, in file order: its floor,
     /// its ceiling, and the walls about it where it moves.
     ///
-    /// What can move is open, as in [`DoomMap::graph`]: walls that end at a floor or
+    /// Moving parts are open, as in [`DoomMap::graph`]: walls that end at a floor or
     /// ceiling which moves are seen where the file has them but hide nothing there
     /// (cut-outs); as far as they hide however it moves, they do as part of its
     /// sector's item. Such a sector has no floor and no ceiling. Heights alone decide:
