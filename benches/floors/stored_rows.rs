@@ -22,6 +22,10 @@ const MOST_TIMES: f64 = 1.5;
 /// Passes over the views in a turn, as one takes a microsecond.
 const PASSES: usize = 1000;
 
+fn of_home(row: &RegionRow, home: RegionId) -> &[RegionId] {
+    row.pvs.as_ref().expect("a stored row").row(home)
+}
+
 /// Returns 1 if the floor is missed, else 0.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
     let (typed, scene, cameras) = loaded(SCENE, PATH, only_test);
@@ -39,7 +43,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
         }
     }
     // What is stored of the rows, one after the other.
-    let rows = homes.iter().map(|home| stored.stored_from(*home).to_vec());
+    let rows = homes.iter().map(|home| of_home(&stored, *home).to_vec());
     let rows: Vec<Vec<RegionId>> = rows.collect();
 
     let passes = if only_test { 1 } else { PASSES };
@@ -62,7 +66,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
         let answer = || {
             answer_ns = time(&mut || {
                 for home in &homes {
-                    read_all(row.stored_from(*home));
+                    read_all(of_home(row, *home));
                 }
             });
             answer_ns

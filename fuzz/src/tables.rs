@@ -97,7 +97,7 @@ pub fn pvs(bytes: &[u8]) {
     let pairs = all
         .clone()
         .flat_map(|from| all.clone().map(move |to| (from, to)));
-    for (from, to) in pairs.filter(|&(from, to)| pvs.row(from).holds(to)) {
+    for (from, to) in pairs.filter(|&(from, to)| pvs.row(from).contains(&to)) {
         write!(text, "[{from},{to}],").expect("a String takes everything");
     }
     let text = text.trim_end_matches(',').to_owned() + "]}";

@@ -120,11 +120,8 @@ fn of_table<'w>(world: &'w World, row: &'w RegionRow) -> Bound<'w> {
     let name = "read the rows of the eye's regions";
     Bound::new(StageKind::Region, [STORED_PVS, name], move |view, _| {
         for &home in &homes[view] {
-            black_box(
-                row.stored_from(home)
-                    .iter()
-                    .fold(0, |all, region| all ^ region),
-            );
+            let stored = row.pvs.iter().flat_map(|pvs| pvs.row(home));
+            black_box(stored.fold(0, |all, region| all ^ region));
         }
     })
 }

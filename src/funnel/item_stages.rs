@@ -9,7 +9,7 @@ use super::world::{View, World};
 use crate::camera::Camera;
 use crate::measure::Ask;
 use crate::query::ItemId;
-use crate::visibility::region::{EyePlace, IdSet, Scratch};
+use crate::visibility::region::{IdSet, Scratch};
 use crate::visibility::{SampleGrid, occlusion};
 
 /// Appends the items of a view that a stage leaves of those given (`None`: all).
@@ -38,10 +38,8 @@ impl World<'_> {
         let state = RefCell::new((Scratch::default(), IdSet::default(), Vec::new()));
         Box::new(move |view, _, out| {
             let (scratch, marks, seen) = &mut *state.borrow_mut();
-            match row.from_eye(&self.views[view].rays, scratch, seen) {
-                EyePlace::Inside => regions.items.of_regions(seen, marks, out),
-                _ => out.extend(0..self.items() as ItemId),
-            }
+            row.from_eye(&self.views[view].rays, scratch, seen);
+            regions.items.of_regions(seen, marks, out);
         })
     }
 

@@ -219,10 +219,10 @@ impl<'w> Picks<'w> {
     pub fn compared(&self) -> Vec<PickRow> {
         let exact: Box<dyn Pick> = match &self.world.shape {
             Shape::Boxes(solids) => Box::new(RayIndex::build(solids)),
-            Shape::Triangles(surfaces) => Box::new(SurfaceIndex::of(&Facets::solid(
-                surfaces,
-                self.world.items(),
-            ))),
+            Shape::Triangles(surfaces) => {
+                let facets = Facets::solid(surfaces, self.world.items());
+                Box::new(SurfaceIndex::of(&facets, self.world.kernel))
+            }
         };
         let mut rows: Vec<PickRow> = self.pickers.iter().map(|(row, _)| row.clone()).collect();
         let mut found = Vec::new();

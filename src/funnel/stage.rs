@@ -7,7 +7,7 @@ use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Regions, Scene};
 use crate::visibility::occlusion::{
-    Interleaved, MaskedCentre, MaskedInner, OccluderScene, OcclusionBuffer, View, ZBuffer,
+    Interleaved, MaskedCentre, MaskedInner, OccluderScene, OcclusionBuffer, View,
 };
 use crate::visibility::triangle::TRIANGLE_ROWS;
 use crate::visibility::{Guarantee, Row, SampleGrid, region};
@@ -251,8 +251,7 @@ const fn occlusion<B: OcclusionBuffer + 'static>(name: &'static str) -> Occlusio
 }
 
 /// Rows of the occlusion stage.
-pub static OCCLUSION_ROWS: [OcclusionRow; 3] = [
+pub static OCCLUSION_ROWS: [OcclusionRow; 2] = [
     occlusion::<MaskedInner>(MASKED_INNER),
     occlusion::<MaskedCentre>("masked"),
-    occlusion::<ZBuffer>("z-buffer"),
 ];

@@ -19,7 +19,7 @@ use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::OccluderScene;
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::region::{BACK_ENDS, Pvs, RegionGraph, RegionItems, RegionRow, Source};
+use crate::visibility::region::{Pvs, RegionGraph, RegionItems, RegionRow, Source};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
 
 /// Bytes per item of structure, solids, occluders and trees for rays.
@@ -354,18 +354,9 @@ impl Regions {
             (None, scene::Regions::Leaves(map)) => RegionGraph::of_quake(map),
             (None, _) => RegionGraph::of_scene(scene).ok_or(None)?,
         });
-        let searches = [Source::Flood, Source::PortalRect, Source::PortalClip];
-        let is_for = |source| {
-            BACK_ENDS
-                .iter()
-                .any(|row| row.build == source && row.is_for(scene))
-        };
+        let searches = RegionRow::searches(&graph).into_iter();
         let mut regions = Regions {
-            rows: searches
-                .into_iter()
-                .filter(|&source| is_for(source))
-                .map(|source| RegionRow::search(source, graph.clone()))
-                .collect(),
+            rows: searches.filter(|row| row.back_end.is_for(scene)).collect(),
             items: RegionItems::of(&graph, scene),
             graph,
         };

@@ -12,7 +12,6 @@ pub mod occlusion;
 pub mod pick;
 mod rays;
 pub mod region;
-mod sah;
 mod solids;
 pub mod triangle;
 pub mod truth;

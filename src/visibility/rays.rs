@@ -120,8 +120,11 @@ pub trait Along: Copy {
     /// A point of the ray on the surface of a body.
     type At: Copy + Debug;
 
+    /// The ray as it was given.
+    fn ray(&self) -> &Ray;
+
     /// Exact order of two such points along the ray.
-    fn order(&self, a: &Self::At, b: &Self::At) -> Ordering;
+    fn compare(&self, a: &Self::At, b: &Self::At) -> Ordering;
 
     /// Depth of a point, rounded.
     fn depth(at: &Self::At) -> f64;

@@ -11,7 +11,7 @@ use cullbench::scene::{WadMap, map_names, read_boxes_csv};
 use cullbench::stress::{read_vectors, replay};
 use cullbench::visibility::Rays;
 use cullbench::visibility::region::doom::DoomMap;
-use cullbench::visibility::region::{RegionRow, Scratch, Source};
+use cullbench::visibility::region::{RegionRow, Scratch};
 use glam::DVec3;
 
 use super::process::*;
@@ -197,8 +197,7 @@ fn damaged_maps_seen_through() {
         let Ok(graph) = map.graph().map(Arc::new) else {
             return Ok(());
         };
-        let sources = [Source::Flood, Source::PortalRect, Source::PortalClip];
-        let rows = sources.map(|source| RegionRow::search(source, graph.clone()));
+        let rows = RegionRow::searches(&graph);
         let (mut scratch, mut seen) = (Scratch::default(), Vec::new());
         for place in &scene.places {
             let frame = Frame::looking_along(place.eye, place.forward, DVec3::Z);

@@ -10,7 +10,7 @@ use super::super::rule::{Draft, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use super::removal::{PROBED, PROBES, of_items};
 use crate::funnel::{PORTAL_CLIP, left_out_of};
-use crate::visibility::region::{EyePlace, IdSet, Scratch, seen_by_samples};
+use crate::visibility::region::{IdSet, Scratch, seen_by_samples};
 
 pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
@@ -32,11 +32,11 @@ pub(super) fn prepare(trials: &mut Trials) -> Result<Draft, Unfit> {
     let kept = trials.unjudged(move |n, out| {
         let (scratch, marks, seen) = &mut *state.borrow_mut();
         match row.from_eye(world.rays(n), scratch, seen) {
-            EyePlace::Inside => {
+            true => {
                 regions.items.of_regions(seen, marks, out);
                 out.retain(|&id| world.views[n].volume.sees(&scene.items[id as usize]));
             }
-            _ => case.query(n, out),
+            false => case.query(n, out),
         }
     });
     // The share of the items in view that lie in no region that a few rays pass.

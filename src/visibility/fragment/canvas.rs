@@ -8,7 +8,7 @@ use super::order::{Part, Piece};
 use crate::kernel::each;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
-use crate::visibility::truth::{Body, Crossing, Probe, SolidBox};
+use crate::visibility::truth::{Along, Body, Crossing, Probe, SolidBox};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// Columns and rows of samples.

@@ -11,7 +11,7 @@ use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::spec::{Spec, SpecError};
 use crate::visibility::region::RegionGraph;
-use crate::visibility::truth::{Crossing, Probe};
+use crate::visibility::truth::{Along, Crossing, Probe};
 
 named! {
     /// Pattern of the opaque parts of a surface.

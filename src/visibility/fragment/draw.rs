@@ -111,7 +111,7 @@ impl<B: Body> Drawn<B> {
         let Fragment { sample, item, at } = *fragment;
         let front = &mut self.front[sample];
         if let Some((other, other_item)) = *front {
-            let order = canvas.probe(sample).order(&at, &other);
+            let order = canvas.probe(sample).compare(&at, &other);
             if order.is_gt() {
                 return false;
             }
@@ -159,7 +159,7 @@ impl<B: Body> Drawn<B> {
     pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
         let in_front = |tie: &&Fragment<B::At>| {
             let front = self.front[tie.sample];
-            let order = |front: (B::At, _)| canvas.probe(tie.sample).order(&tie.at, &front.0);
+            let order = |front: (B::At, _)| canvas.probe(tie.sample).compare(&tie.at, &front.0);
             front.is_some_and(|front| order(front).is_eq())
         };
         let ties = self.ties.iter().filter(in_front).map(|tie| tie.item);

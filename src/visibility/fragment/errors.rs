@@ -13,7 +13,7 @@ use super::draw::{Tally, Tests};
 use super::order::{DepthOrder, Part, Piece};
 use crate::kernel::each;
 use crate::query::ItemId;
-use crate::visibility::truth::{Crossing, Meeting, SurfaceIndex, TriangleProbe};
+use crate::visibility::truth::{Along, Crossing, Meeting, SurfaceIndex, TriangleProbe};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// The errors of an order that should be front to back.

@@ -9,7 +9,7 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, load};
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, SurfaceIndex, judge};
+use crate::visibility::truth::{Along, NO_ITEM, RayIndex, SampleTruth, SurfaceIndex, judge};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 use order::{BspOrder, ORDERS, OrderRow};
 

@@ -1,4 +1,4 @@
-//! Depth buffers as a contract, and the plain one.
+//! Depth buffers as a contract.
 //!
 //! Occluders are drawn into them and rectangles are tested, in turn.
 
@@ -6,7 +6,7 @@ use super::outline::{Coverage, Outline};
 use super::rect::{Candidate, Rect, Rects};
 use super::scene::OccluderScene;
 use super::view::View;
-use crate::kernel::{Isa, LANES, LaneMask, first_lanes};
+use crate::kernel::{Isa, LaneMask};
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// A depth buffer of occluders.
@@ -85,68 +85,4 @@ pub struct CullStats {
     pub drawn: usize,
     /// Items that were not removed.
     pub kept: usize,
-}
-
-/// Nearness at the centre of each pixel; 0 where nothing was drawn.
-#[derive(Clone, Debug)]
-pub struct ZBuffer {
-    grid: SampleGrid,
-    nearness: Vec<f32>,
-}
-
-impl OcclusionBuffer for ZBuffer {
-    const SUMMARY: &'static str =
-        "one depth per pixel, at its centre; every pixel of a box is tested";
-    const GUARANTEE: Guarantee = Guarantee::Unproven;
-    const COVERAGE: Coverage = Coverage::Centre;
-
-    fn new(grid: SampleGrid) -> Self {
-        ZBuffer {
-            grid,
-            nearness: vec![0.0; grid.samples() + LANES],
-        }
-    }
-
-    fn clear(&mut self) {
-        self.nearness.fill(0.0);
-    }
-
-    #[inline(always)]
-    fn draw<I: Isa>(&mut self, _: I, outline: &Outline) {
-        let (width, height) = (self.grid.width as usize, self.grid.height as usize);
-        let nearness = outline.per_pixel();
-        let (first, end) = outline.rows();
-        for row in first..end.min(height) {
-            let ([start], [end]) = outline.spans::<1>(row);
-            let (start, end) = (start as usize, (end as usize).min(width));
-            if start >= end {
-                continue;
-            }
-            let pixels = &mut self.nearness[row * width + start..row * width + end];
-            for (i, pixel) in pixels.iter_mut().enumerate() {
-                let near = nearness.of((start + i) as u32 as f32, row as f32);
-                *pixel = if near > *pixel { near } else { *pixel };
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool {
-        let width = self.grid.width as usize;
-        let nearness = isa.splat(rect.nearness);
-        let (first, end) = (usize::from(rect.x0), usize::from(rect.x1) + 1);
-        for row in usize::from(rect.y0)..usize::from(rect.y1) + 1 {
-            for column in (first..end).step_by(LANES) {
-                let at = row * width + column;
-                let Some(pixels) = self.nearness[at..].first_chunk() else {
-                    return false;
-                };
-                let passed = isa.at_most(isa.load(pixels), nearness);
-                if passed & first_lanes(end - column) != 0 {
-                    return false;
-                }
-            }
-        }
-        true
-    }
 }

@@ -22,7 +22,7 @@ mod tests;
 mod trace;
 mod view;
 
-pub use buffer::{CullStats, OcclusionBuffer, ZBuffer};
+pub use buffer::{CullStats, OcclusionBuffer};
 pub use interleaved::Interleaved;
 pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use outline::{Coverage, Outline};
@@ -32,4 +32,4 @@ pub use trace::FrameTrace;
 pub use view::{Linear, Projection, View};
 
 #[cfg(test)]
-pub use tests::{NoOcclusion, TwoPass};
+pub use tests::{NoOcclusion, TwoPass, ZBuffer};

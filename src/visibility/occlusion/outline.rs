@@ -320,25 +320,13 @@ impl Outline {
     /// The nearness of parts of tiles, never above that of any covered pixel in them.
     #[inline(always)]
     pub fn per_tile(&self) -> Nearness {
-        // Six u of the greatest terms: one for rounding each coefficient, one for each
-        // product, two sums.
-        self.nearness(|face| {
-            let size = face.c.abs() + face.x.abs() * self.columns + face.y.abs() * self.height;
-            face.c - 6.0 * f64::from(U) * size
-        })
-    }
-
-    /// The nearness at the centres of pixels, rounded.
-    #[inline(always)]
-    pub fn per_pixel(&self) -> Nearness {
-        self.nearness(|face| face.c + 0.5 * (face.x + face.y))
-    }
-
-    #[inline(always)]
-    fn nearness(&self, constant: impl Fn(&Linear) -> f64) -> Nearness {
         let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
         for (i, face) in self.faces[..self.face_count].iter().enumerate() {
-            faces[i] = [constant(face) as f32, face.x as f32, face.y as f32];
+            // Six u of the greatest terms: one for rounding each coefficient, one for each
+            // product, two sums.
+            let size = face.c.abs() + face.x.abs() * self.columns + face.y.abs() * self.height;
+            let constant = face.c - 6.0 * f64::from(U) * size;
+            faces[i] = [constant as f32, face.x as f32, face.y as f32];
         }
         Nearness {
             faces,
@@ -390,12 +378,6 @@ pub struct Nearness {
 }
 
 impl Nearness {
-    /// At the centre of a pixel, by its column and row.
-    #[inline(always)]
-    pub fn of(&self, column: f32, row: f32) -> f32 {
-        least(each(self.faces, |f| (f[0] + f[1] * column) + f[2] * row))
-    }
-
     /// From the column `left` to the column `right` and from the row `top` to the row
     /// `bottom`, edges of pixels.
     #[inline(always)]

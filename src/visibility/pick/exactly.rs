@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use super::{Hit, Pick};
 use crate::query::ItemId;
 use crate::visibility::Ray;
-use crate::visibility::truth::{Along, Bodies, Body, BodyIndex};
+use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Visit};
 
 /// An item and where a ray meets it.
 type Met<B> = (ItemId, <B as Body>::At);
@@ -13,7 +13,7 @@ type Met<B> = (ItemId, <B as Body>::At);
 /// Exact order by depth, then by id.
 #[inline]
 fn order<B: Body>(probe: &B::Probe, a: &Met<B>, b: &Met<B>) -> Ordering {
-    probe.order(&a.1, &b.1).then(a.0.cmp(&b.0))
+    probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0))
 }
 
 /// A hit, unless its item is not among the first `items`.
@@ -27,7 +27,7 @@ fn hit<B: Body>((item, at): Met<B>, items: usize) -> Option<Hit> {
 pub(super) struct First<B: Body> {
     probe: B::Probe,
     /// Upper bound of the depth of the first one.
-    pub limit: f64,
+    limit: f64,
     best: Option<Met<B>>,
 }
 
@@ -42,26 +42,32 @@ impl<B: Body> First<B> {
         }
     }
 
-    /// Tests a candidate; returns whether it is the first one now.
+    /// Tests a candidate.
     #[inline(always)]
-    pub fn offer(&mut self, body: &B) -> bool {
+    pub fn offer(&mut self, body: &B) {
         let Some(at) = body.meet(&self.probe, self.limit) else {
-            return false;
+            return;
         };
         let met = (body.item(), at);
         let is_first = |best: Met<B>| order::<B>(&self.probe, &met, &best).is_lt();
-        if !self.best.is_none_or(is_first) {
-            return false;
+        if self.best.is_none_or(is_first) {
+            self.best = Some(met);
+            self.limit = self.limit.min(B::Probe::at_most(&at));
         }
-        self.best = Some(met);
-        self.limit = self.limit.min(B::Probe::at_most(&at));
-        true
     }
 
     /// The first hit, if it is one of the first `items`.
     #[inline]
     pub fn hit(&self, items: usize) -> Option<Hit> {
         hit::<B>(self.best?, items)
+    }
+}
+
+impl<B: Body> Visit<B> for First<B> {
+    #[inline(always)]
+    fn visit(&mut self, body: &B) -> f64 {
+        self.offer(body);
+        self.limit
     }
 }
 
@@ -75,12 +81,12 @@ pub(super) fn nearest<B: Body>(
     hits: &mut Vec<Hit>,
 ) {
     if !B::IS_BOX {
-        met.sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| probe.order(&a.1, &b.1)));
+        met.sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| probe.compare(&a.1, &b.1)));
         met.dedup_by_key(|(item, _)| *item);
     }
     met.sort_unstable_by(|a, b| order::<B>(probe, a, b));
     met.truncate(kept(&met, count, |a, last| {
-        probe.order(&a.1, &last.1).is_le()
+        probe.compare(&a.1, &last.1).is_le()
     }));
     hits.clear();
     hits.extend(met.into_iter().filter_map(|met| hit::<B>(met, usize::MAX)));
@@ -119,9 +125,7 @@ impl<B: Body> Pick for Linear<B> {
     /// O(n).
     fn first(&self, ray: &Ray) -> Option<Hit> {
         let mut first = First::<B>::new(B::probe(ray, self.0.origin), f64::INFINITY);
-        self.0.all.iter().for_each(|body| {
-            first.offer(body);
-        });
+        self.0.all.iter().for_each(|body| first.offer(body));
         first.hit(self.0.items)
     }
 

@@ -32,8 +32,8 @@ pub const BACK_ENDS: &[BackEnd] = rows! { BackEnd { name, guarantee, summary, bu
     "wide-ray", Guarantee::Exact,
         "16-wide tree, sixteen slab tests at once, the last step exact",
         Builds {
-            boxes: |boxes, kernel| Ok(Box::new(WideRay::of(boxes, kernel)?)),
-            facets: |facets, kernel| Ok(Box::new(WideRay::of(facets, kernel)?)),
+            boxes: |boxes, kernel| Ok(Box::new(WideRay::of(boxes, kernel))),
+            facets: |facets, kernel| Ok(Box::new(WideRay::of(facets, kernel))),
         };
     // Rays, nodes and boxes are rounded to f32.
     obvhs::NAME, Guarantee::Unproven, "crate obvhs, eight-wide quantised tree, its ray_traverse",

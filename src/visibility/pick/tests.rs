@@ -130,7 +130,7 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
                 })
                 .collect();
             assert!(built.len() >= 2);
-            let wide = WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap();
+            let wide = WideRay::of(&Boxes::of(&solids), Kernel::best());
             for _ in 0..if count > 100 { 60 } else { 120 } {
                 let ray = worlds.ray();
                 let truth = all_judged(&ray, &solids);
@@ -226,7 +226,7 @@ fn boxes_of_any_size_are_picked_alike() {
 fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
     let mut worlds = Worlds::new(3, 1.0, DVec3::ZERO);
     let solids = worlds.boxes(150);
-    let wide = WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap();
+    let wide = WideRay::of(&Boxes::of(&solids), Kernel::best());
     let sizes = [
         0.0, 1e-70, 1e-30, -1e-26, 6e-17, -6e-17, 1e-9, 0.2, -1.0, 1.0, 900.0, -900.0,
     ];
@@ -259,7 +259,7 @@ fn in_scenes_the_wide_tree_finds_what_the_reference_finds() {
         let bounds = scene.world_bounds();
         let solids = Solids::of(&scene);
         let (wide, reference) = (
-            WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap(),
+            WideRay::of(&Boxes::of(&solids), Kernel::best()),
             Linear(Boxes::of(&solids)),
         );
         let mut rng = SeededRng::new(9);
@@ -311,7 +311,7 @@ fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
         let (scene, cameras) = cameras(name);
         let solids = Solids::of(&scene);
         let (wide, index) = (
-            WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap(),
+            WideRay::of(&Boxes::of(&solids), Kernel::best()),
             RayIndex::build(&solids),
         );
         let mut items = 0;
@@ -336,7 +336,7 @@ fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
 fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_planes() {
     let (scene, cameras) = cameras("city:n=3000");
     let solids = Solids::of(&scene);
-    let wide = WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap();
+    let wide = WideRay::of(&Boxes::of(&solids), Kernel::best());
     let index = index::Wide::build(&Input::new(&scene.items), &Default::default()).unwrap();
     let around = Surroundings {
         origin: scene.origin,
@@ -436,7 +436,7 @@ fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
     let map = DoomMap::of_scene(&scene).unwrap();
     let surfaces = map.surfaces(&scene);
     let count = scene.items.len();
-    let truth = SurfaceIndex::of(&Facets::solid(&surfaces, count));
+    let truth = SurfaceIndex::of(&Facets::solid(&surfaces, count), Kernel::best());
     let built = triangle_back_ends(&Facets::solid(&surfaces, count));
     let mut rng = SeededRng::new(5);
     let (mut hidden, mut differ) = (0, 0);

@@ -29,12 +29,6 @@ impl IdSet {
         self.words[id as usize / 64] >> (id % 64) & 1 != 0
     }
 
-    /// Adds the ids of a set with the same bound.
-    pub fn insert_all(&mut self, other: &IdSet) {
-        let words = self.words.iter_mut().zip(&other.words);
-        words.for_each(|(word, more)| *word |= more);
-    }
-
     /// Replaces `out` by the ids, ascending. O(bound / 64 + ids).
     pub fn list(&self, out: &mut Vec<u32>) {
         out.clear();

@@ -24,7 +24,7 @@ pub use boxes::seen_by_samples;
 pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
 pub use id_set::{IdSet, RegionId};
 pub use locate::RegionItems;
-pub use row::{BACK_ENDS, BackEnd, EyePlace, Pvs, PvsError, RegionRow, Scratch, Source};
+pub use row::{BACK_ENDS, BackEnd, Pvs, PvsError, RegionRow, Scratch, Source};
 
 #[cfg(test)]
 pub use tests::leads_through;

@@ -14,10 +14,14 @@ use crate::kernel::extend;
 use crate::scene::{Regions, Scene};
 use crate::visibility::{Guarantee, Rays, Row};
 
-/// A potentially visible set: for each region the set of regions seen from it.
+/// A potentially visible set: for each region those seen from it, itself among them.
+///
+/// One allocation for each region: reading a row of one table with offsets takes half again
+/// as long.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pvs {
-    rows: Vec<IdSet>,
+    /// Ascending.
+    rows: Box<[Box<[RegionId]>]>,
 }
 
 /// Reason for which bytes are no potentially visible set, in a line.
@@ -35,20 +39,20 @@ struct Written {
     sees: Vec<[RegionId; 2]>,
 }
 
-/// Most regions of a set: half a gigabyte of bits.
+/// Most regions of a set.
 const MOST_REGIONS: usize = 1 << 16;
 
 impl Pvs {
-    /// Each region sees itself alone. O(n^2) bits.
-    pub fn alone(regions: usize) -> Pvs {
-        let row = |region| {
-            let mut row = IdSet::default();
-            row.clear(regions);
-            row.insert(region);
-            row
+    /// Regions seen from each region, which sees itself too.
+    fn of(rows: Vec<Vec<RegionId>>) -> Pvs {
+        let row = |(mut row, own): (Vec<RegionId>, RegionId)| {
+            row.push(own);
+            row.sort_unstable();
+            row.dedup();
+            row.into_boxed_slice()
         };
         Pvs {
-            rows: (0..regions as u32).map(row).collect(),
+            rows: rows.into_iter().zip(0..).map(row).collect(),
         }
     }
 
@@ -67,7 +71,7 @@ impl Pvs {
             let message = format!("{regions} regions; expected at most {MOST_REGIONS}");
             return Err(PvsError(message));
         }
-        let mut pvs = Pvs::alone(regions);
+        let mut rows = vec![Vec::new(); regions];
         for (pair, [from, to]) in written.sees.into_iter().enumerate() {
             let region = from.max(to);
             if region as usize >= regions {
@@ -75,9 +79,9 @@ impl Pvs {
                     "pair {pair}: region {region} is out of range; expected less than {regions}"
                 )));
             }
-            pvs.insert(from, to);
+            rows[from as usize].push(to);
         }
-        Ok(pvs)
+        Ok(Pvs::of(rows))
     }
 
     /// The REJECT table of a Doom map: bit `from * sectors + to`, lowest bit of a
@@ -97,13 +101,9 @@ impl Pvs {
     ///
     /// `None` for too many regions.
     pub fn of_pairs(regions: usize, sees: impl Fn(u32, u32) -> bool) -> Option<Pvs> {
-        let mut pvs = (regions <= MOST_REGIONS).then(|| Pvs::alone(regions))?;
         let all = 0..regions as u32;
-        for from in all.clone() {
-            let seen = all.clone().filter(|&to| sees(from, to));
-            seen.for_each(|to| pvs.insert(from, to));
-        }
-        Some(pvs)
+        let row = |from| all.clone().filter(|&to| sees(from, to)).collect();
+        (regions <= MOST_REGIONS).then(|| Pvs::of(all.clone().map(row).collect()))
     }
 
     /// Number of regions.
@@ -116,14 +116,9 @@ impl Pvs {
         self.rows.is_empty()
     }
 
-    /// The regions that a region sees.
-    pub fn row(&self, from: RegionId) -> &IdSet {
+    /// The regions that a region sees, ascending.
+    pub fn row(&self, from: RegionId) -> &[RegionId] {
         &self.rows[from as usize]
-    }
-
-    /// Adds a pair, in this direction only.
-    pub fn insert(&mut self, from: RegionId, to: RegionId) {
-        self.rows[from as usize].insert(to);
     }
 }
 
@@ -175,16 +170,6 @@ impl BackEnd {
     }
 }
 
-/// Place of the eye of an answer.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub enum EyePlace {
-    /// In regions: the answer is the regions seen from them.
-    Inside,
-    /// Not wholly in regions (or the lens is orthographic): all regions are listed.
-    Outside,
-}
-
 /// A back end over a graph.
 #[derive(Clone, Debug)]
 pub struct RegionRow {
@@ -192,17 +177,8 @@ pub struct RegionRow {
     pub back_end: BackEnd,
     /// The graph that it searches.
     pub graph: Arc<RegionGraph>,
-    pairs: Option<Stored>,
-}
-
-/// Pairs of regions, as bits and as lists.
-#[derive(Clone, Debug)]
-struct Stored {
-    pvs: Arc<Pvs>,
-    /// List of each region.
-    ///
-    /// One allocation each: reading a row of one table with offsets takes half again as long.
-    lists: Box<[Box<[RegionId]>]>,
+    /// Stored pairs; `None` for a search.
+    pub pvs: Option<Arc<Pvs>>,
 }
 
 /// Memory that queries use again and again.
@@ -216,76 +192,57 @@ pub struct Scratch {
 }
 
 impl RegionRow {
-    /// A back end that searches.
-    ///
-    /// # Panics
-    /// If the source is a set of pairs.
-    pub fn search(source: Source, graph: Arc<RegionGraph>) -> RegionRow {
-        let searches = [Source::Flood, Source::PortalRect, Source::PortalClip];
-        assert!(searches.contains(&source), "{source:?} needs pairs");
-        RegionRow::of(source, graph, None)
+    /// The back ends that search, in the order of the table.
+    pub fn searches(graph: &Arc<RegionGraph>) -> [RegionRow; 3] {
+        [Source::Flood, Source::PortalRect, Source::PortalClip]
+            .map(|source| RegionRow::of(source, graph.clone(), None))
     }
 
     /// A back end that reads stored pairs; `None` if they are of another number of
     /// regions.
     pub fn stored(source: Source, graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<RegionRow> {
-        let list = |from| {
-            let mut seen = Vec::new();
-            pvs.row(from).list(&mut seen);
-            seen.into_boxed_slice()
-        };
-        let lists = (0..pvs.len() as u32).map(list).collect();
-        (pvs.len() == graph.len())
-            .then(|| RegionRow::of(source, graph, Some(Stored { lists, pvs })))
+        (pvs.len() == graph.len()).then(|| RegionRow::of(source, graph, Some(pvs)))
     }
 
-    fn of(source: Source, graph: Arc<RegionGraph>, pairs: Option<Stored>) -> RegionRow {
+    fn of(source: Source, graph: Arc<RegionGraph>, pvs: Option<Arc<Pvs>>) -> RegionRow {
         let row = BACK_ENDS.iter().find(|row| row.build == source);
         RegionRow {
             back_end: *row.expect("a row for every source"),
             graph,
-            pairs,
+            pvs,
         }
     }
 
     /// Replaces `out` by the regions that a camera may see, ascending.
+    ///
+    /// Returns `false`, with all regions in `out`, if the eye is not wholly in regions or the
+    /// lens is orthographic.
     #[allow(clippy::wrong_self_convention)] // Regions seen from an eye, not a conversion.
-    pub fn from_eye(
-        &self,
-        rays: &Rays,
-        scratch: &mut Scratch,
-        out: &mut Vec<RegionId>,
-    ) -> EyePlace {
+    pub fn from_eye(&self, rays: &Rays, scratch: &mut Scratch, out: &mut Vec<RegionId>) -> bool {
         let graph = &*self.graph;
         let Scratch { homes, seen, .. } = scratch;
         out.clear();
         if !graph.homes(rays, homes) {
             out.extend(0..graph.len() as u32);
-            return EyePlace::Outside;
+            return false;
         }
-        if let (Some(pairs), [home]) = (&self.pairs, &homes[..]) {
-            extend(out, &pairs.lists[*home as usize]);
-            return EyePlace::Inside;
+        if let (Some(pvs), [home]) = (&self.pvs, &homes[..]) {
+            extend(out, pvs.row(*home));
+            return true;
         }
         seen.clear(graph.len());
-        match (&self.pairs, self.back_end.build) {
-            (Some(Stored { pvs, .. }), _) => {
-                homes
-                    .iter()
-                    .for_each(|&home| seen.insert_all(pvs.row(home)));
+        match (&self.pvs, self.back_end.build) {
+            (Some(pvs), _) => {
+                for &region in homes.iter().flat_map(|&home| pvs.row(home)) {
+                    seen.insert(region);
+                }
             }
             (None, Source::Flood) => scratch.flood.run(graph, rays, homes, seen),
             (None, Source::PortalRect) => scratch.portal_rect.run(graph, rays, homes, seen),
             (None, _) => scratch.portal_clip.run(graph, rays, homes, seen),
         }
         seen.list(out);
-        EyePlace::Inside
-    }
-
-    /// Stored regions that are seen from a region, ascending; none of a search.
-    pub fn stored_from(&self, region: RegionId) -> &[RegionId] {
-        let pairs = self.pairs.as_ref();
-        pairs.map_or(&[], |pairs| &pairs.lists[region as usize])
+        true
     }
 }
 
@@ -295,15 +252,10 @@ mod tests {
 
     #[test]
     fn pairs_are_read_and_each_region_sees_itself() {
-        let pvs = Pvs::from_json(r#"{"regions":70,"sees":[[3,69],[69,4]]}"#).unwrap();
-        let mut wanted = Pvs::alone(70);
-        wanted.insert(3, 69);
-        wanted.insert(69, 4);
-        assert_eq!(pvs, wanted);
-        assert!(pvs.row(3).holds(69) && !pvs.row(69).holds(3));
-        let mut row = Vec::new();
-        pvs.row(69).list(&mut row);
-        assert_eq!(row, [4, 69]);
+        let pvs = Pvs::from_json(r#"{"regions":70,"sees":[[3,69],[69,4],[3,69]]}"#).unwrap();
+        assert_eq!((pvs.row(3), pvs.row(69)), (&[3, 69][..], &[4, 69][..]));
+        assert_eq!(pvs.row(5), [5]);
+        assert_eq!(pvs.len(), 70);
     }
 
     #[test]
@@ -322,9 +274,8 @@ mod tests {
     fn a_reject_bit_hides_and_bits_run_on_over_rows() {
         // Bit 1 (0 to 1) and bit 8 (2 to 2, which sees itself all the same).
         let pvs = Pvs::from_reject(&[0b10, 0b1], 3).unwrap();
-        assert!(!pvs.row(0).holds(1) && pvs.row(1).holds(0) && pvs.row(2).holds(2));
-        let rows = [0, 1, 2].map(|from| [0, 1, 2].map(|to| pvs.row(from).holds(to)));
-        assert_eq!(rows, [[true, false, true], [true; 3], [true; 3]]);
+        assert_eq!(pvs.row(0), [0, 2]);
+        assert_eq!((pvs.row(1), pvs.row(2)), (&[0, 1, 2][..], &[0, 1, 2][..]));
         assert_eq!(Pvs::from_reject(&[0], 3), None, "a byte for nine pairs");
     }
 }

@@ -11,7 +11,7 @@ use crate::camera::Lens;
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::Rays;
 use crate::visibility::region::{
-    Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, Source, leads_through, rectangle,
+    Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, leads_through, rectangle,
 };
 
 /// A chain of rooms along x, and a line of sight from the first to the last.
@@ -119,6 +119,5 @@ fn narrower(opening: Opening, by: f64) -> Opening {
 }
 
 fn rows(graph: &Arc<RegionGraph>) -> [RegionRow; 3] {
-    let sources = [Source::Flood, Source::PortalRect, Source::PortalClip];
-    sources.map(|source| RegionRow::search(source, graph.clone()))
+    RegionRow::searches(graph)
 }

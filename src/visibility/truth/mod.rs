@@ -1,11 +1,13 @@
 //! The visible items, exact along the rays of a sample grid.
 //!
-//! No back end shares this code but for the bodies and their exact tests.
+//! Tests compare it with whole numbers of any length, which share nothing with it.
 
 mod body;
 mod ray_box;
 mod ray_index;
+mod ray_tree;
 mod ray_triangle;
+mod slabs;
 #[cfg(test)]
 pub(super) mod tests;
 
@@ -18,7 +20,8 @@ use crate::visibility::{Rays, SampleGrid};
 pub use super::rays::Along;
 pub use body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
 pub use ray_box::{Crossing, Probe};
-pub use ray_index::{BodyIndex, Front, RayIndex, SurfaceIndex};
+pub use ray_index::{BodyIndex, Front, RayIndex, SurfaceIndex, Visit};
+pub use ray_tree::Candidates;
 pub use ray_triangle::{Meeting, TriangleProbe};
 
 #[cfg(test)]

@@ -46,8 +46,26 @@ impl Along for Probe {
     type At = Crossing;
 
     #[inline(always)]
-    fn order(&self, a: &Crossing, b: &Crossing) -> Ordering {
-        self.compare(a, b)
+    fn ray(&self) -> &Ray {
+        &self.ray
+    }
+
+    #[inline]
+    fn compare(&self, a: &Crossing, b: &Crossing) -> Ordering {
+        if a.axis == b.axis {
+            let order = a.plane.total_cmp(&b.plane);
+            let same = a.plane == b.plane;
+            return match self.ray.direction[a.axis] > 0.0 {
+                _ if same => Ordering::Equal,
+                true => order,
+                false => order.reverse(),
+            };
+        }
+        match apart(a.depth, b.depth) {
+            true if a.depth > b.depth => Ordering::Greater,
+            true => Ordering::Less,
+            false => self.compare_exactly(a, b),
+        }
     }
 
     #[inline(always)]
@@ -67,12 +85,6 @@ impl Probe {
     pub fn new(ray: Ray) -> Probe {
         let inverse = each(ray.direction.to_array(), |d| 1.0 / d);
         Probe { ray, inverse }
-    }
-
-    /// The ray as it was given.
-    #[inline]
-    pub fn ray(&self) -> &Ray {
-        &self.ray
     }
 
     #[inline(always)]
@@ -177,25 +189,6 @@ impl Probe {
             let left = self.crossing(axis, self.entered(&mirrored, axis));
             self.compare(enters, &left).is_gt()
         })
-    }
-
-    /// Which of two crossings of this ray comes first, exactly.
-    #[inline]
-    pub fn compare(&self, a: &Crossing, b: &Crossing) -> Ordering {
-        if a.axis == b.axis {
-            let order = a.plane.total_cmp(&b.plane);
-            let same = a.plane == b.plane;
-            return match self.ray.direction[a.axis] > 0.0 {
-                _ if same => Ordering::Equal,
-                true => order,
-                false => order.reverse(),
-            };
-        }
-        match apart(a.depth, b.depth) {
-            true if a.depth > b.depth => Ordering::Greater,
-            true => Ordering::Less,
-            false => self.compare_exactly(a, b),
-        }
     }
 
     /// `N_a / d_a` against `N_b / d_b`, multiplied by both `d`.

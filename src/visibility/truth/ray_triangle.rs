@@ -85,8 +85,23 @@ impl Along for TriangleProbe {
     type At = Meeting;
 
     #[inline(always)]
-    fn order(&self, a: &Meeting, b: &Meeting) -> Ordering {
-        self.compare(a, b)
+    fn ray(&self) -> &Ray {
+        &self.ray
+    }
+
+    #[inline]
+    fn compare(&self, a: &Meeting, b: &Meeting) -> Ordering {
+        if a.at_most() < b.at_least() {
+            return Ordering::Less;
+        }
+        if b.at_most() < a.at_least() {
+            return Ordering::Greater;
+        }
+        // Walls of two sides are twice in one plane, which the ray meets once.
+        if are_in_one_plane(a.corners, b.corners) {
+            return Ordering::Equal;
+        }
+        self.compare_exactly(a, b)
     }
 
     #[inline(always)]
@@ -113,12 +128,6 @@ impl TriangleProbe {
             far: shift.abs().max_element(),
             ray,
         }
-    }
-
-    /// The ray as it was given.
-    #[inline]
-    pub fn ray(&self) -> &Ray {
-        &self.ray
     }
 
     /// Meeting of the ray and a triangle, if that is from near to far.
@@ -181,22 +190,6 @@ impl TriangleProbe {
             return None;
         }
         Some(meeting)
-    }
-
-    /// Which of two meetings of this ray comes first, exactly.
-    #[inline]
-    pub fn compare(&self, a: &Meeting, b: &Meeting) -> Ordering {
-        if a.at_most() < b.at_least() {
-            return Ordering::Less;
-        }
-        if b.at_most() < a.at_least() {
-            return Ordering::Greater;
-        }
-        // Walls of two sides are twice in one plane, which the ray meets once.
-        if are_in_one_plane(a.corners, b.corners) {
-            return Ordering::Equal;
-        }
-        self.compare_exactly(a, b)
     }
 
     #[cold]

@@ -13,6 +13,7 @@ mod traces;
 mod two_pass;
 mod windows;
 mod worlds;
+mod z_buffer;
 
 use super::{Interleaved, OcclusionBuffer, View};
 use crate::kernel::Kernel;
@@ -20,6 +21,7 @@ use crate::query::ItemId;
 use by_rays::Ready;
 pub use none::NoOcclusion;
 pub use two_pass::TwoPass;
+pub use z_buffer::ZBuffer;
 
 /// Number of cases of a long test: the environment variable, or `cases`.
 ///

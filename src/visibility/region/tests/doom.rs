@@ -63,10 +63,10 @@ fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
     let mut rng = SeededRng::new(1);
     // The near window is some 0.1 wide; right of a linedef is its front.
     for (away, height, place) in [
-        (4.0, 41.0, EyePlace::Inside),
-        (0.01, 41.0, EyePlace::Outside),
-        (-4.0, 41.0, EyePlace::Outside),
-        (4.0, -1.0, EyePlace::Outside),
+        (4.0, 41.0, true),
+        (0.01, 41.0, false),
+        (-4.0, 41.0, false),
+        (4.0, -1.0, false),
     ] {
         let eye = (middle + right * away).extend(floor + height);
         let rays = looking(eye, &mut rng);

@@ -131,11 +131,11 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
     };
     for row in &rows(&graph) {
         let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();
-        assert_eq!(answer(row, level), (EyePlace::Outside, 40));
+        assert_eq!(answer(row, level), (false, 40));
         // The last opening that is not beyond the far plane leads one room on.
         let near = Lens::perspective(60.0, 1.0, 1e-4, Some(9.9)).unwrap();
         let (place, count) = answer(row, near);
-        assert_eq!(place, EyePlace::Inside);
+        assert!(place);
         assert!((10..=12).contains(&count), "{} {count}", row.back_end.name);
     }
 }

@@ -1,64 +1,37 @@
 //! The sixteen-wide tree: sixteen slab tests at once, nearest children first.
 //!
-//! It holds the bounds of bodies. The exact tests of the bodies (`bodies`) decide what the slab
-//! tests in f32 leave open. It is made from the root down: the set of each node is cut by the
-//! surface area heuristic until it has sixteen parts.
-
-mod bodies;
-mod slabs;
+//! It holds the bounds of bodies. The exact tests of the bodies decide what the slab tests in
+//! f32 leave open. It is made from the root down: the set of each node is cut by the surface
+//! area heuristic (16 bins per axis; Wald 2007, "On fast construction of SAH-based bounding
+//! volume hierarchies") until it has sixteen parts.
 
 use std::hint::black_box;
+use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::NotBuilt;
-use super::wide_ray::slabs::{Rows, Slabs};
+use super::slabs::{Rows, Slabs};
 use crate::geometry::Aabb;
 use crate::index::Record;
-use crate::kernel::{Isa, Kernel, LANES, LaneMask};
+use crate::kernel::{Isa, LANES, LaneMask};
 use crate::query::ItemId;
 use crate::visibility::Ray;
-use crate::visibility::sah::{Part, halve};
-
-pub use super::wide_ray::bodies::WideRay;
 
 /// The nodes, some 45 bytes of them a box.
 #[derive(Clone, Debug)]
-struct Tree {
+pub struct RayTree {
     nodes: Vec<Node>,
     root: Child,
     /// World position of the zero of the nodes.
-    zero: DVec3,
+    pub zero: DVec3,
     /// Bounds of all boxes.
     bounds: Aabb,
-    /// Instruction set of the queries.
-    kernel: Kernel,
 }
 
-impl Tree {
-    /// Builds it over boxes relative to a zero. O(n log n).
-    ///
-    /// Returns their ids in tree order; [`Candidates`] get positions in these.
-    fn of(boxes: &[Aabb], zero: DVec3, kernel: Kernel) -> Result<(Tree, Vec<ItemId>), NotBuilt> {
-        // Each node holds at least one box.
-        let (count, most) = (boxes.len(), Child::MOST);
-        if count > most {
-            return Err(NotBuilt(format!("{count} items; expected at most {most}")));
-        }
-        let (nodes, root, ids) = build(boxes);
-        let tree = Tree {
-            nodes,
-            root,
-            zero,
-            bounds: Aabb::union_of(boxes),
-            kernel,
-        };
-        Ok((tree, ids))
-    }
-
+impl RayTree {
     /// The ray for the tests of the nodes; `None` if they do not cover it.
     #[inline(always)]
-    fn slabs(&self, ray: &Ray) -> Option<Slabs> {
+    pub fn slabs(&self, ray: &Ray) -> Option<Slabs> {
         Slabs::of(ray, self.zero, self.bounds.reach())
     }
 
@@ -71,7 +44,7 @@ impl Tree {
     /// "OBBTree", the separating axes that are products of two directions). What is rounded
     /// is below 2^-50 of the largest number here times the direction; 2^-48 of it is added.
     #[inline(always)]
-    fn is_passed_by(&self, ray: &Ray) -> bool {
+    pub fn is_passed_by(&self, ray: &Ray) -> bool {
         let start = ray.origin - self.zero;
         let (min, max) = (self.bounds.min.as_dvec3(), self.bounds.max.as_dvec3());
         let (above, below) = (start.cmpgt(max), start.cmplt(min));
@@ -98,7 +71,7 @@ impl Tree {
     /// Offers every item that the ray can meet no deeper than the candidates'
     /// bound, near ones first as far as the tree tells.
     #[inline(always)]
-    fn search<I: Isa, C: Candidates>(&self, isa: I, slabs: &Slabs, found: &mut C) {
+    pub fn search<I: Isa, C: Candidates>(&self, isa: I, slabs: &Slabs, found: &mut C) {
         // Behind an opaque pointer, so that each node reads the ray's numbers again, which
         // AVX-512 does within the instruction that needs them.
         // Spread over whole vectors ahead of the loop, they are read back from the stack.
@@ -168,7 +141,7 @@ impl Tree {
 }
 
 /// Candidates that a search collects.
-trait Candidates {
+pub trait Candidates {
     /// Nothing deeper than this is wanted.
     fn bound(&self) -> f32;
     /// A box that can be entered from `low` on, and up to what [`Slabs::latest`] says.
@@ -231,33 +204,33 @@ impl Open {
 /// Sixteen boxes: items in the first lanes, nodes in those behind. 448 bytes.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Node {
-    pub rows: Rows,
+struct Node {
+    rows: Rows,
     /// Places of items in tree order, nodes as [`Child`]; of unused lanes any.
-    pub children: [u32; LANES],
+    children: [u32; LANES],
 }
 
 /// A node's number and how many of its first lanes hold items, in 27 and 5 bits:
 /// known before the node is read.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Child(pub u32);
+struct Child(u32);
 
 impl Child {
-    /// Most nodes there can be.
-    pub const MOST: usize = 1 << 27;
-
+    /// # Panics
+    /// With 2^27 nodes, of a billion boxes.
     fn new(node: usize, items: usize) -> Child {
+        assert!(node < 1 << 27, "too many nodes");
         Child((node as u32) << 5 | items as u32)
     }
 
     #[inline(always)]
-    pub fn node(self) -> usize {
+    fn node(self) -> usize {
         (self.0 >> 5) as usize
     }
 
     /// The lanes of items.
     #[inline(always)]
-    pub fn items(self) -> LaneMask {
+    fn items(self) -> LaneMask {
         ((1u32 << (self.0 & 31)) - 1) as LaneMask
     }
 }
@@ -280,38 +253,46 @@ impl Node {
     }
 }
 
-/// Builds the tree. O(n log n).
-///
-/// Returns its nodes, the root first, the root, and the ids of the items in tree order.
-pub(super) fn build(boxes: &[Aabb]) -> (Vec<Node>, Child, Vec<ItemId>) {
-    let mut items = Record::numbered(boxes);
-    let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
-    let mut root = Child::new(0, 0);
-    // Where the number of the node is to be written.
-    let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
-    if !items.is_empty() {
-        open.push((Part::of(&items, 0..items.len()), None));
+impl RayTree {
+    /// Builds the tree over boxes relative to a zero. O(n log n).
+    ///
+    /// Returns their ids in tree order; [`Candidates`] get positions in these.
+    pub fn of(boxes: &[Aabb], zero: DVec3) -> (RayTree, Vec<ItemId>) {
+        let mut items = Record::numbered(boxes);
+        let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
+        let mut root = Child::new(0, 0);
+        // Where the number of the node is to be written.
+        let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
+        if !items.is_empty() {
+            open.push((Part::of(&items, 0..items.len()), None));
+        }
+        while let Some((part, above)) = open.pop() {
+            let at = nodes.len();
+            let mut parts = cut(&mut items, part);
+            parts.sort_by_key(|part| part.len() > 1);
+            let single = parts.iter().filter(|part| part.len() == 1).count();
+            let child = Child::new(at, single);
+            match above {
+                None => root = child,
+                Some((node, lane)) => nodes[node].children[lane] = child.0,
+            }
+            let mut node = EMPTY;
+            for (lane, part) in parts.iter().enumerate() {
+                node.set(lane, &part.bounds, part.range.start as u32);
+            }
+            nodes.push(node);
+            for (lane, part) in parts.into_iter().enumerate().skip(single).rev() {
+                open.push((part, Some((at, lane))));
+            }
+        }
+        let tree = RayTree {
+            nodes,
+            root,
+            zero,
+            bounds: Aabb::union_of(boxes),
+        };
+        (tree, items.iter().map(|item| item.id).collect())
     }
-    while let Some((part, above)) = open.pop() {
-        let at = nodes.len();
-        let mut parts = cut(&mut items, part);
-        parts.sort_by_key(|part| part.len() > 1);
-        let single = parts.iter().filter(|part| part.len() == 1).count();
-        let child = Child::new(at, single);
-        match above {
-            None => root = child,
-            Some((node, lane)) => nodes[node].children[lane] = child.0,
-        }
-        let mut node = EMPTY;
-        for (lane, part) in parts.iter().enumerate() {
-            node.set(lane, &part.bounds, part.range.start as u32);
-        }
-        nodes.push(node);
-        for (lane, part) in parts.into_iter().enumerate().skip(single).rev() {
-            open.push((part, Some((at, lane))));
-        }
-    }
-    (nodes, root, items.iter().map(|item| item.id).collect())
 }
 
 /// Cuts a set into at most sixteen parts: the one with the largest surface
@@ -345,15 +326,83 @@ fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
     parts
 }
 
+const BINS: usize = 16;
+
+/// A part of the items and its bounds.
+struct Part {
+    range: Range<usize>,
+    bounds: Aabb,
+}
+
+impl Part {
+    fn of(items: &[Record], range: Range<usize>) -> Part {
+        Part {
+            bounds: Aabb::union_of(items[range.clone()].iter().map(|item| &item.bounds)),
+            range,
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.range.len()
+    }
+}
+
+/// Orders a set so that its first part, whose length is returned, is one side of
+/// the cheapest cut between bins; by halves where no cut parts the centres.
+fn halve(items: &mut [Record]) -> usize {
+    let centres = items.iter().map(|item| item.bounds.centre());
+    let (low, high) = centres.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), c| {
+        (low.min(c), high.max(c))
+    });
+    let scale = BINS as f32 / (high - low);
+    let bin = |item: &Record, axis: usize| {
+        let along = (item.bounds.centre()[axis] - low[axis]) * scale[axis];
+        (along as usize).min(BINS - 1)
+    };
+    let mut best: Option<(f32, usize, usize)> = None;
+    for axis in (0..3).filter(|&axis| scale[axis].is_finite()) {
+        let mut bins = [(Aabb::EMPTY, 0usize); BINS];
+        for item in items.iter() {
+            let bin = &mut bins[bin(item, axis)];
+            *bin = (bin.0.union(&item.bounds), bin.1 + 1);
+        }
+        // What lies above each cut.
+        let mut above = [(Aabb::EMPTY, 0); BINS];
+        for i in (1..BINS).rev() {
+            let rest = above.get(i).copied().unwrap_or((Aabb::EMPTY, 0));
+            above[i - 1] = (rest.0.union(&bins[i].0), rest.1 + bins[i].1);
+        }
+        let mut below = (Aabb::EMPTY, 0);
+        for i in 0..BINS - 1 {
+            below = (below.0.union(&bins[i].0), below.1 + bins[i].1);
+            let cost =
+                below.0.half_area() * below.1 as f32 + above[i].0.half_area() * above[i].1 as f32;
+            let parts = below.1 > 0 && above[i].1 > 0;
+            if parts && cost.is_finite() && best.is_none_or(|best| cost < best.0) {
+                best = Some((cost, axis, i));
+            }
+        }
+    }
+    let Some((_, axis, last)) = best else {
+        return items.len() / 2;
+    };
+    let mut first = 0;
+    for i in 0..items.len() {
+        if bin(&items[i], axis) <= last {
+            items.swap(first, i);
+            first += 1;
+        }
+    }
+    first
+}
+
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
     use crate::scene::SeededRng;
 
     fn check(boxes: &[Aabb]) -> usize {
-        let (nodes, root, ids) = build(boxes);
+        let (RayTree { nodes, root, .. }, ids) = RayTree::of(boxes, DVec3::ZERO);
         let mut sorted = ids.clone();
         sorted.sort_unstable();
         assert!(sorted.iter().copied().eq(0..boxes.len() as u32));

@@ -53,17 +53,17 @@ const MOST_DEPTH: f64 = 1e38;
 /// Two f32 below and above a depth: one part in 2^24 is lost when they are
 /// rounded, and less than 1e-37 where they underflow. (Infinity has no lower one.)
 #[inline(always)]
-pub(super) fn around(depth: f64) -> [f32; 2] {
+pub fn around(depth: f64) -> [f32; 2] {
     let more = depth.abs() * f64::from(f32::EPSILON) + 1e-37;
     [(depth - more) as f32, (depth + more) as f32]
 }
 
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z.
-pub(super) type Rows = [[f32; LANES]; 6];
+pub type Rows = [[f32; LANES]; 6];
 
 /// A ray's numbers for the slab test.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slabs {
+pub struct Slabs {
     /// Which row is crossed first, and which last, on each axis.
     first: [usize; 3],
     last: [usize; 3],
@@ -77,7 +77,7 @@ pub(super) struct Slabs {
 }
 
 /// Result of the test of sixteen boxes.
-pub(super) struct Tested<I: Isa> {
+pub struct Tested<I: Isa> {
     /// Those that the ray can meet.
     pub lanes: LaneMask,
     /// Less the least depth at which it can enter each.

@@ -1,0 +1,72 @@
+//! The plain depth buffer, a reference for the masked ones.
+
+use super::super::buffer::OcclusionBuffer;
+use super::super::outline::{Coverage, Outline};
+use super::super::rect::Rect;
+use crate::kernel::{Isa, LANES, first_lanes};
+use crate::visibility::{Guarantee, SampleGrid};
+
+/// Nearness at the centre of each pixel; 0 where nothing was drawn.
+#[derive(Clone, Debug)]
+pub struct ZBuffer {
+    grid: SampleGrid,
+    nearness: Vec<f32>,
+}
+
+impl OcclusionBuffer for ZBuffer {
+    const SUMMARY: &'static str =
+        "one depth per pixel, at its centre; every pixel of a box is tested";
+    const GUARANTEE: Guarantee = Guarantee::Unproven;
+    const COVERAGE: Coverage = Coverage::Centre;
+
+    fn new(grid: SampleGrid) -> Self {
+        ZBuffer {
+            grid,
+            nearness: vec![0.0; grid.samples() + LANES],
+        }
+    }
+
+    fn clear(&mut self) {
+        self.nearness.fill(0.0);
+    }
+
+    #[inline(always)]
+    fn draw<I: Isa>(&mut self, _: I, outline: &Outline) {
+        let (width, height) = (self.grid.width as usize, self.grid.height as usize);
+        let nearness = outline.per_tile();
+        let (first, end) = outline.rows();
+        for row in first..end.min(height) {
+            let ([start], [end]) = outline.spans::<1>(row);
+            let (start, end) = (start as usize, (end as usize).min(width));
+            if start >= end {
+                continue;
+            }
+            let pixels = &mut self.nearness[row * width + start..row * width + end];
+            for (i, pixel) in pixels.iter_mut().enumerate() {
+                let [x, y] = [start + i, row].map(|at| at as f32 + 0.5);
+                let near = nearness.within([x, x], [y, y]);
+                *pixel = if near > *pixel { near } else { *pixel };
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool {
+        let width = self.grid.width as usize;
+        let nearness = isa.splat(rect.nearness);
+        let (first, end) = (usize::from(rect.x0), usize::from(rect.x1) + 1);
+        for row in usize::from(rect.y0)..usize::from(rect.y1) + 1 {
+            for column in (first..end).step_by(LANES) {
+                let at = row * width + column;
+                let Some(pixels) = self.nearness[at..].first_chunk() else {
+                    return false;
+                };
+                let passed = isa.at_most(isa.load(pixels), nearness);
+                if passed & first_lanes(end - column) != 0 {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+}
