@@ -14,7 +14,7 @@ use crate::kernel::extend;
 use crate::scene::{Regions, Scene};
 use crate::visibility::{Guarantee, Rays, Row};
 
-/// A potentially visible set: for each region those seen from it, itself among them.
+/// A potentially visible set: regions seen from each region, itself among them.
 ///
 /// One allocation for each region: reading a row of one table with offsets takes half again
 /// as long.

@@ -1,4 +1,4 @@
-//! Exact search along a ray, with the bodies of a scene under a tree of nodes of sixteen.
+//! Exact search along a ray, with bodies under a tree of nodes of sixteen.
 
 use std::cmp::Ordering;
 
