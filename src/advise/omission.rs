@@ -216,30 +216,30 @@ impl Omission {
     }
 }
 
-/// A check with the given ratio and decision of the clock.
 #[cfg(test)]
-pub(super) fn check(ratio: f64, pays: Option<bool>) -> Check {
-    Check {
-        on: "wide".to_owned(),
-        kept_ns: ratio * 100.0,
-        left_out_ns: 100.0,
-        ratio: Some(Estimate::within(ratio, [f64::NAN; 2])),
-        same_answers: true,
-        same_expected: true,
-        kept_excess: None,
-        left_out_excess: None,
-        kept_false_negative_ppm: None,
-        left_out_false_negative_ppm: None,
-        errors: None,
-        judged: 10,
-        pays,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::rule::{Finding, some_rule};
+pub mod tests {
+    use super::super::rule::Finding;
+    use super::super::rule::tests::some_rule;
     use super::*;
+
+    /// A check with the given ratio and decision of the clock.
+    pub fn check(ratio: f64, pays: Option<bool>) -> Check {
+        Check {
+            on: "wide".to_owned(),
+            kept_ns: ratio * 100.0,
+            left_out_ns: 100.0,
+            ratio: Some(Estimate::within(ratio, [f64::NAN; 2])),
+            same_answers: true,
+            same_expected: true,
+            kept_excess: None,
+            left_out_excess: None,
+            kept_false_negative_ppm: None,
+            left_out_false_negative_ppm: None,
+            errors: None,
+            judged: 10,
+            pays,
+        }
+    }
 
     fn settled(by: By, statistic: f64, check: Check) -> Omission {
         let rule = some_rule(LeftOutIf::AtMost, by);

@@ -228,17 +228,21 @@ impl Rule {
     }
 }
 
-/// A rule that enters nothing.
 #[cfg(test)]
-pub fn some_rule(left_out_if: LeftOutIf, by: By) -> Rule {
-    Rule {
-        name: "rule",
-        left_out: "something",
-        feature: "something",
-        is_saving: false,
-        statistic_name: "its size",
-        left_out_if,
-        by,
-        prepare: |_| Ok(Draft::new(Vec::new(), Finding::default())),
+pub mod tests {
+    use super::*;
+
+    /// A rule that enters nothing.
+    pub fn some_rule(left_out_if: LeftOutIf, by: By) -> Rule {
+        Rule {
+            name: "rule",
+            left_out: "something",
+            feature: "something",
+            is_saving: false,
+            statistic_name: "its size",
+            left_out_if,
+            by,
+            prepare: |_| Ok(Draft::new(Vec::new(), Finding::default())),
+        }
     }
 }

@@ -9,10 +9,10 @@ use std::rc::Rc;
 use serde::Serialize;
 
 use super::stage::{Chain, MASKED_INNER, PORTAL_CLIP, StageKind, Z};
-use super::task::{FunnelKey, KeyedTask, KeyedTimes};
+use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::world::{View, World};
-use crate::measure::Ask;
+use crate::measure::OverProcesses;
 use crate::query::ItemId;
 use crate::statistics::{Estimate, flat};
 use crate::visibility::occlusion::{self, FrameTrace, MaskedInner, OccluderScene, OcclusionBuffer};
@@ -43,7 +43,7 @@ impl BoundRow {
         FunnelKey::Bound(self.stage, self.name.to_owned())
     }
 
-    pub(super) fn set(&mut self, chain: &Chain, times: &KeyedTimes) {
+    pub(super) fn set(&mut self, chain: &Chain, times: &OverProcesses<FunnelKey>) {
         let own = self.key();
         self.time = times.ns(&own);
         let bounded = FunnelKey::of_stage(chain, self.stage, self.back_end);
@@ -52,35 +52,22 @@ impl BoundRow {
 }
 
 /// A bound with its task; what the task appends is counted and no answer.
-pub struct Bound<'w> {
-    pub row: BoundRow,
-    ask: Ask<'w>,
-}
+pub type Bound<'w> = (BoundRow, KeyedTask<'w>);
 
-impl<'w> Bound<'w> {
-    fn new(
-        stage: StageKind,
-        [back_end, name]: [&'static str; 2],
-        ask: impl Fn(usize, &mut Vec<ItemId>) + 'w,
-    ) -> Bound<'w> {
-        Bound {
-            row: BoundRow {
-                stage,
-                back_end,
-                name,
-                time: None,
-                ratio: None,
-            },
-            ask: Box::new(ask),
-        }
-    }
-
-    pub fn task(self) -> KeyedTask<'w> {
-        KeyedTask {
-            key: self.row.key(),
-            ask: self.ask,
-        }
-    }
+fn bound<'w>(
+    stage: StageKind,
+    [back_end, name]: [&'static str; 2],
+    ask: impl Fn(usize, &mut Vec<ItemId>) + 'w,
+) -> Bound<'w> {
+    let row = BoundRow {
+        stage,
+        back_end,
+        name,
+        time: None,
+        ratio: None,
+    };
+    let key = row.key();
+    (row, (key, Box::new(ask)))
 }
 
 /// Name of the bound that appends the ids of the covered samples.
@@ -118,7 +105,7 @@ fn of_table<'w>(world: &'w World, row: &'w RegionRow) -> Bound<'w> {
     });
     let homes: Vec<Vec<RegionId>> = homes.collect();
     let name = "read the rows of the eye's regions";
-    Bound::new(StageKind::Region, [STORED_PVS, name], move |view, _| {
+    bound(StageKind::Region, [STORED_PVS, name], move |view, _| {
         for &home in &homes[view] {
             let stored = row.pvs.iter().flat_map(|pvs| pvs.row(home));
             black_box(stored.fold(0, |all, region| all ^ region));
@@ -137,7 +124,7 @@ fn of_portals<'w>(world: &World, row: &RegionRow) -> Bound<'w> {
     };
     let openings: Vec<Vec<Opening>> = world.views().map(seen_openings).collect();
     let name = "read the portals between seen regions";
-    Bound::new(StageKind::Region, [PORTAL_CLIP, name], move |view, _| {
+    bound(StageKind::Region, [PORTAL_CLIP, name], move |view, _| {
         let corners = openings[view].iter().flat_map(|opening| &opening.corners);
         let bits = corners.fold(0, |all, p| {
             all ^ p.x.to_bits() ^ p.y.to_bits() ^ p.z.to_bits()
@@ -178,7 +165,7 @@ fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
     bounds.map(|(name, work)| {
         let traces = traces.clone();
         let buffer = RefCell::new(MaskedInner::new(world.samples));
-        Bound::new(
+        bound(
             StageKind::Occlusion,
             [MASKED_INNER, name],
             move |view, _| {
@@ -196,7 +183,7 @@ fn of_cones<'w>(world: &World, triangles: &TriangleStage) -> Bound<'w> {
         .collect();
     let kernel = world.kernel;
     let names = ["cone-f32-safe", "read the cones"];
-    Bound::new(StageKind::Triangle, names, move |view, _| {
+    bound(StageKind::Triangle, names, move |view, _| {
         black_box(cones[view].read(kernel));
     })
 }
@@ -207,7 +194,7 @@ fn of_fragments<'w>(world: &World, covered: &[u64]) -> Bound<'w> {
     let depths = vec![1.0f32; samples];
     let buffer = RefCell::new(vec![0.0f32; samples]);
     let ids: Vec<ItemId> = (0..samples as ItemId).collect();
-    Bound::new(StageKind::Fragment, [Z, WRITE_COVERED], move |view, out| {
+    bound(StageKind::Fragment, [Z, WRITE_COVERED], move |view, out| {
         let count = covered.get(view).map_or(0, |count| *count);
         out.extend_from_slice(&ids[..count]);
         let buffer = &mut buffer.borrow_mut();

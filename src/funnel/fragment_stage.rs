@@ -17,6 +17,7 @@ use super::triangle_stage::TriangleStage;
 use super::truth::{Truth, ViewCounts, count_items};
 use super::world::{Shape, World};
 use crate::camera::Camera;
+use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
 use crate::visibility::fragment::{
@@ -189,11 +190,12 @@ impl<'w> FragmentStage<'w> {
     }
 
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
-        self.tests().map(move |row| KeyedTask {
-            key: FunnelKey::Stage(StageKind::Fragment, row.name.to_owned()),
-            ask: Box::new(move |view, out| {
+        self.tests().map(move |row| {
+            let ask: Ask = Box::new(move |view, out| {
                 self.draw(row.name, view, out);
-            }),
+            });
+            let key = FunnelKey::Stage(StageKind::Fragment, row.name.to_owned());
+            (key, ask)
         })
     }
 

@@ -172,8 +172,7 @@ impl<'w> ItemStages<'w> {
             let ask: Ask = Box::new(move |view, out| {
                 run(view, input.map(|left| &left[view][..]), out);
             });
-            let key = FunnelKey::Steps(steps.clone());
-            KeyedTask { key, ask }
+            (FunnelKey::Steps(steps.clone()), ask)
         })
     }
 

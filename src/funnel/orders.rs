@@ -15,6 +15,7 @@ use super::item_stages::ItemStages;
 use super::stage::Step;
 use super::task::{FunnelKey, KeyedTask};
 use super::world::World;
+use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::Surfaces;
 use crate::statistics::{Estimate, flat};
@@ -183,14 +184,12 @@ impl Orders {
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         self.rows.iter().enumerate().map(move |(order, row)| {
             let pieces = RefCell::new(Vec::new());
-            KeyedTask {
-                key: FunnelKey::Order(row.name.to_owned()),
-                ask: Box::new(move |view, out| {
-                    let pieces = &mut *pieces.borrow_mut();
-                    self.views[view].sort(order, pieces);
-                    out.extend(pieces.iter().map(|piece| piece.item));
-                }),
-            }
+            let ask: Ask = Box::new(move |view, out| {
+                let pieces = &mut *pieces.borrow_mut();
+                self.views[view].sort(order, pieces);
+                out.extend(pieces.iter().map(|piece| piece.item));
+            });
+            (FunnelKey::Order(row.name.to_owned()), ask)
         })
     }
 

@@ -13,6 +13,7 @@ use super::error::LeftOutRow;
 use super::task::{FunnelKey, KeyedTask, PickQuestion};
 use super::world::{Shape, World};
 use crate::index::caught;
+use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::statistics::{Estimate, flat};
 use crate::visibility::pick::{BACK_ENDS, BackEnd, CursorRectangle, NotBuilt, Pick};
@@ -205,13 +206,13 @@ impl<'w> Picks<'w> {
 
     /// Every row; the ids are the answers at all cursors of a view in turn.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
-        self.pickers.iter().map(move |(row, answer)| KeyedTask {
-            key: row.key(),
-            ask: Box::new(move |view, out| {
+        self.pickers.iter().map(move |(row, answer)| {
+            let ask: Ask = Box::new(move |view, out| {
                 for cursor in &self.cursors[view] {
                     answer(self.world.rays(view), cursor, out);
                 }
-            }),
+            });
+            (row.key(), ask)
         })
     }
 

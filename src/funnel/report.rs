@@ -9,8 +9,9 @@ use super::item_stages::PlanView;
 use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::stage::{BackEnd, Chain, STENCIL, StageKind, default_test};
-use super::task::{FunnelKey, KeyedTimes};
+use super::task::FunnelKey;
 use super::truth::Errors;
+use crate::measure::OverProcesses;
 use crate::shown::{counted, significant, time};
 use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
 use crate::visibility::Level;
@@ -152,7 +153,7 @@ impl StageRow {
         FunnelKey::of_stage(chain, self.back_end.stage, name)
     }
 
-    pub(super) fn set(&mut self, chain: &Chain, times: &KeyedTimes) {
+    pub(super) fn set(&mut self, chain: &Chain, times: &OverProcesses<FunnelKey>) {
         let Some(found) = self.key(chain).and_then(|key| times.ns(&key)) else {
             return;
         };
@@ -216,8 +217,8 @@ impl Gain {
         self.without_count - self.with_count
     }
 
-    pub(super) fn set(&mut self, times: &KeyedTimes) {
-        let [with, without] = self.tasks.each_ref().map(|tasks| times.sums(tasks));
+    pub(super) fn set(&mut self, times: &OverProcesses<FunnelKey>) {
+        let [with, without] = self.tasks.each_ref().map(|tasks| sums(times, tasks));
         (self.with_ns, self.without_ns) = (centre(&with), centre(&without));
         let removed = self.removed();
         if removed > 0.0 {
@@ -231,6 +232,19 @@ impl Gain {
             });
         }
     }
+}
+
+/// Sum of the times of some tasks in each process, ns.
+///
+/// 0 without tasks, empty if one of them has no times.
+fn sums(times: &OverProcesses<FunnelKey>, tasks: &[FunnelKey]) -> Vec<f64> {
+    let logs: Vec<Vec<f64>> = tasks.iter().map(|key| times.ln_ns(key)).collect();
+    let sum = |process: usize| {
+        let parts = logs.iter().map(|own| own.get(process).map(|ln| ln.exp()));
+        parts.sum::<Option<f64>>().map(|sum| sum + 0.0)
+    };
+    let sums: Option<Vec<f64>> = (0..times.processes()).map(sum).collect();
+    sums.unwrap_or_default()
 }
 
 /// The trimmed mean, or below three values the plain one.

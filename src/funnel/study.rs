@@ -212,7 +212,9 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, Fu
     let z = tested.iter().find(|tested| tested.back_end.name == Z);
     let tallies = z.iter().flat_map(|z| &z.tallies);
     let covered: Vec<u64> = tallies.map(|tally| tally.covered).collect();
-    let mut bounds = bounds(&world, &study.triangles, &covered);
+    let (mut bounds, bound_tasks): (Vec<_>, Vec<_>) = bounds(&world, &study.triangles, &covered)
+        .into_iter()
+        .unzip();
     if !input.all {
         bounds.clear();
     }
@@ -246,15 +248,15 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, Fu
         orders,
         picks,
         left_out,
-        bounds: bounds.iter().map(|bound| bound.row.clone()).collect(),
+        bounds,
         conclusions: Vec::new(),
         warnings: input.path.warnings(input.scene),
         plan_view: PlanView::of(&world, &study.items, input.chain, &truth),
     };
     let mut tasks = study.tasks();
-    tasks.extend(bounds.into_iter().map(|bound| bound.task()));
+    tasks.extend(bound_tasks);
     if !input.all {
-        tasks.retain(|task| report.needs(&task.key));
+        tasks.retain(|(key, _)| report.needs(key));
     }
     Ok(Prepared {
         plan: FunnelPlan::new(tasks, world.views.len(), input),
@@ -272,7 +274,7 @@ pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes, Funn
     let covered = plan.expected(&covered_key()).unwrap_or_default();
     let bounds = bounds(&world, &study.triangles, covered).into_iter();
     let mut tasks = study.tasks();
-    tasks.extend(bounds.map(|bound| bound.task()));
+    tasks.extend(bounds.map(|(_, task)| task));
     Ok(plan.time(tasks, input))
 }
 
@@ -292,10 +294,10 @@ impl Prepared {
             .iter_mut()
             .for_each(|row| row.set(chain, &times));
         for row in &mut report.picks {
-            row.set(times.ns(&row.key()));
+            row.set(times.ns(row.key()));
         }
         for row in &mut report.orders {
-            row.time = times.ns(&FunnelKey::Order(row.name.to_owned()));
+            row.time = times.ns(FunnelKey::Order(row.name.to_owned()));
         }
         report.gains.iter_mut().for_each(|gain| gain.set(&times));
         report.conclusions = conclusions(&report);

@@ -161,8 +161,8 @@ impl<'w> Swept<'w> {
 
     fn with_task<'s>(&'s self, point: SweepPoint, run: Run<'s>) -> (SweepPoint, KeyedTask<'s>) {
         let ask: Ask = Box::new(move |view, out| run(view, self.given(view), out));
-        let key = point.key();
-        (point, KeyedTask { key, ask })
+        let task = (point.key(), ask);
+        (point, task)
     }
 
     fn given(&self, view: usize) -> Option<&[ItemId]> {
@@ -197,7 +197,7 @@ pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSw
     };
     let (mut points, mut tasks) = (Vec::new(), Vec::new());
     for (mut point, task) in swept.points() {
-        point.errors = Errors::of(&swept.counts(&point.back_end, &task.ask, &truth));
+        point.errors = Errors::of(&swept.counts(&point.back_end, &task.1, &truth));
         points.push(point);
         tasks.push(task);
     }

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use super::stage::{Chain, NONE, StageKind, Step};
 use super::world::FunnelInput;
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed_to_end};
-use crate::statistics::Estimate;
 
 named! {
     /// A question about a cursor.
@@ -55,12 +54,8 @@ impl FunnelKey {
     }
 }
 
-/// A task of the timed pass.
-pub struct KeyedTask<'w> {
-    pub key: FunnelKey,
-    /// Does the task in a view; the number of appended ids is checked.
-    pub ask: Ask<'w>,
-}
+/// A task of the timed pass; the number of ids that it appends is checked.
+pub type KeyedTask<'w> = (FunnelKey, Ask<'w>);
 
 /// Tasks and schedule of the timed pass, the same for all processes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -79,19 +74,16 @@ impl FunnelPlan {
             ask(view, &mut out);
             out.len() as u64
         };
-        let (keys, tasks): (Vec<_>, Vec<_>) = tasks
-            .into_iter()
-            .map(|KeyedTask { key, ask }| {
-                let expected = (0..views).map(|view| count(&ask, view)).collect();
-                (key, TimedTask::new(expected, ask))
-            })
-            .unzip();
+        let tasks = tasks.into_iter().map(|(key, ask)| {
+            let expected = (0..views).map(|view| count(&ask, view)).collect();
+            (key, TimedTask::new(expected, ask))
+        });
+        let (keys, tasks): (Vec<_>, Vec<_>) = tasks.unzip();
+        let schedule = Schedule::new(views, &tasks, input.protocol);
+        let expected = tasks.into_iter().map(|task| task.expected);
         FunnelPlan {
-            schedule: Schedule::new(views, &tasks, input.protocol),
-            tasks: keys
-                .into_iter()
-                .zip(tasks.into_iter().map(|task| task.expected))
-                .collect(),
+            schedule,
+            tasks: keys.into_iter().zip(expected).collect(),
         }
     }
 
@@ -99,8 +91,7 @@ impl FunnelPlan {
     ///
     /// A planned task that this process does not have fails by its counts.
     pub fn time(&self, tasks: Vec<KeyedTask>, input: &FunnelInput) -> ProcessTimes {
-        let tasks = tasks.into_iter().map(|task| (task.key, task.ask));
-        let mut asks: HashMap<FunnelKey, Ask> = tasks.collect();
+        let mut asks: HashMap<FunnelKey, Ask> = tasks.into_iter().collect();
         let planned = self.tasks.iter().map(|(key, expected)| {
             let ask = asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
             TimedTask::new(expected.clone(), ask)
@@ -116,53 +107,8 @@ impl FunnelPlan {
     }
 
     /// Times of all processes.
-    pub fn times(&self, processes: &[ProcessTimes]) -> KeyedTimes {
+    pub fn times(&self, processes: &[ProcessTimes]) -> OverProcesses<FunnelKey> {
         let keys = self.tasks.iter().map(|(key, _)| key.clone());
-        KeyedTimes {
-            indices: keys.zip(0..).collect(),
-            all: OverProcesses::of(processes),
-        }
-    }
-}
-
-/// Times of the tasks of a plan over the processes.
-pub struct KeyedTimes {
-    indices: HashMap<FunnelKey, usize>,
-    all: OverProcesses,
-}
-
-impl KeyedTimes {
-    /// Time of a view, ns.
-    pub fn ns(&self, key: &FunnelKey) -> Option<Estimate> {
-        self.all.ns(*self.indices.get(key)?)
-    }
-
-    /// Time of a task / time of another.
-    pub fn ratio(&self, key: &FunnelKey, other: &FunnelKey) -> Option<Estimate> {
-        let index = |key| self.indices.get(key).copied();
-        self.all.ratio(index(key)?, index(other)?)
-    }
-
-    /// Returns `true` if the processes show that a task is faster than another.
-    pub fn is_faster(&self, key: &FunnelKey, other: &FunnelKey) -> bool {
-        let both = self.indices.get(key).zip(self.indices.get(other));
-        both.is_some_and(|(own, other)| self.all.is_faster(*own, *other))
-    }
-
-    /// Sum of the times of some tasks in each process, ns.
-    ///
-    /// 0 without tasks, empty if one of them has no times.
-    pub fn sums(&self, keys: &[FunnelKey]) -> Vec<f64> {
-        let logs = keys.iter().map(|key| {
-            let index = self.indices.get(key);
-            index.map_or(Vec::new(), |index| self.all.ln_ns(*index))
-        });
-        let logs: Vec<Vec<f64>> = logs.collect();
-        let sum = |process: usize| {
-            let parts = logs.iter().map(|own| own.get(process).map(|ln| ln.exp()));
-            parts.sum::<Option<f64>>().map(|sum| sum + 0.0)
-        };
-        let sums: Option<Vec<f64>> = (0..self.all.processes()).map(sum).collect();
-        sums.unwrap_or_default()
+        OverProcesses::keyed(keys.collect(), processes)
     }
 }

@@ -15,6 +15,7 @@ use super::truth::ViewCounts;
 use super::world::{Shape, World};
 use crate::camera::Camera;
 use crate::kernel::Kernel;
+use crate::measure::Ask;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::triangle::{
     Clusters, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, facing,
@@ -132,14 +133,15 @@ impl TriangleStage {
     /// Every back end; the ids are of clusters with a triangle left.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         let rows = TRIANGLE_ROWS.iter().enumerate();
-        rows.map(move |(index, row)| KeyedTask {
-            key: FunnelKey::Stage(StageKind::Triangle, row.name.to_owned()),
-            ask: Box::new(move |view, out| {
+        rows.map(move |(index, row)| {
+            let ask: Ask = Box::new(move |view, out| {
                 let kept = self.kept(Some(index), view);
                 let clusters = kept.words().iter().zip(0..);
                 let left = clusters.filter(|(word, _)| **word != 0);
                 out.extend(left.map(|(_, cluster)| cluster));
-            }),
+            });
+            let key = FunnelKey::Stage(StageKind::Triangle, row.name.to_owned());
+            (key, ask)
         })
     }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::error::{FunnelError, check_memory};
-use super::stage::{BackEnd, Chain, NONE, OCCLUSION_ROWS, StageKind, back_ends};
+use super::stage::{BackEnd, Chain, NONE, StageKind, back_ends};
 use crate::camera::{CameraError, PlaneOptions};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
@@ -210,25 +210,33 @@ impl<'a> World<'a> {
 
     /// Back ends of a stage that are compared, each with its name or its structure's.
     pub fn rows(&self, stage: StageKind) -> Vec<(BackEnd, String)> {
-        let is_there = |name: &str| {
-            let regions = self.regions.as_ref();
-            let is_row = || regions.is_some_and(|regions| regions.row(name).is_some());
-            stage != StageKind::Region || name == NONE || is_row()
-        };
-        let rows = self.back_ends(stage).into_iter();
-        let rows = rows.filter(|row| is_there(row.name));
-        let rows = rows.map(|row| (row, row.name.to_owned()));
-        let frustum = ["frustum", "the six-plane test by a structure"];
-        let frustum = BackEnd::new(stage, frustum, Guarantee::Conservative);
-        let built = self.structures.iter();
-        let of_objects = built.filter(|_| stage == StageKind::Object);
-        let structures = of_objects.map(|(label, _)| (frustum, label.clone()));
-        let is_wanted = |(_, name): &(BackEnd, String)| {
-            let only = self.only.as_ref();
-            only.is_none_or(|chain| chain.of(stage) == name)
-        };
-        rows.chain(structures).filter(is_wanted).collect()
+        let labels = self.structures.iter().map(|(label, _)| label);
+        let mut rows = rows(self.back_ends(stage), self.regions.as_ref(), labels);
+        if let Some(chain) = &self.only {
+            rows.retain(|(_, name)| chain.of(stage) == name);
+        }
+        rows
     }
+}
+
+/// The back ends of a stage that a scene has, and for the object stage its structures.
+fn rows<'l>(
+    back_ends: Vec<BackEnd>,
+    regions: Option<&Regions>,
+    labels: impl Iterator<Item = &'l String>,
+) -> Vec<(BackEnd, String)> {
+    let stage = back_ends[0].stage;
+    let is_there = |row: &BackEnd| {
+        let is_row = || regions.is_some_and(|regions| regions.row(row.name).is_some());
+        stage != StageKind::Region || row.name == NONE || is_row()
+    };
+    let there = back_ends.into_iter().filter(is_there);
+    let frustum = ["frustum", "the six-plane test by a structure"];
+    let frustum = BackEnd::new(stage, frustum, Guarantee::Conservative);
+    let structures = labels.filter(|_| stage == StageKind::Object);
+    let structures = structures.map(|label| (frustum, label.clone()));
+    let there = there.map(|row| (row, row.name.to_owned()));
+    there.chain(structures).collect()
 }
 
 /// Views of the path, evenly spread.
@@ -258,21 +266,12 @@ fn views(input: &FunnelInput) -> Result<Vec<View>, FunnelError> {
 
 /// Refuses back ends of the item stages that the scene cannot have.
 fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), FunnelError> {
-    let labels = || input.structures.iter().map(|spec| spec.label.as_str());
     for stage in StageKind::OF_ITEMS {
-        let is_there = |name: &str| match stage {
-            StageKind::Region => regions.is_some_and(|regions| regions.row(name).is_some()),
-            StageKind::Object => labels().any(|label| label == name),
-            _ => OCCLUSION_ROWS.iter().any(|row| row.name == name),
-        };
+        let labels = input.structures.iter().map(|spec| &spec.label);
+        let known = rows(back_ends(stage, input.scene, false), regions, labels);
         let name = input.chain.of(stage);
-        if name != NONE && !is_there(name) {
-            let rows = back_ends(stage, input.scene, false).into_iter();
-            let rows = rows
-                .map(|row| row.name)
-                .filter(|name| *name == NONE || is_there(name));
-            let labels = labels().filter(|_| stage == StageKind::Object);
-            let known: Vec<&str> = rows.chain(labels).collect();
+        if !known.iter().any(|(_, known)| known == name) {
+            let known: Vec<String> = known.into_iter().map(|(_, name)| name).collect();
             return Err(FunnelError::Refused(format!(
                 "{} '{name}' needs what the scene does not have; expected one of {}",
                 stage.name(),

@@ -8,11 +8,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::key::{CellKey, GroupKey};
-use super::{Judged, Metric, Status, Verdict, Workload};
+use super::{Judged, Status, Verdict, Workload};
 use crate::culling::Culling;
 use crate::index::{Kind, Origin};
 use crate::path::{self, CameraFacts};
 use crate::scene::{self, Scene};
+use crate::statistics::Estimate;
 
 /// A structure, or a lower bound, on one scene, path and test.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -88,6 +89,31 @@ pub struct CellTimes {
     pub batch: usize,
     /// Time in each process, ns, by metric.
     pub by_process: BTreeMap<String, Vec<f64>>,
+}
+
+/// A value, with its 95 % interval where it was sampled.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Metric {
+    /// The mean, count or ratio.
+    pub value: f64,
+    /// Lower end of the interval; `None` without one.
+    pub lower: Option<f64>,
+    /// Upper end of the interval; `None` without one.
+    pub upper: Option<f64>,
+    /// Unit, as in `cullbench list metrics`.
+    pub unit: String,
+}
+
+impl Metric {
+    /// Value and interval.
+    pub fn estimate(&self) -> Estimate {
+        Estimate {
+            value: self.value,
+            lower: self.lower,
+            upper: self.upper,
+        }
+    }
 }
 
 impl ReportCell {

@@ -8,8 +8,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::key::Pass;
-use super::progress::Notice;
-use super::{Built, Status, Subject, Verdict, Workload, guarded};
+use super::{Built, Notice, Status, Subject, Verdict, Workload, guarded};
 use crate::culling::CullingTest;
 use crate::index::Kind;
 use crate::query::{ItemId, Located, QueryCost};

@@ -10,12 +10,11 @@ use super::bounds::{BOUNDS, Bound};
 use super::frames::measure_queries_or_frames;
 use super::group::GroupPlan;
 use super::key::{CellKey, GroupKey};
+use super::moving::refitted_ln;
 use super::process_result::{Known, Part, TaskSamples};
-use super::progress::Notice;
-use super::refitted::refitted_ln;
 use super::schedule::cameras_within;
 use super::{
-    Group, Machine, PathInfo, Protocol, SceneInfo, Status, Subject, Verdict, Workload,
+    Group, Machine, Notice, PathInfo, Protocol, SceneInfo, Status, Subject, Verdict, Workload,
     WorkloadError,
 };
 use crate::culling::{Culling, CullingTest};
@@ -111,23 +110,19 @@ impl Plan {
     /// Tests over boxes come before those over spheres, so that structures are built
     /// twice at most.
     pub fn groups_of(&self, scene: &PlannedScene) -> Vec<SceneGroup> {
-        let of_spheres = |c: &&Culling| c.test == CullingTest::Sphere;
-        let (spheres, boxes): (Vec<&Culling>, Vec<&Culling>) =
-            self.cullings.iter().partition(of_spheres);
         let still = [String::new()];
         let motions = match self.motions.is_empty() {
             true => &still[..],
             false => &self.motions[..],
         };
         let mut groups = Vec::new();
-        for cullings in [boxes, spheres] {
+        for of_spheres in [false, true] {
             for path in &scene.paths {
-                for (&cold, motion) in scene
-                    .caches
-                    .iter()
-                    .flat_map(|c| motions.iter().map(move |m| (c, m)))
-                {
-                    groups.extend(cullings.iter().map(|&&culling| SceneGroup {
+                let caches = scene.caches.iter();
+                for (&cold, motion) in caches.flat_map(|c| motions.iter().map(move |m| (c, m))) {
+                    let cullings = self.cullings.iter();
+                    let own = cullings.filter(|c| (c.test == CullingTest::Sphere) == of_spheres);
+                    groups.extend(own.map(|&culling| SceneGroup {
                         path: path.clone(),
                         cold,
                         culling,
@@ -141,13 +136,8 @@ impl Plan {
 
     /// The key of a group of a scene.
     pub fn key(&self, scene: &PlannedScene, group: &SceneGroup) -> GroupKey {
-        let SceneGroup {
-            path,
-            cold,
-            culling,
-            motion,
-        } = group;
-        GroupKey::of(&scene.source, path, *cold, culling, motion)
+        let SceneGroup { path, motion, .. } = group;
+        GroupKey::of(&scene.source, path, group.cold, &group.culling, motion)
     }
 
     /// Keys of all groups, in the order in which they are measured.

@@ -5,22 +5,18 @@
 //! round; the rounds are paired and ordered as those of still scenes. In the first round
 //! every set is compared with the reference scan, in later rounds every size.
 
-use std::collections::BTreeMap;
-
 use super::clock::Stopwatch;
-use super::group::{GroupPlan, counts, measure_part};
+use super::group::{GroupPlan, counts, measure_part, task_part};
 use super::moving::{Frames, Laps, Moving, ageing, lap_ns, replay};
-use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
-use super::progress::{Notice, TIMING};
+use super::process_result::{Known, Part, SubjectPart, TaskSamples};
 use super::schedule::Orders;
 use super::{
-    Counted, GroupKey, KeyedSchedule, Protocol, Sample, Schedule, Status, Subject, TaskKind,
-    TaskPlan, Verdict, Workload, guarded,
+    Counted, KeyedSchedule, Notice, Protocol, Sample, Schedule, Status, Subject, TIMING, TaskKind,
+    TaskPlan, Timed, Verdict, Workload, guarded,
 };
 use crate::index::{StructureSpec, UpdatePolicy};
 use crate::motion::Motion;
 use crate::query::QueryCost;
-use crate::statistics::{interquartile_mean, median};
 
 /// Ageing is measured in every n-th process, because it costs builds.
 const AGES_EVERY: u32 = 4;
@@ -34,17 +30,12 @@ const KINDS: [TaskKind; 4] = [
     TaskKind::Frame,
 ];
 
-/// A structure of the group with its verdict so far.
+/// A structure of the group with its results so far.
 struct Entry<'a> {
     subject: &'a Subject,
-    verdict: Verdict,
-    counted: Counted,
+    part: SubjectPart,
     /// CPU time of one replay in the count pass, ns.
     replay_ns: f64,
-    memory_after: Option<u64>,
-    chose: Option<String>,
-    /// Ids of fat bounds whose items are not visible.
-    false_positives: u64,
     rounds: Vec<Vec<Laps>>,
 }
 
@@ -76,22 +67,20 @@ fn measure_frames(
     let frames = &Frames::new(workload, motion, answered);
     let mut entries = Vec::new();
     for subject in subjects {
+        let verdict = subject.built.as_ref().err().cloned().unwrap_or_default();
         let mut entry = Entry {
             subject,
-            verdict: subject.built.as_ref().err().cloned().unwrap_or_default(),
-            counted: Counted::default(),
+            part: SubjectPart {
+                chose: None,
+                ..SubjectPart::of(subject, verdict)
+            },
             replay_ns: 1.0,
-            memory_after: None,
-            chose: None,
-            false_positives: 0,
             rounds: Vec::new(),
         };
         if answered.is_none() && entry.runs() {
-            notice(Some(&subject.label()), "counting");
-            entry.verdict = guarded(|| entry.count(frames, stop))
-                .unwrap_or_else(Err)
-                .err()
-                .unwrap_or_default();
+            notice(Some(&entry.part.label), "counting");
+            let counted = guarded(|| entry.count(frames, stop));
+            entry.part.verdict = counted.unwrap_or_else(Err).err().unwrap_or_default();
         }
         if stop() {
             return None;
@@ -104,22 +93,24 @@ fn measure_frames(
         time(&mut entries, frames, &planned, &plan, notice, stop)?;
     }
     let (mut tasks, mut samples) = (Vec::new(), Vec::new());
-    let per_round = frames.right.iter().map(|a| a.count).sum::<u64>();
-    for (label, kind) in planned.keys.iter().filter(|_| !plan.plan_only) {
-        let own = entries.iter().find(|e| e.subject.label() == *label);
-        if let Some(entry) = own.filter(|e| e.subject.built.is_ok()) {
-            tasks.push(entry.task(*kind, workload, per_round));
-            samples.push((label.clone(), *kind, entry.samples(*kind, frames)));
+    for key in planned.keys.iter().filter(|_| !plan.plan_only) {
+        let own = entries.iter().find(|entry| entry.part.label == key.0);
+        if let Some(entry) = own.filter(|entry| entry.subject.built.is_ok()) {
+            let timed = entry.timed(key.1, frames);
+            let tail_of = (key.1 == TaskKind::Frame).then_some(1);
+            tasks.push(task_part(key, &timed, &planned.schedule, tail_of));
+            let is_kept = [TaskKind::Frame, TaskKind::Update].contains(&key.1);
+            let kept = timed.ok().filter(|_| is_kept).unwrap_or_default();
+            samples.push((key.0.clone(), key.1, kept.samples));
         }
     }
-    let mut parts: Vec<SubjectPart> = entries.iter().map(|e| e.part(workload)).collect();
     if plan.process.is_multiple_of(AGES_EVERY) && !plan.plan_only {
-        for (entry, part) in entries.iter().zip(&mut parts) {
+        for entry in &mut entries {
             let Subject { spec, is_twin, .. } = entry.subject;
             if entry.runs() && !is_twin && ages(spec) {
-                notice(Some(&part.label), "ageing");
+                notice(Some(&entry.part.label), "ageing");
                 let found = guarded(|| ageing(spec, frames, &plan.protocol, stop));
-                part.ageing_ln = found.unwrap_or_default();
+                entry.part.ageing_ln = found.unwrap_or_default();
             }
         }
         if stop() {
@@ -134,16 +125,9 @@ fn measure_frames(
         lens_scale: workload.lens_scale,
     };
     let part = Part {
-        key: GroupKey::new(&plan.scene.name, &plan.path, workload.culling.test.name()),
-        process: plan.process,
-        scene: plan.scene.clone(),
-        path: plan.path,
-        known: answered.is_none().then_some(known),
-        judged: None,
-        subjects: parts,
-        failed: BTreeMap::new(),
-        bounds: Vec::new(),
+        subjects: entries.into_iter().map(|entry| entry.part).collect(),
         tasks,
+        ..plan.part(workload, answered.is_none().then_some(known))
     };
     Some((part, samples))
 }
@@ -155,13 +139,14 @@ fn ages(spec: &StructureSpec) -> bool {
 
 impl Entry<'_> {
     fn runs(&self) -> bool {
-        self.verdict.status == Status::Ok
+        self.part.verdict.status == Status::Ok
     }
 
     /// Counts and verifies all queries, and measures the time of one replay.
     fn count(&mut self, frames: &Frames, stop: &dyn Fn() -> bool) -> Result<(), Verdict> {
         let mut moving = Moving::build(frames, &self.subject.spec)?;
         let (mut out, mut cost) = (Vec::new(), QueryCost::default());
+        let mut false_positives = 0;
         self.replay_ns = 0.0;
         for frame in 0.. {
             if !moving.take_moves() || stop() {
@@ -181,108 +166,54 @@ impl Entry<'_> {
                 moving.index.query(view.as_any(), &mut out);
                 self.replay_ns += watch.lap().cpu_ns;
                 frames.check(&moving, query, &out)?;
-                self.false_positives += out.len() as u64 - frames.right[query].count;
+                false_positives += out.len() as u64 - frames.right[query].count;
             }
             if self.replay_ns > PATIENCE_NS {
                 let reason = format!("{frame} frames took longer than {} s", PATIENCE_NS / 1e9);
                 return Err(Verdict::new(Status::TimedOut, reason));
             }
         }
-        self.memory_after = Some(moving.index.memory().total() as u64);
-        self.chose = moving.index.chose();
-        self.counted.answers[0] = frames.right.clone();
-        self.counted.costs[0] = cost;
+        let counted = Counted {
+            answers: [frames.right.clone(), Vec::new()],
+            costs: [cost, QueryCost::default()],
+            ..Counted::default()
+        };
+        let mut counts = counts(&counted, frames.workload.scene.items.len());
+        if let UpdatePolicy::Fat(_) = self.subject.spec.policy {
+            let visible = frames.right.iter().map(|answer| answer.count).sum::<u64>();
+            let (extra, queries) = (false_positives as f64, frames.right.len() as f64);
+            counts.insert("false_positive_count".to_owned(), extra / queries);
+            counts.insert("excess".to_owned(), extra / (visible as f64).max(1.0));
+        }
+        self.part.counts = counts;
+        self.part.memory_after_bytes = Some(moving.index.memory().total() as u64);
+        self.part.chose = moving.index.chose();
         Ok(())
     }
 
-    fn part(&self, workload: &Workload) -> SubjectPart {
-        let built = self.subject.built.as_ref().ok();
-        let is_counted = self.runs() && !self.counted.answers[0].is_empty();
-        let counted = || {
-            let mut all = counts(&self.counted, workload.scene.items.len());
-            if let UpdatePolicy::Fat(_) = self.subject.spec.policy {
-                let answers = &self.counted.answers[0];
-                let visible: u64 = answers.iter().map(|answer| answer.count).sum();
-                let extra = self.false_positives as f64;
-                all.insert(
-                    "false_positive_count".to_owned(),
-                    extra / answers.len() as f64,
-                );
-                all.insert("excess".to_owned(), extra / (visible as f64).max(1.0));
-            }
-            all
-        };
-        SubjectPart {
-            label: self.subject.label(),
-            build_ms: built.map(|b| b.build_ms),
-            memory_bytes: built.map(|b| b.memory.total() as u64),
-            memory_after_bytes: self.memory_after,
-            chose: self.chose.clone(),
-            counts: if is_counted {
-                counted()
-            } else {
-                BTreeMap::new()
-            },
-            ..SubjectPart::unknown(&self.subject.spec, self.verdict.clone())
+    /// A sample of a kind of task per frame and round; its ids are those of all views.
+    fn timed(&self, kind: TaskKind, frames: &Frames) -> Result<Timed, Verdict> {
+        if !self.runs() {
+            return Err(self.part.verdict.clone());
         }
-    }
-
-    fn task(&self, kind: TaskKind, workload: &Workload, per_round: u64) -> TaskPart {
-        let of = |laps: &Laps| laps.of(kind, workload);
-        let mean = |laps: &Vec<Laps>| laps.iter().map(of).sum::<f64>() / laps.len() as f64;
-        let frames = self.rounds.first().map_or(0, Vec::len);
-        let of_frame = |frame: usize| {
-            let rounds = self.rounds.iter().map(|round| of(&round[frame]));
-            median(&rounds.collect::<Vec<_>>())
-        };
-        let wall = self.rounds.iter().map(|round| {
-            let wall = round
-                .iter()
-                .map(|laps| laps.wall * of(laps) / laps.of(TaskKind::Frame, workload));
-            (wall.sum::<f64>() / round.len() as f64).ln()
-        });
-        TaskPart {
-            label: self.subject.label(),
-            task: kind,
-            verdict: self.verdict.clone(),
-            rounds_ns: self.rounds.iter().map(mean).collect(),
-            wall_ln_ns: interquartile_mean(&wall.collect::<Vec<_>>()),
-            tail_ns: match kind {
-                TaskKind::Frame => (0..frames).filter_map(of_frame).collect(),
-                _ => Vec::new(),
-            },
-            returned: per_round * self.rounds.len() as u64,
-        }
-    }
-
-    /// A sample per frame and round; its ids are those of all views.
-    fn samples(&self, kind: TaskKind, frames: &Frames) -> Vec<Sample> {
         let workload = frames.workload;
-        let ids = |frame: usize| {
-            frames.right[frame * workload.views_per_frame..]
-                .iter()
-                .take(workload.views_per_frame)
-                .map(|answer| answer.count)
-                .sum()
-        };
-        let all = self
-            .rounds
-            .iter()
-            .zip(0..)
-            .filter(|_| kind == TaskKind::Frame || kind == TaskKind::Update);
-        let of_round = |(round, n): (&Vec<Laps>, u32)| {
-            let frames = round.iter().enumerate();
-            let sample = |(frame, laps): (usize, &Laps)| Sample {
-                round: n,
-                frame: frame as u32,
-                queries: 1,
-                cpu_ns: laps.of(kind, workload),
-                wall_ns: laps.wall * laps.of(kind, workload) / laps.of(TaskKind::Frame, workload),
-                returned: ids(frame),
-            };
-            frames.map(sample).collect::<Vec<_>>()
-        };
-        all.flat_map(of_round).collect()
+        let views = workload.views_per_frame;
+        let mut timed = Timed::default();
+        for (round, laps) in (0..).zip(&self.rounds) {
+            let frames = (0..).zip(frames.right.chunks(views)).zip(laps);
+            timed
+                .samples
+                .extend(frames.map(|((frame, answers), laps)| Sample {
+                    round,
+                    frame,
+                    queries: 1,
+                    cpu_ns: laps.of(kind, workload),
+                    wall_ns: laps.wall * laps.of(kind, workload)
+                        / laps.of(TaskKind::Frame, workload),
+                    returned: answers.iter().map(|answer| answer.count).sum(),
+                }));
+        }
+        Ok(timed)
     }
 }
 
@@ -302,7 +233,7 @@ fn schedule(
             .into_iter()
             .filter(|k| several || *k != TaskKind::Further)
         {
-            keys.push((entry.subject.label(), kind));
+            keys.push((entry.part.label.clone(), kind));
             let every = (rounds / own(entry)) as u32;
             tasks.push(TaskPlan { batch: 1, every });
         }
@@ -332,8 +263,7 @@ fn time(
     for round in 0..planned.schedule.rounds {
         for n in orders.next() {
             let entry = &mut entries[n];
-            let label = entry.subject.label();
-            let own = |key: &(String, TaskKind)| key.0 == label;
+            let own = |key: &(String, TaskKind)| key.0 == entry.part.label;
             let task = planned.keys.iter().position(own);
             let Some(task) = task.filter(|_| entry.runs()) else {
                 continue;
@@ -351,7 +281,7 @@ fn time(
             match laps.unwrap_or_else(Err) {
                 Ok(Some(laps)) => entry.rounds.push(laps),
                 Ok(None) => return None,
-                Err(verdict) => entry.verdict = verdict,
+                Err(verdict) => entry.part.verdict = verdict,
             }
         }
     }

@@ -11,10 +11,9 @@ use super::count::{Counted, count_pass, judge};
 use super::index_under_test::TWIN;
 use super::key::{GroupKey, Pass, TaskKey};
 use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
-use super::progress::{Notice, TIMING};
 use super::{
-    Answer, Judged, KeyedSchedule, PathInfo, Protocol, SceneInfo, Schedule, Status, Subject,
-    TaskKind, Tasks, Timed, TimedTask, Verdict, Workload, guarded, timed,
+    Answer, Judged, KeyedSchedule, Notice, PathInfo, Protocol, SceneInfo, Schedule, Status,
+    Subject, TIMING, TaskKind, Tasks, Timed, TimedTask, Verdict, Workload, guarded, timed,
 };
 use crate::statistics::{interquartile_mean, median};
 
@@ -45,31 +44,35 @@ pub struct GroupPlan<'a> {
     pub locate: bool,
 }
 
-/// A structure under test with its verdict so far.
+impl GroupPlan<'_> {
+    /// The part of this process without results.
+    pub(super) fn part(self, workload: &Workload, known: Option<Known>) -> Part {
+        Part {
+            key: GroupKey::new(&self.scene.name, &self.path, workload.culling.test.name()),
+            process: self.process,
+            scene: self.scene.clone(),
+            path: self.path,
+            known,
+            judged: None,
+            subjects: Vec::new(),
+            failed: BTreeMap::new(),
+            bounds: Vec::new(),
+            tasks: Vec::new(),
+        }
+    }
+}
+
+/// A structure under test with its results so far.
 struct Entry<'a> {
     subject: &'a Subject,
-    verdict: Verdict,
+    part: SubjectPart,
     /// Answers and costs; in the first process only.
     counted: Option<Counted>,
 }
 
 impl Entry<'_> {
     fn runs(&self) -> bool {
-        self.verdict.status == Status::Ok
-    }
-
-    fn part(&self, workload: &Workload) -> SubjectPart {
-        let built = self.subject.built.as_ref().ok();
-        let counted = self.counted.as_ref().filter(|_| self.runs());
-        SubjectPart {
-            label: self.subject.label(),
-            build_ms: built.map(|b| b.build_ms),
-            memory_bytes: built.map(|b| b.memory.total() as u64),
-            update_ms: built.map(|b| b.update_ms.clone()).unwrap_or_default(),
-            chose: built.and_then(|b| b.items.chose()),
-            counts: counted.map_or_else(BTreeMap::new, |c| counts(c, workload.scene.items.len())),
-            ..SubjectPart::unknown(&self.subject.spec, self.verdict.clone())
-        }
+        self.part.verdict.status == Status::Ok
     }
 }
 
@@ -87,10 +90,13 @@ pub fn measure_part(
     let (mut entries, judged) = match answered {
         None => count(workload, subjects, notice),
         Some(known) => {
-            let entry = |subject| Entry {
-                subject,
-                verdict: compare_digests(subject, workload, known, notice),
-                counted: None,
+            let entry = |subject| {
+                let verdict = compare_digests(subject, workload, known, notice);
+                Entry {
+                    subject,
+                    part: SubjectPart::of(subject, verdict),
+                    counted: None,
+                }
             };
             (subjects.iter().map(entry).collect(), None)
         }
@@ -130,10 +136,13 @@ pub fn measure_part(
         let alone = alone.filter(|((_, kind), _)| *kind != TaskKind::Views);
         let largest = alone.map(|(_, task)| task.batch).max().unwrap_or(1) as usize;
         for (key, result) in keyed.keys().iter().zip(timed) {
+            let groups = schedule.cameras.len().div_ceil(largest);
+            let has_tail = key.1 == TaskKind::Query && groups >= LEAST_TAIL;
+            let largest = has_tail.then_some(largest);
             tasks.push(task_part(key, &result, &schedule, largest));
-            let mut own = entries.iter_mut().filter(|e| e.subject.label() == key.0);
+            let mut own = entries.iter_mut().filter(|e| e.part.label == key.0);
             if let (Err(verdict), Some(entry)) = (&result, own.next()) {
-                entry.verdict = verdict.clone();
+                entry.part.verdict = verdict.clone();
             }
             let own = result.map(|timed| timed.samples).unwrap_or_default();
             samples.push((key.0.clone(), key.1, own));
@@ -153,16 +162,11 @@ pub fn measure_part(
         lens_scale: workload.lens_scale,
     };
     let part = Part {
-        key: GroupKey::new(&plan.scene.name, &plan.path, workload.culling.test.name()),
-        process: plan.process,
-        scene: plan.scene.clone(),
-        path: plan.path,
-        known: answered.is_none().then_some(known),
         judged,
-        subjects: entries.iter().map(|e| e.part(workload)).collect(),
-        failed: BTreeMap::new(),
+        subjects: entries.into_iter().map(|entry| entry.part).collect(),
         bounds,
         tasks,
+        ..plan.part(workload, answered.is_none().then_some(known))
     };
     Some((part, samples))
 }
@@ -222,30 +226,24 @@ fn add_bounds<'a>(
     names
 }
 
-/// The times of a task, from its samples.
-///
-/// `largest` is the largest batch of all tasks that do not share views.
-fn task_part(
+/// The times of a task, from its samples; a tail of groups of `largest` cameras.
+pub(super) fn task_part(
     key: &TaskKey,
     result: &Result<Timed, Verdict>,
     schedule: &Schedule,
-    largest: usize,
+    largest: Option<usize>,
 ) -> TaskPart {
     let nothing = Timed::default();
     let timed = result.as_ref().unwrap_or(&nothing);
     let wall = timed.round_means(|s| s.wall_ns).into_iter().map(f64::ln);
-    let has_tail =
-        key.1 == TaskKind::Query && schedule.cameras.len().div_ceil(largest) >= LEAST_TAIL;
+    let tail_ns = largest.map(|largest| tail(timed, largest, schedule));
     TaskPart {
         label: key.0.clone(),
         task: key.1,
         verdict: result.as_ref().err().cloned().unwrap_or_default(),
         rounds_ns: timed.round_means(|s| s.cpu_ns),
         wall_ln_ns: interquartile_mean(&wall.collect::<Vec<_>>()),
-        tail_ns: match has_tail {
-            true => tail(timed, largest, schedule),
-            false => Vec::new(),
-        },
+        tail_ns: tail_ns.unwrap_or_default(),
         returned: timed.samples.iter().map(|s| s.returned).sum(),
     }
 }
@@ -292,12 +290,15 @@ fn count<'a>(
         _ => None,
     };
     let entries = subjects.iter().zip(counted).map(|(subject, counted)| {
-        let own = of_all
-            .clone()
-            .filter(|_| counted.verdict.status == Status::Ok);
+        let is_ok = counted.verdict.status == Status::Ok;
+        let verdict = of_all.clone().filter(|_| is_ok);
+        let verdict = verdict.unwrap_or_else(|| counted.verdict.clone());
         Entry {
             subject,
-            verdict: own.unwrap_or_else(|| counted.verdict.clone()),
+            part: SubjectPart {
+                counts: counts(&counted, workload.scene.items.len()),
+                ..SubjectPart::of(subject, verdict)
+            },
             counted: Some(counted),
         }
     });

@@ -3,10 +3,9 @@
 //! No other structure warms its data. Times the build; a panic becomes a verdict.
 
 use super::clock::Stopwatch;
-use super::guarded::guarded;
 use super::key::Pass;
 use super::update::measure_updates;
-use super::{Status, Verdict, Workload, input_of};
+use super::{Status, Verdict, Workload, guarded, input_of};
 use crate::culling::CullingTest;
 use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec};
 use crate::query::{ItemId, QueryCost};

@@ -24,11 +24,11 @@
 //! | `task`, `schedule` | one timed task; a keyed list of them; their schedule and order |
 //! | `timing`, `clock` | timed pass, cold caches; clocks |
 //! | `frames`, `moving` | groups whose items move: update and queries, frame by frame |
-//! | `update`, `refitted`, `bounds` | updates of moved items; lower bounds |
+//! | `update`, `bounds` | updates of moved items; lower bounds |
 //! | `results`, `cell`, `metrics` | cells of a report from parts |
 //! | `shared_work` | gain from threads |
 //! | `over_processes` | times of a study's tasks over several processes |
-//! | `guarded`, `progress`, `environment` | panics as verdicts; progress; machine and toolchain |
+//! | `environment` | machine and toolchain |
 
 mod bounds;
 mod cell;
@@ -38,15 +38,12 @@ mod environment;
 mod experiment;
 mod frames;
 mod group;
-mod guarded;
 mod index_under_test;
 mod key;
 mod metrics;
 mod moving;
 mod over_processes;
 mod process_result;
-mod progress;
-mod refitted;
 mod results;
 mod schedule;
 mod shared_work;
@@ -57,10 +54,11 @@ mod workload;
 
 use serde::{Deserialize, Serialize};
 
+use crate::index::caught;
 use crate::verify::Fault;
 
 pub use bounds::{BOUNDS, Bound, Material};
-pub use cell::{CellTimes, PathInfo, ReportCell, SamplesRef, SceneInfo};
+pub use cell::{CellTimes, Metric, PathInfo, ReportCell, SamplesRef, SceneInfo};
 pub use clock::{Lap, Stopwatch};
 #[cfg(feature = "cli")]
 pub(crate) use count::blamed;
@@ -72,13 +70,11 @@ pub use experiment::{
 };
 pub use frames::measure_queries_or_frames;
 pub use group::{GroupPlan, NO_ITEMS, measure_part};
-pub use guarded::guarded;
 pub use index_under_test::{Built, Subject};
 pub use key::{CellKey, GroupKey, TaskKey, TaskKind};
-pub use metrics::{METRICS, Metric, MetricInfo};
+pub use metrics::{METRICS, MetricInfo};
 pub use over_processes::{OverProcesses, ProcessTimes};
 pub use process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
-pub use progress::{Notice, TIMING};
 pub use results::{Group, YARDSTICK};
 pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, Tasks, cameras_within};
 pub use shared_work::SharedWork;
@@ -153,3 +149,16 @@ impl Verdict {
         }
     }
 }
+
+/// Runs code of a structure; a panic becomes [`Status::Panicked`] with its message.
+pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Verdict> {
+    caught(work).map_err(|text| Verdict::new(Status::Panicked, format!("panicked: {text}")))
+}
+
+/// Step that is reported at every turn of a timed pass.
+pub const TIMING: &str = "timing";
+
+/// Callback that gets each step of a process, for progress and time limits.
+///
+/// Its arguments are the structure, `None` for steps without one, and the step.
+pub type Notice<'n> = &'n dyn Fn(Option<&str>, &str);

@@ -12,7 +12,8 @@ use crate::index::{Kind, Origin, StructureSpec};
 
 use super::key::{Pass, TaskKey};
 use super::{
-    Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, TaskKind, Verdict,
+    Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, Subject,
+    TaskKind, Verdict,
 };
 
 /// Results of one process for one group of cells.
@@ -131,6 +132,24 @@ impl Known {
 }
 
 impl SubjectPart {
+    /// The results of a structure before its queries.
+    pub(super) fn of(subject: &Subject, verdict: Verdict) -> SubjectPart {
+        let part = SubjectPart {
+            label: subject.label(),
+            ..SubjectPart::unknown(&subject.spec, verdict)
+        };
+        match &subject.built {
+            Err(_) => part,
+            Ok(built) => SubjectPart {
+                build_ms: Some(built.build_ms),
+                memory_bytes: Some(built.memory.total() as u64),
+                update_ms: built.update_ms.clone(),
+                chose: built.items.chose(),
+                ..part
+            },
+        }
+    }
+
     /// The results of a structure that was not tried.
     pub fn unknown(spec: &StructureSpec, verdict: Verdict) -> SubjectPart {
         SubjectPart {

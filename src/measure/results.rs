@@ -8,48 +8,15 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::bounds::BOUNDS;
 use super::group::LEAST_TAIL;
 use super::index_under_test::TWIN;
-use super::metrics::{METRICS, Metrics, WALL_METRICS};
-use super::moving::AGES;
+use super::metrics::{METRICS, MetricInfo, Of};
 use super::process_result::{Known, Part, SubjectPart, TaskPart};
 use super::update::MOST_UPDATED;
-use super::{CellTimes, Judged, ReportCell, Status, TaskKind, UPDATE_SHARES, Verdict};
+use super::{CellTimes, Judged, Metric, ReportCell, Status, TaskKind, Verdict};
 use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted, speedup,
 };
-
-/// Metrics of updates, in the order of [`UPDATE_SHARES`].
-const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
-    "update_ms_0_1_percent",
-    "update_ms",
-    "update_ms_10_percent",
-    "update_ms_100_percent",
-];
-
-/// Metrics of each task: its time, and its speed-up over the yardstick.
-/// The last speed-up counts: that of whole frames where items move.
-const TIME_METRICS: [(TaskKind, &str, Option<&str>); 7] = [
-    (TaskKind::Query, "query_ns", Some("speedup")),
-    (TaskKind::Locate, "locate_ns", Some("locate_speedup")),
-    (TaskKind::LocateBatched, "locate_batched_ns", None),
-    (TaskKind::Views, "views_ns", None),
-    (TaskKind::Update, "update_ns", None),
-    (TaskKind::Further, "further_query_ns", None),
-    (TaskKind::Frame, "frame_ns", Some("speedup")),
-];
-
-/// Metrics of ageing, in the order of [`AGES`].
-const AGE_METRICS: [&str; AGES.len()] = ["ageing_1", "ageing_10", "ageing_100", "ageing_1000"];
-
-/// Metrics that are quantiles over groups of cameras, each with its quantile.
-const TAIL_METRICS: [(&str, f64); 4] = [
-    ("query_ns_p5", 0.05),
-    ("query_ns_p95", 0.95),
-    ("query_ns_p99", 0.99),
-    ("query_ns_max", 1.0),
-];
 
 /// Label of the structure that speed-ups refer to.
 pub const YARDSTICK: &str = "linear";
@@ -78,13 +45,15 @@ impl Group {
         let subjects = first.subjects.iter();
         let mut cells: Vec<ReportCell> = subjects
             .filter(|s| !s.label.ends_with(TWIN))
-            .map(|subject| merged.cell(subject))
+            .map(|subject| merged.cell(&subject.label, Some(subject)))
             .collect();
         for (i, rank) in merged.ranks(&cells) {
             cells[i].rank = Some(rank);
         }
+        let bounds = first.bounds.iter();
+        let bounds = bounds.map(|name| merged.cell(name, None));
         Group {
-            bounds: first.bounds.iter().map(|name| merged.bound(name)).collect(),
+            bounds: bounds.collect(),
             twin: merged.twin(),
             cells,
         }
@@ -211,70 +180,33 @@ impl<'p> MergedParts<'p> {
         Some(visible / cameras.len() as f64)
     }
 
-    /// The cell of a structure, its rank excluded.
-    fn cell(&self, subject: &SubjectPart) -> ReportCell {
-        let label = subject.label.as_str();
-        let verdict = self.verdict(label);
-        let right = verdict.status == Status::Ok;
-        let judged = self.parts[0]
-            .judged
-            .filter(|_| right || verdict.status == Status::Unsafe);
-        let mut metrics = Metrics::default();
-        self.build_metrics(&mut metrics, label);
-        if let Some(judged) = &judged {
-            error_metrics(&mut metrics, judged);
-        }
-        let mut left_out = Vec::new();
-        if right {
-            // Listed metrics only: a stream may hold others.
-            for metric in METRICS {
-                metrics.set(metric.name, subject.counts.get(metric.name).copied());
-            }
-            self.time_metrics(&mut metrics, label);
-            metrics.set("break_even_queries", self.break_even(label));
-            for bound in BOUNDS {
-                metrics.estimate(bound.ratio, self.ratio(label, bound.name));
-            }
-            left_out = self.left_out(label);
-        }
-        ReportCell {
-            kind: Some(subject.kind),
-            origin: Some(subject.origin.clone()),
-            params: subject.params.clone(),
-            error: judged,
-            left_out,
-            chose: self.subjects(label).find_map(|s| s.chose.clone()),
-            ..self.timed(label, verdict, metrics)
-        }
-    }
-
-    /// The cell of a lower bound.
-    fn bound(&self, name: &str) -> ReportCell {
-        let mut metrics = Metrics::default();
-        self.time_metrics(&mut metrics, name);
-        self.timed(name, self.verdict(name), metrics)
-    }
-
-    /// A cell with the fields that structures and lower bounds have in common.
-    fn timed(&self, label: &str, verdict: Verdict, metrics: Metrics) -> ReportCell {
+    /// The cell of a structure, its rank excluded, or of a lower bound.
+    fn cell(&self, label: &str, subject: Option<&SubjectPart>) -> ReportCell {
         let first = &self.parts[0];
+        let verdict = self.verdict(label);
+        let is_right = verdict.status == Status::Ok;
+        let is_answered = is_right || verdict.status == Status::Unsafe;
+        let judged = subject.and(first.judged).filter(|_| is_answered);
         ReportCell {
             scene: first.scene.clone(),
             path: first.path.clone(),
             structure: label.to_owned(),
-            kind: None,
-            origin: None,
-            params: Value::Null,
+            kind: subject.map(|subject| subject.kind),
+            origin: subject.map(|subject| subject.origin.clone()),
+            params: subject.map_or(Value::Null, |subject| subject.params.clone()),
             test: first.key.test.clone(),
             status: verdict.status,
             reason: verdict.reason,
             rank: None,
             times: self.times(label),
-            metrics: metrics.0,
-            error: None,
-            left_out: Vec::new(),
+            metrics: self.metrics(label, subject, judged.as_ref(), is_right),
+            error: judged,
+            left_out: match subject {
+                Some(_) if is_right => self.left_out(label),
+                _ => Vec::new(),
+            },
             samples_ref: None,
-            chose: None,
+            chose: self.subjects(label).find_map(|s| s.chose.clone()),
         }
     }
 
@@ -309,9 +241,12 @@ impl<'p> MergedParts<'p> {
         });
         let (batch, cameras_timed) = planned.unwrap_or_default();
         let mut by_process = BTreeMap::new();
-        for (task, metric, _) in TIME_METRICS {
-            if let Some(own) = self.ln_ns(label, task) {
-                by_process.insert(metric.to_owned(), own.iter().map(|x| x.exp()).collect());
+        for metric in METRICS {
+            if let Of::Time(task) = metric.of
+                && let Some(own) = self.ln_ns(label, task)
+            {
+                let ns = own.iter().map(|x| x.exp()).collect();
+                by_process.insert(metric.name.to_owned(), ns);
             }
         }
         let builds: Vec<f64> = self.subjects(label).filter_map(|s| s.build_ms).collect();
@@ -339,57 +274,74 @@ impl<'p> MergedParts<'p> {
         one_run(&logs, &logs)
     }
 
-    fn build_metrics(&self, metrics: &mut Metrics, label: &str) {
-        metrics.estimate("build_ms", self.over_processes(label, |s| s.build_ms));
-        for (share, name) in UPDATE_METRICS.into_iter().enumerate() {
-            let update = self.over_processes(label, |s| s.update_ms.get(share).copied());
-            metrics.estimate(name, update);
-        }
-        let refitted: Vec<f64> = self.subjects(label).filter_map(|s| s.refitted_ln).collect();
-        metrics.estimate("refitted_over_rebuilt", one_run(&refitted, &refitted));
-        for (age, name) in AGES.iter().zip(AGE_METRICS) {
-            let own = self.subjects(label).filter_map(|s| s.ageing_ln.get(age));
-            let own: Vec<f64> = own.copied().collect();
-            metrics.estimate(name, one_run(&own, &own));
-        }
+    /// Metrics of a structure or, without `subject`, of a lower bound.
+    ///
+    /// Where the answers are not right, of errors, builds and memory only. A missing or
+    /// infinite value is absent, never 0 and never NaN.
+    fn metrics(
+        &self,
+        label: &str,
+        subject: Option<&SubjectPart>,
+        judged: Option<&Judged>,
+        is_right: bool,
+    ) -> BTreeMap<String, Metric> {
         let items = self.parts[0].scene.total_count as f64;
-        let bytes = self.subjects(label).find_map(|s| s.memory_bytes);
-        let after = self.subjects(label).find_map(|s| s.memory_after_bytes);
-        for (name, bytes) in [
-            ("memory_bytes_per_item", bytes),
-            ("memory_after_bytes_per_item", after),
-        ] {
-            metrics.set(name, bytes.map(|bytes| bytes as f64 / items));
-        }
-    }
-
-    fn time_metrics(&self, metrics: &mut Metrics, label: &str) {
-        for (task, time, faster) in TIME_METRICS {
-            let Some([reference, own]) = self.paired(label, task) else {
-                continue;
+        let counted = |name: &str| {
+            let count = subject.filter(|_| is_right)?.counts.get(name)?;
+            Some(Estimate::exact(*count))
+        };
+        let logs = |own: Vec<f64>| one_run(&own, &own);
+        let value = |info: &MetricInfo| match info.of {
+            Of::Judged(of) => counted(info.name).or_else(|| of(judged?)),
+            Of::Process(of) => self.over_processes(label, of),
+            Of::Log(of) => logs(self.subjects(label).filter_map(of).collect()),
+            Of::Bytes(of) => {
+                let bytes = self.subjects(label).find_map(of)?;
+                Some(Estimate::exact(bytes as f64 / items))
+            }
+            _ if !is_right && subject.is_some() => None,
+            Of::Count => counted(info.name),
+            Of::Time(task) => self.ns(label, task),
+            Of::TimePerVisible => {
+                let ns = self.ns(label, TaskKind::Query)?;
+                Some(ns.per(self.visible_when_timed()?))
+            }
+            Of::Wall(task) => {
+                let tasks = self.tasks(label, task);
+                logs(tasks.filter_map(|task| task.wall_ln_ns).collect())
+            }
+            Of::Tail(q) => {
+                let all = self.tail(label, TaskKind::Query);
+                let all = Some(all).filter(|all| all.len() >= LEAST_TAIL)?;
+                quantile(&all, q).map(Estimate::exact)
+            }
+            Of::WorstFrame => {
+                let frames = self.tail(label, TaskKind::Frame);
+                frames.last().copied().map(Estimate::exact)
+            }
+            Of::Speedup(task) => {
+                let [yardstick, own] = self.paired(label, task.unwrap_or(self.ranked()))?;
+                speedup(yardstick, own).filter(|_| self.has_yardstick())
+            }
+            Of::Over(bound) => subject.and_then(|_| self.ratio(label, bound)),
+            Of::BreakEven => self.break_even(label).map(Estimate::exact),
+        };
+        let found = METRICS.iter().filter_map(|info| {
+            let Estimate {
+                value,
+                lower,
+                upper,
+            } = value(info).filter(|found| found.value.is_finite())?;
+            let unit = info.unit.to_owned();
+            let metric = Metric {
+                value,
+                lower,
+                upper,
+                unit,
             };
-            let ns = one_run(reference, own);
-            metrics.estimate(time, ns);
-            if task == TaskKind::Query {
-                let visible = self.visible_when_timed();
-                metrics.estimate("ns_per_visible", ns.zip(visible).map(|(ns, v)| ns.per(v)));
-            }
-            if let Some(faster) = faster.filter(|_| self.has_yardstick()) {
-                metrics.estimate(faster, speedup(reference, own));
-            }
-        }
-        for (name, task) in WALL_METRICS {
-            let tasks = self.tasks(label, task);
-            let wall: Vec<f64> = tasks.filter_map(|t| t.wall_ln_ns).collect();
-            metrics.estimate(name, one_run(&wall, &wall));
-        }
-        let all = self.tail(label, TaskKind::Query);
-        let all = &all[..if all.len() < LEAST_TAIL { 0 } else { all.len() }];
-        for (name, q) in TAIL_METRICS {
-            metrics.set(name, quantile(all, q));
-        }
-        let worst = self.tail(label, TaskKind::Frame).last().copied();
-        metrics.set("worst_frame_ns", worst);
+            Some((info.name.to_owned(), metric))
+        });
+        found.collect()
     }
 
     /// Median times of each group of cameras or each frame, ns, ascending.
@@ -440,29 +392,6 @@ impl<'p> MergedParts<'p> {
         let (positions, values): (Vec<usize>, Vec<Vec<f64>>) = timed.unzip();
         positions.into_iter().zip(ranks(&values, ALPHA)).collect()
     }
-}
-
-fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
-    let (errors, queries) = (&judged.errors, judged.judged_queries as f64);
-    metrics.set("judged_queries", queries);
-    let interval = judged.excess_interval;
-    metrics.estimate(
-        "excess",
-        errors.excess().map(|value| Estimate {
-            value,
-            lower: interval.map(|ends| ends[0]),
-            upper: interval.map(|ends| ends[1]),
-        }),
-    );
-    for (name, count) in [
-        ("false_positive_count", errors.false_positives),
-        ("false_negative_count", errors.false_negatives),
-        ("touch_dropped_count", errors.touch_dropped),
-        ("undecided_count", errors.undecided),
-    ] {
-        metrics.set(name, count as f64 / queries);
-    }
-    metrics.set("worst_miss", errors.worst_miss);
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::clock::Stopwatch;
-use super::guarded::guarded;
+use super::guarded;
 use super::task::TimedTask;
 use crate::query::ItemId;
 use crate::scene::SeededRng;

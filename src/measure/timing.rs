@@ -9,10 +9,9 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::clock::Stopwatch;
-use super::guarded::guarded;
 use super::schedule::{Orders, Protocol, Schedule};
 use super::task::TimedTask;
-use super::{Status, Verdict};
+use super::{Status, Verdict, guarded};
 use crate::query::ItemId;
 use crate::statistics::interquartile_mean;
 
@@ -133,7 +132,7 @@ pub fn timed(
         let batch = |task: usize| schedule.tasks[task].batch as usize;
         if let Some(cold) = &mut cold {
             for first in 0..schedule.cameras.len() {
-                cold.sweep.over_caches();
+                cold.sweep_over_caches();
                 // The first task after the sweep finds the view cold as well:
                 // a new order for each camera.
                 for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
@@ -235,46 +234,36 @@ const SLACK: usize = 64;
 ///
 /// One sweep serves one query of every task: each task has its own data, which no other
 /// query loads into the caches, and its own output.
-pub(super) struct Cold {
-    pub(super) sweep: Sweep,
+struct Cold {
+    /// Memory larger than the last cache, overwritten between cold queries.
+    sweep: Vec<u64>,
     /// An output per task.
-    pub(super) outs: Vec<Vec<ItemId>>,
+    outs: Vec<Vec<ItemId>>,
 }
 
 impl Cold {
     /// Allocates the sweep, and outputs of their final size.
     ///
     /// A query that runs once per sweep must not pay for the growth of its output.
-    pub(super) fn new(protocol: &Protocol, tasks: &[TimedTask]) -> Cold {
-        let most = |c: &TimedTask| c.expected.iter().copied().max().unwrap_or(0) as usize;
+    fn new(protocol: &Protocol, tasks: &[TimedTask]) -> Cold {
+        let out = |task: &TimedTask| {
+            let most = task.expected.iter().copied().max().unwrap_or(0) as usize;
+            let mut out = vec![0; most + SLACK];
+            out.clear();
+            out
+        };
         Cold {
-            sweep: Sweep::new(protocol.cache_bytes),
-            outs: tasks
-                .iter()
-                .map(|c| {
-                    let mut out = vec![0; most(c) + SLACK];
-                    out.clear();
-                    out
-                })
-                .collect(),
+            sweep: vec![1; protocol.cache_bytes / size_of::<u64>()],
+            outs: tasks.iter().map(out).collect(),
         }
     }
-}
 
-/// Memory larger than the last cache, overwritten between cold queries.
-pub(super) struct Sweep(Vec<u64>);
-
-impl Sweep {
-    fn new(bytes: usize) -> Self {
-        Sweep(vec![1; bytes / size_of::<u64>()])
-    }
-
-    pub(super) fn over_caches(&mut self) {
+    fn sweep_over_caches(&mut self) {
         // Written, not only read: shared zero pages would stay in one line.
-        for line in self.0.chunks_mut(8) {
+        for line in self.sweep.chunks_mut(8) {
             line[0] = line[0].wrapping_add(1);
         }
-        std::hint::black_box(&self.0);
+        std::hint::black_box(&self.sweep);
     }
 }
 

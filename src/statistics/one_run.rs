@@ -21,6 +21,11 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// A value without an interval.
+    pub fn exact(value: f64) -> Estimate {
+        Estimate::within(value, [f64::NAN; 2])
+    }
+
     /// An estimate with an interval if both ends are finite.
     pub fn within(value: f64, [lower, upper]: [f64; 2]) -> Estimate {
         let ends = Some((lower, upper)).filter(|(l, u)| l.is_finite() && u.is_finite());

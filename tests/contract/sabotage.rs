@@ -333,10 +333,10 @@ fn every_fault_is_caught_and_every_property_catches_one() {
     }
     let faults = faults! {
         DROPS_AN_ITEM: "reference_set_on_edge_scenes", "reference_set_on_random_cases",
-            "reference_set_on_generated_scenes", "inside_means_all_and_outside_none";
-        RETURNS_ONE_TWICE: "each_id_comes_once", "reference_set_on_generated_scenes";
+            "reference_set_on_generated_scenes";
+        RETURNS_ONE_TWICE: "reference_set_on_generated_scenes";
         STALE_NODES_AFTER_REFIT: "refit_equals_a_fresh_build";
-        LEAF_ENDS_ONE_EARLY: "reference_set_on_edge_scenes", "order_of_items_changes_nothing";
+        LEAF_ENDS_ONE_EARLY: "reference_set_on_edge_scenes", "reference_set_on_random_cases";
         MASK_OF_ONE_CHILD_FOR_THE_OTHER: "reference_set_on_generated_scenes";
         MASK_LOSES_AN_OPEN_PLANE: "reference_set_on_edge_scenes", "reference_set_on_random_cases";
         TOUCHING_IS_OUTSIDE: "reference_set_on_edge_scenes";
@@ -344,14 +344,14 @@ fn every_fault_is_caught_and_every_property_catches_one() {
         INVERTED_BOXES_ARE_SOUND: "reference_set_on_edge_scenes";
         IGNORES_BREAK: "a_sink_that_breaks_is_not_called_again";
         FORGETS_TO_PASS_BREAK_ON: "a_sink_that_breaks_is_not_called_again";
-        ONLY_SIX_PLANES: "smaller_volume_sees_a_subset";
+        ONLY_SIX_PLANES: "reference_set_on_random_cases";
         KEEPS_ITEMS_THAT_LEAVE: "items_that_come_and_go_are_followed";
         REFUSES_REFIT_HALFWAY: "refit_equals_a_fresh_build";
         TAKES_BAD_ITEMS: "bad_items_are_refused_and_named";
         NAMES_THE_NEXT_ITEM: "bad_items_are_refused_and_named";
-        COUNTS_NO_ITEMS: "counters_are_plausible";
+        COUNTS_NO_ITEMS: "reference_set_on_edge_scenes";
         EVERY_OTHER_BUILD_DIFFERS: "building_again_gives_the_same_structure";
-        COUNTED_QUERY_DIFFERS: "counters_are_plausible", "every_view_sees_what_the_scan_sees";
+        COUNTED_QUERY_DIFFERS: "reference_set_on_random_cases", "every_view_sees_what_the_scan_sees";
         CLAIMS_TO_REFIT: "declared_capabilities_are_true";
         REFITS_UNDECLARED: "declared_capabilities_are_true";
         CLAIMS_RANGES: "declared_capabilities_are_true";

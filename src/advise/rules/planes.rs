@@ -1,0 +1,444 @@
+//! Rules about planes: which are tested, below which nodes, in which numbers.
+
+use std::rc::Rc;
+
+use glam::DVec3;
+
+use super::super::case::{Case, part_of};
+use super::super::choice::TestChoice;
+use super::super::omission::{Decision, LeftOutIf};
+use super::super::rule::{Draft, Finding, Unfit, not_applicable};
+use super::super::trials::{BASE, Sides, Trials};
+use crate::culling::{Arithmetic, CameraView, Culling, CullingTest};
+use crate::geometry::{Aabb, BoxBlock, ConvexVolume, FrustumPlane, LANES, LaneMask, PlaneMask};
+use crate::index::{DynIndex, FrustumQuery, Input, Query, RegionIndex, Wide};
+use crate::kernel::{Isa, Kernel};
+use crate::measure::Workload;
+use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume};
+use crate::shown::counted;
+
+/// Share of the planes below which the saving is lost in noise.
+const LEAST_NEEDLESS: f64 = 0.01;
+
+/// Planes that the whole scene lies within: a camera does not need them.
+///
+/// The far plane first of all, which paths often put behind the scene.
+pub(super) fn needless_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let bounds = &case.scene().bounds;
+    let (mut needless, mut far, mut all) = (0, 0, 0);
+    let mut fewer = Vec::with_capacity(case.cameras());
+    for volume in case.volumes() {
+        let left = without_needless(volume, bounds);
+        all += volume.planes().len();
+        needless += volume.planes().len() - left.planes().len();
+        let far_plane = volume.plane(FrustumPlane::Far);
+        far += usize::from(far_plane.is_some_and(|far| far.contains(bounds)));
+        fewer.push(CameraView::Volume(left));
+    }
+    let share = needless as f64 / all.max(1) as f64;
+    let reason = format!(
+        "the whole scene is inside of {needless} of {}, and of the far plane for {far} of {}",
+        counted(all, "plane"),
+        counted(case.cameras(), "camera")
+    );
+    let fewer: Rc<[CameraView]> = fewer.into();
+    let scan: Rc<dyn DynIndex> = case.scan.build(&case.scene().items)?.into();
+    let on_tree = trials.index(&*case.index, fewer.clone());
+    let [kept, left_out] = [
+        trials.index(scan.clone(), case.views()),
+        trials.index(scan, fewer),
+    ];
+    let sides = vec![
+        Sides::same(&case.spec.label, BASE, on_tree),
+        Sides::same(&case.scan.label, kept, left_out),
+    ];
+    Ok(Draft::new(
+        sides,
+        Finding::new(share, LEAST_NEEDLESS, reason)
+            .noted(format!("scene is inside {:.0} % of them", share * 100.0)),
+    ))
+}
+
+/// The volume without planes that contain the bounds: whatever lies within the
+/// bounds gets the same verdict, since plane tests are monotone.
+fn without_needless(volume: &ConvexVolume, bounds: &Aabb) -> ConvexVolume {
+    let indexed = volume.planes().iter().zip(0..);
+    let needed = indexed.filter(|(_, index)| !volume.contains(*index, bounds));
+    let needed: Vec<_> = needed.map(|(plane, _)| *plane).collect();
+    // Finite planes, and no more of them than there were.
+    ConvexVolume::from_planes(&needed).unwrap_or_else(|_| volume.clone())
+}
+
+/// Share of the plane tests that has to go: a small tree saves a few percent,
+/// and carrying masks is not free.
+const LEAST_SAVED: f64 = 0.1;
+/// Cameras whose plane tests are counted.
+const COUNTED: usize = 64;
+
+/// Plane tests below a node that a plane contains.
+///
+/// The mask of open planes that a node passes to its children leaves them out. The side
+/// without the rule is a view whose nodes never close a plane (unless they close all).
+pub(super) fn plane_masks(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let kernel = case.spec.execution.kernel;
+    let tree = Rc::new(Wide::build(
+        &Input::new(&case.scene().items),
+        &Default::default(),
+    )?);
+    let volumes: Rc<[ConvexVolume]> = case.volumes().cloned().collect();
+    let step = volumes.len().div_ceil(COUNTED).max(1);
+    let (mut with, mut without) = (QueryCost::default(), QueryCost::default());
+    for volume in volumes.iter().step_by(step) {
+        with += tree.counted(volume).1;
+        without += tree.counted(&Unmasked(volume)).1;
+    }
+    let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
+    let mut finding = Finding {
+        reason: "no plane is ever tested".to_owned(),
+        ..Finding::default()
+    };
+    if all > 0 {
+        let reason = format!("{fewer} plane tests with masks, {all} without");
+        let saved = 1.0 - fewer as f64 / all as f64;
+        finding = Finding::new(saved, LEAST_SAVED, reason)
+            .noted(format!("save {:.0} % of plane tests", saved * 100.0));
+    }
+    let (other, views) = (tree.clone(), volumes.clone());
+    let kept = trials.judged(move |n, out| see(kernel, &other, &Unmasked(&views[n]), out));
+    let left_out = trials.judged(move |n, out| see(kernel, &tree, &volumes[n], out));
+    let sides = Sides::same(Wide::INFO.name, kept, left_out);
+    Ok(Draft::new(vec![sides], finding))
+}
+
+fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<ItemId>) {
+    let recorder = &mut NoRecorder;
+    // A Vec never breaks off.
+    let _ = kernel.run(Query {
+        index,
+        volume,
+        sink,
+        recorder,
+    });
+}
+
+/// The six-plane view with every plane open wherever one is.
+struct Unmasked<'a>(&'a ConvexVolume);
+
+impl Predicate for Unmasked<'_> {
+    #[inline(always)]
+    fn mask(&self) -> PlaneMask {
+        self.0.mask()
+    }
+    #[inline(always)]
+    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.0.excludes(plane, bounds)
+    }
+    #[inline(always)]
+    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.0.contains(plane, bounds)
+    }
+}
+
+impl QueryVolume for Unmasked<'_> {
+    #[inline(always)]
+    fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        self.0.kept_lanes(isa, block, mask)
+    }
+    #[inline(always)]
+    fn kept_of_four<I: Isa>(
+        &self,
+        isa: I,
+        blocks: &[BoxBlock; 4],
+        mask: PlaneMask,
+    ) -> [LaneMask; 4] {
+        self.0.kept_of_four(isa, blocks, mask)
+    }
+    #[inline(always)]
+    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> impl Planes<I> {
+        self.0.one_plane(isa, plane)
+    }
+    #[inline(always)]
+    fn all_planes<I: Isa>(&self, isa: I) -> Option<impl Planes<I>> {
+        self.0.all_planes(isa)
+    }
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock, mask: PlaneMask) {
+        self.0.prefetch(block, mask);
+    }
+    #[inline(always)]
+    fn sorted_lanes<I: Isa>(
+        &self,
+        isa: I,
+        block: &BoxBlock,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        let (kept, words) = self.0.sorted_lanes(isa, block, mask);
+        let inside = isa.zeros(words);
+        let mut open = [mask; LANES];
+        for (lane, open) in open.iter_mut().enumerate() {
+            if inside >> lane & 1 == 1 {
+                *open = 0;
+            }
+        }
+        (kept, isa.words(&open))
+    }
+}
+
+/// Axes beyond the six planes: the volume's own box and its silhouettes.
+///
+/// The exact test adds them. They cost test time and save the drawing of what cannot be
+/// seen.
+pub(super) fn six_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let exact = Culling {
+        test: CullingTest::Exact,
+        ..Culling::default()
+    };
+    let sides = against_base(trials, &exact)?;
+    let draw_ns = case.options.draw_ns;
+    let predicted = predicted_excess(case);
+    Ok(Draft::concluded(vec![sides], move |facts| {
+        let check = &facts.checks[0];
+        let Some(more) = check.more_false_positives() else {
+            return Finding {
+                saving: facts.saving(),
+                ..Finding::default()
+            };
+        };
+        let (drawing, testing) = (more * draw_ns, check.kept_ns - check.left_out_ns);
+        let worth = testing / more;
+        let left_out = check.left_out_ns + drawing;
+        let reason = format!(
+            "{more:.1} items a query too many ({:.2} %; 4 (s/D)^2 predicts {:.2} %) at {draw_ns} ns each, \
+             against the extra test time{}",
+            check.left_out_excess.unwrap_or(0.0) * 100.0,
+            predicted * 100.0,
+            match worth.is_finite() && worth > 0.0 {
+                true => format!("; worth it above {worth:.0} ns per item"),
+                false => String::new(),
+            }
+        );
+        let finding = Finding::new(drawing, testing, reason)
+            .noted(format!("with {draw_ns} ns/item drawn"))
+            .costing([check.kept_ns, left_out]);
+        following(finding, facts.test)
+    }))
+}
+
+/// Decides as the test that is taken, which has these axes or has not.
+///
+/// The statistic is then a prediction.
+fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
+    let predicted = finding
+        .compared
+        .and_then(|both| LeftOutIf::AtMost.holds(both));
+    let (Some(predicted), Some(taken)) = (predicted, choice.name) else {
+        return finding;
+    };
+    let with_axes = |name: &str| {
+        let tests = [CullingTest::SixBox, CullingTest::Exact];
+        tests.iter().any(|test| test.name() == name)
+    };
+    let kept = with_axes(taken);
+    // The side taken by its test, the other by its best.
+    let total = |with: bool| {
+        let rows = choice.rows.iter().filter(|row| with_axes(row.test) == with);
+        let rows = rows.filter(|row| with != kept || row.test == taken);
+        rows.filter_map(|row| row.total_ns).min_by(f64::total_cmp)
+    };
+    finding.cost_ns = total(true)
+        .zip(total(false))
+        .map(|(with, without)| [with, without]);
+    let is_tie = choice.ties.iter().any(|name| with_axes(name) != kept);
+    finding.decision = Some(Decision::of(!kept));
+    finding.is_tie = Some(is_tie);
+    finding.confirmed = (!is_tie).then_some(predicted != kept);
+    finding.reason += &match is_tie {
+        true => format!("; a tie, {taken} is the simplest"),
+        false => format!("; {taken} is the test taken"),
+    };
+    finding
+}
+
+/// `4 (s/D)^2` for the mean square of the items' edges s and the mean depth D
+/// of the views: docs/NUMERICS.md.
+fn predicted_excess(case: &Case) -> f64 {
+    let items = &case.scene().items;
+    let squares = items
+        .iter()
+        .map(|item| f64::from(item.extent().length_squared()) / 3.0);
+    let square = squares.sum::<f64>() / items.len() as f64;
+    let cameras = case.workload.cameras.len();
+    let depth = (0..cameras).map(|frame| case.depth(frame)).sum::<f64>() / cameras as f64;
+    4.0 * square / (depth * depth)
+}
+
+/// The tree with the views of a culling against the tree with the default views.
+fn against_base(trials: &mut Trials, culling: &Culling) -> Result<Sides, Unfit> {
+    let case = trials.case;
+    let views = case.views_by(culling).map_err(not_applicable)?;
+    let kept = trials.index(case.tree_for(culling.test)?, views);
+    Ok(Sides::new(&case.spec.label, kept, BASE))
+}
+
+/// The plane test in f64.
+///
+/// f32 planes, moved outward for their rounding, miss nothing either, and let through a
+/// margin that is mostly far too thin to hold an item.
+pub(super) fn f64_kernel(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let in_f64 = Culling {
+        arithmetic: Arithmetic::F64,
+        ..Culling::default()
+    };
+    let (margin, tolerance) = (case.margin(case.scene()), case.options.tolerance);
+    let reason = format!(
+        "f32 planes are moved outward by up to {margin:.1e} of the depth; {tolerance:.0e} are tolerated"
+    );
+    let sides = against_base(trials, &in_f64)?;
+    Ok(Draft::new(
+        vec![sides],
+        Finding::new(margin, tolerance, reason).noted(format!("f32 errs by {margin:.0e} of depth")),
+    ))
+}
+
+/// An origin of the scene's own: near the world's origin f32 has digits enough without.
+///
+/// One side has the scene about its centre, the other about the world's origin.
+pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let scene = case.scene();
+    let is_moved = scene.origin != DVec3::ZERO;
+    let elsewhere = if is_moved {
+        DVec3::ZERO
+    } else {
+        let bounds = scene.world_bounds();
+        bounds.min / 2.0 + bounds.max / 2.0
+    };
+    let other = part_of(scene, elsewhere, scene.items.len()).map_err(not_applicable)?;
+    let workload = Workload::new(&other, case.path, &Culling::default());
+    let views = workload.map_err(not_applicable)?.views;
+    let there = trials.index(case.spec.build(&other.items)?, views);
+    let (at_zero, moved, sides) = match is_moved {
+        true => (&other, scene, [BASE, there]),
+        false => (scene, &other, [there, BASE]),
+    };
+    let (margin, better) = (case.margin(at_zero), case.margin(moved));
+    let reason = format!(
+        "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({}, {}, {}); this scene {}",
+        moved.origin.x,
+        moved.origin.y,
+        moved.origin.z,
+        if is_moved {
+            "is moved"
+        } else {
+            "stays where it is"
+        }
+    );
+    let sides = Sides::new(&case.spec.label, sides[0], sides[1]);
+    let finding = Finding::new(margin, case.options.tolerance, reason)
+        .noted(format!("f32 errs by {margin:.0e} of depth"));
+    Ok(Draft::new(vec![sides], finding))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::omission::By;
+    use super::super::super::rule::tests::some_rule;
+    use super::*;
+    use crate::geometry::Plane;
+    use glam::Vec3;
+
+    #[test]
+    fn planes_that_cut_the_scene_stay() {
+        let planes = [
+            // Cuts the bounds; holds them; just holds them; excludes them.
+            Plane::new(Vec3::X, 0.0),
+            Plane::new(Vec3::Y, 5.0),
+            Plane::new(Vec3::Z, 1.0),
+            Plane::new(-Vec3::Z, -2.0),
+        ];
+        let volume = ConvexVolume::from_planes(&planes).unwrap();
+        let bounds = Aabb::new(Vec3::splat(-1.0), Vec3::splat(1.0));
+        let left = without_needless(&volume, &bounds);
+        assert_eq!(left.planes(), [planes[0], planes[3]]);
+        let none = without_needless(&ConvexVolume::from_planes(&planes[1..3]).unwrap(), &bounds);
+        assert!(none.planes().is_empty() && none.sees(&bounds));
+    }
+
+    #[test]
+    fn without_masks_the_answer_is_the_same_and_costs_more_tests() {
+        let corner = |i: u32| Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32);
+        let items: Vec<Aabb> = (0..16_000)
+            .map(|i| Aabb::new(corner(i), corner(i) + 0.5))
+            .collect();
+        let planes = [Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y].map(|normal| {
+            Plane::new(
+                normal,
+                if normal.max_element() > 0.0 {
+                    -10.2
+                } else {
+                    30.7
+                },
+            )
+        });
+        let volume = ConvexVolume::from_planes(&planes).unwrap();
+        let tree = Wide::build(&Input::new(&items), &Default::default()).unwrap();
+        let ask = |masked: bool| {
+            let (mut out, cost) = match masked {
+                true => tree.counted(&volume),
+                false => tree.counted(&Unmasked(&volume)),
+            };
+            out.sort_unstable();
+            let mut timed = Vec::new();
+            match masked {
+                true => see(Kernel::best(), &tree, &volume, &mut timed),
+                false => see(Kernel::best(), &tree, &Unmasked(&volume), &mut timed),
+            }
+            timed.sort_unstable();
+            assert_eq!(timed, out);
+            (out, cost.planes_tested, cost.subtrees_accepted)
+        };
+        let ((with, fewer, accepted), (without, all, also)) = (ask(true), ask(false));
+        assert!(!with.is_empty() && with == without);
+        assert_eq!(accepted, also, "what is inside is accepted either way");
+        assert!(fewer * 3 < all * 2, "{fewer} of {all}");
+    }
+
+    #[test]
+    fn the_test_taken_decides_about_the_axes() {
+        let tests = ["six-plane", "six-box", "exact", "sphere"];
+        for predicted in [true, false] {
+            for (taken, ties, decision, confirmed) in [
+                (tests[0], vec![], Decision::LeaveOut, Some(predicted)),
+                (tests[3], vec![], Decision::LeaveOut, Some(predicted)),
+                (tests[1], vec![], Decision::Keep, Some(!predicted)),
+                (tests[2], vec![tests[1]], Decision::Keep, Some(!predicted)),
+                (tests[0], vec![tests[2]], Decision::LeaveOut, None),
+                (tests[1], vec![tests[3]], Decision::Keep, None),
+            ] {
+                let statistic = if predicted { 0.5 } else { 2.0 };
+                let finding = Finding::new(statistic, 1.0, "");
+                let mut choice = TestChoice {
+                    name: Some(taken),
+                    ties,
+                    structure: "wide".to_owned(),
+                    rows: Vec::new(),
+                };
+                let settled = |choice: &TestChoice| {
+                    let rule = some_rule(LeftOutIf::AtMost, By::Rule);
+                    rule.omission(following(finding.clone(), choice), Vec::new())
+                };
+                let omission = settled(&choice);
+                let found = (omission.decision, omission.confirmed);
+                assert_eq!(found, (decision, confirmed), "{taken} {:?}", choice.ties);
+                assert!(omission.reason.contains(taken), "{}", omission.reason);
+                // Without a test that is taken the rule decides.
+                choice.name = None;
+                assert_eq!(settled(&choice).decision, Decision::of(predicted));
+            }
+        }
+    }
+}

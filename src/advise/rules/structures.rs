@@ -1,0 +1,208 @@
+//! Rules about structures and what they are kept up to date with.
+
+use super::super::change::Axis;
+use super::super::omission::Decision;
+use super::super::options::default_of;
+use super::super::rule::{Draft, Finding, Unfit, not_applicable};
+use super::super::trials::{BASE, Sides, Trials};
+use crate::drift::rotations;
+use crate::measure::{Stopwatch, input_of, move_share};
+use crate::statistics::Estimate;
+
+/// The index itself: below some number of items a scan is as fast.
+///
+/// That number follows from the parts of the scene that are measured beside it
+/// ([`Axis::Items`]).
+pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
+    let items = &case.scene().items;
+    let whole = trials.index(case.scan.build(items)?, case.views());
+    let sides = Sides::same(format!("{tree} against {scan}"), BASE, whole);
+    let all = items.len() as f64;
+    Ok(Draft::concluded(vec![sides], move |facts| {
+        let taken = facts.structure;
+        let change = facts.changes.iter().find(|c| c.axis == Axis::Items);
+        let below = change.and_then(|change| change.below.as_ref());
+        let crossing = match below.filter(|turn| turn.structure == scan) {
+            _ if taken.is_scan => all,
+            Some(turn) => turn.at,
+            None => 0.0,
+        };
+        let least = change.map_or(all, |change| change.measured[0]);
+        let reason = format!(
+            "{scan} is faster than {tree} up to {crossing:.0} items, of parts of {least:.0} to {all:.0} items"
+        );
+        Finding {
+            saving: facts.saving(),
+            // As the structure taken, wherever there was a choice.
+            decision: taken.is_open.then_some(Decision::of(taken.is_scan)),
+            is_tie: taken.is_mixed.then_some(true),
+            note: match crossing {
+                0.0 => format!("no scan wins from {least:.0} items on"),
+                _ => format!("a scan wins up to {crossing:.0} items"),
+            },
+            ..Finding::new(all, crossing, reason)
+        }
+    }))
+}
+
+/// The third dimension of the cells.
+///
+/// Where a scene is flatter than a quadtree's leaves are wide, an octree's third split parts
+/// nothing. Bounds stay three-dimensional either way.
+pub(super) fn third_dimension(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let (scene, by) = (case.scene(), case.spec.execution);
+    let (octree, quadtree) = (default_of("octree", by)?, default_of("quadtree", by)?);
+    let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
+    let extent = scene.bounds.max.as_dvec3() - scene.bounds.min.as_dvec3();
+    let mut extents = extent.to_array();
+    extents.sort_by(f64::total_cmp);
+    let [height, widths @ ..] = extents;
+    let cell = 2.0 * (widths[0] * widths[1]).sqrt() / (scene.items.len() as f64 / leaf).sqrt();
+    let reason = format!(
+        "height {height:.4} by widths {:.4} and {:.4}; the threshold is two leaves of {leaf} items, \
+         2 W / sqrt(N / leaf)",
+        widths[0], widths[1]
+    );
+    let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
+        .map(|index| trials.index(index, case.views()));
+    let sides = Sides::same("octree against quadtree", kept, left_out);
+    Ok(Draft::concluded(vec![sides], move |facts| {
+        let taken = facts.structure.name.as_deref().unwrap_or_default();
+        let flat = taken.starts_with("quadtree");
+        let is_either = flat || taken.starts_with("octree");
+        let is_either = is_either && facts.structure.ties.is_empty();
+        Finding {
+            saving: facts.saving(),
+            decision: is_either.then_some(Decision::of(flat)),
+            note: "octree against quadtree".to_owned(),
+            ..Finding::new(height, cell, reason)
+        }
+    }))
+}
+
+/// A rebuild after items have moved.
+///
+/// A refit keeps the tree and is quicker, but leaves a tree that answers more slowly. Weighed
+/// for a share of items that move and a number of queries between two updates.
+pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let case = trials.case;
+    let scene = case.scene();
+    if case.workload.motion.is_some() {
+        return Err(not_applicable(
+            "the frames of the motion decide on rebuilds",
+        ));
+    }
+    let mut items = scene.items.clone();
+    let moved = move_share(&mut items, case.options.moved);
+    let mut refitted = case.spec.build(input_of(scene, &scene.items))?;
+    // Some structures allocate room for refits at the first one.
+    let can = refitted.refit(&scene.items, &moved);
+    let watch = Stopwatch::start();
+    if !can || !refitted.refit(&items, &moved) {
+        let why = format!("'{}' cannot be refitted", case.spec.label);
+        return Err(not_applicable(why));
+    }
+    let refit_ns = watch.lap().cpu_ns;
+    let watch = Stopwatch::start();
+    let rebuilt = case.spec.build(input_of(scene, &items))?;
+    let rebuild_ns = watch.lap().cpu_ns;
+    // Moved items are not the scene's: there is no truth about them.
+    let [kept, left_out] = [rebuilt, refitted]
+        .map(|index| trials.unjudged(move |n, out| index.query(case.views()[n].as_any(), out)));
+    let on = format!("{}, queries after an update", case.spec.label);
+    let queries = case.options.queries_per_update;
+    let (share, count) = (case.options.moved, moved.len());
+    let mut draft = Draft::concluded(vec![Sides::same(on, kept, left_out)], move |facts| {
+        let (check, [refit_ns, rebuild_ns]) = (&facts.checks[0], facts.once_ns);
+        let slower = queries * (check.left_out_ns - check.kept_ns);
+        let kept = rebuild_ns + queries * check.kept_ns;
+        let left_out = refit_ns + queries * check.left_out_ns;
+        let reason = format!(
+            "{count} items moved by their own size ({} %), {queries} queries an update: refit {:.0} us, \
+             rebuild {:.0} us",
+            share * 100.0,
+            refit_ns / 1e3,
+            rebuild_ns / 1e3
+        );
+        Finding::new(slower, rebuild_ns - refit_ns, reason)
+            .noted(format!(
+                "{} % moved, {queries} {} each",
+                share * 100.0,
+                if queries == 1.0 { "query" } else { "queries" }
+            ))
+            .costing([kept, left_out])
+    });
+    draft.once = Some(trials.once_ns.len());
+    trials.once_ns.extend([refit_ns, rebuild_ns]);
+    Ok(draft)
+}
+
+/// Drift of an f32 frame per step, radians: docs/NUMERICS.md.
+const DRIFT: f64 = 2e-8;
+/// "Much less than the tolerance" is this share of it.
+const MUCH_LESS: f64 = 0.1;
+const KEPT: &str = "f32-polar-100";
+const LEFT_OUT: &str = "f32";
+
+/// Correcting a camera's frame.
+///
+/// Axes in f32 that are turned and never straightened drift by some 2e-8 a step. A frame
+/// that is built for each camera, or takes few steps, does not need it. Checked by walking.
+pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
+    let tolerance = trials.case.options.tolerance;
+    let steps = trials.case.workload.cameras.len() as u64;
+    let rotations = rotations(&[KEPT, LEFT_OUT], steps);
+    let &[(kept, kept_ns), (left_out, left_out_ns)] = &rotations[..] else {
+        return Err(not_applicable("no such method"));
+    };
+    let walked = |error: Option<f64>| match error {
+        Some(error) => format!("{error:.1e}"),
+        None => "lost".to_owned(),
+    };
+    let (kept_error, left_out_error) = (walked(kept), walked(left_out));
+    let compared = [steps as f64 * DRIFT, tolerance * MUCH_LESS];
+    // A walk outweighs the estimate.
+    let predicted = left_out.map(|error| error <= tolerance);
+    let mut draft = Draft::concluded(Vec::new(), move |facts| {
+        let mut finding = Finding {
+            compared: Some(compared),
+            predicted,
+            confirmed: predicted.map(|walked| (compared[0] <= compared[1]) == walked),
+            ..Finding::default()
+        };
+        let ([left_out_ns, kept_ns], Some(ratio)) = (facts.once_ns, &facts.once_ratio) else {
+            return finding;
+        };
+        finding.reason = format!(
+            "{steps} steps of {DRIFT:.0e}; walked: {left_out_error} uncorrected at {left_out_ns:.0} ns a step, \
+             {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns ({}); a tenth of \
+             {tolerance:.0e} is used up after some {:.0} steps",
+            dearer(ratio),
+            tolerance * MUCH_LESS / DRIFT
+        );
+        finding.note = format!("{steps} steps drift {left_out_error} rad");
+        finding.cost_ns = Some([kept_ns, left_out_ns]);
+        let ends = ratio.lower.zip(ratio.upper);
+        finding.is_tie = ends.map(|(lower, upper)| lower <= 1.0 && 1.0 <= upper);
+        finding.saving = Some(1.0 - 1.0 / ratio.value);
+        finding
+    });
+    draft.once = Some(trials.once_ns.len());
+    trials.once_ns.extend([left_out_ns, kept_ns]);
+    Ok(draft)
+}
+
+/// A ratio of times in words, with its interval.
+fn dearer(ratio: &Estimate) -> String {
+    let value = ratio.value;
+    match ratio.lower.zip(ratio.upper) {
+        None => format!("{value:.2} times as long"),
+        Some((lower, upper)) if lower > 1.0 => {
+            format!("{value:.2} [{lower:.2}, {upper:.2}] times as long")
+        }
+        Some((lower, upper)) => format!("as long: {value:.2} [{lower:.2}, {upper:.2}]"),
+    }
+}
