@@ -81,7 +81,6 @@ struct Changed {
     /// Value on the axis, requested and reached.
     value: f64,
     reached: f64,
-    lens_scale: Option<f64>,
     known: Option<Known>,
 }
 
@@ -130,7 +129,6 @@ impl Beside {
                 axis,
                 value,
                 reached: value,
-                lens_scale: None,
                 known: None,
             };
             // No such workload: a share that the cameras do not reach, a recorded motion.
@@ -138,7 +136,6 @@ impl Beside {
                 continue;
             };
             changed.known.clone_from(&part.known);
-            changed.lens_scale = part.known.as_ref().and_then(|known| known.lens_scale);
             changed.reached = reached;
             beside.changed.push(changed);
             parts.push(part);
@@ -243,7 +240,8 @@ impl Changed {
         let scene = part.as_ref().unwrap_or(input.scene);
         let mut path = input.path.clone();
         if is(Axis::ShareInView) {
-            path = path.seeing(scene, self.value, self.lens_scale).ok()?;
+            let lens_scale = self.known.as_ref().and_then(|known| known.lens_scale);
+            path = path.seeing(scene, self.value, lens_scale).ok()?;
         }
         let mut motion = None;
         if let Some(source) = input.motion {
@@ -342,7 +340,6 @@ mod tests {
             axis: Some(axis),
             value: reached,
             reached,
-            lens_scale: None,
             known: None,
         };
         let beside = Beside {

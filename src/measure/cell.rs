@@ -222,7 +222,7 @@ impl SceneInfo {
 }
 
 /// The queries of a cell.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct PathInfo {
@@ -268,16 +268,12 @@ impl PathInfo {
     pub fn unknown(key: &GroupKey) -> PathInfo {
         PathInfo {
             name: key.path.clone(),
-            camera_count: 0,
             cache: key.cache.clone(),
             planes: key.planes.clone(),
             epsilon: key.epsilon,
             arithmetic: key.arithmetic.clone(),
-            digest: None,
-            lens: None,
-            warnings: Vec::new(),
             motion: key.motion.clone(),
-            views_per_frame: 0,
+            ..PathInfo::default()
         }
     }
 

@@ -10,7 +10,7 @@ use super::super::rule::{Draft, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials, mean};
 use super::removal::{PROBED, PROBES, Removal, weighed};
 use crate::camera::Camera;
-use crate::funnel::World;
+use crate::funnel::{RaysEnd, World};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Surfaces};
@@ -19,7 +19,6 @@ use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Tests, draw, draw_s
 use crate::visibility::triangle::{
     Clusters, Cone, Eye, MOST_TRIANGLES, SafeCones, Selection, TriangleCull,
 };
-use crate::visibility::truth::{RayIndex, SurfaceIndex};
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
 /// Items of a camera whose triangles are looked at, evenly spread.
@@ -149,10 +148,7 @@ pub(super) fn sorting(trials: &mut Trials) -> Result<Draft, Unfit> {
         solids: Solids::of(scene),
         origin: scene.origin,
         items: scene.items.len(),
-        index: match world.shape.triangles() {
-            None => Index::Boxes(RayIndex::build(&Solids::of(scene))),
-            Some(surfaces) => Index::Triangles(SurfaceIndex::build(surfaces)),
-        },
+        surfaces: RaysEnd::at(&world.shape, None),
     });
     let few = some_of(case.cameras(), PROBED).map(|n| (*world.rays(n), case.found(n)));
     let few: Vec<(Rays, Vec<ItemId>)> = few.collect();
@@ -182,15 +178,9 @@ pub(super) fn sorting(trials: &mut Trials) -> Result<Draft, Unfit> {
 struct Drawn {
     /// Solid boxes, or the boxes about the items.
     solids: Solids,
-    index: Index,
+    surfaces: RaysEnd<'static>,
     origin: DVec3,
     items: usize,
-}
-
-/// Trees over solid boxes, or over triangles with floors behind the items.
-enum Index {
-    Boxes(RayIndex),
-    Triangles(SurfaceIndex),
 }
 
 impl Drawn {
@@ -200,14 +190,14 @@ impl Drawn {
         if sorted {
             front_to_back(&self.solids, rays.camera(), &mut items);
         }
-        let passed = match &self.index {
-            Index::Boxes(_) => {
+        let passed = match &self.surfaces {
+            RaysEnd::Boxes(..) => {
                 let pieces: Vec<Piece> = items.into_iter().map(Piece::whole).collect();
                 let canvas = Canvas::of(rays, COUNTED);
                 let drawn = draw(&canvas, &self.solids, &pieces, &Tests::default());
                 drawn.tally.passed
             }
-            Index::Triangles(index) => {
+            RaysEnd::Triangles(index) => {
                 let mut left = items.clone();
                 left.sort_unstable();
                 let place = |item| left.binary_search(item).unwrap_or_default() as ItemId;
@@ -223,17 +213,9 @@ impl Drawn {
 
     /// Number of items along a ray.
     fn layers(&self, ray: &Ray) -> usize {
-        let mut met: Vec<ItemId> = match &self.index {
-            Index::Boxes(index) => {
-                let all = index.all_along(ray).into_iter();
-                all.map(|(item, _)| item).collect()
-            }
-            Index::Triangles(index) => {
-                let all = index.all_along(ray).into_iter();
-                let ids = all.map(|(item, _)| item);
-                ids.filter(|&item| (item as usize) < self.items).collect()
-            }
-        };
+        let mut met = self.surfaces.all_along(ray);
+        // Floors and ceilings of a map come behind its items.
+        met.retain(|&item| (item as usize) < self.items);
         met.sort_unstable();
         met.dedup();
         met.len()

@@ -139,7 +139,7 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
     let (workload, subjects) = (workload(&scene), subjects("bvh", &scene));
     let entry = |subject| Entry {
         subject,
-        verdict: Verdict::ok(),
+        part: SubjectPart::of(subject, Verdict::ok()),
         counted: None,
     };
     let entries: Vec<Entry> = subjects.iter().map(entry).collect();
