@@ -217,9 +217,11 @@ impl Omission {
 }
 
 #[cfg(test)]
-pub mod tests {
-    use super::super::rule::Finding;
-    use super::super::rule::tests::some_rule;
+pub use tests::check;
+
+#[cfg(test)]
+mod tests {
+    use super::super::rule::{Finding, some_rule};
     use super::*;
 
     /// A check with the given ratio and decision of the clock.

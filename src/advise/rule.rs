@@ -229,7 +229,10 @@ impl Rule {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub use tests::some_rule;
+
+#[cfg(test)]
+mod tests {
     use super::*;
 
     /// A rule that enters nothing.

@@ -219,7 +219,7 @@ impl<'a> World<'a> {
     }
 }
 
-/// The back ends of a stage that a scene has, and for the object stage its structures.
+/// Back ends of a stage that a scene has, with structures for the object stage.
 fn rows<'l>(
     back_ends: Vec<BackEnd>,
     regions: Option<&Regions>,

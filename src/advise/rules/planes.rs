@@ -304,9 +304,10 @@ pub(super) fn f64_kernel(trials: &mut Trials) -> Result<Draft, Unfit> {
     ))
 }
 
-/// An origin of the scene's own: near the world's origin f32 has digits enough without.
+/// An origin of the scene's own.
 ///
-/// One side has the scene about its centre, the other about the world's origin.
+/// Near the world's origin f32 has digits enough without. One side has the scene about its
+/// centre, the other about the world's origin.
 pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let scene = case.scene();
@@ -346,7 +347,7 @@ pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
 #[cfg(test)]
 mod tests {
     use super::super::super::omission::By;
-    use super::super::super::rule::tests::some_rule;
+    use super::super::super::rule::some_rule;
     use super::*;
     use crate::geometry::Plane;
     use glam::Vec3;

@@ -93,9 +93,8 @@ pub fn of_items(trials: &Trials, sides: Sides, predicted: f64) -> Draft {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::omission::tests::check;
-    use super::super::super::omission::{By, Decision, LeftOutIf};
-    use super::super::super::rule::tests::some_rule;
+    use super::super::super::omission::{By, Decision, LeftOutIf, check};
+    use super::super::super::rule::some_rule;
     use super::*;
 
     #[test]

@@ -1,5 +1,7 @@
-//! Rules about the region and the occlusion stage: one side removes items that the other
-//! returns, so the drawing that this saves is weighed against the time that it takes.
+//! Rules about the region and the occlusion stage.
+//!
+//! One side removes items that the other returns, so the drawing that this saves is weighed
+//! against the time that it takes.
 
 use std::cell::RefCell;
 

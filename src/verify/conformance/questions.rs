@@ -89,7 +89,9 @@ pub(super) fn edges() -> impl Iterator<Item = Questions> {
     })
 }
 
-/// The [`RandomCase`]s of some seeds with derived volumes, and the case's point last.
+/// The [`RandomCase`]s of some seeds, with derived volumes.
+///
+/// The case's point is the last one.
 pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = Questions> {
     seeds.map(|seed| {
         let (case, next) = (RandomCase::new(seed), RandomCase::new(seed + 1));
@@ -104,7 +106,7 @@ pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = Questions> {
     })
 }
 
-/// A volume cut by the planes of another, one that holds all items, and one beside them.
+/// A volume cut by the planes of another, one about all items, one beside them.
 fn derived(volume: &ConvexVolume, other: &ConvexVolume, items: &[Aabb]) -> Vec<ConvexVolume> {
     let bounds = Aabb::union_of(items);
     let reach = bounds.min.abs().max(bounds.max.abs()) * 2.0;
