@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::case::part_of;
 use super::choice::{fastest, time_over};
 use super::omission::is_longer;
-use super::options::{AdviseError, AdviseInput, planned};
+use super::options::{AdviseInput, planned};
 use crate::culling::{Culling, CullingTest};
+use crate::funnel::StudyError;
 use crate::index::StructureSpec;
 use crate::measure::{
     Group, GroupPlan, Known, Part, PathInfo, ProcessTimes, ReportCell, SceneInfo, Subject,
@@ -149,12 +150,12 @@ impl Beside {
     }
 
     /// Measures the workloads in one process.
-    pub(super) fn times(&self, input: &AdviseInput) -> Result<Vec<Part>, AdviseError> {
+    pub(super) fn times(&self, input: &AdviseInput) -> Result<Vec<Part>, StudyError> {
         let changed = self.changed.iter();
         let parts = changed.map(|changed| Some(changed.measured(input, self)?.1));
         let reason = "another scene or motion than the advice was planned for";
         let parts: Option<Vec<Part>> = parts.collect();
-        parts.ok_or_else(|| AdviseError::Refused(reason.to_owned()))
+        parts.ok_or_else(|| StudyError::Refused(reason.to_owned()))
     }
 
     /// The group of each workload, from the count pass and all processes.

@@ -18,9 +18,10 @@ pub use change::{Axis, Beside, Change, Turn};
 pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
 pub use motion::{MotionChoice, policy_of};
 pub use omission::{Check, Omission};
-pub use options::{AdviseError, AdviseInput, AdviseOptions};
+pub use options::{AdviseInput, AdviseOptions};
 
 use crate::culling::CullingTest;
+use crate::funnel::StudyError;
 use crate::measure::{
     OverProcesses, Part, ProcessTimes, ReportCell, Schedule, SharedWork, timed_to_end,
 };
@@ -114,7 +115,7 @@ pub fn prepare(
     input: &AdviseInput,
     cells: Vec<ReportCell>,
     progress: &dyn Fn(&str),
-) -> Result<Prepared, AdviseError> {
+) -> Result<Prepared, StudyError> {
     let AdviseInput { scene, path, .. } = *input;
     let workload = input.workload()?;
     let structure = StructureChoice::of(&cells);
@@ -158,14 +159,14 @@ pub fn prepare(
 ///
 /// # Errors
 /// The errors of [`prepare`], and a scene other than the planned one.
-pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, AdviseError> {
+pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, StudyError> {
     let workload = input.workload()?;
     let case = Case::new(input, &workload, &plan.structures)?;
     let entered = Entered::new(&case, &|_| ())?;
     let (found, planned) = (entered.trials.len(), plan.expected.len());
     let cameras = plan.expected.iter().map(Vec::len);
     if found != planned || cameras.min() != Some(input.path.cameras.len()) {
-        return Err(AdviseError::Refused(format!(
+        return Err(StudyError::Refused(format!(
             "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed \
              on the way"
         )));
@@ -227,7 +228,7 @@ struct Entered<'c> {
 }
 
 impl<'c> Entered<'c> {
-    fn new(case: &'c Case<'c>, progress: &dyn Fn(&str)) -> Result<Self, AdviseError> {
+    fn new(case: &'c Case<'c>, progress: &dyn Fn(&str)) -> Result<Self, StudyError> {
         let mut trials = Trials::new(case);
         let mut rules = Vec::with_capacity(RULES.len());
         for rule in RULES {

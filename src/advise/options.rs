@@ -1,11 +1,11 @@
-//! Costs and limits of the advice, and scenes without advice.
+//! Costs and limits of the advice, and its inputs.
 
 use serde::Serialize;
 
 use crate::culling::Culling;
-use crate::funnel::check_memory;
+use crate::funnel::{StudyError, check_memory};
 use crate::index::{BuildError, Execution, StructureSpec};
-use crate::measure::{Protocol, Workload, WorkloadError};
+use crate::measure::{Protocol, Workload};
 use crate::motion::Motion;
 use crate::path::CameraPath;
 use crate::scene::Scene;
@@ -38,20 +38,6 @@ impl Default for AdviseOptions {
     }
 }
 
-/// A scene and a path without advice.
-#[derive(Debug, thiserror::Error)]
-pub enum AdviseError {
-    /// A camera of the path has no view.
-    #[error(transparent)]
-    Workload(#[from] WorkloadError),
-    /// A structure of a rule cannot be built.
-    #[error(transparent)]
-    Build(#[from] BuildError),
-    /// Nothing to cull, nothing to cull for, or another scene than planned.
-    #[error("{0}")]
-    Refused(String),
-}
-
 /// Bytes per item of the structures and trees of all rules; 950 were measured.
 const BYTES_PER_ITEM: u64 = 1000;
 
@@ -78,27 +64,27 @@ impl<'a> AdviseInput<'a> {
     /// Refuses a scene without items, a path without cameras, an unfit motion.
     ///
     /// # Errors
-    /// [`AdviseError::Refused`].
-    pub fn check(&self) -> Result<(), AdviseError> {
+    /// [`StudyError`].
+    pub fn check(&self) -> Result<(), StudyError> {
         self.workload().map(|_| ())
     }
 
-    pub(super) fn workload(&self) -> Result<Workload<'a>, AdviseError> {
-        let (scene, path) = (&self.scene.name, &self.path.name);
-        let refused = |reason: &dyn ToString| AdviseError::Refused(reason.to_string());
-        if self.scene.items.is_empty() {
-            let reason = format!("scene '{scene}' has no items; expected at least one");
-            return Err(refused(&reason));
+    pub(super) fn workload(&self) -> Result<Workload<'a>, StudyError> {
+        let (scene, path) = (self.scene, self.path);
+        for (kind, name, things, count) in [
+            ("scene", &scene.name, "items", scene.items.len()),
+            ("path", &path.name, "cameras", path.cameras.len()),
+        ] {
+            if count == 0 {
+                return Err(StudyError::Refused(format!(
+                    "{kind} '{name}' has no {things}; expected at least one"
+                )));
+            }
         }
-        if self.path.cameras.is_empty() {
-            let reason = format!("path '{path}' has no cameras; expected at least one");
-            return Err(refused(&reason));
-        }
-        let needed = BYTES_PER_ITEM * self.scene.items.len() as u64;
-        check_memory(scene, needed).map_err(|error| refused(&error))?;
-        let motion = self.motion.map(|motion| Motion::load(motion, self.scene));
-        let motion = motion.transpose().map_err(|error| refused(&error))?;
-        let workload = Workload::new(self.scene, self.path, &Culling::default())?;
+        check_memory(&scene.name, BYTES_PER_ITEM * scene.items.len() as u64)?;
+        let motion = self.motion.map(|motion| Motion::load(motion, scene));
+        let motion = motion.transpose()?;
+        let workload = Workload::new(scene, path, &Culling::default())?;
         Ok(workload.moved_by(motion, self.views))
     }
 }

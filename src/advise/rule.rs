@@ -4,8 +4,8 @@
 use super::change::Change;
 use super::choice::{StructureChoice, TestChoice};
 use super::omission::{By, Check, Decision, LeftOutIf, Omission, is_longer};
-use super::options::AdviseError;
 use super::trials::{Answered, Sides, Trials};
+use crate::funnel::StudyError;
 use crate::measure::OverProcesses;
 use crate::statistics::Estimate;
 
@@ -28,10 +28,10 @@ pub struct Rule {
 pub enum Unfit {
     /// It does not apply to this scene or these cameras, for a reason.
     NotApplicable(String),
-    Failed(AdviseError),
+    Failed(StudyError),
 }
 
-impl<E: Into<AdviseError>> From<E> for Unfit {
+impl<E: Into<StudyError>> From<E> for Unfit {
     fn from(error: E) -> Unfit {
         Unfit::Failed(error.into())
     }

@@ -9,25 +9,27 @@ use crate::scene::available_bytes;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::Rectangle;
 
-/// A funnel that cannot be studied.
+/// A scene and a path that cannot be studied.
 #[derive(Debug, thiserror::Error)]
-pub enum FunnelError {
+pub enum StudyError {
     /// A structure refuses the scene.
     #[error(transparent)]
     Build(#[from] BuildError),
     /// A camera has no frustum.
     #[error(transparent)]
     View(#[from] WorkloadError),
-    /// The scene's file, read a second time.
+    /// A motion, or the scene's file, read a second time.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Options, cameras and scene do not fit each other, or too little memory is free.
+    /// Options, cameras and scene that do not fit each other or the plan.
+    ///
+    /// Or too little free memory.
     #[error("{0}")]
     Refused(String),
 }
 
 /// Refuses a step that needs more memory than is free.
-pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), FunnelError> {
+pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), StudyError> {
     check_fits([step, "fewer items or views"], needed, available_bytes())
 }
 
@@ -36,9 +38,9 @@ pub fn check_fits(
     [what, expected]: [&str; 2],
     needed: u64,
     available: Option<u64>,
-) -> Result<(), FunnelError> {
+) -> Result<(), StudyError> {
     match available.filter(|available| needed > *available) {
-        Some(available) => Err(FunnelError::Refused(format!(
+        Some(available) => Err(StudyError::Refused(format!(
             "{what}: about {} needed, {} are free; expected {expected}",
             gigabytes(needed),
             gigabytes(available)

@@ -3,7 +3,7 @@
 //! All are compared with the truth, then timed side by side in one or more processes.
 
 use super::bounds::{bounds, covered_key};
-use super::error::{FunnelError, LeftOutRow, check_fits, check_memory};
+use super::error::{LeftOutRow, StudyError, check_fits, check_memory};
 use super::fragment_stage::{FragmentCounts, FragmentStage, Tested, mirrored};
 use super::item_stages::{ItemStages, PlanView};
 use super::orders::Orders;
@@ -30,7 +30,7 @@ const BYTES_PER_SAMPLE: u64 = 450;
 const BYTES_PER_LEFT: f64 = 1600.0;
 
 /// Refuses images that need more memory than is available.
-fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), FunnelError> {
+fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), StudyError> {
     let SampleGrid { width, height } = grid;
     let needed = u64::from(width) * u64::from(height) * BYTES_PER_SAMPLE;
     let images = format!("--samples {width}x{height}");
@@ -50,7 +50,7 @@ struct Study<'w> {
 }
 
 impl<'w> Study<'w> {
-    fn new(world: &'w World<'w>, input: &FunnelInput<'w>) -> Result<Study<'w>, FunnelError> {
+    fn new(world: &'w World<'w>, input: &FunnelInput<'w>) -> Result<Study<'w>, StudyError> {
         let chain = input.chain;
         let items = ItemStages::all(world, chain);
         let steps = chain.steps();
@@ -167,7 +167,7 @@ pub struct Prepared {
 ///
 /// # Errors
 /// A camera, a structure, a back end or an image that is refused.
-pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, FunnelError> {
+pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, StudyError> {
     fits(input.samples, available_bytes())?;
     let world = World::new(input.scene, input, begin)?;
     begin("truth");
@@ -268,7 +268,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, Fu
 ///
 /// # Errors
 /// The errors of [`prepare`].
-pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes, FunnelError> {
+pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes, StudyError> {
     let world = World::new(input.scene, input, &|_| ())?;
     let study = Study::new(&world, input)?;
     let covered = plan.expected(&covered_key()).unwrap_or_default();

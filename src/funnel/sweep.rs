@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use super::error::FunnelError;
+use super::error::StudyError;
 use super::item_stages::{ItemStages, Run};
 use super::stage::{BackEnd, Chain, NONE, OCCLUSION_ROWS, StageKind, Step};
 use super::task::{FunnelKey, FunnelPlan, KeyedTask};
@@ -187,7 +187,7 @@ impl<'w> Swept<'w> {
 ///
 /// # Errors
 /// The errors of [`prepare`](super::prepare).
-pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSweep, FunnelError> {
+pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSweep, StudyError> {
     let world = World::new(input.scene, input, &|_| ())?;
     let swept = Swept::new(&world, input.chain, stage);
     // The side of a triangle needs no rays.
@@ -224,7 +224,7 @@ pub fn time_sweep(
     input: &FunnelInput,
     stage: StageKind,
     plan: &FunnelPlan,
-) -> Result<ProcessTimes, FunnelError> {
+) -> Result<ProcessTimes, StudyError> {
     let world = World::new(input.scene, input, &|_| ())?;
     let swept = Swept::new(&world, input.chain, stage);
     let tasks = swept.points().into_iter().map(|(_, task)| task);

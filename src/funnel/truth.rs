@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use super::error::{FunnelError, most_drawn};
+use super::error::{StudyError, most_drawn};
 use super::world::{Shape, World};
 use crate::query::ItemId;
 use crate::statistics::{Rate, rate};
@@ -25,7 +25,7 @@ pub type Truth = Vec<Vec<(ItemId, u32)>>;
 ///
 /// # Errors
 /// Too many items in front at the same samples.
-pub fn visible(world: &World, random_rays: usize, threads: usize) -> Result<Truth, FunnelError> {
+pub fn visible(world: &World, random_rays: usize, threads: usize) -> Result<Truth, StudyError> {
     let rays_end = RaysEnd::at(&world.shape, world.cut_outs.as_ref());
     let samples = world.samples;
     let items = world.items() as ItemId;
@@ -33,7 +33,7 @@ pub fn visible(world: &World, random_rays: usize, threads: usize) -> Result<Trut
     for view in world.views() {
         let rays = world.rays(view);
         let truth = rays_end.visible(rays, samples, threads).map_err(|error| {
-            FunnelError::Refused(format!("camera {}: {error}", world.views[view].camera))
+            StudyError::Refused(format!("camera {}: {error}", world.views[view].camera))
         })?;
         let counts = truth.visible.iter().copied().zip(truth.samples_of);
         let mut seen: Vec<(ItemId, u32)> = counts.collect();

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::error::{FunnelError, check_memory};
+use super::error::{StudyError, check_memory};
 use super::stage::{BackEnd, Chain, NONE, StageKind, back_ends};
 use crate::camera::{CameraError, PlaneOptions};
 use crate::geometry::ConvexVolume;
@@ -130,7 +130,7 @@ impl<'a> World<'a> {
         scene: &'a Scene,
         input: &FunnelInput,
         begin: &dyn Fn(&str),
-    ) -> Result<World<'a>, FunnelError> {
+    ) -> Result<World<'a>, StudyError> {
         check_options(input)?;
         let views = views(input)?;
         let regions = regions(input)?;
@@ -240,7 +240,7 @@ fn rows<'l>(
 }
 
 /// Views of the path, evenly spread.
-fn views(input: &FunnelInput) -> Result<Vec<View>, FunnelError> {
+fn views(input: &FunnelInput) -> Result<Vec<View>, StudyError> {
     let around = input.scene.surroundings();
     let all = &input.path.cameras;
     let count = all.len().min(input.most_views.max(1));
@@ -265,14 +265,14 @@ fn views(input: &FunnelInput) -> Result<Vec<View>, FunnelError> {
 }
 
 /// Refuses back ends of the item stages that the scene cannot have.
-fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), FunnelError> {
+fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), StudyError> {
     for stage in StageKind::OF_ITEMS {
         let labels = input.structures.iter().map(|spec| &spec.label);
         let known = rows(back_ends(stage, input.scene, false), regions, labels);
         let name = input.chain.of(stage);
         if !known.iter().any(|(_, known)| known == name) {
             let known: Vec<String> = known.into_iter().map(|(_, name)| name).collect();
-            return Err(FunnelError::Refused(format!(
+            return Err(StudyError::Refused(format!(
                 "{} '{name}' needs what the scene does not have; expected one of {}",
                 stage.name(),
                 known.join(", ")
@@ -283,7 +283,7 @@ fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), Fun
 }
 
 /// Refuses options that the items of the scene cannot have.
-fn check_options(input: &FunnelInput) -> Result<(), FunnelError> {
+fn check_options(input: &FunnelInput) -> Result<(), StudyError> {
     let FunnelInput { scene, mirror, .. } = input;
     let (name, shape) = (&scene.name, scene.item_shape());
     for (option, is_given, expected) in [
@@ -296,7 +296,7 @@ fn check_options(input: &FunnelInput) -> Result<(), FunnelError> {
         ),
     ] {
         if is_given && shape != expected {
-            return Err(FunnelError::Refused(format!(
+            return Err(StudyError::Refused(format!(
                 "the items of '{name}' are {}; expected a scene of {} for {option}",
                 shape.name(),
                 expected.name()
@@ -305,7 +305,7 @@ fn check_options(input: &FunnelInput) -> Result<(), FunnelError> {
     }
     let items = scene.items.len();
     match mirror {
-        Some(item) if *item as usize >= items => Err(FunnelError::Refused(format!(
+        Some(item) if *item as usize >= items => Err(StudyError::Refused(format!(
             "--mirror {item}: '{name}' has {items} items; expected one from 0 to {}",
             items - 1
         ))),
@@ -314,7 +314,7 @@ fn check_options(input: &FunnelInput) -> Result<(), FunnelError> {
 }
 
 /// Regions of the scene, with the claimed table.
-fn regions(input: &FunnelInput) -> Result<Option<Regions>, FunnelError> {
+fn regions(input: &FunnelInput) -> Result<Option<Regions>, StudyError> {
     let name = &input.scene.name;
     let refused = match (Regions::of(input.scene), input.claim) {
         (Ok(mut regions), Some(claim)) => match regions.claim(claim) {
@@ -331,7 +331,7 @@ fn regions(input: &FunnelInput) -> Result<Option<Regions>, FunnelError> {
             format!("'{name}': {dispute}; expected sectors that divide the map for --pvs")
         }
     };
-    Err(FunnelError::Refused(refused))
+    Err(StudyError::Refused(refused))
 }
 
 /// Rooms of a scene, or sectors or clusters of its map.
