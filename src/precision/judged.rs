@@ -188,11 +188,6 @@ impl Judged {
         Ok(())
     }
 
-    /// Ids of every answer.
-    pub fn counts(&self) -> Vec<u64> {
-        self.answers.iter().map(|a| a.len() as u64).collect()
-    }
-
     /// The culling's errors as a point of a structure, without a time.
     pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point<CullingErrors> {
         let is_judged = self.refused.is_none();

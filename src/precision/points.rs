@@ -6,9 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::judged::{CullingErrors, Judged, Shots, Truths};
 use super::point::{self, Point, StableAfter, by_camera, stability};
-use super::region_search::{
-    POINTS_PER_CAMERA, RegionErrors, RegionJudged, RegionNumbers, RegionQueries,
-};
+use super::region_search::{POINTS_PER_CAMERA, RegionErrors, RegionNumbers, RegionQueries};
 use crate::camera::{PLANE_METHODS, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, DynIndex, StructureSpec};
@@ -23,7 +21,7 @@ use crate::statistics::Estimate;
 use crate::verify::Trial;
 
 /// The diagram of a scene and path.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct Precision {
     /// Name of the scene.
     pub scene: String,
@@ -238,24 +236,6 @@ impl<'a> Built<'a> {
         Ok(())
     }
 
-    /// Compares the answers of a way to search with those by the same numbers.
-    fn check_regions(
-        &self,
-        way: Way,
-        judged: &RegionJudged,
-        cameras: usize,
-    ) -> Result<(), Verdict> {
-        let is_right = |n: usize| {
-            let mut out = Vec::new();
-            self.answer(way, n, &mut out);
-            judged.is_right(n, &out)
-        };
-        match (0..cameras).all(is_right) {
-            true => Ok(()),
-            false => Err(Verdict::new(Status::Wrong, "other regions".to_owned())),
-        }
-    }
-
     fn tasks(&self, planned: &[PlannedTask]) -> Vec<TimedTask<'_>> {
         let ways = self.ways();
         let task = |planned: &PlannedTask| {
@@ -288,7 +268,7 @@ pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
     let (mut points, mut region_points) = (Vec::new(), Vec::new());
     let (mut tasks, mut twin) = (Vec::new(), None);
     for (index, way) in built.ways().into_iter().enumerate() {
-        let (is_sound, expected) = match way {
+        let (is_sound, answers) = match way {
             Way::Culling(indexes, judged) => {
                 let test = judged.culling.test;
                 let memory = indexes.of(test).memory().total() as f64 / items as f64;
@@ -296,14 +276,18 @@ pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
                 let is_sound =
                     judged.refused.is_none() && point.accepts(built.check(way, judged, items));
                 points.push(point);
-                (is_sound, judged.counts())
+                (is_sound, &judged.answers)
             }
             Way::Region(indexes, numbers) => {
                 let judged = &region_judged[numbers as usize];
                 let mut point = judged.point(indexes.map_or("scan", |own| own.structure));
-                let is_sound = point.accepts(built.check_regions(way, judged, cameras));
+                let found = match built.queries.agree(judged, indexes.map(Indexes::regions)) {
+                    true => Ok(()),
+                    false => Err(Verdict::new(Status::Wrong, "other regions".to_owned())),
+                };
+                let is_sound = point.accepts(found);
                 region_points.push(point);
-                (is_sound, judged.counts())
+                (is_sound, &judged.answers)
             }
         };
         if !is_sound {
@@ -312,7 +296,7 @@ pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
         let task = |is_twin| PlannedTask {
             way: index,
             is_twin,
-            expected: expected.clone(),
+            expected: answers.iter().map(|ids| ids.len() as u64).collect(),
         };
         tasks.push(task(false));
         if let Way::Culling(_, judged) = way
@@ -329,13 +313,10 @@ pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
             path: input.path.name.clone(),
             items,
             cameras,
-            processes: 0,
             rounds: schedule.rounds as usize,
-            twin: None,
             points,
-            front: Vec::new(),
             region_points,
-            stability: Vec::new(),
+            ..Precision::default()
         },
         plan: PointPlan { tasks, schedule },
     })

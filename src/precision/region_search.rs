@@ -3,6 +3,8 @@
 //! A point is compared with regions in f32, in f32 with an exact test of the hits, in f64,
 //! and exactly.
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
 use serde::Serialize;
 
@@ -60,13 +62,11 @@ pub(super) struct RegionQueries<'a> {
 /// Answers in one kind of numbers, and their errors.
 pub(super) struct RegionJudged {
     numbers: RegionNumbers,
-    answers: Answers,
+    /// Slots of each camera, ascending.
+    pub answers: Vec<Vec<ItemId>>,
     /// Wrong answers, false regions, missed regions and worst of each camera.
     by_camera: Vec<[f64; 4]>,
 }
-
-/// Regions by camera and point.
-type Answers = Vec<Vec<Vec<ItemId>>>;
 
 fn boxes_of(scene: &Scene) -> Vec<[DVec3; 2]> {
     let originals = match &scene.regions {
@@ -158,58 +158,64 @@ impl RegionQueries<'_> {
         }
     }
 
+    /// Slots of a camera, ascending: the id of each region that a point is found in, plus
+    /// the number of regions times the index of the point.
+    fn slots(
+        &self,
+        numbers: RegionNumbers,
+        index: Option<&dyn DynIndex>,
+        camera: usize,
+    ) -> Vec<ItemId> {
+        let mut slots = Vec::new();
+        for (n, p) in (0..).zip(&self.by_camera[camera]) {
+            let first = slots.len();
+            self.find(numbers, index, p, &mut slots);
+            let regions = self.boxes.len() as ItemId;
+            slots[first..].iter_mut().for_each(|id| *id += n * regions);
+        }
+        slots.sort_unstable();
+        slots
+    }
+
+    /// Tests that an index returns the answers of the same numbers by a scan.
+    pub fn agree(&self, judged: &RegionJudged, index: Option<&dyn DynIndex>) -> bool {
+        let answers = (0..).zip(&judged.answers);
+        let mut found = answers.map(|(n, own)| self.slots(judged.numbers, index, n) == *own);
+        found.all(|is_same| is_same)
+    }
+
     /// Answers in every kind of numbers, judged by the exact one. O(points * regions).
     pub fn judged(&self) -> Vec<RegionJudged> {
-        let truth = self.answers(RegionNumbers::Exact);
+        let cameras = || 0..self.by_camera.len();
+        let truth = cameras().map(|n| self.slots(RegionNumbers::Exact, None, n));
+        let truth: Vec<Vec<ItemId>> = truth.collect();
         let of = |numbers| {
-            let answers = self.answers(numbers);
-            let by_camera = answers.iter().zip(&truth).zip(&self.by_camera);
-            let by_camera = by_camera.map(|((found, truth), points)| {
-                let points = found.iter().zip(truth).zip(points);
-                points.fold([0.0; 4], |sum, ((found, truth), p)| {
-                    self.plus_errors(sum, p, found, truth)
-                })
-            });
+            let answers = cameras().map(|n| self.slots(numbers, None, n));
+            let answers: Vec<Vec<ItemId>> = answers.collect();
+            let errors = cameras().map(|n| self.errors(n, &answers[n], &truth[n]));
             RegionJudged {
                 numbers,
-                by_camera: by_camera.collect(),
+                by_camera: errors.collect(),
                 answers,
             }
         };
         RegionNumbers::ALL.map(of).into()
     }
 
-    fn answers(&self, numbers: RegionNumbers) -> Answers {
-        let of_point = |p: &Sought| {
-            let mut found = Vec::new();
-            self.find(numbers, None, p, &mut found);
-            found
+    fn errors(&self, camera: usize, found: &[ItemId], truth: &[ItemId]) -> [f64; 4] {
+        let apart = |a: &[ItemId], b: &[ItemId]| -> Vec<(usize, usize)> {
+            let lone = a.iter().filter(|slot| b.binary_search(slot).is_err());
+            let (slots, regions) = (lone.map(|&slot| slot as usize), self.boxes.len());
+            slots.map(|s| (s / regions, s % regions)).collect()
         };
-        let of_camera = |points: &Vec<Sought>| points.iter().map(of_point).collect();
-        self.by_camera.iter().map(of_camera).collect()
-    }
-
-    fn plus_errors(
-        &self,
-        sum: [f64; 4],
-        p: &Sought,
-        found: &[ItemId],
-        truth: &[ItemId],
-    ) -> [f64; 4] {
-        let [wrong, falsely, missed, worst] = sum;
-        let beyond = |id: &&ItemId| !truth.contains(id);
-        let extra: Vec<&ItemId> = found.iter().filter(beyond).collect();
-        let lost = truth.iter().filter(|id| !found.contains(id)).count();
-        let outside = extra.iter().map(|&&id| {
-            let [min, max] = self.boxes[id as usize];
-            (min - p.world).max(p.world - max).max_element().max(0.0)
+        let (extra, lost) = (apart(found, truth), apart(truth, found));
+        let wrong: BTreeSet<usize> = extra.iter().chain(&lost).map(|slot| slot.0).collect();
+        let outside = extra.iter().map(|&(point, region)| {
+            let (p, [min, max]) = (self.by_camera[camera][point].world, self.boxes[region]);
+            (min - p).max(p - max).max_element()
         });
-        [
-            wrong + f64::from(!extra.is_empty() || lost > 0),
-            falsely + extra.len() as f64,
-            missed + lost as f64,
-            outside.fold(worst, f64::max),
-        ]
+        let counts = [wrong.len(), extra.len(), lost.len()].map(|count| count as f64);
+        [counts[0], counts[1], counts[2], outside.fold(0.0, f64::max)]
     }
 }
 
@@ -226,26 +232,6 @@ fn beside_a_face(rng: &mut SeededRng, origin: DVec3, [low, high]: [DVec3; 2]) ->
 }
 
 impl RegionJudged {
-    /// Ids of every query.
-    pub fn counts(&self) -> Vec<u64> {
-        let count = |points: &Vec<Vec<ItemId>>| points.iter().map(|ids| ids.len() as u64).sum();
-        self.answers.iter().map(count).collect()
-    }
-
-    /// Compares the regions found for a camera, point by point, with this answer.
-    pub fn is_right(&self, camera: usize, found: &[ItemId]) -> bool {
-        let mut rest = found;
-        self.answers[camera].iter().all(|answer| {
-            let Some((own, others)) = rest.split_at_checked(answer.len()) else {
-                return false;
-            };
-            rest = others;
-            let mut own = own.to_vec();
-            own.sort_unstable();
-            own == *answer
-        }) && rest.is_empty()
-    }
-
     /// The errors of these numbers as a point of a structure, without a time.
     pub fn point(&self, structure: &str) -> Point<RegionErrors> {
         let column = |k: usize| self.by_camera.iter().map(move |c| c[k]);
@@ -291,7 +277,7 @@ mod tests {
         let scene = Scene::about("far", &boxes, DVec3::ZERO).unwrap();
         let path = path::load("orbit:frames=12", &scene, &LensDefaults::default()).unwrap();
         let queries = RegionQueries::new(&scene, &Shots::of(&path, 12));
-        let judged = queries.judged();
+        let mut judged = queries.judged();
         let [f32s, checked, f64s, exact] = [0, 1, 2, 3].map(|i| judged[i].point("x").errors);
         assert!(
             f32s.wrong.unwrap().value > 0.2 && f32s.worst_false > 0.1,
@@ -304,13 +290,11 @@ mod tests {
             assert_eq!((found, right.worst_false), ((0, 0), 0.0));
             assert_eq!(right.wrong.unwrap().value, 0.0);
         }
-        for judged in &judged {
+        for judged in &mut judged {
             assert_eq!(judged.point("x").errors.missed_region_count, 0);
-            let mut out = Vec::new();
-            queries.answer(judged.numbers, None, 3, &mut out);
-            assert!(judged.is_right(3, &out), "{:?}", judged.numbers);
-            out.push(0);
-            assert!(!judged.is_right(3, &out));
+            assert!(queries.agree(judged, None), "{:?}", judged.numbers);
+            judged.answers[3].push(0);
+            assert!(!queries.agree(judged, None));
         }
     }
 }
