@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::run_verdict::gains;
 use super::table::{Column, Table};
-use super::text::{self, some};
+use super::text::{self, significant, some, time, time_within};
 use crate::advise::{
     Advice, Axis, Check, Omission, StructureChoice, StructureRow, TestChoice, TestRow, Turn,
     policy_of,
@@ -83,13 +83,13 @@ fn taken(advice: &Advice) -> String {
         row.query_ns.is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
     });
     let faster = next.and_then(|next| {
-        let times = text::significant(next.ns()? / row?.ns()?);
+        let times = significant(next.ns()? / row?.ns()?);
         Some(format!("{times} x {}, the next", next.structure))
     });
     let is_next = next.is_some_and(|next| next.structure == YARDSTICK);
     let linear = row.and_then(|row| row.speedup);
     let linear = linear.filter(|_| !choice.is_scan && !is_next);
-    let linear = linear.map(|times| format!("{} x linear", text::significant(times)));
+    let linear = linear.map(|times| format!("{} x linear", significant(times)));
     let figures = bracketed(linear.into_iter().chain(faster), ", ");
     let test = some(advice.test.name, |test| {
         format!(", test {test}{}", ties(&advice.test.ties))
@@ -119,14 +119,14 @@ fn in_motion(advice: &Advice) -> Option<String> {
     let (row, others) = motion.policies.split_first()?;
     let frame = row.ns()?;
     let longer = others.iter().filter_map(|row| {
-        let longer = text::significant(row.ns()? / frame);
+        let longer = significant(row.ns()? / frame);
         Some(format!(
             "{} takes {longer} x as long",
             policy_of(&row.structure)
         ))
     });
     let ruled_out = motion.ruled_out.iter().map(|(policy, builds)| {
-        let longer = text::significant(builds / frame);
+        let longer = significant(builds / frame);
         format!("{policy} at least {longer} x, its builds alone")
     });
     let others = bracketed(longer.chain(ruled_out), "; ");
@@ -216,7 +216,7 @@ fn rule_table(advice: &Advice) -> Table {
             let shown = |ns| some(finite(ns), text::time);
             let ratio = match rule.is_tie {
                 true => "tie".to_owned(),
-                false => some(finite(ratio), |x| format!("{} x", text::significant(x))),
+                false => some(finite(ratio), |x| format!("{} x", significant(x))),
             };
             let feature = format!("  {}", rule.feature);
             table.add_row([
@@ -275,25 +275,21 @@ fn bracketed(texts: impl Iterator<Item = String>, between: &str) -> String {
 
 fn structure_table(choice: &StructureChoice) -> Table {
     let columns: &[Column<&StructureRow>] = &[
-        ("structure", |row| row.structure.clone()),
-        (">query [95 % interval]", |row| {
-            some(row.query_ns, text::time_within)
+        ("structure", |r| r.structure.clone()),
+        (">query [95 % interval]", |r| some(r.query_ns, time_within)),
+        (">speed-up", |r| some(r.speedup, significant)),
+        (">build", |r| some(r.build_ms, |ms| time(ms * 1e6))),
+        (">B/item", |r| {
+            some(r.memory_bytes_per_item, |bytes| format!("{bytes:.1}"))
         }),
-        (">speed-up", |row| some(row.speedup, text::significant)),
-        (">build", |row| {
-            some(row.build_ms, |ms| text::time(ms * 1e6))
+        (">break-even queries", |r| {
+            some(r.break_even_queries, |n| text::count(n as usize))
         }),
-        (">B/item", |row| {
-            some(row.memory_bytes_per_item, |bytes| format!("{bytes:.1}"))
-        }),
-        (">break-even queries", |row| {
-            some(row.break_even_queries, |n| text::count(n as usize))
-        }),
-        (">locate", |row| some(row.locate_ns, text::time)),
-        (">frame", |row| some(row.frame_ns, text::time_within)),
-        (">update", |row| some(row.update_ns, text::time)),
-        (">worst frame", |row| some(row.worst_frame_ns, text::time)),
-        ("status", |row| row.status.to_owned()),
+        (">locate", |r| some(r.locate_ns, time)),
+        (">frame", |r| some(r.frame_ns, time_within)),
+        (">update", |r| some(r.update_ns, time)),
+        (">worst frame", |r| some(r.worst_frame_ns, time)),
+        ("status", |r| r.status.to_owned()),
     ];
     Table::with(&choice.rows, columns).without_empty_columns()
 }
@@ -303,22 +299,18 @@ fn test_table(choice: &TestChoice) -> Table {
         ("", |(is_chosen, _)| {
             if *is_chosen { "*" } else { "" }.to_owned()
         }),
-        ("test", |(_, row)| row.test.to_owned()),
-        (">query [95 % interval]", |(_, row)| {
-            some(row.query_ns, text::time_within)
+        ("test", |(_, r)| r.test.to_owned()),
+        (">query [95 % interval]", |(_, r)| {
+            some(r.query_ns, time_within)
         }),
-        (">false positives %", |(_, row)| {
-            text::rate(row.excess, 100.0)
+        (">false positives %", |(_, r)| text::rate(r.excess, 100.0)),
+        (">missed ppm", |(_, r)| {
+            text::rate(r.false_negative_ppm, 1.0)
         }),
-        (">missed ppm", |(_, row)| {
-            text::rate(row.false_negative_ppm, 1.0)
+        (">false positives per query", |(_, r)| {
+            some(r.false_positives_per_query, significant)
         }),
-        (">false positives per query", |(_, row)| {
-            some(row.false_positives_per_query, text::significant)
-        }),
-        (">query and drawing", |(_, row)| {
-            some(row.total_ns, text::time)
-        }),
+        (">query and drawing", |(_, r)| some(r.total_ns, time)),
     ];
     let rows = choice.rows.iter();
     Table::with(

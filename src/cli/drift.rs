@@ -10,7 +10,7 @@ use super::figure::{Axis, Figure, Look, is_drawn, picture};
 use super::processes::{Job, Timing};
 use super::study::Study;
 use super::table::{Column, Table};
-use super::text::{self, some};
+use super::text::{self, some, time_plus_minus};
 use super::{Ending, expect_places, print, write_text};
 use crate::drift::{
     self, ARMS, ArmChoice, ArmKind, ArmOptions, ArmPoint, ArmReport, DriftOptions, DriftReport,
@@ -214,20 +214,16 @@ fn errors<T>(
 /// Methods with error and time; with `all` a line about each.
 fn rated(methods: &[Rated], error: &str, tolerance: f64, all: bool) -> Table {
     let columns: [Column<&Rated>; 5] = [
-        ("method", |row| {
-            let default = if row.is_default { " (default)" } else { "" };
-            format!("{}{default}", row.name)
+        ("method", |r| {
+            let default = if r.is_default { " (default)" } else { "" };
+            format!("{}{default}", r.name)
         }),
-        (">error", |row| {
-            row.error.map_or("unstable".to_owned(), scientific)
+        (">error", |r| {
+            r.error.map_or("unstable".to_owned(), scientific)
         }),
-        (">time per step", |row| {
-            text::time_plus_minus(row.time_per_step)
-        }),
-        ("", |row| {
-            if row.qualifies { "yes" } else { "no" }.to_owned()
-        }),
-        ("", |row| row.summary.to_owned()),
+        (">time per step", |r| time_plus_minus(r.time_per_step)),
+        ("", |r| if r.qualifies { "yes" } else { "no" }.to_owned()),
+        ("", |r| r.summary.to_owned()),
     ];
     let shown = if all { columns.len() } else { 4 };
     let mut table = Table::with(methods, &columns[..shown]);
@@ -242,9 +238,9 @@ fn recommended(what: &str, methods: &[Rated], choice: &Recommendation) -> String
         return format!("Recommended for {what}: nothing, {}.", choice.reason);
     };
     let row = methods.iter().find(|row| row.name == name);
-    let figures = text::some(row, |row| {
-        let error = text::some(row.error, scientific);
-        let time = text::time_plus_minus(row.time_per_step);
+    let figures = some(row, |row| {
+        let error = some(row.error, scientific);
+        let time = time_plus_minus(row.time_per_step);
         format!(" ({time} per step, error {error})")
     });
     format!(
@@ -399,21 +395,21 @@ fn stability(limits: &[StabilityLimit]) -> Table {
 /// The method of each arm; with `all` the reasons too.
 fn choices(report: &ArmReport, all: bool) -> Table {
     let columns: [Column<&ArmChoice>; 5] = [
-        ("", |choice| {
-            let setting = &choice.setting;
+        ("", |c| {
+            let setting = &c.setting;
             let (arm, k, rate) = (setting.arm.name(), setting.stiffness, setting.rate_hz);
             format!("{arm} k={k:e}, {rate} Hz")
         }),
-        ("method", |choice| {
-            choice.choice.name.clone().unwrap_or("nothing".into())
+        ("method", |c| {
+            c.choice.name.clone().unwrap_or("nothing".into())
         }),
-        (">error", |choice| {
-            some(choice.position_error, |error| format!("{error:.1e}"))
+        (">error", |c| {
+            some(c.position_error, |error| format!("{error:.1e}"))
         }),
-        (">time per s", |choice| {
-            some(choice.us_per_second, |us| text::time(us * 1e3))
+        (">time per s", |c| {
+            some(c.us_per_second, |us| text::time(us * 1e3))
         }),
-        ("why", |choice| choice.choice.reason.clone()),
+        ("why", |c| c.choice.reason.clone()),
     ];
     let shown = if all { columns.len() } else { 4 };
     let mut table = Table::with(&report.choices, &columns[..shown]);

@@ -11,9 +11,9 @@ use super::funnel::plain_input;
 use super::processes::{Job, Timing};
 use super::study::{Setting, Study};
 use super::table::{Column, Table};
+use super::text::{self, significant, some, time_plus_minus};
 use super::{
-    Ending, expect_places, funnel_table, precision_conclusions, precision_tables, print, text,
-    write_text,
+    Ending, expect_places, funnel_table, precision_conclusions, precision_tables, print, write_text,
 };
 use crate::funnel::{self, Chain, FunnelPlan, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
@@ -242,27 +242,17 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
         funnel_table::spread(sweep.processes)
     );
     let columns: &[Column<&SweepPoint>] = &[
-        ("by", |point| {
-            let doubt = funnel_table::doubt(point.back_end.guarantee);
-            format!("{}{doubt}", point.back_end.name)
+        ("by", |p| {
+            let doubt = funnel_table::doubt(p.back_end.guarantee);
+            format!("{}{doubt}", p.back_end.name)
         }),
-        (">buffer", |point| {
-            text::some(point.buffer, |[w, h]| format!("{w}x{h}"))
-        }),
-        (">out", |point| text::significant(point.errors.output_count)),
-        (">FP / visible", |point| {
-            text::rate(point.errors.excess, 1.0)
-        }),
-        (">FN / visible", |point| {
-            text::rate(point.errors.missing, 1.0)
-        }),
-        (">FN / view", |point| {
-            text::significant(point.errors.false_negative_count)
-        }),
-        (">time / view", |point| text::time_plus_minus(point.time)),
-        (">front", |point| {
-            if point.on_front { "*" } else { "" }.to_owned()
-        }),
+        (">buffer", |p| some(p.buffer, |[w, h]| format!("{w}x{h}"))),
+        (">out", |p| significant(p.errors.output_count)),
+        (">FP / visible", |p| text::rate(p.errors.excess, 1.0)),
+        (">FN / visible", |p| text::rate(p.errors.missing, 1.0)),
+        (">FN / view", |p| significant(p.errors.false_negative_count)),
+        (">time / view", |p| time_plus_minus(p.time)),
+        (">front", |p| if p.on_front { "*" } else { "" }.to_owned()),
     ];
     let is_lossy = |point: &&SweepPoint| point.errors.false_negative_count > 0.0;
     let lossy = sweep.points.iter().filter(is_lossy);

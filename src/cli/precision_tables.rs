@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::document::Block;
 use super::table::{Column, Table};
-use super::text::{self, some};
+use super::text::{self, significant, some, time, time_plus_minus};
 use crate::precision::{
     CullingErrors, Names, Point, Precision, RegionErrors, SIZE_RATIOS, SWEEPS, SizeRow,
     StableAfter, SweepRow,
@@ -152,32 +152,26 @@ fn by_source(errors: &ErrorCount) -> String {
 
 fn errors_table(points: &[&CullingPoint]) -> Table {
     let columns: &[Column<&&CullingPoint>] = &[
-        ("culling", |point| culling(point)),
-        (">FP %", |point| percent(point.errors.excess)),
-        (">by source", |point| {
-            some(point.errors.counts.as_ref(), by_source)
-        }),
-        (">FN ppm", |point| {
-            text::rate(point.errors.false_negative_ppm, 1.0)
-        }),
-        (">px", |point| {
-            some(point.errors.worst_miss_px, text::significant)
-        }),
-        (">flicker %", |point| percent(point.errors.flicker)),
+        ("culling", |p| culling(p)),
+        (">FP %", |p| percent(p.errors.excess)),
+        (">by source", |p| some(p.errors.counts.as_ref(), by_source)),
+        (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
+        (">px", |p| some(p.errors.worst_miss_px, significant)),
+        (">flicker %", |p| percent(p.errors.flicker)),
     ];
     Table::with(points, columns)
 }
 
 fn times_table(points: &[&CullingPoint]) -> Table {
     let columns: &[Column<&&CullingPoint>] = &[
-        ("", |point| mark(point.on_front, point.is_tie).to_owned()),
-        ("culling", |point| culling(point)),
-        ("structure", |point| structure(point)),
-        (">query", |point| text::time_plus_minus(point.time)),
-        (">B/item", |point| {
-            format!("{:.1}", point.errors.memory_bytes_per_item)
+        ("", |p| mark(p.on_front, p.is_tie).to_owned()),
+        ("culling", |p| culling(p)),
+        ("structure", |p| structure(p)),
+        (">query", |p| time_plus_minus(p.time)),
+        (">B/item", |p| {
+            format!("{:.1}", p.errors.memory_bytes_per_item)
         }),
-        ("status", |point| point.status.name().to_owned()),
+        ("status", |p| p.status.name().to_owned()),
     ];
     Table::with(points, columns)
 }
@@ -192,19 +186,15 @@ fn mark(on_front: bool, is_tie: bool) -> &'static str {
 
 fn front_table(p: &Precision) -> Table {
     let columns: &[Column<&CullingPoint>] = &[
-        ("structure", |point| structure(point)),
-        ("culling", |point| culling(point)),
-        (">query", |point| text::time_plus_minus(point.time)),
-        (">FP %", |point| percent(point.errors.excess)),
-        (">FN ppm", |point| {
-            text::rate(point.errors.false_negative_ppm, 1.0)
+        ("structure", |p| structure(p)),
+        ("culling", |p| culling(p)),
+        (">query", |p| time_plus_minus(p.time)),
+        (">FP %", |p| percent(p.errors.excess)),
+        (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
+        (">B/item", |p| {
+            format!("{:.1}", p.errors.memory_bytes_per_item)
         }),
-        (">B/item", |point| {
-            format!("{:.1}", point.errors.memory_bytes_per_item)
-        }),
-        ("tie", |point| {
-            if point.is_tie { "tie" } else { "" }.to_owned()
-        }),
+        ("tie", |p| if p.is_tie { "tie" } else { "" }.to_owned()),
     ];
     let points = p.front.iter().map(|&i| &p.points[i]);
     Table::with(points, columns).without_empty_columns()
@@ -226,26 +216,24 @@ fn regions_table(p: &Precision) -> Table {
         }
     }
     let columns: &[Column<&Point<RegionErrors>>] = &[
-        ("", |row| mark(row.on_front, row.is_tie).to_owned()),
-        ("numbers", |row| row.errors.numbers.to_owned()),
-        ("structure", |row| row.structure.clone()),
-        (">points", |row| row.errors.points.to_string()),
-        (">wrong %", |row| percent(row.errors.wrong)),
-        (">false", |row| row.errors.false_region_count.to_string()),
-        (">missed", |row| row.errors.missed_region_count.to_string()),
-        (">farthest", |row| text::significant(row.errors.worst_false)),
-        (">per point", |row| text::time_plus_minus(row.time)),
+        ("", |r| mark(r.on_front, r.is_tie).to_owned()),
+        ("numbers", |r| r.errors.numbers.to_owned()),
+        ("structure", |r| r.structure.clone()),
+        (">points", |r| r.errors.points.to_string()),
+        (">wrong %", |r| percent(r.errors.wrong)),
+        (">false", |r| r.errors.false_region_count.to_string()),
+        (">missed", |r| r.errors.missed_region_count.to_string()),
+        (">farthest", |r| significant(r.errors.worst_false)),
+        (">per point", |r| time_plus_minus(r.time)),
     ];
     Table::with(rows, columns)
 }
 
 fn stability_table(p: &Precision) -> Table {
     let columns: &[Column<&StableAfter>] = &[
-        (">cameras", |row| row.cameras.to_string()),
-        (">pairs in final order", |row| {
-            text::percent(row.pairs_in_order)
-        }),
-        (">CPU time", |row| text::time(row.seconds * 1e9)),
+        (">cameras", |r| r.cameras.to_string()),
+        (">pairs in final order", |r| text::percent(r.pairs_in_order)),
+        (">CPU time", |r| time(r.seconds * 1e9)),
     ];
     Table::with(&p.stability, columns)
 }
@@ -278,7 +266,7 @@ fn sizes_note(rows: &[SizeRow]) -> String {
         .filter(|row| row.size_over_depth == SIZE_RATIOS[2]);
     let tests = middle.next().unwrap_or(first).tests.iter();
     let costs = tests.filter_map(|t| {
-        let ns = text::significant(t.ns_per_box?);
+        let ns = significant(t.ns_per_box?);
         Some(format!("{} {ns}", t.test))
     });
     format!(
@@ -330,7 +318,7 @@ fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
         true => String::new(),
         false => format!(
             "Nothing missed (below {} ppm): {}.",
-            text::significant(least),
+            significant(least),
             sound.join(", ")
         ),
     };

@@ -164,19 +164,13 @@ fn json(sections: &[Section]) -> io::Result<()> {
 fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     let mut out = text::terminal();
     let columns: &[Column<&Section>] = &[
-        ("category", |section| section.name.clone()),
-        (">cases", |section| text::count(section.cases as usize)),
-        (">boxes", |section| text::count(section.boxes as usize)),
-        (">rows", |section| text::count(section.rows.len())),
-        (">passed", |section| {
-            text::count(section.count(Status::Pass))
-        }),
-        (">refused", |section| {
-            text::count(section.count(Status::Refused))
-        }),
-        (">failed", |section| {
-            text::count(section.count(Status::Fail))
-        }),
+        ("category", |s| s.name.clone()),
+        (">cases", |s| text::count(s.cases as usize)),
+        (">boxes", |s| text::count(s.boxes as usize)),
+        (">rows", |s| text::count(s.rows.len())),
+        (">passed", |s| text::count(s.count(Status::Pass))),
+        (">refused", |s| text::count(s.count(Status::Refused))),
+        (">failed", |s| text::count(s.count(Status::Fail))),
     ];
     let width = text::width();
     writeln!(out, "{}", Table::with(sections, columns).fitted(width))?;
