@@ -7,18 +7,13 @@ use super::diagram::{Diagram, Joined, Point, Series};
 use super::figure::{Axis, Figure, is_drawn, left_out};
 use super::text;
 
-/// A structure with a test.
+/// A point of a structure with a test.
 pub struct Measured {
     pub structure: String,
     pub test: String,
-    pub time: f64,
-    pub ends: Option<[f64; 2]>,
-    /// Error; zero stands at the bottom.
-    pub error: f64,
-    pub on_front: bool,
-    /// True if it misses something that is to be found.
-    pub is_cross: bool,
-    pub note: String,
+    /// Time and error; large if it is on the front, a cross if it misses something that
+    /// is to be found.
+    pub point: Point,
 }
 
 /// Error against run time.
@@ -35,18 +30,12 @@ pub struct Against<'a> {
 }
 
 impl Against<'_> {
-    /// Position of a point, if it is on the axes.
-    fn at(&self, point: &Measured) -> Option<[f64; 2]> {
-        let at = [point.time, point.error.max(self.none)];
-        at.iter().all(|value| is_drawn(*value)).then_some(at)
-    }
-
     /// Those of the front that are better the longer they take: the others are on it
     /// for their memory or for what they do not miss.
     fn front(&self) -> Vec<[f64; 2]> {
         let mut least = f64::INFINITY;
-        let marks = self.points.iter().filter(|point| point.on_front);
-        let places = marks.filter_map(|point| self.at(point));
+        let points = self.points.iter().map(|own| &own.point);
+        let places = points.filter(|point| point.is_large).map(|point| point.at);
         let better = |at: &[f64; 2]| {
             let is_better = at[1] < least;
             least = least.min(at[1]);
@@ -57,10 +46,7 @@ impl Against<'_> {
 
     /// The tests at each height, near ones together.
     fn levels(&self) -> Vec<(f64, String)> {
-        let places = self
-            .points
-            .iter()
-            .filter_map(|p| Some((self.at(p)?[1], &p.test)));
+        let places = self.points.iter().map(|own| (own.point.at[1], &own.test));
         let mut places: Vec<(f64, &String)> = places.collect();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
         let near = |a: &(f64, &String), b: &(f64, &String)| b.0 / a.0 < 1.25;
@@ -73,29 +59,29 @@ impl Against<'_> {
         places.chunk_by(near).map(level).collect()
     }
 
-    pub fn draw(&self) -> Figure {
-        let front = self.front();
+    pub fn draw(mut self) -> Figure {
+        let all = self.points.len();
+        for own in &mut self.points {
+            own.point.at[1] = own.point.at[1].max(self.none);
+        }
+        let is_drawn = |own: &Measured| own.point.at.iter().all(|value| is_drawn(*value));
+        self.points.retain(is_drawn);
+        let beyond = all - self.points.len();
+        let (front, levels) = (self.front(), self.levels());
         let mut series: Vec<Series> = Vec::new();
-        let mut beyond = 0;
-        for point in &self.points {
-            let Some(at) = self.at(point) else {
-                beyond += 1;
-                continue;
-            };
-            let is_large = front.contains(&at);
-            let own = Point {
-                at,
-                ends: None,
-                wide: point.ends.filter(|_| is_large),
-                note: point.note.clone(),
-                is_cross: point.is_cross,
-                is_large,
-            };
-            match series.iter_mut().find(|s| s.name == point.structure) {
-                Some(series) => series.points.push(own),
+        for Measured {
+            structure,
+            mut point,
+            ..
+        } in self.points
+        {
+            point.is_large = front.contains(&point.at);
+            point.wide = point.wide.filter(|_| point.is_large);
+            match series.iter_mut().find(|s| s.name == structure) {
+                Some(series) => series.points.push(point),
                 None => {
-                    let is_scan = point.structure.starts_with("linear");
-                    series.push(Series::of(&point.structure, is_scan, vec![own]));
+                    let is_scan = structure.starts_with("linear");
+                    series.push(Series::of(&structure, is_scan, vec![point]));
                 }
             }
         }
@@ -120,7 +106,7 @@ impl Against<'_> {
         );
         Diagram {
             front,
-            levels: self.levels(),
+            levels,
             ..Diagram::of(caption, [x, y], Joined::Apart, series)
         }
         .draw()

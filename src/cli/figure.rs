@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::text;
 use super::text::html;
 use crate::shown::shortened;
+use crate::statistics::Estimate;
 
 /// Series of a figure with a colour; the others are grey.
 pub const STRONG: usize = 8;
@@ -26,6 +27,12 @@ const DRAWN: Range<f64> = 1e-30..1e30;
 /// Returns true for a value with a place on a logarithmic axis.
 pub fn is_drawn(value: f64) -> bool {
     DRAWN.contains(&value)
+}
+
+/// Ends of an interval that have a place on a logarithmic axis.
+pub fn ends(value: Estimate) -> Option<[f64; 2]> {
+    let ends = value.lower.zip(value.upper)?;
+    (is_drawn(ends.0) && is_drawn(ends.1)).then_some(ends.into())
 }
 
 /// Note in a caption on points that are not drawn.

@@ -2,8 +2,7 @@
 
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, to_html};
-use super::figure::{Axis, is_drawn};
-use super::run_figures::ends;
+use super::figure::{Axis, ends, is_drawn};
 use super::table::{Column, Table};
 use super::{program, text};
 use crate::measure::{CellKey, GroupKey, Metric};
@@ -76,7 +75,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
                 change = format!("{} x", text::significant(last.value / first.value));
                 compared += 1;
                 let line = || format!("{structure} on {}, {} ({change})", group.scene, group.path);
-                match (ends(first), ends(last)) {
+                match (ends(first.estimate()), ends(last.estimate())) {
                     (Some(a), Some(b)) if b[0] > a[1] => changed[0].push(line()),
                     (Some(a), Some(b)) if b[1] < a[0] => changed[1].push(line()),
                     _ => {}
@@ -94,7 +93,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
                 let time = (*time)?;
                 Some(Point {
                     at: [run as f64, time.value],
-                    ends: ends(time),
+                    ends: ends(time.estimate()),
                     note: format!(
                         "{structure}, {}: {}",
                         name(&reports[run]),

@@ -1,12 +1,13 @@
 //! The sentences that `cullbench precision` ends with: what its figures say, from
 //! the figures alone.
 
+use super::diagram;
 use super::error_figure::{Against, Measured};
-use super::figure::{Figure, is_drawn};
+use super::figure::{Figure, ends};
 use super::precision_tables::{CullingPoint, Outcome, elsewhere, named, numbers, percent, swept};
 use super::text;
 use crate::precision::{Point, Precision, RegionErrors, SWEEPS, SizeRow, SweepRow};
-use crate::statistics::Estimate;
+use crate::statistics::Rate;
 
 pub fn conclusions(outcome: &Outcome) -> Vec<String> {
     let p = &outcome.precision;
@@ -158,46 +159,44 @@ fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
     })
 }
 
-/// Ends of the interval of a time.
-fn ends(time: Option<Estimate>) -> Option<[f64; 2]> {
-    let ends = time?.lower.zip(time?.upper)?;
-    (is_drawn(ends.0) && is_drawn(ends.1)).then_some(ends.into())
-}
-
-/// If the point has a time and an error.
-fn of(point: &CullingPoint) -> Option<Measured> {
-    let missed = point
-        .errors
-        .counts
-        .map_or(0, |errors| errors.false_negatives);
+/// A point of a figure, if it has a time and an error.
+fn measured<E>(
+    point: &Point<E>,
+    test: &str,
+    error: Option<Rate>,
+    is_cross: bool,
+    note: String,
+) -> Option<Measured> {
     Some(Measured {
         structure: point.structure.clone(),
-        test: point.errors.names.test.to_owned(),
-        time: point.query_ns()?,
-        ends: ends(point.time),
-        error: point.errors.excess?.value * 100.0,
-        on_front: point.on_front,
-        is_cross: missed > 0,
-        note: format!(
-            "{}: {}, false positives {} %, {missed} missed",
-            named(point),
-            text::some(point.query_ns(), text::time),
-            percent(point.errors.excess)
-        ),
+        test: test.to_owned(),
+        point: diagram::Point {
+            at: [point.query_ns()?, error?.value * 100.0],
+            wide: point.time.and_then(ends),
+            note,
+            is_cross,
+            is_large: point.on_front,
+            ..Default::default()
+        },
     })
+}
+
+fn of(point: &CullingPoint) -> Option<Measured> {
+    let (errors, missed) = (&point.errors, missed(point));
+    let note = format!(
+        "{}: {}, false positives {} %, {missed} missed",
+        named(point),
+        text::some(point.query_ns(), text::time),
+        percent(errors.excess)
+    );
+    measured(point, errors.names.test, errors.excess, missed > 0, note)
 }
 
 fn of_region(point: &Point<RegionErrors>) -> Option<Measured> {
-    Some(Measured {
-        structure: point.structure.clone(),
-        test: point.errors.numbers.to_owned(),
-        time: point.query_ns()?,
-        ends: ends(point.time),
-        error: point.errors.wrong?.value * 100.0,
-        on_front: point.on_front,
-        is_cross: point.errors.missed_region_count > 0,
-        note: format!("{} {}", point.structure, point.errors.numbers),
-    })
+    let errors = &point.errors;
+    let note = format!("{} {}", point.structure, errors.numbers);
+    let is_cross = errors.missed_region_count > 0;
+    measured(point, errors.numbers, errors.wrong, is_cross, note)
 }
 
 /// Frustum queries, then region search where it was measured.
@@ -220,6 +219,6 @@ pub fn figures(precision: &Precision) -> Vec<Figure> {
             .collect(),
     };
     let all = [queries, regions];
-    let drawn = all.iter().filter(|one| !one.points.is_empty());
+    let drawn = all.into_iter().filter(|one| !one.points.is_empty());
     drawn.map(Against::draw).collect()
 }

@@ -3,21 +3,14 @@
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::diagram::{Row, rows};
 use super::error_figure::{Against, Measured};
-use super::figure::{Axis, Figure, Look, is_drawn, left_out};
+use super::figure::{Axis, Figure, Look, ends, is_drawn, left_out};
 use super::run_verdict::times;
 use super::text;
-use crate::measure::Metric;
 use crate::report::{Comparison, Reading, ReportCell, Speedup, Views};
 use crate::statistics::quantile;
 
 /// Least number of clock readings along a path for a line, and for quantiles.
 const LEAST_READINGS: [usize; 2] = [4, 20];
-
-/// Ends of an interval that have a place on a logarithmic axis.
-pub fn ends(metric: &Metric) -> Option<[f64; 2]> {
-    let ends = metric.lower.zip(metric.upper)?;
-    (is_drawn(ends.0) && is_drawn(ends.1)).then_some(ends.into())
-}
 
 /// Scene, path and motion of a comparison.
 pub fn of(comparison: &Comparison) -> String {
@@ -200,18 +193,19 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
                 Some(Measured {
                     structure: cell.structure.clone(),
                     test: cell.test.clone(),
-                    time: time.value,
-                    ends: ends(time),
-                    error: error * 100.0,
-                    on_front: true,
-                    is_cross: false,
-                    note: format!(
-                        "{} {}: {}, {} % false positives",
-                        cell.structure,
-                        cell.test,
-                        text::time_within(time.estimate()),
-                        text::significant(error * 100.0)
-                    ),
+                    point: Point {
+                        at: [time.value, error * 100.0],
+                        wide: ends(time.estimate()),
+                        note: format!(
+                            "{} {}: {}, {} % false positives",
+                            cell.structure,
+                            cell.test,
+                            text::time_within(time.estimate()),
+                            text::significant(error * 100.0)
+                        ),
+                        is_large: true,
+                        ..Point::default()
+                    },
                 })
             })
             .collect();
@@ -221,7 +215,7 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     if comparisons.len() < 2 || points.is_empty() {
         return None;
     }
-    points.sort_by(|a, b| a.time.total_cmp(&b.time));
+    points.sort_by(|a, b| a.point.at[0].total_cmp(&b.point.at[0]));
     let against = Against {
         caption: format!("{}: error against run time, by test", of(first)),
         axes: ["time per query", "false positives, % of visible"],

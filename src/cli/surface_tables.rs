@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::Block;
-use super::figure::{Axis, Figure, is_drawn, left_out, picture};
-use super::run_figures::ends;
+use super::figure::{Axis, Figure, ends, is_drawn, left_out, picture};
 use super::table::{Column, Table};
 use super::{run_figures, text};
 use crate::report::{
@@ -175,7 +174,7 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
             let metric = cells.next().and_then(|cell| cell.metrics.get("query_ns"));
             Point {
                 at: [items as f64, ns],
-                ends: metric.and_then(ends),
+                ends: metric.and_then(|metric| ends(metric.estimate())),
                 note: format!(
                     "{name}, {}: {}",
                     text::count(items),

@@ -1,6 +1,8 @@
 //! Answers of a culling to every camera by the plain loop, and their errors. No
 //! structure and no clock.
 
+use std::ops::Add;
+
 use serde::ser::Error as _;
 use serde::{Serialize, Serializer};
 
@@ -212,10 +214,10 @@ impl Judged {
             memory_bytes_per_item,
         };
         let dimensions = vec![
-            Dimension::sum(known().map(|c| c.counts.false_negatives as f64)),
-            Dimension::sum(known().map(|c| c.counts.touch_dropped as f64)),
-            Dimension::sum(known().map(|c| c.counts.false_positives as f64)),
-            Dimension::worst(known().map(|c| c.worst_miss_px)),
+            Dimension::of(known().map(|c| c.counts.false_negatives as f64), f64::add),
+            Dimension::of(known().map(|c| c.counts.touch_dropped as f64), f64::add),
+            Dimension::of(known().map(|c| c.counts.false_positives as f64), f64::add),
+            Dimension::of(known().map(|c| c.worst_miss_px), f64::max),
             Dimension::fixed(memory_bytes_per_item),
         ];
         let mut point = Point::new(structure, errors, dimensions);

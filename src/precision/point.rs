@@ -18,20 +18,11 @@ pub(super) struct Dimension {
 }
 
 impl Dimension {
-    /// A count over all cameras.
-    pub fn sum(by_camera: impl Iterator<Item = f64>) -> Dimension {
+    /// A value that `fold` makes of those of all cameras.
+    pub fn of(by_camera: impl Iterator<Item = f64>, fold: fn(f64, f64) -> f64) -> Dimension {
         let by_camera: Vec<f64> = by_camera.collect();
         Dimension {
-            value: by_camera.iter().sum(),
-            by_camera,
-        }
-    }
-
-    /// The worst of all cameras.
-    pub fn worst(by_camera: impl Iterator<Item = f64>) -> Dimension {
-        let by_camera: Vec<f64> = by_camera.collect();
-        Dimension {
-            value: by_camera.iter().copied().fold(0.0, f64::max),
+            value: by_camera.iter().copied().fold(0.0, fold),
             by_camera,
         }
     }
@@ -216,13 +207,15 @@ pub(super) fn stability(
 
 #[cfg(test)]
 mod tests {
+    use std::ops::Add;
+
     use super::*;
     use crate::measure::Sample;
 
     /// A point with false negatives, dropped touches and false positives, each the
     /// same number at four cameras, the depth of its worst miss, its memory and time.
     fn point(errors: [f64; 3], depth: f64, memory: f64, ns: Option<f64>) -> Point<()> {
-        let sampled = |value: f64| Dimension::sum([value / 4.0; 4].into_iter());
+        let sampled = |value: f64| Dimension::of([value / 4.0; 4].into_iter(), f64::add);
         let mut dimensions = errors.map(sampled).to_vec();
         dimensions.push(Dimension {
             value: depth,

@@ -4,6 +4,7 @@
 //! and exactly.
 
 use std::collections::BTreeSet;
+use std::ops::Add;
 
 use glam::DVec3;
 use serde::Serialize;
@@ -247,9 +248,9 @@ impl RegionJudged {
             worst_false,
         };
         let dimensions = vec![
-            Dimension::sum(column(2)),
-            Dimension::sum(column(1)),
-            Dimension::worst(column(3)),
+            Dimension::of(column(2), f64::add),
+            Dimension::of(column(1), f64::add),
+            Dimension::of(column(3), f64::max),
         ];
         let mut point = Point::new(structure, errors, dimensions);
         if missed > 0.0 {
