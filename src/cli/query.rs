@@ -102,37 +102,32 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
         ("region_ids", &|row| json!(row.ids)),
         ("nodes_tested", &|row| json!(row.cost.nodes_tested)),
     ];
-    let agree = match (&args.sought.points, &args.sought.boxes) {
-        (Some(file), _) => {
-            let points = points(&scene, file)?;
-            let boxes = scene.regions.boxes(&scene.items);
-            let ask = |index: &dyn DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
-                let p = &points[point];
-                scene.search(p, out, |p, out| index.query_counted(p.into(), out, cost));
-                out.clear();
-                scene.search(p, out, |p, out| index.locate(p, out));
-            };
-            let questions = (what, points.len());
-            write(args.format, &columns, |each| {
-                ask_all(&structures, &scene, boxes, questions, true, ask, each)
-            })?
-        }
-        (_, Some(file)) => {
-            let boxes = boxes(&scene, file)?;
-            let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
-                index.query_counted((&boxes[n].volume).into(), out, cost);
-                out.clear();
-                index.visible(&boxes[n].volume, out);
-                scene.refine_overlapping(&boxes[n], out);
-            };
-            let (items, questions) = (&scene.items, (what, boxes.len()));
-            write(args.format, &columns, |each| {
-                ask_all(&structures, &scene, items, questions, true, ask, each)
-            })?
-        }
+    let (points, boxes) = match (&args.sought.points, &args.sought.boxes) {
+        (Some(file), _) => (points(&scene, file)?, Vec::new()),
+        (_, Some(file)) => (Vec::new(), boxes(&scene, file)?),
         // The argument parser refuses that.
-        (None, None) => true,
+        (None, None) => return Ok(Ending::Ok),
     };
+    let items: &[Aabb] = match args.sought.points {
+        Some(_) => scene.regions.boxes(&scene.items),
+        None => &scene.items,
+    };
+    let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
+        if let Some(p) = points.get(n) {
+            scene.search(p, out, |p, out| index.query_counted(p.into(), out, cost));
+            out.clear();
+            scene.search(p, out, |p, out| index.locate(p, out));
+        } else {
+            index.query_counted((&boxes[n].volume).into(), out, cost);
+            out.clear();
+            index.visible(&boxes[n].volume, out);
+            scene.refine_overlapping(&boxes[n], out);
+        }
+    };
+    let questions = (what, points.len() + boxes.len());
+    let agree = write(args.format, &columns, |each| {
+        ask_all(&structures, &scene, items, questions, true, ask, each)
+    })?;
     Ok(Ending::of(agree))
 }
 

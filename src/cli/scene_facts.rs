@@ -122,7 +122,7 @@ impl SceneFacts {
         let length = |value: f64| length(value, scene.unit);
         let count = scene.items.len();
         let three = |values: [f64; 3]| values.map(length).join(", ");
-        let mut rows = vec![("extent", self.extent.map(length).join(" x "))];
+        let extent = ("extent", self.extent.map(length).join(" x "));
         let sizes = [
             self.size_min,
             self.size_median,
@@ -131,71 +131,62 @@ impl SceneFacts {
         ];
         let [Some(least), Some(median), Some(p99), Some(most)] = sizes.map(|s| s.map(length))
         else {
-            rows.push(("sizes", "no items".to_owned()));
-            return rows;
+            return vec![extent, ("sizes", "no items".to_owned())];
         };
-        rows.push((
-            "sizes",
-            format!("longest edge min {least}, median {median}, p99 {p99}, max {most}"),
-        ));
-        if let [first, .., last] = &self.size_histogram[..] {
-            let most = self.size_histogram.iter().map(|step| step.count).max();
-            let bar = |step: &SizeStep| {
-                BARS[(step.count * (BARS.len() - 1)).div_ceil(most.unwrap_or(1).max(1))]
-            };
-            let bars: String = self.size_histogram.iter().map(bar).collect();
-            let [from, to] = [first.from, last.to].map(length);
-            let factor = text::short(first.to / first.from);
-            let points = match self.point_count {
-                0 => String::new(),
-                points => format!("; {} of size 0", people(points)),
-            };
-            rows.push((
-                "",
-                format!("{from} |{bars}| {to}, steps of x{factor}{points}"),
-            ));
-        }
+        let sizes = format!("longest edge min {least}, median {median}, p99 {p99}, max {most}");
         let axes = ["x", "y", "z"].into_iter().zip(self.flat_counts);
-        let flat = axes.filter(|(_, flat)| *flat > 0);
-        let flat: Vec<String> = flat
-            .map(|(axis, flat)| {
-                format!("{} along {axis}", text::percent(flat as f64 / count as f64))
-            })
-            .collect();
-        rows.push((
-            "flat",
-            match flat.is_empty() {
-                true => "no items thinner than 1 % of their longest edge".to_owned(),
-                false => format!("{} (below 1 % of the longest edge)", flat.join(", ")),
-            },
-        ));
-        if let (Some(mean), Some(share)) = (self.overlap_mean, self.overlap_share) {
-            let of = match self.overlap_sample_count < count {
-                true => format!(" (of {} sampled)", people(self.overlap_sample_count)),
-                false => String::new(),
-            };
-            let (share, mean) = (text::percent(share), text::short(mean));
-            rows.push((
-                "overlap",
-                format!("{share} meet other items, {mean} on average{of}"),
-            ));
-        }
-        rows.push((
-            "copies",
-            match self.coincident_count {
-                0 => "no two items have the same bounds".to_owned(),
-                copies => format!("{} with the bounds of another item", people(copies)),
-            },
-        ));
-        rows.push((
-            "f32",
-            format!(
-                "bounds grow by at most {} (x, y, z); f32 steps in world coordinates are {}",
-                three(self.f32_loss),
-                three(self.f32_step_unmoved)
-            ),
-        ));
+        let flat = axes.filter(|(_, flat)| *flat > 0).map(|(axis, flat)| {
+            let share = text::percent(flat as f64 / count as f64);
+            format!("{share} along {axis}")
+        });
+        let flat = match flat.collect::<Vec<_>>().join(", ") {
+            none if none.is_empty() => "no items thinner than 1 % of their longest edge".to_owned(),
+            some => format!("{some} (below 1 % of the longest edge)"),
+        };
+        let overlap = self
+            .overlap_mean
+            .zip(self.overlap_share)
+            .map(|(mean, share)| {
+                let of = match self.overlap_sample_count < count {
+                    true => format!(" (of {} sampled)", people(self.overlap_sample_count)),
+                    false => String::new(),
+                };
+                let (share, mean) = (text::percent(share), text::short(mean));
+                format!("{share} meet other items, {mean} on average{of}")
+            });
+        let copies = match self.coincident_count {
+            0 => "no two items have the same bounds".to_owned(),
+            copies => format!("{} with the bounds of another item", people(copies)),
+        };
+        let loss = format!(
+            "bounds grow by at most {} (x, y, z); f32 steps in world coordinates are {}",
+            three(self.f32_loss),
+            three(self.f32_step_unmoved)
+        );
+        let mut rows = vec![extent, ("sizes", sizes)];
+        rows.extend(self.bars(length).map(|bars| ("", bars)));
+        rows.push(("flat", flat));
+        rows.extend(overlap.map(|overlap| ("overlap", overlap)));
+        rows.extend([("copies", copies), ("f32", loss)]);
         rows
+    }
+
+    /// The histogram of sizes as bars.
+    fn bars(&self, length: impl Fn(f64) -> String) -> Option<String> {
+        let [first, .., last] = &self.size_histogram[..] else {
+            return None;
+        };
+        let counts = || self.size_histogram.iter().map(|step| step.count);
+        let most = counts().max().unwrap_or(1).max(1);
+        let bars = counts().map(|count| BARS[(count * (BARS.len() - 1)).div_ceil(most)]);
+        let bars: String = bars.collect();
+        let [from, to] = [first.from, last.to].map(length);
+        let factor = text::short(first.to / first.from);
+        let points = match self.point_count {
+            0 => String::new(),
+            points => format!("; {} of size 0", people(points)),
+        };
+        Some(format!("{from} |{bars}| {to}, steps of x{factor}{points}"))
     }
 }
 

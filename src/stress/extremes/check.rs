@@ -12,7 +12,7 @@ use crate::index::{DynIndex, Input, StructureSpec};
 use crate::oracle::{Judgement, Oracle, Pose, Verdict};
 use crate::query::{AnyVolume, ItemId};
 use crate::stress::sheet::slack;
-use crate::stress::{Level, Row, Status};
+use crate::stress::{Level, Row, Said, Status};
 use crate::verify::{self, Trial};
 
 /// Name of the scalar loop in place of a structure.
@@ -55,40 +55,30 @@ impl std::ops::AddAssign for Tally {
 /// A wrong answer, or none.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Fault {
-    /// Name of the structure, or [`SCALAR`].
-    pub structure: String,
-    /// Name of the culling test.
-    pub test: String,
+    /// Its row, but for the id and the level of the case.
+    pub row: Row,
     /// Index of the box; `None` where the whole answer is wrong.
     pub item: Option<usize>,
-    /// Answer of the oracle.
-    pub expected: String,
-    /// Answer of the structure.
-    pub got: String,
     /// The box and the truth about it, so that a reader can check by hand.
     about: Option<String>,
 }
 
 impl Fault {
     /// A row for the fault, and one for its box.
-    pub(super) fn rows(self, id: &str, level: Level) -> Vec<Row> {
-        let about = self.item.zip(self.about);
-        let about = about.map(|(item, about)| (format!("{id}/box {item}"), about));
-        let row = |(id, got): (String, String)| Row {
+    pub(super) fn rows(self, id: &str, level: Level) -> impl Iterator<Item = Row> {
+        let id = id.to_owned();
+        let about = self.item.zip(self.about).map(|(item, about)| Row {
+            id: format!("{id}/box {item}"),
+            level,
+            got: about.into(),
+            ..self.row.clone()
+        });
+        let whole = Row {
             id,
             level,
-            structure: self.structure.clone(),
-            test: self.test.clone(),
-            status: Status::Fail,
-            expected: self.expected.as_str().into(),
-            got: got.into(),
+            ..self.row
         };
-        let whole = (id.to_owned(), self.got);
-        [Some(whole), about]
-            .into_iter()
-            .flatten()
-            .map(row)
-            .collect()
+        [whole].into_iter().chain(about)
     }
 }
 
@@ -119,15 +109,20 @@ impl Findings {
         &mut self,
         [structure, test]: [&str; 2],
         item: Option<usize>,
-        expected: impl Into<String>,
+        expected: impl Into<Said>,
         got: String,
     ) {
         self.faults.push(Fault {
-            structure: structure.to_owned(),
-            test: test.to_owned(),
+            row: Row {
+                id: String::new(),
+                level: Level::Camera,
+                structure: structure.to_owned(),
+                test: test.to_owned(),
+                status: Status::Fail,
+                expected: expected.into(),
+                got: got.into(),
+            },
             item,
-            expected: expected.into(),
-            got,
             about: None,
         });
     }

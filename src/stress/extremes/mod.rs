@@ -145,10 +145,10 @@ impl Extremes<'_> {
                 *checked.entry([group.clone(), structure, test]).or_default() += 1;
             }
             for fault in findings.faults {
-                failed.insert([group.clone(), fault.structure.clone(), fault.test.clone()]);
-                section
-                    .rows
-                    .extend(fault.rows(&format!("{group}/seed {seed}"), level));
+                for row in fault.rows(&format!("{group}/seed {seed}"), level) {
+                    failed.insert([group.clone(), row.structure.clone(), row.test.clone()]);
+                    section.rows.push(row);
+                }
             }
         }
         checked.retain(|key, _| !failed.contains(key));
