@@ -159,8 +159,10 @@ impl RegionQueries<'_> {
         }
     }
 
-    /// Slots of a camera, ascending: the id of each region that a point is found in, plus
-    /// the number of regions times the index of the point.
+    /// Slots of a camera, ascending, one per point and region that it is found in.
+    ///
+    /// A slot is the id of the region plus the number of regions times the index of the
+    /// point.
     fn slots(
         &self,
         numbers: RegionNumbers,
