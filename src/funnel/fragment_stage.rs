@@ -6,7 +6,6 @@
 use std::cell::RefCell;
 use std::collections::HashSet;
 
-use glam::DVec3;
 use serde::Serialize;
 
 use super::error::fits_drawing;
@@ -20,10 +19,8 @@ use crate::camera::Camera;
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
-use crate::visibility::fragment::{
-    Canvas, Drawn, Holes, Piece, Screen, Stencil, Tally, Tests, draw,
-};
-use crate::visibility::truth::Facet;
+use crate::visibility::fragment::{Canvas, Drawn, Holes, Screen, Stencil, Tally, Tests, draw};
+use crate::visibility::truth::{Facet, SolidBox};
 use crate::visibility::{Rays, Solids};
 
 /// Samples and fragments of a test, means per view.
@@ -104,8 +101,11 @@ impl Left<'_> {
         let screen = Screen::of(world.rays(view), world.samples);
         match self {
             Left::Boxes(views, _) => {
-                let boxes = views[view].solids.boxes.iter();
-                fits_drawing(world.samples, boxes.filter_map(|b| screen.rectangle(b)))
+                let boxes = views[view].bodies.iter();
+                fits_drawing(
+                    world.samples,
+                    boxes.filter_map(|body| screen.rectangle(&body.b)),
+                )
             }
             Left::Triangles(surfaces, views, _) => {
                 let corners = views[view].iter().map(|&t| surfaces.corners(t));
@@ -157,7 +157,7 @@ impl<'w> FragmentStage<'w> {
                 let new = || (Canvas::of(rays, grid), Drawn::new(grid.samples()));
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
-                canvas.turn_to(rays, DVec3::ZERO);
+                canvas.turn_to(rays);
                 let left = &views[view];
                 left.draw(test, canvas, drawn);
                 let visible = drawn.visible(canvas).into_iter();
@@ -165,14 +165,13 @@ impl<'w> FragmentStage<'w> {
                 drawn.tally
             }
             Left::Triangles(surfaces, views, image) => {
-                let origin = surfaces.origin;
                 let new = || {
-                    let canvas = Canvas::about(rays, grid, origin);
+                    let canvas = Canvas::about(rays, grid, surfaces.origin);
                     (canvas, Drawn::new(grid.samples()))
                 };
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
-                canvas.turn_to(rays, origin);
+                canvas.turn_to(rays);
                 drawn.draw_triangles(canvas, surfaces, &views[view]);
                 // Floors and ceilings of a map come behind its items.
                 let items = self.world.items() as ItemId;
@@ -228,7 +227,7 @@ impl<'w> FragmentStage<'w> {
 /// Solid boxes of a view, renumbered.
 struct Boxes {
     items: Vec<ItemId>,
-    solids: Solids,
+    bodies: Vec<SolidBox>,
     cut_outs: Option<Holes>,
     room: Option<Room>,
 }
@@ -238,39 +237,40 @@ struct Room {
     /// Flat boxes.
     portals: Vec<WorldBox>,
     /// Items that meet the rooms.
-    near: Vec<Piece>,
-    beyond: Vec<Piece>,
+    near: Vec<SolidBox>,
+    beyond: Vec<SolidBox>,
 }
 
 impl Boxes {
     fn of(world: &World, solids: &Solids, view: usize, items: &[ItemId]) -> Boxes {
+        let bodies = bodies(solids, items).zip(0..);
+        let bodies: Vec<SolidBox> = bodies
+            .map(|(body, item)| SolidBox { item, ..body })
+            .collect();
         Boxes {
             items: items.to_vec(),
-            solids: solids.some(items),
             cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),
-            room: Room::of(world, world.rays(view), items),
+            room: Room::of(world, world.rays(view), items, &bodies),
+            bodies,
         }
     }
 
     /// Replaces the image by that of a test.
     fn draw(&self, test: &str, canvas: &Canvas, drawn: &mut Drawn) {
-        let solids = &self.solids;
         drawn.clear();
         let tests = Tests {
             surfaces: self.cut_outs.as_ref().filter(|_| test != Z),
             stencil: None,
         };
         match self.room.as_ref().filter(|_| test == STENCIL) {
-            None => {
-                let pieces = (0..solids.boxes.len() as ItemId).map(Piece::whole);
-                drawn.draw(canvas, solids, &pieces.collect::<Vec<_>>(), &tests);
-            }
+            None => drawn.draw(canvas, self.bodies.iter().copied(), &tests),
             Some(room) => {
-                drawn.draw(canvas, solids, &room.near, &tests);
+                drawn.draw(canvas, room.near.iter().copied(), &tests);
                 let stencil = room.stencil(canvas, drawn);
                 drawn.tally.asked += stencil.tested;
                 let stencil = Some(&stencil);
-                drawn.draw(canvas, solids, &room.beyond, &Tests { stencil, ..tests });
+                let beyond = room.beyond.iter().copied();
+                drawn.draw(canvas, beyond, &Tests { stencil, ..tests });
             }
         }
     }
@@ -278,7 +278,7 @@ impl Boxes {
 
 impl Room {
     /// `None` for an eye that is in no room.
-    fn of(world: &World, rays: &Rays, items: &[ItemId]) -> Option<Room> {
+    fn of(world: &World, rays: &Rays, items: &[ItemId], bodies: &[SolidBox]) -> Option<Room> {
         let regions = world.regions.as_ref()?;
         let graph = &regions.graph;
         let mut homes = Vec::new();
@@ -292,9 +292,8 @@ impl Room {
         });
         let of_rooms = homes.iter().flat_map(|&home| regions.items.of_region(home));
         let of_rooms: HashSet<ItemId> = of_rooms.copied().collect();
-        let pieces = (0..items.len() as ItemId).map(Piece::whole);
-        let is_near = |piece: &Piece| of_rooms.contains(&items[piece.item as usize]);
-        let (near, beyond) = pieces.partition(is_near);
+        let is_near = |body: &SolidBox| of_rooms.contains(&items[body.item as usize]);
+        let (near, beyond) = bodies.iter().copied().partition(is_near);
         Some(Room {
             portals: portals.collect(),
             near,
@@ -347,7 +346,7 @@ pub fn mirrored(
     let own = &solids.boxes[item as usize];
     let axis = (own.max - own.min).min_position();
     let others = (0..solids.boxes.len() as ItemId).filter(|&other| other != item);
-    let others: Vec<Piece> = others.map(Piece::whole).collect();
+    let others: Vec<ItemId> = others.collect();
     let (mut with, mut without) = (Vec::new(), Vec::new());
     let (mut views, mut marked, mut shown, mut wrong) = (0, 0, 0, 0);
     for view in world.views() {
@@ -359,8 +358,7 @@ pub fn mirrored(
         };
         let canvas = Canvas::of(rays, world.samples);
         let left = world.listed(stages.items(steps, view));
-        let left: Vec<Piece> = left.iter().copied().map(Piece::whole).collect();
-        let direct = draw(&canvas, solids, &left, &Tests::default());
+        let direct = draw(&canvas, bodies(solids, &left), &Tests::default());
         let stencil = direct.stencil(&canvas, &[face]);
         let reflected = canvas.mirrored(axis, face.min[axis]);
         let screen = reflected.screen();
@@ -370,8 +368,8 @@ pub fn mirrored(
             stencil: Some(&stencil),
             surfaces: None,
         };
-        let mut seen = draw(&reflected, solids, &others, &tests);
-        let all = draw(&reflected, solids, &others, &Tests::default());
+        let mut seen = draw(&reflected, bodies(solids, &others), &tests);
+        let all = draw(&reflected, bodies(solids, &others), &Tests::default());
         seen.tally.asked += stencil.tested;
         let [own, other] = [&seen, &all].map(|drawn| drawn.ids());
         let marks = (0..own.len()).filter(|&sample| stencil.holds(sample));
@@ -394,6 +392,14 @@ pub fn mirrored(
         without_stencil,
         wrong_sample_count: wrong,
     }))
+}
+
+/// Some of the items as bodies.
+fn bodies<'a>(solids: &'a Solids, items: &'a [ItemId]) -> impl Iterator<Item = SolidBox> + 'a {
+    items.iter().map(|&item| SolidBox {
+        b: solids.boxes[item as usize],
+        item,
+    })
 }
 
 /// The face of a box across an axis whose front a camera sees.

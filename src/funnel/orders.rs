@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::error::{LeftOutRow, fits_drawing};
+use super::error::LeftOutRow;
 use super::item_stages::ItemStages;
 use super::stage::Step;
 use super::task::{FunnelKey, KeyedTask};
@@ -21,10 +21,9 @@ use crate::scene::Surfaces;
 use crate::statistics::{Estimate, flat};
 use crate::visibility::fragment::order::{self, ORDERS};
 use crate::visibility::fragment::{
-    self, Canvas, DepthOrder, OrderErrors, Part, Piece, Screen, Tally, Tests, ToOrder,
-    TooManyPairs, draw, draw_surfaces, order_errors,
+    self, DepthOrder, OrderErrors, Piece, Tally, ToOrder, TooManyPairs, draw_orders,
 };
-use crate::visibility::truth::SurfaceIndex;
+use crate::visibility::truth::{Crossing, Probe, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
 /// A depth order over all views. Counts are means per view.
@@ -76,8 +75,8 @@ pub struct Orders {
     /// Drawn triangles of a scene whose items are no solid boxes.
     triangles: Option<Arc<Surfaces>>,
     samples: SampleGrid,
-    /// Orders whose pieces cover too many samples.
-    pub left_out: Vec<LeftOutRow>,
+    /// All orders, if too much would be drawn.
+    pub left_out: Option<LeftOutRow>,
 }
 
 impl Left {
@@ -111,21 +110,6 @@ impl Left {
     fn sort(&self, order: usize, pieces: &mut Vec<Piece>) {
         self.orders[order].order(&self.boxes, self.rays.camera(), pieces);
     }
-
-    /// Refuses an order that cuts items into pieces that cover too many samples.
-    fn fits(&self, order: usize, samples: SampleGrid) -> Result<(), String> {
-        let mut pieces = Vec::new();
-        self.sort(order, &mut pieces);
-        if pieces.len() == self.items.len() {
-            return Ok(());
-        }
-        let screen = Screen::of(&self.rays, samples);
-        let drawn = pieces.iter().filter_map(|piece| match &piece.part {
-            Some(Part::Within(part)) => screen.rectangle(part),
-            _ => screen.rectangle(&self.boxes.boxes[piece.item as usize]),
-        });
-        fits_drawing(samples, drawn)
-    }
 }
 
 impl Orders {
@@ -146,38 +130,12 @@ impl Orders {
             Left::of(world, &all, world.rays(view), &items)
         });
         let (rows, views): (Vec<_>, Vec<Left>) = views.unzip();
-        let mut orders = Orders {
+        Orders {
             rows: rows.into_iter().next().unwrap_or_default(),
             views,
             triangles: world.shape.triangles().cloned(),
             samples: world.samples,
-            left_out: Vec::new(),
-        };
-        let left_out = too_much.map(|reason| LeftOutRow::new("orders", "all", reason));
-        orders.left_out.extend(left_out);
-        orders.drop_large();
-        orders
-    }
-
-    /// Leaves out orders whose pieces cover too many samples.
-    ///
-    /// Orders of triangles are never left out: rays meet triangles, not pieces.
-    fn drop_large(&mut self) {
-        let cuts = if self.triangles.is_none() {
-            self.rows.len()
-        } else {
-            0
-        };
-        for order in (0..cuts).rev() {
-            let fits = |left: &Left| left.fits(order, self.samples);
-            if let Err(reason) = self.views.iter().try_for_each(fits) {
-                let row = self.rows.remove(order);
-                self.left_out
-                    .push(LeftOutRow::new("orders", row.name, reason));
-                for left in &mut self.views {
-                    left.orders.remove(order);
-                }
-            }
+            left_out: too_much.map(|reason| LeftOutRow::new("orders", "all", reason)),
         }
     }
 
@@ -230,20 +188,17 @@ impl Orders {
             (&**order, pieces)
         });
         let sorted: Vec<(&dyn DepthOrder, Vec<Piece>)> = sorted.collect();
-        if let (Some(index), Some(all)) = (index, &self.triangles) {
-            return draw_surfaces(rays, samples, index, all.origin, items, &sorted);
+        if let Some(index) = index {
+            return draw_orders(rays, samples, index, items, &|_, _, _| true, &sorted);
         }
-        let canvas = Canvas::of(rays, samples);
-        let tests = Tests {
-            surfaces: left.cut_outs.as_ref(),
-            stencil: None,
+        let all: Vec<ItemId> = (0..items.len() as ItemId).collect();
+        let is_opaque = |item: ItemId, probe: &Probe, at: &Crossing| {
+            let b = &left.boxes.boxes[item as usize];
+            let mut holes = left.cut_outs.iter();
+            holes.all(|holes| holes.opaque(item, b, probe, at))
         };
-        let counts = sorted.iter().map(|(_, pieces)| {
-            let tally = draw(&canvas, &left.boxes, pieces, &tests).tally;
-            let errors = order_errors(&canvas, &left.boxes, pieces, &tests);
-            (tally, errors)
-        });
-        counts.collect()
+        let index = RayIndex::build(&left.boxes);
+        draw_orders(rays, samples, &index, &all, &is_opaque, &sorted)
     }
 }
 

@@ -3,8 +3,6 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::super::case::{Case, some_of};
 use super::super::rule::{Draft, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials, mean};
@@ -15,10 +13,11 @@ use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Surfaces};
 use crate::visibility::fragment::order::front_to_back;
-use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Tests, draw, draw_surfaces};
+use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Tests, draw, draw_orders};
 use crate::visibility::triangle::{
     Clusters, Cone, Eye, MOST_TRIANGLES, SafeCones, Selection, TriangleCull,
 };
+use crate::visibility::truth::SolidBox;
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
 /// Items of a camera whose triangles are looked at, evenly spread.
@@ -146,7 +145,6 @@ pub(super) fn sorting(trials: &mut Trials) -> Result<Draft, Unfit> {
     let world = case.world.as_ref().map_err(not_applicable)?;
     let drawn = Rc::new(Drawn {
         solids: Solids::of(scene),
-        origin: scene.origin,
         items: scene.items.len(),
         surfaces: RaysEnd::at(&world.shape, None),
     });
@@ -179,7 +177,6 @@ struct Drawn {
     /// Solid boxes, or the boxes about the items.
     solids: Solids,
     surfaces: RaysEnd<'static>,
-    origin: DVec3,
     items: usize,
 }
 
@@ -192,9 +189,11 @@ impl Drawn {
         }
         let passed = match &self.surfaces {
             RaysEnd::Boxes(..) => {
-                let pieces: Vec<Piece> = items.into_iter().map(Piece::whole).collect();
-                let canvas = Canvas::of(rays, COUNTED);
-                let drawn = draw(&canvas, &self.solids, &pieces, &Tests::default());
+                let bodies = items.iter().map(|&item| SolidBox {
+                    b: self.solids.boxes[item as usize],
+                    item,
+                });
+                let drawn = draw(&Canvas::of(rays, COUNTED), bodies, &Tests::default());
                 drawn.tally.passed
             }
             RaysEnd::Triangles(index) => {
@@ -204,7 +203,8 @@ impl Drawn {
                 let pieces = items.iter().map(place).map(Piece::whole).collect();
                 let no_parts = |_: &Solids, _: &Camera, _: &mut Vec<Piece>| ();
                 let orders: [(&dyn DepthOrder, _); 1] = [(&no_parts, pieces)];
-                let drawn = draw_surfaces(rays, COUNTED, index, self.origin, &left, &orders);
+                let is_opaque = |_, _: &_, _: &_| true;
+                let drawn = draw_orders(rays, COUNTED, index, &left, &is_opaque, &orders);
                 drawn[0].0.passed
             }
         };

@@ -4,12 +4,10 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use super::order::{Part, Piece};
 use crate::kernel::each;
-use crate::query::ItemId;
 use crate::scene::WorldBox;
-use crate::visibility::truth::{Along, Body, Crossing, Probe, SolidBox};
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::truth::{Along, Body, Probe, SolidBox};
+use crate::visibility::{Rays, SampleGrid};
 
 /// Columns and rows of samples.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -243,32 +241,14 @@ impl Stencil {
     }
 }
 
-/// An item at a sample.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Fragment<At = Crossing> {
-    /// Index of the sample, row by row from the top left.
-    pub sample: usize,
-    /// The item.
-    pub item: ItemId,
-    /// Point where the ray meets the item.
-    pub at: At,
-}
-
-/// Samples that were visited for a piece.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub(super) struct Visited {
-    /// Samples whose rays were tested.
-    pub tested: u64,
-    /// Samples that the stencil kept from a test.
-    pub kept_out: u64,
-}
-
 /// The samples of an image with their rays.
 ///
 /// 88 bytes per sample for boxes, 128 for triangles.
 #[derive(Clone, Debug)]
 pub struct Canvas<B: Body = SolidBox> {
     screen: Screen,
+    /// Zero of the bodies' local coordinates.
+    pub(super) origin: DVec3,
     probes: Vec<B::Probe>,
 }
 
@@ -278,20 +258,21 @@ impl<B: Body> Canvas<B> {
     pub fn about(rays: &Rays, grid: SampleGrid, origin: DVec3) -> Canvas<B> {
         let mut canvas = Canvas {
             screen: Screen::of(rays, grid),
+            origin,
             probes: Vec::with_capacity(grid.samples()),
         };
-        canvas.turn_to(rays, origin);
+        canvas.turn_to(rays);
         canvas
     }
 
     /// Takes the samples of another camera, in the same memory.
-    pub fn turn_to(&mut self, rays: &Rays, origin: DVec3) {
+    pub fn turn_to(&mut self, rays: &Rays) {
         let grid = self.grid();
         self.screen = Screen::of(rays, grid);
         self.probes.clear();
         for row in 0..grid.height {
             let ray = |column| rays.sample(grid, column, row);
-            let probes = (0..grid.width).map(|column| B::probe(&ray(column), origin));
+            let probes = (0..grid.width).map(|column| B::probe(&ray(column), self.origin));
             self.probes.extend(probes);
         }
     }
@@ -313,28 +294,30 @@ impl<B: Body> Canvas<B> {
     }
 
     /// Calls `visit` with each sample of a rectangle that the stencil lets through.
+    ///
+    /// Returns how many these are, and how many the stencil kept out.
     pub(super) fn scan(
         &self,
         rectangle: Option<Rectangle>,
         stencil: Option<&Stencil>,
         mut visit: impl FnMut(usize, &B::Probe),
-    ) -> Visited {
-        let mut visited = Visited::default();
+    ) -> [u64; 2] {
+        let [mut tested, mut kept_out] = [0; 2];
         let Some(Rectangle { columns, rows }) = rectangle else {
-            return visited;
+            return [tested, kept_out];
         };
         for row in rows {
             for column in columns.clone() {
                 let sample = (row * self.grid().width + column) as usize;
                 if stencil.is_some_and(|stencil| !stencil.holds(sample)) {
-                    visited.kept_out += 1;
+                    kept_out += 1;
                     continue;
                 }
-                visited.tested += 1;
+                tested += 1;
                 visit(sample, &self.probes[sample]);
             }
         }
-        visited
+        [tested, kept_out]
     }
 }
 
@@ -361,48 +344,8 @@ impl Canvas {
         };
         Canvas {
             screen: self.screen.mirrored(axis, at),
+            origin: self.origin,
             probes: self.probes.iter().map(reflected).collect(),
         }
-    }
-
-    /// Calls `found` with each sample that meets the box.
-    pub(super) fn meet(
-        &self,
-        b: &WorldBox,
-        stencil: Option<&Stencil>,
-        mut found: impl FnMut(usize, Crossing),
-    ) -> Visited {
-        self.scan(self.screen.rectangle(b), stencil, |sample, probe| {
-            if let Some(at) = probe.enter(b, probe.ray().far) {
-                found(sample, at);
-            }
-        })
-    }
-
-    /// Calls `found` with the fragments of a piece.
-    ///
-    /// For a part of an item, those where the item is entered through that part.
-    pub(super) fn fragments(
-        &self,
-        solids: &Solids,
-        piece: &Piece,
-        stencil: Option<&Stencil>,
-        mut found: impl FnMut(Fragment),
-    ) -> Visited {
-        let item = piece.item;
-        let whole = &solids.boxes[item as usize];
-        let Some(Part::Within(part)) = &piece.part else {
-            // Leaves are of triangles.
-            return self.meet(whole, stencil, |sample, at| {
-                found(Fragment { sample, item, at });
-            });
-        };
-        self.meet(part, stencil, |sample, of_part| {
-            let probe = &self.probes[sample];
-            let entered = probe.enter(whole, probe.ray().far);
-            if let Some(at) = entered.filter(|at| probe.compare(at, &of_part).is_eq()) {
-                found(Fragment { sample, item, at });
-            }
-        })
     }
 }

@@ -1,14 +1,16 @@
-//! Drawing with fragment tests: lists of pieces of boxes, or triangles.
+//! Drawing with fragment tests: boxes or triangles in the order of a list.
 //!
 //! Counts the fragments that each test lets through.
 
-use super::canvas::{Canvas, Fragment, Stencil, Visited};
+use super::canvas::{Canvas, Rectangle, Stencil};
 use super::cut_outs::Holes;
-use super::order::Piece;
+use super::order::{DepthOrder, Part};
+use crate::kernel::each;
 use crate::query::ItemId;
-use crate::scene::{SurfaceKind, Surfaces, WorldBox};
-use crate::visibility::Solids;
-use crate::visibility::truth::{Along, Body, Facet, NO_ITEM, SolidBox};
+use crate::scene::{Surfaces, WorldBox};
+use crate::visibility::truth::{
+    Along, Body, Crossing, Facet, Meeting, NO_ITEM, Probe, SolidBox, TriangleProbe,
+};
 
 /// The fragment tests beside the z-test.
 #[derive(Clone, Copy, Default, Debug)]
@@ -19,14 +21,50 @@ pub struct Tests<'a> {
     pub stencil: Option<&'a Stencil>,
 }
 
-impl Tests<'_> {
-    /// Tests whether the alpha-test keeps a fragment.
-    pub(super) fn keep(&self, canvas: &Canvas, solids: &Solids, fragment: &Fragment) -> bool {
-        self.surfaces.is_none_or(|surfaces| {
-            let b = &solids.boxes[fragment.item as usize];
-            let probe = canvas.probe(fragment.sample);
-            surfaces.opaque(fragment.item, b, probe, &fragment.at)
-        })
+/// A body that is drawn sample by sample.
+pub trait Drawable: Body {
+    /// A rectangle that holds every sample whose ray meets the body.
+    fn rectangle(&self, canvas: &Canvas<Self>) -> Option<Rectangle>;
+
+    /// Tests whether the body is opaque where a ray meets it.
+    fn is_opaque(&self, holes: &Holes, probe: &Self::Probe, at: &Self::At) -> bool;
+
+    /// Tests whether a part of an item holds the point where a ray meets the item.
+    fn is_in(part: Part, order: &dyn DepthOrder, probe: &Self::Probe, at: &Self::At) -> bool;
+}
+
+impl Drawable for SolidBox {
+    fn rectangle(&self, canvas: &Canvas) -> Option<Rectangle> {
+        canvas.screen().rectangle(&self.b)
+    }
+
+    fn is_opaque(&self, holes: &Holes, probe: &Probe, at: &Crossing) -> bool {
+        holes.opaque(self.item, &self.b, probe, at)
+    }
+
+    /// The part is entered where the item is.
+    fn is_in(part: Part, _: &dyn DepthOrder, probe: &Probe, at: &Crossing) -> bool {
+        let Part::Within(b) = part else {
+            return false;
+        };
+        let entered = probe.enter(&b, probe.ray().far);
+        entered.is_some_and(|of_part| probe.compare(at, &of_part).is_eq())
+    }
+}
+
+impl Drawable for Facet {
+    fn rectangle(&self, canvas: &Canvas<Facet>) -> Option<Rectangle> {
+        canvas.screen().triangle(self.corners, canvas.origin)
+    }
+
+    fn is_opaque(&self, _: &Holes, _: &TriangleProbe, _: &Meeting) -> bool {
+        true
+    }
+
+    fn is_in(part: Part, order: &dyn DepthOrder, probe: &TriangleProbe, at: &Meeting) -> bool {
+        let [a, b, c] = each(at.corners(), |p| p.as_dvec3());
+        let leaf = order.leaf(probe.local(at.depth), (b - a).cross(c - a));
+        leaf.map(Part::InLeaf) == Some(part)
     }
 }
 
@@ -34,13 +72,11 @@ impl Tests<'_> {
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 #[non_exhaustive]
 pub struct Tally {
-    /// Pieces or triangles that came to lie in the image.
-    pub drawn: u64,
     /// Samples whose rays were tested.
     pub asked: u64,
     /// Samples that the stencil kept from a test.
     pub kept_out: u64,
-    /// Fragments: samples that met a piece.
+    /// Fragments: samples that met a body.
     pub fragments: u64,
     /// Fragments that the alpha-test dropped.
     pub clear: u64,
@@ -51,12 +87,12 @@ pub struct Tally {
     pub covered: u64,
 }
 
-impl Tally {
-    fn visited(&mut self, visited: Visited) {
-        self.drawn += u64::from(visited.tested + visited.kept_out > 0);
-        self.asked += visited.tested;
-        self.kept_out += visited.kept_out;
-    }
+/// A fragment that was as near as the one in front, and lost by its id.
+#[derive(Clone, Copy, Debug)]
+struct Tie<At> {
+    sample: usize,
+    item: ItemId,
+    at: At,
 }
 
 /// A drawn image, of boxes or of triangles.
@@ -67,25 +103,23 @@ pub struct Drawn<B: Body = SolidBox> {
     pub tally: Tally,
     /// The exact front of each sample, of opaque items; of a tie the lowest id.
     front: Vec<Option<(B::At, ItemId)>>,
-    /// Fragments that were as near as the one in front, and lost by their id.
-    ties: Vec<Fragment<B::At>>,
+    ties: Vec<Tie<B::At>>,
     /// Items of triangles that hide nothing and are met before the front or with it.
     before: Vec<ItemId>,
 }
 
-/// Draws the pieces in this order. Θ(samples of the screen rectangles).
-pub fn draw<'a>(
-    canvas: &Canvas,
-    solids: &Solids,
-    pieces: impl IntoIterator<Item = &'a Piece>,
+/// Draws bodies in this order on an empty image.
+pub fn draw<B: Drawable>(
+    canvas: &Canvas<B>,
+    bodies: impl IntoIterator<Item = B>,
     tests: &Tests<'_>,
-) -> Drawn {
+) -> Drawn<B> {
     let mut drawn = Drawn::new(canvas.grid().samples());
-    drawn.draw(canvas, solids, pieces, tests);
+    drawn.draw(canvas, bodies, tests);
     drawn
 }
 
-impl<B: Body> Drawn<B> {
+impl<B: Drawable> Drawn<B> {
     /// An empty image of this many samples.
     pub fn new(samples: usize) -> Drawn<B> {
         Drawn {
@@ -104,28 +138,66 @@ impl<B: Body> Drawn<B> {
         self.before.clear();
     }
 
+    /// Draws more on the same image, each body by itself.
+    ///
+    /// Those that hide nothing come last. A fragment is a body at a sample whose ray meets it. Θ(samples of the screen
+    /// rectangles).
+    pub fn draw(
+        &mut self,
+        canvas: &Canvas<B>,
+        bodies: impl IntoIterator<Item = B>,
+        tests: &Tests<'_>,
+    ) {
+        for body in bodies {
+            let item = body.item();
+            let place = body.rectangle(canvas);
+            let [tested, kept_out] = canvas.scan(place, tests.stencil, |sample, probe| {
+                let Some(at) = body.meet(probe, probe.ray().far) else {
+                    return;
+                };
+                self.tally.fragments += 1;
+                let mut holes = tests.surfaces.iter();
+                if !holes.all(|holes| body.is_opaque(holes, probe, &at)) {
+                    self.tally.clear += 1;
+                    return;
+                }
+                let is_before = |(front, _): (B::At, _)| probe.compare(&at, &front).is_le();
+                let passes = match body.hides() {
+                    true => self.test(probe, Tie { sample, item, at }),
+                    false => self.front(sample).is_none_or(is_before),
+                };
+                self.tally.passed += u64::from(passes);
+                if passes && !body.hides() && self.before.last() != Some(&item) {
+                    self.before.push(item);
+                }
+            });
+            self.tally.asked += tested;
+            self.tally.kept_out += kept_out;
+        }
+        self.tally.covered = self.front.iter().flatten().count() as u64;
+    }
+
     /// Draws the fragment, if it passes: its sample is empty, or holds an item that is
     /// deeper, or as deep with a higher id. Returns whether it passed.
     #[inline]
-    fn test(&mut self, canvas: &Canvas<B>, fragment: &Fragment<B::At>) -> bool {
-        let Fragment { sample, item, at } = *fragment;
+    fn test(&mut self, probe: &B::Probe, fragment: Tie<B::At>) -> bool {
+        let Tie { sample, item, at } = fragment;
         let front = &mut self.front[sample];
         if let Some((other, other_item)) = *front {
-            let order = canvas.probe(sample).compare(&at, &other);
+            let order = probe.compare(&at, &other);
             if order.is_gt() {
                 return false;
             }
             if order.is_eq() {
-                // The same item may come in several pieces.
+                // Triangles of one item meet.
                 if item == other_item {
                     return false;
                 }
                 let lost = item.max(other_item);
-                let tie = Fragment {
+                self.ties.push(Tie {
                     item: lost,
-                    ..*fragment
-                };
-                self.ties.push(tie);
+                    ..fragment
+                });
                 if lost == item {
                     return false;
                 }
@@ -147,17 +219,12 @@ impl<B: Body> Drawn<B> {
         self.front.iter().map(id).collect()
     }
 
-    /// Number of samples that have been drawn on.
-    fn covered(&self) -> u64 {
-        self.front.iter().filter(|front| front.is_some()).count() as u64
-    }
-
     /// The exact visible set of the samples, ascending.
     ///
     /// All items that are in front anywhere, every item of a tie, and the items before them
     /// that hide nothing.
     pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
-        let in_front = |tie: &&Fragment<B::At>| {
+        let in_front = |tie: &&Tie<B::At>| {
             let front = self.front[tie.sample];
             let order = |front: (B::At, _)| canvas.probe(tie.sample).compare(&tie.at, &front.0);
             front.is_some_and(|front| order(front).is_eq())
@@ -173,52 +240,35 @@ impl<B: Body> Drawn<B> {
 }
 
 impl Drawn {
-    /// Draws more on the same image.
-    pub fn draw<'a>(
-        &mut self,
-        canvas: &Canvas,
-        solids: &Solids,
-        pieces: impl IntoIterator<Item = &'a Piece>,
-        tests: &Tests<'_>,
-    ) {
-        for piece in pieces {
-            let visited = canvas.fragments(solids, piece, tests.stencil, |fragment| {
-                self.tally.fragments += 1;
-                if tests.keep(canvas, solids, &fragment) {
-                    self.tally.passed += u64::from(self.test(canvas, &fragment));
-                } else {
-                    self.tally.clear += 1;
-                }
-            });
-            self.tally.visited(visited);
-        }
-        self.tally.covered = self.covered();
-    }
-
     /// Marks the samples at which a rectangle is no farther than what was drawn.
     ///
     /// A rectangle is a box without thickness along one axis.
     pub fn stencil(&self, canvas: &Canvas, rectangles: &[WorldBox]) -> Stencil {
         let mut stencil = Stencil::new(canvas.grid().samples());
         for rectangle in rectangles {
-            let visited = canvas.meet(rectangle, None, |sample, at| {
-                let before = |(front, _): (_, _)| canvas.probe(sample).compare(&at, &front).is_le();
-                if self.front(sample).is_none_or(before) {
+            let place = canvas.screen().rectangle(rectangle);
+            let [tested, _] = canvas.scan(place, None, |sample, probe| {
+                let is_before = |at| {
+                    let before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
+                    self.front(sample).is_none_or(before)
+                };
+                if probe
+                    .enter(rectangle, probe.ray().far)
+                    .is_some_and(is_before)
+                {
                     stencil.mark(sample);
                 }
             });
-            stencil.tested += visited.tested;
+            stencil.tested += tested;
         }
         stencil
     }
 }
 
 impl Drawn<Facet> {
-    /// Empties the image and draws triangles, each by itself.
+    /// Empties the image and draws triangles.
     ///
-    /// The opaque ones first, with the z-test; then those that hide nothing, against the front.
-    /// A fragment is a triangle at a sample whose ray meets it: a one-sided one from its front.
-    /// Θ(samples of the screen rectangles).
+    /// The opaque ones first, then those that hide nothing, against the front.
     pub fn draw_triangles(
         &mut self,
         canvas: &Canvas<Facet>,
@@ -227,36 +277,13 @@ impl Drawn<Facet> {
     ) {
         self.clear();
         for opaque in [true, false] {
-            for &triangle in triangles {
+            let facets = triangles.iter().map(|&triangle| {
                 let item = surfaces.item_of(triangle);
-                if (surfaces.kinds[item] == SurfaceKind::Opaque) == opaque {
-                    self.add(canvas, surfaces, triangle, item);
-                }
-            }
+                Facet::of(surfaces, item, surfaces.corners(triangle))
+            });
+            let facets = facets.filter(|facet| facet.hides == opaque);
+            self.draw(canvas, facets, &Tests::default());
         }
-        self.tally.covered = self.covered();
-    }
-
-    fn add(&mut self, canvas: &Canvas<Facet>, surfaces: &Surfaces, triangle: u32, item: usize) {
-        let facet = Facet::of(surfaces, item, surfaces.corners(triangle));
-        let Facet { item, hides, .. } = facet;
-        let rectangle = canvas.screen().triangle(facet.corners, surfaces.origin);
-        let visited = canvas.scan(rectangle, None, |sample, probe| {
-            let Some(at) = facet.meet(probe, probe.ray().far) else {
-                return;
-            };
-            self.tally.fragments += 1;
-            let is_before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
-            let passes = match hides {
-                true => self.test(canvas, &Fragment { sample, item, at }),
-                false => self.front(sample).is_none_or(is_before),
-            };
-            self.tally.passed += u64::from(passes);
-            if passes && !hides && self.before.last() != Some(&item) {
-                self.before.push(item);
-            }
-        });
-        self.tally.visited(visited);
     }
 }
 

@@ -1,20 +1,15 @@
-//! Errors of an order, by the exact order of depths at each sample.
+//! Cost and errors of draw orders, by the exact order of depths at each sample.
 //!
-//! Items of triangles are drawn in several orders at once, ray by ray; counts are those of
-//! boxes. An item at a sample is one fragment, where the ray meets it first. Every item is
-//! taken for solid; a one-sided triangle is met from its front only.
+//! Items are drawn in several orders at once, ray by ray. An item at a sample is one fragment,
+//! where the ray meets it first; a one-sided triangle is met from its front only.
 
 use std::cmp::Ordering;
 
-use glam::DVec3;
-
-use super::canvas::Canvas;
-use super::draw::{Tally, Tests};
+use super::draw::{Drawable, Tally};
 use super::order::{DepthOrder, Part, Piece};
-use crate::kernel::each;
 use crate::query::ItemId;
-use crate::visibility::truth::{Along, Crossing, Meeting, SurfaceIndex, TriangleProbe};
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::truth::{Along, BodyIndex};
+use crate::visibility::{Rays, SampleGrid};
 
 /// The errors of an order that should be front to back.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
@@ -51,38 +46,6 @@ pub(super) struct Layer<A> {
     pub when: u32,
     pub item: ItemId,
     pub at: A,
-}
-
-/// Compares an order from front to back with the exact one at every sample, of the
-/// fragments that the tests beside the z-test let through. It keeps all of them: 40
-/// bytes each. O(fragments log layers) and the pairs that are looked at.
-///
-/// # Errors
-/// Too many pairs.
-pub fn order_errors(
-    canvas: &Canvas,
-    solids: &Solids,
-    pieces: &[Piece],
-    tests: &Tests,
-) -> Result<OrderErrors, TooManyPairs> {
-    let mut layers: Vec<Vec<Layer<Crossing>>> = vec![Vec::new(); canvas.grid().samples()];
-    for (piece, when) in pieces.iter().zip(0..) {
-        canvas.fragments(solids, piece, tests.stencil, |fragment| {
-            if tests.keep(canvas, solids, &fragment) {
-                layers[fragment.sample].push(Layer {
-                    when,
-                    item: fragment.item,
-                    at: fragment.at,
-                });
-            }
-        });
-    }
-    let mut errors = ErrorCount::default();
-    for (sample, layers) in layers.iter_mut().enumerate() {
-        let probe = canvas.probe(sample);
-        errors.sample(layers, |a, b| probe.compare(a, b));
-    }
-    errors.all()
 }
 
 /// The errors so far, sample by sample.
@@ -194,64 +157,37 @@ fn sort_and_dedup(pairs: &mut Vec<(ItemId, ItemId)>) {
     pairs.dedup();
 }
 
-/// When each part of each item is drawn.
-struct Ranks {
-    /// Leaf (or none) and place in the list of each part, by item.
-    of: Vec<Vec<(Option<u32>, u32)>>,
-}
-
-impl Ranks {
-    fn of(pieces: &[Piece], items: usize) -> Ranks {
-        let mut ranks = vec![Vec::new(); items];
-        for (piece, when) in pieces.iter().zip(0..) {
-            let leaf = match piece.part {
-                Some(Part::InLeaf(leaf)) => Some(leaf),
-                _ => None,
-            };
-            ranks[piece.item as usize].push((leaf, when));
-        }
-        Ranks { of: ranks }
-    }
-
-    /// Place in the list at which an item is drawn at a point.
-    ///
-    /// A point that rounding has put into a leaf without a part of it counts with its first part.
-    fn when(&self, item: ItemId, leaf: impl FnOnce() -> Option<u32>) -> Option<u32> {
-        let parts = &self.of[item as usize];
-        let first = parts.first()?;
-        if first.0.is_none() {
-            return Some(first.1);
-        }
-        let leaf = leaf();
-        let found = parts.iter().find(|part| part.0 == leaf);
-        Some(found.unwrap_or(first).1)
-    }
-}
+/// The parts of an item with the place of each in the list.
+type Parts = Vec<(Option<Part>, u32)>;
 
 /// Cost and errors of several orders of the items that are left.
 ///
-/// `left` has their ids among those of `index`, ascending; pieces are numbered by the place
-/// there. O(fragments log layers) and the pairs that are looked at.
-pub fn draw_surfaces(
+/// `left` has their ids among those of `index`, ascending; pieces and `is_opaque` number items
+/// by the place there. Fragments are counted whether opaque or not. O(fragments log layers) and
+/// the pairs that are looked at.
+pub fn draw_orders<B: Drawable>(
     rays: &Rays,
     grid: SampleGrid,
-    index: &SurfaceIndex,
-    origin: DVec3,
+    index: &BodyIndex<B>,
     left: &[ItemId],
+    is_opaque: &dyn Fn(ItemId, &B::Probe, &B::At) -> bool,
     orders: &[(&dyn DepthOrder, Vec<Piece>)],
 ) -> Vec<(Tally, Result<OrderErrors, TooManyPairs>)> {
-    let ranks: Vec<Ranks> = orders
-        .iter()
-        .map(|(_, pieces)| Ranks::of(pieces, left.len()))
-        .collect();
-    let mut counts: Vec<_> = orders
-        .iter()
-        .map(|_| (Tally::default(), ErrorCount::default()))
-        .collect();
-    let mut layers: Vec<Layer<Meeting>> = Vec::new();
+    let parts_of = |pieces: &[Piece]| {
+        let mut parts: Vec<Parts> = vec![Vec::new(); left.len()];
+        for (piece, when) in pieces.iter().zip(0..) {
+            parts[piece.item as usize].push((piece.part, when));
+        }
+        parts
+    };
+    let parts = orders.iter().map(|(_, pieces)| parts_of(pieces));
+    let parts: Vec<Vec<Parts>> = parts.collect();
+    let mut counts: Vec<(Tally, ErrorCount)> = Vec::new();
+    counts.resize_with(orders.len(), Default::default);
+    let mut layers: Vec<Layer<B::At>> = Vec::new();
     for (row, column) in (0..grid.height).flat_map(|row| (0..grid.width).map(move |c| (row, c))) {
         let ray = rays.sample(grid, column, row);
-        let probe = TriangleProbe::new(ray, origin);
+        let probe = index.probe(&ray);
         let mut met = index.all_along(&ray);
         met.retain_mut(|(item, _)| {
             let place = left.binary_search(item);
@@ -260,22 +196,29 @@ pub fn draw_surfaces(
         });
         met.sort_unstable_by(|(a, at_a), (b, at_b)| a.cmp(b).then(probe.compare(at_a, at_b)));
         met.dedup_by_key(|(item, _)| *item);
-        for (((order, _), ranks), (tally, errors)) in orders.iter().zip(&ranks).zip(&mut counts) {
+        let fragments = met.len() as u64;
+        met.retain(|(item, at)| is_opaque(*item, &probe, at));
+        for (((order, _), parts), (tally, errors)) in orders.iter().zip(&parts).zip(&mut counts) {
             layers.clear();
             layers.extend(met.iter().filter_map(|&(item, at)| {
-                let leaf = || {
-                    let [a, b, c] = each(at.corners(), |p| p.as_dvec3());
-                    let point = (ray.origin - origin) + ray.direction * at.depth;
-                    order.leaf(point, (b - a).cross(c - a))
+                // A point that rounding has put into a leaf without a part of the item counts
+                // with the first part.
+                let parts = &parts[item as usize];
+                let holds = |&&(part, _): &&(Option<Part>, u32)| {
+                    part.is_none_or(|part| B::is_in(part, *order, &probe, &at))
                 };
-                let when = ranks.when(item, leaf)?;
+                let own = match &parts[..] {
+                    [only] => Some(only),
+                    all => all.iter().find(holds).or(all.first()),
+                };
+                let when = own?.1;
                 Some(Layer { when, item, at })
             }));
             errors.sample(&mut layers, |a, b| probe.compare(a, b));
-            tally.fragments += layers.len() as u64;
+            tally.fragments += fragments;
             tally.covered += u64::from(!layers.is_empty());
             // The z-test: nearer than all before, of a tie the lower id.
-            let mut front: Option<&Layer<Meeting>> = None;
+            let mut front: Option<&Layer<B::At>> = None;
             for layer in &layers {
                 let passes = front.is_none_or(|front| {
                     let order = probe.compare(&layer.at, &front.at);

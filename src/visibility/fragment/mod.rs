@@ -14,10 +14,10 @@ mod draw;
 mod errors;
 pub mod order;
 
-pub use canvas::{Canvas, Fragment, Rectangle, Screen, Stencil};
+pub use canvas::{Canvas, Rectangle, Screen, Stencil};
 pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface, holes_of};
-pub use draw::{Drawn, Tally, Tests, draw};
-pub use errors::{OrderErrors, TooManyPairs, draw_surfaces, order_errors};
+pub use draw::{Drawable, Drawn, Tally, Tests, draw};
+pub use errors::{OrderErrors, TooManyPairs, draw_orders};
 pub use order::{DepthOrder, Part, Piece, ToOrder};
 
 #[cfg(test)]

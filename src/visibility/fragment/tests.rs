@@ -9,13 +9,55 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, load};
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::truth::{Along, NO_ITEM, RayIndex, SampleTruth, SurfaceIndex, judge};
+use crate::visibility::truth::{
+    Along, Boxes, NO_ITEM, RayIndex, SampleTruth, SolidBox, SurfaceIndex, judge,
+};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 use order::{BspOrder, ORDERS, OrderRow};
 
-fn all(solids: &Solids) -> Vec<Piece> {
-    let items = 0..solids.boxes.len() as ItemId;
-    items.map(Piece::whole).collect()
+fn all(solids: &Solids) -> Vec<SolidBox> {
+    Boxes::of(solids).all
+}
+
+/// The items of pieces as bodies, in this order.
+fn bodies(solids: &Solids, pieces: &[Piece]) -> Vec<SolidBox> {
+    let body = |piece: &Piece| SolidBox {
+        b: solids.boxes[piece.item as usize],
+        item: piece.item,
+    };
+    pieces.iter().map(body).collect()
+}
+
+/// Samples at which an item is entered through a piece of it.
+fn entered(canvas: &Canvas, solids: &Solids, piece: &Piece) -> Vec<usize> {
+    let is_in = |sample: &usize| {
+        let probe = canvas.probe(*sample);
+        let enters = |b: &WorldBox| probe.enter(b, f64::INFINITY);
+        let Some(at) = enters(&solids.boxes[piece.item as usize]) else {
+            return false;
+        };
+        let Some(Part::Within(part)) = &piece.part else {
+            return true;
+        };
+        enters(part).is_some_and(|of_part| probe.compare(&at, &of_part).is_eq())
+    };
+    (0..canvas.grid().samples()).filter(is_in).collect()
+}
+
+/// Cost and errors of one order of all boxes.
+fn drawn_in(
+    solids: &Solids,
+    rays: &Rays,
+    grid: SampleGrid,
+    order: &dyn DepthOrder,
+    pieces: &[Piece],
+) -> (Tally, OrderErrors) {
+    let left: Vec<ItemId> = (0..solids.boxes.len() as ItemId).collect();
+    let index = RayIndex::build(solids);
+    let orders = [(order, pieces.to_vec())];
+    let mut drawn = draw_orders(rays, grid, &index, &left, &|_, _, _| true, &orders);
+    let (tally, errors) = drawn.remove(0);
+    (tally, errors.unwrap())
 }
 
 fn to_order(boxes: &Solids) -> ToOrder<'_> {
@@ -83,7 +125,7 @@ fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
             let mut pieces = Vec::new();
             for (row, order) in &orders {
                 order.order(&solids, &camera, &mut pieces);
-                let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
+                let drawn = draw(&canvas, bodies(&solids, &pieces), &Tests::default());
                 assert_eq!(drawn.ids(), truth.front, "{name} {}", row.name);
                 assert_eq!(drawn.visible(&canvas), truth.visible, "{name} {}", row.name);
                 assert!(drawn.tally.passed >= drawn.tally.covered);
@@ -109,7 +151,7 @@ fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
         let mut pieces = Vec::new();
         for (row, order) in orders(&solids) {
             order.order(&solids, &camera, &mut pieces);
-            let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
+            let drawn = draw(&canvas, bodies(&solids, &pieces), &Tests::default());
             assert_eq!(
                 drawn.ids(),
                 truth.front,
@@ -164,19 +206,24 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
             let frame = Frame::looking_along(eye, -eye, DVec3::Z).unwrap();
             let lens = lens.clone().unwrap();
             let camera = Camera { frame, lens };
-            let canvas = Canvas::of(&Rays::of(&camera).unwrap(), grid);
+            let rays = Rays::of(&camera).unwrap();
+            let canvas = Canvas::of(&rays, grid);
             let mut pieces = Vec::new();
             for (i, (row, order)) in orders(&solids).into_iter().enumerate() {
                 order.order(&solids, &camera, &mut pieces);
-                let errors = order_errors(&canvas, &solids, &pieces, &Tests::default()).unwrap();
+                let (tally, errors) = drawn_in(&solids, &rays, grid, &*order, &pieces);
                 wrong[i] += errors.wrong;
                 pairs += errors.pairs;
                 // The painter's picture, drawn, is wrong where it was said to be.
-                let drawn = draw(&canvas, &solids, pieces.iter().rev(), &Tests::default());
-                let ids = drawn.ids();
+                let whole = draw(&canvas, all(&solids), &Tests::default());
+                let ids = whole.ids();
                 let mut last = vec![NO_ITEM; ids.len()];
+                let mut fragments = 0;
                 for piece in pieces.iter().rev() {
-                    canvas.fragments(&solids, piece, None, |f| last[f.sample] = f.item);
+                    for sample in entered(&canvas, &solids, piece) {
+                        last[sample] = piece.item;
+                        fragments += 1;
+                    }
                 }
                 let differing = last.iter().zip(&ids).filter(|(last, id)| last != id);
                 let tied = |sample: usize| {
@@ -193,11 +240,10 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
                 if row.guarantee == Guarantee::Exact {
                     assert_eq!(errors.wrong_samples, 0);
                     // Each item once at a sample, in however many parts it comes.
-                    let whole = draw(&canvas, &solids, &all(&solids), &Tests::default());
-                    assert_eq!(drawn.tally.fragments, whole.tally.fragments);
+                    assert_eq!(fragments, whole.tally.fragments);
+                    assert_eq!(tally.fragments, fragments);
                     // From front to back nothing is shaded twice, but for ties.
-                    let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
-                    assert!(drawn.tally.passed <= drawn.tally.covered + ties as u64);
+                    assert!(tally.passed <= tally.covered + ties as u64);
                 }
             }
         }
@@ -231,12 +277,13 @@ fn overlaps_in_a_cycle_are_found_and_only_cutting_undoes_them() {
         let solids = judge::solids(boxes);
         let frame = Frame::looking_along(eye, at - eye, DVec3::new(0.1, 0.2, 1.0)).unwrap();
         let camera = Camera { frame, lens };
-        let canvas = Canvas::of(&Rays::of(&camera).unwrap(), SampleGrid::new(80, 80));
-        let mut pieces = Vec::new();
-        of_boxes("box-distance", &solids).order(&solids, &camera, &mut pieces);
-        let sorted = order_errors(&canvas, &solids, &pieces, &Tests::default()).unwrap();
-        of_boxes("bsp", &solids).order(&solids, &camera, &mut pieces);
-        let cut = order_errors(&canvas, &solids, &pieces, &Tests::default()).unwrap();
+        let rays = Rays::of(&camera).unwrap();
+        let errors = |name: &str| {
+            let (order, mut pieces) = (of_boxes(name, &solids), Vec::new());
+            order.order(&solids, &camera, &mut pieces);
+            drawn_in(&solids, &rays, SampleGrid::new(80, 80), &*order, &pieces).1
+        };
+        let (sorted, cut) = (errors("box-distance"), errors("bsp"));
         assert_eq!((cut.wrong, cut.wrong_samples), (0, 0));
         assert_eq!(cut.cyclic, sorted.cyclic);
         sorted
@@ -275,16 +322,18 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
     let frame = Frame::looking_along(eye, DVec3::X, DVec3::Z).unwrap();
     let lens = Lens::perspective(130.0, 16.0 / 9.0, 2.0, None).unwrap();
     let camera = Camera { frame, lens };
-    let canvas = Canvas::of(&Rays::of(&camera).unwrap(), SampleGrid::new(32, 18));
+    let (rays, grid) = (Rays::of(&camera).unwrap(), SampleGrid::new(32, 18));
     let mut pieces = Vec::new();
     tree.order(&solids, &camera, &mut pieces);
-    let errors = order_errors(&canvas, &solids, &pieces, &Tests::default()).unwrap();
+    let (_, errors) = drawn_in(&solids, &rays, grid, &tree, &pieces);
     assert_eq!((errors.wrong_samples, tree.exception(&camera)), (0, None));
     assert!(errors.pairs > 6, "the premise: they overlap in the image");
     // What is within a box is never drawn.
-    let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
-    let whole = draw(&canvas, &solids, &all(&solids), &Tests::default());
-    assert_eq!(drawn.tally.fragments, whole.tally.fragments);
+    let canvas = Canvas::of(&rays, grid);
+    let whole = draw(&canvas, all(&solids), &Tests::default());
+    let of_piece = |piece| entered(&canvas, &solids, piece).len() as u64;
+    let fragments: u64 = pieces.iter().map(of_piece).sum();
+    assert_eq!(fragments, whole.tally.fragments);
     // The eye in the plane of a face, and more parts than there is room for.
     let frame = Frame::looking_along(eye.with_x(1e5 + 7.0), DVec3::Y, DVec3::Z).unwrap();
     let within = Camera { frame, lens };
@@ -342,7 +391,7 @@ fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
                     (&**order, pieces)
                 });
                 sorted[2].1.reverse();
-                let counts = draw_surfaces(&rays, GRID, &index, surfaces.origin, &items, &sorted);
+                let counts = draw_orders(&rays, GRID, &index, &items, &|_, _, _| true, &sorted);
                 for ((tally, errors), counted) in counts.iter().zip(&mut counted) {
                     let errors = errors.as_ref().unwrap();
                     let again = tally.passed - tally.covered;

@@ -17,8 +17,9 @@ use super::inscribed::cells::Grid;
 use crate::arithmetic::Expansion;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
-use crate::scene::{SurfaceKind, Surfaces, volume_within};
+use crate::scene::{SurfaceKind, Surfaces, WorldBox, volume_within};
 use crate::threads;
+use crate::visibility::region::without;
 use crate::visibility::triangle::{Eye, faces, normal};
 
 pub(crate) use super::inscribed::cells::Cells;
@@ -93,9 +94,11 @@ fn boxes_in(part: &[[Vec3; 3]], cells: usize, most: usize, least: f64) -> Vec<(f
         let Some(proven) = proven(part, grid.to_box(tried)) else {
             continue;
         };
-        let mut rest = vec![proven];
+        let exact = |b| WorldBox::of(b, DVec3::ZERO);
+        let mut rest = vec![exact(&proven)];
         for (_, other) in &found {
-            rest = rest.iter().flat_map(|b| without(b, other)).collect();
+            let other = exact(other);
+            rest = rest.iter().flat_map(|b| without(b, &other)).collect();
         }
         let gain = rest.iter().map(volume).sum();
         if gain < least {
@@ -118,31 +121,8 @@ fn proven(part: &[[Vec3; 3]], mut tried: Aabb) -> Option<Aabb> {
     None
 }
 
-/// The part of a box outside another: up to six boxes.
-fn without(b: &Aabb, other: &Aabb) -> Vec<Aabb> {
-    if !b.intersects(other) {
-        return vec![*b];
-    }
-    let (mut left, mut parts) = (*b, Vec::new());
-    for axis in 0..3 {
-        if left.min[axis] < other.min[axis] {
-            let mut part = left;
-            part.max[axis] = other.min[axis];
-            left.min[axis] = other.min[axis];
-            parts.push(part);
-        }
-        if left.max[axis] > other.max[axis] {
-            let mut part = left;
-            part.min[axis] = other.max[axis];
-            left.max[axis] = other.max[axis];
-            parts.push(part);
-        }
-    }
-    parts
-}
-
-fn volume(b: &Aabb) -> f64 {
-    let size = b.max.as_dvec3() - b.min.as_dvec3();
+fn volume(b: &WorldBox) -> f64 {
+    let size = b.max - b.min;
     size.x * size.y * size.z
 }
 
@@ -396,7 +376,7 @@ mod tests {
             // The cube in a ball has 2 / (sqrt(3) pi) = 37 % of it.
             let found = inscribed_boxes(&spheres, item, CELLS, MOST_BOXES).unwrap();
             let whole = spheres.volume(item);
-            let first = volume(&found.boxes[0]) / whole;
+            let first = volume(&WorldBox::of(&found.boxes[0], DVec3::ZERO)) / whole;
             assert!(first > 0.25 && first < 0.37, "{first}");
             assert!(found.share > 0.6 && found.share < 1.0, "{found:?}");
         }

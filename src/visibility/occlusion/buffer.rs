@@ -83,6 +83,4 @@ pub struct CullStats {
     pub boxes: usize,
     /// Occluders drawn.
     pub drawn: usize,
-    /// Items that were not removed.
-    pub kept: usize,
 }

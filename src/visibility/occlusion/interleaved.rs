@@ -213,7 +213,6 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             }
             stats.drawn += drawn;
         }
-        let before = self.out.len();
         let (early, late) = survivors.split_at(early);
         for sixteen in early.chunks(LANES) {
             let mut asked: LaneMask = 0;
@@ -231,7 +230,6 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         for survivor in late {
             self.out.extend(scene.item(survivor.position as usize));
         }
-        stats.kept = self.out.len() - before;
         stats
     }
 }

@@ -94,30 +94,34 @@ impl BoxGrid {
 
 /// Tests whether closed boxes cover a box, exactly. O(pieces * boxes): for few.
 pub fn covers(by: &[WorldBox], b: &WorldBox) -> bool {
-    let mut open = vec![(*b, 0)];
-    while let Some((piece, first)) = open.pop() {
-        let rest = by[first..].iter();
-        let Some(hit) = rest.zip(first..).find(|(o, _)| piece.meets(o)) else {
-            return false;
-        };
-        let (cut, next) = (hit.0, hit.1 + 1);
-        let mut left = piece;
-        for axis in 0..3 {
-            if left.min[axis] < cut.min[axis] {
-                let mut below = left;
-                below.max[axis] = cut.min[axis];
-                left.min[axis] = cut.min[axis];
-                open.push((below, next));
-            }
-            if left.max[axis] > cut.max[axis] {
-                let mut above = left;
-                above.min[axis] = cut.max[axis];
-                left.max[axis] = cut.max[axis];
-                open.push((above, next));
-            }
+    let mut open = vec![*b];
+    for other in by {
+        open = open.iter().flat_map(|b| without(b, other)).collect();
+    }
+    open.is_empty()
+}
+
+/// The part of a box outside another: up to six boxes.
+pub fn without(b: &WorldBox, other: &WorldBox) -> Vec<WorldBox> {
+    if !b.meets(other) {
+        return vec![*b];
+    }
+    let (mut left, mut parts) = (*b, Vec::new());
+    for axis in 0..3 {
+        if left.min[axis] < other.min[axis] {
+            let mut below = left;
+            below.max[axis] = other.min[axis];
+            left.min[axis] = other.min[axis];
+            parts.push(below);
+        }
+        if left.max[axis] > other.max[axis] {
+            let mut above = left;
+            above.min[axis] = other.max[axis];
+            left.max[axis] = other.max[axis];
+            parts.push(above);
         }
     }
-    true
+    parts
 }
 
 /// The items of each region.

@@ -23,7 +23,7 @@ mod view;
 pub use boxes::seen_by_samples;
 pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
 pub use id_set::{IdSet, RegionId};
-pub use locate::RegionItems;
+pub use locate::{RegionItems, without};
 pub use row::{BACK_ENDS, BackEnd, Pvs, PvsError, RegionRow, Scratch, Source};
 
 #[cfg(test)]

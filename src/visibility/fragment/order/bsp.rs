@@ -11,7 +11,10 @@
 //! are too many parts or planes, and for a ray within a plane both sides are on the eye's
 //! side.
 
-use super::{DepthOrder, Piece, ToOrder, nearest};
+use glam::DVec3;
+
+use super::partition::{Held, Node, Partition};
+use super::{DepthOrder, Part, Piece, ToOrder};
 use crate::camera::Camera;
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
@@ -28,31 +31,9 @@ const MOST_PLANES: usize = 64;
 /// Cost of a cut, in boxes of imbalance.
 const COST_OF_CUT: usize = 8;
 
-/// A node, or the parts of a leaf.
-#[derive(Clone, Debug)]
-enum Node {
-    /// A plane, with the nodes not above it and above it.
-    Plane {
-        axis: usize,
-        at: f64,
-        sides: [usize; 2],
-    },
-    /// Parts between which there is no plane.
-    Leaf(Vec<Part>),
-}
-
-/// A part of an item while the tree is built, and in its leaves.
-#[derive(Clone, Copy, Debug)]
-struct Part {
-    item: u32,
-    b: WorldBox,
-    cut: bool,
-}
-
 /// The tree.
-#[derive(Clone, Debug)]
 pub struct BspOrder {
-    nodes: Vec<Node>,
+    tree: Partition,
     parts: usize,
     /// `true` if cutting ended early.
     is_cut_short: bool,
@@ -72,43 +53,50 @@ impl BspOrder {
 
     /// The same, of at most `most` parts.
     pub fn within(solids: &Solids, most: usize) -> BspOrder {
-        let part = |(b, item): (&WorldBox, u32)| Part {
+        let part = |(b, item): (&WorldBox, u32)| Held {
             item,
-            b: *b,
-            cut: false,
+            bounds: *b,
+            part: None,
+            is_behind_all: false,
         };
-        let all: Vec<Part> = solids.boxes.iter().zip(0..).map(part).collect();
-        let mut tree = BspOrder {
-            parts: all.len(),
-            is_cut_short: false,
-            nodes: vec![Node::Leaf(Vec::new())],
-        };
+        let all: Vec<Held> = solids.boxes.iter().zip(0..).map(part).collect();
+        let (mut tree, mut count, mut is_cut_short) = (Partition::default(), all.len(), false);
+        tree.leaves.push(Vec::new());
+        // Parts, and the leaf that they are if no plane divides them.
         let mut open = vec![(0, all)];
         let mut left = most.saturating_mul(MOST_PLANES);
-        while let Some((node, parts)) = open.pop() {
+        while let Some((leaf, parts)) = open.pop() {
             left = left.saturating_sub(parts.len());
-            let room = most.saturating_sub(tree.parts);
+            let room = most.saturating_sub(count);
             let found = (left > 0).then(|| plane(&parts, room)).flatten();
             let Some((axis, at)) = found else {
-                tree.is_cut_short |= plane(&parts, usize::MAX).is_some();
-                tree.nodes[node] = Node::Leaf(parts);
+                is_cut_short |= plane(&parts, usize::MAX).is_some();
+                tree.leaves[leaf] = parts;
                 continue;
             };
-            let count = parts.len();
-            let sides = sides(parts, axis, at).map(|side| entered(side, &solids.boxes));
-            tree.parts = tree.parts + sides[0].len() + sides[1].len() - count;
-            let first = tree.nodes.len();
-            for (side, parts) in sides.into_iter().enumerate() {
-                tree.nodes.push(Node::Leaf(Vec::new()));
-                open.push((first + side, parts));
+            count -= parts.len();
+            let node = tree.nodes.len() as u32;
+            match tree.nodes.get_mut(leaf / 2) {
+                None => tree.root = Some(node),
+                Some(above) => above.children[leaf % 2] = Some(node),
             }
-            tree.nodes[node] = Node::Plane {
-                axis,
-                at,
-                sides: [first, first + 1],
-            };
+            tree.nodes.push(Node {
+                normal: DVec3::AXES[axis],
+                d: -at,
+                children: [None; 2],
+            });
+            tree.leaves.resize_with(2 * tree.nodes.len(), Vec::new);
+            for (side, parts) in sides(parts, axis, at).into_iter().enumerate().rev() {
+                let parts = entered(parts, &solids.boxes);
+                count += parts.len();
+                open.push((2 * node as usize + side, parts));
+            }
         }
-        tree
+        BspOrder {
+            tree,
+            parts: count,
+            is_cut_short,
+        }
     }
 
     /// How many parts the items were cut into.
@@ -117,13 +105,16 @@ impl BspOrder {
     }
 }
 
-/// Parts below and above a plane; parts within the plane count as below.
-fn sides(parts: Vec<Part>, axis: usize, at: f64) -> [Vec<Part>; 2] {
+/// Parts above and below a plane; parts within the plane count as below.
+fn sides(parts: Vec<Held>, axis: usize, at: f64) -> [Vec<Held>; 2] {
     let (mut below, mut above) = (Vec::new(), Vec::new());
     for part in parts {
-        let [mut low, mut high] = [Part { cut: true, ..part }; 2];
-        (low.b.max[axis], high.b.min[axis]) = (at, at);
-        match (part.b.max[axis] <= at, part.b.min[axis] >= at) {
+        let [mut low, mut high] = [part; 2];
+        (low.bounds.max[axis], high.bounds.min[axis]) = (at, at);
+        for half in [&mut low, &mut high] {
+            half.part = Some(Part::Within(half.bounds));
+        }
+        match (part.bounds.max[axis] <= at, part.bounds.min[axis] >= at) {
             (true, _) => below.push(part),
             (_, true) => above.push(part),
             _ => {
@@ -132,15 +123,15 @@ fn sides(parts: Vec<Part>, axis: usize, at: f64) -> [Vec<Part>; 2] {
             }
         }
     }
-    [below, above]
+    [above, below]
 }
 
 /// The parts through which a ray can enter their items; others are never drawn.
-fn entered(mut parts: Vec<Part>, boxes: &[WorldBox]) -> Vec<Part> {
-    parts.retain(|Part { item, b, cut }| {
-        let whole = &boxes[*item as usize];
+fn entered(mut parts: Vec<Held>, boxes: &[WorldBox]) -> Vec<Held> {
+    parts.retain(|held| {
+        let (b, whole) = (&held.bounds, &boxes[held.item as usize]);
         let ends = b.min.cmpeq(whole.min) | b.max.cmpeq(whole.max);
-        !cut || ends.any()
+        held.part.is_none() || ends.any()
     });
     parts
 }
@@ -148,7 +139,7 @@ fn entered(mut parts: Vec<Part>, boxes: &[WorldBox]) -> Vec<Part> {
 /// The plane through a face that balances its sides best and cuts least; `None` if
 /// there is none that parts or cuts anything, or only such as cut more than `room`
 /// parts.
-fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
+fn plane(parts: &[Held], room: usize) -> Option<(usize, f64)> {
     let count = parts.len();
     if count < 2 {
         return None;
@@ -156,7 +147,7 @@ fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
     let mut best: Option<(usize, usize, f64)> = None;
     for axis in 0..3 {
         let sorted = |bound: &dyn Fn(&WorldBox) -> Option<f64>| {
-            let bounds = parts.iter().filter_map(|part| bound(&part.b));
+            let bounds = parts.iter().filter_map(|part| bound(&part.bounds));
             let mut bounds: Vec<f64> = bounds.collect();
             bounds.sort_unstable_by(f64::total_cmp);
             bounds
@@ -188,33 +179,7 @@ fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
 
 impl DepthOrder for BspOrder {
     fn order(&self, _: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
-        pieces.clear();
-        let parallel = camera.lens.is_orthographic();
-        let mut open = vec![0];
-        while let Some(node) = open.pop() {
-            match &self.nodes[node] {
-                &Node::Plane { axis, at, sides } => {
-                    let below_first = match parallel {
-                        true => camera.frame.forward()[axis] > 0.0,
-                        false => camera.frame.eye[axis] < at,
-                    };
-                    let [below, above] = sides;
-                    open.extend(match below_first {
-                        true => [above, below],
-                        false => [below, above],
-                    });
-                }
-                Node::Leaf(parts) => {
-                    let far = |part: &Part| nearest(camera, &part.b);
-                    let mut parts: Vec<&Part> = parts.iter().collect();
-                    parts.sort_by(|a, b| far(a).total_cmp(&far(b)).then(a.item.cmp(&b.item)));
-                    pieces.extend(parts.iter().map(|part| Piece {
-                        item: part.item,
-                        part: part.cut.then_some(super::Part::Within(part.b)),
-                    }));
-                }
-            }
-        }
+        self.tree.pieces(camera, pieces);
     }
 
     fn exception(&self, camera: &Camera) -> Option<&'static str> {
@@ -222,21 +187,17 @@ impl DepthOrder for BspOrder {
             return Some("the limit on cuts was reached before all items were separated");
         }
         let Camera { frame, lens } = camera;
-        let parallel = lens.is_orthographic();
-        let is_within = |node: &Node| match node {
-            Node::Plane { axis, .. } if parallel => frame.forward()[*axis] == 0.0,
-            Node::Plane { axis, at, .. } => frame.eye[*axis] == *at,
-            Node::Leaf(_) => false,
+        let is_within = |node: &Node| match lens.is_orthographic() {
+            true => node.normal.dot(frame.forward()) == 0.0,
+            false => node.height(frame.eye) == 0.0,
         };
-        let within = self.nodes.iter().any(is_within);
+        let within = self.tree.nodes.iter().any(is_within);
         within.then_some("rays may run within the plane of a face")
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
     use crate::visibility::truth::judge;
 

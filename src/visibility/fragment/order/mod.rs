@@ -22,13 +22,15 @@ pub type OrderRow = Row<fn(&ToOrder) -> Option<Box<dyn DepthOrder>>>;
 /// An [exact](Guarantee::Exact) one has no pair that overlaps in the image the wrong way
 /// round, but where it says so ([`DepthOrder::exception`]).
 pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, build }
-    "none", "items in the order of their ids", Guarantee::Unproven, by_id;
+    "none", "items in the order of their ids", Guarantee::Unproven,
+        |of| Some(by_id(of));
     "tree", "items in the order of the tree 'wide', the same for all views",
         Guarantee::Unproven, by_tree;
     "centre-distance", "sorted by the distance of the centre of each box",
-        Guarantee::Unproven, by_centre;
+        Guarantee::Unproven,
+        |_| Some(sorted(|camera, b| distance(camera, b.min / 2.0 + b.max / 2.0)));
     "box-distance", "sorted by the distance of the nearest point of each box",
-        Guarantee::Unproven, by_box;
+        Guarantee::Unproven, |_| Some(sorted(nearest));
     "bsp", "planes through faces of boxes, which are cut where they cross: exact",
         Guarantee::Exact, bsp::order;
     // In a leaf of walls that surround it nothing hides a wall but what is no wall.
@@ -101,52 +103,33 @@ where
 }
 
 /// The same list of items for every camera.
-struct Fixed(Vec<ItemId>);
-
-impl DepthOrder for Fixed {
-    fn order(&self, _: &Solids, _: &Camera, pieces: &mut Vec<Piece>) {
-        pieces.clear();
-        pieces.extend(self.0.iter().map(|&item| Piece::whole(item)));
-    }
+fn fixed(items: impl Iterator<Item = ItemId>) -> Box<dyn DepthOrder> {
+    let all: Vec<Piece> = items.map(Piece::whole).collect();
+    Box::new(move |_: &Solids, _: &Camera, pieces: &mut Vec<Piece>| pieces.clone_from(&all))
 }
 
 /// Items in the order of their ids.
-pub fn by_id(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
-    let items = 0..of.boxes.boxes.len() as ItemId;
-    Some(Box::new(Fixed(items.collect())))
+fn by_id(of: &ToOrder) -> Box<dyn DepthOrder> {
+    fixed(0..of.boxes.boxes.len() as ItemId)
 }
 
 /// Items in the order of the packed tree: the output of the object stage, unsorted.
-pub fn by_tree(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
-    let tree = Wide::build(&Input::new(&of.boxes.outer), &Default::default());
-    match tree.ok().and_then(|tree| Some(tree.tree_order()?.to_vec())) {
-        Some(items) => Some(Box::new(Fixed(items))),
-        None => by_id(of),
-    }
+fn by_tree(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
+    let tree = Wide::build(&Input::new(&of.boxes.outer), &Default::default()).ok();
+    let items = tree.as_ref().and_then(|tree| tree.tree_order());
+    Some(items.map_or_else(|| by_id(of), |items| fixed(items.iter().copied())))
 }
 
 /// Items sorted by a key of their boxes, then by id. O(n log n) per view.
-struct Sorted(fn(&Camera, &WorldBox) -> f64);
-
-impl DepthOrder for Sorted {
-    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
+fn sorted(key: fn(&Camera, &WorldBox) -> f64) -> Box<dyn DepthOrder> {
+    let order = move |solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>| {
         let boxes = solids.boxes.iter().zip(0..);
-        let mut keyed: Vec<_> = boxes.map(|(b, item)| (self.0(camera, b), item)).collect();
+        let mut keyed: Vec<_> = boxes.map(|(b, item)| (key(camera, b), item)).collect();
         sort(&mut keyed);
         pieces.clear();
         pieces.extend(keyed.into_iter().map(|(_, item)| Piece::whole(item)));
-    }
-}
-
-/// Items sorted by the distance of the centre of each box.
-pub fn by_centre(_: &ToOrder) -> Option<Box<dyn DepthOrder>> {
-    let key = |camera: &Camera, b: &WorldBox| distance(camera, b.min / 2.0 + b.max / 2.0);
-    Some(Box::new(Sorted(key)))
-}
-
-/// Items sorted by the distance of the nearest point of each box.
-pub fn by_box(_: &ToOrder) -> Option<Box<dyn DepthOrder>> {
-    Some(Box::new(Sorted(nearest)))
+    };
+    Box::new(order)
 }
 
 /// Sorts items by the distance of the nearest point of each box. O(n log n).

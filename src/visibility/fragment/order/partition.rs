@@ -27,14 +27,14 @@ const MOST_COMPARED: usize = 1000;
 
 /// A plane: unit normal towards the front, offset, and what is in front and behind.
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    normal: DVec3,
-    d: f64,
-    children: [Option<u32>; 2],
+pub(super) struct Node {
+    pub normal: DVec3,
+    pub d: f64,
+    pub children: [Option<u32>; 2],
 }
 
 impl Node {
-    fn height(&self, at: DVec3) -> f64 {
+    pub fn height(&self, at: DVec3) -> f64 {
         self.normal.dot(at) + self.d
     }
 
@@ -46,21 +46,67 @@ impl Node {
 
 /// Part of an item in a leaf.
 #[derive(Clone, Copy, Debug)]
-struct Held {
-    item: ItemId,
-    bounds: WorldBox,
+pub(super) struct Held {
+    pub item: ItemId,
+    pub bounds: WorldBox,
+    pub part: Option<Part>,
     /// `true` if all the rest of the leaf is before it, and it is seen from there only.
-    is_behind_all: bool,
+    pub is_behind_all: bool,
 }
 
-/// The partition with the items in its leaves.
-pub struct PartitionOrder {
-    nodes: Vec<Node>,
-    root: Option<u32>,
-    origin: DVec3,
-    slack: f64,
+/// A partition with the items in its leaves.
+#[derive(Default)]
+pub(super) struct Partition {
+    pub nodes: Vec<Node>,
+    pub root: Option<u32>,
+    /// World position of the zero of the planes.
+    pub origin: DVec3,
     /// Index: twice the node above, plus its side. An undivided space is leaf 0.
-    leaves: Vec<Vec<Held>>,
+    pub leaves: Vec<Vec<Held>>,
+}
+
+impl Partition {
+    /// Replaces `pieces` by the parts, leaf by leaf from front to back.
+    pub fn pieces(&self, camera: &Camera, pieces: &mut Vec<Piece>) {
+        pieces.clear();
+        let eye = camera.frame.eye - self.origin;
+        let parallel = camera.lens.is_orthographic();
+        let mut sorted = Vec::new();
+        let mut open = vec![(self.root, 0)];
+        while let Some((node, leaf)) = open.pop() {
+            if let Some(at) = node {
+                let node = &self.nodes[at as usize];
+                let is_before = match parallel {
+                    true => node.normal.dot(camera.frame.forward()) <= 0.0,
+                    false => node.height(eye) >= 0.0,
+                };
+                let near = usize::from(!is_before);
+                for side in [1 - near, near] {
+                    open.push((node.children[side], 2 * at as usize + side));
+                }
+                continue;
+            }
+            sorted.clear();
+            let keyed = self.leaves[leaf]
+                .iter()
+                .map(|held| (nearest(camera, &held.bounds), held));
+            sorted.extend(keyed);
+            sorted.sort_by(|(near_a, a): &(f64, &Held), (near_b, b)| {
+                let by_depth = near_a.total_cmp(near_b).then(a.item.cmp(&b.item));
+                a.is_behind_all.cmp(&b.is_behind_all).then(by_depth)
+            });
+            pieces.extend(sorted.iter().map(|(_, held)| Piece {
+                item: held.item,
+                part: held.part,
+            }));
+        }
+    }
+}
+
+/// The scene's own partition with the triangles of its items in the leaves.
+pub struct PartitionOrder {
+    tree: Partition,
+    slack: f64,
 }
 
 /// Part of a triangle in a leaf.
@@ -94,14 +140,16 @@ impl PartitionOrder {
         let corners = surfaces.points.iter().map(|p| p.abs().max_element());
         let reach = f64::from(corners.fold(0.0, f32::max));
         let mut order = PartitionOrder {
-            nodes: nodes.collect(),
-            root: planes.root,
-            origin: surfaces.origin,
+            tree: Partition {
+                nodes: nodes.collect(),
+                root: planes.root,
+                origin: surfaces.origin,
+                leaves: Vec::new(),
+            },
             slack: reach * SLACK,
-            leaves: vec![Vec::new(); 2 * planes.nodes.len().max(1)],
         };
         let mut fallen: Vec<Vec<Fallen>> = Vec::new();
-        fallen.resize_with(order.leaves.len(), Vec::new);
+        fallen.resize_with(2 * planes.nodes.len().max(1), Vec::new);
         for item in 0..surfaces.items() {
             for corners in surfaces.of(item) {
                 let [a, b, c] = corners.map(|p| p.as_dvec3());
@@ -116,8 +164,9 @@ impl PartitionOrder {
                 });
             }
         }
-        let held = fallen.iter().map(|all| order.held(all));
-        order.leaves = held.collect();
+        let leaves = fallen.iter().zip(0..);
+        let held = leaves.map(|(all, leaf)| order.held(all, leaf));
+        order.tree.leaves = held.collect();
         order
     }
 
@@ -128,13 +177,13 @@ impl PartitionOrder {
         mut fallen: impl FnMut(usize, Vec<DVec3>),
     ) {
         // Parts of the triangle, each with the node that it is at and the leaf if that is none.
-        let mut open = vec![(corners.to_vec(), self.root, 0)];
+        let mut open = vec![(corners.to_vec(), self.tree.root, 0)];
         while let Some((polygon, node, leaf)) = open.pop() {
             let Some(at) = node else {
                 fallen(leaf, polygon);
                 continue;
             };
-            let node = &self.nodes[at as usize];
+            let node = &self.tree.nodes[at as usize];
             let heights: Vec<f64> = polygon.iter().map(|&p| node.height(p)).collect();
             let sides = match [1.0, -1.0].map(|sign| heights.iter().any(|h| sign * h > self.slack))
             {
@@ -152,7 +201,7 @@ impl PartitionOrder {
     }
 
     /// The parts of a leaf, from all triangles in it, item by item.
-    fn held(&self, all: &[Fallen]) -> Vec<Held> {
+    fn held(&self, all: &[Fallen], leaf: u32) -> Vec<Held> {
         let is_before = |own: &Fallen| {
             let mut corners = all.iter().flat_map(|other| &other.polygon);
             let height = |p: &DVec3| own.normal.dot(*p - own.polygon[0]);
@@ -160,13 +209,14 @@ impl PartitionOrder {
         };
         let parts = all.chunk_by(|a, b| a.item == b.item).map(|parts| {
             let corners = parts.iter().flat_map(|part| &part.polygon);
-            let corners = corners.map(|&p| p + self.origin);
+            let corners = corners.map(|&p| p + self.tree.origin);
             let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |bounds, p| {
                 (bounds.0.min(p), bounds.1.max(p))
             });
             Held {
                 item: parts[0].item,
                 bounds: WorldBox::new(min, max),
+                part: Some(Part::InLeaf(leaf)),
                 is_behind_all: all.len() <= MOST_COMPARED && parts.iter().all(is_before),
             }
         });
@@ -192,40 +242,14 @@ fn cut(polygon: &[DVec3], heights: &[f64], sign: f64) -> Vec<DVec3> {
 
 impl DepthOrder for PartitionOrder {
     fn order(&self, _: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
-        pieces.clear();
-        let eye = camera.frame.eye - self.origin;
-        let parallel = camera.lens.is_orthographic();
-        let mut sorted = Vec::new();
-        let mut open = vec![(self.root, 0)];
-        while let Some((node, leaf)) = open.pop() {
-            if let Some(at) = node {
-                let node = &self.nodes[at as usize];
-                let is_before = match parallel {
-                    true => node.normal.dot(camera.frame.forward()) <= 0.0,
-                    false => node.height(eye) >= 0.0,
-                };
-                let near = usize::from(!is_before);
-                for side in [1 - near, near] {
-                    open.push((node.children[side], 2 * at as usize + side));
-                }
-                continue;
-            }
-            sorted.clear();
-            let key = |held: &Held| (held.is_behind_all, nearest(camera, &held.bounds), held.item);
-            sorted.extend(self.leaves[leaf].iter().map(key));
-            sorted.sort_unstable_by(|a: &(bool, f64, ItemId), b| {
-                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
-            });
-            let part = Some(Part::InLeaf(leaf as u32));
-            pieces.extend(sorted.iter().map(|&(_, _, item)| Piece { item, part }));
-        }
+        self.tree.pieces(camera, pieces);
     }
 
     fn leaf(&self, at: DVec3, normal: DVec3) -> Option<u32> {
-        let (mut node, mut leaf) = (self.root, 0);
+        let (mut node, mut leaf) = (self.tree.root, 0);
         let normal = normal.normalize_or_zero();
         while let Some(place) = node {
-            let plane = &self.nodes[place as usize];
+            let plane = &self.tree.nodes[place as usize];
             let height = plane.height(at);
             let along = plane.normal.dot(normal).abs();
             let side = match height.abs() <= self.slack && along > 1.0 - 1e-6 {

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::super::{CullStats, Interleaved, MaskedCentre, MaskedInner, OcclusionBuffer};
+use super::super::{Interleaved, MaskedCentre, MaskedInner, OcclusionBuffer};
 use super::by_rays::{Ready, missing, seen_by_rays, with_view};
 use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
@@ -98,28 +98,30 @@ fn every_instruction_set_gives_the_same_answer() {
     }
 }
 
-/// [`CullStats`] of six views.
+/// Counts of six views.
 ///
 /// The counts of tested, drawn and kept boxes depend on the order of the traversal only: a
 /// faster traversal has the same counts.
 #[test]
 fn the_walk_tests_draws_and_keeps_pinned_numbers_of_boxes() {
     let pinned = [[2067, 202, 398], [1160, 214, 183], [6003, 2535, 3529]];
-    for (spec, [boxes, drawn, kept]) in SCENES.into_iter().zip(pinned) {
+    for (spec, pinned) in SCENES.into_iter().zip(pinned) {
         let ready = ready(spec);
         for kernel in Kernel::available() {
             let mut walk = Interleaved::new(MaskedInner::new(GRID), kernel);
-            let mut total = CullStats::default();
+            let mut total = [0; 3];
             for camera in cameras(&ready, 6) {
                 with_view(&ready, &camera, GRID, |view, _| {
-                    let stats = walk.cull(&ready.occluders, view, &mut Vec::new());
-                    total.boxes += stats.boxes;
-                    total.drawn += stats.drawn;
-                    total.kept += stats.kept;
+                    let mut kept = Vec::new();
+                    let stats = walk.cull(&ready.occluders, view, &mut kept);
+                    for (total, count) in
+                        total.iter_mut().zip([stats.boxes, stats.drawn, kept.len()])
+                    {
+                        *total += count;
+                    }
                 });
             }
-            let wanted = CullStats { boxes, drawn, kept };
-            assert_eq!(total, wanted, "{spec} {kernel}");
+            assert_eq!(total, pinned, "{spec} {kernel}");
         }
     }
 }
