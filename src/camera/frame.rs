@@ -192,15 +192,6 @@ impl Frame {
         frame
     }
 
-    /// This frame with the axes of another but its own pose as written.
-    ///
-    /// Wrong on purpose, for tests of what notices it.
-    #[doc(hidden)]
-    pub fn with_axes_of(self, other: &Frame) -> Frame {
-        let (u, v, n) = (other.u, other.v, other.n);
-        Frame { u, v, n, ..self }
-    }
-
     /// Right.
     pub fn u(&self) -> DVec3 {
         self.u
@@ -253,6 +244,16 @@ impl Frame {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl Frame {
+        /// This frame with the axes of another but its own pose as written.
+        ///
+        /// Wrong on purpose, for tests of what notices it.
+        pub fn with_axes_of(self, other: &Frame) -> Frame {
+            let (u, v, n) = (other.u, other.v, other.n);
+            Frame { u, v, n, ..self }
+        }
+    }
 
     #[test]
     fn the_lectures_frame_from_eye_look_and_up() {

@@ -28,33 +28,23 @@ impl InputError {
 
     /// An error in a place of a file: `line 3`, `byte 17`, `cases[3].near`.
     pub fn at(
-        file: impl Display,
+        file: &str,
         place: impl Display,
         found: impl Display,
         expected: impl Display,
-    ) -> InputError {
+    ) -> Self {
         InputError::new(format_args!(
             "{file}, {place}: {found}; expected {expected}"
         ))
     }
 
     /// An error in a line of a text file; `line` counts from 1, the header included.
-    pub fn line(
-        file: impl Display,
-        line: u64,
-        found: impl Display,
-        expected: impl Display,
-    ) -> InputError {
+    pub fn line(file: &str, line: u64, found: impl Display, expected: impl Display) -> Self {
         InputError::at(file, format_args!("line {line}"), found, expected)
     }
 
     /// An error in a binary file behind `offset` bytes.
-    pub fn byte(
-        file: impl Display,
-        offset: usize,
-        found: impl Display,
-        expected: impl Display,
-    ) -> InputError {
+    pub fn byte(file: &str, offset: usize, found: impl Display, expected: impl Display) -> Self {
         InputError::at(file, format_args!("byte {offset}"), found, expected)
     }
 

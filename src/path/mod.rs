@@ -315,19 +315,13 @@ fn fits(source: &str, cameras: u64) -> Result<(), InputError> {
     /// Bytes of a camera with its views and answers: 2,800 were measured.
     const PER_CAMERA: u64 = 3000;
     let needed = cameras.saturating_mul(PER_CAMERA);
-    if cameras <= ANYWHERE {
+    let free = (cameras > ANYWHERE).then(scene::available_bytes).flatten();
+    let Some(free) = free.filter(|free| needed > *free) else {
         return Ok(());
-    }
-    match scene::available_bytes() {
-        Some(available) if needed > available => {
-            let (needed, available) = (gigabytes(needed), gigabytes(available));
-            let reason = format!(
-                "{cameras} cameras need about {needed}, {available} are free; expected fewer"
-            );
-            Err(unfit(source, reason))
-        }
-        _ => Ok(()),
-    }
+    };
+    let [needed, free] = [needed, free].map(gigabytes);
+    let reason = format!("{cameras} cameras need about {needed}, {free} are free; expected fewer");
+    Err(unfit(source, reason))
 }
 
 /// The lens parameters of a generated path.

@@ -87,13 +87,14 @@ struct Stand {
 fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<Stand> {
     let mut columns: Vec<Column> = (0..count).flat_map(|_| drawn(stage, rng)).collect();
     fill(stage, &mut columns);
-    let has_ground = have_ground(&columns);
+    // Where nearly all places have an item below them, the others are beyond its edge.
+    let bare = columns.iter().filter(|column| column.spans.is_empty());
+    let has_ground = bare.count() * 10 < columns.len();
     let stands = columns.chunks_mut(DRAWN).filter_map(|columns| {
         let stands = columns.iter_mut().map(|column| {
             let ground = column.ground(height + CLEARANCE);
             let first = column.spans.first();
             let is_off_mesh = !first.is_some_and(|span| span.is_ground);
-            // Where there is ground, a place without any is beyond its edge.
             let is_beyond = has_ground && first.is_none();
             let stand = Stand {
                 eye: DVec3::new(column.x, column.y, ground + height),
@@ -106,14 +107,6 @@ fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<
         best.map(|(_, stand)| stand)
     });
     stands.collect()
-}
-
-/// Returns whether nearly all places have an item below them.
-///
-/// The others are then beyond the edge of the ground.
-fn have_ground(columns: &[Column]) -> bool {
-    let bare = columns.iter().filter(|column| column.spans.is_empty());
-    bare.count() * 10 < columns.len()
 }
 
 /// A direction in the plane of the ground, each equally likely.

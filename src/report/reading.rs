@@ -70,6 +70,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
         at: String,
     }
     let bytes = fs::read(path).map_err(writing::io(path))?;
+    let file = path.display().to_string();
     let mut stream: Option<Stream> = None;
     let (mut seen, mut groups) = (BTreeSet::new(), BTreeMap::new());
     let (mut ends, mut end) = (Vec::new(), 0);
@@ -90,14 +91,8 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
             };
             writing::json(path, &error, "the stream of a run")
         };
-        let bad = |found: &str, expected| {
-            Err(InputError::line(
-                path.display(),
-                n as u64 + 1,
-                found,
-                expected,
-            ))
-        };
+        let bad =
+            |found: &str, expected| Err(InputError::line(&file, n as u64 + 1, found, expected));
         let tag: Tag = from_json(text).map_err(no_json)?;
         match (tag.line.as_str(), &mut stream) {
             ("run", None) => {
@@ -147,14 +142,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
         }
     }
     ends.push(end);
-    let none = || {
-        InputError::line(
-            path.display(),
-            1,
-            "no run begins here",
-            "the stream of a run",
-        )
-    };
+    let none = || InputError::line(&file, 1, "no run begins here", "the stream of a run");
     Ok((stream.ok_or_else(none)?, ends))
 }
 

@@ -223,7 +223,8 @@ pub(super) fn io(path: &Path) -> impl Fn(io::Error) -> InputError + Copy {
 /// Text that is not the JSON of `whole`, such as "the report of a run".
 pub(super) fn json(path: &Path, error: &JsonError, whole: &str) -> InputError {
     let expected = error.expected_of(whole);
-    InputError::at(path.display(), error.place(), &error.found, expected)
+    let file = path.display().to_string();
+    InputError::at(&file, error.place(), &error.found, expected)
 }
 
 /// A file of another schema version.

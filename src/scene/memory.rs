@@ -6,7 +6,7 @@ use std::path::Path;
 
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
-use super::WorldBox;
+use super::{LoadOptions, WorldBox};
 use crate::geometry::Aabb;
 use crate::input::{InputError, gigabytes};
 
@@ -27,14 +27,29 @@ const MESHED: u64 = 120;
 const FEWEST: u64 = 24;
 
 /// About how many bytes a scene takes with `structures` over it.
-pub fn needed_by_items(items: u64, structures: u64) -> u64 {
+fn needed_by_items(items: u64, structures: u64) -> u64 {
     let built = if structures > 0 { BUILT } else { 0 };
     items.saturating_mul(MADE.max(HELD + structures * INDEXED + built))
 }
 
-/// About how many bytes a mesh takes, `beside` of them per triangle for other ends.
-pub fn needed_by_triangles(triangles: u64, beside: u64, structures: u64) -> u64 {
-    triangles * (MESHED + beside) + needed_by_items(triangles / FEWEST, structures)
+impl LoadOptions {
+    /// Refuses a scene that would not fit into memory.
+    ///
+    /// Items are estimated from the triangles where they are not counted.
+    ///
+    /// # Errors
+    /// The sizes needed and free.
+    pub fn check_fits(
+        &self,
+        scene: &str,
+        items: Option<u64>,
+        triangles: u64,
+    ) -> Result<(), InputError> {
+        let made = needed_by_items(items.unwrap_or(triangles / FEWEST), self.structures);
+        let needed = made.saturating_add(triangles.saturating_mul(MESHED + self.per_triangle));
+        let count = items.unwrap_or(0).max(triangles);
+        check_fits(scene, needed, self.structures, count)
+    }
 }
 
 /// Refuses a scene that needs more bytes than are free.

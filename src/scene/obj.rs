@@ -48,8 +48,8 @@ pub fn read_obj(
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
     let size = bytes.len() as u64;
-    let fits = |needed, count| memory::check_fits(name, needed, options.structures, count);
-    fits(size.saturating_mul(BYTES_PER_BYTE), size)?;
+    let needed = size.saturating_mul(BYTES_PER_BYTE);
+    memory::check_fits(name, needed, options.structures, size)?;
     let mut obj = Obj {
         file,
         points: Vec::new(),
@@ -73,10 +73,7 @@ pub fn read_obj(
         let found = format!("{triangles} triangles");
         return Err(obj.error(number, found, "at most a billion"));
     }
-    fits(
-        memory::needed_by_triangles(triangles, options.per_triangle, options.structures),
-        triangles,
-    )?;
+    options.check_fits(name, None, triangles)?;
     if !obj.unread.is_empty() {
         let unread: Vec<&String> = obj.unread.iter().collect();
         note(&format!(

@@ -13,7 +13,7 @@ use super::obj::{is_obj, read_obj};
 use super::zip::{self, is_zip};
 use super::{
     FAMILIES, Family, ItemKind, LoadOptions, MESHES, Regions, SAMPLES, Sample, Scene, WadMap,
-    boxes_csv, map_names, memory,
+    boxes_csv, map_names,
 };
 use crate::input::{InputError, is_readable, note, read_file};
 use crate::spec::{Spec, SpecError, nearest};
@@ -152,12 +152,10 @@ fn check_generated(
     let Ok(n) = spec.clone().whole("n", COUNT, MOST) else {
         return Ok(());
     };
-    let structures = options.structures;
-    let needed = match family.build {
-        Build::Boxes(_) | Build::Rooms(_) => memory::needed_by_items(n, structures),
-        Build::Mesh(_) => memory::needed_by_triangles(n, options.per_triangle, structures),
-    };
-    memory::check_fits(source, needed, structures, n)
+    match family.build {
+        Build::Boxes(_) | Build::Rooms(_) => options.check_fits(source, Some(n), 0),
+        Build::Mesh(_) => options.check_fits(source, None, n),
+    }
 }
 
 /// Reads a file by its beginning or extension; anything else as boxes CSV.
@@ -196,9 +194,7 @@ pub fn read_bytes(
         return read_obj(bytes, file, name, options);
     }
     let rows = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
-    let structures = options.structures;
-    let needed = memory::needed_by_items(rows, structures);
-    memory::check_fits(name, needed, structures, rows)?;
+    options.check_fits(name, Some(rows), 0)?;
     let mut scene = boxes_csv::read_boxes_csv(bytes, file, options.skip_bad_items)?;
     scene.name = name.to_owned();
     scene.up = options.up.unwrap_or_default();

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::{Labels, LoadOptions, Regions, Scene, WorldBox, memory};
+use super::{Labels, LoadOptions, Regions, Scene, WorldBox};
 use crate::geometry::Aabb;
 use crate::input::InputError;
 use crate::query::ItemId;
@@ -246,9 +246,7 @@ impl Scene {
             .into());
         };
         let count = surfaces.triangles.len() as u64;
-        let needed = memory::needed_by_items(count, options.structures)
-            + memory::needed_by_triangles(count, options.per_triangle, 0);
-        memory::check_fits(&self.name, needed, options.structures, count)?;
+        options.check_fits(&self.name, Some(count), count)?;
         let mut single = Surfaces::about(surfaces.origin);
         let empty = |labels: &Labels| Labels::new(labels.column.clone());
         let mut labels: Vec<Labels> = self.labels.iter().map(empty).collect();

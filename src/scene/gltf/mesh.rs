@@ -96,11 +96,8 @@ impl File<'_> {
         let Some(positions) = positions(primitive) else {
             return Ok(Err("has no positions".to_owned()));
         };
-        let points = match self.values(positions, 3, place)? {
-            Ok(values) => values
-                .chunks_exact(3)
-                .map(DVec3::from_slice)
-                .collect::<Vec<_>>(),
+        let points: Vec<DVec3> = match self.values(positions, 3, place)? {
+            Ok(values) => values.chunks_exact(3).map(DVec3::from_slice).collect(),
             Err(reason) => return Ok(Err(reason)),
         };
         let order: Vec<u32> = match primitive.indices {
@@ -122,17 +119,10 @@ impl File<'_> {
             Checked::Valid(Mode::Triangles) => {
                 order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
             }
-            Checked::Valid(Mode::TriangleStrip) => order
-                .windows(3)
-                .enumerate()
-                .map(|(i, c)| {
-                    if i % 2 == 0 {
-                        [c[0], c[1], c[2]]
-                    } else {
-                        [c[1], c[0], c[2]]
-                    }
-                })
-                .collect(),
+            Checked::Valid(Mode::TriangleStrip) => {
+                let strip = order.windows(3).enumerate();
+                strip.map(|(i, c)| [c[i % 2], c[1 - i % 2], c[2]]).collect()
+            }
             Checked::Valid(Mode::TriangleFan) => {
                 let rim = order.get(1..).unwrap_or_default().windows(2);
                 rim.map(|c| [order[0], c[0], c[1]]).collect()

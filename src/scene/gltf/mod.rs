@@ -218,12 +218,7 @@ impl File<'_> {
         let count = |of: fn(&Triangles) -> usize| placed.iter().map(|i| of(plain(i)) as u64).sum();
         let (triangles, points): (u64, u64) =
             (count(|t| t.corners.len()), count(|t| t.points.len()));
-        let needed = memory::needed_by_triangles(
-            triangles.max(points),
-            options.per_triangle,
-            options.structures,
-        );
-        memory::check_fits(name, needed, options.structures, triangles.max(points))?;
+        options.check_fits(name, None, triangles.max(points))?;
         if triangles.max(points) > u64::from(u32::MAX) / 4 {
             let found = format!("{triangles} triangles");
             return Err(self.error("meshes".to_owned(), found, "at most a billion"));

@@ -18,7 +18,6 @@ pub use self::tree::{LeafNode, LeafTree};
 use super::records::Table;
 use super::{
     CameraPlace, ItemKind, Labels, LoadOptions, Regions, Scene, SurfaceKind, Surfaces, WorldBox,
-    memory,
 };
 use crate::geometry::Aabb;
 use crate::input::{InputError, note};
@@ -71,13 +70,9 @@ impl QuakeMap {
         }
         let count = table.map(|(count, _)| count);
         let tree = LeafTree::read(&nodes, &leaves, &lump(2)?, count)?;
-        let largest = tree
-            .clusters
-            .iter()
-            .max()
-            .map_or(0, |&last| last as usize + 1);
+        let last = tree.clusters.iter().max();
         Ok(QuakeMap {
-            clusters: count.unwrap_or(largest),
+            clusters: count.unwrap_or(last.map_or(0, |&last| last as usize + 1)),
             bare: 0,
             seen: table.map(|(count, row_bytes)| {
                 let rows = &visibility.data[8..8 + count * row_bytes];
@@ -227,10 +222,7 @@ fn check_counts(
     }
     let items = (surfaces.len() + brushes.len()) as u64;
     let triangles = ends / 3 + points * PER_PATCH as u64 / 4 + 4 * faces;
-    let needed = memory::needed_by_items(items, options.structures).saturating_add(
-        memory::needed_by_triangles(triangles, options.per_triangle, 0),
-    );
-    memory::check_fits(name, needed, options.structures, triangles)
+    options.check_fits(name, Some(items), triangles)
 }
 
 type Surface = (&'static str, Aabb, faces::Faces);

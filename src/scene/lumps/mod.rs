@@ -3,7 +3,7 @@
 //! After the unofficial Doom specs 1.666, Matthew S. Fell 1994. No byte is trusted.
 
 use std::collections::HashSet;
-use std::fmt;
+use std::fmt::Display;
 use std::ops::Range;
 
 use super::records::{Table, int_at, range_within};
@@ -245,12 +245,7 @@ impl<'a> Wad<'a> {
         Ok([int(4)?, int(8)?])
     }
 
-    fn error(
-        &self,
-        offset: usize,
-        found: impl fmt::Display,
-        expected: impl fmt::Display,
-    ) -> InputError {
+    fn error(&self, offset: usize, found: impl Display, expected: impl Display) -> InputError {
         InputError::byte(self.file, offset, found, expected)
     }
 }
