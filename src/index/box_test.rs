@@ -6,11 +6,9 @@ use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use glam::Vec3;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
 use super::items::Record;
-use super::{BuildError, Info, Input, MemoryUsage, RegionIndex, centre_bounds};
+use super::{BuildError, Info, Input, MemoryUsage, NoParams, RegionIndex, centre_bounds};
 use crate::geometry::{Aabb, PlaneRows};
 use crate::query::{Bits, Context, ItemId, NoRecorder, QueryVolume, Recorder, Sink};
 
@@ -153,29 +151,16 @@ impl<'a, R: Recorder> Tally<'a, R> {
     }
 }
 
-/// Half the size of the largest item, axis by axis.
-pub fn half_of_largest(items: &[Record]) -> Vec3 {
-    let halves = items.iter().map(|item| item.bounds.extent() * 0.5);
-    halves.fold(Vec3::ZERO, Vec3::max)
-}
-
 /// A structure that is searched one box at a time.
 pub trait BoxTested: Sized + Send + Sync {
     /// Its [`RegionIndex::INFO`].
     const ABOUT: Info;
-    /// Its [`RegionIndex::Params`]: how it is updated.
-    type Params: Default + Clone + Serialize + DeserializeOwned;
 
     /// Builds it over all items that are not empty.
     ///
     /// # Errors
     /// If it cannot hold them.
     fn of(items: Vec<Record>) -> Result<Self, BuildError>;
-
-    /// Takes the parameters after the build.
-    fn with(self, _params: Self::Params) -> Self {
-        self
-    }
 
     /// Its [`RegionIndex::refit`].
     fn follow(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
@@ -196,10 +181,10 @@ pub trait BoxTested: Sized + Send + Sync {
 
 impl<X: BoxTested> RegionIndex for X {
     const INFO: Info = X::ABOUT;
-    type Params = X::Params;
+    type Params = NoParams;
 
-    fn build(input: &Input<'_>, params: &X::Params) -> Result<Self, BuildError> {
-        Ok(X::of(Record::all(input.items)?)?.with(params.clone()))
+    fn build(input: &Input<'_>, _: &NoParams) -> Result<Self, BuildError> {
+        X::of(Record::all(input.items)?)
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {

@@ -7,9 +7,9 @@ use std::ops::{ControlFlow, Range};
 
 use glam::{UVec3, Vec3};
 
-use super::box_test::{BoxTest, BoxTested, Tally, half_of_largest};
+use super::box_test::{BoxTest, BoxTested, Tally};
 use super::items::{Record, bounds_of_centres};
-use super::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
+use super::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::geometry::Aabb;
 use crate::query::{ItemId, Recorder, Sink};
 
@@ -31,6 +31,7 @@ pub struct UniformGrid {
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
     scene: Aabb,
+    /// Half the size of the largest item, axis by axis.
     half: Vec3,
 }
 
@@ -133,7 +134,6 @@ impl BoxTested for UniformGrid {
         Kind::Grid,
         Origin::Ours,
     );
-    type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let centres = bounds_of_centres(items.iter().map(|item| item.bounds.centre()));
@@ -142,6 +142,7 @@ impl BoxTested for UniformGrid {
             false => cells_for(centres.extent(), items.len()),
         };
         let cells = counts.as_usizevec3().element_product();
+        let halves = items.iter().map(|item| item.bounds.extent() * 0.5);
         let mut grid = UniformGrid {
             centres,
             counts,
@@ -150,7 +151,7 @@ impl BoxTested for UniformGrid {
             boxes: vec![Aabb::EMPTY; items.len()],
             ids: vec![0; items.len()],
             scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
-            half: half_of_largest(&items),
+            half: halves.fold(Vec3::ZERO, Vec3::max),
         };
         // A counting sort by cell.
         let cell_of = |item: &Record| grid.cell_of(item.bounds.centre());

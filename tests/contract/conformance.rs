@@ -137,9 +137,7 @@ conforms_with! {
     quadtree_loose: Quadtree = "loose=2";
     bsp_small_leaves: Bsp = "leaf=1";
     bsp_large_leaves: Bsp = "leaf=300";
-    bsp_sah: Bsp = "builder=sah";
-    bsp_oblique: Bsp = "builder=oblique,leaf=3";
-    bsp_faces: Bsp = "builder=faces,cut=4";
+    bsp_sah: Bsp = "builder=sah,leaf=3";
     bvh_fastest: Bvh = "preset=fastest,leaf=1";
     bvh_large_leaves: Bvh = "preset=medium,leaf=255";
     bvh_slowest: Bvh = "preset=very-slow";

@@ -1,23 +1,15 @@
-//! The BSP tree: planes of any orientation divide the items, and region search
-//! descends by the planes alone. Includes the import of a map's own tree;
+//! The BSP tree: planes divide the items, and region search descends by the planes
+//! alone. Includes the import of a map's own tree, whose planes have any orientation;
 //! `bsp_split_planes` has the choice of planes.
-
-use std::ops::ControlFlow;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::bsp_split_planes::{
-    between_layers, by_own_planes, by_principal_axis, by_surface_area, divide,
-};
-use crate::geometry::{Plane, PlaneTree};
+use super::bsp_split_planes::{ARRANGED, between_layers, by_surface_area, divide};
+use crate::geometry::PlaneTree;
 use crate::index::items::Record;
-use crate::index::tree::kd_treelets::{DESCENT_LEAF, Treelets};
-use crate::index::tree::node::Stack;
-use crate::index::tree::{Descent, PackedTree, Part, Splitter, Tree, TreeBuilder, build_top_down};
+use crate::index::tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, build_top_down};
 use crate::index::{BuildError, Info, Input, Kind, Origin, check_range};
-use crate::kernel::Isa;
-use crate::query::{ManySink, Predicate, Recorder, Sink};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
 /// generation by a priori tree structures").
@@ -32,33 +24,6 @@ pub type Bsp = Tree<BspBuilder>;
 /// Builder of [`Bsp`].
 pub struct BspBuilder;
 
-/// Planes by which region search descends.
-pub enum Planes {
-    /// Planes of any direction, one per node; unused for leaves.
-    Any(Vec<Split>),
-    /// Axis-parallel planes.
-    Axes(Treelets),
-}
-
-/// The direction of a node's plane and how far its two sides reach along it.
-#[derive(Clone, Copy, Default, Debug)]
-pub struct Split {
-    normal: Vec3,
-    /// Nothing on the back side reaches farther than this along the normal.
-    back_high: f32,
-    /// Nothing on the front side reaches back beyond this.
-    front_low: f32,
-}
-
-impl Split {
-    /// Position along the normal, by the plane test's own arithmetic: being
-    /// monotone, it never puts a point of an item beyond the item's corner.
-    #[inline(always)]
-    fn along(&self) -> Plane {
-        Plane::new(self.normal, 0.0)
-    }
-}
-
 /// Source of the dividing planes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -71,18 +36,12 @@ pub enum PlaneSource {
     Sah,
     /// The median of the centres along the widest axis: perfectly balanced.
     Median,
-    /// The median across the direction of largest spread (principal axis of
-    /// the centres): planes of any orientation.
-    Oblique,
-    /// Auto-partition: of the planes that the items' faces and diagonals offer,
-    /// the one that balances best for the fewest cut items.
-    Faces,
     /// The map's own tree (a Doom WAD has one); items that its branches leave
     /// together are divided by `sah`.
     Import,
 }
 
-/// Parameters: `bsp:builder=faces,leaf=32,cut=2`.
+/// Parameters: `bsp:builder=sah,leaf=16`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BspParams {
@@ -90,9 +49,6 @@ pub struct BspParams {
     pub builder: PlaneSource,
     /// Most items of a leaf (1 to 4096).
     pub leaf: u32,
-    /// For `faces`: how many items of imbalance one cut item counts as (0 to
-    /// 1000).
-    pub cut: f32,
 }
 
 impl Default for BspParams {
@@ -100,7 +56,6 @@ impl Default for BspParams {
         BspParams {
             builder: PlaneSource::Auto,
             leaf: 32,
-            cut: 1.0,
         }
     }
 }
@@ -130,12 +85,9 @@ impl BspParams {
 
 struct PlaneSplitter<'a> {
     source: PlaneSource,
-    cut: f32,
     imported: Option<&'a PlaneTree>,
-    splits: Vec<Split>,
-    /// Number of items before the plane, for each division within a leaf of more
-    /// than [`DESCENT_LEAF`] items.
-    cuts: Vec<u32>,
+    /// The normal of each inner node's plane.
+    normals: Vec<Vec3>,
 }
 
 /// The imported node to divide a group by.
@@ -171,8 +123,6 @@ impl Splitter for PlaneSplitter<'_> {
             let chosen = match self.source {
                 PlaneSource::Sah | PlaneSource::Import => by_surface_area(records),
                 PlaneSource::Auto | PlaneSource::Median => None,
-                PlaneSource::Oblique => by_principal_axis(records),
-                PlaneSource::Faces => by_own_planes(records, self.cut),
             };
             let divides = |&(_, back): &(Vec3, usize)| (1..count).contains(&back);
             let (normal, back) = chosen
@@ -180,112 +130,23 @@ impl Splitter for PlaneSplitter<'_> {
                 .unwrap_or_else(|| between_layers(records));
             (normal, back, [None; 2])
         });
-        if self.splits.len() <= node {
-            self.splits.resize(node + 1, Split::default());
+        if self.normals.len() <= node {
+            self.normals.resize(node + 1, Vec3::ZERO);
         }
-        self.splits[node].normal = normal;
+        self.normals[node] = normal;
         let halves = [back, count - back].into_iter().zip(cells.map(Some));
         parts.extend(halves.map(|(items, cell)| Part { items, cell }));
     }
 
+    /// Goes on as if the leaf were divided.
     fn arrange(&mut self, records: &mut [Record]) {
-        if self.source != PlaneSource::Median || records.len() <= DESCENT_LEAF {
+        if self.source != PlaneSource::Median || records.len() <= ARRANGED {
             return;
         }
         let (_, back) = between_layers(records);
-        self.cuts.push(back as u32);
         let (back, front) = records.split_at_mut(back);
         self.arrange(back);
         self.arrange(front);
-    }
-}
-
-/// Computes how far the two sides of a node reach along its normal, from the bounds
-/// of its children.
-fn measure_reach(splits: &mut [Split], tree: &PackedTree, node: usize) {
-    if tree.is_leaf(node) {
-        return;
-    }
-    let back = &tree.nodes()[node + 1];
-    let front = &tree.nodes()[back.after()];
-    let split = &mut splits[node];
-    let along = split.along();
-    split.back_high = along.value_at(along.p_vertex(&back.bounds));
-    split.front_low = along.value_at(along.n_vertex(&front.bounds));
-}
-
-impl Descent for Planes {
-    fn bytes(&self) -> usize {
-        match self {
-            Planes::Any(splits) => size_of_val(&splits[..]),
-            Planes::Axes(treelets) => treelets.bytes(),
-        }
-    }
-
-    fn refit(&mut self, tree: &PackedTree, node: usize) {
-        match self {
-            Planes::Any(splits) => measure_reach(splits, tree, node),
-            Planes::Axes(treelets) => treelets.fit(tree, node),
-        }
-    }
-
-    /// One dot product per node.
-    #[inline(always)]
-    fn locate<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        tree: &PackedTree,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let splits = match self {
-            Planes::Any(splits) => splits,
-            Planes::Axes(treelets) => return treelets.locate(isa, tree, p, sink, recorder),
-        };
-        let nodes = tree.nodes();
-        let mut open = Stack::new((0, ()));
-        while let Some((at, ())) = open.pop() {
-            let mut at = at as usize;
-            // An empty tree has no node 0.
-            while let Some(node) = nodes.get(at) {
-                recorder.nodes_tested(1);
-                if tree.is_leaf(at) {
-                    tree.test_items(isa, node.items(), (&p, p.mask()), sink, recorder)?;
-                    break;
-                }
-                let split = &splits[at];
-                let value = split.along().value_at(p);
-                let front = nodes[at + 1].after();
-                // Not `<=`: a NaN (coordinates beyond f32) enters both sides.
-                let beyond_back = value > split.back_high;
-                let before_front = value < split.front_low;
-                at = match (beyond_back, before_front) {
-                    (true, true) => break,
-                    (true, false) => front,
-                    (false, true) => at + 1,
-                    (false, false) => {
-                        open.push((front as u32, ()));
-                        at + 1
-                    }
-                };
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
-    #[inline(always)]
-    fn locate_many<I: Isa, S: ManySink>(
-        &self,
-        isa: I,
-        tree: &PackedTree,
-        points: &[Vec3],
-        sink: &mut S,
-    ) -> ControlFlow<()> {
-        match self {
-            Planes::Any(_) => tree.query_many(isa, points, sink),
-            Planes::Axes(treelets) => treelets.query_many(tree, points, sink),
-        }
     }
 }
 
@@ -297,32 +158,21 @@ impl TreeBuilder for BspBuilder {
         Origin::Ours,
     );
     type Params = BspParams;
-    type Descent = Planes;
+    const BY_PLANES: bool = true;
 
-    fn build(input: &Input<'_>, params: &BspParams) -> Result<(PackedTree, Planes), BuildError> {
+    fn build(input: &Input<'_>, params: &BspParams) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 4096.0)?;
-        check_range(Self::INFO.name, "cut", params.cut.into(), 0.0, 1000.0)?;
         let (source, imported) = params.chosen(input.own_tree)?;
         let mut splitter = PlaneSplitter {
             source,
-            cut: params.cut,
             imported,
-            splits: Vec::new(),
-            cuts: Vec::new(),
+            normals: Vec::new(),
         };
         let root = imported.and_then(|planes| planes.root);
         let records = Record::all(input.items)?;
         let tree = build_top_down(records, params.leaf as usize, root, &mut splitter);
-        if source == PlaneSource::Median {
-            let treelets = Treelets::over(&tree, splitter.cuts);
-            return Ok((tree, Planes::Axes(treelets)));
-        }
-        let mut splits = splitter.splits;
-        splits.resize(tree.nodes().len(), Split::default());
-        splits.shrink_to_fit();
-        for node in 0..splits.len() {
-            measure_reach(&mut splits, &tree, node);
-        }
-        Ok((tree, Planes::Any(splits)))
+        let mut normals = splitter.normals;
+        normals.resize(tree.nodes().len(), Vec3::ZERO);
+        Ok((tree, normals))
     }
 }

@@ -5,6 +5,7 @@
 
 use std::borrow::Cow;
 
+use glam::Vec3;
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use serde::{Deserialize, Serialize};
@@ -183,9 +184,8 @@ impl TreeBuilder for BvhBuilder {
         Origin::Ours,
     );
     type Params = BvhParams;
-    type Descent = ();
 
-    fn build(input: &Input<'_>, params: &BvhParams) -> Result<(PackedTree, ()), BuildError> {
+    fn build(input: &Input<'_>, params: &BvhParams) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
         let items = input.items;
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 255.0)?;
         let config = BvhBuildParams {
@@ -195,9 +195,9 @@ impl TreeBuilder for BvhBuilder {
         };
         let stacks = Stacks::of(items, indexable(items)?);
         if stacks.members.is_empty() {
-            return Ok((PackedTree::default(), ()));
+            return Ok((PackedTree::default(), Vec::new()));
         }
         let built = ploc::build(&stacks.boxes(items), config);
-        Ok((packed(items, &stacks, &built), ()))
+        Ok((packed(items, &stacks, &built), Vec::new()))
     }
 }

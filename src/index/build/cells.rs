@@ -45,9 +45,11 @@ impl TreeBuilder for OctreeBuilder {
         Origin::Ours,
     );
     type Params = CellParams;
-    type Descent = ();
 
-    fn build(input: &Input<'_>, params: &CellParams) -> Result<(PackedTree, ()), BuildError> {
+    fn build(
+        input: &Input<'_>,
+        params: &CellParams,
+    ) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
         params.build(Self::INFO.name, input.items, &[0, 1, 2], None)
     }
 }
@@ -60,9 +62,11 @@ impl TreeBuilder for QuadtreeBuilder {
         Origin::Ours,
     );
     type Params = CellParams;
-    type Descent = ();
 
-    fn build(input: &Input<'_>, params: &CellParams) -> Result<(PackedTree, ()), BuildError> {
+    fn build(
+        input: &Input<'_>,
+        params: &CellParams,
+    ) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
         let axes = widest_axes(&Aabb::union_of(input.items));
         let height = 3 - axes[0] - axes[1];
         params.build(Self::INFO.name, input.items, &axes, Some(height))
@@ -112,7 +116,7 @@ impl CellParams {
         items: &[Aabb],
         axes: &[usize],
         column: Option<usize>,
-    ) -> Result<(PackedTree, ()), BuildError> {
+    ) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
         check_range(structure, "leaf", self.leaf.into(), 1.0, 4096.0)?;
         check_range(structure, "depth", self.depth.into(), 0.0, 64.0)?;
         check_range(structure, "loose", self.loose.into(), 1.0, 16.0)?;
@@ -135,7 +139,10 @@ impl CellParams {
             level: 0,
         };
         let records = Record::all(items)?;
-        Ok((build_top_down(records, leaf, root, &mut splitter), ()))
+        Ok((
+            build_top_down(records, leaf, root, &mut splitter),
+            Vec::new(),
+        ))
     }
 }
 
@@ -343,7 +350,7 @@ mod tests {
         let items = grid([64, 64, 2]);
         let (tree, params) = (built(&items), CellParams::default());
         let plain = params.build("plain", &items, &[0, 1], None);
-        let (plain, ()) = plain.expect("boxes on a grid");
+        let (plain, _) = plain.expect("boxes on a grid");
         assert_eq!(tree.ids(), plain.ids());
         assert_eq!(tree.nodes().len(), plain.nodes().len());
     }

@@ -7,7 +7,6 @@ use obvhs::bvh2::node::Bvh2Node;
 
 use super::{Division, Node, Textbook, TextbookParams};
 use crate::geometry::{Aabb, Plane, PlaneTree};
-use crate::index::build::bsp_split_planes::planes_of;
 use crate::index::build::cells::widest_axes;
 use crate::index::items::Record;
 use crate::index::{Input, ploc};
@@ -197,6 +196,21 @@ struct Planes<'a> {
 /// Boxes per node that offer planes, and items by which the planes are ranked.
 const OFFER: usize = 4;
 const JUDGES: usize = 512;
+
+/// The faces of `boxes` of the boxes, and two diagonals through the centre of each:
+/// eight planes per box.
+fn planes_of(records: &[Record], boxes: usize) -> impl Iterator<Item = Plane> {
+    let step = records.len().div_ceil(boxes).max(1);
+    records.iter().step_by(step).flat_map(|r| {
+        let diagonals = [Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
+        let faces = Vec3::AXES
+            .into_iter()
+            .flat_map(|n| [(n, r.bounds.min), (n, r.bounds.max)]);
+        let diagonals = diagonals.into_iter().map(|n| (n, r.bounds.centre()));
+        let through = |(normal, at)| Plane::through(at, normal);
+        faces.chain(diagonals).map(through).collect::<Vec<_>>()
+    })
+}
 
 impl Planes<'_> {
     /// The division of some items, with the map's nodes in front and behind; `at` is

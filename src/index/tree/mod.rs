@@ -1,33 +1,34 @@
 //! The packed tree, which `bvh`, `bsp`, `octree` and `quadtree` share.
 //!
 //! [`Tree`] is the structure: a [`PackedTree`] made by a [`TreeBuilder`] (`index/build`),
-//! which decides how items are grouped and, by its [`Descent`], how points descend.
+//! which decides how items are grouped and whether points descend by planes.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `node`, `packed` | nodes in depth-first order, stacks of them; layout, construction, refit |
 //! | `wide_nodes` | the same nodes in blocks of sixteen, for queries by volumes |
-//! | `search` | queries by volumes, by points, by many points |
+//! | `search` | queries by volumes and by points |
 //! | `partition` | top-down construction by a [`Splitter`] |
-//! | `kd_treelets` | region search by axis-parallel planes, a descent of `bsp` |
+//! | `splits` | region search by dividing planes, for `bsp` |
 
-pub mod kd_treelets;
 pub mod node;
 mod packed;
 mod partition;
 mod search;
+mod splits;
 mod wide_nodes;
 
+use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
 use glam::Vec3;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use self::splits::Split;
 use super::{BuildError, Info, Input, MemoryUsage, RegionIndex, TreeCell};
 use crate::geometry::Aabb;
-use crate::kernel::Isa;
-use crate::query::{Context, ItemId, ManySink, QueryVolume, Recorder, Sink};
+use crate::query::{Context, ItemId, QueryVolume};
 
 pub use node::TreeNode;
 pub use packed::PackedTree;
@@ -39,76 +40,27 @@ pub trait TreeBuilder: Send + Sync {
     const INFO: Info;
     /// [`RegionIndex::Params`].
     type Params: Default + Serialize + DeserializeOwned;
-    /// Descent of region search: `()` for nodes' bounds, or planes of the builder.
-    type Descent: Descent;
+    /// True if points descend by the normals that the build returns.
+    const BY_PLANES: bool = false;
 
-    /// Builds the tree.
+    /// Builds the tree; with [`TreeBuilder::BY_PLANES`] it is binary, and a plane of each
+    /// inner node's normal divides the items, those on the back first.
     ///
     /// # Errors
     /// The errors of [`RegionIndex::build`].
     fn build(
         input: &Input<'_>,
         params: &Self::Params,
-    ) -> Result<(PackedTree, Self::Descent), BuildError>;
-}
-
-/// Descent of region search through a packed tree, from the root to the leaves.
-pub trait Descent: Send + Sync {
-    /// Heap bytes.
-    fn bytes(&self) -> usize;
-
-    /// Updates the planes of a node whose bounds have changed, after its children.
-    fn refit(&mut self, tree: &PackedTree, node: usize);
-
-    /// Passes every item whose closed box holds `p` to the sink, in tree order.
-    fn locate<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        tree: &PackedTree,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()>;
-
-    /// Region search for many points, as [`RegionIndex::query_many`].
-    #[inline(always)]
-    fn locate_many<I: Isa, S: ManySink>(
-        &self,
-        isa: I,
-        tree: &PackedTree,
-        points: &[Vec3],
-        sink: &mut S,
-    ) -> ControlFlow<()> {
-        tree.query_many(isa, points, sink)
-    }
-}
-
-/// Descent by the bounds of the nodes.
-impl Descent for () {
-    fn bytes(&self) -> usize {
-        0
-    }
-
-    fn refit(&mut self, _: &PackedTree, _: usize) {}
-
-    #[inline(always)]
-    fn locate<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        tree: &PackedTree,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        tree.walk(isa, &p, sink, recorder)
-    }
+    ) -> Result<(PackedTree, Vec<Vec3>), BuildError>;
 }
 
 /// A packed tree by the builder `B`: [`Octree`](super::Octree),
 /// [`Quadtree`](super::Quadtree), [`Bvh`](super::Bvh) and [`Bsp`](super::Bsp).
 pub struct Tree<B: TreeBuilder> {
     pub(super) tree: PackedTree,
-    descent: B::Descent,
+    /// One per node with [`TreeBuilder::BY_PLANES`], else none.
+    splits: Vec<Split>,
+    builder: PhantomData<B>,
 }
 
 impl<B: TreeBuilder> RegionIndex for Tree<B> {
@@ -116,42 +68,40 @@ impl<B: TreeBuilder> RegionIndex for Tree<B> {
     type Params = B::Params;
 
     fn build(input: &Input<'_>, params: &B::Params) -> Result<Self, BuildError> {
-        let (tree, descent) = B::build(input, params)?;
-        Ok(Tree { tree, descent })
+        let (tree, normals) = B::build(input, params)?;
+        let splits = Split::all(&tree, normals);
+        Ok(Tree {
+            tree,
+            splits,
+            builder: PhantomData,
+        })
     }
 
     fn memory(&self) -> MemoryUsage {
         let mut memory = self.tree.memory();
-        memory.node_bytes += self.descent.bytes();
+        memory.node_bytes += size_of_val(&self.splits[..]);
         memory
     }
 
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        if Q::IS_POINT {
-            let isa = cx.isa();
-            let (sink, recorder) = cx.parts();
-            return match volume.as_point() {
-                Some(p) => self.descent.locate(isa, &self.tree, p, sink, recorder),
-                None => ControlFlow::Continue(()),
-            };
+        match volume.as_point() {
+            Some(p) if B::BY_PLANES => {
+                let isa = cx.isa();
+                let (sink, recorder) = cx.parts();
+                splits::locate(isa, (&self.tree, &self.splits), p, sink, recorder)
+            }
+            _ => self.tree.query(volume, cx),
         }
-        self.tree.query(volume, cx)
-    }
-
-    #[inline(always)]
-    fn query_many<I: Isa, S: ManySink>(
-        &self,
-        isa: I,
-        points: &[Vec3],
-        sink: &mut S,
-    ) -> ControlFlow<()> {
-        self.descent.locate_many(isa, &self.tree, points, sink)
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let descent = &mut self.descent;
-        let fitted = |tree: &PackedTree, node| descent.refit(tree, node);
+        let splits = &mut self.splits;
+        let fitted = |tree: &PackedTree, node: usize| {
+            if let Some(split) = splits.get_mut(node) {
+                split.fit(tree, node);
+            }
+        };
         self.tree.refit(items, moved, fitted)
     }
 

@@ -54,17 +54,17 @@ pub fn children(nodes: &[TreeNode], node: usize) -> impl Iterator<Item = usize> 
 /// Open subtrees kept without the heap: enough for any balanced tree.
 const NEAR: usize = 64;
 
-/// Open nodes, each with a state of the traversal such as its open planes.
-pub struct Stack<M> {
-    near: [(u32, M); NEAR],
+/// Open nodes of a depth-first traversal.
+pub struct Stack {
+    near: [u32; NEAR],
     used: usize,
     /// Deeper levels of degenerate trees.
-    far: Vec<(u32, M)>,
+    far: Vec<u32>,
 }
 
-impl<M: Copy> Stack<M> {
+impl Stack {
     #[inline(always)]
-    pub fn new(root: (u32, M)) -> Self {
+    pub fn new(root: u32) -> Self {
         Stack {
             near: [root; NEAR],
             used: 1,
@@ -73,7 +73,7 @@ impl<M: Copy> Stack<M> {
     }
 
     #[inline(always)]
-    pub fn pop(&mut self) -> Option<(u32, M)> {
+    pub fn pop(&mut self) -> Option<u32> {
         if let Some(top) = self.far.pop() {
             return Some(top);
         }
@@ -82,12 +82,12 @@ impl<M: Copy> Stack<M> {
     }
 
     #[inline(always)]
-    pub fn push(&mut self, entry: (u32, M)) {
+    pub fn push(&mut self, node: u32) {
         if let Some(slot) = self.near.get_mut(self.used) {
-            *slot = entry;
+            *slot = node;
             self.used += 1;
         } else {
-            self.far.push(entry);
+            self.far.push(node);
         }
     }
 }

@@ -3,6 +3,8 @@
 //! Nodes are in depth-first order, items in the order of their leaves ("tree order"), so
 //! that every subtree is one slice of either. Item bounds are in blocks of sixteen.
 
+use std::ops::Range;
+
 use super::node::{TreeNode, children, is_leaf};
 use super::wide_nodes::WideNodes;
 use crate::geometry::{Aabb, BoxBlocks, LANES};
@@ -11,8 +13,8 @@ use crate::index::{MemoryUsage, TreeCell};
 use crate::kernel::prefetch;
 use crate::query::ItemId;
 
-/// A tree packed for queries: 36 bytes per node, 28 per item. Nodes may have
-/// any number of children.
+/// A tree packed for queries: 36 bytes per node, 28 per item. Nodes have at most
+/// sixteen children.
 #[derive(Default)]
 pub struct PackedTree {
     /// In depth-first order.
@@ -60,6 +62,9 @@ impl PackedTree {
     /// group: it either [pushes](PackedTree::push) the items of a leaf or lists the
     /// groups of the children, in order. Iterative, so that a degenerate tree cannot
     /// overflow the stack.
+    ///
+    /// # Panics
+    /// If a node has more than sixteen children.
     pub fn grow<G>(
         items: usize,
         root: G,
@@ -89,6 +94,8 @@ impl PackedTree {
                     });
                     tasks.push(Task::Close(node));
                     expand(&mut tree, node, group, &mut groups);
+                    let count = groups.len();
+                    assert!(count <= LANES, "{count} children; expected at most {LANES}");
                     tasks.extend(groups.drain(..).rev().map(Task::Open));
                 }
                 Task::Close(node) => {
@@ -145,40 +152,35 @@ impl PackedTree {
 
     /// The root, and the lanes of the wide nodes below it.
     pub fn cells(&self) -> Vec<TreeCell<'_>> {
-        let Some(root) = self.nodes.first() else {
-            return Vec::new();
-        };
-        let cell = |level, bounds, items| TreeCell {
+        let mut cells = Vec::new();
+        if let Some(root) = self.nodes.first() {
+            let below = (!self.wide_nodes.blocks.is_empty()).then_some(0);
+            self.add_cells(0, (root.bounds, root.items()), below, &mut cells);
+        }
+        cells
+    }
+
+    /// Adds a cell and those of the wide node below it; a cell without one keeps items.
+    fn add_cells<'a>(
+        &'a self,
+        level: u32,
+        (bounds, items): (Aabb, Range<usize>),
+        below: Option<usize>,
+        cells: &mut Vec<TreeCell<'a>>,
+    ) {
+        cells.push(TreeCell {
             level,
             bounds,
             half_space: None,
-            items,
-        };
-        let wide = &self.wide_nodes;
-        let is_leaf = wide.blocks.is_empty();
-        let items = if is_leaf { &self.ids[..] } else { &[] };
-        let mut cells = vec![cell(0, root.bounds, items)];
-        let lanes = |at: usize, level: u32| {
-            let lanes = (0..LANES).rev();
-            let held = lanes.filter(move |lane| wide.links[at].lanes >> lane & 1 == 1);
-            held.map(move |lane| (at, lane, level))
-        };
-        // The last entry is the next cell.
-        let mut open = Vec::new();
-        if !is_leaf {
-            open.extend(lanes(0, 1));
+            items: below.map_or(&self.ids[items], |_| &[]),
+        });
+        let Some(at) = below else { return };
+        let (links, block) = (&self.wide_nodes.links[at], &self.wide_nodes.blocks[at]);
+        for lane in (0..LANES).filter(|lane| links.lanes >> lane & 1 == 1) {
+            let items = links.first[lane] as usize..links.end[lane] as usize;
+            let below = (links.leaves >> lane & 1 == 0).then_some(links.below[lane] as usize);
+            self.add_cells(level + 1, (block.get(lane), items), below, cells);
         }
-        while let Some((at, lane, level)) = open.pop() {
-            let (links, bounds) = (&wide.links[at], wide.blocks[at].get(lane));
-            if links.leaves >> lane & 1 == 1 {
-                let items = links.first[lane] as usize..links.end[lane] as usize;
-                cells.push(cell(level, bounds, &self.ids[items]));
-            } else {
-                cells.push(cell(level, bounds, &[]));
-                open.extend(lanes(links.below[lane] as usize, level + 1));
-            }
-        }
-        cells
     }
 
     /// Bytes of nodes and of items, as allocated.
@@ -226,16 +228,12 @@ impl PackedTree {
                 node = self.paths.parents[node] as usize;
             }
         }
-        let mut fits = true;
         for word in (0..changed.words()).rev() {
             for node in changed.of_word(word).rev() {
                 self.fit(node);
-                fits &= self.wide_nodes.refit(node, &self.nodes[node].bounds);
+                self.wide_nodes.refit(node, &self.nodes[node].bounds);
                 fitted(self, node);
             }
-        }
-        if !fits {
-            self.wide_nodes = WideNodes::new(&self.nodes);
         }
         true
     }
@@ -295,7 +293,10 @@ mod tests {
         assert_eq!(tree.depth(), 100_001);
         let mut all = Count::default();
         let everything = Aabb::new(Vec3::splat(-1e9), Vec3::splat(1e9));
-        let _ = tree.walk(BASELINE, &everything, &mut all, &mut NoRecorder);
+        let _ = tree.query(
+            &everything,
+            &mut QueryContext::new(BASELINE, &mut all, &mut NoRecorder),
+        );
         assert_eq!(all.0, 100_000);
         for id in [0, 50_000, 99_999] {
             let mut found = Vec::new();

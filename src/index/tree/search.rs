@@ -1,15 +1,14 @@
 //! Queries of the packed tree, the same for every builder.
 //!
 //! [`PackedTree::query`] descends level by level through the wide nodes for a volume and
-//! calls [`PackedTree::walk`] for a point, one pass along the nodes in memory order.
-//! [`PackedTree::query_many`] searches for many points.
+//! calls [`PackedTree::locate`] for a point, one pass along the nodes in memory order.
 
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 
-use super::node::{Stack, TreeNode};
+use super::node::TreeNode;
 use super::packed::PackedTree;
 use crate::geometry::{LANES, LaneMask, PlaneMask};
 use crate::index::frontier::{
@@ -17,9 +16,7 @@ use crate::index::frontier::{
 };
 use crate::index::linear::scan_blocks;
 use crate::kernel::{Isa, pairs, prefetch};
-use crate::query::{
-    Containment, Context, ItemId, ManySink, NoRecorder, QueryContext, QueryVolume, Recorder, Sink,
-};
+use crate::query::{Containment, Context, Predicate, QueryVolume, Recorder, Sink};
 
 /// Memory of a traversal by level, kept between queries.
 #[derive(Default)]
@@ -36,25 +33,6 @@ thread_local! {
     static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
 }
 
-/// Number of points that descend together.
-///
-/// Enough to hide the waits for memory, few enough for their data to stay in the
-/// nearest caches.
-pub const GROUP: usize = 64;
-
-/// A point and the node that its descent has reached.
-#[derive(Clone, Copy, Default, Debug)]
-pub struct Cursor {
-    /// Index of the point in its group.
-    pub point: u32,
-    /// Index of a node; in treelets, of a treelet or leaf.
-    pub at: u32,
-}
-
-/// Fewest items of a tree whose points are searched for in turn. Smaller trees fit
-/// the caches, where there are no misses to overlap (docs/adr/0009).
-const INTERLEAVED_FROM: usize = 1 << 18;
-
 impl PackedTree {
     /// Passes every item that the volume sees to the sink: items that hold a point in
     /// tree order; items of a frustum by level, accepted subtrees first, then the
@@ -63,9 +41,12 @@ impl PackedTree {
     pub fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        match Q::IS_POINT {
-            true => self.walk(isa, volume, sink, recorder),
-            false => self.search(isa, volume, sink, recorder),
+        if !Q::IS_POINT {
+            return self.search(isa, volume, sink, recorder);
+        }
+        match volume.as_point() {
+            Some(p) => self.locate(isa, p, sink, recorder),
+            None => ControlFlow::Continue(()),
         }
     }
 
@@ -221,50 +202,29 @@ impl PackedTree {
         }
     }
 
-    /// Passes every item that the volume sees to the sink, in tree order.
+    /// Passes every item whose closed box holds `p` to the sink, in tree order.
     ///
-    /// One pass over the nodes in memory order: it jumps over a rejected subtree,
-    /// passes an accepted one as a single slice, and keeps the open planes of a
-    /// straddling one for all nodes up to its end.
+    /// One pass over the nodes in memory order, which jumps over rejected subtrees.
     #[inline(always)]
-    pub fn walk<I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
+    fn locate<I: Isa, S: Sink, R: Recorder>(
         &self,
         isa: I,
-        volume: &Q,
+        p: Vec3,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        let (nodes, ids) = (self.nodes(), self.ids());
-        let mut top = (nodes.len() as u32, volume.mask());
-        // End and open planes of the straddling nodes around the present one; the
-        // first entry is never popped.
-        let mut below = Stack::new(top);
+        let nodes = self.nodes();
         let mut at = 0;
-        while let Some(node) = nodes.get(at as usize) {
-            while at >= top.0 {
-                top = below.pop().unwrap_or(top);
-            }
+        while let Some(node) = nodes.get(at) {
             recorder.nodes_tested(1);
-            let (containment, mask) = volume.classify(&node.bounds, top.1, recorder);
-            match containment {
-                Containment::Outside => {
-                    recorder.subtrees_rejected(1);
-                    at = node.after;
-                }
-                Containment::Inside => {
-                    recorder.subtree_accepted(node.count as usize);
-                    sink.accept_range(isa, ids, node.items())?;
-                    at = node.after;
-                }
-                Containment::Straddles => {
-                    at += 1;
-                    if node.after == at {
-                        self.test_items(isa, node.items(), (volume, mask), sink, recorder)?;
-                    } else {
-                        below.push(top);
-                        top = (node.after, mask);
-                    }
-                }
+            if !node.bounds.contains_point(p) {
+                recorder.subtrees_rejected(1);
+                at = node.after();
+                continue;
+            }
+            at += 1;
+            if node.after() == at {
+                self.test_items(isa, node.items(), (&p, p.mask()), sink, recorder)?;
             }
         }
         ControlFlow::Continue(())
@@ -283,180 +243,11 @@ impl PackedTree {
         let blocks = self.boxes().range(items.start, items.end);
         scan_blocks(isa, blocks, self.ids(), (volume, mask), sink, recorder)
     }
-
-    /// Prefetches the bounds and ids of some items.
-    #[inline(always)]
-    pub fn prefetch_items(&self, items: Range<usize>) {
-        for (start, _, block) in self.boxes().range(items.start, items.end) {
-            block.prefetch();
-            prefetch(&self.ids()[start]);
-        }
-    }
-
-    /// Region search for many points by the nodes' bounds.
-    ///
-    /// See [`RegionIndex::query_many`](crate::index::RegionIndex::query_many).
-    #[inline(always)]
-    pub fn query_many<I: Isa, S: ManySink>(
-        &self,
-        isa: I,
-        points: &[Vec3],
-        sink: &mut S,
-    ) -> ControlFlow<()> {
-        if self.ids().len() >= INTERLEAVED_FROM {
-            return self.query_interleaved(points, sink);
-        }
-        let mut ids = Vec::new();
-        for (p, point) in points.iter().zip(0..) {
-            ids.clear();
-            // A Vec never breaks off.
-            let _ = self.query(p, &mut QueryContext::new(isa, &mut ids, &mut NoRecorder));
-            sink.accept(point, &ids)?;
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// Region search for groups of points whose steps alternate.
-    ///
-    /// Each point of a group advances by one node in turn, so that their cache misses
-    /// overlap.
-    #[inline(always)]
-    fn query_interleaved<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
-        let nodes = self.nodes();
-        let (mut leaves, mut ids) = (Vec::new(), Vec::new());
-        let mut open: Vec<Cursor> = Vec::with_capacity(GROUP);
-        for (group, first) in points.chunks(GROUP).zip((0..).step_by(GROUP)) {
-            open.extend((0..group.len() as u32).map(|point| Cursor { point, at: 0 }));
-            while !open.is_empty() {
-                let mut kept = 0;
-                for i in 0..open.len() {
-                    let Cursor { point, at } = open[i];
-                    // An empty tree has no node 0.
-                    let Some(node) = nodes.get(at as usize) else {
-                        continue;
-                    };
-                    let next = if node.bounds.contains_point(group[point as usize]) {
-                        if self.is_leaf(at as usize) {
-                            leaves.push(open[i]);
-                        }
-                        at as usize + 1
-                    } else {
-                        node.after()
-                    };
-                    if let Some(next) = nodes.get(next) {
-                        prefetch(next);
-                    }
-                    open[kept] = Cursor {
-                        point,
-                        at: next as u32,
-                    };
-                    kept += 1;
-                }
-                open.truncate(kept);
-            }
-            // Stable: within a point the leaves are in tree order.
-            leaves.sort_by_key(|leaf: &Cursor| leaf.point);
-            let items_of = |leaf: u32| nodes[leaf as usize].items();
-            self.answer_group(group, first, &leaves, items_of, &mut ids, sink)?;
-            leaves.clear();
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// Tests the items of the leaves that a group of points has reached.
-    ///
-    /// Passes the answers to the sink, point by point. `leaves` are in the order of
-    /// the points, `first` is the index of the group's first point, `ids` is scratch.
-    #[inline(always)]
-    pub fn answer_group<S: ManySink>(
-        &self,
-        group: &[Vec3],
-        first: u32,
-        leaves: &[Cursor],
-        items_of: impl Fn(u32) -> Range<usize>,
-        ids: &mut Vec<ItemId>,
-        sink: &mut S,
-    ) -> ControlFlow<()> {
-        for leaf in leaves {
-            self.prefetch_items(items_of(leaf.at));
-        }
-        ids.clear();
-        let mut ends = [0; GROUP];
-        for leaf in leaves {
-            let (items, p) = (items_of(leaf.at), group[leaf.point as usize]);
-            for (start, lanes, block) in self.boxes().range(items.start, items.end) {
-                let mut holding = block.holding(p) & lanes;
-                while holding != 0 {
-                    ids.push(self.ids()[start + holding.trailing_zeros() as usize]);
-                    holding &= holding - 1;
-                }
-            }
-            ends[leaf.point as usize] = ids.len();
-        }
-        let mut from = 0;
-        for (end, point) in ends[..group.len()].iter().zip(first..) {
-            // A point without a leaf has no end; its list is empty.
-            let end = from.max(*end);
-            sink.accept(point, &ids[from..end])?;
-            from = end;
-        }
-        ControlFlow::Continue(())
-    }
 }
 
 #[inline(always)]
 fn prefetch_leaf(nodes: &[TreeNode], entries: &[u32], i: usize) {
     if let Some(&leaf) = entries.get(i) {
         prefetch(&nodes[leaf as usize]);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Aabb;
-    use crate::kernel::BASELINE;
-    use crate::query::Located;
-
-    /// Overlapping boxes in three levels: ten branches of three leaves of ten items.
-    fn tree() -> PackedTree {
-        PackedTree::grow(
-            300,
-            (0, 0..30),
-            |tree, _, (level, leaves), groups| match level {
-                0 => groups.extend((0..10).map(|branch| (1, 3 * branch..3 * branch + 3))),
-                1 => groups.extend(leaves.map(|leaf| (2, leaf..leaf + 1))),
-                _ => {
-                    for item in 0..10 {
-                        let (leaf, id) = (leaves.start, leaves.start * 10 + item);
-                        let centre = [leaf / 3, leaf % 3, item].map(|x| x as f32);
-                        let centre = Vec3::from_array(centre) * Vec3::new(1.0, 1.0, 0.3);
-                        tree.push(id, &Aabb::around(centre, Vec3::splat(0.75)));
-                    }
-                }
-            },
-        )
-    }
-
-    #[test]
-    fn points_that_take_turns_get_what_each_gets_alone() {
-        for tree in [tree(), PackedTree::default()] {
-            let mut points: Vec<Vec3> = (0..150u8)
-                .map(|i| {
-                    Vec3::new(
-                        f32::from(i % 25) * 0.5,
-                        f32::from(i % 7) * 0.5,
-                        f32::from(i % 11) * 0.4,
-                    )
-                })
-                .collect();
-            points[70].y = f32::NAN;
-            let (mut turns, mut alone) = (Located::default(), Located::default());
-            assert!(tree.query_interleaved(&points, &mut turns).is_continue());
-            assert!(tree.query_many(BASELINE, &points, &mut alone).is_continue());
-            assert_eq!(turns, alone);
-            assert_eq!(turns.len(), points.len());
-            assert_eq!(turns.ids().is_empty(), tree.ids().is_empty());
-        }
     }
 }

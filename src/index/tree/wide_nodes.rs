@@ -31,15 +31,10 @@ pub struct WideNodes {
     pub links: Vec<Links>,
     /// The lane of each tree node, counted over all wide nodes; or [`NO_LANE`].
     lane_of: Vec<u32>,
-    /// True if some lane stands for several siblings.
-    has_groups: bool,
 }
 
 /// Mark of a tree node whose children take its place.
 const NO_LANE: u32 = u32::MAX;
-
-/// Sibling nodes that share a lane: adjoining subtrees.
-type Siblings = Vec<usize>;
 
 impl WideNodes {
     /// Groups the nodes of a tree in depth-first order. Nodes are replaced by their
@@ -55,32 +50,24 @@ impl WideNodes {
             return wide;
         }
         // Breadth first, so that wide nodes of one level are adjacent.
-        let mut waiting = VecDeque::from([children(nodes, 0).collect::<Siblings>()]);
+        let mut waiting = VecDeque::from([0]);
         let mut queued = 1;
-        while let Some(siblings) = waiting.pop_front() {
+        while let Some(parent) = waiting.pop_front() {
             let mut links = Links::default();
             let mut block = BoxBlock::EMPTY;
-            for (lane, siblings) in lanes_of(nodes, &siblings).into_iter().enumerate() {
-                block.set(lane, &bounds_of(nodes, &siblings));
-                let (first, last) = (siblings[0], siblings[siblings.len() - 1]);
-                links.first[lane] = nodes[first].first;
-                links.end[lane] = nodes[last].items().end as u32;
+            for (lane, node) in lanes_of(nodes, parent).enumerate() {
+                block.set(lane, &nodes[node].bounds);
+                links.first[lane] = nodes[node].first;
+                links.end[lane] = nodes[node].items().end as u32;
                 links.lanes |= 1 << lane;
-                let is_group = siblings.len() > 1;
-                wide.has_groups |= is_group;
-                if !is_group {
-                    wide.lane_of[first] = (wide.blocks.len() * LANES + lane) as u32;
-                }
-                if !is_group && is_leaf(nodes, first) {
-                    links.below[lane] = first as u32;
+                wide.lane_of[node] = (wide.blocks.len() * LANES + lane) as u32;
+                if is_leaf(nodes, node) {
+                    links.below[lane] = node as u32;
                     links.leaves |= 1 << lane;
                 } else {
                     links.below[lane] = queued;
                     queued += 1;
-                    waiting.push_back(match is_group {
-                        true => siblings,
-                        false => children(nodes, first).collect(),
-                    });
+                    waiting.push_back(node);
                 }
             }
             wide.blocks.push(block);
@@ -91,16 +78,13 @@ impl WideNodes {
         wide
     }
 
-    /// Takes over a node's new bounds. False if the wide nodes must be built again:
-    /// some lane stands for several siblings, whose union no node has.
-    #[must_use]
-    pub fn refit(&mut self, node: usize, bounds: &Aabb) -> bool {
+    /// Takes over a node's new bounds.
+    pub fn refit(&mut self, node: usize, bounds: &Aabb) {
         let lane = self.lane_of[node];
         if lane != NO_LANE {
             let lane = lane as usize;
             self.blocks[lane / LANES].set(lane % LANES, bounds);
         }
-        !self.has_groups
     }
 
     /// Prefetches the wide node of an entry of a frontier, if there is such an entry.
@@ -124,32 +108,21 @@ impl WideNodes {
     }
 }
 
-/// Distributes siblings over at most sixteen lanes, in tree order.
-fn lanes_of(nodes: &[TreeNode], siblings: &[usize]) -> Vec<Siblings> {
-    let share = siblings.len().div_ceil(LANES);
-    let mut lanes: Vec<Siblings> = siblings.chunks(share).map(<[usize]>::to_vec).collect();
-    let area = |lane: &Siblings| bounds_of(nodes, lane).half_area();
-    let mut areas: Vec<f32> = lanes.iter().map(area).collect();
+/// At most sixteen descendants that a node's block holds, in tree order.
+fn lanes_of(nodes: &[TreeNode], parent: usize) -> impl Iterator<Item = usize> {
+    let below = |node| children(nodes, node).map(|child| (nodes[child].bounds.half_area(), child));
+    let mut lanes: Vec<(f32, usize)> = below(parent).collect();
     loop {
-        let fits = |lane: &Siblings| match lane[..] {
-            [node] if !is_leaf(nodes, node) => {
-                lanes.len() + children(nodes, node).count() <= LANES + 1
-            }
-            _ => false,
+        let fits = |node| {
+            !is_leaf(nodes, node) && lanes.len() + children(nodes, node).count() <= LANES + 1
         };
         let largest = (0..lanes.len())
-            .filter(|&i| fits(&lanes[i]))
-            .max_by(|&a, &b| areas[a].total_cmp(&areas[b]));
-        let Some(lane) = largest else { return lanes };
-        let opened: Vec<Siblings> = children(nodes, lanes[lane][0])
-            .map(|node| vec![node])
-            .collect();
-        areas.splice(lane..=lane, opened.iter().map(area));
-        lanes.splice(lane..=lane, opened);
+            .filter(|&lane| fits(lanes[lane].1))
+            .max_by(|&a, &b| lanes[a].0.total_cmp(&lanes[b].0));
+        let Some(lane) = largest else {
+            return lanes.into_iter().map(|(_, node)| node);
+        };
+        let node = lanes[lane].1;
+        lanes.splice(lane..=lane, below(node));
     }
-}
-
-fn bounds_of(nodes: &[TreeNode], siblings: &[usize]) -> Aabb {
-    let bounds = siblings.iter().map(|&node| nodes[node].bounds);
-    bounds.fold(Aabb::EMPTY, |all, b| all.union(&b))
 }

@@ -1,0 +1,97 @@
+//! Region search by dividing planes of any direction, one per inner node of a binary
+//! tree: one dot product per node.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+
+use super::node::Stack;
+use super::packed::PackedTree;
+use crate::geometry::Plane;
+use crate::kernel::Isa;
+use crate::query::{Predicate, Recorder, Sink};
+
+/// The direction of a node's plane and how far its two sides reach along it.
+#[derive(Clone, Copy, Debug)]
+pub struct Split {
+    normal: Vec3,
+    /// Nothing on the back side reaches farther than this along the normal.
+    back_high: f32,
+    /// Nothing on the front side reaches back beyond this.
+    front_low: f32,
+}
+
+impl Split {
+    /// The splits of a tree by the normal of each node; those of leaves are unused.
+    pub fn all(tree: &PackedTree, normals: Vec<Vec3>) -> Vec<Split> {
+        let unfitted = |normal| Split {
+            normal,
+            back_high: 0.0,
+            front_low: 0.0,
+        };
+        let mut splits: Vec<Split> = normals.into_iter().map(unfitted).collect();
+        for (node, split) in splits.iter_mut().enumerate() {
+            split.fit(tree, node);
+        }
+        splits
+    }
+
+    /// Computes how far the two sides of a node reach, from the bounds of its children.
+    pub fn fit(&mut self, tree: &PackedTree, node: usize) {
+        if tree.is_leaf(node) {
+            return;
+        }
+        let back = &tree.nodes()[node + 1];
+        let front = &tree.nodes()[back.after()];
+        let along = self.along();
+        self.back_high = along.value_at(along.p_vertex(&back.bounds));
+        self.front_low = along.value_at(along.n_vertex(&front.bounds));
+    }
+
+    /// Position along the normal, by the plane test's own arithmetic: being
+    /// monotone, it never puts a point of an item beyond the item's corner.
+    #[inline(always)]
+    fn along(&self) -> Plane {
+        Plane::new(self.normal, 0.0)
+    }
+}
+
+/// Passes every item whose closed box holds `p` to the sink, in tree order.
+#[inline(always)]
+pub fn locate<I: Isa, S: Sink, R: Recorder>(
+    isa: I,
+    (tree, splits): (&PackedTree, &[Split]),
+    p: Vec3,
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    let nodes = tree.nodes();
+    let mut open = Stack::new(0);
+    while let Some(at) = open.pop() {
+        let mut at = at as usize;
+        // An empty tree has no node 0.
+        while let Some(node) = nodes.get(at) {
+            recorder.nodes_tested(1);
+            if tree.is_leaf(at) {
+                tree.test_items(isa, node.items(), (&p, p.mask()), sink, recorder)?;
+                break;
+            }
+            let split = &splits[at];
+            let value = split.along().value_at(p);
+            let front = nodes[at + 1].after();
+            // Not `<=`: a NaN (coordinates beyond f32) enters both sides.
+            let beyond_back = value > split.back_high;
+            let before_front = value < split.front_low;
+            at = match (beyond_back, before_front) {
+                (true, true) => break,
+                (true, false) => front,
+                (false, true) => at + 1,
+                (false, false) => {
+                    open.push(front as u32);
+                    at + 1
+                }
+            };
+        }
+    }
+    ControlFlow::Continue(())
+}
