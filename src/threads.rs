@@ -54,21 +54,26 @@ pub fn share<J: Send>(
     if threads <= 1 {
         return jobs.for_each(work);
     }
-    let jobs = Mutex::new(jobs.fuse());
-    let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let work_off = || {
-        while let Some(job) = next() {
-            work(job);
-        }
-    };
+    let work_off = queue(jobs, work);
     scope(|scope| {
         for _ in 1..threads.min(MOST_THREADS) {
-            if Builder::new().spawn_scoped(scope, work_off).is_err() {
+            if Builder::new().spawn_scoped(scope, &work_off).is_err() {
                 break;
             }
         }
         work_off();
     });
+}
+
+/// A function for every thread: it does job after job until there is none left.
+fn queue<J>(jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) -> impl Fn() + Sync {
+    let jobs = Mutex::new(jobs.fuse());
+    move || {
+        let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
+        while let Some(job) = next() {
+            work(job);
+        }
+    }
 }
 
 /// Threads that stay between queries. The thread that shares work is one of them.
@@ -99,13 +104,7 @@ impl Workers {
     /// # Panics
     /// If a job does.
     pub fn share<J: Send>(&self, jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) {
-        let jobs = Mutex::new(jobs.fuse());
-        let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
-        let work_off = || {
-            while let Some(job) = next() {
-                work(job);
-            }
-        };
+        let work_off = queue(jobs, work);
         self.others.in_place_scope(|scope| {
             for _ in 1..self.threads {
                 scope.spawn(|_| work_off());

@@ -15,13 +15,6 @@ pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - virtual_a) + (b - virtual_b))
 }
 
-/// The upper 28 bits of a double; the rest has at most 25, so that the product
-/// of either with an f32 is exact.
-#[inline(always)]
-pub fn upper_half(a: f64) -> f64 {
-    f64::from_bits(a.to_bits() & !0x01FF_FFFF)
-}
-
 /// `a * b` as the rounded product and what the rounding lost (Dekker 1971).
 ///
 /// Exact while the product and its parts neither overflow nor underflow: for

@@ -3,10 +3,12 @@
 //! Directed rounding, error-free sums and products, cross products without cancellation,
 //! and expansions (exact sums of doubles).
 
+mod combinations;
 mod cross;
 pub mod exact;
 mod expansion;
 pub mod rounding;
 
+pub use combinations::combinations;
 pub use cross::cross;
-pub use expansion::{Expansion, two_product, two_sum, upper_half};
+pub use expansion::{Expansion, two_product, two_sum};

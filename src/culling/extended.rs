@@ -9,7 +9,7 @@
 
 use glam::DVec3;
 
-use crate::arithmetic::cross;
+use crate::arithmetic::{combinations, cross};
 use crate::geometry::{MAX_PLANES, PlaneF64};
 
 /// Rounding error of a sum of unit normals that is zero: some units of 2^-53 each.
@@ -84,29 +84,27 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64>
     const TIGHT: f64 = 1e-7;
     let corners = corners(faces);
     let mut found: Vec<(f64, PlaneF64)> = Vec::new();
-    for (i, a) in faces.iter().enumerate() {
-        for b in &faces[i + 1..] {
-            for axis in 0..3 {
-                let (pull, against) = (a.normal[axis], b.normal[axis]);
-                if pull * against >= 0.0 {
-                    continue;
-                }
-                let mut normal = a.normal * against.abs() + b.normal * pull.abs();
-                normal[axis] = 0.0;
-                let length = normal.length();
-                let [of_a, of_b] = [a.d * against.abs(), b.d * pull.abs()];
-                let d = (of_a + of_b) / length;
-                let plane = PlaneF64::new(normal / length, d);
-                if length < CANCELLED {
-                    continue;
-                }
-                let gaps = corners.iter().map(|&corner| share(&plane, corner));
-                let gap = gaps.fold(f64::INFINITY, f64::min);
-                let cost = RESIDUE * (2.0 * reach + of_a.abs() + of_b.abs());
-                let d = d + cost / length;
-                if plane.normal.is_finite() && d.is_finite() && gap <= TIGHT {
-                    found.push((gap, PlaneF64::new(plane.normal, d)));
-                }
+    for [a, b] in combinations(faces.len()).map(|pair| pair.map(|face| &faces[face])) {
+        for axis in 0..3 {
+            let (pull, against) = (a.normal[axis], b.normal[axis]);
+            if pull * against >= 0.0 {
+                continue;
+            }
+            let mut normal = a.normal * against.abs() + b.normal * pull.abs();
+            normal[axis] = 0.0;
+            let length = normal.length();
+            let [of_a, of_b] = [a.d * against.abs(), b.d * pull.abs()];
+            let d = (of_a + of_b) / length;
+            let plane = PlaneF64::new(normal / length, d);
+            if length < CANCELLED {
+                continue;
+            }
+            let gaps = corners.iter().map(|&corner| share(&plane, corner));
+            let gap = gaps.fold(f64::INFINITY, f64::min);
+            let cost = RESIDUE * (2.0 * reach + of_a.abs() + of_b.abs());
+            let d = d + cost / length;
+            if plane.normal.is_finite() && d.is_finite() && gap <= TIGHT {
+                found.push((gap, PlaneF64::new(plane.normal, d)));
             }
         }
     }
@@ -147,9 +145,7 @@ fn share(plane: &PlaneF64, p: DVec3) -> f64 {
 }
 
 fn triples(faces: &[PlaneF64]) -> impl Iterator<Item = [&PlaneF64; 3]> {
-    let count = faces.len();
-    let pairs = (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)));
-    pairs.flat_map(move |(i, j)| (j + 1..count).map(move |l| [&faces[i], &faces[j], &faces[l]]))
+    combinations(faces.len()).map(|triple| triple.map(|face| &faces[face]))
 }
 
 /// Intersection of three planes, by Cramer's rule.

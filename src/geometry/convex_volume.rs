@@ -110,7 +110,8 @@ impl ConvexVolume {
     /// # Errors
     /// More than 32 planes, or a plane with a NaN or infinite number.
     pub fn from_planes(planes: &[Plane]) -> Result<Self, VolumeError> {
-        Self::collect(planes.iter().map(|&plane| (plane, None)))
+        let unnamed: Vec<_> = planes.iter().map(|&plane| (None, plane)).collect();
+        Self::from_labelled_planes(&unnamed)
     }
 
     /// A box as six planes: the items that no plane excludes are exactly those that
@@ -137,12 +138,6 @@ impl ConvexVolume {
     pub fn from_labelled_planes(
         planes: &[(Option<FrustumPlane>, Plane)],
     ) -> Result<Self, VolumeError> {
-        Self::collect(planes.iter().map(|&(name, plane)| (plane, name)))
-    }
-
-    fn collect(
-        planes: impl ExactSizeIterator<Item = (Plane, Option<FrustumPlane>)>,
-    ) -> Result<Self, VolumeError> {
         let count = planes.len();
         VolumeError::check_count(count)?;
         let mut volume = ConvexVolume {
@@ -153,7 +148,7 @@ impl ConvexVolume {
             p_vertices: [BoxCorner([true; 3]); MAX_PLANES],
             minus_d: [0.0; MAX_PLANES],
         };
-        for (index, (plane, name)) in planes.enumerate() {
+        for (index, &(name, plane)) in planes.iter().enumerate() {
             if !plane.is_finite() {
                 let numbers = plane.normal.extend(plane.d).to_array();
                 let label = match name {

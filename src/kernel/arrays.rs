@@ -21,13 +21,13 @@ pub fn run<W: Work>(_: Kernel, work: W) -> W::Output {
     work.run(BASELINE)
 }
 
-/// See [`extend`](crate::kernel::extend).
+/// `out.extend_from_slice(words)`.
 #[inline(always)]
 pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
     out.extend_from_slice(words);
 }
 
-/// See [`extend_from_range`](crate::kernel::extend_from_range).
+/// `extend(out, &words[places])`.
 #[inline(always)]
 pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
     out.extend_from_slice(&words[places]);

@@ -97,7 +97,11 @@ pub trait Isa: Copy + Send + Sync {
     /// `place`; the rest of it holds anything.
     fn compress(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask);
     /// Appends the words of `lanes`, lowest first.
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask);
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        // Room first: a register would not outlive the call that makes it.
+        Self::Packer::onto(out, 0).push(self, row, lanes);
+    }
 }
 
 /// A piece of a larger work: what [`Isa::apart`] does.

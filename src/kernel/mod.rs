@@ -20,12 +20,11 @@ mod machine;
 mod machine;
 
 use std::fmt;
-use std::ops::Range;
 use std::sync::OnceLock;
 
 pub use inlined::{each, pairs};
 pub use isa::{Isa, LANES, LaneMask, Pack, Piece, first_lanes};
-pub use machine::{BASELINE, Baseline};
+pub use machine::{BASELINE, Baseline, extend, extend_from_range, prefetch};
 pub use plain::Plain;
 
 named! {
@@ -107,29 +106,6 @@ impl fmt::Display for Kernel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
-}
-
-/// Prefetches the cache line at the start of `place`.
-///
-/// A hint without effect on values; does nothing on machines without such an instruction.
-#[inline(always)]
-pub fn prefetch<T>(place: &T) {
-    machine::prefetch(place);
-}
-
-/// `out.extend_from_slice(words)`, inlined.
-///
-/// std makes two calls, and structures often pass a few ids.
-#[inline(always)]
-pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
-    machine::extend(out, words);
-}
-
-/// `extend(out, &words[places])`, row by row where there are few: a call of memcpy
-/// costs more than they do. What lies behind them in `words` is read too.
-#[inline(always)]
-pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
-    machine::extend_from_range(out, words, places);
 }
 
 #[cfg(test)]

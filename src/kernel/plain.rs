@@ -25,121 +25,112 @@ fn lanes_where(holds: impl Fn(usize) -> bool) -> LaneMask {
     bits.iter().fold(0, |all, bit| all | bit) as LaneMask
 }
 
+type Floats = [f32; LANES];
+type Words = [u32; LANES];
+
 impl Isa for Plain {
-    type Floats = [f32; LANES];
-    type Words = [u32; LANES];
+    type Floats = Floats;
+    type Words = Words;
     /// All bits where a lane is dropped.
-    type Kept = [u32; LANES];
+    type Kept = Words;
     type Packer<'a> = PlainPacker<'a>;
 
     #[inline(always)]
-    fn load(self, row: &[f32; LANES]) -> [f32; LANES] {
+    fn load(self, row: &Floats) -> Floats {
         *row
     }
     #[inline(always)]
-    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [[f32; LANES]; 2] {
+    fn pairs(self, table: &[f32], places: &Words) -> [Floats; 2] {
         let last = table.len() - 2;
         let at = |side| lanes(|lane| table[(places[lane] as usize).min(last) + side]);
         [at(0), at(1)]
     }
     #[inline(always)]
-    fn to_array(self, floats: [f32; LANES]) -> [f32; LANES] {
+    fn to_array(self, floats: Floats) -> Floats {
         floats
     }
     #[inline(always)]
-    fn whole(self, floats: [f32; LANES]) -> [i32; LANES] {
+    fn whole(self, floats: Floats) -> [i32; LANES] {
         lanes(|lane| floats[lane] as i32)
     }
     #[inline(always)]
-    fn splat(self, x: f32) -> [f32; LANES] {
+    fn splat(self, x: f32) -> Floats {
         [x; LANES]
     }
     #[inline(always)]
-    fn add(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+    fn add(self, a: Floats, b: Floats) -> Floats {
         lanes(|lane| a[lane] + b[lane])
     }
     #[inline(always)]
-    fn mul(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+    fn mul(self, a: Floats, b: Floats) -> Floats {
         lanes(|lane| a[lane] * b[lane])
     }
     #[inline(always)]
-    fn min(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+    fn min(self, a: Floats, b: Floats) -> Floats {
         lanes(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
     }
     #[inline(always)]
-    fn max(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+    fn max(self, a: Floats, b: Floats) -> Floats {
         lanes(|lane| if a[lane] > b[lane] { a[lane] } else { b[lane] })
     }
     #[inline(always)]
-    fn sub_abs(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+    fn sub_abs(self, a: Floats, b: Floats) -> Floats {
         lanes(|lane| a[lane] - b[lane].abs())
     }
     #[inline(always)]
-    fn below_zero(self, a: [f32; LANES]) -> LaneMask {
+    fn below_zero(self, a: Floats) -> LaneMask {
         lanes_where(|lane| a[lane] < 0.0)
     }
     #[inline(always)]
-    fn keep_all(self) -> [u32; LANES] {
+    fn keep_all(self) -> Words {
         [0; LANES]
     }
     #[inline(always)]
-    fn keep(self, kept: [u32; LANES], values: [f32; LANES], least: [f32; LANES]) -> [u32; LANES] {
+    fn keep(self, kept: Words, values: Floats, least: Floats) -> Words {
         lanes(|lane| kept[lane] | if values[lane] < least[lane] { !0 } else { 0 })
     }
     #[inline(always)]
-    fn kept(self, kept: [u32; LANES]) -> LaneMask {
+    fn kept(self, kept: Words) -> LaneMask {
         lanes_where(|lane| kept[lane] == 0)
     }
     #[inline(always)]
-    fn at_most(self, a: [f32; LANES], b: [f32; LANES]) -> LaneMask {
+    fn at_most(self, a: Floats, b: Floats) -> LaneMask {
         lanes_where(|lane| a[lane] <= b[lane])
     }
     #[inline(always)]
-    fn words(self, row: &[u32; LANES]) -> [u32; LANES] {
+    fn words(self, row: &Words) -> Words {
         *row
     }
     #[inline(always)]
-    fn splat_word(self, x: u32) -> [u32; LANES] {
+    fn splat_word(self, x: u32) -> Words {
         [x; LANES]
     }
     #[inline(always)]
-    fn iota(self, first: u32) -> [u32; LANES] {
+    fn iota(self, first: u32) -> Words {
         lanes(|lane| first.wrapping_add(lane as u32))
     }
     #[inline(always)]
-    fn without(
-        self,
-        words: [u32; LANES],
-        values: [f32; LANES],
-        least: [f32; LANES],
-        bits: u32,
-    ) -> [u32; LANES] {
+    fn without(self, words: Words, values: Floats, least: Floats, bits: u32) -> Words {
         lanes(|lane| {
             let inside = values[lane] >= least[lane];
             words[lane] & !if inside { bits } else { 0 }
         })
     }
     #[inline(always)]
-    fn zeros(self, words: [u32; LANES]) -> LaneMask {
+    fn zeros(self, words: Words) -> LaneMask {
         lanes_where(|lane| words[lane] == 0)
     }
     #[inline(always)]
-    fn equal(self, words: [u32; LANES], x: u32) -> LaneMask {
+    fn equal(self, words: Words, x: u32) -> LaneMask {
         lanes_where(|lane| words[lane] == x)
     }
     #[inline(always)]
-    fn compress(self, place: &mut [u32; LANES], words: [u32; LANES], lanes: LaneMask) {
+    fn compress(self, place: &mut Words, words: Words, lanes: LaneMask) {
         let mut left = lanes;
         for to in place.iter_mut().take(lanes.count_ones() as usize) {
             *to = words[left.trailing_zeros() as usize % LANES];
             left &= left - 1;
         }
-    }
-    #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        let mut place = [0; LANES];
-        self.compress(&mut place, *row, lanes);
-        out.extend_from_slice(&place[..lanes.count_ones() as usize]);
     }
 }
 
@@ -161,7 +152,10 @@ impl<'a> Pack<'a, Plain> for PlainPacker<'a> {
     #[inline(always)]
     fn push(&mut self, isa: Plain, row: &[u32; LANES], lanes: LaneMask) {
         assert!(self.room >= LANES, "more words than there is room for");
-        isa.append(self.out, row, lanes);
-        self.room -= lanes.count_ones() as usize;
+        let mut place = [0; LANES];
+        isa.compress(&mut place, *row, lanes);
+        let count = lanes.count_ones() as usize;
+        self.out.extend_from_slice(&place[..count]);
+        self.room -= count;
     }
 }

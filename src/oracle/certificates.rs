@@ -21,6 +21,7 @@ use std::cell::OnceCell;
 
 use super::evaluate::{HalfSpace, Number, Precision};
 use super::rough::{RoughSpaces, may_agree};
+use crate::arithmetic::combinations;
 
 /// Extent of a volume, independent of the box.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -157,22 +158,17 @@ impl Search {
     /// corner of the other, or an edge of each; where an edge of P takes part,
     /// two planes through that edge make the certificate.
     fn pairs(&mut self, only_edges: bool) {
-        let count = self.constraints.len();
-        for i in 0..count {
-            for j in i + 1..count {
-                if only_edges && self.rough.edge_misses(i, j) {
+        for [i, j] in combinations(self.constraints.len()) {
+            if only_edges && self.rough.edge_misses(i, j) {
+                continue;
+            }
+            for k in 0..3 {
+                let [a, b] = [i, j].map(|c| &self.constraints[c].normal[k]);
+                if self.precision.sign(a) * self.precision.sign(b) >= 0 {
                     continue;
                 }
-                for k in 0..3 {
-                    let [a, b] = [i, j].map(|c| &self.constraints[c].normal[k]);
-                    if self.precision.sign(a) * self.precision.sign(b) >= 0 {
-                        continue;
-                    }
-                    let weights = [b.absolute(), a.absolute()];
-                    let mut zero = [false; 3];
-                    zero[k] = true;
-                    self.take(&weights, [i, j], zero);
-                }
+                let weights = [b.absolute(), a.absolute()];
+                self.take(&weights, [i, j], [0, 1, 2].map(|axis| axis == k));
             }
         }
     }
@@ -183,26 +179,20 @@ impl Search {
     fn triples(&mut self) {
         let mut candidates = Vec::new();
         let mut best = [f64::INFINITY; 6];
-        let count = self.constraints.len();
-        for i in 0..count {
-            for j in i + 1..count {
-                for l in j + 1..count {
-                    for axis in 0..3 {
-                        let triple = [i, j, l];
-                        if !may_agree(self.rough.weights_of_triple(triple, axis)) {
-                            continue;
-                        }
-                        let bound = self.rough.bound(triple, axis);
-                        if let Some(bound) = &bound {
-                            let best = &mut best[bound.direction];
-                            if bound.low > *best {
-                                continue;
-                            }
-                            *best = best.min(bound.high);
-                        }
-                        candidates.push((triple, axis, bound));
-                    }
+        for triple in combinations(self.constraints.len()) {
+            for axis in 0..3 {
+                if !may_agree(self.rough.weights_of_triple(triple, axis)) {
+                    continue;
                 }
+                let bound = self.rough.bound(triple, axis);
+                if let Some(bound) = &bound {
+                    let best = &mut best[bound.direction];
+                    if bound.low > *best {
+                        continue;
+                    }
+                    *best = best.min(bound.high);
+                }
+                candidates.push((triple, axis, bound));
             }
         }
         for (triple, axis, bound) in candidates {
@@ -212,30 +202,21 @@ impl Search {
             let [i, j, l] = triple;
             let weights = [(j, l), (l, i), (i, j)].map(|(a, b)| self.minor(a, b, axis).clone());
             if let Some(weights) = self.of_one_sign(weights) {
-                let mut zero = [true; 3];
-                zero[axis] = false;
-                self.take(&weights, triple, zero);
+                self.take(&weights, triple, [0, 1, 2].map(|k| k != axis));
             }
         }
     }
 
     /// Four constraints that leave no axis at all.
     fn quadruples(&mut self) {
-        let count = self.constraints.len();
-        for i in 0..count {
-            for j in i + 1..count {
-                for l in j + 1..count {
-                    for m in l + 1..count {
-                        match self.rough.quadruple([i, j, l, m]) {
-                            Some(1) => {}
-                            Some(_) => self.extent = Extent::Empty,
-                            None => self.quadruple([i, j, l, m]),
-                        }
-                        if self.extent == Extent::Empty {
-                            return;
-                        }
-                    }
-                }
+        for quadruple in combinations(self.constraints.len()) {
+            match self.rough.quadruple(quadruple) {
+                Some(1) => {}
+                Some(_) => self.extent = Extent::Empty,
+                None => self.quadruple(quadruple),
+            }
+            if self.extent == Extent::Empty {
+                return;
             }
         }
     }

@@ -6,8 +6,7 @@
 
 use glam::DVec3;
 
-use crate::arithmetic::{Expansion, two_product, two_sum, upper_half};
-use crate::geometry::Aabb;
+use crate::arithmetic::{Expansion, combinations, two_product, two_sum};
 
 /// How exactly to calculate.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -155,8 +154,8 @@ pub(super) struct Filter {
 
 /// A certificate in full.
 pub(super) struct Exact {
-    /// Axis and coefficient, split so that a product with an f32 is exact.
-    terms: Vec<(u8, f64)>,
+    /// Axis and term of its coefficient, smallest first.
+    terms: Vec<(usize, f64)>,
     d: Vec<f64>,
     /// Magnitudes before cancellation, per axis and of d.
     size: [f64; 4],
@@ -170,26 +169,14 @@ const FILTER_ERROR: f64 = 16.0 * f64::EPSILON;
 pub(super) struct Corners {
     pub low: [f64; 3],
     pub high: [f64; 3],
-    /// True if all of them are numbers of f32, whose products are short.
-    pub is_narrow: bool,
 }
 
 impl Corners {
     #[inline]
-    pub fn of(b: &Aabb) -> Corners {
-        Corners {
-            low: b.min.as_dvec3().to_array(),
-            high: b.max.as_dvec3().to_array(),
-            is_narrow: true,
-        }
-    }
-
-    /// Corners in f64, whose products with a coefficient are rounded.
     pub fn between(min: DVec3, max: DVec3) -> Corners {
         Corners {
             low: min.to_array(),
             high: max.to_array(),
-            is_narrow: false,
         }
     }
 
@@ -229,13 +216,7 @@ impl Exact {
     pub fn new(certificate: &HalfSpace) -> Exact {
         let mut terms = Vec::new();
         for (axis, n) in certificate.normal.iter().enumerate() {
-            for &term in n.value.terms() {
-                let upper = upper_half(term);
-                let halves = [upper, term - upper]
-                    .into_iter()
-                    .filter(|&half| half != 0.0);
-                terms.extend(halves.map(|half| (axis as u8, half)));
-            }
+            terms.extend(n.value.terms().iter().map(|&term| (axis, term)));
         }
         let [x, y, z] = [0, 1, 2].map(|k| certificate.normal[k].size);
         Exact {
@@ -249,40 +230,30 @@ impl Exact {
     pub fn sign_at_p_vertex(&self, b: &Corners, precision: Precision) -> i32 {
         // The sign of a coefficient is that of its largest, last term.
         let mut corner = b.high;
-        for &(axis, term) in &self.terms {
-            let k = usize::from(axis);
+        for &(k, term) in &self.terms {
             corner[k] = if term >= 0.0 { b.high[k] } else { b.low[k] };
         }
-        let products = || {
-            let of_corner = self
-                .terms
-                .iter()
-                .map(|&(axis, term)| term * corner[usize::from(axis)]);
-            of_corner.chain(self.d.iter().copied())
-        };
+        let products = self.terms.iter().flat_map(|&(k, term)| {
+            let (product, rest) = two_product(term, corner[k]);
+            [rest, product]
+        });
+        let parts = products.chain(self.d.iter().copied());
         // Most ties are between short numbers, whose sum loses nothing.
-        let (mut sum, mut lost) = (0.0, 0.0);
-        for product in products().filter(|_| b.is_narrow) {
-            let (next, error) = two_sum(sum, product);
-            sum = next;
+        let (mut value, mut lost) = (0.0_f64, 0.0);
+        for part in parts.clone() {
+            let (sum, error) = two_sum(value, part);
+            value = sum;
             lost += error.abs();
         }
-        let mut value = sum;
-        let mut sign = if sum == 0.0 { 0 } else { sum.signum() as i32 };
-        if lost != 0.0 || !b.is_narrow {
+        let mut sign = if value == 0.0 {
+            0
+        } else {
+            value.signum() as i32
+        };
+        if lost != 0.0 {
             let mut total = Expansion::default();
-            if b.is_narrow {
-                products().for_each(|product| total.grow(product));
-            } else {
-                for &(axis, term) in &self.terms {
-                    let (product, rest) = two_product(term, corner[usize::from(axis)]);
-                    total.grow(rest);
-                    total.grow(product);
-                }
-                self.d.iter().for_each(|&d| total.grow(d));
-            }
-            sign = total.sign();
-            value = total.estimate();
+            parts.for_each(|part| total.grow(part));
+            (sign, value) = (total.sign(), total.estimate());
         }
         if !precision.is_exact() {
             let [x, y, z, d] = self.size;
@@ -300,21 +271,17 @@ impl Exact {
 pub(super) fn inner_point(faces: &[Filter]) -> Option<[f64; 3]> {
     let mut sum = [0.0; 3];
     let mut count = 0.0;
-    for (i, a) in faces.iter().enumerate() {
-        for (j, b) in faces.iter().enumerate().skip(i + 1) {
-            for c in &faces[j + 1..] {
-                let Some(corner) = meeting_point([a, b, c]) else {
-                    continue;
-                };
-                let within = faces.iter().all(|face| {
-                    let (value, error) = face.at(corner);
-                    value >= -1e6 * error
-                });
-                if within {
-                    (0..3).for_each(|k| sum[k] += corner[k]);
-                    count += 1.0;
-                }
-            }
+    for triple in combinations(faces.len()) {
+        let Some(corner) = meeting_point(triple.map(|face| &faces[face])) else {
+            continue;
+        };
+        let within = faces.iter().all(|face| {
+            let (value, error) = face.at(corner);
+            value >= -1e6 * error
+        });
+        if within {
+            (0..3).for_each(|k| sum[k] += corner[k]);
+            count += 1.0;
         }
     }
     (count >= 4.0).then(|| sum.map(|s| s / count))

@@ -105,15 +105,12 @@ impl Oracle {
 
     /// The verdict, and whether it is proved; at planes level it always is.
     pub fn judge(&self, b: &Aabb) -> Judgement {
-        self.judge_corners(&Corners::of(b))
+        self.judge_wide(b.min.as_dvec3(), b.max.as_dvec3())
     }
 
     /// The same about a box in f64, between finite corners of at most 1e60.
     pub fn judge_wide(&self, min: DVec3, max: DVec3) -> Judgement {
-        self.judge_corners(&Corners::between(min, max))
-    }
-
-    fn judge_corners(&self, corners: &Corners) -> Judgement {
+        let corners = &Corners::between(min, max);
         let judged = |verdict, undecided| Judgement { verdict, undecided };
         if corners.is_empty() || self.extent == Extent::Empty {
             return judged(Verdict::Out, false);
@@ -160,18 +157,27 @@ impl Oracle {
     /// # Ok::<(), cullbench::geometry::VolumeError>(())
     /// ```
     pub fn depth(&self, b: &Aabb) -> f64 {
-        self.depth_of_corners(&Corners::of(b))
+        self.depth_wide(b.min.as_dvec3(), b.max.as_dvec3())
     }
 
     /// The same of a box in f64.
     pub fn depth_wide(&self, min: DVec3, max: DVec3) -> f64 {
-        self.depth_of_corners(&Corners::between(min, max))
+        let corners = &Corners::between(min, max);
+        if corners.is_empty() || self.extent == Extent::Empty {
+            return f64::NEG_INFINITY;
+        }
+        let depths = self.filter.iter().map(|certificate| {
+            let [x, y, z] = certificate.normal;
+            let length = (x * x + y * y + z * z).sqrt();
+            certificate.at_p_vertex(corners).0 / length
+        });
+        depths.fold(f64::INFINITY, f64::min)
     }
 
     /// Returns whether one plane has the whole box on its outer side, exactly: a
     /// six-plane test without any error.
     pub fn faces_exclude(&self, b: &Aabb) -> bool {
-        let corners = Corners::of(b);
+        let corners = Corners::between(b.min.as_dvec3(), b.max.as_dvec3());
         self.extent == Extent::Empty || (0..self.faces).any(|face| self.sign(face, &corners) < 0)
     }
 
@@ -187,18 +193,6 @@ impl Oracle {
             return -1;
         }
         self.exact[certificate].sign_at_p_vertex(corners, self.precision)
-    }
-
-    fn depth_of_corners(&self, corners: &Corners) -> f64 {
-        if corners.is_empty() || self.extent == Extent::Empty {
-            return f64::NEG_INFINITY;
-        }
-        let depths = self.filter.iter().map(|certificate| {
-            let [x, y, z] = certificate.normal;
-            let length = (x * x + y * y + z * z).sqrt();
-            certificate.at_p_vertex(corners).0 / length
-        });
-        depths.fold(f64::INFINITY, f64::min)
     }
 
     /// Returns whether a point of the box lies strictly inside all planes for certain:

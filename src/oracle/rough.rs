@@ -4,6 +4,7 @@
 //! matter.
 
 use super::evaluate::HalfSpace;
+use crate::arithmetic::combinations;
 
 /// A result in f64 errs by less than this part of its size. No sum below has
 /// a longer history than coefficients rounded twice, five products and six
@@ -117,13 +118,8 @@ impl RoughSpaces {
             crosses.extend(normals.iter().map(|b| cross(a, b)));
         }
         let mut determinants = vec![Rough::default(); count * count * count];
-        for i in 0..count {
-            for j in i + 1..count {
-                for l in j + 1..count {
-                    determinants[(i * count + j) * count + l] =
-                        dot(&normals[i], &crosses[j * count + l]);
-                }
-            }
+        for [i, j, l] in combinations(count) {
+            determinants[(i * count + j) * count + l] = dot(&normals[i], &crosses[j * count + l]);
         }
         RoughSpaces {
             offsets: offsets.collect(),

@@ -65,7 +65,10 @@ pub trait QueryVolume: Predicate {
     /// [`QueryVolume::kept_lanes`] with this bit for a mask.
     #[inline(always)]
     fn one_plane<I: Isa>(&self, _: I, plane: u32) -> impl Planes<I> {
-        UnpreparedPlanes::one(self, plane)
+        UnpreparedPlanes {
+            view: self,
+            mask: 1 << plane,
+        }
     }
 
     /// All planes, prepared for many blocks: [`QueryVolume::kept_lanes`] with
@@ -146,13 +149,6 @@ impl<V> Clone for UnpreparedPlanes<'_, V> {
 impl<V> Copy for UnpreparedPlanes<'_, V> {}
 
 impl<'v, V: QueryVolume> UnpreparedPlanes<'v, V> {
-    /// The plane of that bit.
-    #[inline(always)]
-    pub fn one(view: &'v V, plane: u32) -> Self {
-        let mask = 1 << plane;
-        UnpreparedPlanes { view, mask }
-    }
-
     /// All planes of the view.
     #[inline(always)]
     pub fn all(view: &'v V) -> Self {

@@ -2,9 +2,9 @@
 
 use std::arch::x86_64::*;
 
-use super::each;
-use super::packer::{self, PackTo, Packer};
+use super::packer::{PackTo, Packer};
 use super::sse2::four_pairs;
+use super::{each, lanewise};
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
 /// A value is the proof that the processor has AVX2, BMI1, BMI2, LZCNT and POPCNT.
@@ -26,15 +26,18 @@ fn apart<P: Piece<Avx2>>(isa: Avx2, piece: P) -> P::Output {
     piece.run(isa)
 }
 
+type Floats = [__m256; 2];
+type Words = [__m256i; 2];
+
 // SAFETY, of all blocks below: the receiver proves that the processor has the
 // instructions.
 // Loads and stores are unaligned ones within their arrays.
 
 impl Isa for Avx2 {
-    type Floats = [__m256; 2];
-    type Words = [__m256i; 2];
+    type Floats = Floats;
+    type Words = Words;
     /// All bits where a lane is dropped.
-    type Kept = [__m256; 2];
+    type Kept = Floats;
     type Packer<'a> = Packer<'a>;
 
     #[inline(always)]
@@ -42,11 +45,11 @@ impl Isa for Avx2 {
         unsafe { apart(self, piece) }
     }
     #[inline(always)]
-    fn load(self, row: &[f32; LANES]) -> [__m256; 2] {
+    fn load(self, row: &[f32; LANES]) -> Floats {
         each!(2, |i| unsafe { _mm256_loadu_ps(row[8 * i..].as_ptr()) })
     }
     #[inline(always)]
-    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [[__m256; 2]; 2] {
+    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [Floats; 2] {
         let fours: &[[u32; 4]] = places.as_chunks().0;
         let [a, b, c, d] = each!(4, |i| four_pairs(table, &fours[i]));
         each!(2, |side| unsafe {
@@ -57,7 +60,7 @@ impl Isa for Avx2 {
         })
     }
     #[inline(always)]
-    fn to_array(self, floats: [__m256; 2]) -> [f32; LANES] {
+    fn to_array(self, floats: Floats) -> [f32; LANES] {
         let mut row = [0.0; LANES];
         for (eight, x) in row.chunks_exact_mut(8).zip(floats) {
             unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), x) };
@@ -65,7 +68,7 @@ impl Isa for Avx2 {
         row
     }
     #[inline(always)]
-    fn whole(self, floats: [__m256; 2]) -> [i32; LANES] {
+    fn whole(self, floats: Floats) -> [i32; LANES] {
         let mut row = [0; LANES];
         for (i, x) in floats.iter().enumerate() {
             let eight = &mut row[8 * i..8 * i + 8];
@@ -74,83 +77,62 @@ impl Isa for Avx2 {
         row
     }
     #[inline(always)]
-    fn splat(self, x: f32) -> [__m256; 2] {
+    fn splat(self, x: f32) -> Floats {
         [unsafe { _mm256_set1_ps(x) }; 2]
     }
+    lanewise!(2; add: _mm256_add_ps, mul: _mm256_mul_ps, min: _mm256_min_ps, max: _mm256_max_ps);
     #[inline(always)]
-    fn add(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-        each!(2, |i| unsafe { _mm256_add_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
-    fn mul(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-        each!(2, |i| unsafe { _mm256_mul_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
-    fn min(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-        each!(2, |i| unsafe { _mm256_min_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
-    fn max(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-        each!(2, |i| unsafe { _mm256_max_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
-    fn sub_abs(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+    fn sub_abs(self, a: Floats, b: Floats) -> Floats {
         each!(2, |i| unsafe {
             _mm256_sub_ps(a[i], _mm256_andnot_ps(_mm256_set1_ps(-0.0), b[i]))
         })
     }
     #[inline(always)]
-    fn below_zero(self, a: [__m256; 2]) -> LaneMask {
+    fn below_zero(self, a: Floats) -> LaneMask {
         signs_256(each!(2, |i| unsafe {
             _mm256_cmp_ps::<_CMP_LT_OQ>(a[i], _mm256_setzero_ps())
         }))
     }
     #[inline(always)]
-    fn keep_all(self) -> [__m256; 2] {
+    fn keep_all(self) -> Floats {
         self.splat(0.0)
     }
     #[inline(always)]
-    fn keep(self, kept: [__m256; 2], values: [__m256; 2], least: [__m256; 2]) -> [__m256; 2] {
+    fn keep(self, kept: Floats, values: Floats, least: Floats) -> Floats {
         each!(2, |i| unsafe {
             let dropped = _mm256_cmp_ps::<_CMP_LT_OQ>(values[i], least[i]);
             _mm256_or_ps(kept[i], dropped)
         })
     }
     #[inline(always)]
-    fn kept(self, kept: [__m256; 2]) -> LaneMask {
+    fn kept(self, kept: Floats) -> LaneMask {
         !signs_256(kept)
     }
     #[inline(always)]
-    fn at_most(self, a: [__m256; 2], b: [__m256; 2]) -> LaneMask {
+    fn at_most(self, a: Floats, b: Floats) -> LaneMask {
         signs_256(each!(2, |i| unsafe {
             _mm256_cmp_ps::<_CMP_LE_OQ>(a[i], b[i])
         }))
     }
     #[inline(always)]
-    fn words(self, row: &[u32; LANES]) -> [__m256i; 2] {
+    fn words(self, row: &[u32; LANES]) -> Words {
         each!(2, |i| unsafe {
             _mm256_loadu_si256(row[8 * i..].as_ptr().cast())
         })
     }
     #[inline(always)]
-    fn splat_word(self, x: u32) -> [__m256i; 2] {
+    fn splat_word(self, x: u32) -> Words {
         [unsafe { _mm256_set1_epi32(x as i32) }; 2]
     }
     #[inline(always)]
-    fn iota(self, first: u32) -> [__m256i; 2] {
+    fn iota(self, first: u32) -> Words {
         each!(2, |i| unsafe {
             let from = _mm256_set1_epi32(first.wrapping_add(8 * i as u32) as i32);
             _mm256_add_epi32(from, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7))
         })
     }
     #[inline(always)]
-    fn without(
-        self,
-        words: [__m256i; 2],
-        values: [__m256; 2],
-        least: [__m256; 2],
-        bits: u32,
-    ) -> [__m256i; 2] {
+    fn without(self, words: Words, values: Floats, least: Floats, bits: u32) -> Words {
         each!(2, |i| unsafe {
             let inside = _mm256_cmp_ps::<_CMP_GE_OQ>(values[i], least[i]);
             let bits =
@@ -159,32 +141,28 @@ impl Isa for Avx2 {
         })
     }
     #[inline(always)]
-    fn zeros(self, words: [__m256i; 2]) -> LaneMask {
+    fn zeros(self, words: Words) -> LaneMask {
         signs_256(each!(2, |i| unsafe {
             _mm256_castsi256_ps(_mm256_cmpeq_epi32(words[i], _mm256_setzero_si256()))
         }))
     }
     #[inline(always)]
-    fn equal(self, words: [__m256i; 2], x: u32) -> LaneMask {
+    fn equal(self, words: Words, x: u32) -> LaneMask {
         signs_256(each!(2, |i| unsafe {
             _mm256_castsi256_ps(_mm256_cmpeq_epi32(words[i], _mm256_set1_epi32(x as i32)))
         }))
     }
     #[inline(always)]
-    fn compress(self, place: &mut [u32; LANES], words: [__m256i; 2], lanes: LaneMask) {
+    fn compress(self, place: &mut [u32; LANES], words: Words, lanes: LaneMask) {
         // SAFETY: sixteen words may be written.
         unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
-    }
-    #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        packer::append(self, out, row, lanes);
     }
 }
 
 // SAFETY: as many words as there are lanes are written, and never more than a row.
 unsafe impl PackTo for Avx2 {
     #[inline(always)]
-    unsafe fn pack_to(self, place: *mut u32, words: [__m256i; 2], lanes: LaneMask) {
+    unsafe fn pack_to(self, place: *mut u32, words: Words, lanes: LaneMask) {
         // The first store is whole, and what it leaves behind its lanes the
         // second one covers; together they stay within sixteen places.
         let (low, high) = (lanes & 0xff, lanes >> 8);
@@ -197,7 +175,7 @@ unsafe impl PackTo for Avx2 {
 }
 
 #[inline(always)]
-fn signs_256(x: [__m256; 2]) -> LaneMask {
+fn signs_256(x: Floats) -> LaneMask {
     let signs = each!(2, |i| unsafe { _mm256_movemask_ps(x[i]) } as LaneMask);
     signs[0] | signs[1] << 8
 }

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::each;
-use super::packer::{self, PackTo, Packer};
+use super::packer::{PackTo, Packer};
 use super::sse2::four_pairs;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
@@ -148,10 +148,6 @@ impl Isa for Avx512 {
     fn compress(self, place: &mut [u32; LANES], words: __m512i, lanes: LaneMask) {
         // SAFETY: sixteen words may be written.
         unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
-    }
-    #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        packer::append(self, out, row, lanes);
     }
 }
 

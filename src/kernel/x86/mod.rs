@@ -61,7 +61,7 @@ fn avx512<W: Work>(work: W) -> W::Output {
     work.run(avx512::Avx512::here())
 }
 
-/// Prefetches the cache line at the start of `place`.
+/// Prefetches the cache line at the start of `place`, without effect on values.
 #[inline(always)]
 pub fn prefetch<T>(place: &T) {
     use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
@@ -83,3 +83,14 @@ macro_rules! each {
     }};
 }
 use each;
+
+/// Methods of [`Isa`](super::Isa) that are one instruction per vector.
+macro_rules! lanewise {
+    ($vectors:tt; $($name:ident: $instruction:ident),+) => {$(
+        #[inline(always)]
+        fn $name(self, a: Floats, b: Floats) -> Floats {
+            each!($vectors, |i| unsafe { $instruction(a[i], b[i]) })
+        }
+    )+};
+}
+use lanewise;

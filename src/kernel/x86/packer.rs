@@ -18,19 +18,6 @@ pub unsafe trait PackTo: Isa {
     unsafe fn pack_to(self, place: *mut u32, words: Self::Words, lanes: LaneMask);
 }
 
-/// [`Isa::append`], by a store of the whole row.
-#[inline(always)]
-pub fn append<I: PackTo>(isa: I, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-    // Room first: a register would not outlive the call that makes it.
-    make_room(out, LANES);
-    let end = out.spare_capacity_mut().as_mut_ptr().cast();
-    // SAFETY: there is room for sixteen words; at most sixteen are written.
-    unsafe {
-        isa.pack_to(end, isa.words(row), lanes);
-        out.set_len(out.len() + lanes.count_ones() as usize);
-    }
-}
-
 /// `Vec::reserve`, which is a call even where there is room.
 #[inline(always)]
 fn make_room(out: &mut Vec<u32>, words: usize) {
@@ -39,7 +26,9 @@ fn make_room(out: &mut Vec<u32>, words: usize) {
     }
 }
 
-/// [`extend`](crate::kernel::extend), calling only memcpy if there is room.
+/// `out.extend_from_slice(words)`, calling only memcpy if there is room.
+///
+/// std makes two calls, and structures often pass a few ids.
 #[inline(always)]
 pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
     make_room(out, words.len());
@@ -55,7 +44,8 @@ pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
 /// Most words that are copied row by row.
 const FEW: usize = 16 * LANES;
 
-/// [`extend_from_range`](crate::kernel::extend_from_range).
+/// `extend(out, &words[places])`, row by row where there are few: a call of memcpy
+/// costs more than they do. What lies behind them in `words` is read too.
 #[inline(always)]
 pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
     let few = &words[places.clone()];

@@ -3,13 +3,16 @@
 
 use std::arch::x86_64::*;
 
-use super::each;
-use super::packer::{self, PackTo, Packer};
+use super::packer::{PackTo, Packer};
+use super::{each, lanewise};
 use crate::kernel::isa::{Isa, LANES, LaneMask};
 
 /// Part of x86-64.
 #[derive(Clone, Copy, Debug)]
 pub struct Sse2;
+
+type Floats = [__m128; 4];
+type Words = [__m128i; 4];
 
 // SAFETY, of all blocks below: SSE2 is part of every x86-64.
 // Loads and stores are unaligned ones within their arrays.
@@ -43,24 +46,24 @@ fn two_pairs(table: &[f32], [a, b]: [&u32; 2]) -> __m128 {
 }
 
 impl Isa for Sse2 {
-    type Floats = [__m128; 4];
-    type Words = [__m128i; 4];
+    type Floats = Floats;
+    type Words = Words;
     /// All bits where a lane is dropped.
-    type Kept = [__m128; 4];
+    type Kept = Floats;
     type Packer<'a> = Packer<'a>;
 
     #[inline(always)]
-    fn load(self, row: &[f32; LANES]) -> [__m128; 4] {
+    fn load(self, row: &[f32; LANES]) -> Floats {
         each!(4, |i| unsafe { _mm_loadu_ps(row[4 * i..].as_ptr()) })
     }
     #[inline(always)]
-    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [[__m128; 4]; 2] {
+    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [Floats; 2] {
         let fours: &[[u32; 4]] = places.as_chunks().0;
         let [a, b, c, d] = each!(4, |i| four_pairs(table, &fours[i]));
         each!(2, |side| [a[side], b[side], c[side], d[side]])
     }
     #[inline(always)]
-    fn to_array(self, floats: [__m128; 4]) -> [f32; LANES] {
+    fn to_array(self, floats: Floats) -> [f32; LANES] {
         let mut row = [0.0; LANES];
         for (four, x) in row.chunks_exact_mut(4).zip(floats) {
             unsafe { _mm_storeu_ps(four.as_mut_ptr(), x) };
@@ -68,7 +71,7 @@ impl Isa for Sse2 {
         row
     }
     #[inline(always)]
-    fn whole(self, floats: [__m128; 4]) -> [i32; LANES] {
+    fn whole(self, floats: Floats) -> [i32; LANES] {
         let mut row = [0; LANES];
         for (i, x) in floats.iter().enumerate() {
             let four = &mut row[4 * i..4 * i + 4];
@@ -77,111 +80,86 @@ impl Isa for Sse2 {
         row
     }
     #[inline(always)]
-    fn splat(self, x: f32) -> [__m128; 4] {
+    fn splat(self, x: f32) -> Floats {
         [unsafe { _mm_set1_ps(x) }; 4]
     }
+    lanewise!(4; add: _mm_add_ps, mul: _mm_mul_ps, min: _mm_min_ps, max: _mm_max_ps);
     #[inline(always)]
-    fn add(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
-        each!(4, |i| unsafe { _mm_add_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
-    fn mul(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
-        each!(4, |i| unsafe { _mm_mul_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
-    fn min(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
-        each!(4, |i| unsafe { _mm_min_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
-    fn max(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
-        each!(4, |i| unsafe { _mm_max_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
-    fn sub_abs(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+    fn sub_abs(self, a: Floats, b: Floats) -> Floats {
         each!(4, |i| unsafe {
             _mm_sub_ps(a[i], _mm_andnot_ps(_mm_set1_ps(-0.0), b[i]))
         })
     }
     #[inline(always)]
-    fn below_zero(self, a: [__m128; 4]) -> LaneMask {
+    fn below_zero(self, a: Floats) -> LaneMask {
         let below = each!(4, |i| unsafe { _mm_cmplt_ps(a[i], _mm_setzero_ps()) });
         signs_128(below)
     }
     #[inline(always)]
-    fn keep_all(self) -> [__m128; 4] {
+    fn keep_all(self) -> Floats {
         self.splat(0.0)
     }
     #[inline(always)]
-    fn keep(self, kept: [__m128; 4], values: [__m128; 4], least: [__m128; 4]) -> [__m128; 4] {
+    fn keep(self, kept: Floats, values: Floats, least: Floats) -> Floats {
         each!(4, |i| unsafe {
             _mm_or_ps(kept[i], _mm_cmplt_ps(values[i], least[i]))
         })
     }
     #[inline(always)]
-    fn kept(self, kept: [__m128; 4]) -> LaneMask {
+    fn kept(self, kept: Floats) -> LaneMask {
         !signs_128(kept)
     }
     #[inline(always)]
-    fn at_most(self, a: [__m128; 4], b: [__m128; 4]) -> LaneMask {
+    fn at_most(self, a: Floats, b: Floats) -> LaneMask {
         signs_128(each!(4, |i| unsafe { _mm_cmple_ps(a[i], b[i]) }))
     }
     #[inline(always)]
-    fn words(self, row: &[u32; LANES]) -> [__m128i; 4] {
+    fn words(self, row: &[u32; LANES]) -> Words {
         each!(4, |i| unsafe {
             _mm_loadu_si128(row[4 * i..].as_ptr().cast())
         })
     }
     #[inline(always)]
-    fn splat_word(self, x: u32) -> [__m128i; 4] {
+    fn splat_word(self, x: u32) -> Words {
         [unsafe { _mm_set1_epi32(x as i32) }; 4]
     }
     #[inline(always)]
-    fn iota(self, first: u32) -> [__m128i; 4] {
+    fn iota(self, first: u32) -> Words {
         each!(4, |i| unsafe {
             let from = _mm_set1_epi32(first.wrapping_add(4 * i as u32) as i32);
             _mm_add_epi32(from, _mm_setr_epi32(0, 1, 2, 3))
         })
     }
     #[inline(always)]
-    fn without(
-        self,
-        words: [__m128i; 4],
-        values: [__m128; 4],
-        least: [__m128; 4],
-        bits: u32,
-    ) -> [__m128i; 4] {
+    fn without(self, words: Words, values: Floats, least: Floats, bits: u32) -> Words {
         each!(4, |i| unsafe {
             let inside = _mm_castps_si128(_mm_cmpge_ps(values[i], least[i]));
             _mm_andnot_si128(_mm_and_si128(inside, _mm_set1_epi32(bits as i32)), words[i])
         })
     }
     #[inline(always)]
-    fn zeros(self, words: [__m128i; 4]) -> LaneMask {
+    fn zeros(self, words: Words) -> LaneMask {
         signs_128(each!(4, |i| unsafe {
             _mm_castsi128_ps(_mm_cmpeq_epi32(words[i], _mm_setzero_si128()))
         }))
     }
     #[inline(always)]
-    fn equal(self, words: [__m128i; 4], x: u32) -> LaneMask {
+    fn equal(self, words: Words, x: u32) -> LaneMask {
         signs_128(each!(4, |i| unsafe {
             _mm_castsi128_ps(_mm_cmpeq_epi32(words[i], _mm_set1_epi32(x as i32)))
         }))
     }
     #[inline(always)]
-    fn compress(self, place: &mut [u32; LANES], words: [__m128i; 4], lanes: LaneMask) {
+    fn compress(self, place: &mut [u32; LANES], words: Words, lanes: LaneMask) {
         // SAFETY: sixteen words may be written.
         unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
-    }
-    #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        packer::append(self, out, row, lanes);
     }
 }
 
 // SAFETY: as many words as there are lanes are written, and never more than a row.
 unsafe impl PackTo for Sse2 {
     #[inline(always)]
-    unsafe fn pack_to(self, place: *mut u32, words: [__m128i; 4], lanes: LaneMask) {
+    unsafe fn pack_to(self, place: *mut u32, words: Words, lanes: LaneMask) {
         let mut row = [0; LANES];
         for (four, x) in row.chunks_exact_mut(4).zip(words) {
             unsafe { _mm_storeu_si128(four.as_mut_ptr().cast(), x) };
@@ -196,7 +174,7 @@ unsafe impl PackTo for Sse2 {
 }
 
 #[inline(always)]
-fn signs_128(x: [__m128; 4]) -> LaneMask {
+fn signs_128(x: Floats) -> LaneMask {
     let signs = each!(4, |i| unsafe { _mm_movemask_ps(x[i]) } as LaneMask);
     signs[0] | signs[1] << 4 | signs[2] << 8 | signs[3] << 12
 }
