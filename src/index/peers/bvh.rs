@@ -189,7 +189,7 @@ impl BoxTested for PeerBvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::{FrustumQuery, Input, RegionIndex};
+    use crate::index::{FrustumQuery, Input, NoParams, RegionIndex};
 
     /// Left to the crate, nothing is found where areas overflow, and where
     /// widths do there is no tree.

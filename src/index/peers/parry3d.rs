@@ -55,8 +55,9 @@ impl BoxTested for PeerParry3d {
         })
     }
 
-    /// `insert_or_update_partially`, then `refit_partial`, or `refit` from one moved item
-    /// in sixteen on.
+    /// `insert_or_update_partially`, then `refit_partial`.
+    ///
+    /// `refit` in its place from one moved item in sixteen on.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         let Some(placed) = placed(|id| place_of(&self.ids, |id| *id, id), items, moved) else {
             return false;

@@ -43,8 +43,10 @@ pub trait TreeBuilder: Send + Sync {
     /// True if points descend by the normals that the build returns.
     const BY_PLANES: bool = false;
 
-    /// Builds the tree; with [`TreeBuilder::BY_PLANES`] it is binary, and a plane of each
-    /// inner node's normal divides the items, those on the back first.
+    /// Builds the tree, and a normal per node with [`TreeBuilder::BY_PLANES`].
+    ///
+    /// Such a tree is binary: a plane of an inner node's normal divides its items, those
+    /// on the back first.
     ///
     /// # Errors
     /// The errors of [`RegionIndex::build`].

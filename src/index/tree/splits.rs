@@ -1,5 +1,6 @@
-//! Region search by dividing planes of any direction, one per inner node of a binary
-//! tree: one dot product per node.
+//! Region search by dividing planes of any direction.
+//!
+//! One per inner node of a binary tree, and one dot product each.
 
 use std::ops::ControlFlow;
 
