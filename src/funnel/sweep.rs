@@ -238,7 +238,7 @@ impl PreparedSweep {
         let mut sweep = self.sweep;
         sweep.processes = processes.len();
         for point in &mut sweep.points {
-            point.time = times.ns(&point.key());
+            point.time = times.ns(point.key());
         }
         let all = sweep.points.iter().enumerate();
         let (timed, values): (Vec<usize>, Vec<[f64; 3]>) =
