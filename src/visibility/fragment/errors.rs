@@ -165,12 +165,12 @@ type Parts = Vec<(Option<Part>, u32)>;
 /// `left` has their ids among those of `index`, ascending; pieces and `is_opaque` number items
 /// by the place there. Fragments are counted whether opaque or not. O(fragments log layers) and
 /// the pairs that are looked at.
-pub fn draw_orders<B: Drawable>(
+pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
     rays: &Rays,
     grid: SampleGrid,
     index: &BodyIndex<B>,
     left: &[ItemId],
-    is_opaque: &dyn Fn(ItemId, &B::Probe, &B::At) -> bool,
+    is_opaque: &F,
     orders: &[(&dyn DepthOrder, Vec<Piece>)],
 ) -> Vec<(Tally, Result<OrderErrors, TooManyPairs>)> {
     let parts_of = |pieces: &[Piece]| {
