@@ -119,9 +119,9 @@ pub fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
             right[i] = cost(above);
         }
         let mut below = (Aabb::EMPTY, 0);
-        for i in 1..BINS {
+        for (i, right) in right.into_iter().enumerate().skip(1) {
             below = with(below, i - 1);
-            let sum = cost(below) + right[i];
+            let sum = cost(below) + right;
             let divides = (1..records.len()).contains(&below.1);
             if divides && best.is_none_or(|(lowest, ..)| sum < lowest) {
                 best = Some((sum, k, i));
