@@ -5,7 +5,7 @@ use std::path::Path;
 
 use cullbench::json::from_json;
 use cullbench::report::{
-    JUDGED_METRICS, Report, StoppedRun, Stream, changes, comparisons, growths, merge, read_report,
+    Basis, JUDGED_METRICS, Report, StoppedRun, Stream, changes, comparisons, growths, merge, read_report,
     read_stream, save_report, settings, surfaces,
 };
 use tempfile::TempDir;
@@ -39,7 +39,8 @@ fn conclude(folder: &Path, report: &Report) {
     let _ = surfaces(comparisons(report));
     growths(report);
     settings(report, report);
-    changes(report, report, 0.05, JUDGED_METRICS);
+    let cells = [&report.cells[..]; 2];
+    changes(Basis::Reports, cells, 0.05, JUDGED_METRICS);
     save_report(folder, report).expect("room for a file");
 }
 
@@ -68,7 +69,7 @@ fn go_on(folder: &Path) {
         read(merged.write(&folder.join("merged"), &|| false));
     }
     if let Some((stopped, stream)) = read(StoppedRun::open(folder)) {
-        assert!(stopped.lost() == 0 || stream.finished_at.is_none());
+        assert!(stopped.lost == 0 || stream.finished_at.is_none());
         read(stopped.go_on(&stream));
         let again = read_stream(&folder.join("stream.jsonl"));
         assert_eq!(again.expect("what was left").0.parts, stream.parts);

@@ -3,7 +3,7 @@
 
 use super::advise_table::show;
 use super::args::AdviseArgs;
-use super::processes::Said;
+use super::processes::Message;
 use super::processes::{Job, Timing};
 use super::study::{Setting, Study};
 use super::{Ending, print, tell, text};
@@ -52,7 +52,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
         };
         let found = study.workers.found(process, scene, &begin)?;
         parts.extend(found.into_iter().filter_map(|said| match said {
-            Said::Part(part, _) => Some(*part),
+            Message::Part(part, _) => Some(*part),
             _ => None,
         }));
         study.advance();

@@ -1,23 +1,172 @@
 //! `cullbench compare --against BINARY`: this program and another build of it,
 //! pair by pair of processes that take turns on one processor, until the change
-//! of every cell is known to within the threshold. The statistics are
-//! [`judge`]'s; here is how the pairs are run.
+//! of every cell is known to within the threshold. The statistics are those of
+//! [`changes`]; here are the options and how the pairs are run.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::thread;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use std::{fs, thread};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use serde_json::json;
 
+use super::command_args::{CompareArgs, Gate};
+use super::compare_table::{CompareTable, Side};
 use super::interrupt::{self, Interrupted};
-use super::processes::{Job, PROTOCOL, Request};
-use super::processes::{Said, Worker, processors, see_through};
-use crate::input;
-use crate::measure::{GroupKey, Known, Part, Plan, Share, Status, TaskKind, Verdict};
-use crate::statistics::{Judgement, interquartile_mean, judge, resolved, trimmed_mean};
+use super::processes::{Job, Message, Request, Worker, processors, see_through};
+use super::run_resume::RunOptions;
+use super::study::progress;
+use super::{run_plan, text};
+use crate::index::Registry;
+use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Share};
+use crate::report::{Basis, Changes, JUDGED_METRICS, ReportCell, WORK, changes};
+use crate::scene;
+use crate::statistics::resolved;
+
+const SUITE: &str = "compare";
+/// Default structures, without the plain loop over all items: it takes most of the
+/// time and says least.
+const STRUCTURES: &str = "linear,bsp,octree,quadtree,bvh,wide";
+
+/// Changes below this are not looked for: two builds of one source differ as much
+/// by where their code lies.
+const LEAST_THRESHOLD: f64 = 0.01;
+
+pub fn compare_against<'a>(
+    registry: &Registry,
+    args: &'a CompareArgs,
+    binary: &Path,
+) -> anyhow::Result<CompareTable<'a>> {
+    let threshold = args.threshold;
+    let is_timed = args.gate == Gate::Time;
+    if is_timed && threshold < LEAST_THRESHOLD {
+        bail!(
+            "--threshold is {}; expected at least {}: two builds of one source differ by as much",
+            text::percent(threshold),
+            text::percent(LEAST_THRESHOLD)
+        );
+    }
+    let new = std::env::current_exe().context("this program cannot be found again")?;
+    let binary = &program(binary)?;
+    let sides = [side(binary)?, side(&new)?];
+    let plan = run_plan::plan_of(registry, &args.what, SUITE, Some(STRUCTURES))?;
+    plan.check_inputs()?;
+    interrupt::from_now_on_finish();
+    let bar = progress(0, " pairs");
+    let duel = Duel {
+        args,
+        of_run: arguments()?,
+        plan: &plan.plan,
+        programs: [binary.to_owned(), new],
+        progress: &|done, most, step| {
+            bar.set_length(most as u64);
+            bar.set_position(done as u64);
+            bar.set_message(step.to_owned());
+        },
+    };
+    // Before it begins: afterwards the load is its own.
+    let load = Machine::capture();
+    let found = duel.run();
+    bar.finish_and_clear();
+    let (changes, head) = found?;
+    let busy = load
+        .load
+        .filter(|busy| is_timed && *busy > 0.5 * load.cores as f64);
+    let note = |busy| {
+        format!(
+            "the machine was busy (load average {busy:.1} on {} cores): both sides suffered \
+             alike, and it took more pairs",
+            load.cores
+        )
+    };
+    let left_out = match args.what.structure.is_empty() {
+        true => left_out(registry, &plan.plan)?,
+        false => None,
+    };
+    let [old, new] = sides;
+    Ok(CompareTable {
+        args,
+        old,
+        new,
+        basis: Basis::Pairs,
+        head,
+        notes: busy.map(note).into_iter().chain(left_out).collect(),
+        settings: Vec::new(),
+        changes,
+    })
+}
+
+/// Line on the default structures of a run that a comparison lacks.
+fn left_out(registry: &Registry, plan: &Plan) -> anyhow::Result<Option<String>> {
+    let default = registry.structures("default")?.into_iter();
+    let is_in = |name: &String| plan.structures.iter().any(|spec| spec.label == *name);
+    let names = default.map(|spec| spec.label).filter(|name| !is_in(name));
+    let names: Vec<String> = names.collect();
+    let note = "not compared by default";
+    let names = (!names.is_empty()).then(|| names.join(", "));
+    Ok(names.map(|names| format!("{note}: {names} (--structure default takes all)")))
+}
+
+/// The program of a name, as in a shell: one without a folder is looked up in PATH.
+fn program(name: &Path) -> anyhow::Result<PathBuf> {
+    let found = match name.parent() {
+        Some(folder) if folder.as_os_str().is_empty() => {
+            let path = std::env::var_os("PATH").unwrap_or_default();
+            let mut places = std::env::split_paths(&path).map(|folder| folder.join(name));
+            places.find(|place| place.is_file()).with_context(|| {
+                let name = name.display();
+                format!("{name}: not in PATH; expected a program there, or ./{name} for one here")
+            })?
+        }
+        _ => name.to_owned(),
+    };
+    let shown = || found.display().to_string();
+    let is_file = fs::metadata(&found).with_context(shown)?.is_file();
+    anyhow::ensure!(is_file, "{}: no file; expected a program", shown());
+    std::path::absolute(&found).with_context(shown)
+}
+
+/// A program as one side of the comparison.
+fn side(program: &Path) -> anyhow::Result<Side> {
+    let bytes = fs::read(program).with_context(|| program.display().to_string())?;
+    let digest = scene::hex(&hmac_sha256::Hash::hash(&bytes));
+    let short: String = digest.chars().take(12).collect();
+    Ok(Side {
+        line: format!("{}, digest {short}", program.display()),
+        json: json!({ "program": program.display().to_string(), "digest": digest }),
+    })
+}
+
+/// The options of `run` that were typed behind `compare`.
+fn typed() -> anyhow::Result<Vec<String>> {
+    Ok(RunOptions::of("compare", std::env::args_os())?.words(|_| true))
+}
+
+/// The arguments of `run` for the same measurement.
+fn arguments() -> anyhow::Result<Vec<String>> {
+    let mut arguments = vec!["run".to_owned()];
+    arguments.extend(typed()?);
+    for (option, value) in [("--suite=", SUITE), ("--structure=", STRUCTURES)] {
+        if !arguments.iter().any(|typed| typed.starts_with(option)) {
+            arguments.push(format!("{option}{value}"));
+        }
+    }
+    Ok(arguments)
+}
+
+/// Refuses options of a measurement where nothing is measured.
+pub fn expect_none_of_a_run() -> anyhow::Result<()> {
+    if let Some(option) = typed()?.first().and_then(|typed| typed.split('=').next()) {
+        bail!(
+            "{option} says what --against BINARY measures, and two reports are measured already; \
+             expected no {option}"
+        );
+    }
+    Ok(())
+}
 
 /// How long one of a pair runs before the other takes its turn: well below the
 /// time in which a shared machine changes its speed.
@@ -40,81 +189,81 @@ fn pairs(threshold: f64) -> (usize, usize) {
     }
 }
 
-/// One structure in one group, on both sides.
-pub struct AgainstCell {
-    pub group: GroupKey,
-    pub structure: String,
-    /// Status on the old and on the new side.
-    pub verdicts: [Verdict; 2],
-    /// Counters of each side, by metric.
-    pub counts: [BTreeMap<String, f64>; 2],
-    /// ln ns per query of each pair, on each side.
-    pub ln_ns: [Vec<f64>; 2],
-    pub judgement: Option<Judgement>,
-}
-
-/// A comparison that was run.
-pub struct Against {
-    pub cells: Vec<AgainstCell>,
-    pub pairs: usize,
-    pub rounds: usize,
-    pub cameras: usize,
-    pub seconds: f64,
-}
-
 /// Two programs, and the plan on which they are compared.
-pub struct Duel<'a> {
-    pub plan: &'a Plan,
+struct Duel<'a> {
+    /// Gate, threshold and patience.
+    args: &'a CompareArgs,
+    plan: &'a Plan,
     /// The arguments of `run` that the plan follows from.
-    pub args: Vec<String>,
-    pub programs: [PathBuf; 2],
-    pub threshold: f64,
-    /// Counts and checks the answers only, if false.
-    pub is_timed: bool,
-    pub patience: Duration,
+    of_run: Vec<String>,
+    programs: [PathBuf; 2],
     /// Receives the pairs that are done, the most there may be, and the step.
-    pub progress: &'a dyn Fn(usize, usize, &str),
+    progress: &'a dyn Fn(usize, usize, &str),
 }
 
 impl Duel<'_> {
-    /// Runs pairs of processes until every change is known to within the threshold.
+    /// Runs pairs of processes until every change is known to within the threshold; the
+    /// changes, and what they are based on.
     ///
     /// # Errors
     /// A program that cannot be started or is of another version, a scene that
     /// it cannot read.
-    pub fn run(&self) -> anyhow::Result<Against> {
+    fn run(&self) -> anyhow::Result<(Changes, String)> {
         let started = Instant::now();
-        let (first, most) = match self.is_timed {
-            true => pairs(self.threshold),
-            false => (0, 0),
+        let (first, most) = match self.args.gate {
+            Gate::Time => pairs(self.args.threshold),
+            Gate::Work => (0, 0),
         };
-        let seen = self.count(most)?;
-        let mut cells = self.cells(&seen);
+        let mut seen = self.count(most)?;
         let mut rng = Pcg64::seed_from_u64(self.plan.seed);
         let mut pairs = 0;
         loop {
             let is_due = pairs >= first && (pairs - first).is_multiple_of(MORE);
-            let is_look = is_due || pairs == most;
-            if is_look && (judge_cells(&mut cells, self.threshold) || pairs == most) {
-                let mut known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
-                let query = known.find_map(|known| known.query.as_ref());
-                return Ok(Against {
-                    cells,
-                    pairs,
-                    rounds: query.map_or(0, |named| named.schedule.rounds as usize),
-                    cameras: query.map_or(0, |named| named.schedule.cameras.len()),
-                    seconds: started.elapsed().as_secs_f64(),
-                });
+            if is_due || pairs == most {
+                let changes = self.changes(&seen);
+                let timed = changes.rows.iter().filter(|row| row.pairs_ln_ns.is_some());
+                let judged: Vec<_> = timed.map(|row| row.judgement).collect();
+                if resolved(&judged, self.args.threshold) || pairs == most {
+                    let mut known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
+                    let query = known.find_map(|known| known.query.as_ref());
+                    let head = format!(
+                        "{} × {} rounds × {} cameras in {:.0} s",
+                        text::counted(pairs, "pair"),
+                        query.map_or(0, |named| named.schedule.rounds),
+                        query.map_or(0, |named| named.schedule.cameras.len()),
+                        started.elapsed().as_secs_f64()
+                    );
+                    return Ok((changes, head));
+                }
             }
             (self.progress)(pairs, most, "pairs of processes");
             for scene in 0..self.plan.scenes.len() {
                 let both = self.pair(scene, pairs as u32, &seen, &mut rng)?;
-                for (side, parts) in both.iter().enumerate() {
-                    note(&mut cells, side, parts);
+                for (seen, own) in seen.iter_mut().zip(both) {
+                    seen.extend(own);
                 }
             }
             pairs += 1;
         }
+    }
+
+    /// The changes of all cells by the parts of both sides.
+    fn changes(&self, seen: &[Vec<Part>; 2]) -> Changes {
+        let cells = seen.each_ref().map(|parts| -> Vec<ReportCell> {
+            let of_group = |key: GroupKey| -> Vec<Part> {
+                let own = parts.iter().filter(|part| part.key == key);
+                own.cloned().collect()
+            };
+            let groups = self.plan.groups().into_iter().map(of_group);
+            let groups = groups.filter(|parts| !parts.is_empty());
+            groups.flat_map(|parts| Group::of(&parts).cells).collect()
+        });
+        let metrics = match self.args.gate {
+            Gate::Time => &JUDGED_METRICS[..1],
+            Gate::Work => WORK,
+        };
+        let [old, new] = &cells;
+        changes(Basis::Pairs, [old, new], self.args.threshold, metrics)
     }
 
     /// Has both sides count and check their answers.
@@ -132,13 +281,14 @@ impl Duel<'_> {
                 };
                 let request = self.request(scene, share, 0);
                 let own = &mut seen[side];
+                let patience = Duration::from_secs(self.args.what.timeout);
                 let mut keep = |said| {
-                    if let Said::Part(part, _) = said {
+                    if let Message::Part(part, _) = said {
                         own.push(*part);
                     }
                     Ok(())
                 };
-                let ended = see_through(program, &request, self.patience, &mut keep, &|_| ())?;
+                let ended = see_through(program, &request, patience, &mut keep, &|_| ())?;
                 ended
                     .done()
                     .with_context(|| program.display().to_string())?;
@@ -154,16 +304,10 @@ impl Duel<'_> {
         let groups = self.plan.groups_of(planned);
         let keys = groups.iter().map(|group| self.plan.key(planned, group));
         let known = keys.map(|key| {
-            let answers = counted(own, &key);
-            Some(Known {
-                visible: answers
-                    .map(|known| known.visible.clone())
-                    .unwrap_or_default(),
-                located: answers
-                    .map(|known| known.located.clone())
-                    .unwrap_or_default(),
-                ..counted(new, &key)?.clone()
-            })
+            let mut known = counted(new, &key)?.clone();
+            let answers = counted(own, &key).map(|own| (own.visible.clone(), own.located.clone()));
+            (known.visible, known.located) = answers.unwrap_or_default();
+            Some(known)
         });
         Share {
             process,
@@ -175,19 +319,12 @@ impl Duel<'_> {
     }
 
     fn request(&self, scene: usize, share: Share, layout: u64) -> Request {
-        Request {
-            protocol: PROTOCOL,
-            args: self.args.clone(),
-            spooled: BTreeMap::new(),
-            files: input::held_files(),
-            job: Job::Scene {
-                scene,
-                share,
-                samples: false,
-            },
-            cpu: processors().last().copied(),
-            layout,
-        }
+        let job = Job::Scene {
+            scene,
+            share,
+            samples: false,
+        };
+        Request::new(&self.of_run, job, processors().last().copied(), layout)
     }
 
     /// One pair of processes on one scene, in turns; old and new.
@@ -230,8 +367,8 @@ impl Duel<'_> {
             }
             while let Some(worker) = &mut workers[side] {
                 match worker.listen(Duration::ZERO)? {
-                    Some(Said::Part(part, _)) => parts[side].push(*part),
-                    Some(Said::Ended(ended)) => {
+                    Some(Ok(Message::Part(part, _))) => parts[side].push(*part),
+                    Some(Err(ended)) => {
                         let program = || self.programs[side].display().to_string();
                         ended.done().with_context(program)?;
                         workers[side] = None;
@@ -243,60 +380,6 @@ impl Duel<'_> {
         }
         Ok(parts)
     }
-
-    /// All cells of the plan, without times.
-    fn cells(&self, seen: &[Vec<Part>; 2]) -> Vec<AgainstCell> {
-        let cells = self.plan.cells().into_iter().map(|cell| {
-            let subjects = seen.each_ref().map(|parts| {
-                let part = parts.iter().find(|part| part.key == cell.group);
-                part.and_then(|p| p.subjects.iter().find(|s| s.label == cell.structure))
-            });
-            let absent = || Verdict::new(Status::LeftOut, "not in this program");
-            AgainstCell {
-                verdicts: subjects.map(|own| own.map_or_else(absent, |own| own.verdict.clone())),
-                counts: subjects.map(|own| own.map(|own| own.counts.clone()).unwrap_or_default()),
-                ln_ns: [Vec::new(), Vec::new()],
-                judgement: None,
-                group: cell.group,
-                structure: cell.structure,
-            }
-        });
-        cells.collect()
-    }
-}
-
-/// Judges all cells that were timed; true if every change is known to within the
-/// threshold.
-fn judge_cells(cells: &mut [AgainstCell], threshold: f64) -> bool {
-    let timed = cells.iter_mut().filter(|cell| cell.is_timed());
-    let mut timed: Vec<&mut AgainstCell> = timed.collect();
-    timed.retain(|cell| cell.differences().len() >= 3);
-    let differences: Vec<Vec<f64>> = timed.iter().map(|cell| cell.differences()).collect();
-    let judgements = judge(&differences, threshold);
-    let enough = resolved(&judgements, threshold);
-    for (cell, judgement) in timed.into_iter().zip(judgements) {
-        cell.judgement = judgement;
-    }
-    enough
-}
-
-impl AgainstCell {
-    fn is_timed(&self) -> bool {
-        self.verdicts.iter().all(|v| v.status == Status::Ok)
-    }
-
-    /// The times of both sides, of which the quotient is the change.
-    pub fn shown(&self) -> [Option<f64>; 2] {
-        let old = trimmed_mean(&self.ln_ns[0]).map(|old| old.mean.exp());
-        let ratio = self.judgement.map(|found| found.ratio);
-        [old, old.zip(ratio).map(|(old, ratio)| old * ratio)]
-    }
-
-    /// ln(new / old) of each pair.
-    fn differences(&self) -> Vec<f64> {
-        let [old, new] = &self.ln_ns;
-        old.iter().zip(new).map(|(old, new)| new - old).collect()
-    }
 }
 
 /// Answers and counters of a side.
@@ -305,23 +388,29 @@ fn counted<'p>(parts: &'p [Part], key: &GroupKey) -> Option<&'p Known> {
     part.known.as_ref()
 }
 
-/// Adds the times and the failures of one process.
-fn note(cells: &mut [AgainstCell], side: usize, parts: &[Part]) {
-    for cell in cells {
-        let Some(part) = parts.iter().find(|part| part.key == cell.group) else {
-            continue;
-        };
-        let subject = part.subjects.iter().find(|s| s.label == cell.structure);
-        if let Some(failed) = subject.filter(|s| s.verdict.status != Status::Ok)
-            && cell.verdicts[side].status == Status::Ok
-        {
-            cell.verdicts[side] = failed.verdict.clone();
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The report names the program that runs.
+    #[cfg(unix)]
+    #[test]
+    fn a_name_without_a_folder_is_looked_up_in_path() {
+        let found = |name: &str| program(Path::new(name)).map_err(|error| error.to_string());
+        let shell = found("sh").unwrap();
+        assert!(shell.is_absolute() && shell.ends_with("sh") && shell.is_file());
+        let manifest = found("./Cargo.toml").unwrap();
+        assert!(manifest.is_absolute() && manifest.is_file());
+        for (name, wanted) in [
+            (
+                "Cargo.toml",
+                "Cargo.toml: not in PATH; expected a program there, or ./Cargo.toml",
+            ),
+            ("/dev/zero", "/dev/zero: no file; expected a program"),
+            ("./src", "./src: no file; expected a program"),
+        ] {
+            let error = found(name).unwrap_err();
+            assert!(error.starts_with(wanted), "{error}");
         }
-        let mut tasks = part.tasks.iter();
-        let task = tasks.find(|t| t.label == cell.structure && t.task == TaskKind::Query);
-        let rounds = task.into_iter().flat_map(|task| &task.rounds_ns);
-        let rounds: Vec<f64> = rounds.map(|ns| ns.ln()).collect();
-        // A pair that lacks a side is no pair: NaN keeps the places.
-        cell.ln_ns[side].push(interquartile_mean(&rounds).unwrap_or(f64::NAN));
     }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
+use serde::Serialize;
 
 use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, SceneArgs, StudyArgs, TableFormat, WhatArgs,
@@ -208,7 +209,8 @@ pub struct SceneDrawArgs {
 const COMPARE_HELP: &str = include_str!("assets/help/compare.txt");
 
 /// Measure of a regression; an answer that is not given any more is one by each.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Gate {
     /// A proven change of the time
     Time,
@@ -246,8 +248,14 @@ pub struct CompareArgs {
     pub threshold: f64,
     /// Metrics to compare: query_ns, locate_ns, locate_batched_ns, build_ms, frame_ns,
     /// update_ns; may be repeated [default: query_ns, and frame_ns of motions]
-    #[arg(long, value_name = "LIST", conflicts_with = "against")]
-    pub metric: Vec<String>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        value_parser = values::metric,
+        conflicts_with = "against"
+    )]
+    pub metric: Vec<&'static str>,
     /// Measure of a regression
     #[arg(long, value_enum, default_value = "time")]
     pub gate: Gate,

@@ -10,18 +10,17 @@ use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
 use super::command_args::{CompareArgs, Gate};
-use super::compare_table::{Basis, CompareTable, Side, WORK_HEAD, change_of, name, reason};
+use super::compare_table::{CompareTable, Side, change_of, counted, name, reason};
 use super::diagram::{Row, rows};
 use super::document::{Block, to_page};
 use super::figure::{Axis, Figure, is_drawn};
-use super::{Ending, expect_places, text, unread_is_fine, write_text};
+use super::{Ending, expect_places, run_plan, text, unread_is_fine, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
-    Changes, JUDGED_METRICS, Lone, Outcome, Report, ReportCell, Setting, WORK, changes,
+    Basis, Changes, JUDGED_METRICS, Outcome, Report, ReportCell, Setting, WORK, changes,
     read_report, settings, write_atomically,
 };
-use crate::spec::SpecError;
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
     let inputs: Vec<&Path> = [&args.old, &args.new]
@@ -32,13 +31,16 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
     expect_places(&[("--html", args.html.as_deref())], &inputs)?;
     let threshold = args.threshold;
     if let Some(binary) = &args.against {
-        let table = super::against_table::compare_against(registry, args, binary, threshold)?;
-        return show(&table, args);
+        let table = super::against::compare_against(registry, args, binary)?;
+        return show(&table);
     }
-    super::against_table::expect_none_of_a_run()?;
+    super::against::expect_none_of_a_run()?;
     let mut metrics = match (args.gate, args.metric.is_empty()) {
         (Gate::Time, true) => vec![JUDGED_METRICS[0]],
-        (Gate::Time, false) => metrics(&args.metric)?,
+        (Gate::Time, false) => {
+            run_plan::each_once("metric", &args.metric)?;
+            args.metric.clone()
+        }
         (Gate::Work, is_free) => {
             ensure!(
                 is_free,
@@ -57,9 +59,19 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         let moving = new.cells.iter().filter(|cell| !cell.path.motion.is_empty());
         metrics.extend(moving.map(ReportCell::ranked_by).take(1));
     }
-    let changes = changes(&old, &new, threshold, &metrics);
+    let changes = changes(
+        Basis::Reports,
+        [&old.cells, &new.cells],
+        threshold,
+        &metrics,
+    );
     if changes.cells_in_common == 0 {
-        bail!("{}", nothing_in_common(&changes));
+        bail!(
+            "no cell in common: OLD has {}, NEW has {}; expected runs of the same scenes, \
+             paths, tests and structures",
+            counted(&changes.only_in_old),
+            counted(&changes.only_in_new)
+        );
     }
     if let Some(first) = changes.why_nothing_was_judged() {
         bail!(
@@ -74,60 +86,16 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
     }
     let settings = settings(&old, &new);
     let table = CompareTable {
+        args,
         old: side(&old),
         new: side(&new),
         basis: Basis::Reports,
-        gate: args.gate,
-        fail_inconclusive: args.fail_inconclusive,
-        head: match args.gate {
-            Gate::Time => format!("{} vs {}", processes(&old), processes(&new)),
-            Gate::Work => WORK_HEAD.to_owned(),
-        },
+        head: format!("{} vs {}", processes(&old), processes(&new)),
         notes: notes(&old, &new, &settings, args.gate),
         settings,
         changes,
     };
-    show(&table, args)
-}
-
-/// The metrics of all lists, each once.
-fn metrics(lists: &[String]) -> Result<Vec<&'static str>, SpecError> {
-    let mut chosen: Vec<&'static str> = Vec::new();
-    let names = lists.iter().flat_map(|list| list.split(','));
-    for name in names.map(str::trim).filter(|name| !name.is_empty()) {
-        let known = || JUDGED_METRICS.iter().copied();
-        let metric = known().find(|metric| *metric == name);
-        let metric = metric.ok_or_else(|| SpecError::unknown("metric", name, known()))?;
-        if chosen.contains(&metric) {
-            return Err(SpecError::new(format_args!(
-                "metric '{name}' is named twice; expected each once"
-            )));
-        }
-        chosen.push(metric);
-    }
-    if chosen.is_empty() {
-        return Err(SpecError::new(
-            "no metric to compare by; expected names such as query_ns,build_ms",
-        ));
-    }
-    Ok(chosen)
-}
-
-fn nothing_in_common(changes: &Changes) -> String {
-    let side = |cells: &[Lone]| {
-        let Some(first) = cells.first() else {
-            return "no cells".to_owned();
-        };
-        let more = if cells.len() == 1 { "" } else { ", ..." };
-        let name = text::plain(&name(&first.cell));
-        format!("{} ({name}{more})", text::counted(cells.len(), "cell"))
-    };
-    format!(
-        "no cell in common: OLD has {}, NEW has {}; expected runs of the same scenes, paths, \
-         tests and structures",
-        side(&changes.only_in_old),
-        side(&changes.only_in_new)
-    )
+    show(&table)
 }
 
 /// Lines before the figures.
@@ -159,10 +127,8 @@ fn notes(old: &Report, new: &Report, settings: &[Setting], gate: Gate) -> Vec<St
 fn processes(report: &Report) -> String {
     let cells = report.cells.iter().filter(|cell| cell.status == Status::Ok);
     let counts = || cells.clone().map(|cell| cell.times.processes);
-    match (counts().min().unwrap_or(0), counts().max().unwrap_or(0)) {
-        (least, most) if least == most => text::counted(most, "process"),
-        (least, most) => format!("{least} to {}", text::counted(most, "process")),
-    }
+    let ends = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+    text::range(ends, |most| text::counted(most, "process"))
 }
 
 fn side(report: &Report) -> Side {
@@ -190,9 +156,9 @@ fn side(report: &Report) -> Side {
 const DRAWN: usize = 40;
 
 /// Prints a comparison in the chosen format, and writes its page.
-pub fn show(table: &CompareTable, args: &CompareArgs) -> anyhow::Result<Ending> {
-    let shown = unread_is_fine(table.print(args));
-    if let Some(file) = &args.html {
+fn show(table: &CompareTable) -> anyhow::Result<Ending> {
+    let shown = unread_is_fine(table.print());
+    if let Some(file) = &table.args.html {
         let blocks = table.blocks(true, Some(usize::MAX));
         let changes = figure(&table.changes).map(Block::Figure);
         write_text(file, &to_page("compare", 1, changes, blocks))?;
@@ -289,28 +255,4 @@ fn names(folder: &str, is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
     let mut names: Vec<String> = names.filter(|name| is_wanted(name)).collect();
     names.sort();
     names
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn metrics_are_named_once_and_only_those_that_less_is_better_of() {
-        let chosen = |lists: &[&str]| {
-            let lists: Vec<String> = lists.iter().map(|list| (*list).to_owned()).collect();
-            metrics(&lists).map_err(|error| error.to_string())
-        };
-        let two = chosen(&["query_ns, build_ms", "locate_ns,"]);
-        assert_eq!(two, Ok(vec!["query_ns", "build_ms", "locate_ns"]));
-        for (list, wanted) in [
-            ("qery_ns", "did you mean 'query_ns'"),
-            ("excess", "unknown metric 'excess'"),
-            ("query_ns,query_ns", "named twice"),
-            (" , ", "no metric"),
-        ] {
-            let error = chosen(&[list]).expect_err(list);
-            assert!(error.contains(wanted), "{error}");
-        }
-    }
 }

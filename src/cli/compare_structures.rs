@@ -177,9 +177,8 @@ pub fn write(
                     csv.write_record(columns)?;
                 }
                 let cells = |row| columns.iter().map(move |(_, value)| cell(&value(row)));
-                Ok(rows
-                    .iter()
-                    .try_for_each(|row| csv.write_record(cells(row)))?)
+                let mut rows = rows.iter().map(cells);
+                Ok(rows.try_for_each(|cells| csv.write_record(cells))?)
             });
             if let Some(columns) = header.filter(|_| agree.is_ok()) {
                 csv.write_record(columns)?;
@@ -190,17 +189,14 @@ pub fn write(
         RowFormat::Json => {
             let mut json = serde_json::Serializer::pretty(&mut out);
             let mut array = json.serialize_seq(None)?;
-            let field = |&(name, value): &(&str, &dyn Fn(&Row) -> Value), row: &Row| {
-                (name.to_owned(), value(row))
-            };
-            let object = |row: &Row| {
-                columns
-                    .iter()
-                    .map(|column| field(column, row))
-                    .collect::<Map<_, _>>()
+            let object = |row: &Row| -> Map<String, Value> {
+                let fields = columns.iter();
+                fields
+                    .map(|(name, value)| ((*name).to_owned(), value(row)))
+                    .collect()
             };
             let agree = ask(&mut |rows| {
-                let mut rows = rows.iter().map(&object);
+                let mut rows = rows.iter().map(object);
                 Ok(rows.try_for_each(|object| array.serialize_element(&object))?)
             });
             array.end()?;

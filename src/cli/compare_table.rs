@@ -15,7 +15,8 @@ use super::{Ending, print_json, program, text};
 use crate::culling::CullingTest;
 use crate::measure::{CellKey, METRICS};
 use crate::report::{
-    Changes, CommonShift, FEW_OTHERS, JudgedRow, Lone, Outcome, Setting, WORK, WorkChange,
+    Basis, Changes, CommonShift, FEW_OTHERS, JudgedRow, Lone, Outcome, Setting, WORK, WorkChange,
+    grouped,
 };
 use crate::shown::{number, shortened};
 
@@ -25,32 +26,18 @@ const LISTED: usize = 20;
 /// Further processes of a run that are worth a try.
 const MOST_MORE: usize = 100;
 
-/// Head of a comparison by `--gate work`.
-pub const WORK_HEAD: &str = "nodes, items and planes tested per query";
-
 /// OLD or NEW.
 pub struct Side {
     pub line: String,
     pub json: Value,
 }
 
-/// Source of the times of both sides.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Basis {
-    /// Two stored reports: times relative to the other structures.
-    Reports,
-    /// Pairs of processes in turns: times as they are.
-    Pairs,
-}
-
 /// A comparison with its notes.
-pub struct CompareTable {
+pub struct CompareTable<'a> {
+    pub args: &'a CompareArgs,
     pub old: Side,
     pub new: Side,
     pub basis: Basis,
-    pub gate: Gate,
-    /// True if an inconclusive cell is a regression.
-    pub fail_inconclusive: bool,
     /// "14 pairs × 100 rounds × 128 cameras", "10 vs 10 processes".
     pub head: String,
     /// Lines before the figures.
@@ -59,7 +46,7 @@ pub struct CompareTable {
     pub changes: Changes,
 }
 
-impl CompareTable {
+impl CompareTable<'_> {
     /// 1 for a wrong answer, otherwise 3 for a regression.
     pub fn ending(&self) -> Ending {
         self.verdict().0
@@ -71,7 +58,9 @@ impl CompareTable {
         match (self.changes.is_wrong(), self.changes.is_regression()) {
             (true, _) => (Ending::WrongAnswer, "wrong_answer"),
             (false, true) => (Ending::Regression, "regression"),
-            _ if self.fail_inconclusive && is_undecided => (Ending::Regression, "inconclusive"),
+            _ if self.args.fail_inconclusive && is_undecided => {
+                (Ending::Regression, "inconclusive")
+            }
             (false, false) => (Ending::Ok, "ok"),
         }
     }
@@ -96,7 +85,8 @@ impl CompareTable {
     }
 
     /// Prints the comparison in the chosen format.
-    pub fn print(&self, args: &CompareArgs) -> io::Result<()> {
+    pub fn print(&self) -> io::Result<()> {
+        let args = self.args;
         let text = match (args.markdown, args.format) {
             (true, _) => folded(
                 &format!("{}: {}", program::name(), self.summary()),
@@ -118,7 +108,7 @@ impl CompareTable {
             old: &'c Value,
             new: &'c Value,
             verdict: &'static str,
-            gate: &'static str,
+            gate: Gate,
             counts: Value,
             head: &'c str,
             notes: &'c [String],
@@ -133,18 +123,22 @@ impl CompareTable {
             old: &self.old.json,
             new: &self.new.json,
             verdict: self.verdict().1,
-            gate: match self.gate {
-                Gate::Time => "time",
-                Gate::Work => "work",
-            },
+            gate: self.args.gate,
             counts: Value::Object(counts.into_iter().collect()),
-            head: &self.head,
+            head: self.head(),
             notes: &self.notes,
             settings: &self.settings,
             advice: self.advice(),
             changes,
         };
         print_json(&document)
+    }
+
+    fn head(&self) -> &str {
+        match self.args.gate {
+            Gate::Time => &self.head,
+            Gate::Work => "nodes, items and planes tested per query",
+        }
     }
 
     /// The document for Markdown, or with a table for a terminal of some `room`.
@@ -155,7 +149,7 @@ impl CompareTable {
             format!("NEW  {}", self.new.line),
             format!(
                 "{}, threshold {}",
-                self.head,
+                self.head(),
                 text::percent(changes.threshold)
             ),
         ];
@@ -176,7 +170,7 @@ impl CompareTable {
         let is_listed = |work: &&WorkChange| {
             // Counters of the gate have rows.
             let is_beyond = work.new > work.old * most || work.old > work.new * most;
-            all || self.gate == Gate::Time || (is_beyond && !WORK.contains(&work.counter))
+            all || self.args.gate == Gate::Time || (is_beyond && !WORK.contains(&work.counter))
         };
         let work: Vec<_> = changes.work_changed.iter().filter(is_listed).collect();
         lines.extend(work.iter().take(listed).map(|work| work_line(work)));
@@ -200,7 +194,7 @@ impl CompareTable {
 
     /// One row per figure; for a terminal the columns that `room` holds.
     fn table(&self, rows: &[&JudgedRow], room: Option<usize>) -> Table {
-        let (change, processes) = match (self.gate, self.basis) {
+        let (change, processes) = match (self.args.gate, self.basis) {
             (Gate::Work, _) => ("change", "processes"),
             (Gate::Time, Basis::Reports) if room.is_none() => {
                 ("change vs the others [95 %]", "processes")
@@ -246,22 +240,18 @@ impl CompareTable {
             ];
             table.add_row(places.into_iter().chain(figures));
         }
-        match (self.gate, room) {
-            (_, Some(usize::MAX)) => table.without_empty_columns(),
-            (_, Some(room)) => {
-                let mut first_to_go = vec!["metric", "resolves", processes, "old", "new"];
-                let is_of_metric = |row: &&JudgedRow| row.metric == rows[0].metric;
-                first_to_go.retain(|name| *name != "metric" || rows.iter().all(is_of_metric));
-                let table = table.without_empty_columns().within(room, &first_to_go);
-                let has_old = table.header.iter().any(|name| name == "old");
-                // One value alone says nothing.
-                match has_old {
-                    true => table,
-                    false => table.without("new"),
-                }
-            }
-            (Gate::Time, None) => table,
-            (Gate::Work, None) => table.without_empty_columns(),
+        let table = table.without_empty_columns();
+        let Some(room) = room.filter(|room| *room < usize::MAX) else {
+            return table;
+        };
+        let mut first_to_go = vec!["metric", "resolves", processes, "old", "new"];
+        let is_of_metric = |row: &&JudgedRow| row.metric == rows[0].metric;
+        first_to_go.retain(|name| *name != "metric" || rows.iter().all(is_of_metric));
+        let table = table.within(room, &first_to_go);
+        // One value alone says nothing.
+        match table.header.iter().any(|name| name == "old") {
+            true => table,
+            false => table.without("new"),
         }
     }
 
@@ -269,7 +259,7 @@ impl CompareTable {
     fn counts_line(&self) -> String {
         let changes = &self.changes;
         // The verdicts of the gate are shown in any case.
-        let is_of_gate = |outcome: Outcome| match self.gate {
+        let is_of_gate = |outcome: Outcome| match self.args.gate {
             Gate::Time => outcome.is_judged(),
             Gate::Work => matches!(
                 outcome,
@@ -304,27 +294,29 @@ impl CompareTable {
         let more = self.changes.more_pairs();
         let mut rows = self.changes.rows.iter();
         let lacks_others = rows.any(|row| row.reason.as_deref() == Some(FEW_OTHERS));
-        let decides = match (self.basis, more) {
+        let told = match (self.basis, more) {
             (Basis::Pairs, Some(more)) => {
-                return Some(format!(
-                    "{cells}: about {} would decide",
-                    text::counted(more, "more pair")
-                ));
+                format!("about {} would decide", text::counted(more, "more pair"))
             }
-            (Basis::Pairs, None) => return Some(format!("{cells}: more pairs would not decide")),
-            (Basis::Reports, None) if lacks_others => {
-                "runs (run --structure) with the same four structures or more".to_owned()
+            (Basis::Pairs, None) => "more pairs would not decide".to_owned(),
+            (Basis::Reports, _) => {
+                let runs = match more {
+                    None if lacks_others => {
+                        "runs (run --structure) with the same four structures or more".to_owned()
+                    }
+                    Some(more) if more <= MOST_MORE => {
+                        let more = text::counted(more, "more process");
+                        format!("about {more} in each run (run --processes)")
+                    }
+                    _ => "finer runs, perhaps with --processes 20,".to_owned(),
+                };
+                format!(
+                    "{runs} would decide, or compare --against BINARY, which runs both programs \
+                     in turns"
+                )
             }
-            (Basis::Reports, Some(more)) if more <= MOST_MORE => {
-                let more = text::counted(more, "more process");
-                format!("about {more} in each run (run --processes)")
-            }
-            (Basis::Reports, _) => "finer runs, perhaps with --processes 20,".to_owned(),
         };
-        Some(format!(
-            "{cells}: {decides} would decide, or compare --against BINARY, which runs both programs in \
-             turns"
-        ))
+        Some(format!("{cells}: {told}"))
     }
 }
 
@@ -361,11 +353,8 @@ fn question(cell: &CellKey) -> String {
         "warm" => String::new(),
         cache => format!(" ({cache})"),
     };
-    let motion = match group.motion.as_str() {
-        "" => String::new(),
-        motion => format!(", {motion}"),
-    };
-    format!("{}, {}{cold}{motion}", group.path, group.test)
+    let test = format!("{}{cold}", group.test);
+    text::joined([&group.path, &test, &group.motion])
 }
 
 /// "+6.8 % [+5.2, +8.4]" of a ratio new / old.
@@ -430,19 +419,17 @@ pub fn reason(row: &JudgedRow) -> String {
 
 /// Every reason once, with the only cell of it or their number.
 fn reasons(rows: &[&JudgedRow]) -> Vec<String> {
-    let mut found: Vec<(String, Vec<&CellKey>)> = Vec::new();
-    for row in rows {
+    let told = rows.iter().filter(|row| !reason(row).is_empty());
+    let told = told.map(|row| {
         let why = format!("{}: {}", row.outcome.name().replace('_', " "), reason(row));
-        match found.iter_mut().find(|(known, _)| *known == why) {
-            _ if reason(row).is_empty() => {}
-            Some((_, cells)) => cells.push(&row.cell),
-            None => found.push((why, vec![&row.cell])),
-        }
-    }
-    let lines = found.into_iter().map(|(why, cells)| match cells[..] {
-        [one] => format!("{why} ({})", name(one)),
-        _ => format!("{why} ({})", text::counted(cells.len(), "cell")),
+        (why, &row.cell)
     });
+    let lines = grouped(told)
+        .into_iter()
+        .map(|(why, cells)| match cells[..] {
+            [one] => format!("{why} ({})", name(one)),
+            _ => format!("{why} ({})", text::counted(cells.len(), "cell")),
+        });
     lines.collect()
 }
 
@@ -456,22 +443,24 @@ fn shown(metric: &str, value: f64) -> String {
     }
 }
 
-/// How many cells only one side has; each that is wrong by its name.
-fn lone_lines(side: &str, cells: &[Lone]) -> Vec<String> {
+/// "3 cells (bvh on city, orbit, six-plane, ...)".
+pub fn counted(cells: &[Lone]) -> String {
     let Some(first) = cells.first() else {
-        return Vec::new();
+        return "no cells".to_owned();
     };
     let more = if cells.len() == 1 { "" } else { ", ..." };
-    let first = format!(
-        "only in {side}: {} ({}{more})",
-        text::counted(cells.len(), "cell"),
-        name(&first.cell)
-    );
+    let name = text::plain(&name(&first.cell));
+    format!("{} ({name}{more})", text::counted(cells.len(), "cell"))
+}
+
+/// How many cells only one side has; each that is wrong by its name.
+fn lone_lines(side: &str, cells: &[Lone]) -> Vec<String> {
+    let all = (!cells.is_empty()).then(|| format!("only in {side}: {}", counted(cells)));
     let wrong = cells.iter().filter(|cell| cell.status.is_failure());
     let wrong = wrong.map(|cell| {
         let (name, status) = (name(&cell.cell), cell.status.name());
         let why = text::some(cell.reason.as_ref(), |reason| format!(": {reason}"));
         format!("only in {side}: {name}: {status}{why}")
     });
-    [first].into_iter().chain(wrong).collect()
+    all.into_iter().chain(wrong).collect()
 }

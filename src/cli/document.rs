@@ -32,7 +32,7 @@ impl Block {
 }
 
 fn markdown_table(table: &Table) -> String {
-    let line = |cells: &[String]| {
+    let line = |cells: &Vec<String>| {
         let cells: Vec<String> = cells.iter().map(|cell| markdown(cell)).collect();
         format!("| {} |\n", cells.join(" | "))
     };
@@ -40,11 +40,8 @@ fn markdown_table(table: &Table) -> String {
         true => "---:|",
         false => "---|",
     });
-    let mut out = line(&table.header) + "|" + &rule.collect::<String>() + "\n";
-    for row in &table.rows {
-        out += &line(row);
-    }
-    out
+    let rule = format!("|{}\n", rule.collect::<String>());
+    line(&table.header) + &rule + &table.rows.iter().map(line).collect::<String>()
 }
 
 /// A table that scrolls inside itself.
@@ -53,11 +50,7 @@ fn markdown_table(table: &Table) -> String {
 fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
     let is_right = |column: &usize| table.right.contains(column);
     let head = table.header.iter().enumerate().map(|(column, name)| {
-        let class = if is_right(&column) {
-            " class=\"n\""
-        } else {
-            ""
-        };
+        let class = text::some(is_right(&column).then_some(" class=\"n\""), str::to_owned);
         format!("<th scope=\"col\"{class}>{}</th>", html(name))
     });
     let of_structures = table.header.first().is_some_and(|name| name == "structure");
@@ -101,11 +94,8 @@ fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
 fn markdown(text: &str) -> String {
     let marks = ['\\', '|', '`', '*', '_', '<', '[', '&'];
     let text = text::plain(text);
-    let escaped = text.chars().flat_map(|c| {
-        let escape = marks.contains(&c).then_some('\\');
-        escape.into_iter().chain([c])
-    });
-    escaped.collect()
+    let escape = |c: char| marks.contains(&c).then_some('\\').into_iter().chain([c]);
+    text.chars().flat_map(escape).collect()
 }
 
 /// The document as Markdown.

@@ -128,18 +128,12 @@ impl<'t> Axis<'t> {
             return self.ticks.clone();
         }
         let Range { start, end } = self.values;
-        let within = |ticks: Vec<f64>| -> Vec<f64> {
-            let inside = ticks.into_iter().filter(|t| (start..=end).contains(t));
-            inside.collect()
-        };
         if self.is_log {
             let powers = self.powers(10.0);
             let below = powers.first().map_or(1.0, |first| first / 10.0);
             let all = [below].into_iter().chain(powers.clone());
-            let finer = within(
-                all.flat_map(|power| [power, 2.0 * power, 5.0 * power])
-                    .collect(),
-            );
+            let finer = all.flat_map(|power| [power, 2.0 * power, 5.0 * power]);
+            let finer: Vec<f64> = finer.filter(|t| (start..=end).contains(t)).collect();
             match (powers.len(), finer.len()) {
                 (3.., _) => return powers,
                 (_, 3..) => return finer,

@@ -5,8 +5,8 @@ use super::document::{Block, to_html};
 use super::figure::{Axis, ends, is_drawn};
 use super::table::{Column, Table};
 use super::{program, text};
-use crate::measure::{CellKey, GroupKey, Metric};
-use crate::report::{Report, ReportCell, settings};
+use crate::measure::Metric;
+use crate::report::{Report, grouped, settings};
 
 /// Digits of a commit that name it.
 const COMMIT: usize = 7;
@@ -14,11 +14,10 @@ const COMMIT: usize = 7;
 /// Commit, or the day of a run without one.
 fn name(report: &Report) -> String {
     let (commit, at) = (&report.source.commit, &report.run.started_at);
-    let whole = commit
-        .as_ref()
-        .map_or(at.chars().take(10).collect(), |commit| {
-            commit.chars().take(COMMIT).collect::<String>()
-        });
+    let whole: String = match commit {
+        Some(commit) => commit.chars().take(COMMIT).collect(),
+        None => at.chars().take(10).collect(),
+    };
     let dirty = report.source.dirty == Some(true);
     format!("{whole}{}", if dirty { "+" } else { "" })
 }
@@ -26,52 +25,24 @@ fn name(report: &Report) -> String {
 /// The page; runs are sorted by their start.
 pub fn page(mut reports: Vec<Report>) -> String {
     reports.sort_by(|a, b| a.run.started_at.cmp(&b.run.started_at));
-    let mut groups: Vec<(GroupKey, Vec<String>)> = Vec::new();
-    for cell in reports.iter().flat_map(|report| &report.cells) {
-        let CellKey { group, structure } = cell.key();
-        let place = groups.iter().position(|row| row.0 == group);
-        let place = place.unwrap_or_else(|| {
-            groups.push((group, Vec::new()));
-            groups.len() - 1
-        });
-        if !groups[place].1.contains(&structure) {
-            groups[place].1.push(structure);
-        }
-    }
+    let cells = reports.iter().enumerate();
+    let cells = cells.flat_map(|(run, report)| report.cells.iter().map(move |cell| (run, cell)));
+    let cells = cells.map(|(run, cell)| (cell.key().group, (cell.structure.as_str(), (run, cell))));
     let mut blocks = Vec::new();
     let mut changed = [Vec::new(), Vec::new()];
     let mut compared = 0;
-    for (group, structures) in &groups {
-        let heading = format!(
-            "{}, {}, {}, {}",
-            group.scene, group.path, group.cache, group.test
-        );
-        let cells = |structure: &String| {
-            let key = CellKey {
-                group: group.clone(),
-                structure: structure.clone(),
-            };
-            let found = reports.iter();
-            let found = found.map(|report| report.cells.iter().find(|cell| cell.key() == key));
-            found.collect::<Vec<Option<&ReportCell>>>()
-        };
-        let mut table = Table::of_numbers(
-            ["structure".to_owned()]
-                .into_iter()
-                .chain(reports.iter().map(name))
-                .chain(["last / first".to_owned()]),
-        );
+    for (group, cells) in grouped(cells) {
+        let heading = text::joined([&group.scene, &group.path, &group.cache, &group.test]);
+        let names = reports.iter().map(name).chain(["last / first".to_owned()]);
+        let mut table = Table::of_numbers(["structure".to_owned()].into_iter().chain(names));
         let mut series = Vec::new();
-        for structure in structures {
-            let cells = cells(structure);
-            let times = cells.iter().map(|cell| {
-                let sound = cell.filter(|cell| cell.rank.is_some())?;
-                sound.time().filter(|time| is_drawn(time.value))
-            });
-            let times: Vec<Option<&Metric>> = times.collect();
-            let known: Vec<&Metric> = times.iter().copied().flatten().collect();
+        for (structure, cells) in grouped(cells.into_iter()) {
+            let sound = cells.iter().filter(|(_, cell)| cell.rank.is_some());
+            let times = sound.filter_map(|&(run, cell)| Some((run, cell.time()?)));
+            let times = times.filter(|(_, time)| is_drawn(time.value));
+            let times: Vec<(usize, &Metric)> = times.collect();
             let mut change = String::new();
-            if let [first, .., last] = known[..] {
+            if let [(_, first), .., (_, last)] = times[..] {
                 change = format!("{} x", text::significant(last.value / first.value));
                 compared += 1;
                 let line = || format!("{structure} on {}, {} ({change})", group.scene, group.path);
@@ -81,30 +52,35 @@ pub fn page(mut reports: Vec<Report>) -> String {
                     _ => {}
                 }
             }
-            let shown = cells
-                .iter()
-                .zip(&times)
-                .map(|(cell, time)| match (time, cell) {
-                    (Some(time), _) => text::time_with(time),
-                    (None, cell) => text::some(*cell, |cell| cell.status.name().to_owned()),
-                });
-            table.add_row([structure.clone()].into_iter().chain(shown).chain([change]));
-            let point = |(run, time): (usize, &Option<&Metric>)| {
-                let time = (*time)?;
-                Some(Point {
-                    at: [run as f64, time.value],
-                    ends: ends(time.estimate()),
-                    note: format!(
-                        "{structure}, {}: {}",
-                        name(&reports[run]),
-                        text::time_with(time)
-                    ),
-                    ..Point::default()
-                })
+            let shown = (0..reports.len()).map(|run| {
+                let cell = cells.iter().find(|cell| cell.0 == run);
+                match times.iter().find(|time| time.0 == run) {
+                    Some((_, time)) => text::time_with(time),
+                    None => text::some(cell, |(_, cell)| cell.status.name().to_owned()),
+                }
+            });
+            table.add_row(
+                [structure.to_owned()]
+                    .into_iter()
+                    .chain(shown)
+                    .chain([change]),
+            );
+            let point = |&(run, time): &(usize, &Metric)| Point {
+                at: [run as f64, time.value],
+                ends: ends(time.estimate()),
+                note: format!(
+                    "{structure}, {}: {}",
+                    name(&reports[run]),
+                    text::time_with(time)
+                ),
+                ..Point::default()
             };
-            let is_scan = cells.iter().flatten().any(|cell| cell.is_scan());
-            let points = times.iter().enumerate().filter_map(point).collect();
-            series.push(Series::of(structure, is_scan, points));
+            let is_scan = cells.iter().any(|(_, cell)| cell.is_scan());
+            series.push(Series::of(
+                structure,
+                is_scan,
+                times.iter().map(point).collect(),
+            ));
         }
         series.retain(|series| !series.points.is_empty());
         // The fastest of the last run keeps its colour.
@@ -122,17 +98,13 @@ pub fn page(mut reports: Vec<Report>) -> String {
             let values = points.flat_map(|p| p.ends.unwrap_or([p.at[1]; 2]));
             let y = Axis::log("", values.collect::<Vec<_>>().into_iter(), 1.1, &text::time);
             let caption = format!("{heading}: time per query in each run, 95 % interval");
-            blocks.push(Block::Figure(
-                Diagram::of(caption, [x, y], Joined::Marked, series).draw(),
-            ));
+            let diagram = Diagram::of(caption, [x, y], Joined::Marked, series);
+            blocks.push(Block::Figure(diagram.draw()));
         }
         blocks.push(Block::Table(table));
     }
-    let title = format!(
-        "{} history of {}",
-        program::name(),
-        text::counted(reports.len(), "run")
-    );
+    let runs_shown = text::counted(reports.len(), "run");
+    let title = format!("{} history of {runs_shown}", program::name());
     let mut all = vec![
         Block::Heading(1, title.clone()),
         Block::Line(conclusion(&reports, compared, &changed)),

@@ -10,7 +10,7 @@ use super::shared_args::TableFormat;
 use super::table::Table;
 use super::{Ending, print_json, program, text};
 use crate::culling::TESTS;
-use crate::index::{Info, Registry};
+use crate::index::Registry;
 use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
 use crate::motion::{MOTION_PARAMS, MOTIONS};
 use crate::path::{PATH_PARAMS, PATHS};
@@ -54,15 +54,6 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// Condition under which a run times a structure.
-fn timed(info: &Info) -> &'static str {
-    if info.on_request {
-        "if named"
-    } else {
-        "by default"
-    }
-}
-
 /// A row for people: its name and its summary with what the columns hold.
 fn told((name, columns, summary): Row) -> [String; 2] {
     let of = |value: &Value| match value {
@@ -89,6 +80,11 @@ fn told((name, columns, summary): Row) -> [String; 2] {
     }
 }
 
+fn entries<'r>(rows: impl Iterator<Item = [&'r str; 2]>) -> String {
+    let rows = rows.map(|row| row.map(str::to_owned));
+    text::entries(&rows.collect::<Vec<_>>(), text::width())
+}
+
 fn as_json((name, columns, summary): Row) -> Value {
     let mut row = json!({ "name": name, "summary": summary });
     for (column, value) in columns {
@@ -97,107 +93,101 @@ fn as_json((name, columns, summary): Row) -> Value {
     row
 }
 
+/// Rows with one further column: name, column and summary.
+fn rows_with<'r>(
+    column: &'static str,
+    rows: impl IntoIterator<Item = [&'r str; 3]>,
+) -> impl Iterator<Item = Row> {
+    let rows = rows.into_iter();
+    rows.map(move |[name, value, summary]| {
+        let columns = vec![(column, value.into())];
+        (name.to_owned(), columns, summary.to_owned())
+    })
+}
+
+/// Name of a topic, a note on it, and its rows.
 fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
-    let row = |name: &str, columns: &[(&'static str, &str)], summary: &str| {
-        let columns = columns
-            .iter()
-            .map(|&(column, value)| (column, value.into()));
-        (name.to_owned(), columns.collect(), summary.to_owned())
-    };
     Ok(match topic {
         ListTopic::Structures => {
             let rows = registry.rows().iter().map(|row| {
                 let info = row.info;
                 let params = registry.structure(info.name)?.params;
+                let timed = if info.on_request {
+                    "if named"
+                } else {
+                    "by default"
+                };
                 let columns = vec![
                     ("kind", info.kind.name().into()),
                     ("origin", info.origin.to_string().into()),
                     ("capabilities", info.capabilities.names().into()),
-                    ("timed", timed(&info).into()),
+                    ("timed", timed.into()),
                     ("params", params.to_string().into()),
                 ];
                 Ok((info.name.to_owned(), columns, info.summary.to_owned()))
             });
+            let rows = rows.collect::<anyhow::Result<_>>()?;
             let note = "Parameters follow the name: bvh:leaf=4,preset=medium\nLists of \
                         structures: all, default (those timed by default) or names separated by \
                         commas";
-            (
-                "structures",
-                note.to_owned(),
-                rows.collect::<anyhow::Result<_>>()?,
-            )
+            ("structures", note.to_owned(), rows)
         }
         ListTopic::Scenes => {
-            let families = FAMILIES.iter().map(|f| {
+            let mut rows: Vec<[String; 3]> = Vec::new();
+            for f in FAMILIES {
                 let params = format!("{SCENE_PARAMS}, {}", f.params);
-                row(f.name, &[("params", &params)], f.summary)
-            });
-            let meshes = MESHES
-                .iter()
-                .map(|m| row(m.name, &[("params", SCENE_PARAMS)], m.summary));
-            let samples = SAMPLES.iter().map(|s| {
-                let licence = format!("real; {}", s.licence);
-                row(s.name, &[("params", &licence)], s.summary)
-            });
-            let fetched = FETCHED.iter().map(|f| {
+                rows.push([f.name.to_owned(), params, f.summary.to_owned()]);
+            }
+            rows.extend(
+                MESHES
+                    .iter()
+                    .map(|m| [m.name, SCENE_PARAMS, m.summary].map(str::to_owned)),
+            );
+            for s in SAMPLES {
+                let params = format!("real; {}", s.licence);
+                rows.push([s.name.to_owned(), params, s.summary.to_owned()]);
+            }
+            for f in FETCHED.iter() {
                 let state = match f.is_there() {
                     true => "fetched".to_owned(),
                     false => format!("missing: scripts/fetch.py {}", f.name),
                 };
                 let params = format!("{state}; {}", f.licence);
-                let path = f.path();
-                row(&path.to_string_lossy(), &[("params", &params)], &f.summary)
-            });
-            let suites = SUITES
-                .iter()
-                .map(|s| [s.name.to_owned(), s.summary.to_owned()]);
-            let suites = text::entries(&suites.collect::<Vec<_>>(), text::width());
+                let path = f.path().to_string_lossy().into_owned();
+                rows.push([path, params, f.summary.clone()]);
+            }
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, \
                  glTF or GLB, OBJ, a Doom WAD (maps.wad#MAP07 picks a map), a Quake III BSP, or a \
-                 zip or pk3 with one (pak.pk3#maps/q.bsp).\nReal scenes have licences of their own: `{} licences`.\nSuites of `run`:\n{suites}",
-                program::name()
+                 zip or pk3 with one (pak.pk3#maps/q.bsp).\nReal scenes have licences of their own: `{} licences`.\nSuites of `run`:\n{}",
+                program::name(),
+                entries(SUITES.iter().map(|s| [s.name, s.summary]))
             );
-            (
-                "scenes",
-                note,
-                families
-                    .chain(meshes)
-                    .chain(samples)
-                    .chain(fetched)
-                    .collect(),
-            )
+            let rows = rows.iter().map(|row| row.each_ref().map(String::as_str));
+            ("scenes", note, rows_with("params", rows).collect())
         }
-        ListTopic::Paths => (
-            "paths",
-            format!(
+        ListTopic::Paths => {
+            let rows = PATHS.iter().map(|p| [p.name, p.params, p.summary]);
+            let note = format!(
                 "Parameters of every path: {PATH_PARAMS}.\nA path is also a file: a cameras CSV (eye_x.. and look_x.. or forward_x.., or matrices m00..m33)."
-            ),
-            PATHS
-                .iter()
-                .map(|p| row(p.name, &[("params", p.params)], p.summary))
-                .collect(),
-        ),
-        ListTopic::Tests => (
-            "tests",
-            String::new(),
-            TESTS.iter().map(|(_, n, s)| row(n, &[], s)).collect(),
-        ),
+            );
+            ("paths", note, rows_with("params", rows).collect())
+        }
+        ListTopic::Tests => {
+            let row = |(name, summary): (&str, &str)| (name.to_owned(), vec![], summary.to_owned());
+            let rows = TESTS.iter().map(|(_, name, summary)| row((name, summary)));
+            ("tests", String::new(), rows.collect())
+        }
         ListTopic::Metrics => {
-            let rows = METRICS
-                .iter()
-                .map(|m| row(m.name, &[("unit", m.unit)], m.summary));
-            let bounds = BOUNDS
-                .iter()
-                .map(|b| [b.name, b.summary].map(str::to_owned));
-            let bounds = text::entries(&bounds.collect::<Vec<_>>(), text::width());
+            let rows = METRICS.iter().map(|m| [m.name, m.unit, m.summary]);
+            let bounds = entries(BOUNDS.iter().map(|b| [b.name, b.summary]));
             let note = format!("Lower bounds in reports and tables (no structures):\n{bounds}");
-            ("metrics", note, rows.collect())
+            ("metrics", note, rows_with("unit", rows).collect())
         }
         ListTopic::Motions => {
-            let rows = MOTIONS.iter().map(|m| {
+            let rows = MOTIONS.iter().flat_map(|m| {
                 let params = format!("share={}, step={}", m.share, m.step);
-                row(m.name, &[("params", &params)], m.summary)
+                rows_with("params", [[m.name, &params, m.summary]]).collect::<Vec<_>>()
             });
             let note = format!(
                 "Parameters of every motion: {MOTION_PARAMS}.\nA motion is also a file: a motion \

@@ -10,7 +10,6 @@
 mod advise;
 mod advise_table;
 mod against;
-mod against_table;
 mod args;
 mod bencher;
 mod command_args;
@@ -71,7 +70,7 @@ use std::process::ExitCode;
 
 use crate::index::Registry;
 use crate::input::{InputError, hold_files, tell_notes, tell_warnings};
-use crate::report::{try_folder, try_place, write_atomically};
+use crate::report::{folder_of, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene};
 use crate::shown::expected_by;
 use clap::{CommandFactory, Parser};
@@ -292,14 +291,6 @@ fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow:
         taken.push(place);
     }
     Ok(())
-}
-
-/// The folder that a file is in.
-fn folder_of(file: &Path) -> &Path {
-    let folder = file
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    folder.unwrap_or(Path::new("."))
 }
 
 /// Checks that one output can be written.

@@ -73,16 +73,6 @@ pub struct Worker {
     since: Instant,
 }
 
-/// A message of a worker, or its end.
-pub enum Said {
-    Part(Box<Part>, Vec<TaskSamples>),
-    Times(ProcessTimes),
-    /// The step that it begins.
-    Step(String),
-    /// The end, reported or observed.
-    Ended(Ended),
-}
-
 impl Worker {
     /// # Errors
     /// The program cannot be started.
@@ -139,15 +129,15 @@ impl Worker {
         })
     }
 
-    /// Waits for the next message; none within `wait`.
+    /// Waits for the next message or the end, reported or observed; none within `wait`.
     ///
     /// # Errors
     /// A message that no worker of this version sends.
-    pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Said>> {
+    pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Result<Message, Ended>>> {
         let line = match self.lines.recv_timeout(wait) {
             Ok(line) => line?,
             Err(RecvTimeoutError::Timeout) => return Ok(None),
-            Err(RecvTimeoutError::Disconnected) => return Ok(Some(Said::Ended(self.obituary()?))),
+            Err(RecvTimeoutError::Disconnected) => return Ok(Some(Err(self.obituary()?))),
         };
         self.since = Instant::now();
         let told = str::from_utf8(&line).ok();
@@ -161,24 +151,22 @@ impl Worker {
             )
         })?;
         Ok(Some(match message {
-            Message::Ready { protocol } => {
-                ensure!(
-                    protocol == PROTOCOL,
-                    "the program speaks protocol {protocol}; expected {PROTOCOL}: it is of \
-                     another version"
-                );
-                Said::Step("started".to_owned())
+            Message::Failed(reason) => Err(Ended::Failed(reason)),
+            Message::Done => Err(Ended::Done),
+            message => {
+                match &message {
+                    Message::Ready { protocol } => ensure!(
+                        *protocol == PROTOCOL,
+                        "the program speaks protocol {protocol}; expected {PROTOCOL}: it is of \
+                         another version"
+                    ),
+                    Message::Doing { structure, step } => {
+                        self.doing = (structure.clone(), step.clone());
+                    }
+                    _ => {}
+                }
+                Ok(message)
             }
-            Message::Doing { structure, step } => {
-                let name = structure.as_deref().unwrap_or_default();
-                let said = format!("{step} {name}").trim_end().to_owned();
-                self.doing = (structure, step);
-                Said::Step(said)
-            }
-            Message::Part(part, samples) => Said::Part(part, samples),
-            Message::Times(times) => Said::Times(times),
-            Message::Failed(reason) => Said::Ended(Ended::Failed(reason)),
-            Message::Done => Said::Ended(Ended::Done),
         }))
     }
 
@@ -231,11 +219,9 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
         const SIGKILL: i32 = 9;
+        let by_system = format!("killed while {step}: the system was out of memory, most likely");
         return match signal {
-            SIGKILL => Verdict::new(
-                Status::OutOfMemory,
-                format!("killed while {step}: the system was out of memory, most likely"),
-            ),
+            SIGKILL => Verdict::new(Status::OutOfMemory, by_system),
             _ => Verdict::new(
                 Status::Panicked,
                 format!("ended by signal {signal} while {step}"),
@@ -259,7 +245,7 @@ pub fn see_through(
     program: &Path,
     request: &Request,
     patience: Duration,
-    keep: &mut dyn FnMut(Said) -> anyhow::Result<()>,
+    keep: &mut dyn FnMut(Message) -> anyhow::Result<()>,
     step: &dyn Fn(&str),
 ) -> anyhow::Result<Ended> {
     let mut worker = Worker::start(program, request)?;
@@ -268,9 +254,15 @@ pub fn see_through(
             return Err(Interrupted.into());
         }
         match worker.listen(GLANCE)? {
-            Some(found @ (Said::Part(..) | Said::Times(_))) => keep(found)?,
-            Some(Said::Step(text)) => step(&text),
-            Some(Said::Ended(ended)) => return Ok(ended),
+            Some(Ok(Message::Ready { .. })) => step("started"),
+            Some(Ok(Message::Doing {
+                structure,
+                step: doing,
+            })) => {
+                step(format!("{doing} {}", structure.unwrap_or_default()).trim_end());
+            }
+            Some(Ok(found)) => keep(found)?,
+            Some(Err(ended)) => return Ok(ended),
             None if worker.since.elapsed() > patience => return Ok(worker.give_up(patience)),
             None => {}
         }
@@ -331,20 +323,14 @@ impl Workers {
         &self,
         process: u32,
         job: Job,
-        keep: &mut dyn FnMut(Said) -> anyhow::Result<()>,
+        keep: &mut dyn FnMut(Message) -> anyhow::Result<()>,
         step: &dyn Fn(&str),
     ) -> anyhow::Result<Ended> {
+        let cpu = process as usize % self.cpus.len().max(1);
+        let cpu = self.cpus.get(cpu).copied();
         let request = Request {
-            protocol: PROTOCOL,
-            args: self.args.clone(),
             spooled: self.spooled.clone(),
-            cpu: match self.cpus.len() {
-                0 => None,
-                count => Some(self.cpus[process as usize % count]),
-            },
-            layout: u64::from(process),
-            files: input::held_files(),
-            job,
+            ..Request::new(&self.args, job, cpu, u64::from(process))
         };
         see_through(&self.program, &request, self.patience, keep, step)
     }
@@ -353,7 +339,12 @@ impl Workers {
     ///
     /// # Errors
     /// The errors of [`see_through`]; a process that does not finish.
-    pub fn found(&self, process: u32, job: Job, step: &dyn Fn(&str)) -> anyhow::Result<Vec<Said>> {
+    pub fn found(
+        &self,
+        process: u32,
+        job: Job,
+        step: &dyn Fn(&str),
+    ) -> anyhow::Result<Vec<Message>> {
         let mut found = Vec::new();
         let mut keep = |said| {
             found.push(said);
@@ -398,6 +389,21 @@ pub struct Request {
     pub cpu: Option<usize>,
     /// Decides on where its memory lies: another number for every process.
     pub layout: u64,
+}
+
+impl Request {
+    /// A job of a command with these arguments; no pipes.
+    pub fn new(args: &[String], job: Job, cpu: Option<usize>, layout: u64) -> Request {
+        Request {
+            protocol: PROTOCOL,
+            args: args.to_vec(),
+            spooled: BTreeMap::new(),
+            files: input::held_files(),
+            job,
+            cpu,
+            layout,
+        }
+    }
 }
 
 /// One process's share of what a command measures.

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::index::Registry;
 use crate::measure::{BOUNDS, METRICS};
-use crate::report::{Comparison, Overall, Report, Views, comparisons, read_report, views};
+use crate::report::{Comparison, Overall, Report, Views, comparisons, grouped, read_report, views};
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
     let outputs = [
@@ -28,14 +28,18 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         ("--history", args.history.as_deref()),
     ];
     // Of a run's folder the report is read.
-    let inputs = args.reports.iter();
-    let inputs: Vec<PathBuf> = inputs
-        .flat_map(|path| [path.clone(), path.join("report.json")])
+    let files: Vec<PathBuf> = args
+        .reports
+        .iter()
+        .map(|path| path.join("report.json"))
         .collect();
-    expect_places(
-        &outputs,
-        &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>(),
-    )?;
+    let inputs: Vec<&Path> = args
+        .reports
+        .iter()
+        .chain(&files)
+        .map(PathBuf::as_path)
+        .collect();
+    expect_places(&outputs, &inputs)?;
     expect_folder("--svg", args.svg.as_deref())?;
     if let Some(path) = &args.history {
         let reports = args.reports.iter().map(|path| read_report(path));
@@ -50,23 +54,20 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     };
     let mut report = read_report(path)?;
     declare(&mut report, registry);
-    let pictures = match args.svg.is_some() {
-        true => surface_tables::pictures(&report),
-        false => Vec::new(),
-    };
     if let Some(path) = &args.markdown {
         write_text(path, &to_markdown(&blocks(&report, &BTreeMap::new())))?;
     }
     if let Some(path) = &args.bencher {
         write_text(path, &bencher::format(&report)?)?;
     }
-    match &args.svg {
-        Some(folder) if pictures.is_empty() => tell(&format!(
-            "note: no chart in {}; a chart needs a structure with times",
-            folder.display()
-        )),
-        Some(folder) => write_charts(folder, &pictures)?,
-        None => {}
+    if let Some(folder) = &args.svg {
+        match &surface_tables::pictures(&report)[..] {
+            [] => tell(&format!(
+                "note: no chart in {}; a chart needs a structure with times",
+                folder.display()
+            )),
+            pictures => write_charts(folder, pictures)?,
+        }
     }
     if let Some(file) = &args.html {
         let folder = match path.is_dir() {
@@ -224,47 +225,35 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
 
 /// Every scene and path with all its figures.
 fn details(all: &[Comparison], views: &BTreeMap<String, Views>) -> Vec<Block> {
-    let mut blocks = Vec::new();
-    let mut scene = "";
-    for comparison in all {
-        let about = comparison.about();
-        if about.scene.name != scene {
-            scene = &about.scene.name;
+    let path = |comparison: &Comparison| {
+        let cell = comparison.about();
+        let path = &cell.path;
+        [&cell.scene.name, &path.name, &path.cache, &path.motion].map(String::clone)
+    };
+    let paths = grouped(all.iter().map(|comparison| (path(comparison), comparison)));
+    let (mut blocks, mut scene) = (Vec::new(), "");
+    for (names, tests) in &paths {
+        if names[0] != scene {
+            scene = &names[0];
             blocks.push(Block::Heading(2, scene.to_owned()));
         }
-        let base = Overall::of(&[comparison]).base;
-        let own = views.get(&about.key().group.id());
-        let own = own.filter(|_| about.path.motion.is_empty());
-        blocks.extend(of_comparison(comparison, base, own));
-        let path = |comparison: &Comparison| {
-            let cell = comparison.about();
-            let path = &cell.path;
-            [&cell.scene.name, &path.name, &path.cache, &path.motion].map(String::clone)
-        };
-        let tests: Vec<&Comparison> = (all.iter())
-            .filter(|other| path(other) == path(comparison))
-            .collect();
-        if tests
-            .last()
-            .is_some_and(|last| std::ptr::eq(*last, comparison))
-        {
-            blocks.extend(run_figures::errors(&tests).map(Block::Figure));
+        for comparison in tests {
+            let about = comparison.about();
+            let base = Overall::of(&[comparison]).base;
+            let own = views.get(&about.key().group.id());
+            let own = own.filter(|_| about.path.motion.is_empty());
+            blocks.extend(of_comparison(comparison, base, own));
         }
+        blocks.extend(run_figures::errors(tests).map(Block::Figure));
     }
     blocks
 }
 
 fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Views>) -> Vec<Block> {
     let about = comparison.about();
-    let motion = match about.path.motion.as_str() {
-        "" => String::new(),
-        motion => format!(", {motion}"),
-    };
-    let (path, cache, test) = (&about.path.name, &about.path.cache, &about.test);
-    let mut blocks = vec![Block::Heading(
-        3,
-        format!("{path}, {cache}, {test}{motion}"),
-    )];
+    let path = &about.path;
+    let heading = text::joined([&path.name, &path.cache, &about.test, &path.motion]);
+    let mut blocks = vec![Block::Heading(3, heading)];
     blocks.extend(run_table::heads(comparison).into_iter().map(Block::Line));
     blocks.push(Block::Line(text::basis(comparison)));
     let plot = base.and_then(|base| run_figures::speedups(comparison, base));

@@ -4,25 +4,24 @@
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 
 use super::args::RunArgs;
 use super::interrupt::Interrupted;
-use super::processes::Job;
-use super::processes::{Ended, Said, Workers};
+use super::processes::{Ended, Job, Message, Workers};
 use super::report::{page, show, show_written};
 use super::run_plan::{RunPlan, plan};
-use super::run_resume::{RunOptions, create, go_on, resume, utc_now};
+use super::run_resume::{RunOptions, create, go_on, resume};
 use super::study::progress;
 use super::{Ending, compare, expect_folder, interrupt, run_why, tell, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
 };
-use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_page};
+use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_page, save_report, utc};
 use crate::suite::DEFAULT_PATH;
 
 pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
@@ -33,13 +32,13 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     let folder = args.save.as_ref().map(|_| Path::new(compare::BASELINES));
     expect_folder("--save", folder)?;
     if args.resume {
-        let (folder, stream, begun) = resume(args)?;
+        let (stopped, stream, begun) = resume(args)?;
         let plan = plan(registry, &begun)?;
         plan.check_goes_on(&stream)
-            .with_context(|| folder.path().display().to_string())?;
+            .with_context(|| stopped.path.display().to_string())?;
         check_why(args, &plan)?;
         interrupt::from_now_on_finish();
-        let folder = go_on(folder, &stream)?;
+        let folder = go_on(stopped, &stream)?;
         let save = args.save.clone().or(begun.save);
         return Run::new(args, plan, folder, stream)?.all(save);
     }
@@ -58,16 +57,14 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
 /// Refuses the explanation of a structure that is not measured.
 fn check_why(args: &RunArgs, plan: &RunPlan) -> anyhow::Result<()> {
     let labels = plan.plan.structures.iter().map(|spec| spec.label.as_str());
-    let is_there = |why: &str| {
-        let mut labels = labels.clone();
-        labels.any(|label| label == why || label.split(':').next() == Some(why))
-    };
-    match &args.why {
-        Some(why) if !is_there(why) => bail!(
+    let labels: Vec<&str> = labels.collect();
+    let is_there = |why: &String| labels.iter().any(|label| run_why::is_named(label, why));
+    match args.why.as_ref().filter(|why| !is_there(why)) {
+        Some(why) => bail!(
             "--why is '{why}'; expected a structure that is measured: {}",
-            labels.collect::<Vec<_>>().join(", ")
+            labels.join(", ")
         ),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 
@@ -83,25 +80,23 @@ fn print_plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
 }
 
 /// A run on its way.
-struct Run {
+struct Run<'a> {
+    args: &'a RunArgs,
     plan: RunPlan,
     folder: RunFolder,
     stream: Stream,
     workers: Workers,
     bar: ProgressBar,
     started: Instant,
-    all_columns: bool,
-    /// The structure to explain.
-    why: Option<String>,
 }
 
-impl Run {
+impl<'a> Run<'a> {
     fn new(
-        args: &RunArgs,
+        args: &'a RunArgs,
         plan: RunPlan,
         folder: RunFolder,
         stream: Stream,
-    ) -> anyhow::Result<Run> {
+    ) -> anyhow::Result<Self> {
         let groups = plan.plan.groups().len() as u64;
         Ok(Run {
             bar: progress(groups * u64::from(plan.plan.effort.processes), ""),
@@ -113,8 +108,7 @@ impl Run {
                 folder.path(),
             )?,
             started: Instant::now(),
-            all_columns: args.all_columns,
-            why: args.why.clone(),
+            args,
             plan,
             folder,
             stream,
@@ -123,39 +117,33 @@ impl Run {
 
     /// Measures all scenes; keeps a finished run as the baseline `save`.
     fn all(mut self, save: Option<String>) -> anyhow::Result<Ending> {
-        let mut stopped = false;
-        for scene in 0..self.plan.plan.scenes.len() {
-            stopped = match self.scene(scene) {
-                Ok(()) => false,
-                Err(error) if error.is::<Interrupted>() => true,
-                Err(error) => {
-                    self.bar.finish_and_clear();
-                    self.close_early();
-                    return Err(error);
-                }
-            };
-            if stopped {
-                break;
-            }
-        }
+        let mut scenes = 0..self.plan.plan.scenes.len();
+        let measured = scenes.try_for_each(|scene| self.scene(scene));
         self.bar.finish_and_clear();
+        let stopped = measured.is_err();
+        // After an error what was measured stays, and no empty folder.
+        let failed = measured.err().filter(|error| !error.is::<Interrupted>());
         if self.stream.parts.is_empty() {
             drop(self.workers);
             self.folder.discard();
-            return Ok(Ending::Interrupted);
+            return failed.map_or(Ok(Ending::Interrupted), Err);
         }
         if !stopped && self.stream.finished_at.is_none() {
-            let at = utc_now();
-            self.folder.append(&Line::Finished { at: at.clone() })?;
+            let at = utc(SystemTime::now());
+            self.folder.append(Line::Finished { at: &at })?;
             self.stream.finished_at = Some(at);
         }
         let report = self.stream.report();
         // Tables before files: where a file cannot be written, what was measured is seen.
         let why = |structure: &String| run_why::show(&report, structure);
-        let shown = show(&report, self.all_columns);
-        let shown = shown.and_then(|()| self.why.as_ref().map_or(Ok(()), why));
+        let shown = show(&report, self.args.all_columns);
+        let shown = shown.and_then(|()| self.args.why.as_ref().map_or(Ok(()), why));
         let shown = unread_is_fine(shown);
-        self.folder.save(&report)?;
+        let saved = save_report(self.folder.path(), &report);
+        if let Some(error) = failed {
+            return Err(error);
+        }
+        saved?;
         save_page(self.folder.path(), &page(&report, self.folder.path()))?;
         let save = save.filter(|_| !stopped);
         if let Some(name) = &save {
@@ -172,27 +160,11 @@ impl Run {
         })
     }
 
-    /// After an error: what was measured stays, and no empty folder.
-    fn close_early(self) {
-        match self.stream.parts.is_empty() {
-            true => {
-                drop(self.workers);
-                self.folder.discard();
-            }
-            false => {
-                let report = self.stream.report();
-                let _ = show(&report, self.all_columns);
-                drop(self.folder.save(&report));
-            }
-        }
-    }
-
     /// All processes of a scene.
     fn scene(&mut self, scene: usize) -> anyhow::Result<()> {
         let planned = self.plan.plan.scenes[scene].clone();
-        let groups = self.plan.plan.groups_of(&planned);
-        let keys = groups.iter();
-        let keys = keys.map(|group| self.plan.plan.key(&planned, group));
+        let groups = self.plan.plan.groups_of(&planned).into_iter();
+        let keys = groups.map(|group| self.plan.plan.key(&planned, &group));
         let keys: Vec<GroupKey> = keys.collect();
         let mut failed = self.failed_before(&planned.source);
         for process in 0..self.plan.plan.effort.processes {
@@ -255,25 +227,18 @@ impl Run {
         };
         let source = self.plan.plan.scenes[scene].source.clone();
         let processes = self.plan.plan.effort.processes;
-        let Run {
-            bar,
-            folder,
-            stream,
-            workers,
-            ..
-        } = self;
         let mut keep = |said| {
-            if let Said::Part(part, samples) = said {
-                stream.parts.push(folder.keep(*part, &samples)?);
-                bar.inc(1);
+            if let Message::Part(part, samples) = said {
+                self.stream.parts.push(self.folder.keep(*part, &samples)?);
+                self.bar.inc(1);
             }
             Ok(())
         };
         let step = |step: &str| {
             let at = format!("{source}, process {} of {processes}: {step}", process + 1);
-            bar.set_message(text::plain(&at));
+            self.bar.set_message(text::plain(&at));
         };
-        workers.see_through(process, job, &mut keep, &step)
+        self.workers.see_through(process, job, &mut keep, &step)
     }
 
     /// Every cell of what is still wanted gets this verdict.
@@ -358,33 +323,28 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
     let program = report.run.command.split(' ').next()?;
     let all = comparisons(report);
     let first = all.iter().find(|c| c.winners().next().is_some())?.about();
-    let (scene, path) = (quoted(&first.scene.name), quoted(&first.path.name));
-    let (command, path, gives) = match report.run.suite {
-        Some(_) => ("run", None, "the same for a scene of your own"),
-        None => ("advise", Some(path), "which shortcuts pay here"),
-    };
-    let scene = path.as_ref().map_or("FILE", |_| &scene);
-    let mut line = format!("next    {program} {command} --scene {scene}");
-    let path = path.filter(|_| first.path.name != DEFAULT_PATH);
-    let mut options: Vec<String> = path
-        .map(|path| format!("--path {path}"))
-        .into_iter()
-        .collect();
+    if report.run.suite.is_some() {
+        let gives = "the same for a scene of your own";
+        return Some(format!("next    {program} run --scene FILE  {gives}"));
+    }
+    let mut line = format!(
+        "next    {program} advise --scene {}",
+        quoted(&first.scene.name)
+    );
+    let path = Some(&first.path.name).filter(|path| *path != DEFAULT_PATH);
+    let path = path.map(|path| format!("--path {}", quoted(path)));
     let recorded = RunOptions::recorded(args).ok()?;
-    options.extend(recorded.words(|name| READS.contains(&name)));
-    for option in options.iter().filter(|_| report.run.suite.is_none()) {
+    let read = recorded.words(|name| READS.contains(&name));
+    for option in path.into_iter().chain(read) {
         let last = line.rsplit('\n').next().unwrap_or_default();
         let is_within = last.chars().count() + option.chars().count() < width;
         // The shell joins the lines.
         let gap = if is_within { " " } else { " \\\n        " };
         line += &format!("{gap}{option}");
     }
-    let is_within = line.chars().count() + gives.len() + 2 <= width;
-    Some(if is_within {
-        format!("{line}  {gives}")
-    } else {
-        line
-    })
+    let gives = "  which shortcuts pay here";
+    let is_within = line.chars().count() + gives.len() <= width;
+    Some(line + if is_within { gives } else { "" })
 }
 
 /// A word as a shell takes it.

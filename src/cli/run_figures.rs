@@ -15,14 +15,9 @@ const LEAST_READINGS: [usize; 2] = [4, 20];
 /// Scene, path and motion of a comparison.
 pub fn of(comparison: &Comparison) -> String {
     let about = comparison.about();
-    let mut name = format!("{}, {}", about.scene.name, about.path.name);
-    if about.path.cache != "warm" {
-        name += &format!(", {}", about.path.cache);
-    }
-    if !about.path.motion.is_empty() {
-        name += &format!(", {}", about.path.motion);
-    }
-    name
+    let cache = Some(about.path.cache.as_str()).filter(|cache| *cache != "warm");
+    let (scene, path) = (about.scene.name.as_str(), &about.path);
+    text::joined([scene, &path.name, cache.unwrap_or_default(), &path.motion])
 }
 
 /// Speed-ups over `base`: a dot with its 95 % interval per structure.

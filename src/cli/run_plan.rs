@@ -102,15 +102,17 @@ fn shard(text: &str) -> Result<(usize, usize), SpecError> {
 }
 
 /// Refuses a name that comes twice: a cell is found by its names.
-fn each_once(what: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> anyhow::Result<()> {
+pub fn each_once(
+    what: &str,
+    names: impl IntoIterator<Item = impl AsRef<str>>,
+) -> anyhow::Result<()> {
     let mut seen = BTreeSet::new();
     for name in names {
-        let name = name.as_ref().to_owned();
+        let name = name.as_ref();
         ensure!(
-            !seen.contains(&name),
+            seen.insert(name.to_owned()),
             "{what} '{name}' is named twice; expected each once"
         );
-        seen.insert(name);
     }
     Ok(())
 }
@@ -120,12 +122,8 @@ impl RunPlan {
     fn check_motions(&self) -> anyhow::Result<()> {
         let motions = &self.plan.motions;
         each_once("motion", motions)?;
-        let mut cold = self
-            .plan
-            .scenes
-            .iter()
-            .filter(|scene| scene.caches.contains(&true));
-        if !motions.is_empty() && cold.next().is_some() {
+        let mut scenes = self.plan.scenes.iter();
+        if !motions.is_empty() && scenes.any(|scene| scene.caches.contains(&true)) {
             bail!(
                 "suite '{}' has cold caches, --motion has none; expected another suite, or --scene",
                 self.suite.name
@@ -175,13 +173,9 @@ impl RunPlan {
 
     /// Loads every scene and then every path of it, with a look at each.
     fn check_scenes(&self, look: Look) -> anyhow::Result<()> {
+        let plain = Culling::default();
         let is_plain = |culling: &Culling| {
-            let test = culling.test;
-            *culling
-                == Culling {
-                    test,
-                    ..Culling::default()
-                }
+            (culling.arithmetic, culling.planes) == (plain.arithmetic, plain.planes)
         };
         let as_it_comes =
             self.plan.lens == LensDefaults::default() && self.plan.cullings.iter().all(is_plain);

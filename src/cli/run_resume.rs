@@ -15,7 +15,7 @@ use super::run_plan::RunPlan;
 use super::{program, tell, text};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
-    Header, RunFolder, RunInfo, SCHEMA_VERSION, Setting, StoppedRun, Stream, dated, read_report,
+    Header, RunFolder, SCHEMA_VERSION, Setting, StoppedRun, Stream, dated, read_report,
     read_stream, utc,
 };
 use crate::scene;
@@ -34,7 +34,8 @@ pub fn create(
              from 1970 to 9999"
         ));
     }
-    let nanos = nanos(clock);
+    // Distinguishes runs of the same second.
+    let nanos = (clock.duration_since(UNIX_EPOCH)).map_or(0, |since| since.subsec_nanos());
     let id = format!("{:04x}", (nanos ^ std::process::id()) & 0xFFFF);
     let stamp: String = now.chars().filter(|c| !matches!(c, '-' | ':')).collect();
     let path = match &args.out {
@@ -42,21 +43,14 @@ pub fn create(
         None => PathBuf::from(format!("results/{stamp}-{}-{id}", machine.slug())),
     };
     let typed = typed_args()?;
-    let header = Header::of(&plan.plan, machine, format!("{stamp}-{id}"), now);
-    let header = Header {
-        run: RunInfo {
-            command: [&[program::name().to_owned()], &typed[..]]
-                .concat()
-                .join(" "),
-            suite: plan.from_suite.then(|| plan.suite.name.to_owned()),
-            shard: args.shard.clone(),
-            ..header.run
-        },
-        args: typed,
-        whole: plan.whole.clone(),
-        binary: binary_digest(),
-        ..header
-    };
+    let mut header = Header::of(&plan.plan, machine, format!("{stamp}-{id}"), now);
+    let words = [&[program::name().to_owned()], &typed[..]].concat();
+    header.run.command = words.join(" ");
+    header.run.suite = plan.from_suite.then(|| plan.suite.name.to_owned());
+    header.run.shard.clone_from(&args.shard);
+    header.args = typed;
+    header.whole.clone_from(&plan.whole);
+    header.binary = binary_digest();
     let folder = RunFolder::create(&path, &header)?;
     Ok((folder, Stream::of(header)))
 }
@@ -89,11 +83,11 @@ pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
 
 /// Continues a run.
 pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> {
-    if stopped.lost() > 0 {
+    if stopped.lost > 0 {
         tell(&format!(
             "note: {}: samples.csv lacks samples; {} measured again",
-            stopped.path().display(),
-            text::counted(stopped.lost(), "part")
+            stopped.path.display(),
+            text::counted(stopped.lost, "part")
         ));
     }
     Ok(stopped.go_on(stream)?)
@@ -106,10 +100,12 @@ const NOT_OF_THE_PLAN: [&str; 6] = ["resume", "out", "timeout", "save", "all_col
 fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
     let before = RunOptions::recorded(recorded)?;
     let now = RunOptions::of("run", std::env::args_os())?;
-    for (id, name, _) in RunOptions::all() {
-        let is_free = !now.is_typed(&id) || NOT_OF_THE_PLAN.contains(&id.as_str());
+    for (id, name, _) in RunOptions::all()
+        .into_iter()
+        .filter(|(id, ..)| now.is_typed(id))
+    {
         ensure!(
-            is_free || before.values(&id) == now.values(&id),
+            NOT_OF_THE_PLAN.contains(&id.as_str()) || before.values(&id) == now.values(&id),
             "--{name} is '{}', and the run was begun {}; expected the same or none: \
              --resume continues with the recorded options",
             now.values(&id).join(" "),
@@ -131,24 +127,21 @@ const NO_RUN: &str = "no run was recorded there; expected the folder of a run";
 pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
     let (one, other) = (RunOptions::recorded(one)?, RunOptions::recorded(other)?);
     for (id, name, _) in RunOptions::all() {
-        let of_all = id != "shard" && !NOT_OF_THE_PLAN.contains(&id.as_str());
-        if of_all && one.values(&id) != other.values(&id) {
-            bail!(
-                "was begun {} for --{name}, and the first shard {}; expected the same options",
-                other.told(&id),
-                one.told(&id)
-            );
-        }
+        let is_free = id == "shard" || NOT_OF_THE_PLAN.contains(&id.as_str());
+        ensure!(
+            is_free || one.values(&id) == other.values(&id),
+            "was begun {} for --{name}, and the first shard {}; expected the same options",
+            other.told(&id),
+            one.told(&id)
+        );
     }
     Ok(())
 }
 
 /// An error of recorded options, which are no usage of this command.
 fn one_line(error: clap::Error) -> anyhow::Error {
-    match program::one_line(&error) {
-        Some(line) => anyhow::anyhow!("recorded options: {line}"),
-        None => anyhow::anyhow!(NO_RUN),
-    }
+    let line = program::one_line(&error).map(|line| format!("recorded options: {line}"));
+    anyhow::Error::msg(line.unwrap_or_else(|| NO_RUN.to_owned()))
 }
 
 fn first() -> std::iter::Once<String> {
@@ -238,23 +231,10 @@ fn same_place(header: &Header, begun: &RunArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// RFC 3339 in UTC, to the second.
-pub fn utc_now() -> String {
-    utc(SystemTime::now())
-}
-
-/// Nanoseconds of a clock, which distinguish runs of the same second.
-fn nanos(clock: SystemTime) -> u32 {
-    let since = clock.duration_since(UNIX_EPOCH);
-    since
-        .unwrap_or_else(|before| before.duration())
-        .subsec_nanos()
-}
-
 fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
     // No folder of results holds no run.
-    let listing = fs::read_dir(results).into_iter().flatten();
-    let mut folders: Vec<PathBuf> = listing.flatten().map(|entry| entry.path()).collect();
+    let listing = fs::read_dir(results).into_iter().flatten().flatten();
+    let mut folders: Vec<PathBuf> = listing.map(|entry| entry.path()).collect();
     folders.sort();
     // Killed at the very end, a run lacks nothing but its report.
     let unfinished = |path: &PathBuf| {
@@ -325,8 +305,5 @@ mod tests {
         ] {
             assert_eq!(utc(at(seconds)), wanted, "{seconds}");
         }
-        let half = Duration::from_millis(500);
-        assert_eq!(nanos(UNIX_EPOCH - half), 500_000_000);
-        assert_eq!(nanos(UNIX_EPOCH + half), 500_000_000);
     }
 }

@@ -9,23 +9,14 @@ use super::document::Block;
 use super::table::Table;
 use super::{run_verdict, scene_facts, text};
 use crate::measure::Status;
-use crate::report::{Comparison, Overall, Ranked, ReportCell, Speedup, times_as_fast};
+use crate::report::{Comparison, Overall, ReportCell, Speedup, grouped, times_as_fast};
 use crate::shown::shortened;
 use crate::spec::parse_number;
 
 /// Comparisons of one cache state and culling test each.
 pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>> {
-    let mut groups: Vec<Vec<&Comparison>> = Vec::new();
-    for comparison in all {
-        match groups
-            .iter_mut()
-            .find(|group| key(group[0]) == key(comparison))
-        {
-            Some(group) => group.push(comparison),
-            None => groups.push(vec![comparison]),
-        }
-    }
-    groups
+    let groups = grouped(all.iter().map(|comparison| (key(comparison), comparison)));
+    groups.into_iter().map(|(_, group)| group).collect()
 }
 
 /// Conclusion of a group in sentences.
@@ -46,37 +37,32 @@ fn key<'r>(comparison: &Comparison<'r>) -> [&'r str; 3] {
 pub fn heads(comparison: &Comparison) -> Vec<String> {
     let cell = comparison.about();
     let (scene, path) = (&cell.scene, &cell.path);
-    let mut first = format!(
-        "{}: {}, {}",
-        scene.name,
+    let bad = (scene.skipped_items > 0).then(|| text::counted(scene.skipped_items, "bad item"));
+    let axes = (!scene.up.is_empty()).then(|| scene_facts::axes(scene));
+    let of_scene = [
         text::counted(scene.total_count, "item"),
-        text::counted(scene.region_count, "region")
-    );
-    if !scene.up.is_empty() {
-        first += &format!(", {}", scene_facts::axes(scene));
-    }
-    if scene.skipped_items > 0 {
-        let bad = text::counted(scene.skipped_items, "bad item");
-        first += &format!(", {bad} left out");
-    }
-    if scene.total_count == 0 {
-        first += "; nothing is ranked";
-    }
+        text::counted(scene.region_count, "region"),
+        axes.unwrap_or_default(),
+        text::some(bad, |bad| format!("{bad} left out")),
+    ];
+    let empty = if scene.total_count == 0 {
+        "; nothing is ranked"
+    } else {
+        ""
+    };
     let views = text::counted(path.camera_count, "view");
-    let mut second = format!("{}: {views}, {}", path.name, cell.test);
-    if path.cache != "warm" {
-        second += &format!(", {}", path.cache);
-    }
-    let mut motion = String::new();
-    if let Some(queries) = path.views_per_frame.checked_sub(1) {
+    let cache = if path.cache == "warm" {
+        ""
+    } else {
+        &path.cache
+    };
+    let motion = text::some(path.views_per_frame.checked_sub(1), |queries| {
         let checked = comparison.range(|cell| cell.times.cameras_checked);
         let frames = checked.unwrap_or_default().1 / (queries + 1);
-        let (frames, queries) = (
-            text::counted(frames, "frame"),
-            text::counted(queries + 1, "query"),
-        );
-        motion = format!("{}: {frames}, {queries} each", path.motion);
-    }
+        let frames = text::counted(frames, "frame");
+        let queries = text::counted(queries + 1, "query");
+        format!("{}: {frames}, {queries} each", path.motion)
+    });
     let visible = comparison.of_any("cull_rate").map(|culled| 1.0 - culled);
     let visible = visible.map(|visible| format!("{} of the items are visible", share(visible)));
     let sources = text::by_source(comparison);
@@ -86,17 +72,23 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         (Some(share), Some(items)) => Some(format!("{share} false positives ({items})")),
         (None, sources) => sources.map(|items| format!("false positives {items}")),
     };
-    let third: Vec<String> = visible.into_iter().chain(excess).collect();
-    let lens = path
-        .lens
-        .as_ref()
-        .map(scene_facts::lens)
-        .unwrap_or_default();
-    let matrix = path.lens.as_ref().and_then(|lens| lens.matrix.as_ref());
-    let matrix = matrix.map(|matrix| format!("matrices: {}", scene_facts::matrices(matrix)));
-    let matrix = matrix.unwrap_or_default();
-    let lines = [first, second, motion, lens, matrix, third.join(", ")].into_iter();
-    lines.filter(|line| !line.is_empty()).collect()
+    let lens = path.lens.as_ref();
+    let matrix = lens.and_then(|lens| lens.matrix.as_ref());
+    let lines = [
+        format!("{}: {}{empty}", scene.name, text::joined(of_scene)),
+        format!(
+            "{}: {}",
+            path.name,
+            text::joined([&views, &cell.test, cache])
+        ),
+        motion,
+        text::some(lens, scene_facts::lens),
+        text::some(matrix, |matrix| {
+            format!("matrices: {}", scene_facts::matrices(matrix))
+        }),
+        text::joined(visible.into_iter().chain(excess)),
+    ];
+    lines.into_iter().filter(|line| !line.is_empty()).collect()
 }
 
 /// A share in percent with three digits, never rounded up to 100.
@@ -175,8 +167,9 @@ pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) ->
         let row = row.into_iter().chain(figures.iter().map(figure));
         table.add_row(row.chain(last));
     };
-    for Ranked { rank, cell } in &comparison.ranked {
-        add(rank.map_or("-".to_owned(), |rank| rank.to_string()), cell);
+    for cell in &comparison.cells {
+        let rank = cell.rank.map_or("-".to_owned(), |rank| rank.to_string());
+        add(rank, cell);
     }
     for cell in comparison.bounds.iter().filter(|_| is_full) {
         add("lower bound".to_owned(), cell);
@@ -203,18 +196,18 @@ pub fn matrix(names: Vec<String>, all: &[&Comparison], overall: &Overall) -> Tab
     let mut table = Table::of_numbers(["scene, path"].into_iter().chain(head));
     for (name, comparison) in names.into_iter().zip(all) {
         let figure = |structure: &str| {
-            let mut cells = comparison.ranked.iter();
-            let Some(found) = cells.find(|ranked| ranked.cell.structure == structure) else {
+            let mut cells = comparison.cells.iter();
+            let Some(cell) = cells.find(|cell| cell.structure == structure) else {
                 return String::new();
             };
             let speedup = overall.base.filter(|base| *base != structure);
-            let speedup = speedup.and_then(|base| comparison.speedup(base, found.cell));
-            let shown = match (found.rank, speedup) {
-                (None, _) => return found.cell.status.name().to_owned(),
+            let speedup = speedup.and_then(|base| comparison.speedup(base, cell));
+            let shown = match (cell.rank, speedup) {
+                (None, _) => return cell.status.name().to_owned(),
                 (_, Some((ratio, _))) => text::significant(ratio),
-                (_, None) => text::some(found.cell.time(), |time| text::time(time.value)),
+                (_, None) => text::some(cell.time(), |time| text::time(time.value)),
             };
-            let mark = if found.rank == Some(1) { "*" } else { "" };
+            let mark = if cell.rank == Some(1) { "*" } else { "" };
             format!("{mark}{shown}")
         };
         let figures = columns.iter().map(|standing| figure(standing.structure));
@@ -235,19 +228,19 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
     let up: BTreeSet<&str> = about().map(|cell| cell.scene.up.as_str()).collect();
     let up: Vec<&str> = up.into_iter().collect();
     let lens = scene_facts::lenses(about().map(|cell| &cell.path));
-    let lens = lens.map(|lens| Block::Line(format!("{} up; {lens}", up.join(" or "))));
+    let lens = lens.map(|lens| format!("{} up; {lens}", up.join(" or ")));
     let names = labels(all).into_iter();
     let names = names.map(|label| shortened(&label, width / 2));
     let mut parts = matrix(names.collect(), all, overall).parts(width);
     let hidden = parts.split_off(1);
     let hidden: usize = hidden.iter().map(|part| part.header.len() - 1).sum();
     let more = text::counted(hidden, "further structure");
-    let more = (hidden > 0).then(|| Block::Line(format!("{more}: --all-columns")));
-    let lines = [lens, Some(Block::Table(parts.swap_remove(0)))];
-    let lines = lines
-        .into_iter()
-        .chain([Some(Block::Line(legend(all, overall)))]);
-    lines.chain([more]).flatten().collect()
+    let more = (hidden > 0).then(|| format!("{more}: --all-columns"));
+    let mut blocks: Vec<Block> = lens.into_iter().map(Block::Line).collect();
+    blocks.extend(parts.into_iter().map(Block::Table));
+    let lines = [legend(all, overall)].into_iter().chain(more);
+    blocks.extend(lines.map(Block::Line));
+    blocks
 }
 
 /// Meaning of the figures of a [`matrix`].
@@ -267,15 +260,8 @@ pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
 pub fn labels(all: &[&Comparison]) -> Vec<String> {
     let of = |comparison: &Comparison, show: fn(&str) -> String| {
         let about = comparison.about();
-        let motion = Some(show(&about.path.motion)).filter(|motion| !motion.is_empty());
-        let motion = motion
-            .map(|motion| format!(" {motion}"))
-            .unwrap_or_default();
-        format!(
-            "{} {}{motion}",
-            show(&about.scene.name),
-            show(&about.path.name)
-        )
+        let names = [&about.scene.name, &about.path.name, &about.path.motion];
+        names.map(|name| show(name)).join(" ").trim_end().to_owned()
     };
     let short: Vec<String> = all.iter().map(|c| of(c, short)).collect();
     let is_unique = |label: &String| short.iter().filter(|other| *other == label).count() == 1;
@@ -326,27 +312,15 @@ pub fn choices(group: &[&Comparison]) -> Vec<String> {
 }
 
 fn notes(group: &[&Comparison], of: impl Fn(&ReportCell) -> Option<String>) -> Vec<String> {
-    let mut found: Vec<(String, usize)> = Vec::new();
-    let ranked = group
-        .iter()
-        .flat_map(|c| c.ranked.iter().map(|ranked| ranked.cell));
-    let bounds = group.iter().flat_map(|c| c.bounds.iter().copied());
-    for cell in ranked.chain(bounds) {
-        let Some(note) = of(cell) else {
-            continue;
+    let cells = group.iter().flat_map(|c| c.cells.iter());
+    let cells = cells.chain(group.iter().flat_map(|c| &c.bounds));
+    let notes = cells.filter_map(|cell| Some((format!("{}: {}", cell.structure, of(cell)?), ())));
+    let lines = grouped(notes).into_iter().map(|(line, found)| {
+        let count = match group.len() {
+            1 => String::new(),
+            all => format!(" ({} of {all} paths)", found.len()),
         };
-        let line = format!("{}: {note}", cell.structure);
-        match found.iter_mut().find(|(known, _)| *known == line) {
-            Some((_, count)) => *count += 1,
-            None => found.push((line, 1)),
-        }
-    }
-    let of = |count: usize| match group.len() {
-        1 => String::new(),
-        all => format!(" ({count} of {all} paths)"),
-    };
-    let lines = found
-        .into_iter()
-        .map(|(line, count)| text::plain(&line) + &of(count));
+        text::plain(&line) + &count
+    });
     lines.collect()
 }

@@ -36,15 +36,10 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     let mut told = vec![ranking(comparison, base)];
     told.extend(base.and_then(fallback));
     told.extend(repaid(comparison));
-    told.extend(shared(comparison));
+    told.extend(gains(&SharedWork::of(comparison.sound())));
     told.extend(checked(&[comparison]));
     told.extend(failed(&[comparison]));
     told.join(" ")
-}
-
-/// Gains from threads that share a query, or the views of all cameras.
-fn shared(comparison: &Comparison) -> Option<String> {
-    gains(&SharedWork::of(comparison.sound()))
 }
 
 /// Wall time, gain and CPU time of work that threads share.
@@ -136,7 +131,7 @@ fn repaid(comparison: &Comparison) -> Option<String> {
 
 /// Checks of the answers: by the reference scan, and in exact arithmetic.
 fn checked(all: &[&Comparison]) -> Option<String> {
-    let cells = || all.iter().flat_map(|c| &c.ranked).map(|r| r.cell);
+    let cells = || all.iter().flat_map(|c| &c.cells);
     let tried = cells()
         .filter(|cell| cell.status != Status::LeftOut)
         .count();
@@ -171,7 +166,7 @@ fn checked(all: &[&Comparison]) -> Option<String> {
 
 /// Cells without a right answer, by their status.
 fn failed(all: &[&Comparison]) -> Option<String> {
-    let statuses = || all.iter().flat_map(|c| &c.ranked).map(|r| r.cell.status);
+    let statuses = || all.iter().flat_map(|c| &c.cells).map(|cell| cell.status);
     let mut failed = BTreeMap::<&str, usize>::new();
     for status in statuses().filter(|s| !matches!(s, Status::Ok | Status::LeftOut)) {
         *failed.entry(status.name()).or_default() += 1;

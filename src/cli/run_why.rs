@@ -45,13 +45,15 @@ pub fn show(report: &Report, structure: &str) -> io::Result<()> {
     out.flush()
 }
 
+/// Returns true for a structure by its label, or by its name without parameters.
+pub fn is_named(label: &str, name: &str) -> bool {
+    label == name || label.split(':').next() == Some(name)
+}
+
 /// The structure with that label, or without parameters that name.
 fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, String> {
-    let is_own = |cell: &ReportCell| {
-        cell.structure == structure || cell.structure.split(':').next() == Some(structure)
-    };
-    let mut cells = comparison.ranked.iter().map(|ranked| ranked.cell);
-    let Some(own) = cells.find(|cell| is_own(cell)) else {
+    let is_own = |cell: &ReportCell| is_named(&cell.structure, structure);
+    let Some(own) = comparison.cells.iter().copied().find(|cell| is_own(cell)) else {
         return Err(format!("{structure} was not measured."));
     };
     if own.value("query_ns").is_none() {

@@ -8,8 +8,7 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use serde_json::json;
 
-use super::processes::{Job, Timing};
-use super::processes::{Said, Workers};
+use super::processes::{Job, Message, Timing, Workers};
 use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
 use super::{Ending, interrupt, load_scene_by, print, tell, text};
 use crate::index::{Registry, StructureSpec};
@@ -183,7 +182,7 @@ impl Study {
             };
             let found = self.workers.found(process, job(timing), &told)?;
             all.extend(found.into_iter().filter_map(|said| match said {
-                Said::Times(times) => Some(times),
+                Message::Times(times) => Some(times),
                 _ => None,
             }));
         }

@@ -13,6 +13,21 @@ pub fn some<T>(value: Option<T>, show: impl FnOnce(T) -> String) -> String {
     value.map(show).unwrap_or_default()
 }
 
+/// Texts that are not empty, with commas between them.
+pub fn joined(texts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    let texts = texts.into_iter().map(|text| text.as_ref().to_owned());
+    let texts: Vec<String> = texts.filter(|text| !text.is_empty()).collect();
+    texts.join(", ")
+}
+
+/// "10 processes", or the fewest and the most: "3 to 10 processes".
+pub fn range((least, most): (usize, usize), shown: impl Fn(usize) -> String) -> String {
+    match least == most {
+        true => shown(most),
+        false => format!("{} to {}", count(least), shown(most)),
+    }
+}
+
 /// Basis of the times of a report, in one sentence.
 pub fn conclusion(report: &Report) -> String {
     let processes = report.cells.iter().map(|c| c.times.processes);
@@ -195,12 +210,8 @@ pub fn basis(comparison: &Comparison) -> String {
     if comparison.range(|_| 0).is_none() {
         return "no times".to_owned();
     }
-    let of = |number: fn(&ReportCell) -> usize, shown: &dyn Fn(usize) -> String| match comparison
-        .range(number)
-        .unwrap_or_default()
-    {
-        (least, most) if least == most => shown(most),
-        (least, most) => format!("{} to {}", count(least), shown(most)),
+    let of = |number: fn(&ReportCell) -> usize, shown: &dyn Fn(usize) -> String| {
+        range(comparison.range(number).unwrap_or_default(), shown)
     };
     format!(
         "{}, {} each; {} timed, {} checked, {} of them against the oracle",

@@ -8,6 +8,7 @@ use std::str::FromStr;
 use crate::drift::MOST_STEPS;
 use crate::funnel::StageKind;
 use crate::kernel::Kernel;
+use crate::report::JUDGED_METRICS;
 use crate::spec::{SpecError, parse_number};
 use crate::visibility::SampleGrid;
 
@@ -93,6 +94,13 @@ pub fn threshold(typed: &str) -> Result<f64, SpecError> {
     };
     let what = "a percentage such as 5% or a share from 0 to 1 such as 0.05";
     expected(share.filter(|share| *share >= 0.0), what)
+}
+
+/// A metric that runs are compared by.
+pub fn metric(name: &str) -> Result<&'static str, SpecError> {
+    let mut known = JUDGED_METRICS.iter().copied();
+    let metric = known.find(|metric| *metric == name.trim());
+    metric.ok_or_else(|| SpecError::unknown("metric", name, JUDGED_METRICS.iter().copied()))
 }
 
 /// Name of a baseline, which becomes the name of a file.

@@ -2,16 +2,14 @@
 //! relative to the other structures of its group, process by process: what moves
 //! a whole process, and most of what tells two days apart, drops out.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
-use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, WORK, work_changes};
+use super::judging::{COUNTERS, Changes, CommonShift, JudgedRow, Lone, Outcome, WORK, WorkChange};
 use super::ranking::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
 use super::{Report, ReportCell};
-use crate::measure::{CellKey, GroupKey, Machine, Status, Toolchain};
+use crate::measure::{GroupKey, Machine, Status, Toolchain};
 use crate::shown::number;
-use crate::statistics::{Judgement, judge_unpaired, median, trimmed_mean};
+use crate::statistics::{Judgement, judge, judge_unpaired, median, trimmed_mean};
 
 /// Fewer other structures cannot tell which of them moved: the median of three
 /// stays where it is when one of them moves, that of two does not.
@@ -21,15 +19,29 @@ pub const FEW_OTHERS: &str = "under three other structures in both reports to co
 /// Fewer processes have no interval.
 const LEAST_PROCESSES: usize = 3;
 
-/// Compares a report with an older one by these metrics of
-/// [`JUDGED_METRICS`](super::JUDGED_METRICS) or of [`WORK`]. `threshold` 0.05 is 5 %.
-///
-/// Per process, ln(time) of a structure minus the median of the other
-/// structures that both reports have in the group, each about its mean in the
-/// old report; old and new by [`judge_unpaired`], with Holm's correction over the cells of a metric. What
-/// moved everything at once is [`Changes::common_shift`].
-pub fn changes(old: &Report, new: &Report, threshold: f64, metrics: &[&'static str]) -> Changes {
-    let matched = matched(&old.cells, &new.cells);
+/// Source of the times of both sides.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Basis {
+    /// Two stored reports.
+    ///
+    /// Per process, ln(time) of a structure minus the median of the other structures that
+    /// both reports have in the group, each about its mean in the old report; old and new
+    /// by [`judge_unpaired`]. What moved everything at once is [`Changes::common_shift`].
+    Reports,
+    /// Pairs of processes in turns: times as they are, by [`judge`].
+    Pairs,
+}
+
+/// Compares cells with older ones by these metrics of
+/// [`JUDGED_METRICS`](super::JUDGED_METRICS) or of [`WORK`], with Holm's correction over
+/// the cells of a metric. `threshold` 0.05 is 5 %.
+pub fn changes(
+    basis: Basis,
+    [old, new]: [&[ReportCell]; 2],
+    threshold: f64,
+    metrics: &[&'static str],
+) -> Changes {
+    let matched = matched(old, new);
     let mut found = Changes {
         threshold,
         cells_in_common: matched.pairs.len(),
@@ -39,16 +51,8 @@ pub fn changes(old: &Report, new: &Report, threshold: f64, metrics: &[&'static s
     };
     let mut comparable = Vec::new();
     for &pair in &matched.pairs {
-        let is_asked_alike = asked_otherwise(pair).is_none();
-        if is_asked_alike {
-            let counts = |cell: &ReportCell| -> BTreeMap<String, f64> {
-                let metrics = cell.metrics.iter();
-                metrics.map(|(name, m)| (name.clone(), m.value)).collect()
-            };
-            let (was, is) = (counts(pair.0), counts(pair.1));
-            found
-                .work_changed
-                .extend(work_changes(&pair.0.key(), &was, &is));
+        if asked_otherwise(pair).is_none() {
+            found.work_changed.extend(work_changes(pair));
         }
         match as_a_whole(pair) {
             Some(row) => found.rows.push(row),
@@ -58,14 +62,27 @@ pub fn changes(old: &Report, new: &Report, threshold: f64, metrics: &[&'static s
     for &metric in metrics {
         found.rows.extend(match WORK.contains(&metric) {
             true => by_work(&comparable, metric, threshold),
-            false => by_metric(&comparable, metric, threshold),
+            false => by_metric(basis, &comparable, metric, threshold),
         });
     }
-    if metrics.iter().any(|metric| !WORK.contains(metric)) {
+    if basis == Basis::Reports && metrics.iter().any(|metric| !WORK.contains(metric)) {
         found.common_shift = common_shift(&comparable);
     }
     found.rows.sort_by(JudgedRow::order);
     found
+}
+
+/// The counters that differ, of those that both sides have.
+fn work_changes((old, new): Pair) -> impl Iterator<Item = WorkChange> {
+    COUNTERS.iter().filter_map(move |&counter| {
+        let (was, is) = (old.value(counter)?, new.value(counter)?);
+        (was != is).then(|| WorkChange {
+            cell: new.key(),
+            counter,
+            old: was,
+            new: is,
+        })
+    })
 }
 
 fn lone(cell: &ReportCell) -> Lone {
@@ -76,21 +93,49 @@ fn lone(cell: &ReportCell) -> Lone {
     }
 }
 
+/// A pair without figures.
+fn row((old, new): Pair, outcome: Outcome, reason: Option<String>) -> JudgedRow {
+    JudgedRow {
+        outcome,
+        cell: new.key(),
+        metric: None,
+        old: None,
+        new: None,
+        judgement: None,
+        processes: [0; 2],
+        old_status: old.status,
+        new_status: new.status,
+        reason,
+        pairs_ln_ns: None,
+    }
+}
+
 /// Outcome of a pair by its statuses and questions alone; `None` if times decide.
 fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
     let (old, new) = pair;
-    let by_status = JudgedRow::of_statuses(new.key(), &old.verdict(), &new.verdict());
+    let by_status = Outcome::of_statuses(old.status, new.status);
+    let different = |reason: String| row(pair, Outcome::Different, Some(reason));
     // Wrong is wrong, whatever the question was.
-    let is_broken = by_status.as_ref().map(|row| row.outcome) == Some(Outcome::Broken);
-    let different = |reason: String| JudgedRow {
-        old_status: old.status,
-        new_status: new.status,
-        ..JudgedRow::unjudged(new.key(), Outcome::Different, Some(reason))
-    };
-    match asked_otherwise(pair) {
-        Some(reason) if !is_broken => Some(different(reason)),
-        _ if by_status.is_some() => by_status,
-        _ => answered_otherwise(pair).map(different),
+    if by_status != Some(Outcome::Broken)
+        && let Some(reason) = asked_otherwise(pair)
+    {
+        return Some(different(reason));
+    }
+    match by_status {
+        Some(Outcome::Gained) => Some(row(pair, Outcome::Gained, old.reason.clone())),
+        Some(outcome) => Some(row(pair, outcome, new.reason.clone())),
+        None => answered_otherwise(pair).map(different),
+    }
+}
+
+/// A pair with both values of a metric, not yet judged.
+fn valued(pair: Pair, metric: &'static str) -> JudgedRow {
+    let (old, new) = (pair.0.value(metric), pair.1.value(metric));
+    JudgedRow {
+        metric: Some(metric),
+        old,
+        new,
+        ..row(pair, Outcome::Unmeasured, None)
     }
 }
 
@@ -131,77 +176,105 @@ fn logs((old, new): Pair, metric: &str) -> Option<Logs> {
     Some([of(old)?, of(new)?])
 }
 
-/// A cell on its way to a verdict.
-struct Candidate {
-    key: CellKey,
-    logs: Logs,
-    centred: Logs,
-}
+/// A cell on its way to a verdict: its row and its times.
+type Candidate<'r> = (&'r mut JudgedRow, Logs);
 
 /// The rows of one metric, in the order of the pairs.
-fn by_metric(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<JudgedRow> {
-    let mut rows = Vec::new();
-    let mut candidates: Vec<(usize, Candidate)> = Vec::new();
+fn by_metric(basis: Basis, pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<JudgedRow> {
+    let (mut rows, mut timed) = (Vec::new(), Vec::new());
     let is_of_frames = ["frame_ns", "update_ns"].contains(&metric);
     let moves = |pair: &&Pair| !pair.1.path.motion.is_empty();
     for &pair in pairs.iter().filter(|pair| !is_of_frames || moves(pair)) {
-        let value = |cell: &ReportCell| cell.value(metric);
-        let values = (value(pair.0), value(pair.1));
         let sound = |value: Option<f64>| value.is_some_and(is_sound);
-        let key = pair.1.key();
-        let mut row = JudgedRow::by_times(key.clone(), metric, values, None, [0; 2]);
-        match logs(pair, metric).filter(|_| sound(values.0) && sound(values.1)) {
-            None => row.reason = Some(why_unmeasured(values)),
-            Some(logs) => {
-                row.processes = [logs[0].len(), logs[1].len()];
-                // A build is not of cameras.
-                match timed_otherwise(pair).filter(|_| metric != "build_ms") {
-                    Some(reason) => {
-                        (row.outcome, row.reason) = (Outcome::Different, Some(reason));
-                    }
-                    None => {
-                        let centred = centred(&logs);
-                        candidates.push((rows.len(), Candidate { key, logs, centred }));
-                    }
-                }
-            }
+        let mut row = valued(pair, metric);
+        let mut own = logs(pair, metric).filter(|_| sound(row.old) && sound(row.new));
+        match &own {
+            None => row.reason = Some(why_unmeasured(row.old, row.new)),
+            Some(logs) => row.processes = logs.each_ref().map(Vec::len),
+        }
+        // A build is not of cameras.
+        let differs = timed_otherwise(pair).filter(|_| own.is_some() && metric != "build_ms");
+        if let Some(reason) = differs {
+            (row.outcome, row.reason, own) = (Outcome::Different, Some(reason), None);
         }
         rows.push(row);
+        timed.push(own);
     }
-    let relative: Vec<Option<Logs>> = candidates
-        .iter()
-        .map(|(_, own)| relative(own, candidates.iter().map(|(_, other)| other)))
-        .collect();
-    let [was, is] = [0, 1].map(|side| -> Vec<Vec<f64>> {
-        let known = relative.iter().flatten();
-        known.map(|logs| logs[side].clone()).collect()
-    });
-    let with_others = candidates.iter().zip(&relative);
-    let structures: Vec<&str> = with_others
-        .filter(|(_, relative)| relative.is_some())
-        .map(|((_, own), _)| own.key.structure.as_str())
-        .collect();
-    let mut judged = judge_unpaired(&was, &is, &structures, threshold).into_iter();
-    for ((at, _), relative) in candidates.iter().zip(&relative) {
-        let row = &mut rows[*at];
-        let judgement = relative.as_ref().and_then(|_| judged.next().flatten());
-        row.reason = why_inconclusive(relative.is_some(), row.processes);
-        row.judgement = judgement.or_else(|| by_values(row));
-        row.outcome = row
-            .judgement
-            .map_or(Outcome::Unmeasured, |j| j.change.into());
+    let timed = rows.iter_mut().zip(timed);
+    let timed = timed.filter_map(|(row, logs)| Some((row, logs?)));
+    match basis {
+        Basis::Reports => judge_reports(timed.collect(), threshold),
+        Basis::Pairs => judge_pairs(timed.collect(), threshold),
     }
     rows
 }
 
-/// The rows of one counter, in the order of the pairs.
+fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
+    let centred: Vec<Logs> = timed.iter().map(|(_, logs)| centred(logs)).collect();
+    let relative = (0..timed.len()).map(|own| relative(own, &timed, &centred));
+    let relative: Vec<Option<Logs>> = relative.collect();
+    let [was, is] = [0, 1].map(|side| -> Vec<Vec<f64>> {
+        let known = relative.iter().flatten();
+        known.map(|logs| logs[side].clone()).collect()
+    });
+    let with_others = timed.iter().zip(&relative);
+    let structures: Vec<&str> = with_others
+        .filter(|(_, relative)| relative.is_some())
+        .map(|((row, _), _)| row.cell.structure.as_str())
+        .collect();
+    let mut judged = judge_unpaired(&was, &is, &structures, threshold).into_iter();
+    for ((row, _), relative) in timed.into_iter().zip(relative) {
+        let judgement = relative.as_ref().and_then(|_| judged.next().flatten());
+        row.reason = why_inconclusive(relative.is_some(), row.processes);
+        conclude(row, judgement);
+    }
+}
+
+/// The old time as it is, and the new one by the ratio of the pairs.
+fn judge_pairs(timed: Vec<Candidate>, threshold: f64) {
+    let differences = timed.iter().map(|(_, [old, new])| -> Vec<f64> {
+        old.iter().zip(new).map(|(old, new)| new - old).collect()
+    });
+    let judged = judge(&differences.collect::<Vec<_>>(), threshold);
+    for ((row, logs), judgement) in timed.into_iter().zip(judged) {
+        let ratio = judgement.map(|found| found.ratio);
+        row.old = trimmed_mean(&logs[0]).map(|old| old.mean.exp()).or(row.old);
+        row.new = row
+            .old
+            .zip(ratio)
+            .map_or(row.new, |(old, ratio)| Some(old * ratio));
+        row.reason = why_inconclusive(true, row.processes);
+        row.pairs_ln_ns = Some(logs);
+        conclude(row, judgement);
+    }
+}
+
+/// Enters a judgement, or else the quotient of the values, which decides nothing.
+fn conclude(row: &mut JudgedRow, judgement: Option<Judgement>) {
+    let by_values = || {
+        let ratio = Some(row.new? / row.old?).filter(|ratio| is_sound(*ratio))?;
+        let pairs = row.processes[0].min(row.processes[1]);
+        Some(Judgement::without_interval(ratio, pairs))
+    };
+    row.judgement = judgement.or_else(by_values);
+    row.outcome = row
+        .judgement
+        .map_or(Outcome::Unmeasured, |j| j.change.into());
+}
+
+/// The rows of one counter, which is exact.
+///
+/// Any growth by more than `threshold` is more work.
 fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedRow> {
-    let rows = pairs.iter().map(|(old, new)| {
-        let values = (old.value(counter), new.value(counter));
-        let mut row = JudgedRow::by_work(new.key(), counter, values, threshold);
-        if row.outcome == Outcome::Unmeasured {
-            row.reason = Some(why_unmeasured(values));
-        }
+    let most = 1.0 + threshold;
+    let rows = pairs.iter().map(|&pair| {
+        let mut row = valued(pair, counter);
+        (row.outcome, row.reason) = match (row.old, row.new) {
+            (Some(old), Some(new)) if new > old * most => (Outcome::MoreWork, None),
+            (Some(old), Some(new)) if old > new * most => (Outcome::LessWork, None),
+            (Some(_), Some(_)) => (Outcome::Same, None),
+            (old, new) => (Outcome::Unmeasured, Some(why_unmeasured(old, new))),
+        };
         row
     });
     rows.collect()
@@ -209,20 +282,20 @@ fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedR
 
 /// ln(time) less what moved the median of the others, process by process;
 /// `None` with too few others.
-fn relative<'c>(own: &Candidate, all: impl Iterator<Item = &'c Candidate>) -> Option<Logs> {
-    let others = all.filter(|other| {
-        let same = |side: usize| other.logs[side].len() == own.logs[side].len();
-        let (key, own) = (&other.key, &own.key);
-        key.group == own.group && key.structure != own.structure && same(0) && same(1)
+fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Option<Logs> {
+    let (row, logs) = &timed[own];
+    let others = timed.iter().zip(centred).filter(|((other, _), _)| {
+        let (key, own) = (&other.cell, &row.cell);
+        key.group == own.group && key.structure != own.structure && other.processes == row.processes
     });
-    let others: Vec<&Candidate> = others.collect();
+    let others: Vec<&Logs> = others.map(|(_, centred)| centred).collect();
     if others.len() < LEAST_OTHERS {
         return None;
     }
     let side = |side: usize| -> Vec<f64> {
-        let own = own.logs[side].iter().enumerate();
+        let own = logs[side].iter().enumerate();
         own.filter_map(|(process, ln)| {
-            let others: Vec<f64> = others.iter().map(|o| o.centred[side][process]).collect();
+            let others: Vec<f64> = others.iter().map(|o| o[side][process]).collect();
             Some(ln - median(&others)?)
         })
         .collect()
@@ -230,15 +303,8 @@ fn relative<'c>(own: &Candidate, all: impl Iterator<Item = &'c Candidate>) -> Op
     Some([side(0), side(1)])
 }
 
-/// The quotient of the two values, which decides nothing.
-fn by_values(row: &JudgedRow) -> Option<Judgement> {
-    let ratio = Some(row.new? / row.old?).filter(|ratio| is_sound(*ratio))?;
-    let pairs = row.processes[0].min(row.processes[1]);
-    Some(Judgement::without_interval(ratio, pairs))
-}
-
-fn why_unmeasured(values: (Option<f64>, Option<f64>)) -> String {
-    match values {
+fn why_unmeasured(old: Option<f64>, new: Option<f64>) -> String {
+    match (old, new) {
         (None, None) => "in neither report".to_owned(),
         (Some(_), None) => "only in OLD".to_owned(),
         (None, Some(_)) => "only in NEW".to_owned(),

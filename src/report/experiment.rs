@@ -84,12 +84,8 @@ impl Experiment {
     /// The errors of [`measure_scene`].
     pub fn run(&self) -> Result<Report, ExperimentError> {
         let started_at = utc(SystemTime::now());
-        let mut header = Header::of(
-            &self.plan,
-            Machine::capture(),
-            started_at.clone(),
-            started_at,
-        );
+        let (machine, id) = (Machine::capture(), started_at.clone());
+        let mut header = Header::of(&self.plan, machine, id, started_at);
         header.run.processes = 1;
         let mut stream = Stream::of(header);
         for planned in &self.plan.scenes {
@@ -101,9 +97,8 @@ impl Experiment {
                     samples_end: 0,
                 });
             };
-            measure_scene(&self.plan, planned, &share, &mut keep, &|_, _| (), &|| {
-                false
-            })?;
+            let never = || false;
+            measure_scene(&self.plan, planned, &share, &mut keep, &|_, _| (), &never)?;
         }
         stream.finished_at = Some(utc(SystemTime::now()));
         Ok(stream.report())

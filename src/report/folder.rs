@@ -44,7 +44,7 @@ impl RunFolder {
         // There is no stream without its first line: it gets its name with it.
         let begin = || -> io::Result<NamedTempFile> {
             let (mut stream, is_locked) = locked_temporary_in(path)?;
-            stream.write_all(&Line::Run(Box::new(header.clone())).to_json()?)?;
+            stream.write_all(&Line::Run(header).to_json()?)?;
             is_locked?;
             Ok(stream)
         };
@@ -55,13 +55,11 @@ impl RunFolder {
             }
             io(error)
         })?;
-        let stream = match begun.persist_noclobber(&file) {
-            Ok(stream) => stream,
-            Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
-                return Err(writing::taken(path));
-            }
-            Err(error) => return Err(io(error.error)),
-        };
+        let named = begun.persist_noclobber(&file);
+        let stream = named.map_err(|error| match error.error.kind() {
+            io::ErrorKind::AlreadyExists => writing::taken(path),
+            _ => io(error.error),
+        })?;
         let mut folder = RunFolder {
             path: path.to_owned(),
             stream,
@@ -95,7 +93,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// I/O errors.
-    pub fn append(&mut self, line: &Line) -> Result<(), InputError> {
+    pub fn append(&mut self, line: Line) -> Result<(), InputError> {
         let written = line.to_json().and_then(|text| self.stream.write_all(&text));
         written.map_err(writing::io(&self.path.join(STREAM)))
     }
@@ -135,16 +133,8 @@ impl RunFolder {
             rows,
             samples_end: self.samples_end,
         };
-        self.append(&Line::Part(Box::new(kept.clone())))?;
+        self.append(Line::Part(&kept))?;
         Ok(kept)
-    }
-
-    /// Writes report.json and summary.csv of what the stream holds.
-    ///
-    /// # Errors
-    /// I/O errors.
-    pub fn save(&self, report: &Report) -> Result<(), InputError> {
-        save_report(&self.path, report)
     }
 
     /// Takes the folder away again: for a run that ended before its first part.
@@ -163,11 +153,13 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The folder of a run that was stopped: locked, and as it was left.
 pub struct StoppedRun {
-    path: PathBuf,
+    /// The folder that is read from.
+    pub path: PathBuf,
+    /// Parts whose samples are gone, to be measured again.
+    pub lost: usize,
     stream: File,
     /// Length of the stream, as far as it is whole and has its samples.
     length: u64,
-    lost: usize,
 }
 
 impl StoppedRun {
@@ -213,17 +205,6 @@ impl StoppedRun {
             lost: all - stream.parts.len(),
         };
         Ok((stopped, stream))
-    }
-
-    /// Parts that are to be measured again: samples.csv holds less than the
-    /// stream says.
-    pub fn lost(&self) -> usize {
-        self.lost
-    }
-
-    /// The folder that is read from.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Cuts off what is not whole, to be appended to.

@@ -3,11 +3,10 @@
 //! may be judged, and the counters that are compared exactly.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::measure::{CellKey, Status, Verdict};
+use crate::measure::{CellKey, Status};
 use crate::statistics::{Change, Judgement};
 
 /// The metrics with a value per process, which a judgement needs; less is
@@ -136,79 +135,6 @@ pub struct JudgedRow {
 }
 
 impl JudgedRow {
-    /// A cell that is not right on both sides; `None` if it is.
-    pub fn of_statuses(cell: CellKey, old: &Verdict, new: &Verdict) -> Option<JudgedRow> {
-        let outcome = Outcome::of_statuses(old.status, new.status)?;
-        let reason = match outcome {
-            Outcome::Gained => old.reason.clone(),
-            _ => new.reason.clone(),
-        };
-        Some(JudgedRow {
-            old_status: old.status,
-            new_status: new.status,
-            ..JudgedRow::unjudged(cell, outcome, reason)
-        })
-    }
-
-    /// A cell that is right on both sides, and yet not judged by times.
-    pub fn unjudged(cell: CellKey, outcome: Outcome, reason: Option<String>) -> JudgedRow {
-        JudgedRow {
-            outcome,
-            cell,
-            metric: None,
-            old: None,
-            new: None,
-            judgement: None,
-            processes: [0; 2],
-            old_status: Status::Ok,
-            new_status: Status::Ok,
-            reason,
-            pairs_ln_ns: None,
-        }
-    }
-
-    /// A cell by its times: old and new as shown, the verdict of the statistics.
-    pub fn by_times(
-        cell: CellKey,
-        metric: &'static str,
-        (old, new): (Option<f64>, Option<f64>),
-        judgement: Option<Judgement>,
-        processes: [usize; 2],
-    ) -> JudgedRow {
-        let outcome = judgement.map_or(Outcome::Unmeasured, |found| found.change.into());
-        JudgedRow {
-            metric: Some(metric),
-            old,
-            new,
-            judgement,
-            processes,
-            ..JudgedRow::unjudged(cell, outcome, None)
-        }
-    }
-
-    /// A cell by one of the counters in [`WORK`], which are exact: any growth by more
-    /// than `threshold` is more work.
-    pub fn by_work(
-        cell: CellKey,
-        counter: &'static str,
-        (old, new): (Option<f64>, Option<f64>),
-        threshold: f64,
-    ) -> JudgedRow {
-        let most = 1.0 + threshold;
-        let outcome = match old.zip(new) {
-            None => Outcome::Unmeasured,
-            Some((old, new)) if new > old * most => Outcome::MoreWork,
-            Some((old, new)) if old > new * most => Outcome::LessWork,
-            Some(_) => Outcome::Same,
-        };
-        JudgedRow {
-            metric: Some(counter),
-            old,
-            new,
-            ..JudgedRow::unjudged(cell, outcome, None)
-        }
-    }
-
     /// new / old, as judged or of the work.
     pub fn ratio(&self) -> Option<f64> {
         let is_work = self.metric.is_some_and(|metric| WORK.contains(&metric));
@@ -254,24 +180,6 @@ pub struct WorkChange {
     pub old: f64,
     /// Value in the new report.
     pub new: f64,
-}
-
-/// The counters of a cell that differ, of those that both sides have.
-pub fn work_changes(
-    cell: &CellKey,
-    old: &BTreeMap<String, f64>,
-    new: &BTreeMap<String, f64>,
-) -> Vec<WorkChange> {
-    let counters = COUNTERS.iter().filter_map(|&counter| {
-        let (&old, &new) = (old.get(counter)?, new.get(counter)?);
-        (old != new).then(|| WorkChange {
-            cell: cell.clone(),
-            counter,
-            old,
-            new,
-        })
-    });
-    counters.collect()
 }
 
 /// A cell that the other report does not have.

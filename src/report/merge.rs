@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 
 use super::changes::Setting;
 use super::folder::{self, save_report};
+use super::ranking::unique;
 use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Stream};
-use super::writing::temporary_folder_in;
 use super::writing::{self, SAMPLE_COLUMNS, SAMPLES, STREAM};
+use super::writing::{folder_of, temporary_folder_in};
 use crate::input::InputError;
 use crate::measure::GroupKey;
 use crate::shown::first_of;
@@ -129,10 +130,7 @@ impl Merged {
             true => fs::canonicalize(out).map_err(io)?,
             false => out.to_owned(),
         };
-        let parent = match out.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
+        let parent = folder_of(&out);
         if fs::read_dir(&out).is_ok_and(|mut entries| entries.next().is_some()) {
             let found = "has other files; expected an empty or new folder";
             return Err(io(io::Error::other(found)));
@@ -144,7 +142,10 @@ impl Merged {
             return Ok(false);
         }
         let stream = beside.path().join(STREAM);
-        self.write_stream(&stream).map_err(io)?;
+        let lines = self.stream.lines().map(|line| line.to_json());
+        let lines: io::Result<Vec<Vec<u8>>> = lines.collect();
+        let written = lines.and_then(|lines| fs::write(stream, lines.concat()));
+        written.map_err(io)?;
         save_report(beside.path(), &self.stream.report())?;
         if stop() {
             return Ok(false);
@@ -169,14 +170,6 @@ impl Merged {
         }
         out.flush()?;
         Ok(true)
-    }
-
-    fn write_stream(&self, path: &Path) -> io::Result<()> {
-        let mut out = BufWriter::new(File::create_new(path)?);
-        for line in self.stream.lines() {
-            out.write_all(&line.to_json()?)?;
-        }
-        out.flush()
     }
 }
 
@@ -231,14 +224,9 @@ fn overlap(own: &Stream, other: &Stream, first: &Path) -> Option<String> {
 /// Scenes with paths, a few of them by name.
 fn pairs(groups: &[GroupKey]) -> String {
     const NAMED: usize = 4;
-    let mut named: Vec<String> = Vec::new();
-    for key in groups {
-        let pair = format!("{} along {}", key.scene, key.path);
-        if !named.contains(&pair) {
-            named.push(pair);
-        }
-    }
-    first_of(&named, NAMED)
+    let pairs = groups.iter();
+    let pairs = pairs.map(|key| format!("{} along {}", key.scene, key.path));
+    first_of(&unique(pairs), NAMED)
 }
 
 /// The header of the run that the shards are together.

@@ -15,21 +15,19 @@ mod surface;
 mod writing;
 
 pub use crate::measure::{ReportCell, SamplesRef};
-pub use changes::{FEW_OTHERS, changes};
-pub use changes::{Setting, settings};
+pub use changes::{Basis, FEW_OTHERS, Setting, changes, settings};
 pub use experiment::Experiment;
 pub use folder::{RunFolder, StoppedRun, save_page, save_report};
 pub use judging::{
     COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WORK, WorkChange,
-    work_changes,
 };
 pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
-pub use ranking::{Comparison, Ranked, Speedup, comparisons, times_as_fast};
-pub use ranking::{Mean, Overall};
+pub use ranking::{Comparison, Mean, Overall, Speedup, comparisons, times_as_fast};
+pub use ranking::{grouped, unique};
 pub use reading::{Reading, Views, views};
 pub use reading::{read_report, read_stream};
 pub use stream::{Header, KeptPart, Line, Stream, dated, utc};
 pub use surface::{Crossing, Place, Surface, surfaces};
 pub use surface::{Growth, growths};
-pub use writing::{temporary_in, try_folder, try_place, write_atomically};
+pub use writing::{folder_of, temporary_in, try_folder, try_place, write_atomically};

@@ -11,18 +11,10 @@ use crate::statistics::geometric_mean;
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
-    /// Fastest first; what failed comes last, unranked.
-    pub ranked: Vec<Ranked<'r>>,
+    /// Fastest first; what failed comes last, without a rank.
+    pub cells: Vec<&'r ReportCell>,
     /// Measured beside them, in the order of the table of bounds.
     pub bounds: Vec<&'r ReportCell>,
-}
-
-/// A cell with its rank; none if it may not be compared by its time.
-pub struct Ranked<'r> {
-    /// 1 is the fastest; tied cells share a rank.
-    pub rank: Option<usize>,
-    /// The cell as reported.
-    pub cell: &'r ReportCell,
 }
 
 /// Key of a comparison.
@@ -38,39 +30,38 @@ fn key(cell: &ReportCell) -> Key<'_> {
 pub fn comparisons(report: &Report) -> Vec<Comparison<'_>> {
     let cells = report.cells.iter().map(|cell| (key(cell), cell));
     let comparison = |(wanted, cells): (Key<'_>, Vec<_>)| Comparison {
-        ranked: ranked(cells),
+        cells: ranked(cells),
         bounds: report.bounds.iter().filter(|b| key(b) == wanted).collect(),
     };
     grouped(cells).into_iter().map(comparison).collect()
 }
 
-/// Time by which a cell is ranked. Nothing is found faster among no items.
-fn time(cell: &ReportCell) -> Option<f64> {
-    let time = cell
-        .time()
-        .map(|time| time.value)
-        .filter(|ns| ns.is_finite());
-    let time = time.filter(|_| cell.scene.total_count > 0);
-    time.filter(|_| cell.status == Status::Ok)
+/// Takes the ranks of cells that may not be compared by their times.
+///
+/// Those without a time, and those among no items, where nothing is found faster.
+pub(super) fn without_false_ranks(cells: &mut [ReportCell]) {
+    for cell in cells {
+        let is_timed = cell.time().is_some_and(|time| time.value.is_finite());
+        let is_sound = is_timed && cell.scene.total_count > 0 && cell.status == Status::Ok;
+        cell.rank = cell.rank.filter(|_| is_sound);
+    }
 }
 
 /// Cells in the order of the ranks from the run, the faster first within a
 /// rank; those without a rank come last.
-fn ranked(cells: Vec<&ReportCell>) -> Vec<Ranked<'_>> {
-    let cells = cells.into_iter().map(|cell| Ranked {
-        rank: cell.rank.filter(|_| time(cell).is_some()),
-        cell,
-    });
-    let mut ranked: Vec<Ranked> = cells.collect();
-    let order = |ranked: &Ranked| {
-        let time = time(ranked.cell).unwrap_or(f64::INFINITY);
-        (ranked.rank.unwrap_or(usize::MAX), time)
+fn ranked(mut cells: Vec<&ReportCell>) -> Vec<&ReportCell> {
+    let order = |cell: &ReportCell| {
+        let time = cell.rank.and_then(|_| Some(cell.time()?.value));
+        (
+            cell.rank.unwrap_or(usize::MAX),
+            time.unwrap_or(f64::INFINITY),
+        )
     };
-    ranked.sort_by(|a, b| {
+    cells.sort_by(|a, b| {
         let (a, b) = (order(a), order(b));
         a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
     });
-    ranked
+    cells
 }
 
 /// A speed-up with the ends of its 95 % interval, where it has one.
@@ -79,19 +70,20 @@ pub type Speedup = (f64, Option<[f64; 2]>);
 impl<'r> Comparison<'r> {
     /// Any of its cells: scene, path and test are the same in all.
     pub fn about(&self) -> &'r ReportCell {
-        self.ranked[0].cell
+        self.cells[0]
     }
 
     /// Those of the first rank: the fastest and what ties with it.
     pub fn winners(&self) -> impl Iterator<Item = &'r ReportCell> {
-        let first = self.ranked.iter().filter(|r| r.rank == Some(1));
-        first.map(|r| r.cell)
+        self.sound().filter(|cell| cell.rank == Some(1))
     }
 
     /// The cells with a rank, fastest first.
     pub fn sound(&self) -> impl Iterator<Item = &'r ReportCell> {
-        let ranked = self.ranked.iter().filter(|r| r.rank.is_some());
-        ranked.map(|r| r.cell)
+        self.cells
+            .iter()
+            .copied()
+            .filter(|cell| cell.rank.is_some())
     }
 
     /// The cell of a structure, if it has a rank.
@@ -121,15 +113,14 @@ impl<'r> Comparison<'r> {
 
     /// The fewest and the most of a number, over the cells that were timed.
     pub fn range(&self, of: impl Fn(&ReportCell) -> usize) -> Option<(usize, usize)> {
-        let cells = self.ranked.iter().map(|r| r.cell);
-        let timed = cells.filter(|cell| cell.times.processes > 0);
-        let timed = || timed.clone().map(&of);
+        let timed = self.cells.iter().filter(|cell| cell.times.processes > 0);
+        let timed = || timed.clone().map(|cell| of(cell));
         Some((timed().min()?, timed().max()?))
     }
 
     /// How the answers differ from the truth: all that are right do alike.
     pub fn judged(&self) -> Option<&'r Judged> {
-        self.ranked.iter().find_map(|r| r.cell.error.as_ref())
+        self.cells.iter().find_map(|cell| cell.error.as_ref())
     }
 
     /// A metric that is the same in all cells, from the first that has it.
@@ -139,7 +130,7 @@ impl<'r> Comparison<'r> {
 
     /// The same with its interval.
     pub fn metric_of_any(&self, metric: &str) -> Option<&'r Metric> {
-        self.ranked.iter().find_map(|r| r.cell.metrics.get(metric))
+        self.cells.iter().find_map(|cell| cell.metrics.get(metric))
     }
 }
 
@@ -150,7 +141,7 @@ pub fn times_as_fast(base: &ReportCell, cell: &ReportCell) -> Option<f64> {
 }
 
 /// Values by their key, both in the order in which they come.
-pub(super) fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> Vec<(K, Vec<V>)> {
+pub fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> Vec<(K, Vec<V>)> {
     let mut groups: Vec<(K, Vec<V>)> = Vec::new();
     for (key, value) in pairs {
         match groups.iter_mut().find(|group| group.0 == key) {
@@ -159,6 +150,12 @@ pub(super) fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> V
         }
     }
     groups
+}
+
+/// Every value once, in the order in which they come.
+pub fn unique<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
+    let groups = grouped(all.map(|value| (value, ())));
+    groups.into_iter().map(|(value, _)| value).collect()
 }
 
 /// Group, structure, and number of cells before it that have both.
@@ -269,16 +266,8 @@ impl<'r> Overall<'r> {
     /// The structures of `all`, of which those without ranks count nothing.
     pub fn of(all: &[&Comparison<'r>]) -> Overall<'r> {
         let ranked = || all.iter().filter(|c| c.winners().next().is_some());
-        let mut names: Vec<&'r str> = Vec::new();
-        for structure in all
-            .iter()
-            .flat_map(|c| &c.ranked)
-            .map(|r| r.cell.structure.as_str())
-        {
-            if !names.contains(&structure) {
-                names.push(structure);
-            }
-        }
+        let cells = all.iter().flat_map(|comparison| &comparison.cells);
+        let names: Vec<&'r str> = unique(cells.map(|cell| cell.structure.as_str()));
         let cells = |name: &str| -> Option<Vec<&'r ReportCell>> {
             ranked().map(|c| c.sound_cell(name)).collect()
         };

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::ranking::without_false_ranks;
 use super::stream::{Header, KeptPart, Stream};
 use super::writing::{self, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::{Report, SCHEMA_VERSION};
@@ -46,10 +47,12 @@ fn read_json(path: PathBuf) -> Result<Report, InputError> {
     let bytes = fs::read(&path).map_err(writing::io(&path))?;
     let bad = |error| writing::json(&path, &error, "the report of a run");
     let Versioned { schema_version } = from_json(&bytes).map_err(bad)?;
-    match schema_version == SCHEMA_VERSION {
-        true => from_json(&bytes).map_err(bad),
-        false => Err(writing::version(&path, schema_version)),
+    if schema_version != SCHEMA_VERSION {
+        return Err(writing::version(&path, schema_version));
     }
+    let mut report: Report = from_json(&bytes).map_err(bad)?;
+    without_false_ranks(&mut report.cells);
+    Ok(report)
 }
 
 /// Reads the stream of a run, and the ends of its lines in bytes: of the header,
@@ -74,25 +77,18 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
     let mut stream: Option<Stream> = None;
     let (mut seen, mut groups) = (BTreeSet::new(), BTreeMap::new());
     let (mut ends, mut end) = (Vec::new(), 0);
-    let lines = bytes.split_inclusive(|b| *b == b'\n');
-    for (n, text) in lines
-        .enumerate()
-        .take_while(|(_, text)| text.ends_with(b"\n"))
-    {
+    let lines = (1..).zip(bytes.split_inclusive(|b| *b == b'\n'));
+    for (n, text) in lines.take_while(|(_, text)| text.ends_with(b"\n")) {
         end += text.len() as u64;
         if text == b"\n" {
             continue;
         }
         let text = &text[..text.len() - 1];
         let no_json = |error| {
-            let error = JsonError {
-                line: n + 1,
-                ..error
-            };
+            let error = JsonError { line: n, ..error };
             writing::json(path, &error, "the stream of a run")
         };
-        let bad =
-            |found: &str, expected| Err(InputError::line(&file, n as u64 + 1, found, expected));
+        let bad = |found: &str, expected| Err(InputError::line(&file, n as u64, found, expected));
         let tag: Tag = from_json(text).map_err(no_json)?;
         match (tag.line.as_str(), &mut stream) {
             ("run", None) => {
@@ -211,16 +207,9 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
         };
         let schedule = known.query.as_ref().map(|query| &query.schedule.cameras);
         let own = |label: &str| {
-            let GroupKey {
-                scene,
-                path,
-                cache,
-                test,
-                ..
-            } = &kept.key;
-            let key = [scene, path, cache, test].map(|name| shown_field(name));
-            let [scene, path, cache, test] = key;
-            let readings = cells.get(&[scene, path, cache, test, shown_field(label)])?;
+            let key = &kept.key;
+            let names = [&key.scene, &key.path, &key.cache, &key.test, label];
+            let readings = cells.get(&names.map(|name| shown_field(name)))?;
             let cameras = schedule?;
             let reading = |(&(frame, queries), ns): (&(u32, u32), &Vec<f64>)| {
                 let first = cameras.iter().position(|camera| *camera == frame)?;

@@ -15,18 +15,18 @@ use crate::scene::GENERATOR_NAME;
 use crate::statistics::two_speeds;
 
 /// A line of stream.jsonl.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[serde(tag = "line", rename_all = "snake_case")]
 #[non_exhaustive]
-pub enum Line {
+pub enum Line<'l> {
     /// The first line: everything about the run but its cells.
-    Run(Box<Header>),
+    Run(&'l Header),
     /// Results of one process for one group of cells.
-    Part(Box<KeptPart>),
+    Part(&'l KeptPart),
     /// All parts of the plan are there.
     Finished {
         /// RFC 3339, UTC.
-        at: String,
+        at: &'l str,
     },
 }
 
@@ -57,7 +57,7 @@ pub struct Header {
     pub binary: Option<String>,
 }
 
-impl Line {
+impl Line<'_> {
     /// The line as JSON, with its end.
     ///
     /// # Errors
@@ -182,12 +182,13 @@ impl Stream {
     }
 
     /// The lines of the file, in order.
-    pub fn lines(&self) -> impl Iterator<Item = Line> {
-        let header = Line::Run(Box::new(self.header.clone()));
-        let parts = self.parts.iter().cloned();
-        let parts = parts.map(|kept| Line::Part(Box::new(kept)));
-        let finished = self.finished_at.clone().map(|at| Line::Finished { at });
-        std::iter::once(header).chain(parts).chain(finished)
+    pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
+        let parts = self.parts.iter().map(Line::Part);
+        let finished = self.finished_at.iter().map(|at| Line::Finished { at });
+        [Line::Run(&self.header)]
+            .into_iter()
+            .chain(parts)
+            .chain(finished)
     }
 
     /// Returns true if every process has measured every group.
@@ -214,11 +215,6 @@ impl Stream {
     /// The report of what is there: every group that the first process has
     /// finished.
     pub fn report(&self) -> Report {
-        self.report_of(|_| true)
-    }
-
-    /// The same of some of the groups.
-    pub fn report_of(&self, wanted: impl Fn(&GroupKey) -> bool) -> Report {
         let header = &self.header;
         let mut run = header.run.clone();
         run.finished_at.clone_from(&self.finished_at);
@@ -233,7 +229,7 @@ impl Stream {
             bounds: Vec::new(),
         };
         let mut speeds = (0, 0);
-        for key in header.groups.iter().filter(|key| wanted(key)) {
+        for key in &header.groups {
             let kept = self.of_group(key);
             let parts: Vec<Part> = kept.iter().map(|kept| kept.part.clone()).collect();
             let Some(first) = parts.first().filter(|part| part.process == 0) else {
@@ -302,10 +298,9 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
         ));
     }
     let twins = report.noise.twins.iter();
-    let twins = twins.filter_map(super::TwinEntry::holds_one);
-    let (missed, all) = twins.fold((0, 0), |(missed, all), holds| {
-        (missed + usize::from(!holds), all + 1)
-    });
+    let holds: Vec<bool> = twins.filter_map(super::TwinEntry::holds_one).collect();
+    let all = holds.len();
+    let missed = holds.iter().filter(|holds| !**holds).count();
     // One in twenty misses by chance; this many of `all` are no chance.
     if missed > 1 + all / 8 {
         warnings.push(format!(

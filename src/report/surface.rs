@@ -2,7 +2,7 @@
 //! and the share of them that is visible, and from which size on a structure is
 //! faster than the linear scan. Read off a report; nothing is measured.
 
-use super::ranking::grouped;
+use super::ranking::{grouped, unique};
 use super::{Comparison, Report, ReportCell};
 use crate::measure::{Status, YARDSTICK};
 use crate::statistics::{Estimate, slope};
@@ -152,15 +152,12 @@ impl Surface<'_> {
     }
 
     fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
-        let mut names: Vec<&str> = Vec::new();
-        for place in &self.places {
-            for cell in place.comparison.sound().filter(|cell| is_one(cell)) {
-                if !names.contains(&cell.structure.as_str()) {
-                    names.push(&cell.structure);
-                }
-            }
-        }
-        names
+        let cells = self
+            .places
+            .iter()
+            .flat_map(|place| place.comparison.sound());
+        let cells = cells.filter(|cell| is_one(cell));
+        unique(cells.map(|cell| cell.structure.as_str()))
     }
 
     /// A metric of a structure over the sizes, at one class of shares; the first
@@ -303,7 +300,6 @@ mod tests {
     use super::super::ranking::tests::cell;
     use super::*;
     use crate::index::Kind;
-    use crate::report::ranking::Ranked;
 
     /// Structures with their times where `visible` of `items` items are visible.
     fn comparison(items: usize, share: f64, times: &[(&str, f64)]) -> Comparison<'static> {
@@ -319,13 +315,10 @@ mod tests {
                 Kind::Tree
             });
             cell.rank = Some(rank);
-            Ranked {
-                rank: Some(rank),
-                cell: Box::leak(Box::new(cell)),
-            }
+            &*Box::leak(Box::new(cell))
         });
         Comparison {
-            ranked: cells.collect(),
+            cells: cells.collect(),
             bounds: Vec::new(),
         }
     }
@@ -384,9 +377,9 @@ mod tests {
     fn a_tie_is_no_crossing() {
         let tied = |items: usize, ns: f64| {
             let mut tied = comparison(items, 0.02, &[("bvh", ns), ("linear", 1000.0)]);
-            let mut linear = tied.ranked[1].cell.clone();
+            let mut linear = tied.cells[1].clone();
             linear.rank = Some(1);
-            tied.ranked[1].cell = Box::leak(Box::new(linear));
+            tied.cells[1] = Box::leak(Box::new(linear));
             tied
         };
         let crossing = |places: Vec<Comparison<'static>>| {

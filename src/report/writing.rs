@@ -71,7 +71,8 @@ fn replace(target: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) 
     Ok(())
 }
 
-fn folder_of(file: &Path) -> &Path {
+/// The folder that a file is in.
+pub fn folder_of(file: &Path) -> &Path {
     match file.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -174,29 +175,21 @@ fn named(mode: u32) -> Builder<'static, 'static> {
 /// Takes away what killed processes have left half written in a folder.
 pub(super) fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let name = entry.file_name();
+        let (name, path) = (entry.file_name(), entry.path());
         let name = name.to_string_lossy();
-        if !name.starts_with(TEMPORARY.0) || !name.ends_with(TEMPORARY.1) {
-            continue;
+        if name.starts_with(TEMPORARY.0)
+            && name.ends_with(TEMPORARY.1)
+            && let Ok(kind) = entry.file_type()
+            && (kind.is_file() || kind.is_dir())
+            // Held until it is gone, so that its maker sees it.
+            && let Ok(lock) = File::open(&path)
+            && !matches!(lock.try_lock(), Err(TryLockError::WouldBlock))
+        {
+            let _ = match kind.is_dir() {
+                true => fs::remove_dir_all(path),
+                false => fs::remove_file(path),
+            };
         }
-        let path = entry.path();
-        let Ok(kind) = entry.file_type() else {
-            continue;
-        };
-        if !kind.is_file() && !kind.is_dir() {
-            continue;
-        }
-        // Held until it is gone, so that its maker sees it.
-        let Ok(lock) = File::open(&path) else {
-            continue;
-        };
-        if let Err(TryLockError::WouldBlock) = lock.try_lock() {
-            continue;
-        }
-        let _ = match kind.is_dir() {
-            true => fs::remove_dir_all(path),
-            false => fs::remove_file(path),
-        };
     }
 }
 

@@ -126,7 +126,7 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
             "--metric build_ms --metric build_ms",
             "'build_ms' is named twice",
         ),
-        ("--metric ,", "no metric to compare by | expected"),
+        ("--metric ,", "unknown metric '' | known: query_ns"),
         ("--threshold nan", "--threshold is 'nan' | expected | 5%"),
         ("--threshold -5%", "--threshold is '-5%'"),
         ("--threshold -0.05", "--threshold is '-0.05'"),

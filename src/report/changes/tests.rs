@@ -68,7 +68,7 @@ fn one_structure_that_moved_is_found_whatever_the_day_was_like() {
     for (factor, wanted) in [(1.3, Outcome::Slower), (0.7, Outcome::Faster)] {
         let (old, mut new) = (all(10, 1.0), all(12, 1.5));
         new.cells[1] = timed("b", 100.0 * factor, 12, 1.5);
-        let found = changes(&old, &new, 0.05, QUERY);
+        let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
         let row = found
             .rows
             .iter()
@@ -91,7 +91,7 @@ fn one_process_and_few_others_are_inconclusive() {
     for (was, is) in [(1, 1), (1, 10), (10, 2)] {
         let (old, mut new) = (all(was, 1.0), all(is, 1.0));
         new.cells[1] = timed("b", 500.0, is, 1.0);
-        let found = changes(&old, &new, 0.05, QUERY);
+        let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
         assert_eq!(found.count(Outcome::Inconclusive), 5, "{was} {is}");
         let b = found.rows.iter().find(|r| r.cell.structure == "b").unwrap();
         assert!(b.reason.as_ref().unwrap().contains("under three processes"));
@@ -103,7 +103,7 @@ fn one_process_and_few_others_are_inconclusive() {
     for report in [&mut old, &mut new] {
         report.cells.truncate(3);
     }
-    let found = changes(&old, &new, 0.05, QUERY);
+    let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
     assert_eq!(found.count(Outcome::Inconclusive), 3);
     // Worst first, by the quotient of the values.
     let first = &found.rows[0];
@@ -122,12 +122,12 @@ fn other_cameras_or_batches_are_another_measurement() {
         let (old, mut new) = (all(10, 1.0), all(10, 1.0));
         new.cells[1] = timed("b", 500.0, 10, 1.0);
         change(&mut new.cells[1]);
-        let found = changes(&old, &new, 0.05, QUERY);
+        let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
         assert_eq!(found.rows[0].outcome, Outcome::Different);
         assert_eq!(found.count(Outcome::Same), 4);
         new.cells.iter_mut().skip(2).for_each(change);
         change(&mut new.cells[0]);
-        let found = changes(&old, &new, 0.05, QUERY);
+        let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
         assert!(found.why_nothing_was_judged().is_some());
     }
 }
@@ -141,7 +141,12 @@ fn statuses_and_questions_go_before_times() {
         if !asked_the_same {
             is.cells[1].scene.digest = "other".to_owned();
         }
-        let found = changes(&was, &is, 0.05, &["query_ns", "build_ms"]);
+        let found = changes(
+            Basis::Reports,
+            [&was.cells, &is.cells],
+            0.05,
+            &["query_ns", "build_ms"],
+        );
         let rows: Vec<_> = found
             .rows
             .iter()
@@ -186,14 +191,18 @@ fn counters_are_compared_exactly_and_judge_nothing() {
             report.cells[1].metrics.insert(name.to_owned(), metric);
         }
     }
-    let found = changes(&old, &new, 0.05, QUERY);
+    let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
     let work = &found.work_changed;
     assert_eq!((work.len(), work[0].counter), (1, "planes_tested"));
     assert_eq!((work[0].old, work[0].new), (100.0, 100.001));
     assert_eq!(found.count(Outcome::Same), 5);
     // Of another scene they are another question's.
     new.cells[1].scene.digest.push('x');
-    assert!(changes(&old, &new, 0.05, QUERY).work_changed.is_empty());
+    assert!(
+        changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY)
+            .work_changed
+            .is_empty()
+    );
 }
 
 #[test]
@@ -201,7 +210,12 @@ fn only_what_has_times_is_judged() {
     let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
     old.cells[1].metrics.get_mut("query_ns").unwrap().value = f64::NAN;
     new.cells[2].metrics.clear();
-    let found = changes(&old, &new, 0.05, &["query_ns", "locate_ns"]);
+    let found = changes(
+        Basis::Reports,
+        [&old.cells, &new.cells],
+        0.05,
+        &["query_ns", "locate_ns"],
+    );
     assert_eq!(found.count(Outcome::Unmeasured), 7);
     // Three are left, with two others each.
     assert_eq!(found.count(Outcome::Inconclusive), 3);
@@ -209,7 +223,12 @@ fn only_what_has_times_is_judged() {
     let news = found.rows.iter().filter(|row| row.is_news());
     assert_eq!(news.count(), 5);
     assert!(found.why_nothing_was_judged().is_none());
-    let found = changes(&old, &new, 0.05, &["locate_ns"]);
+    let found = changes(
+        Basis::Reports,
+        [&old.cells, &new.cells],
+        0.05,
+        &["locate_ns"],
+    );
     assert!(found.why_nothing_was_judged().is_some());
 }
 

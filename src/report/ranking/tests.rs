@@ -40,16 +40,17 @@ fn ranks_are_the_runs_own_and_what_failed_has_none() {
     }
     cells[4].status = Status::Wrong;
     cells[2].status = Status::Unsafe;
+    without_false_ranks(&mut cells);
     let of = |cells: &'static [ReportCell]| Comparison {
-        ranked: ranked(cells.iter().collect()),
+        cells: ranked(cells.iter().collect()),
         bounds: Vec::new(),
     };
     let cells: &'static [ReportCell] = Box::leak(Box::new(cells));
     let comparison = of(cells);
     let found: Vec<_> = comparison
-        .ranked
+        .cells
         .iter()
-        .map(|r| (r.cell.structure.as_str(), r.rank))
+        .map(|cell| (cell.structure.as_str(), cell.rank))
         .collect();
     // In the order they came in, the two that failed.
     let wanted = [
@@ -115,13 +116,7 @@ fn cells(rows: &[(&str, [f64; 2])]) -> Vec<ReportCell> {
 
 fn overall(cells: &[ReportCell], look: impl Fn(&Overall)) {
     let paths = cells.chunks(cells.len() / 2).map(|cells| Comparison {
-        ranked: cells
-            .iter()
-            .map(|cell| Ranked {
-                rank: cell.rank,
-                cell,
-            })
-            .collect(),
+        cells: cells.iter().collect(),
         bounds: Vec::new(),
     });
     let paths: Vec<Comparison> = paths.collect();
