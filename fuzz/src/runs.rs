@@ -5,8 +5,8 @@ use std::path::Path;
 
 use cullbench::json::from_json;
 use cullbench::report::{
-    Basis, JUDGED_METRICS, Report, StoppedRun, Stream, changes, comparisons, growths, merge, read_report,
-    read_stream, save_report, settings, surfaces,
+    Basis, JUDGED_METRICS, Report, StoppedRun, Stream, changes, comparisons, growths, merge,
+    read_report, read_stream, save_report, settings, surfaces,
 };
 use tempfile::TempDir;
 
