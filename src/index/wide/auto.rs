@@ -205,6 +205,9 @@ impl Auto {
     #[inline(always)]
     fn scan<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         let tree = &self.trees.still;
+        if let Some(flow) = tree.query_root(volume, cx) {
+            return flow;
+        }
         let (ids, occupied) = (&tree.ids, &tree.occupied[..]);
         let blocks = &tree.blocks[..occupied.len()];
         if Q::IS_POINT {
@@ -241,6 +244,8 @@ impl Auto {
     fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         if self.trees.movers.ids.is_empty() && self.trees.still.overwrite(items, moved, |_| ()) {
             self.search = SCAN;
+            // All of space: no plane contains or excludes it.
+            self.trees.still.root = Aabb::new(Aabb::EMPTY.max, Aabb::EMPTY.min);
             self.updates[OVERWRITE] += 1;
             return true;
         }

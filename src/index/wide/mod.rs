@@ -20,13 +20,13 @@ use self::block_order::block_ordered;
 use self::level_traversal::LevelTraversal;
 use self::levels::{Layer, Level};
 use self::single_plane_buckets::SinglePlaneBuckets;
-use super::frontier::{Frontier, NodeList, is_far, put_back, take};
+use super::frontier::{Frontier, NodeList, is_far, pass_run, put_back, take};
 use super::items::{ABSENT, PaddedIds, Positions, indexable};
 use super::linear::seen_by;
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES, LaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
+use crate::query::{Bits, Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
 
 pub use self::auto::{Auto, AutoParams};
@@ -50,7 +50,6 @@ const MOST_LEVELS: usize = 8;
 /// Level 0 are the items themselves, sixteen a block; lane `l` of block `b` on
 /// level `k` bounds block `16 b + l` of level `k - 1`, and with it the items
 /// from `(16 b + l) 16^k` on. 25.6 bytes of blocks, 4 of id and 0.13 of lanes an item.
-#[derive(Default)]
 pub struct Wide {
     blocks: Vec<BoxBlock>,
     /// The lanes of each leaf that hold an item.
@@ -61,6 +60,8 @@ pub struct Wide {
     levels: Vec<Level>,
     /// Lanes of leaves without an item; their id is [`ABSENT`].
     vacant: usize,
+    /// Bounds of all items, or more.
+    root: Aabb,
     positions: Positions,
     /// Spheres of the leaves, where the items are [spheres](Input::spheres), until one
     /// moves.
@@ -116,6 +117,12 @@ fn unite(children: &[BoxBlock], parents: &mut [BoxBlock]) {
     }
 }
 
+impl Default for Wide {
+    fn default() -> Self {
+        Wide::unfilled(&[])
+    }
+}
+
 impl Wide {
     /// A tree over ids, [`ABSENT`] for a vacant lane; all boxes are empty.
     fn unfilled(ids: &[ItemId]) -> Wide {
@@ -126,6 +133,7 @@ impl Wide {
             ids: ids.into(),
             levels,
             vacant: ids.iter().filter(|&&id| id == ABSENT).count(),
+            root: Aabb::EMPTY,
             positions: Positions::default(),
             balls: None,
         }
@@ -152,7 +160,13 @@ impl Wide {
                 tree.blocks[below..].split_at_mut(tree.levels[level - 1].blocks);
             unite(children, parents);
         }
+        tree.root = tree.top();
         tree
+    }
+
+    /// Bounds of the highest block.
+    fn top(&self) -> Aabb {
+        self.blocks.last().map_or(Aabb::EMPTY, BoxBlock::union)
     }
 
     /// Compares two trees bit for bit: ids, blocks, levels.
@@ -244,6 +258,33 @@ impl Wide {
             std::mem::swap(&mut here, &mut below);
         }
         traversal.test_leaves(&leaves, here, buckets)
+    }
+
+    /// The whole query where the bounds of all items decide it: nothing or, without vacant
+    /// lanes, everything. Ends at the first plane that does not contain them.
+    #[inline(always)]
+    fn query_root<Q: QueryVolume, C: Context>(
+        &self,
+        volume: &Q,
+        cx: &mut C,
+    ) -> Option<ControlFlow<()>> {
+        if self.vacant == self.ids.len() {
+            return Some(ControlFlow::Continue(()));
+        }
+        let mask = volume.mask();
+        // A box has no planes.
+        if mask != 0 && Q::planes_open(mask) == 0 {
+            return None;
+        }
+        let open = Bits(mask).find(|&plane| !volume.contains(plane, &self.root));
+        if let Some(plane) = open {
+            let is_outside = volume.excludes(plane, &self.root);
+            return is_outside.then_some(ControlFlow::Continue(()));
+        }
+        let isa = cx.isa();
+        let (sink, recorder) = cx.parts();
+        let all = 0..self.ids.len();
+        (self.vacant == 0).then(|| pass_run(isa, all, &self.ids, sink, recorder))
     }
 
     /// Region search: descends from the root, one block at a time.
@@ -358,6 +399,9 @@ impl RegionIndex for Wide {
                 Some(p) => self.descend(isa, p, sink, recorder),
                 None => ControlFlow::Continue(()),
             };
+        }
+        if let Some(flow) = self.query_root(volume, cx) {
+            return flow;
         }
         let mut scratch = take(&SCRATCH);
         let flow = self.search(volume, cx, &mut scratch);

@@ -11,9 +11,8 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::{SCRATCH, Wide, WideParams};
+use super::{Wide, WideParams};
 use crate::geometry::{Aabb, BoxBlock, LANES};
-use crate::index::frontier::{put_back, take};
 use crate::index::items::{ABSENT, Dirty, Positions};
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::kernel::prefetch;
@@ -425,19 +424,8 @@ impl RegionIndex for Moving {
 
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        if Q::IS_POINT {
-            self.still.query(volume, cx)?;
-            return self.movers.query(volume, cx);
-        }
-        let mut scratch = take(&SCRATCH);
-        let mut flow = ControlFlow::Continue(());
-        for tree in [&self.still, &self.movers] {
-            if flow.is_continue() && tree.vacant < tree.ids.len() {
-                flow = tree.search(volume, cx, &mut scratch);
-            }
-        }
-        put_back(&SCRATCH, scratch);
-        flow
+        self.still.query(volume, cx)?;
+        self.movers.query(volume, cx)
     }
 
     /// O(moved). Items may become or cease to be empty. A rebuild is needed where most

@@ -78,6 +78,7 @@ impl Wide {
             block.set(at % LANES, &held.union(bounds));
             at /= LANES;
         }
+        self.root = self.root.union(bounds);
     }
 
     /// Fits the blocks above some leaves to the boxes of these leaves.
@@ -99,6 +100,7 @@ impl Wide {
             }
             changed = changed_above;
         }
+        self.root = self.top();
     }
 }
 
@@ -137,6 +139,7 @@ mod tests {
                 let sound: Vec<Aabb> = items.iter().map(sound).collect();
                 let fresh = Wide::over(&sound, &order, 1);
                 assert!(tree.blocks == fresh.blocks, "{count} items, round {round}");
+                assert_eq!(tree.root, fresh.root);
                 assert_eq!(tree.ids.len() - tree.vacant, held.len());
             }
             // An item that the build did not see.
