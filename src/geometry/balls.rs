@@ -89,8 +89,8 @@ pub(super) fn distances<I: Isa>(
     [a, b, c, d]: Unit<I>,
     [x, y, z]: [I::Floats; 3],
 ) -> I::Floats {
-    let sum = isa.add(isa.mul(a, x), isa.mul(b, y));
-    isa.add(isa.add(sum, isa.mul(c, z)), d)
+    let sum = isa.near_mul_add(b, y, isa.near_mul_add(a, x, d));
+    isa.near_mul_add(c, z, sum)
 }
 
 /// The lanes whose distance is not below the least.

@@ -235,7 +235,7 @@ impl<I: Isa> Planes<I> for BallFrustum<'_, I> {
         let depth = distances(isa, self.depth, centres);
         let mut least = isa.sub_abs(self.half_depth, depth);
         for ([factor, rest], t) in self.sides {
-            let s = isa.add(isa.mul(factor, depth), rest);
+            let s = isa.near_mul_add(factor, depth, rest);
             least = isa.min(isa.sub_abs(s, distances(isa, t, centres)), least);
         }
         let question = || (self.spheres, 0b11_1111, block);

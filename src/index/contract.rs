@@ -210,9 +210,10 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// Takes over the new bounds of `moved` items without a new build.
     ///
     /// `items` holds the bounds of all items, the new ones included; they are
-    /// finite. Returns false, with the structure unchanged, if a rebuild is needed:
-    /// where an item becomes or ceases to be empty, and always from a structure that
-    /// does not declare [`Capabilities::refits`](super::Capabilities).
+    /// finite. `moved` may be empty, as before the first frame of a motion. Returns false,
+    /// with the structure unchanged, if a rebuild is needed: where an item becomes or
+    /// ceases to be empty, and always from a structure that does not declare
+    /// [`Capabilities::refits`](super::Capabilities).
     fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
         false
     }

@@ -85,6 +85,17 @@ pub struct LinearParams {
 }
 
 impl Linear {
+    /// No items yet, and memory for as many.
+    pub(super) fn with_room(items: usize) -> Self {
+        Linear {
+            boxes: BoxBlocks::with_capacity(items),
+            ids: PaddedIds::default(),
+            positions: Positions::default(),
+            balls: None,
+            workers: None,
+        }
+    }
+
     /// Removes the item at a position; the last item takes its place.
     fn remove(&mut self, position: usize, id: ItemId) {
         if let Some(last) = self.ids.pop() {
@@ -99,31 +110,6 @@ impl Linear {
         }
     }
 
-    fn flat(&self) -> Flat<'_, false> {
-        Flat {
-            blocks: self.boxes.blocks(),
-            ids: &self.ids,
-            occupied: &[],
-            balls: self.balls.as_ref(),
-        }
-    }
-}
-
-/// Blocks of items that a scan reads.
-///
-/// `VACANT` is true if lanes may be without an item.
-pub struct Flat<'a, const VACANT: bool> {
-    /// The boxes.
-    pub blocks: &'a [BoxBlock],
-    /// Their ids.
-    pub ids: &'a PaddedIds,
-    /// The lanes of each block that hold an item, if there may be others.
-    pub occupied: &'a [LaneMask],
-    /// Spheres of the items, if they are [spheres](Input::spheres).
-    pub balls: Option<&'a BallBlocks>,
-}
-
-impl<const VACANT: bool> Flat<'_, VACANT> {
     /// Tests a range of blocks against all planes; `open` is their number.
     #[inline(always)]
     fn scan_all<P: Planes<C::Isa>, C: Context>(
@@ -142,9 +128,8 @@ impl<const VACANT: bool> Flat<'_, VACANT> {
                 blocks: &blocks[here.clone()],
                 doubt,
             });
-            let tests = BlockTests::<_, _, VACANT> {
-                blocks: &self.blocks[here.clone()],
-                occupied: self.occupied.get(here.clone()).unwrap_or_default(),
+            let tests = BlockTests {
+                blocks: &self.boxes.blocks()[here.clone()],
                 planes,
                 balls,
                 items: self.ids.len() - first * LANES,
@@ -159,14 +144,14 @@ impl<const VACANT: bool> Flat<'_, VACANT> {
 
     /// Tests a range of blocks, on this thread.
     #[inline(always)]
-    pub fn scan<Q: QueryVolume, C: Context>(
+    fn scan<Q: QueryVolume, C: Context>(
         &self,
         range: Range<usize>,
         volume: &Q,
         cx: &mut C,
     ) -> ControlFlow<()> {
         let open = Q::planes_open(volume.mask());
-        let balls = seen_by(self.balls, volume);
+        let balls = seen_by(self.balls.as_ref(), volume);
         if C::Isa::MANY_REGISTERS
             && let Some(planes) = volume.all_planes(cx.isa())
         {
@@ -190,7 +175,7 @@ impl<I: Isa, Q: QueryVolume> QueryInParts<I> for SharedScan<'_, Q> {
         let recorder = &mut NoRecorder;
         let mut cx = QueryContext::new(isa, ids, recorder);
         // A Vec never breaks off.
-        let _ = self.scan.flat().scan(first..end, self.volume, &mut cx);
+        let _ = self.scan.scan(first..end, self.volume, &mut cx);
     }
 }
 
@@ -252,7 +237,7 @@ impl RegionIndex for Linear {
             let work = SharedScan { scan: self, volume };
             return in_parts(workers, blocks.div_ceil(BLOCKS_PER_CALL), &work, cx);
         }
-        self.flat().scan(0..blocks, volume, cx)
+        self.scan(0..blocks, volume, cx)
     }
 
     /// O(moved): overwrites their lanes. Items may become or cease to be empty.
@@ -286,9 +271,8 @@ pub fn seen_by<'t, Q: QueryVolume>(balls: Option<&'t BallBlocks>, volume: &Q) ->
 }
 
 /// The tests of consecutive blocks against all planes, run by the sink.
-struct BlockTests<'a, P, R, const VACANT: bool> {
+struct BlockTests<'a, P, R> {
     blocks: &'a [BoxBlock],
-    occupied: &'a [LaneMask],
     planes: P,
     balls: Option<Balls<'a>>,
     /// Number of items in these blocks and the following ones.
@@ -300,9 +284,7 @@ struct BlockTests<'a, P, R, const VACANT: bool> {
     four: [LaneMask; 4],
 }
 
-impl<I: Isa, P: Planes<I>, R: Recorder, const VACANT: bool> Tests<I>
-    for BlockTests<'_, P, R, VACANT>
-{
+impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for BlockTests<'_, P, R> {
     const SPARSE: bool = true;
 
     #[inline(always)]
@@ -312,10 +294,7 @@ impl<I: Isa, P: Planes<I>, R: Recorder, const VACANT: bool> Tests<I>
 
     #[inline(always)]
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
-        let mut lanes = first_lanes(self.items - i * LANES);
-        if VACANT {
-            lanes &= self.occupied[i];
-        }
+        let lanes = first_lanes(self.items - i * LANES);
         self.recorder.items_tested(lanes.count_ones());
         let tests = lanes.count_ones() * self.open;
         self.recorder.planes_tested(tests);

@@ -56,6 +56,11 @@ pub trait Isa: Copy + Send + Sync {
     fn add(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// `a * b`, rounded once; never fused with a sum.
     fn mul(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// `a * b + c`, rounded once or twice: for sums whose error a bound covers.
+    #[inline(always)]
+    fn near_mul_add(self, a: Self::Floats, b: Self::Floats, c: Self::Floats) -> Self::Floats {
+        self.add(self.mul(a, b), c)
+    }
     /// `a` where `a < b`, else `b`: of a NaN and a number in this order, the
     /// number.
     fn min(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;

@@ -96,7 +96,7 @@ impl Kernel {
 
     /// Does the work with this instruction set, or with the portable one where
     /// the processor lacks it. The result is the same either way.
-    #[inline]
+    #[inline(always)]
     pub fn run<W: Work>(self, work: W) -> W::Output {
         machine::run(self, work)
     }

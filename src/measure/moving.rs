@@ -136,7 +136,13 @@ impl<'w> Moving<'w> {
             _ => None,
         };
         let held = fat.as_ref().map_or(&items, |fat| &fat.boxes);
-        let index = spec.build(input_of(workload.scene, held));
+        let mut index = spec
+            .build(input_of(workload.scene, held))
+            .map_err(not_built)?;
+        if spec.info().capabilities.refits {
+            // Tables of positions are no part of the first frame.
+            index.refit(held, &[]);
+        }
         Ok(Moving {
             fat,
             frame: 0,
@@ -144,7 +150,7 @@ impl<'w> Moving<'w> {
             spec,
             replay: motion.replay(),
             moved: Vec::new(),
-            index: index.map_err(not_built)?,
+            index,
             items,
         })
     }

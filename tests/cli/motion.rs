@@ -157,7 +157,7 @@ fn what_auto_has_chosen_stands_in_cell_summary_and_notes() {
         "--motion drift:share=50%,frames=6",
         [
             "; refit in 6 of 6 updates, not",
-            "; overwritten leaves in 6 of 6 updates, not",
+            "; overwriting in 6 of 6 updates, not",
         ],
     );
 }

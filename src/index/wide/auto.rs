@@ -1,4 +1,4 @@
-//! The structure `auto`: a tree or a scan of its leaves, and how it is updated.
+//! The structure `auto`: a tree or a scan, and how it is updated.
 //!
 //! The build counts the work of a few frusta that look from item to item. Updates are
 //! weighed by what has moved, by the queries between them and by the work that the refitted
@@ -11,10 +11,10 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use serde::{Deserialize, Serialize};
 
 use super::{BlockOrder, Moving, WideParams};
-use crate::geometry::{Aabb, ConvexVolume, LANES, Plane};
-use crate::index::linear::{Flat, scan_blocks};
+use crate::geometry::{Aabb, ConvexVolume, Plane};
+use crate::index::linear::{Linear, LinearParams};
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::kernel::{BASELINE, pairs};
+use crate::kernel::BASELINE;
 use crate::query::{Context, Count, ItemId, QueryContext, QueryCost, QueryVolume};
 
 /// Parameters: `auto:use=linear,update=rebuild`.
@@ -66,7 +66,7 @@ const SCAN: usize = 0;
 const TREE: usize = 1;
 
 /// Kinds of updates by their index in [`Auto::updates`].
-const UPDATES: [&str; 3] = ["overwritten leaves", "refit", "rebuild"];
+const UPDATES: [&str; 3] = ["overwriting", "refit", "rebuild"];
 const OVERWRITE: usize = 0;
 const REFIT: usize = 1;
 const REBUILD: usize = 2;
@@ -91,6 +91,11 @@ const REFIT_TWO_NS: f64 = 15.0;
 /// An item of a build.
 const BUILD_NS: f64 = 45.0;
 
+/// Fewest items that go to a scan in an update.
+const LEAST_FILLED: usize = 256;
+/// Mark of a scan that has all items.
+const WHOLE: usize = usize::MAX;
+
 /// Fewest leaves for two trees: of fewer, a single tree is refitted faster.
 const TWO_FROM: usize = 1 << 14;
 
@@ -105,13 +110,16 @@ const TOGETHER: u32 = 8;
 /// Most queries that are counted between two weighings; then nothing is written.
 const MOST_ASKED: u32 = 256;
 
-/// A tree, or a scan of its leaves, by counted work.
+/// A tree, or a scan, by counted work.
 #[derive(Default)]
 pub struct Auto {
     trees: Moving,
+    /// The trees are as they were when it became whole.
+    scan: Option<Linear>,
+    /// Number of items that have gone to the scan; [`WHOLE`] from when it takes the queries.
+    filled: usize,
     params: AutoParams,
-    /// Index of the present search, and of that after a build.
-    search: usize,
+    /// Index of the search after a build.
     built: usize,
     /// Modelled time of a query, ns, by search; infinite where that is unknown.
     costs: [f64; 2],
@@ -119,9 +127,9 @@ pub struct Auto {
     aged: f64,
     /// Queries since the last weighing, at most [`MOST_ASKED`].
     asked: AtomicU32,
-    /// Updates since the last weighing, items moved, and leaves that these are in.
+    /// Updates since the last weighing, and items moved.
     weighing: u32,
-    moved: [f64; 2],
+    moved: f64,
     /// Present kind of update, and the modelled time it has lost to the best, ns.
     update: usize,
     regret: f64,
@@ -198,32 +206,13 @@ impl Auto {
             Use::Auto if scan < self.aged => SCAN,
             _ => TREE,
         };
-        self.search = self.built;
     }
 
-    /// Passes the items of all leaves that the volume sees to the sink.
-    #[inline(always)]
-    fn scan<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        let tree = &self.trees.still;
-        if let Some(flow) = tree.query_root(volume, cx) {
-            return flow;
-        }
-        let (ids, occupied) = (&tree.ids, &tree.occupied[..]);
-        let blocks = &tree.blocks[..occupied.len()];
-        if Q::IS_POINT {
-            let isa = cx.isa();
-            let leaves = pairs(blocks, occupied).enumerate();
-            let leaves = leaves.map(|(i, (block, lanes))| (i * LANES, *lanes, block));
-            let (sink, recorder) = cx.parts();
-            return scan_blocks(isa, leaves, ids, (volume, volume.mask()), sink, recorder);
-        }
-        let leaves = Flat::<true> {
-            blocks,
-            ids,
-            occupied,
-            balls: tree.balls.as_ref(),
-        };
-        leaves.scan(0..blocks.len(), volume, cx)
+    /// Scans from now on; false if that cannot be.
+    fn begin_scan(&mut self, input: &Input<'_>) -> bool {
+        self.scan = Linear::build(input, &LinearParams::default()).ok();
+        self.filled = WHOLE;
+        self.scan.is_some()
     }
 
     /// Replaces the trees; false with nothing changed if they cannot be built.
@@ -234,46 +223,53 @@ impl Auto {
             return false;
         };
         self.trees = trees;
-        self.search = self.built;
+        (self.scan, self.filled) = (None, 0);
         (self.aged, self.since, self.lost) = (self.costs[TREE], [0.0; 2], 0.0);
         self.updates[REBUILD] += 1;
-        true
+        self.built == TREE || self.begin_scan(&Input::new(items))
     }
 
-    /// Leaves alone; the nodes above them are stale from then on.
+    /// The scan alone, once it has all items; the trees are stale from then on.
     fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        if self.trees.movers.ids.is_empty() && self.trees.still.overwrite(items, moved, |_| ()) {
-            self.search = SCAN;
-            // All of space: no plane contains or excludes it.
-            self.trees.still.root = Aabb::new(Aabb::EMPTY.max, Aabb::EMPTY.min);
-            self.updates[OVERWRITE] += 1;
-            return true;
+        self.updates[OVERWRITE] += 1;
+        let count = items.len();
+        let scan = (self.scan).get_or_insert_with(|| Linear::with_room(count));
+        let from = self.filled;
+        if from == WHOLE {
+            return scan.refit(items, moved);
         }
-        let is_built = self.rebuild(items);
-        self.search = SCAN;
-        is_built
+        // Filled in item order, half as many at once as are moved: no update is much slower.
+        let more = if from == 0 { 0 } else { moved.len() / 2 };
+        let end = count.min(from + LEAST_FILLED.max(more));
+        let held = moved.iter().filter(|id| (**id as usize) < from);
+        let ids: Vec<ItemId> = held.copied().chain(from as ItemId..end as ItemId).collect();
+        self.filled = if end < count { end } else { WHOLE };
+        scan.refit(items, &ids) && (end == count || self.refit_held(items, moved))
     }
 
-    fn refit_trees(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        if self.search == SCAN {
-            if self.is_aged() || self.has_two_trees() && self.trees.still.vacant > 0 {
-                return self.rebuild(items);
-            }
-            let mut all = self.trees.still.untouched();
-            (0..self.trees.still.occupied.len()).for_each(|leaf| _ = all.mark(leaf));
-            self.trees.still.fit_above(all);
-            self.search = TREE;
-            self.aged = self.tree_ns(items);
-        }
+    /// New bounds in the trees, or a new build.
+    fn refit_held(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         let is_refitted = match self.has_two_trees() {
             true => self.trees.refit(items, moved),
             false => self.trees.still.take_over(items, moved),
         };
-        if !is_refitted || self.is_old(items) {
+        is_refitted || self.rebuild(items)
+    }
+
+    fn refit_trees(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        if self.filled == WHOLE {
+            let all: Vec<ItemId> = (0..items.len() as ItemId).collect();
+            if self.is_aged() || self.has_two_trees() || !self.trees.still.take_over(items, &all) {
+                return self.rebuild(items);
+            }
+            self.aged = self.tree_ns(items);
+        }
+        (self.scan, self.filled) = (None, 0);
+        if self.is_old(items) {
             return self.rebuild(items);
         }
         self.updates[REFIT] += 1;
-        true
+        self.refit_held(items, moved)
     }
 
     /// Returns whether queries take half as long again as those of a new tree.
@@ -299,23 +295,26 @@ impl Auto {
     fn weigh(&mut self, items: usize) {
         let is_first = self.updates == [0; 3];
         let updates = f64::from(std::mem::take(&mut self.weighing));
-        let [moved, fitted] = std::mem::take(&mut self.moved);
+        let moved = std::mem::take(&mut self.moved);
         let asked = f64::from(std::mem::take(self.asked.get_mut()));
         // Queries before the first update are of no frame.
         let asked = if is_first { 1.0 } else { asked.max(updates) };
         let (all, leaves) = (items as f64, self.trees.still.occupied.len() as f64);
+        // About the number of leaves that hold them, if items move anywhere.
+        let fitted = moved * leaves / (moved / updates).hypot(leaves);
         let fit = REFIT_NS[0] * updates
             + match self.has_two_trees() {
                 true => REFIT_TWO_NS * moved,
                 false => REFIT_NS[1] * fitted,
             };
-        let tree = match self.search {
-            SCAN => self.costs[TREE],
-            _ => self.aged,
+        let is_scan = self.filled == WHOLE;
+        let tree = match is_scan {
+            true => self.costs[TREE],
+            false => self.aged,
         };
-        let change = match self.search == SCAN && self.is_aged() || self.has_two_trees() {
+        let change = match is_scan && self.is_aged() || self.has_two_trees() {
             true => BUILD_NS * all,
-            false => REFIT_NS[1] * leaves,
+            false => MOVE_NS * all + REFIT_NS[1] * leaves,
         };
         let costs = [
             MOVE_NS * moved + asked * self.costs[SCAN],
@@ -345,7 +344,7 @@ impl Auto {
 impl RegionIndex for Auto {
     const INFO: Info = Info::new(
         "auto",
-        "a tree or a scan of its leaves, and its updates, by counted work",
+        "a tree or a scan, and its updates, by counted work",
         Kind::Tree,
         Origin::Ours,
     )
@@ -363,11 +362,16 @@ impl RegionIndex for Auto {
             ..Auto::default()
         };
         auto.calibrate(input.items);
+        if auto.built == SCAN {
+            auto.begin_scan(input);
+        }
         Ok(auto)
     }
 
     fn memory(&self) -> MemoryUsage {
-        self.trees.memory()
+        let mut memory = self.trees.memory();
+        memory.item_bytes += (self.scan.as_ref()).map_or(0, |scan| scan.memory().item_bytes);
+        memory
     }
 
     #[inline(always)]
@@ -379,8 +383,16 @@ impl RegionIndex for Auto {
                 self.asked.store(asked + 1, Relaxed);
             }
         }
-        match self.search {
-            SCAN => self.scan(volume, cx),
+        match &self.scan {
+            Some(scan) if self.filled == WHOLE => {
+                // Nothing has moved: the tree's root holds all items.
+                if self.updates[OVERWRITE] == 0
+                    && let Some(flow) = self.trees.still.query_root(volume, cx)
+                {
+                    return flow;
+                }
+                scan.query(volume, cx)
+            }
             _ if self.trees.movers.ids.is_empty() => self.trees.still.query(volume, cx),
             _ => self.trees.query(volume, cx),
         }
@@ -389,14 +401,15 @@ impl RegionIndex for Auto {
     /// O(moved), or a new build. Items may become or cease to be empty.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         if moved.is_empty() {
-            return true;
+            // Tables for the updates that follow.
+            return match &mut self.scan {
+                Some(scan) => scan.refit(items, moved),
+                None => self.refit_held(items, moved),
+            };
         }
         self.trees.still.balls = None;
         self.weighing += 1;
-        let (count, leaves) = (moved.len() as f64, self.trees.still.occupied.len() as f64);
-        self.moved[0] += count;
-        // About the number of leaves that hold them, if items move anywhere.
-        self.moved[1] += count * leaves / count.hypot(leaves);
+        self.moved += moved.len() as f64;
         if self.weighing == TOGETHER || self.updates == [0; 3] {
             self.weigh(items.len());
         }

@@ -26,7 +26,7 @@ use super::linear::seen_by;
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES, LaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{Bits, Context, ItemId, QueryVolume, Recorder, Sink};
+use crate::query::{Bits, Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
 
 pub use self::auto::{Auto, AutoParams};
@@ -261,30 +261,38 @@ impl Wide {
     }
 
     /// The whole query where the bounds of all items decide it: nothing or, without vacant
-    /// lanes, everything. Ends at the first plane that does not contain them.
+    /// lanes, everything. `None` for a query that counts its work, that of blocks.
     #[inline(always)]
     fn query_root<Q: QueryVolume, C: Context>(
         &self,
         volume: &Q,
         cx: &mut C,
     ) -> Option<ControlFlow<()>> {
-        if self.vacant == self.ids.len() {
-            return Some(ControlFlow::Continue(()));
-        }
-        let mask = volume.mask();
-        // A box has no planes.
-        if mask != 0 && Q::planes_open(mask) == 0 {
-            return None;
-        }
-        let open = Bits(mask).find(|&plane| !volume.contains(plane, &self.root));
-        if let Some(plane) = open {
-            let is_outside = volume.excludes(plane, &self.root);
-            return is_outside.then_some(ControlFlow::Continue(()));
-        }
+        let is_counted = size_of::<C::Recorder>() > 0;
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
         let all = 0..self.ids.len();
-        (self.vacant == 0).then(|| pass_run(isa, all, &self.ids, sink, recorder))
+        match self.root_verdict(volume) {
+            _ if is_counted => None,
+            Containment::Outside => Some(ControlFlow::Continue(())),
+            Containment::Inside if self.vacant == 0 => {
+                Some(pass_run(isa, all, &self.ids, sink, recorder))
+            }
+            _ => None,
+        }
+    }
+
+    /// Position of all items, by the planes up to the first that does not contain them.
+    // Not inlined, so that the loops of a query keep their registers.
+    #[inline(never)]
+    fn root_verdict<Q: QueryVolume>(&self, volume: &Q) -> Containment {
+        let open = Bits(volume.mask()).find(|&plane| !volume.contains(plane, &self.root));
+        match open {
+            _ if self.vacant == self.ids.len() => Containment::Outside,
+            None => Containment::Inside,
+            Some(plane) if volume.excludes(plane, &self.root) => Containment::Outside,
+            _ => Containment::Straddles,
+        }
     }
 
     /// Region search: descends from the root, one block at a time.

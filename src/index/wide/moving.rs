@@ -7,6 +7,7 @@
 //! [`Wide`], each leaf of which belongs to a region: some neighbouring homes, fewer where
 //! there are more movers. So bounds do not grow, however many updates come.
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use glam::Vec3;
@@ -27,6 +28,9 @@ const MOVER: usize = 1 << 31;
 /// Updates without a move after which an item rests.
 const REST: u8 = 8;
 
+/// Updates that the movers of a leaf take to leave it, for the sake of the slowest update.
+const LEAVING: u8 = 32;
+
 /// Most growth of a leaf of the still tree on a side, in longest edges of its home.
 const GROWTH: f32 = 0.25;
 
@@ -37,7 +41,7 @@ const REGION_GROWTH: f32 = 0.125;
 const CROWDED: usize = 32;
 
 /// Most moved items per region before there are new regions.
-const COARSE: usize = 32;
+const COARSE: usize = 256;
 
 /// Number of the first update, so that all items rest before it.
 const FIRST: u8 = 2 * REST;
@@ -56,7 +60,7 @@ pub struct Moving {
     finest: usize,
     /// Leaves of `movers`.
     leaves: Vec<MoverLeaf>,
-    free_leaves: Vec<u32>,
+    free_leaves: BTreeSet<u32>,
     /// Position in `still`, or in `movers` and marked [`MOVER`].
     positions: Positions,
     /// Number of the last update that moved each item.
@@ -68,6 +72,8 @@ pub struct Moving {
     /// The leaf of movers that is looked at next.
     next: usize,
     changed: Dirty,
+    /// Leaves of `still` that items have left.
+    left: Dirty,
 }
 
 /// Neighbouring leaves of the still tree.
@@ -130,12 +136,14 @@ impl Moving {
 
     /// Divides the still tree into regions for a number of movers, six to eleven each.
     ///
-    /// The leaves of movers are in the order of space, with room for eight times as many
+    /// The leaves of movers are in the order of space, with room for 8 or 32 times as many
     /// regions.
     fn divide(&mut self, movers: usize) {
         let leaves = self.region_of.len();
         let span = (6 * leaves / movers.max(1)).max(1).next_power_of_two();
-        self.finest = (span / 8).max(1);
+        // Small trees have no room for leaves that stay empty.
+        let parts = if leaves < 1024 { 8 } else { 32 };
+        self.finest = (span / parts).max(1);
         let first_free = leaves.div_ceil(self.finest);
         let count = first_free + first_free / 8 + 1;
         let new = Wide::unfilled(&vec![ABSENT; count * LANES]);
@@ -143,7 +151,7 @@ impl Moving {
         self.changed = self.movers.untouched();
         self.regions.clear();
         self.leaves = vec![MoverLeaf::default(); count];
-        self.free_leaves = (first_free as u32..count as u32).rev().collect();
+        self.free_leaves = (first_free as u32..count as u32).collect();
         (self.crowded, self.next) = (0, 0);
         for first in (0..leaves).step_by(span) {
             self.add_region(first, span);
@@ -224,17 +232,14 @@ impl Moving {
             }
             Some(at) => {
                 let (leaf, lane) = (at / LANES, at % LANES);
-                // Not all at once, for the sake of the slowest update.
-                let leaves = !rested && (id as u8).wrapping_add(self.now).is_multiple_of(REST);
+                let leaves = !rested && (id as u8).wrapping_add(self.now).is_multiple_of(LEAVING);
                 if !leaves && !bounds.is_empty() && self.fits(leaf, bounds) {
                     self.still.blocks[leaf].set(lane, bounds);
                     self.still.grow(leaf, bounds);
                     return;
                 }
-                // The box may stay: nothing reads a vacant lane.
-                self.still.ids.set(at, ABSENT);
-                self.still.occupied[at / LANES] &= !(1 << (at % LANES));
-                self.still.vacant += 1;
+                self.still.put(at, ABSENT, &Aabb::EMPTY);
+                self.left.mark(leaf);
             }
             None => {}
         }
@@ -289,7 +294,7 @@ impl Moving {
     fn append(&mut self, region: usize, id: ItemId, bounds: &Aabb) {
         let movers = self.regions[region].movers;
         if movers > 0 && movers.is_multiple_of(LANES) {
-            let leaf = self.free_leaf();
+            let leaf = self.free_leaf(region);
             let before = std::mem::replace(&mut self.regions[region].last, leaf) as u32;
             let region = region as u32;
             self.leaves[leaf] = MoverLeaf { region, before };
@@ -334,7 +339,7 @@ impl Moving {
         let last = leaf * LANES + left % LANES;
         if left > 0 && left.is_multiple_of(LANES) {
             region.last = self.leaves[leaf].before as usize;
-            self.free_leaves.push(leaf as u32);
+            self.free_leaves.insert(leaf as u32);
             self.crowded -= usize::from(left / LANES >= CROWDED);
         }
         if last != position {
@@ -353,7 +358,9 @@ impl Moving {
     }
 
     /// A leaf of movers that no region begins with; more of them if all are in use.
-    fn free_leaf(&mut self) -> usize {
+    ///
+    /// These are in the order of space too, so that those of a region are neighbours.
+    fn free_leaf(&mut self, region: usize) -> usize {
         if self.free_leaves.is_empty() {
             let count = self.leaves.len();
             let more = count + count.div_ceil(2);
@@ -362,11 +369,18 @@ impl Moving {
             let smaller = std::mem::replace(&mut self.movers, Wide::unfilled(&ids));
             self.movers.blocks[..count].copy_from_slice(&smaller.blocks[..count]);
             self.leaves.resize(more, MoverLeaf::default());
-            self.free_leaves.extend((count as u32..more as u32).rev());
+            self.free_leaves.extend(count as u32..more as u32);
             self.changed = self.movers.untouched();
             (0..count).for_each(|leaf| _ = self.changed.mark(leaf));
         }
-        self.free_leaves.pop().map_or(0, |leaf| leaf as usize)
+        let regular = self.region_of.len().div_ceil(self.finest);
+        let own = self.regions[region].first / self.finest;
+        let wanted = (regular + own * (self.leaves.len() - regular) / regular) as u32;
+        let behind = self.free_leaves.range(wanted..).next();
+        let nearest = behind.or_else(|| self.free_leaves.last()).copied();
+        let leaf = nearest.unwrap_or_default();
+        self.free_leaves.remove(&leaf);
+        leaf as usize
     }
 
     /// Returns resting movers of a few leaves to the still tree.
@@ -414,7 +428,7 @@ impl RegionIndex for Moving {
                 + size_of_val(&self.regions[..])
                 + size_of_val(&self.region_of[..])
                 + size_of_val(&self.leaves[..])
-                + size_of_val(&self.free_leaves[..]),
+                + self.free_leaves.len() * size_of::<u32>(),
             item_bytes: still.item_bytes
                 + movers.item_bytes
                 + self.positions.bytes()
@@ -424,8 +438,12 @@ impl RegionIndex for Moving {
 
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        self.still.query(volume, cx)?;
-        self.movers.query(volume, cx)
+        for tree in [&self.still, &self.movers] {
+            if Q::IS_POINT || tree.vacant < tree.ids.len() {
+                tree.query(volume, cx)?;
+            }
+        }
+        ControlFlow::Continue(())
     }
 
     /// O(moved). Items may become or cease to be empty. A rebuild is needed where most
@@ -436,7 +454,7 @@ impl RegionIndex for Moving {
         }
         self.still.balls = None;
         self.prepare(items.len());
-        self.changed = self.movers.untouched();
+        (self.changed, self.left) = (self.movers.untouched(), self.still.untouched());
         let regions = self.regions.len();
         if moved.len() > COARSE * regions && regions < self.region_of.len() {
             self.divide(moved.len());
@@ -450,15 +468,17 @@ impl RegionIndex for Moving {
                 }
                 Some(at) => {
                     self.still.blocks[at / LANES].prefetch();
-                    if let Some(block) = self.homes.get(at / LANES / LANES) {
-                        block.prefetch();
-                    }
+                    let parent = at / LANES / LANES;
+                    let above = self.still.blocks.get(self.still.occupied.len() + parent);
+                    let blocks = [self.homes.get(parent), above];
+                    blocks.into_iter().flatten().for_each(BoxBlock::prefetch);
                 }
                 None => {}
             }
             self.update(id, &items[id as usize]);
         }
         self.settle(moved.len());
+        self.still.fit_above(std::mem::take(&mut self.left));
         self.movers.fit_above(std::mem::take(&mut self.changed));
         true
     }

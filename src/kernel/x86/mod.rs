@@ -35,7 +35,8 @@ pub fn detect(kernel: Kernel) -> bool {
 
 /// Does the work with this instruction set, or with the portable one where the
 /// processor lacks it.
-#[inline]
+// A call would store the work word by word and load it by vectors, which stalls.
+#[inline(always)]
 pub fn run<W: Work>(kernel: Kernel, work: W) -> W::Output {
     match kernel {
         Kernel::Avx512 if kernel.is_available() => {

@@ -149,7 +149,7 @@ impl RegionIndex for Forgetful {
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        for &id in &moved[..moved.len() - 1] {
+        for &id in &moved[..moved.len().saturating_sub(1)] {
             self.1[id as usize] = items[id as usize];
         }
         let built = Linear::build(&Input::new(&self.1), &Default::default());

@@ -101,8 +101,8 @@ fn what_is_forced_is_taken_and_said() {
         "tree, not scan of all items (",
     );
     for (params, search, update) in [
-        (":use=linear", scan, "overwritten leaves"),
-        (":use=linear,update=refit", scan, "overwritten leaves"),
+        (":use=linear", scan, "overwriting"),
+        (":use=linear,update=refit", scan, "overwriting"),
         (":use=linear,update=rebuild", scan, "rebuild"),
         (":use=wide", tree, "refit"),
         (":use=moving", tree, "refit"),
@@ -176,7 +176,7 @@ fn all_moving_is_overwritten_few_are_refitted_and_an_exception_changes_nothing()
     assert_eq!(update(20, 3), "refit");
     assert_eq!(update(20_000, 1), "refit");
     assert_eq!(update(20, 16), "refit");
-    assert_eq!(update(20_000, 50), "overwritten leaves");
+    assert_eq!(update(20_000, 50), "overwriting");
     assert_eq!(update(20, 90), "refit");
     let told = index.chose().unwrap();
     assert!(
@@ -192,11 +192,7 @@ fn many_queries_between_updates_keep_the_tree() {
     let all: Vec<ItemId> = (0..20_000).collect();
     let mut index = built(&items, "");
     let wedge = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -60.0)]).unwrap();
-    for (queries, wanted) in [
-        (1, "overwritten leaves"),
-        (20, "refit"),
-        (1, "overwritten leaves"),
-    ] {
+    for (queries, wanted) in [(1, "overwriting"), (20, "refit"), (1, "overwriting")] {
         for _ in 0..40 {
             assert!(index.refit(&items, &all));
             for _ in 0..queries {
