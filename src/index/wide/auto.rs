@@ -116,7 +116,7 @@ pub struct Auto {
     trees: Moving,
     /// The trees are as they were when it became whole.
     scan: Option<Linear>,
-    /// Number of items that have gone to the scan; [`WHOLE`] from when it takes the queries.
+    /// Items that have gone to the scan; [`WHOLE`] once it takes the queries.
     filled: usize,
     params: AutoParams,
     /// Index of the search after a build.
@@ -238,8 +238,8 @@ impl Auto {
         if from == WHOLE {
             return scan.refit(items, moved);
         }
-        // Filled in item order, half as many at once as are moved: no update is much slower.
-        let more = if from == 0 { 0 } else { moved.len() / 2 };
+        // Filled in item order, as many at once as are moved: no update is much slower.
+        let more = if from == 0 { 0 } else { moved.len() };
         let end = count.min(from + LEAST_FILLED.max(more));
         let held = moved.iter().filter(|id| (**id as usize) < from);
         let ids: Vec<ItemId> = held.copied().chain(from as ItemId..end as ItemId).collect();

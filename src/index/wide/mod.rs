@@ -260,8 +260,10 @@ impl Wide {
         traversal.test_leaves(&leaves, here, buckets)
     }
 
-    /// The whole query where the bounds of all items decide it: nothing or, without vacant
-    /// lanes, everything. `None` for a query that counts its work, that of blocks.
+    /// The whole query where the bounds of all items decide it.
+    ///
+    /// It finds nothing or, without vacant lanes, everything. `None` for a query that counts
+    /// its work, that of blocks.
     #[inline(always)]
     fn query_root<Q: QueryVolume, C: Context>(
         &self,

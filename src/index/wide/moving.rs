@@ -28,7 +28,7 @@ const MOVER: usize = 1 << 31;
 /// Updates without a move after which an item rests.
 const REST: u8 = 8;
 
-/// Updates that the movers of a leaf take to leave it, for the sake of the slowest update.
+/// Updates that the movers of a leaf take to leave it: no update is much slower.
 const LEAVING: u8 = 32;
 
 /// Most growth of a leaf of the still tree on a side, in longest edges of its home.
