@@ -6,9 +6,11 @@ use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use glam::Vec3;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use super::items::Record;
-use super::{BuildError, Info, Input, MemoryUsage, NoParams, RegionIndex, centre_bounds};
+use super::{BuildError, Info, Input, MemoryUsage, RegionIndex, centre_bounds};
 use crate::geometry::{Aabb, PlaneRows};
 use crate::query::{Bits, Context, ItemId, NoRecorder, QueryVolume, Recorder, Sink};
 
@@ -155,12 +157,19 @@ impl<'a, R: Recorder> Tally<'a, R> {
 pub trait BoxTested: Sized + Send + Sync {
     /// Its [`RegionIndex::INFO`].
     const ABOUT: Info;
+    /// Its [`RegionIndex::Params`]: how it is updated.
+    type Params: Default + Clone + Serialize + DeserializeOwned;
 
     /// Builds it over all items that are not empty.
     ///
     /// # Errors
     /// If it cannot hold them.
     fn of(items: Vec<Record>) -> Result<Self, BuildError>;
+
+    /// Takes the parameters after the build.
+    fn with(self, _params: Self::Params) -> Self {
+        self
+    }
 
     /// Its [`RegionIndex::refit`].
     fn follow(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
@@ -181,10 +190,10 @@ pub trait BoxTested: Sized + Send + Sync {
 
 impl<X: BoxTested> RegionIndex for X {
     const INFO: Info = X::ABOUT;
-    type Params = NoParams;
+    type Params = X::Params;
 
-    fn build(input: &Input<'_>, _: &NoParams) -> Result<Self, BuildError> {
-        X::of(Record::all(input.items)?)
+    fn build(input: &Input<'_>, params: &X::Params) -> Result<Self, BuildError> {
+        Ok(X::of(Record::all(input.items)?)?.with(params.clone()))
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {

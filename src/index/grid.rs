@@ -9,7 +9,7 @@ use glam::{UVec3, Vec3};
 
 use super::box_test::{BoxTest, BoxTested, Tally};
 use super::items::{Record, bounds_of_centres};
-use super::{BuildError, Info, Kind, MemoryUsage, Origin};
+use super::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
 use crate::geometry::Aabb;
 use crate::query::{ItemId, Recorder, Sink};
 
@@ -134,6 +134,7 @@ impl BoxTested for UniformGrid {
         Kind::Grid,
         Origin::Ours,
     );
+    type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let centres = bounds_of_centres(items.iter().map(|item| item.bounds.centre()));

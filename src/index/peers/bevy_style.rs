@@ -7,11 +7,11 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::{place_of, placed};
+use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// The components of an entity that the system reads and writes.
@@ -41,6 +41,7 @@ impl BoxTested for PeerBevyStyle {
         Origin::StandIn("Bevy"),
     )
     .refits();
+    type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let entity = |item| Entity {
@@ -57,11 +58,7 @@ impl BoxTested for PeerBevyStyle {
 
     /// Overwrites the bounds.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = placed(
-            |id| place_of(&self.entities, |e| e.item.id, id),
-            items,
-            moved,
-        ) else {
+        let Some(placed) = placed(&self.entities, |e| e.item.id, items, moved) else {
             return false;
         };
         for (at, bounds) in placed {

@@ -8,11 +8,11 @@ use ::bvh::bvh::{Bvh, BvhNode};
 use glam::Vec3;
 use nalgebra::Point3;
 
-use super::{place_of, placed};
+use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// An item with its node, which the crate writes.
@@ -118,6 +118,7 @@ impl BoxTested for PeerBvh {
         Origin::Crate("bvh"),
     )
     .refits();
+    type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let scene = Aabb::union_of(items.iter().map(|item| &item.bounds));
@@ -138,8 +139,7 @@ impl BoxTested for PeerBvh {
     /// `Bvh::update_shapes`, which removes and adds shape by shape; a build where most
     /// shapes have moved, or where areas overflow.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = placed(|id| place_of(&self.shapes, |s| s.item.id, id), items, moved)
-        else {
+        let Some(placed) = placed(&self.shapes, |s| s.item.id, items, moved) else {
             return false;
         };
         let overflows = |(_, b): &(usize, Aabb)| b.reach().max_element() > LARGEST;
@@ -189,7 +189,7 @@ impl BoxTested for PeerBvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::{FrustumQuery, Input, NoParams, RegionIndex};
+    use crate::index::{FrustumQuery, Input, RegionIndex};
 
     /// Left to the crate, nothing is found where areas overflow, and where
     /// widths do there is no tree.

@@ -18,37 +18,34 @@ use crate::query::ItemId;
 
 pub use bevy_style::PeerBevyStyle;
 pub use bvh::PeerBvh;
-pub use obvhs::PeerObvhs;
-pub use parry3d::PeerParry3d;
+pub use obvhs::{ObvhsParams, ObvhsUpdate, PeerObvhs};
+pub use parry3d::{Parry3dParams, Parry3dUpdate, PeerParry3d};
 pub use rstar::PeerRstar;
 
-/// Places of moved items in a structure, with their new bounds.
+/// Moved items by their index in a list ascending by id, with their new bounds.
 ///
-/// Empty items have none; `None` if one becomes or ceases to be empty.
-fn placed(
-    place_of: impl Fn(ItemId) -> Option<usize>,
+/// Empty items have none; `None` if one becomes or ceases to be empty. O(moved * log n).
+fn placed<T>(
+    held: &[T],
+    id_of: impl Fn(&T) -> ItemId,
     items: &[Aabb],
     moved: &[ItemId],
 ) -> Option<Vec<(usize, Aabb)>> {
     let mut placed = Vec::with_capacity(moved.len());
     for &id in moved {
+        // Where no item is empty, the index is the id.
+        let at = match held.get(id as usize) {
+            Some(own) if id_of(own) == id => Ok(id as usize),
+            _ => held.binary_search_by_key(&id, &id_of),
+        };
         let bounds = items[id as usize];
-        match place_of(id) {
-            Some(place) if !bounds.is_empty() => placed.push((place, bounds)),
-            None if bounds.is_empty() => {}
+        match at {
+            Ok(at) if !bounds.is_empty() => placed.push((at, bounds)),
+            Err(_) if bounds.is_empty() => {}
             _ => return None,
         }
     }
     Some(placed)
-}
-
-/// Index of an item in a list ascending by id. O(log n).
-fn place_of<T>(held: &[T], id_of: impl Fn(&T) -> ItemId, id: ItemId) -> Option<usize> {
-    match held.get(id as usize) {
-        // Where no item is empty, the index is the id.
-        Some(own) if id_of(own) == id => Some(id as usize),
-        _ => held.binary_search_by_key(&id, id_of).ok(),
-    }
 }
 
 /// Most items with the same bounds for a builder of quadratic time.
@@ -97,7 +94,10 @@ mod tests {
         });
         for text in [
             "peer-obvhs",
+            "peer-obvhs:update=move",
             "peer-parry3d",
+            "peer-parry3d:update=optimize",
+            "peer-parry3d:update=reinsert",
             "peer-rstar",
             "peer-bvh",
             "peer-bevy-style",

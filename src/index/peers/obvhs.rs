@@ -4,17 +4,37 @@
 
 use std::ops::ControlFlow;
 
+use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
-use obvhs::{Boundable, BvhBuildParams};
+use serde::{Deserialize, Serialize};
 
-use super::{placed, refuse_stacks};
+use super::refuse_stacks;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::{Positions, Record};
 use crate::index::tree::node::Stack;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
 use crate::query::{ItemId, Recorder, Sink};
+
+/// Parameters: `peer-obvhs:update=move`.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ObvhsParams {
+    /// The crate's calls of an update.
+    pub update: ObvhsUpdate,
+}
+
+/// Calls of the crate after items have moved.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObvhsUpdate {
+    /// `refit_from` for each leaf, or `refit_all` from one moved item in sixteen on.
+    #[default]
+    Refit,
+    /// `move_primitive`; leaves of several items are refitted.
+    Move,
+}
 
 /// An update refits all nodes from one moved item in as many on.
 const ALL_SHARE: usize = 16;
@@ -27,6 +47,7 @@ pub struct PeerObvhs {
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
     positions: Positions,
+    update: ObvhsUpdate,
 }
 
 #[inline(always)]
@@ -67,6 +88,7 @@ impl BoxTested for PeerObvhs {
         Origin::Crate("obvhs"),
     )
     .refits();
+    type Params = ObvhsParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         refuse_stacks(Self::ABOUT.name, &items)?;
@@ -91,29 +113,45 @@ impl BoxTested for PeerObvhs {
         })
     }
 
-    /// `refit_from` for each leaf, or `refit_all` from one moved item in sixteen on.
+    fn with(self, ObvhsParams { update }: ObvhsParams) -> Self {
+        PeerObvhs { update, ..self }
+    }
+
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         self.positions.prepare(&self.ids, items.len());
-        let Some(placed) = placed(|id| self.positions.of(id), items, moved) else {
+        let place_of = |&id: &ItemId| self.positions.of(id).map(|at| (at, items[id as usize]));
+        let is_empty = |id: &ItemId| items[*id as usize].is_empty();
+        if moved
+            .iter()
+            .any(|id| place_of(id).is_none() != is_empty(id))
+        {
             return false;
-        };
+        }
+        let placed: Vec<(usize, Aabb)> = moved.iter().filter_map(place_of).collect();
         self.bvh.init_primitives_to_nodes_if_uninit();
         let all = placed.len() * ALL_SHARE >= self.ids.len();
-        for (place, mut bounds) in placed {
-            let primitive = self.bvh.primitive_indices[place] as usize;
-            let at = self.bvh.primitives_to_nodes[primitive] as usize;
-            let node = &mut self.bvh.nodes[at];
-            if let Some(old) = self.boxes.get_mut(place) {
-                *old = bounds;
-                let first = node.first_index as usize;
-                bounds = Aabb::union_of(&self.boxes[first..first + node.prim_count as usize]);
+        let moves = self.update == ObvhsUpdate::Move && self.boxes.is_empty();
+        for (place, b) in placed {
+            let primitive = self.bvh.primitive_indices[place];
+            let mut bounds = obvhs::aabb::Aabb::new(b.min.into(), b.max.into());
+            if moves {
+                self.bvh.move_primitive(bounds, primitive);
+                continue;
             }
-            node.set_aabb(bounds.aabb());
+            let node = self.bvh.primitives_to_nodes[primitive as usize] as usize;
+            if let Some(old) = self.boxes.get_mut(place) {
+                *old = b;
+                let first = self.bvh.nodes[node].first_index as usize;
+                let count = self.bvh.nodes[node].prim_count as usize;
+                let all = Aabb::union_of(&self.boxes[first..first + count]);
+                bounds = obvhs::aabb::Aabb::new(all.min.into(), all.max.into());
+            }
+            self.bvh.nodes[node].set_aabb(bounds);
             if !all {
-                self.bvh.refit_from(at);
+                self.bvh.refit_from(node);
             }
         }
-        if all {
+        if all && !moves {
             self.bvh.refit_all();
         }
         true

@@ -6,13 +6,37 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use parry3d::bounding_volume::Aabb as ParryAabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace, TraversalAction};
+use serde::{Deserialize, Serialize};
 
-use super::{place_of, placed};
+use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::query::{ItemId, Recorder, Sink};
+
+/// Parameters: `peer-parry3d:update=reinsert`.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Parry3dParams {
+    /// The crate's calls of an update.
+    pub update: Parry3dUpdate,
+}
+
+/// Calls of the crate after items have moved.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Parry3dUpdate {
+    /// `insert_or_update_partially`, then `refit_partial`.
+    ///
+    /// `refit` in its place from one moved item in sixteen on.
+    #[default]
+    Refit,
+    /// The same, then `optimize_incremental`.
+    Optimize,
+    /// `reinsert_or_update_with_change_detection`.
+    Reinsert,
+}
 
 /// The crate's tree by its binned builder, whose leaves are indices of items.
 ///
@@ -20,6 +44,7 @@ use crate::query::{ItemId, Recorder, Sink};
 pub struct PeerParry3d {
     bvh: Bvh,
     ids: Vec<ItemId>,
+    update: Parry3dUpdate,
     workspace: BvhWorkspace,
 }
 
@@ -45,31 +70,47 @@ impl BoxTested for PeerParry3d {
         Origin::Crate("parry3d"),
     )
     .refits();
+    type Params = Parry3dParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let leaves: Vec<ParryAabb> = items.iter().map(|item| crate_box(&item.bounds)).collect();
         Ok(PeerParry3d {
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves),
             ids: items.iter().map(|item| item.id).collect(),
+            update: Parry3dUpdate::default(),
             workspace: BvhWorkspace::default(),
         })
     }
 
-    /// `insert_or_update_partially`, then `refit_partial`.
-    ///
-    /// `refit` in its place from one moved item in sixteen on.
+    fn with(self, Parry3dParams { update }: Parry3dParams) -> Self {
+        PeerParry3d { update, ..self }
+    }
+
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = placed(|id| place_of(&self.ids, |id| *id, id), items, moved) else {
+        let Some(placed) = placed(&self.ids, |id| *id, items, moved) else {
             return false;
         };
         for (leaf, bounds) in &placed {
-            (self.bvh).insert_or_update_partially(crate_box(bounds), *leaf as u32, 0.0);
+            let (leaf, bounds) = (*leaf as u32, crate_box(bounds));
+            // A leaf that holds the new bounds would keep its old ones.
+            let holds = || (self.bvh.leaf_node(leaf)).is_some_and(|n| n.contains_aabb(&bounds));
+            if self.update == Parry3dUpdate::Reinsert && !holds() {
+                (self.bvh).reinsert_or_update_with_change_detection(bounds, leaf, 0.0);
+            } else {
+                self.bvh.insert_or_update_partially(bounds, leaf, 0.0);
+            }
+        }
+        if self.update == Parry3dUpdate::Reinsert {
+            return true;
         }
         if placed.len() * ALL_SHARE < self.ids.len() {
             let leaves: Vec<u32> = placed.iter().map(|(leaf, _)| *leaf as u32).collect();
             self.bvh.refit_partial(&[], &leaves);
         } else {
             self.bvh.refit(&mut self.workspace);
+        }
+        if self.update == Parry3dUpdate::Optimize {
+            self.bvh.optimize_incremental(&mut self.workspace);
         }
         true
     }

@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 
-use super::{place_of, placed};
+use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
 use crate::query::{ItemId, Recorder, Sink};
 
 impl RTreeObject for Record {
@@ -56,6 +56,7 @@ impl BoxTested for PeerRstar {
         Origin::Crate("rstar"),
     )
     .refits();
+    type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let tree = RTree::bulk_load(items.clone());
@@ -64,8 +65,7 @@ impl BoxTested for PeerRstar {
 
     /// `remove` and `insert`, item by item; `bulk_load` from a quarter moved on.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = placed(|id| place_of(&self.items, |item| item.id, id), items, moved)
-        else {
+        let Some(placed) = placed(&self.items, |item| item.id, items, moved) else {
             return false;
         };
         let bulk = placed.len() * BULK_SHARE > self.items.len();
