@@ -156,7 +156,9 @@ impl Spec {
 
     /// A text parameter, if given.
     pub fn text(&mut self, key: &'static str) -> Option<String> {
-        self.known.push(key);
+        if !self.known.contains(&key) {
+            self.known.push(key);
+        }
         self.given.get(key).cloned()
     }
 

@@ -253,8 +253,8 @@ impl Changed {
                 (_, spec) => Motion::load(&spec?, scene).ok()?,
             });
         }
-        let workload = Workload::new(scene, &path, &Culling::default()).ok()?;
-        let workload = workload.moved_by(motion, input.views);
+        let culling = Culling::default();
+        let workload = Workload::moving(scene, &path, &culling, motion, input.views).ok()?;
         let labels = beside.contenders.iter();
         let further = beside.policies.iter().filter(|_| self.axis.is_none());
         let specs = labels

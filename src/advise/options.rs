@@ -83,9 +83,8 @@ impl<'a> AdviseInput<'a> {
         }
         check_memory(&scene.name, BYTES_PER_ITEM * scene.items.len() as u64)?;
         let motion = self.motion.map(|motion| Motion::load(motion, scene));
-        let motion = motion.transpose()?;
-        let workload = Workload::new(scene, path, &Culling::default())?;
-        Ok(workload.moved_by(motion, self.views))
+        let (motion, culling) = (motion.transpose()?, Culling::default());
+        Ok(Workload::moving(scene, path, &culling, motion, self.views)?)
     }
 }
 

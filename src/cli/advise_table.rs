@@ -46,7 +46,7 @@ pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
     let lines: [(&str, Holds); 4] = [
         ("Does not apply: ", &|rule| no(rule).is_some()),
         (
-            "Pays from: over views of the whole path; funnel times 8 of them, or --frames: ",
+            "Pays from: a mean over all views, where funnel takes 8 (or --frames): ",
             &|rule| rule.note.contains("pays from"),
         ),
         ("WRONG: answers with and without differ: ", &|rule| {

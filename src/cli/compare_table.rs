@@ -216,7 +216,7 @@ impl CompareTable<'_> {
             let (scene, structure) = (&row.cell.group.scene, &row.cell.structure);
             let places = match room {
                 None => vec![scene.clone(), question(&row.cell), structure.clone()],
-                Some(_) => vec![shortened(structure, 24), place(&row.cell)],
+                Some(_) => vec![shortened(structure, 21), place(&row.cell, metric)],
             };
             let figures = [
                 metric.to_owned(),
@@ -331,19 +331,23 @@ pub fn name(cell: &CellKey) -> String {
 }
 
 /// Scene and path in short, with the test and the cache state that are no defaults.
-fn place(cell: &CellKey) -> String {
+///
+/// Fits a line of 80 characters with a metric, and cuts the scene first.
+fn place(cell: &CellKey, metric: &str) -> String {
     let group = &cell.group;
-    let mut place = format!("{} {}", short(&group.scene), short(&group.path));
+    let mut rest = format!(" {}", short(&group.path));
     if group.test != CullingTest::SixPlane.name() {
-        place += &format!(" {}", group.test);
+        rest += &format!(" {}", group.test);
     }
     if group.cache != "warm" {
-        place += &format!(" {}", group.cache);
+        rest += &format!(" {}", group.cache);
     }
     if !group.motion.is_empty() {
-        place += &format!(" {}", short(&group.motion));
+        rest += &format!(" {}", short(&group.motion));
     }
-    shortened(&place, 30)
+    let most = 35_usize.saturating_sub(metric.len());
+    let left = most.saturating_sub(rest.chars().count() + 3).max(8);
+    shortened(&(shortened(&short(&group.scene), left) + &rest), most)
 }
 
 /// All of a cell's key that is no default, but for scene and structure.

@@ -23,12 +23,16 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     let mut blocks = vec![
         Block::Heading(1, format!("Funnel of {}, {}", report.scene, report.path)),
         Block::Line(format!(
-            "{}; {} of {} x {} samples; {}; figures are means per view.",
+            "{}; {} of {} x {} samples; {}; figures are means per view{}.",
             text::counted(report.items, "item"),
             views,
             report.samples[0],
             report.samples[1],
             spread(report.processes),
+            match report.views == report.cameras {
+                true => String::new(),
+                false => format!("; --frames {} takes all, as advise does", report.cameras),
+            },
         )),
     ];
     if let Some(made) = &report.cut_outs {

@@ -26,10 +26,14 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
     let mut scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
-    if let Some(motion) = &args.motion {
-        scene.items = at_frame(&scene, motion, args.frame)?;
+    let motion = args.motion.as_ref();
+    let motion = motion
+        .map(|motion| Motion::load(motion, &scene))
+        .transpose()?;
+    if let Some(motion) = &motion {
+        advance(&mut scene.items, motion, args.frame)?;
     }
-    let workload = Workload::new(&scene, &cameras, &culling)?;
+    let workload = Workload::moving(&scene, &cameras, &culling, motion, 1)?;
     tell_warnings();
     if let Some(doubt) = culling.unproven() {
         tell(&format!("note: {doubt}"));
@@ -58,21 +62,19 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     Ok(Ending::of(agree))
 }
 
-/// The items of a scene after `frame` frames of a motion, or after all of them.
-fn at_frame(scene: &Scene, motion: &str, frame: Option<usize>) -> anyhow::Result<Vec<Aabb>> {
-    let motion = Motion::load(motion, scene)?;
+/// Moves items through `frame` frames of a motion, or through all of them.
+fn advance(items: &mut [Aabb], motion: &Motion, frame: Option<usize>) -> anyhow::Result<()> {
     let (frames, name) = (motion.frames(), &motion.name);
     let wanted = frame.unwrap_or(frames);
     anyhow::ensure!(
         wanted <= frames,
         "--frame is {wanted}; expected at most {frames}, the frames of '{name}'"
     );
-    let mut items = scene.items.clone();
     let mut replay = motion.replay();
     for _ in 0..wanted {
-        replay.advance(&mut items);
+        replay.advance(items);
     }
-    Ok(items)
+    Ok(())
 }
 
 /// Counts a query with a camera's view, then returns the ids of the plain query.

@@ -306,9 +306,12 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Options that decide how files are read.
-const READS: [&str; 7] = [
+/// Options that decide how files are read, and what a frame of moving items is.
+const READS: [&str; 10] = [
     "up",
+    "items",
+    "views",
+    "update",
     "skip-bad-items",
     "matrix-convention",
     "fovy",
@@ -333,9 +336,12 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
     );
     let path = Some(&first.path.name).filter(|path| *path != DEFAULT_PATH);
     let path = path.map(|path| format!("--path {}", quoted(path)));
+    let motion = Some(&first.path.motion).filter(|motion| !motion.is_empty());
+    let motion = motion.map(|motion| format!("--motion {}", quoted(motion)));
+    let path = path.into_iter().chain(motion);
     let recorded = RunOptions::recorded(args).ok()?;
     let read = recorded.words(|name| READS.contains(&name));
-    for option in path.into_iter().chain(read) {
+    for option in path.chain(read) {
         let last = line.rsplit('\n').next().unwrap_or_default();
         let is_within = last.chars().count() + option.chars().count() < width;
         // The shell joins the lines.

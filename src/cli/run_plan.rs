@@ -189,13 +189,12 @@ impl RunPlan {
             for source in paths {
                 let path = path::load(source, &scene, &self.plan.lens)?;
                 for culling in &self.plan.cullings {
-                    let mut workload = Workload::new(&scene, &path, culling)?;
-                    for motion in &self.plan.motions {
-                        let motion = Motion::load(motion, &scene)?;
-                        workload = workload.moved_by(Some(motion), self.plan.views_per_frame);
-                        look(&scene, Some((source, &workload)))?;
-                    }
-                    if workload.motion.is_none() {
+                    let moved = self.plan.motions.iter().map(Some);
+                    let still = self.plan.motions.is_empty().then_some(None);
+                    for motion in moved.chain(still) {
+                        let motion = motion.map(|motion| Motion::load(motion, &scene));
+                        let (motion, views) = (motion.transpose()?, self.plan.views_per_frame);
+                        let workload = Workload::moving(&scene, &path, culling, motion, views)?;
                         look(&scene, Some((source, &workload)))?;
                     }
                 }

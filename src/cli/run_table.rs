@@ -228,7 +228,9 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
     let up: BTreeSet<&str> = about().map(|cell| cell.scene.up.as_str()).collect();
     let up: Vec<&str> = up.into_iter().collect();
     let lens = scene_facts::lenses(about().map(|cell| &cell.path));
-    let lens = lens.map(|lens| format!("{} up; {lens}", up.join(" or ")));
+    let [cache, test, _] = all.first().map(|one| key(one)).unwrap_or_default();
+    let cache = if cache == "warm" { "" } else { ", cold" };
+    let lens = lens.map(|lens| format!("{test}{cache}; {} up; {lens}", up.join(" or ")));
     let names = labels(all).into_iter();
     let names = names.map(|label| shortened(&label, width / 2));
     let mut parts = matrix(names.collect(), all, overall).parts(width);

@@ -84,14 +84,30 @@ impl Pair<'_> {
             true => ", the best of the others",
             false => ", the best",
         };
+        let (own, other) = (&self.own.structure, &self.other.structure);
+        let parts = parts(tests, per_test);
+        let Some(frame) = self.ratio(frame_ns) else {
+            return format!(
+                "{own} takes {} the time of {other}{rank}: {parts}.",
+                times(time)
+            );
+        };
         format!(
-            "{} takes {} the time of {}{rank}: {}.",
-            self.own.structure,
-            times(time),
-            self.other.structure,
-            parts(tests, per_test)
+            "A frame by {own} takes {} the time of one by {other}: {} in updates and {} in the \
+             first query, where {parts}.",
+            times(frame),
+            some(self.ratio(update_ns), times),
+            times(time)
         )
     }
+}
+
+fn frame_ns(cell: &ReportCell) -> Option<f64> {
+    cell.value("frame_ns")
+}
+
+fn update_ns(cell: &ReportCell) -> Option<f64> {
+    cell.value("frame_ns").and_then(|_| cell.value("update_ns"))
 }
 
 fn query_ns(cell: &ReportCell) -> Option<f64> {
@@ -132,6 +148,10 @@ fn of_one(pair: &Pair) -> Table {
             some(pair.ratio(of), times),
         ]);
     };
+    if frame_ns(pair.own).is_some() {
+        row("frame", &frame_ns, text::time);
+        row("update", &update_ns, text::time);
+    }
     row("time", &query_ns, text::time);
     for (counter, name) in COUNTERS {
         row(name, &|cell| cell.value(counter), text::significant);
@@ -143,8 +163,10 @@ fn of_one(pair: &Pair) -> Table {
 
 /// A row per scene and path, and the geometric means.
 fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -> (Table, String) {
-    let mut table = Table::of("| best other | >time | >tests | >time per test | >nodes | >items");
-    let mut ratios: [Vec<f64>; 3] = Default::default();
+    let mut table = Table::of(
+        "| best other | >frame | >update | >time | >tests | >time per test | >nodes | >items",
+    );
+    let (mut frames, mut ratios) = (Vec::new(), <[Vec<f64>; 3]>::default());
     for (label, pair) in labels.iter().zip(pairs) {
         let Ok(pair) = pair else { continue };
         let own = [query_ns, tests, ns_per_test].map(|of| pair.ratio(of));
@@ -153,7 +175,9 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
         }
         let counter = |name| pair.ratio(|cell: &ReportCell| cell.value(name));
         let counters = ["nodes_tested", "items_tested"].map(counter);
-        let figures = own.into_iter().chain(counters);
+        let frame = [frame_ns, update_ns].map(|of| pair.ratio(of));
+        frames.extend(frame[0]);
+        let figures = frame.into_iter().chain(own).chain(counters);
         let names = [shortened(label, 28), shortened(&pair.other.structure, 24)];
         table.add_row(
             names
@@ -165,13 +189,16 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
     let failed = pairs.iter().find_map(|pair| pair.as_ref().err());
     let sentence = match means {
         [Some(time), Some(tests), Some(per_test)] => format!(
-            "{structure} takes {} the time of the best other structure in the geometric mean: {}.",
-            times(time),
+            "{structure} takes {} the time of the best other structure in the geometric mean{}: {}.",
+            times(geometric_mean(&frames).unwrap_or(time)),
+            some(geometric_mean(&frames), |_| {
+                format!(" of the frames, and {} in the first query", times(time))
+            }),
             parts(tests, per_test)
         ),
         _ => failed.cloned().unwrap_or_default(),
     };
-    (table, sentence)
+    (table.without_empty_columns(), sentence)
 }
 
 #[cfg(test)]

@@ -105,6 +105,7 @@ macro_rules! precision {
 
             use crate::drift::frames::*;
 
+            #[inline(always)]
             fn sin_cos(radians: $real) -> ($real, $real) {
                 ($sin(radians), $cos(radians))
             }
@@ -117,7 +118,8 @@ macro_rules! precision {
             }
 
             /// u, v and n after yaw, pitch and roll with these sines and
-            /// cosines: the formulas of `camera::controls`.
+            /// cosines: the formulas of `camera::controls`, inlined as those are.
+            #[inline(always)]
             fn turned(
                 [mut u, mut v, mut n]: [$vector; 3],
                 by: [($real, $real); 3],
@@ -131,6 +133,7 @@ macro_rules! precision {
                 [u, v, n]
             }
 
+            #[inline(always)]
             fn degrees(turn: &Turn) -> [$real; 3] {
                 [turn.yaw_deg, turn.pitch_deg, turn.roll_deg].map(|angle| angle as $real)
             }

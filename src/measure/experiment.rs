@@ -306,8 +306,8 @@ pub fn measure_scene(
         let motion = motion
             .map(|motion| Motion::load(motion, &scene))
             .transpose()?;
-        let workload = Workload::new(&scene, &path, &group.culling)?;
-        let workload = workload.moved_by(motion, plan.views_per_frame);
+        let views = plan.views_per_frame;
+        let workload = Workload::moving(&scene, &path, &group.culling, motion, views)?;
         let settings = GroupPlan {
             scene: &info,
             path: PathInfo::of(&group.path, &workload, group.cold),

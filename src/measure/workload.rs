@@ -69,7 +69,24 @@ impl<'a> Workload<'a> {
         path: &CameraPath,
         culling: &Culling,
     ) -> Result<Workload<'a>, WorkloadError> {
-        let around = scene.surroundings();
+        Workload::moving(scene, path, culling, None, 1)
+    }
+
+    /// [`Workload::new`] with items that move, and `views` queries after each frame.
+    ///
+    /// # Errors
+    /// The errors of [`Workload::new`].
+    pub fn moving(
+        scene: &'a Scene,
+        path: &CameraPath,
+        culling: &Culling,
+        motion: Option<Motion>,
+        views: usize,
+    ) -> Result<Workload<'a>, WorkloadError> {
+        let views_per_frame = views.max(1);
+        let mut around = scene.surroundings();
+        let moved = motion.iter().map(Motion::reach);
+        around.reach = moved.fold(around.reach, Vec3::max);
         let views = path.cameras.iter().enumerate().map(|(index, camera)| {
             culling
                 .view(camera, &around)
@@ -90,18 +107,9 @@ impl<'a> Workload<'a> {
             sought,
             cameras: path.cameras.clone(),
             lens_scale: path.lens_scale,
-            motion: None,
-            views_per_frame: 1,
-        })
-    }
-
-    /// Moves the items: `views` queries after each frame.
-    pub fn moved_by(self, motion: Option<Motion>, views: usize) -> Workload<'a> {
-        Workload {
             motion,
-            views_per_frame: views.max(1),
-            ..self
-        }
+            views_per_frame,
+        })
     }
 
     /// Region search at the eye of a camera: the answer of `ask`, made exact by

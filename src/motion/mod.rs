@@ -8,6 +8,8 @@ mod recorded;
 
 use std::path::Path;
 
+use glam::Vec3;
+
 use crate::geometry::Aabb;
 use crate::input::{InputError, is_readable, read_file};
 use crate::query::ItemId;
@@ -158,6 +160,16 @@ impl Motion {
             Source::Recorded(recorded) => recorded.moves() as f64,
         };
         moves / (self.frames * self.items).max(1) as f64
+    }
+
+    /// Largest absolute local coordinate of a recorded row, per axis.
+    ///
+    /// Zero of a generated motion, which stays within the scene.
+    pub fn reach(&self) -> Vec3 {
+        match &self.source {
+            Source::Generated { .. } => Vec3::ZERO,
+            Source::Recorded(recorded) => recorded.reach(),
+        }
     }
 
     /// The spec of this motion with at most `frames` frames.

@@ -1,6 +1,6 @@
 //! Recorded motions: CSV rows of a time, an item and its new bounds.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::laws::REMOVED;
 use crate::geometry::Aabb;
@@ -38,6 +38,10 @@ impl Recorded {
         (&self.ids[rows.clone()], &self.boxes[rows])
     }
 
+    pub(super) fn reach(&self) -> Vec3 {
+        Aabb::union_of(&self.boxes).reach()
+    }
+
     pub(super) fn digest(&self, hash: &mut hmac_sha256::Hash) {
         self.ends
             .iter()
@@ -72,17 +76,23 @@ impl Recorded {
 
 /// Reads a motion CSV: `time_s,id,min_x,..,max_z`.
 ///
-/// Rows of one time are a frame; a row without bounds removes the item. Numbers are f64 and are rounded outward to f32 about
-/// the scene's origin.
+/// Rows of one time are a frame; a row without bounds removes the item. Numbers are f64
+/// and are rounded outward to f32 about the scene's origin.
 ///
 /// # Errors
 /// The line of the first value that is no number, no box or no item of the scene; a time
-/// before the last one; an item twice at one time; a file without rows.
+/// before the last one; an item twice at one time; a file without rows; a scene whose
+/// bad items are left out, as its ids are no longer the rows of its file.
 pub(super) fn read_motion_csv(
     bytes: &[u8],
     file: &str,
     scene: &Scene,
 ) -> Result<Recorded, InputError> {
+    if scene.skipped_items > 0 {
+        let (name, bad) = (&scene.name, scene.skipped_items);
+        let found = format!("ids of '{name}', which is without {bad} of its rows");
+        return Err(InputError::line(file, 1, found, "a scene with all rows"));
+    }
     let mut table = TableReader::open(bytes, file)?;
     let columns = table.columns(&COLUMNS)?;
     table.note_unread(&COLUMNS, &[]);

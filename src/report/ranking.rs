@@ -218,7 +218,7 @@ pub(super) fn asked_otherwise((old, new): Pair) -> Option<String> {
     // A report may not know its cameras.
     let (was, is) = (old.path.digest.as_ref(), new.path.digest.as_ref());
     was.zip(is)
-        .and_then(|(was, is)| digests("other cameras", was, is))
+        .and_then(|(was, is)| digests("other cameras or motions", was, is))
 }
 
 /// Why the times are not of the same work, if they are not: the mean over other

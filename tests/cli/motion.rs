@@ -52,6 +52,37 @@ fn query_shows_the_world_after_a_frame() {
     refused("--motion motion.csv", "motion.csv, line 2: id '7' | 0 to 1");
 }
 
+/// The item ends 0.03 inside of a side plane, where f32 planes err by 0.06: planes that
+/// are rounded for the still scene drop it.
+#[test]
+fn items_that_a_file_moves_far_away_are_still_found() {
+    let scene = format!("{BOXES}\n-10,-10,-10,-9,-9,-9\n9,9,9,10,10,10\n9,9,9,0,0,0\n");
+    let cameras = format!("{EYE_LOOK},aspect,near,far\n0,0,0,-7,1,5,1.5,1,inf\n");
+    let place = "-518428.0625,735361.1875,436435.8125";
+    let folder = folder(&[
+        ("bad.csv", scene.as_bytes()),
+        (
+            "scene.csv",
+            scene.rsplit_once("9,9,9,0").expect("a row").0.as_bytes(),
+        ),
+        ("cameras.csv", cameras.as_bytes()),
+        (
+            "motion.csv",
+            format!("time_s,id,{BOUNDS}\n0,1,{place},{place}\n").as_bytes(),
+        ),
+    ]);
+    let query = "query --cameras cameras.csv --motion motion.csv --ids";
+    for row in rows(&works(folder.path(), &format!("{query} --scene scene.csv"))) {
+        assert_eq!(row["visible_ids"], "1", "{}", row["structure"]);
+    }
+    // Ids of what is left of a file are not its rows.
+    let line = format!("{query} --scene bad.csv --skip-bad-items");
+    let refused = cullbench(folder.path(), &line);
+    let wanted = "error: motion.csv, line 1: ids of 'bad.csv', which is without 1 of its rows";
+    assert_eq!(refused.code, Some(2), "{line}");
+    assert!(refused.err.contains(wanted), "{}", refused.err);
+}
+
 const PLAN: &str = "run --scene city:n=300 --path orbit:frames=4 --structure linear,wide,octree,bvh \
     --motion spawn:share=0.1,frames=12 --motion swarm:frames=10 --views 2 --processes 3";
 

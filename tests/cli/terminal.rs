@@ -125,6 +125,11 @@ fn runs_and_comparisons_fit() {
             &format!("compare one/report.json two {more}"),
         );
     }
+    let frames = format!("{one} --motion swarm:frames=12 --path spin:frames=3,fovy=70");
+    let told = assert_fits(folder.path(), &format!("{frames} --out long --why bvh"));
+    assert!(told.contains(" of the frames, and "), "{told}");
+    let told = assert_fits(folder.path(), "compare long long");
+    assert!(told.contains(" swarm"), "{told}");
     let unknown = cullbench(folder.path(), &format!("{one} --why wid"));
     assert_refused(
         &unknown,

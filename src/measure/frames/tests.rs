@@ -22,8 +22,7 @@ fn part(specs: &[StructureSpec], motion: &str, test: CullingTest, known: Option<
         ..Culling::default()
     };
     let motion = Motion::load(motion, &scene).unwrap();
-    let workload = Workload::new(&scene, &way, &culling).unwrap();
-    let workload = workload.moved_by(Some(motion), 2);
+    let workload = Workload::moving(&scene, &way, &culling, Some(motion), 2).unwrap();
     let build = |spec: &StructureSpec| Subject::build(spec.clone(), false, &scene, test);
     let subjects: Vec<Subject> = specs.iter().map(build).collect();
     let info = SceneInfo::of(&scene);
