@@ -11,6 +11,8 @@ import csv
 import io
 import json
 import math
+import os
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -147,16 +149,29 @@ def one_box():
 
 
 @row
+def one_sphere():
+    cells = run("uniform:n=1000", "outside:frames=64", "linear-scalar", "--test", "sphere")
+    ours = cells["linear-scalar"]["query_ns"] / 1000
+    return ("the same, one sphere", "6.60 ns", f"{ours:.2f} ns", ours / 6.60,
+            "Ours tests the corner of the sphere's cube as well, so that trees over cubes return the "
+            "same set, and adds a margin for rounding.")
+
+
+@row
 def overlaps():
-    boxes = FOLDER / "bepu.csv"
-    boxes.write_text(cullbench("scene", "generate", "bepu:n=65536"))
-    found = cullbench("locate", "--scene", str(boxes), "--boxes", str(boxes), "--structure", "wide",
-                      "--format", "csv")
-    counts = sum(int(r["region_count"]) for r in csv.DictReader(io.StringIO(found)))
-    ours = (counts - 65536) // 2
-    return ("bepuphysics: overlapping pairs of 65,536 leaves", "65,600 to 66,300", f"{ours:,}",
-            ours / 65950, "Other random numbers; the cube's side of 629.96 is from its test program, as the "
-            "article does not state it.")
+    boxes, counts = FOLDER / "bepu.csv", []
+    for seed in range(1, 9):
+        boxes.write_text(cullbench("scene", "generate", f"bepu:n=65536,seed={seed}"))
+        found = cullbench("locate", "--scene", str(boxes), "--boxes", str(boxes), "--structure",
+                          "wide", "--format", "csv")
+        found = sum(int(r["region_count"]) for r in csv.DictReader(io.StringIO(found)))
+        counts.append((found - 65536) / 2)
+    ours = statistics.mean(counts)
+    return ("bepuphysics: overlapping pairs of 65,536 leaves", "65,600 to 66,300",
+            f"{ours:,.0f} ± {statistics.stdev(counts):,.0f} (8 seeds)", ours / 65950,
+            "A box is no pair with itself; contacts are too rare to matter. The cube's side of 629.96 is "
+            "from its test program, as the article does not state it: centres anywhere in it give 64,000 "
+            "in the mean, boxes wholly inside 70,100, centres in a cube of 624 theirs.")
 
 
 @row
@@ -268,6 +283,9 @@ def main():
         found = None if only and only not in made.__qualname__ else made()
         if found:
             what, theirs, ours, ratio, why = found
+            load = os.getloadavg()[0]
+            if load > os.cpu_count() and (" ns" in ours or " ms" in ours):
+                why += f" Measured at a load average of {load:.0f}."
             lines.append(f"| {what} | {theirs} | {ours} | {ratio:.2f} | {why} |")
             print(lines[-1], flush=True)
     if not only:

@@ -52,8 +52,9 @@ fn query_shows_the_world_after_a_frame() {
     refused("--motion motion.csv", "motion.csv, line 2: id '7' | 0 to 1");
 }
 
-/// The item ends 0.03 inside of a side plane, where f32 planes err by 0.06: planes that
-/// are rounded for the still scene drop it.
+/// The item lies 0.03 inside a side plane, where f32 planes err by 0.06.
+///
+/// Planes that are rounded for the still scene drop it.
 #[test]
 fn items_that_a_file_moves_far_away_are_still_found() {
     let scene = format!("{BOXES}\n-10,-10,-10,-9,-9,-9\n9,9,9,10,10,10\n9,9,9,0,0,0\n");
