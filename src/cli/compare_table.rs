@@ -209,6 +209,11 @@ impl CompareTable<'_> {
         let mut table = Table::of(&format!(
             "{places} | metric | >old | >new | >{change} | >resolves | >{processes} | verdict | why"
         ));
+        // Beside the widest other column, "vs the others [95 %]", and three gaps.
+        let widest = |of: &dyn Fn(&JudgedRow) -> usize| rows.iter().map(|row| of(row)).max();
+        let structure = widest(&|row| shortened(&row.cell.structure, 17).chars().count());
+        let metric = widest(&|row| row.metric.map_or(0, str::len));
+        let left = 54_usize.saturating_sub(structure.unwrap_or(0) + metric.unwrap_or(0));
         for row in rows {
             let metric = row.metric.unwrap_or_default();
             let judged = row.judgement.as_ref();
@@ -216,7 +221,7 @@ impl CompareTable<'_> {
             let (scene, structure) = (&row.cell.group.scene, &row.cell.structure);
             let places = match room {
                 None => vec![scene.clone(), question(&row.cell), structure.clone()],
-                Some(_) => vec![shortened(structure, 21), place(&row.cell, metric)],
+                Some(_) => vec![shortened(structure, 17), place(&row.cell, left)],
             };
             let figures = [
                 metric.to_owned(),
@@ -332,8 +337,8 @@ pub fn name(cell: &CellKey) -> String {
 
 /// Scene and path in short, with the test and the cache state that are no defaults.
 ///
-/// Fits a line of 80 characters with a metric, and cuts the scene first.
-fn place(cell: &CellKey, metric: &str) -> String {
+/// At most `room` characters; the scene is cut first.
+fn place(cell: &CellKey, room: usize) -> String {
     let group = &cell.group;
     let mut rest = format!(" {}", short(&group.path));
     if group.test != CullingTest::SixPlane.name() {
@@ -345,9 +350,13 @@ fn place(cell: &CellKey, metric: &str) -> String {
     if !group.motion.is_empty() {
         rest += &format!(" {}", short(&group.motion));
     }
-    let most = 35_usize.saturating_sub(metric.len());
+    let scene = short(&group.scene);
+    if scene.chars().count() + rest.chars().count() <= room {
+        return scene + &rest;
+    }
+    let most = room.saturating_sub(3);
     let left = most.saturating_sub(rest.chars().count() + 3).max(8);
-    shortened(&(shortened(&short(&group.scene), left) + &rest), most)
+    shortened(&(shortened(&scene, left) + &rest), most)
 }
 
 /// All of a cell's key that is no default, but for scene and structure.
