@@ -127,7 +127,7 @@ fn runs_and_comparisons_fit() {
     }
     let frames = format!("{one} --motion swarm:frames=12 --path spin:frames=3,fovy=70");
     let told = assert_fits(folder.path(), &format!("{frames} --out long --why bvh"));
-    let why = lines(&told).join(" ");
+    let why = lines(&told).join(" ").replace("  ", " ");
     assert!(why.contains(" of the frames, and "), "{told}");
     let told = assert_fits(folder.path(), "compare long long");
     assert!(told.contains(" swarm"), "{told}");
