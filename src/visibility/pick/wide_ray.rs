@@ -96,7 +96,7 @@ impl<B: Body> Work for SearchFirst<'_, B> {
                 of.tree.search(isa, &slabs, &mut found);
                 found.within(|place| first.offer(of.body(place)));
             }
-            None => of.bodies().for_each(|body| first.offer(body)),
+            None => of.walk_in_f64(ray, |body| first.offer(body)),
         }
         first.hit(of.items())
     }
@@ -186,7 +186,9 @@ impl<B: Body> Work for SearchNearest<'_, B> {
         } = self;
         let meet = |body: &B| Some((body.item(), body.meet(probe, ray.far)?));
         let Some(slabs) = of.tree.slabs(ray) else {
-            return of.bodies().filter_map(meet).collect();
+            let mut met = Vec::new();
+            of.walk_in_f64(ray, |body| met.extend(meet(body)));
+            return met;
         };
         let mut found = Several {
             lowest: Lowest::new(count, slabs.far()),

@@ -92,9 +92,11 @@ impl<B: Body> BodyIndex<B> {
         &self.bodies[place as usize].0
     }
 
-    /// All bodies, in tree order.
-    pub fn bodies(&self) -> impl Iterator<Item = &B> {
-        self.bodies.iter().map(|body| &body.0)
+    /// Shows each body that a ray does not certainly miss to a visitor, in no order.
+    ///
+    /// For rays that [`RayTree::slabs`] does not cover.
+    pub fn walk_in_f64(&self, ray: &Ray, mut visit: impl FnMut(&B)) {
+        (self.tree).search_in_f64(ray, |place| visit(self.body(place)));
     }
 
     /// Shows each body that a ray may meet to a visitor, nearest nodes first.
@@ -158,7 +160,7 @@ impl<B: Body, V: Visit<B>> Work for Walk<'_, B, V> {
     fn run<I: Isa>(self, isa: I) {
         let Walk { of, ray, visitor } = self;
         let Some(slabs) = of.tree.slabs(ray) else {
-            return of.bodies().for_each(|body| {
+            return of.walk_in_f64(ray, |body| {
                 visitor.visit(body);
             });
         };

@@ -38,34 +38,29 @@ impl RayTree {
     /// Returns `true` if the ray certainly misses all boxes.
     ///
     /// Called first, since it costs less than preparing the ray for the nodes.
-    ///
-    /// It begins outside and comes no nearer along an axis, or the shadows of its line and of
-    /// the bounds on the plane of two axes are apart (Gottschalk, Lin and Manocha 1996,
-    /// "OBBTree", the separating axes that are products of two directions). What is rounded
-    /// is below 2^-50 of the largest number here times the direction; 2^-48 of it is added.
     #[inline(always)]
     pub fn is_passed_by(&self, ray: &Ray) -> bool {
-        let start = ray.origin - self.zero;
-        let (min, max) = (self.bounds.min.as_dvec3(), self.bounds.max.as_dvec3());
-        let (above, below) = (start.cmpgt(max), start.cmplt(min));
-        if !(above | below).any() {
-            return false;
+        misses(ray, self.zero, &self.bounds)
+    }
+
+    /// Offers the place of every item that the ray does not certainly miss, in f64.
+    ///
+    /// For rays that [`RayTree::slabs`] does not cover: about eight times as slow a node.
+    pub fn search_in_f64(&self, ray: &Ray, mut offer: impl FnMut(u32)) {
+        let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(self.root));
+        while let Some(at) = open.pop() {
+            let node = &self.nodes[at.node()];
+            for (lane, &child) in node.children.iter().enumerate() {
+                let bounds = node.bounds(lane);
+                if bounds.is_empty() || misses(ray, self.zero, &bounds) {
+                    continue;
+                }
+                match at.items() >> lane & 1 {
+                    0 => open.push(Child(child)),
+                    _ => offer(child),
+                }
+            }
         }
-        let d = ray.direction;
-        let away = (above & d.cmpge(DVec3::ZERO)) | (below & d.cmple(DVec3::ZERO));
-        if away.any() && ray.near >= 0.0 {
-            return true;
-        }
-        let (half, from) = ((max - min) * 0.5, start - (min + max) * 0.5);
-        let most = start.abs().max(min.abs()).max(max.abs()).max_element();
-        let half = half + most * (1.0 / (1u64 << 48) as f64);
-        let (turned, d) = (from.cross(d).abs(), d.abs());
-        let reach = DVec3::new(
-            half.y * d.z + half.z * d.y,
-            half.z * d.x + half.x * d.z,
-            half.x * d.y + half.y * d.x,
-        );
-        turned.cmpgt(reach).any()
     }
 
     /// Offers every item that the ray can meet no deeper than the candidates'
@@ -138,6 +133,37 @@ impl RayTree {
             }
         }
     }
+}
+
+/// Returns `true` if a ray certainly misses a box about a zero.
+///
+/// It begins outside and comes no nearer along an axis, or the shadows of its line and of
+/// the box on the plane of two axes are apart (Gottschalk, Lin and Manocha 1996,
+/// "OBBTree", the separating axes that are products of two directions). What is rounded
+/// is below 2^-50 of the largest number here times the direction; 2^-48 of it is added.
+#[inline(always)]
+fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
+    let start = ray.origin - zero;
+    let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+    let most = start.abs().max(min.abs()).max(max.abs()).max_element();
+    let slack = DVec3::splat(most * (1.0 / (1u64 << 48) as f64));
+    let (above, below) = (start.cmpgt(max + slack), start.cmplt(min - slack));
+    if !(above | below).any() {
+        return false;
+    }
+    let d = ray.direction;
+    let away = (above & d.cmpge(DVec3::ZERO)) | (below & d.cmple(DVec3::ZERO));
+    if away.any() && ray.near >= 0.0 {
+        return true;
+    }
+    let (half, from) = ((max - min) * 0.5 + slack, start - (min + max) * 0.5);
+    let (turned, d) = (from.cross(d).abs(), d.abs());
+    let reach = DVec3::new(
+        half.y * d.z + half.z * d.y,
+        half.z * d.x + half.x * d.z,
+        half.x * d.y + half.y * d.x,
+    );
+    turned.cmpgt(reach).any()
 }
 
 /// Candidates that a search collects.
@@ -250,6 +276,13 @@ impl Node {
             self.rows[axis + 3][lane] = b.max[axis];
         }
         self.children[lane] = child;
+    }
+
+    /// The box of a lane, empty in an unused one.
+    fn bounds(&self, lane: usize) -> Aabb {
+        let corner =
+            |row: usize| Vec3::from_array([0, 1, 2].map(|axis| self.rows[row + axis][lane]));
+        Aabb::new(corner(0), corner(3))
     }
 }
 
@@ -412,11 +445,7 @@ mod tests {
         for (at, node) in nodes.iter().enumerate() {
             let items = children[at].items();
             for lane in 0..LANES {
-                let bound = |row: usize| node.rows[row][lane];
-                let b = Aabb::new(
-                    Vec3::new(bound(0), bound(1), bound(2)),
-                    Vec3::new(bound(3), bound(4), bound(5)),
-                );
+                let b = node.bounds(lane);
                 let child = node.children[lane];
                 if b.is_empty() {
                     continue;
