@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Counts the instructions of the timed traversal with a recorder that is off
+# Counts the instructions of region searches with a recorder that is off
 # and of a copy without any recorder. Fails if the former takes more than one
 # per cent longer. Needs valgrind (Debian package `valgrind`).
 set -euo pipefail
