@@ -96,6 +96,11 @@ impl Linear {
         }
     }
 
+    /// Ids of the items, in the order of answers.
+    pub(super) fn ids(&self) -> &PaddedIds {
+        &self.ids
+    }
+
     /// Removes the item at a position; the last item takes its place.
     fn remove(&mut self, position: usize, id: ItemId) {
         if let Some(last) = self.ids.pop() {

@@ -72,7 +72,7 @@ fn areas_that_overflow_and_windows_too_narrow_for_f32_lose_nothing() {
 
 /// Forty overlapping boxes, cut into hundreds of parts that each fill the image.
 #[test]
-fn an_order_that_cuts_too_much_is_left_out_and_says_why() {
+fn an_order_that_cuts_much_is_drawn_as_the_others_are() {
     let of = |i: i32| format!("{0},-50,-50,{1},50,50\n", f64::from(i) * 1e-3, 100 + i);
     let scene: String = (0..40).map(of).collect();
     let camera = "-20,1,2,1,0,0,0,0,1,60,1.5,0.1,1000";
@@ -82,17 +82,9 @@ fn an_order_that_cuts_too_much_is_left_out_and_says_why() {
         camera,
         "--samples 300x200 --occlusion none",
     );
-    let [row] = &array(&report, "left_out")[..] else {
-        panic!("{}", report["left_out"]);
-    };
-    assert_eq!(
-        (&row["section"], &row["name"]),
-        (&"orders".into(), &"bsp".into())
-    );
-    let reason = row["reason"].as_str().expect("a reason");
-    assert!(reason.contains("samples drawn in a view"), "{reason}");
+    assert_eq!(array(&report, "left_out").len(), 0);
     let orders = array(&report, "orders");
-    assert!(orders.iter().all(|order| order["name"] != "bsp") && orders.len() >= 4);
+    assert!(orders.iter().any(|order| order["name"] == "bsp") && orders.len() >= 5);
     for order in orders {
         // Each front is before those of all boxes behind it.
         assert_eq!(number(order, "pair_count"), 780.0, "{order}");

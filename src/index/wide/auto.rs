@@ -387,7 +387,7 @@ impl RegionIndex for Auto {
             Some(scan) if self.filled == WHOLE => {
                 // Nothing has moved: the tree's root holds all items.
                 if self.updates[OVERWRITE] == 0
-                    && let Some(flow) = self.trees.still.query_root(volume, cx)
+                    && let Some(flow) = self.trees.still.query_root(scan.ids(), volume, cx)
                 {
                     return flow;
                 }

@@ -262,23 +262,24 @@ impl Wide {
 
     /// The whole query where the bounds of all items decide it.
     ///
-    /// It finds nothing or, without vacant lanes, everything. `None` for a query that counts
-    /// its work, that of blocks.
+    /// It finds nothing or, without vacant lanes, everything: `ids`, those of the tree in some
+    /// order. `None` for a query that counts its work, that of blocks.
     #[inline(always)]
     fn query_root<Q: QueryVolume, C: Context>(
         &self,
+        ids: &PaddedIds,
         volume: &Q,
         cx: &mut C,
     ) -> Option<ControlFlow<()>> {
         let is_counted = size_of::<C::Recorder>() > 0;
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        let all = 0..self.ids.len();
+        let all = 0..ids.len();
         match self.root_verdict(volume) {
             _ if is_counted => None,
             Containment::Outside => Some(ControlFlow::Continue(())),
             Containment::Inside if self.vacant == 0 => {
-                Some(pass_run(isa, all, &self.ids, sink, recorder))
+                Some(pass_run(isa, all, ids, sink, recorder))
             }
             _ => None,
         }
@@ -410,7 +411,7 @@ impl RegionIndex for Wide {
                 None => ControlFlow::Continue(()),
             };
         }
-        if let Some(flow) = self.query_root(volume, cx) {
+        if let Some(flow) = self.query_root(&self.ids, volume, cx) {
             return flow;
         }
         let mut scratch = take(&SCRATCH);
