@@ -78,12 +78,7 @@ impl Plane {
     /// zero.
     #[inline(always)]
     pub fn contains(&self, b: &Aabb) -> bool {
-        // The lesser product is that of the n-vertex, as rounding is monotone: no branches.
-        let lesser = |k: usize| {
-            let [low, high] = [self.normal[k] * b.min[k], self.normal[k] * b.max[k]];
-            if low < high { low } else { high }
-        };
-        ((lesser(0) + lesser(1)) + lesser(2)) + self.d >= 0.0
+        self.value_at(self.n_vertex(b)) >= 0.0
     }
 
     /// Returns whether the point lies in the closed half-space.
