@@ -3,6 +3,7 @@
 //! the cells that its bounds reach. (Grids on crates.io are hash maps for moving
 //! bodies.)
 
+use std::hint::black_box;
 use std::ops::{ControlFlow, Range};
 
 use glam::{UVec3, Vec3};
@@ -98,6 +99,9 @@ impl UniformGrid {
         if items.is_empty() {
             return ControlFlow::Continue(());
         }
+        // Opaque, so that each cell reads the planes again: kept in registers from cell to cell,
+        // they are saved and restored around each call of the sink.
+        let test = black_box(test);
         tally.node(test);
         let bounds = &self.bounds[cell];
         let (rejected, accepted) = test.rejects_accepts(bounds);
