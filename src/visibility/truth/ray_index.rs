@@ -94,7 +94,7 @@ impl<B: Body> BodyIndex<B> {
 
     /// Shows each body that a ray does not certainly miss to a visitor, in no order.
     ///
-    /// For rays that [`RayTree::slabs`] does not cover.
+    /// For rays that the slab tests in f32 do not cover.
     pub fn walk_in_f64(&self, ray: &Ray, mut visit: impl FnMut(&B)) {
         (self.tree).search_in_f64(ray, |place| visit(self.body(place)));
     }

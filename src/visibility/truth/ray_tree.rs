@@ -45,7 +45,7 @@ impl RayTree {
 
     /// Offers the place of every item that the ray does not certainly miss, in f64.
     ///
-    /// For rays that [`RayTree::slabs`] does not cover: about eight times as slow a node.
+    /// For rays that the slab tests in f32 do not cover.
     pub fn search_in_f64(&self, ray: &Ray, mut offer: impl FnMut(u32)) {
         let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(self.root));
         while let Some(at) = open.pop() {
@@ -170,7 +170,7 @@ fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
 pub trait Candidates {
     /// Nothing deeper than this is wanted.
     fn bound(&self) -> f32;
-    /// A box that can be entered from `low` on, and up to what [`Slabs::latest`] says.
+    /// A box that can be entered from `low` on, and up to what `Slabs::latest` says.
     fn offer(&mut self, low: f32, place: u32, latest: impl FnOnce() -> Option<f32>);
 }
 
