@@ -201,23 +201,33 @@ impl Plan {
         let once = self.structures.iter().map(|s| (s, false));
         // A structure that has ended a process is not tried again, not as a twin either.
         let twin = twin.filter(|spec| self.has_all() && !share.failed.contains_key(&spec.label));
-        once.chain(twin.map(|s| (s, true)))
-            .map(|(spec, is_twin)| {
+        let mut subjects: Vec<_> = once.chain(twin.map(|s| (s, true))).enumerate().collect();
+        // Another order in each process: what is built first gets other pages than what follows.
+        let first = share.process as usize % subjects.len().max(1);
+        subjects.rotate_left(first);
+        let mut built: Vec<(usize, Subject)> = subjects
+            .into_iter()
+            .map(|(place, (spec, is_twin))| {
                 if let Some(verdict) = share.failed.get(&spec.label) {
-                    return Subject {
-                        spec: spec.clone(),
+                    let built = Err(verdict.clone());
+                    let spec = spec.clone();
+                    let subject = Subject {
+                        spec,
                         is_twin,
-                        built: Err(verdict.clone()),
+                        built,
                     };
+                    return (place, subject);
                 }
                 notice(Some(&spec.label), "building");
                 let built = Subject::build(spec.clone(), is_twin, scene, test);
                 match self.has_updates(share) && !is_twin {
-                    true => built.with_updates(scene, test),
-                    false => built,
+                    true => (place, built.with_updates(scene, test)),
+                    false => (place, built),
                 }
             })
-            .collect()
+            .collect();
+        built.sort_unstable_by_key(|(place, _)| *place);
+        built.into_iter().map(|(_, subject)| subject).collect()
     }
 }
 

@@ -80,7 +80,7 @@ impl Subject {
     /// Builds the structure over the items as a culling test has them. A panic or a
     /// refusal becomes its verdict.
     pub fn build(spec: StructureSpec, is_twin: bool, scene: &Scene, test: CullingTest) -> Subject {
-        let built = guarded(|| build(&spec, is_twin, scene, test)).unwrap_or_else(Err);
+        let built = guarded(|| build(&spec, scene, test)).unwrap_or_else(Err);
         Subject {
             spec,
             is_twin,
@@ -114,12 +114,7 @@ impl Subject {
     }
 }
 
-fn build(
-    spec: &StructureSpec,
-    is_twin: bool,
-    scene: &Scene,
-    test: CullingTest,
-) -> Result<Built, Verdict> {
+fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built, Verdict> {
     let items = test.items(&scene.items);
     let build = || {
         let watch = Stopwatch::start();
@@ -132,8 +127,7 @@ fn build(
         built.map(|index| (index, ms)).map_err(not_built)
     };
     let (mut index, mut build_ms) = build()?;
-    // A twin's build is shown nowhere.
-    if build_ms < AGAIN_BELOW_MS && !is_twin {
+    if build_ms < AGAIN_BELOW_MS {
         // The first one has paid for memory that was never touched. Never two
         // at once: a large scene would not fit twice.
         drop(index);
