@@ -3,8 +3,6 @@
 //! Nodes are in depth-first order, items in the order of their leaves ("tree order"), so
 //! that every subtree is one slice of either. Item bounds are in blocks of sixteen.
 
-use std::ops::Range;
-
 use super::node::{TreeNode, children, is_leaf};
 use super::wide_nodes::WideNodes;
 use crate::geometry::{Aabb, BoxBlocks, LANES};
@@ -153,34 +151,26 @@ impl PackedTree {
     /// The root, and the lanes of the wide nodes below it.
     pub fn cells(&self) -> Vec<TreeCell<'_>> {
         let mut cells = Vec::new();
-        if let Some(root) = self.nodes.first() {
-            let below = (!self.wide_nodes.blocks.is_empty()).then_some(0);
-            self.add_cells(0, (root.bounds, root.items()), below, &mut cells);
+        let below = (!self.wide_nodes.blocks.is_empty()).then_some(0);
+        let root = self.nodes.first();
+        // The last entry is the next cell; one without a wide node below it keeps items.
+        let mut open = Vec::from_iter(root.map(|root| (0, root.bounds, root.items(), below)));
+        while let Some((level, bounds, items, below)) = open.pop() {
+            cells.push(TreeCell {
+                level,
+                bounds,
+                half_space: None,
+                items: below.map_or(&self.ids[items], |_| &[]),
+            });
+            let Some(at) = below else { continue };
+            let (links, block) = (&self.wide_nodes.links[at], &self.wide_nodes.blocks[at]);
+            for lane in (0..LANES).rev().filter(|lane| links.lanes >> lane & 1 == 1) {
+                let items = links.first[lane] as usize..links.end[lane] as usize;
+                let below = (links.leaves >> lane & 1 == 0).then_some(links.below[lane] as usize);
+                open.push((level + 1, block.get(lane), items, below));
+            }
         }
         cells
-    }
-
-    /// Adds a cell and those of the wide node below it; a cell without one keeps items.
-    fn add_cells<'a>(
-        &'a self,
-        level: u32,
-        (bounds, items): (Aabb, Range<usize>),
-        below: Option<usize>,
-        cells: &mut Vec<TreeCell<'a>>,
-    ) {
-        cells.push(TreeCell {
-            level,
-            bounds,
-            half_space: None,
-            items: below.map_or(&self.ids[items], |_| &[]),
-        });
-        let Some(at) = below else { return };
-        let (links, block) = (&self.wide_nodes.links[at], &self.wide_nodes.blocks[at]);
-        for lane in (0..LANES).filter(|lane| links.lanes >> lane & 1 == 1) {
-            let items = links.first[lane] as usize..links.end[lane] as usize;
-            let below = (links.leaves >> lane & 1 == 0).then_some(links.below[lane] as usize);
-            self.add_cells(level + 1, (block.get(lane), items), below, cells);
-        }
     }
 
     /// Bytes of nodes and of items, as allocated.
@@ -291,6 +281,7 @@ mod tests {
         let items = row(100_000);
         let tree = comb(&items);
         assert_eq!(tree.depth(), 100_001);
+        assert!(tree.cells().len() > items.len());
         let mut all = Count::default();
         let everything = Aabb::new(Vec3::splat(-1e9), Vec3::splat(1e9));
         let _ = tree.query(
