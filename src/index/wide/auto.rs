@@ -82,8 +82,9 @@ const SCAN_NS: f64 = 0.32;
 ///
 /// Beyond it the time of an item grows with the cube root of their number.
 const NEAR: f64 = 32_768.0;
-/// An item that is overwritten.
+/// An item that is overwritten, and an item of a scan that leaves or enters, more than that.
 const MOVE_NS: f64 = 7.0;
+const ENTER_NS: f64 = 8.0;
 /// A refit, and a leaf whose bounds it fits.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
 /// The same of two trees, of a moved item.
@@ -95,9 +96,6 @@ const BUILD_NS: f64 = 45.0;
 const LEAST_FILLED: usize = 256;
 /// Mark of a scan that has all items.
 const WHOLE: usize = usize::MAX;
-
-/// Fewest leaves for two trees: of fewer, a single tree is refitted faster.
-const TWO_FROM: usize = 1 << 14;
 
 /// Number of frusta whose work is counted.
 const VIEWS: usize = 8;
@@ -127,9 +125,10 @@ pub struct Auto {
     aged: f64,
     /// Queries since the last weighing, at most [`MOST_ASKED`].
     asked: AtomicU32,
-    /// Updates since the last weighing, and items moved.
+    /// Updates since the last weighing, items moved, and how many of them left.
     weighing: u32,
     moved: f64,
+    left: f64,
     /// Present kind of update, and the modelled time it has lost to the best, ns.
     update: usize,
     regret: f64,
@@ -144,11 +143,7 @@ pub struct Auto {
 impl Auto {
     /// Returns whether movers get a tree of their own.
     fn has_two_trees(&self) -> bool {
-        match self.params.structure {
-            Use::Moving => true,
-            Use::Auto => self.trees.still.occupied.len() >= TWO_FROM,
-            _ => false,
-        }
+        self.params.structure == Use::Moving
     }
 
     /// Frusta of 60 degrees from the centre of an item to that of another one.
@@ -231,11 +226,11 @@ impl Auto {
 
     /// The scan alone, once it has all items; the trees are stale from then on.
     fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        self.updates[OVERWRITE] += 1;
         let count = items.len();
         let scan = (self.scan).get_or_insert_with(|| Linear::with_room(count));
         let from = self.filled;
         if from == WHOLE {
+            self.updates[OVERWRITE] += 1;
             return scan.refit(items, moved);
         }
         // Filled in item order, as many at once as are moved: no update is much slower.
@@ -244,16 +239,17 @@ impl Auto {
         let held = moved.iter().filter(|id| (**id as usize) < from);
         let ids: Vec<ItemId> = held.copied().chain(from as ItemId..end as ItemId).collect();
         self.filled = if end < count { end } else { WHOLE };
-        scan.refit(items, &ids) && (end == count || self.refit_held(items, moved))
+        let is_held = scan.refit(items, &ids) && (end == count || self.refit_held(items, moved));
+        self.updates[OVERWRITE] += u32::from(is_held);
+        is_held || self.rebuild(items)
     }
 
-    /// New bounds in the trees, or a new build.
+    /// New bounds in the trees; false if they cannot take them over.
     fn refit_held(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let is_refitted = match self.has_two_trees() {
+        match self.has_two_trees() {
             true => self.trees.refit(items, moved),
             false => self.trees.still.take_over(items, moved),
-        };
-        is_refitted || self.rebuild(items)
+        }
     }
 
     fn refit_trees(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
@@ -265,11 +261,11 @@ impl Auto {
             self.aged = self.tree_ns(items);
         }
         (self.scan, self.filled) = (None, 0);
-        if self.is_old(items) {
+        if self.is_old(items) || !self.refit_held(items, moved) {
             return self.rebuild(items);
         }
         self.updates[REFIT] += 1;
-        self.refit_held(items, moved)
+        true
     }
 
     /// Returns whether queries take half as long again as those of a new tree.
@@ -296,6 +292,7 @@ impl Auto {
         let is_first = self.updates == [0; 3];
         let updates = f64::from(std::mem::take(&mut self.weighing));
         let moved = std::mem::take(&mut self.moved);
+        let left = std::mem::take(&mut self.left);
         let asked = f64::from(std::mem::take(self.asked.get_mut()));
         // Queries before the first update are of no frame.
         let asked = if is_first { 1.0 } else { asked.max(updates) };
@@ -317,7 +314,8 @@ impl Auto {
             false => MOVE_NS * all + REFIT_NS[1] * leaves,
         };
         let costs = [
-            MOVE_NS * moved + asked * self.costs[SCAN],
+            // About as many enter as leave.
+            MOVE_NS * moved + 2.0 * ENTER_NS * left + asked * self.costs[SCAN],
             MOVE_NS * moved + fit + asked * tree,
             BUILD_NS * all * updates + asked * self.costs[self.built],
         ];
@@ -404,12 +402,14 @@ impl RegionIndex for Auto {
             // Tables for the updates that follow.
             return match &mut self.scan {
                 Some(scan) => scan.refit(items, moved),
-                None => self.refit_held(items, moved),
+                None => self.refit_held(items, moved) || self.rebuild(items),
             };
         }
         self.trees.still.balls = None;
         self.weighing += 1;
         self.moved += moved.len() as f64;
+        let left = moved.iter().filter(|id| items[**id as usize].is_empty());
+        self.left += left.count() as f64;
         if self.weighing == TOGETHER || self.updates == [0; 3] {
             self.weigh(items.len());
         }

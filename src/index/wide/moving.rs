@@ -141,7 +141,7 @@ impl Moving {
     fn divide(&mut self, movers: usize) {
         let leaves = self.region_of.len();
         let span = (6 * leaves / movers.max(1)).max(1).next_power_of_two();
-        // Small trees have no room for leaves that stay empty.
+        // In small trees empty leaves cost more than nearness gains.
         let parts = if leaves < 1024 { 8 } else { 32 };
         self.finest = (span / parts).max(1);
         let first_free = leaves.div_ceil(self.finest);

@@ -7,30 +7,16 @@ use crate::query::ItemId;
 
 impl Wide {
     /// [`RegionIndex::refit`](crate::index::RegionIndex::refit).
-    pub(super) fn take_over(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let mut leaves = self.untouched();
-        let has_lanes = self.overwrite(items, moved, |leaf| _ = leaves.mark(leaf));
-        if has_lanes {
-            self.fit_above(leaves);
-        }
-        has_lanes
-    }
-
-    /// Takes over the bounds of moved items in the leaves alone.
     ///
-    /// Each leaf is passed to `changed`. False with nothing changed if an item has no lane.
-    pub(super) fn overwrite(
-        &mut self,
-        items: &[Aabb],
-        moved: &[ItemId],
-        mut changed: impl FnMut(usize),
-    ) -> bool {
+    /// False with nothing changed if an item has no lane.
+    pub(super) fn take_over(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         self.positions.prepare(&self.ids, items.len());
         let enters =
             |&id: &ItemId| self.positions.of(id).is_none() && !items[id as usize].is_empty();
         if items.len() > self.ids.len() && moved.iter().any(enters) {
             return false;
         }
+        let mut leaves = self.untouched();
         for (i, &id) in moved.iter().enumerate() {
             if let Some(position) = self.positions.ahead(items, moved, i) {
                 self.blocks[position / LANES].prefetch();
@@ -46,8 +32,9 @@ impl Wide {
             } else {
                 self.blocks[position / LANES].set(position % LANES, bounds);
             }
-            changed(position / LANES);
+            leaves.mark(position / LANES);
         }
+        self.fit_above(leaves);
         true
     }
 

@@ -93,6 +93,37 @@ fn answers_are_those_of_a_scan_whatever_is_chosen_and_moves() {
 }
 
 #[test]
+fn the_tree_answers_while_the_scan_fills() {
+    let mut rng = Pcg64::seed_from_u64(11);
+    for turns in [0, 9] {
+        let mut items = cubes(&mut rng, 5200);
+        let mut index = built(&items, "");
+        index.updates[OVERWRITE] = 1;
+        let mut partly = 0;
+        for round in 1..24 {
+            (index.update, index.weighing) = (OVERWRITE, 0);
+            if round == turns {
+                index.update = REFIT;
+            }
+            // Some twice, in no order; a quarter leaves or stays away.
+            let some = |_| rng.next_u32() % items.len() as u32;
+            let moved: Vec<ItemId> = (0..300).map(some).collect();
+            for &id in &moved {
+                let at = Aabb::around(point(&mut rng), Vec3::splat(0.7));
+                items[id as usize] = [GONE, at, at, at][rng.next_u32() as usize % 4];
+            }
+            assert!(index.refit(&items, &moved));
+            partly += u32::from(index.filled != 0 && index.filled != WHOLE);
+            let told = format!("update {round}, a refit at {turns}");
+            assert_right(&index, &items, &mut rng, &told);
+            assert!(index.refit(&items, &[]));
+            assert_right(&index, &items, &mut rng, &told);
+        }
+        assert!(partly > 10 && (index.filled == WHOLE) == (turns == 0));
+    }
+}
+
+#[test]
 fn what_is_forced_is_taken_and_said() {
     let mut rng = Pcg64::seed_from_u64(6);
     let mut items = cubes(&mut rng, 2000);
