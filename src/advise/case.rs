@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::options::{AdviseInput, AdviseOptions, planned};
-use crate::camera::PlaneOptions;
+use crate::camera::{PlaneOptions, Surroundings};
 use crate::culling::{CameraView, Culling, CullingTest};
 use crate::funnel::{Chain, FunnelInput, World};
 use crate::geometry::ConvexVolume;
@@ -120,7 +120,15 @@ impl<'a> Case<'a> {
 
     /// The views of the path by another culling.
     pub fn views_by(&self, culling: &Culling) -> Result<Vec<CameraView>, WorkloadError> {
-        Ok(Workload::new(self.scene(), self.path, culling)?.views)
+        let cameras = self.workload.cameras.iter().enumerate();
+        let views = cameras.map(|(index, camera)| {
+            let view = culling.view(camera, &self.workload.around);
+            view.map_err(|error| WorkloadError {
+                place: self.path.place(index),
+                error,
+            })
+        });
+        views.collect()
     }
 
     /// The tree over the items as a culling test indexes them.
@@ -136,18 +144,17 @@ impl<'a> Case<'a> {
         far.unwrap_or_else(|| f64::from(self.scene().bounds.extent().length()))
     }
 
-    /// Outward displacement of planes for rounding about a scene's origin, in depths of
-    /// the view: the largest of all cameras and planes.
-    pub fn margin(&self, scene: &Scene) -> f64 {
-        let around = scene.surroundings();
+    /// Outward displacement of planes for rounding about an origin, in depths of the view:
+    /// the largest of all cameras and planes.
+    pub fn margin(&self, around: &Surroundings) -> f64 {
         let bare = PlaneOptions {
             epsilon: 0.0,
             ..PlaneOptions::default()
         };
         let cameras = self.workload.cameras.iter().enumerate();
         let margins = cameras.filter_map(|(index, camera)| {
-            let moved = camera.volume(&PlaneOptions::default(), &around).ok()?;
-            let derived = camera.volume(&bare, &around).ok()?;
+            let moved = camera.volume(&PlaneOptions::default(), around).ok()?;
+            let derived = camera.volume(&bare, around).ok()?;
             let planes = moved.planes().iter().zip(derived.planes());
             let apart = planes.map(|(a, b)| f64::from(a.d) - f64::from(b.d));
             Some(apart.fold(0.0, f64::max) / self.depth(index))

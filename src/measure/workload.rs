@@ -6,7 +6,7 @@ use std::borrow::Cow;
 
 use glam::Vec3;
 
-use crate::camera::Camera;
+use crate::camera::{Camera, Surroundings};
 use crate::culling::{CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
 use crate::index::Input;
@@ -33,6 +33,8 @@ pub struct Workload<'a> {
     pub items: Cow<'a, [Aabb]>,
     /// The cameras of the path; the truth is theirs.
     pub cameras: Vec<Camera>,
+    /// Origin of the scene and extent of what its items cover, moved ones included.
+    pub around: Surroundings,
     /// Views that structures are queried with, one per camera.
     pub views: Vec<CameraView>,
     /// Scale of the lens where the path names a visible share.
@@ -52,7 +54,7 @@ pub struct Workload<'a> {
 #[error("{place}: {error}")]
 #[non_exhaustive]
 pub struct WorkloadError {
-    /// Place in the path: [`CameraPath::place`].
+    /// Place in the path ([`CameraPath::place`]), or the motion that goes too far for it.
     pub place: String,
     /// Reason.
     pub error: CullingError,
@@ -88,13 +90,16 @@ impl<'a> Workload<'a> {
         let moved = motion.iter().map(Motion::reach);
         around.reach = moved.fold(around.reach, Vec3::max);
         let views = path.cameras.iter().enumerate().map(|(index, camera)| {
-            culling
-                .view(camera, &around)
-                .map_err(|error| WorkloadError {
-                    place: path.place(index),
-                    error,
-                })
+            let refused = |error| {
+                let is_motions = culling.view(camera, &scene.surroundings()).is_ok();
+                let motion = motion.as_ref().filter(|_| is_motions);
+                let place = motion.map(|motion| format!("motion '{}'", motion.name));
+                let place = place.unwrap_or_else(|| path.place(index));
+                WorkloadError { place, error }
+            };
+            culling.view(camera, &around).map_err(refused)
         });
+        let views = views.collect::<Result<_, _>>()?;
         let eyes = path.cameras.iter().map(|camera| camera.frame.eye);
         let sought: Vec<Sought> = eyes.map(|eye| scene.sought(eye)).collect();
         Ok(Workload {
@@ -102,7 +107,8 @@ impl<'a> Workload<'a> {
             path: path.name.clone(),
             culling: *culling,
             items: culling.test.items(&scene.items),
-            views: views.collect::<Result<_, _>>()?,
+            around,
+            views,
             points: sought.iter().map(|point| point.local).collect(),
             sought,
             cameras: path.cameras.clone(),

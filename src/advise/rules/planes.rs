@@ -211,7 +211,7 @@ pub(super) fn six_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
         let worth = testing / more;
         let left_out = check.left_out_ns + drawing;
         let reason = format!(
-            "{more:.1} items a query too many ({:.2} %; 4 (s/D)^2 predicts {:.2} %) at {draw_ns} ns each, \
+            "{more:.1} invisible items per query ({:.2} %; 4 (s/D)^2 predicts {:.2} %) at {draw_ns} ns each, \
              against the extra test time{}",
             check.left_out_excess.unwrap_or(0.0) * 100.0,
             predicted * 100.0,
@@ -293,7 +293,7 @@ pub(super) fn f64_kernel(trials: &mut Trials) -> Result<Draft, Unfit> {
         arithmetic: Arithmetic::F64,
         ..Culling::default()
     };
-    let (margin, tolerance) = (case.margin(case.scene()), case.options.tolerance);
+    let (margin, tolerance) = (case.margin(&case.workload.around), case.options.tolerance);
     let reason = format!(
         "f32 planes are moved outward by up to {margin:.1e} of the depth; {tolerance:.0e} are tolerated"
     );
@@ -311,6 +311,9 @@ pub(super) fn f64_kernel(trials: &mut Trials) -> Result<Draft, Unfit> {
 pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let scene = case.scene();
+    if case.workload.around != scene.surroundings() {
+        return Err(not_applicable("a motion that leaves the scene"));
+    }
     let is_moved = scene.origin != DVec3::ZERO;
     let elsewhere = if is_moved {
         DVec3::ZERO
@@ -326,7 +329,10 @@ pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
         true => (&other, scene, [BASE, there]),
         false => (scene, &other, [there, BASE]),
     };
-    let (margin, better) = (case.margin(at_zero), case.margin(moved));
+    let (margin, better) = (
+        case.margin(&at_zero.surroundings()),
+        case.margin(&moved.surroundings()),
+    );
     let reason = format!(
         "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({}, {}, {}); this scene {}",
         moved.origin.x,
