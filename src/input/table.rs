@@ -38,11 +38,13 @@ pub struct Row<'a> {
 impl<'b> TableReader<'b> {
     /// Reads the header. Names are trimmed; a byte order mark is dropped.
     ///
+    /// Fields are separated by the one of `,`, `;`, tab and `|` that gives most of `names`.
+    ///
     /// # Errors
     /// An empty file, a column named twice, a quote that is never closed, text that is no
     /// comma-separated UTF-8 with a header.
-    pub fn open(bytes: &'b [u8], file: &str) -> Result<Self, InputError> {
-        let delimiter = delimiter(bytes);
+    pub fn open(bytes: &'b [u8], file: &str, names: &[&str]) -> Result<Self, InputError> {
+        let delimiter = delimiter(bytes, names);
         let mut csv = csv::ReaderBuilder::new()
             .flexible(true)
             .delimiter(delimiter)
@@ -185,7 +187,7 @@ impl<'b> TableReader<'b> {
         Some(match found == wanted {
             true => Ok(row),
             false => {
-                // Where all are numbers, some of them may be behind a decimal comma.
+                // If all are numbers, some of them may be behind a decimal comma.
                 let is_split = self.delimiter == b',' && found > wanted;
                 let is_split = is_split && (0..found).all(|k| row.text(k).parse::<f64>().is_ok());
                 let why = match is_split {
@@ -224,14 +226,28 @@ impl Row<'_> {
     }
 }
 
-/// First delimiter of the first line that is not empty, outside of quotes.
+/// Delimiter of the first line that is not empty: the one that gives most of the names.
 ///
-/// Not the most frequent one: labels may hold any number of the others.
-fn delimiter(head: &[u8]) -> u8 {
+/// The most frequent one, outside of quotes, if none gives any.
+fn delimiter(head: &[u8], names: &[&str]) -> u8 {
+    let head = head.strip_prefix("\u{feff}".as_bytes()).unwrap_or(head);
     let mut lines = head.split(|byte| matches!(byte, b'\n' | b'\r'));
     let header = lines.find(|line| !line.is_empty()).unwrap_or_default();
-    let mut names = header.split(|byte| *byte == b'"').step_by(2).flatten();
-    *names.find(|byte| b",;\t|".contains(byte)).unwrap_or(&b',')
+    let unquoted = header.split(|byte| *byte == b'"').step_by(2);
+    let rank = |one: &u8| {
+        let mut csv = csv::ReaderBuilder::new();
+        let csv = csv.delimiter(*one).trim(csv::Trim::All);
+        let fields = csv.from_reader(header).byte_headers().cloned();
+        let fields = fields.unwrap_or_default();
+        let named = |name: &&&str| fields.iter().any(|field| field == name.as_bytes());
+        match names.iter().filter(named).count() {
+            0 => (0, unquoted.clone().flatten().filter(|b| *b == one).count()),
+            named => (named, 0),
+        }
+    };
+    // The last of several that are equal.
+    let all = [b'|', b'\t', b';', b','];
+    all.into_iter().max_by_key(rank).unwrap_or(b',')
 }
 
 /// Names of columns, cut down to what fits an error line.

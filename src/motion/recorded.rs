@@ -93,7 +93,7 @@ pub(super) fn read_motion_csv(
         let found = format!("ids of '{name}', which is without {bad} of its rows");
         return Err(InputError::line(file, 1, found, "a scene with all rows"));
     }
-    let mut table = TableReader::open(bytes, file)?;
+    let mut table = TableReader::open(bytes, file, &COLUMNS)?;
     let columns = table.columns(&COLUMNS)?;
     table.note_unread(&COLUMNS, &[]);
     let (mut recorded, mut rows) = (Recorded::default(), Vec::new());

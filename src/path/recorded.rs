@@ -97,7 +97,7 @@ pub fn read_cameras_csv(
     file: &str,
     defaults: &LensDefaults,
 ) -> Result<CameraPath, InputError> {
-    let mut table = TableReader::open(bytes, file)?;
+    let mut table = TableReader::open(bytes, file, &[&MATRIX_ENTRIES[..], &OF_EYES].concat())?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
     let read: CameraReader = if is_matrix {
         matrices(&table, defaults.matrix)?
@@ -287,7 +287,7 @@ fn eyes<'a>(
 /// The line of the first value that is no finite number; a file without
 /// points.
 pub fn read_points_csv(bytes: &[u8], file: &str) -> Result<Vec<DVec3>, InputError> {
-    let mut table = TableReader::open(bytes, file)?;
+    let mut table = TableReader::open(bytes, file, &["x", "y", "z"])?;
     let columns = table.columns(&["x", "y", "z"])?;
     let points = rows(&mut table, file, "no point", |row| point(row, columns))?;
     table.note_unread(&["x", "y", "z"], &[]);

@@ -78,7 +78,7 @@ impl Rows {
 
 /// Reads all rows; bad is also a bound beyond `limit`.
 fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
-    let mut table = TableReader::open(bytes, file)?;
+    let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let columns = table.columns(&BOUNDS)?;
     let others = table.header().iter().enumerate();
     let others = others.filter(|(i, _)| !columns.contains(i));

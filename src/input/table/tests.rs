@@ -2,9 +2,11 @@
 
 use super::*;
 
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
 /// The line of the first row whose field `x` is no number.
 fn bad_line(text: &str) -> u64 {
-    let mut table = TableReader::open(text.as_bytes(), "t.csv").unwrap();
+    let mut table = TableReader::open(text.as_bytes(), "t.csv", &NAMES).unwrap();
     while let Some(row) = table.next_row() {
         if let Err(error) = row.and_then(|row| row.finite_number(0)) {
             let error = error.to_string();
@@ -16,14 +18,19 @@ fn bad_line(text: &str) -> u64 {
 }
 
 #[test]
-fn the_first_delimiter_of_the_header_separates() {
+fn the_delimiter_that_gives_most_names_separates() {
     for (header, wanted) in [
         ("x,y,a\t\t\t\tb", b','),
-        ("x;y,;,,,", b';'),
+        ("x;y;,,,,", b';'),
         ("\"a,b\"\tx\ty", b'\t'),
+        ("size (w;h;d;e),x,y,z", b','),
+        ("name|id,x,y", b','),
+        ("\u{feff}x;y;a,b,c", b';'),
+        ("x,y,z,x\tz\ty\tx\tx", b','),
+        ("1;2;3", b';'),
         ("x", b','),
     ] {
-        assert_eq!(delimiter(header.as_bytes()), wanted, "{header:?}");
+        assert_eq!(delimiter(header.as_bytes(), &NAMES), wanted, "{header:?}");
     }
 }
 
@@ -60,7 +67,9 @@ fn nothing_is_told_from_columns_without_names() {
             "t.csv, line 1: 3 columns without a name; expected a header line",
         ),
     ] {
-        let error = TableReader::open(text.as_bytes(), "t.csv").err().unwrap();
+        let error = TableReader::open(text.as_bytes(), "t.csv", &NAMES)
+            .err()
+            .unwrap();
         assert_eq!(error.to_string(), wanted, "{text:?}");
     }
 }
@@ -73,7 +82,7 @@ fn columns_are_separated_by_what_separates_the_header() {
         "x\ty\tz\tkind\r\n1\t2\t\" 3\"\ta b\r\n",
         "\u{feff}\"x\"|\"y\"|z|\"a \"\"|\"\"\"\n 1 |2|3| ",
     ] {
-        let mut table = TableReader::open(text.as_bytes(), "t.csv").unwrap();
+        let mut table = TableReader::open(text.as_bytes(), "t.csv", &NAMES).unwrap();
         let columns = table.columns(&["x", "y", "z"]).unwrap();
         assert_eq!(table.header().len(), 4, "{text}");
         let row = table.next_row().unwrap().unwrap();
@@ -86,7 +95,7 @@ fn columns_are_separated_by_what_separates_the_header() {
 /// The error of reading a table of three columns to its end.
 fn told(text: &[u8]) -> String {
     let read = || -> Result<(), InputError> {
-        let mut table = TableReader::open(text, "t.csv")?;
+        let mut table = TableReader::open(text, "t.csv", &NAMES)?;
         let columns = table.columns(&["x", "y", "z"])?;
         while let Some(row) = table.next_row() {
             row?.finite_number(columns[1])?;
@@ -196,7 +205,9 @@ fn text_of_another_form_is_named() {
 #[test]
 fn header_errors_fit_one_line() {
     let twice = format!("\n\"{0}\n\",\"{0}\n\"\n", "long".repeat(50));
-    let error = TableReader::open(twice.as_bytes(), "t.csv").err().unwrap();
+    let error = TableReader::open(twice.as_bytes(), "t.csv", &NAMES)
+        .err()
+        .unwrap();
     let error = error.to_string();
     assert!(
         error.starts_with("t.csv, line 2: column 'longlong"),
