@@ -62,14 +62,15 @@ def files():
     yield from (ROOT / name for name in ["README.md", "CHANGELOG.md", "results/README.md"])
 
 
-def summaries(lines):
-    """First lines of doc comments, as (line number, text)."""
+def paragraphs(lines):
+    """First lines of the paragraphs of doc comments, as (line number, text, is the summary)."""
     before = None
     for number, line in enumerate(lines, 1):
         found = DOC.match(line)
-        if found and found[1] != before:
-            yield number, found[2]
-        before = found and found[1]
+        is_summary = found and (not before or found[1] != before[1])
+        if is_summary or found and not before[2]:
+            yield number, found[2], is_summary
+        before = found
 
 
 def prose(path, text):
@@ -89,10 +90,10 @@ def occurrences():
         text = path.read_text(encoding="utf-8")
         name = path.relative_to(ROOT)
         if path.suffix == ".rs":
-            for number, first in summaries(text.split("\n")):
+            for number, first, is_summary in paragraphs(text.split("\n")):
                 if OPENER.match(first):
                     yield "doc-opener", name, number, first
-                if len(first) > LONGEST_SUMMARY:
+                if is_summary and len(first) > LONGEST_SUMMARY:
                     yield "doc-length", name, number, first
         elif path.suffix == ".md":
             for link in LINK.finditer(text):

@@ -42,7 +42,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
             homes.extend(of_eye);
         }
     }
-    // What is stored of the rows, one after the other.
+    // The stored rows, one after the other.
     let rows = homes.iter().map(|home| of_home(&stored, *home).to_vec());
     let rows: Vec<Vec<RegionId>> = rows.collect();
 

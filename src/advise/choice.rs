@@ -355,7 +355,7 @@ mod tests {
         let off = |n: usize| 1.0 + 0.01 * ((n * test.len()) % 7) as f64 - 0.03;
         TestRow {
             test,
-            query_ns: Some(Estimate::within(query, [f64::NAN; 2])),
+            query_ns: Some(Estimate::exact(query)),
             excess: None,
             false_negative_ppm: rate(&[[0.0, 1e6]]),
             false_positives_per_query: Some(drawn),
@@ -370,7 +370,7 @@ mod tests {
             structure: structure.to_owned(),
             status: "ok",
             reason: None,
-            query_ns: query_ns.map(|ns| Estimate::within(ns, [f64::NAN; 2])),
+            query_ns: query_ns.map(Estimate::exact),
             speedup: None,
             build_ms: None,
             memory_bytes_per_item: None,

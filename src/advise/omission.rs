@@ -230,7 +230,7 @@ mod tests {
             on: "wide".to_owned(),
             kept_ns: ratio * 100.0,
             left_out_ns: 100.0,
-            ratio: Some(Estimate::within(ratio, [f64::NAN; 2])),
+            ratio: Some(Estimate::exact(ratio)),
             same_answers: true,
             same_expected: true,
             kept_excess: None,

@@ -58,7 +58,7 @@ impl ViewProjection {
         let aside = |row: DVec3| row - forward * row.dot(forward);
         let (across, upward) = (aside(x), aside(y));
         let is_mirrored = across.cross(upward).dot(forward) > 0.0;
-        // Of clip spaces only Vulkan's has y downward.
+        // Only Vulkan's clip space has y downward.
         let up = if is_mirrored && self.is_vulkan() {
             -upward
         } else {

@@ -107,7 +107,7 @@ impl<'d> Diagram<'d> {
             let x = x_axis.percent(tick);
             parts += &line("grid", [x, x], [0.0, bottom]);
             let name = (x_axis.shown)(tick);
-            // Of the narrowest plot.
+            // Percent of the narrowest plot.
             let half = 50.0 * CHARACTER * name.chars().count() as f64 / 200.0;
             if x - half < free {
                 continue;

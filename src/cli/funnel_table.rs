@@ -89,7 +89,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         let (section, name, reason) = (row.section, row.name, &row.reason);
         Block::Line(format!("Left out ({section}, {name}): {reason}."))
     }));
-    // Of other back ends only with them.
+    // Notes about other back ends are shown with them only.
     let is_shown = |told: &&String| {
         let mut others = report.stages.iter().filter(|row| !row.is_chosen);
         all || !others.any(|row| row.loss().as_ref() == Some(*told))

@@ -27,7 +27,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         ("--bencher", args.bencher.as_deref()),
         ("--history", args.history.as_deref()),
     ];
-    // Of a run's folder the report is read.
+    // A run's folder stands for its report.
     let files: Vec<PathBuf> = args
         .reports
         .iter()

@@ -199,7 +199,7 @@ mod tests {
     use super::*;
     use crate::geometry::arbitrary::{any_box, number, vector};
     use crate::geometry::{BallFrustum, ConvexVolume, Plane, Planes, sphere_cube};
-    use crate::kernel::{BASELINE, Plain};
+    use crate::kernel::{BASELINE, Kernel, Plain, Work};
     use glam::{EulerRot, Quat, Vec3};
     use proptest::prelude::*;
 
@@ -207,6 +207,28 @@ mod tests {
         lanes.fold(0, |all, lane| {
             all >> 1 | LaneMask::from(lane) << (LANES - 1)
         })
+    }
+
+    /// Lanes by single planes, and by the frustum of all six.
+    struct KeptBalls<'a> {
+        spheres: &'a Spheres,
+        balls: &'a Balls<'a>,
+        block: (usize, &'a BoxBlock),
+        mask: PlaneMask,
+    }
+
+    impl Work for KeptBalls<'_> {
+        type Output = [LaneMask; 2];
+
+        fn run<I: Isa>(self, isa: I) -> [LaneMask; 2] {
+            let (balls, block) = (self.balls, self.block);
+            let kept = self.spheres.kept_balls(isa, balls, block, self.mask);
+            let frustum = BallFrustum::new(isa, self.spheres).filter(|_| self.mask == 0b11_1111);
+            [
+                kept,
+                frustum.map_or(kept, |frustum| frustum.kept_balls(isa, balls, block)),
+            ]
+        }
     }
 
     /// Compares blocks of spheres and blocks of bounds with the scalar test.
@@ -230,13 +252,17 @@ mod tests {
         );
         assert_eq!(spheres.kept_boxes(Plain, &block, mask), wanted, "{boxes:?}");
         let balls = all.seen_by(&spheres)?;
-        let found = spheres.kept_balls(BASELINE, &balls, (0, &block), mask);
-        assert_eq!(found, wanted, "{boxes:?} {planes:?}");
-        let frustum = BallFrustum::new(BASELINE, &spheres).filter(|_| mask == 0b11_1111);
-        if let Some(frustum) = &frustum {
-            let found = frustum.kept_balls(BASELINE, &balls, (0, &block));
-            assert_eq!(found, wanted, "{boxes:?} {planes:?}");
+        for kernel in Kernel::available() {
+            let (balls, block) = (&balls, (0, &block));
+            let found = kernel.run(KeptBalls {
+                spheres: &spheres,
+                balls,
+                block,
+                mask,
+            });
+            assert_eq!(found, [wanted; 2], "{kernel}: {boxes:?} {planes:?}");
         }
+        let frustum = BallFrustum::new(BASELINE, &spheres).filter(|_| mask == 0b11_1111);
         Some(frustum.is_some())
     }
 

@@ -101,7 +101,7 @@ impl<I: Isa> BroadcastPlanes<I> {
     /// The planes of a mask; `None` if they are too many.
     #[inline(always)]
     pub fn new(isa: I, volume: &ConvexVolume, mask: PlaneMask) -> Option<Self> {
-        // Where there are fewer, the first one is tested again; a volume
+        // If there are fewer, the first one is tested again; a volume
         // without any has a plane that excludes nothing in its place.
         let first = BroadcastPlane::new(isa, volume, mask.trailing_zeros());
         let mut planes = [first; MOST_PLANES];

@@ -85,7 +85,7 @@ pub struct LinearParams {
 }
 
 impl Linear {
-    /// No items yet, and memory for as many.
+    /// No items yet, and memory for the boxes of as many.
     pub(super) fn with_room(items: usize) -> Self {
         Linear {
             boxes: BoxBlocks::with_capacity(items),
@@ -235,7 +235,7 @@ impl RegionIndex for Linear {
             );
         }
         let blocks = self.boxes.blocks().len();
-        // What is counted is not shared: one recorder, one thread.
+        // Counted queries are not shared: one recorder, one thread.
         if size_of::<C::Recorder>() == 0
             && let Some(workers) = &self.workers
         {

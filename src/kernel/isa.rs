@@ -14,9 +14,9 @@ pub fn first_lanes(count: usize) -> LaneMask {
 
 /// An instruction set: sixteen f32 lanes and sixteen u32 lanes.
 ///
-/// Every operation rounds once, to nearest, lane by lane; code written with these
-/// operations has bit-identical results on every instruction set. A value of such a type
-/// is the proof that the processor supports the instructions.
+/// Every operation but [`Isa::near_mul_add`] rounds once, to nearest, lane by lane; code
+/// written with these operations has bit-identical results on every instruction set. A value
+/// of such a type is the proof that the processor supports the instructions.
 pub trait Isa: Copy + Send + Sync {
     /// True if the registers hold the coefficients of six planes and a block.
     const MANY_REGISTERS: bool = false;

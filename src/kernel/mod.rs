@@ -5,8 +5,9 @@
 //! arrays (other architectures, interpreters, `--cfg plain_vectors`) omit that folder, and
 //! the compiler forbids unsafe code in them.
 //!
-//! No kernel contracts a product and a sum into a fused multiply-add: Rust does not do
-//! this implicitly on any instruction set, and the plane test relies on it.
+//! Products and sums are never fused: Rust does not do it implicitly on any instruction set,
+//! and the plane test relies on it. [`Isa::near_mul_add`] alone may fuse, for sums whose error
+//! a bound covers.
 
 mod inlined;
 mod isa;

@@ -139,7 +139,7 @@ impl<'w> Moving<'w> {
         let mut index = spec
             .build(input_of(workload.scene, held))
             .map_err(not_built)?;
-        if spec.info().capabilities.refits {
+        if spec.info().capabilities.refits && spec.policy != UpdatePolicy::Rebuild {
             // Tables of positions are no part of the first frame.
             index.refit(held, &[]);
         }

@@ -276,7 +276,7 @@ impl<'p> MergedParts<'p> {
 
     /// Metrics of a structure or, without `subject`, of a lower bound.
     ///
-    /// Where the answers are not right, of errors, builds and memory only. A missing or
+    /// Errors, builds and memory only if the answers are not right. A missing or
     /// infinite value is absent, never 0 and never NaN.
     fn metrics(
         &self,

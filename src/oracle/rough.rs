@@ -232,7 +232,7 @@ impl RoughSpaces {
                 to = to.min(reach);
             }
         }
-        // What hardly leans along the line must hold at both ends together.
+        // A plane that hardly leans along the line must hold at both ends together.
         let fails = |(most, b): (f64, Rough)| {
             [from, to].into_iter().all(|t| {
                 let change = t * b.value;

@@ -87,7 +87,7 @@ struct Stand {
 fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<Stand> {
     let mut columns: Vec<Column> = (0..count).flat_map(|_| drawn(stage, rng)).collect();
     fill(stage, &mut columns);
-    // Where nearly all places have an item below them, the others are beyond its edge.
+    // If nearly all places have an item below them, the others are beyond its edge.
     let bare = columns.iter().filter(|column| column.spans.is_empty());
     let has_ground = bare.count() * 10 < columns.len();
     let stands = columns.chunks_mut(DRAWN).filter_map(|columns| {
@@ -273,7 +273,7 @@ mod tests {
             let mut over = 0;
             for camera in &path.cameras {
                 let eye = camera.frame.eye;
-                // Of triangles over or under the eye, the height of their planes there.
+                // Heights, at the eye, of the planes of triangles over or under it.
                 let heights = triangles.iter().filter_map(|[a, b, c]| {
                     let side =
                         |p: &DVec3, q: &DVec3| (q - p).truncate().perp_dot((eye - p).truncate());

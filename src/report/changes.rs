@@ -331,7 +331,7 @@ fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
         Some((pair.1.key().group, centred(&logs)))
     });
     let groups: Vec<(GroupKey, Vec<Logs>)> = grouped(timed);
-    // What is not there in every process is paired with nothing.
+    // A cell that is missing in a process is paired with nothing.
     let all = || groups.iter().flat_map(|group| &group.1);
     let counts = [0, 1].map(|side| all().map(|logs| logs[side].len()).max().unwrap_or(0));
     let is_whole = |logs: &&Logs| [0, 1].iter().all(|&s| logs[s].len() == counts[s]);

@@ -82,7 +82,7 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
             ));
         }
     }
-    // As one run would have measured them: scene by scene, process by process.
+    // The order of one run: scene by scene, process by process.
     let place = |key: &GroupKey| whole.iter().position(|other| other == key);
     let scene = |key: &GroupKey| whole.iter().position(|other| other.scene == key.scene);
     parts.sort_by_key(|(kept, _)| {

@@ -24,7 +24,7 @@ pub struct BspNode {
 pub enum BspChild {
     /// Index of a node.
     Node(u32),
-    /// Index of a leaf, of a Quake III map among the open ones.
+    /// Index of a leaf; in a Quake III map it counts the open leaves alone.
     Leaf(ItemId),
     /// A leaf within the solid.
     Solid,

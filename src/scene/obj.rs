@@ -141,7 +141,7 @@ impl Obj<'_> {
                         self.error(number, found, expected)
                     })?;
                 }
-                // Of a weight or a colour.
+                // Numbers of a weight or a colour.
                 let more = words.count();
                 if more > 4 {
                     let found = format!("a vertex of {}", counted(3 + more, "number"));

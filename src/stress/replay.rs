@@ -111,7 +111,7 @@ impl Replay<'_> {
         let sound = camera.as_ref().ok();
         let sound = sound.filter(|_| vector.camera_error().is_none());
         let oracle = sound.and_then(|c| Oracle::of_camera(&stated.pose(), &c.lens, DVec3::ZERO));
-        // Where the file does not say what is visible, the oracle does.
+        // The oracle decides what is visible if the file does not say it.
         let truth = oracle.as_ref().map(|oracle| sheet.seen_by(oracle));
         let listed = vector.expected_visible_camera.clone();
         let wanted = listed.or(truth).unwrap_or_default();

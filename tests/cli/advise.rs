@@ -123,7 +123,6 @@ fn json_has_the_documented_fields() {
     }
 }
 
-/// Options of frames of moving items, and of two threads.
 #[test]
 fn every_rule_is_there_once_with_both_sides_checked() {
     let omissions = array(small(), "omissions");

@@ -9,6 +9,7 @@ use serde_json::Value;
 use super::advise::{advice, rule, small};
 use super::process::*;
 
+/// Options of frames of moving items, and of two threads.
 const MOVING: &str = "--scene city:n=400 --path orbit:frames=4 --structure linear,wide,octree-textbook \
      --motion drift:share=10%,frames=12 --views 2 --update refit,every=5 --threads 1,2";
 

@@ -23,7 +23,7 @@ use glam::Vec3;
 thread_local! {
     /// The parameters that this thread builds structures with; empty for the defaults.
     ///
-    /// As part of the type, each set would compile the whole suite again.
+    /// No parameter of the type: each set would compile the whole suite again.
     static PARAMS: Cell<&'static str> = const { Cell::new("") };
 }
 

@@ -68,7 +68,7 @@ const fn declared(claims: Claims) -> Info {
 thread_local! {
     /// Fault of the trees that this thread builds.
     ///
-    /// As a parameter of the type, each fault would compile the whole suite again.
+    /// No parameter of the type: each fault would compile the whole suite again.
     static FAULT: Cell<Fault> = const { Cell::new(NONE) };
 }
 

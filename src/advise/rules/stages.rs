@@ -95,6 +95,7 @@ pub(super) fn occlusion(trials: &mut Trials) -> Result<Draft, Unfit> {
     Ok(of_items(trials, Sides::new(on, kept, BASE), predicted))
 }
 
+/// Half of the occlusion buffer's columns and rows.
 pub(super) fn occlusion_buffer(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let [large, small] = [masked_inner(case, BUFFER)?, masked_inner(case, SMALL)?];

@@ -1,4 +1,4 @@
-//! Rules about structures and what they are kept up to date with.
+//! Rules about structures, their updates, and the camera's frame.
 
 use super::super::change::Axis;
 use super::super::omission::Decision;
@@ -11,7 +11,7 @@ use crate::statistics::Estimate;
 
 /// The index itself: below some number of items a scan is as fast.
 ///
-/// That number follows from the parts of the scene that are measured beside it
+/// The number follows from the parts of the scene that are measured beside it
 /// ([`Axis::Items`]).
 pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
@@ -35,7 +35,7 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
         );
         Finding {
             saving: facts.saving(),
-            // As the structure taken, wherever there was a choice.
+            // Follows the structure taken, wherever there was a choice.
             decision: taken.is_open.then_some(Decision::of(taken.is_scan)),
             is_tie: taken.is_mixed.then_some(true),
             note: match crossing {
@@ -49,8 +49,8 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
 
 /// The third dimension of the cells.
 ///
-/// Where a scene is flatter than a quadtree's leaves are wide, an octree's third split parts
-/// nothing. Bounds stay three-dimensional either way.
+/// An octree's third split separates nothing in a scene that is flatter than a quadtree's
+/// leaves are wide. Bounds stay three-dimensional either way.
 pub(super) fn third_dimension(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let (scene, by) = (case.scene(), case.spec.execution);

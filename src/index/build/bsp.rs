@@ -138,7 +138,7 @@ impl Splitter for PlaneSplitter<'_> {
         parts.extend(halves.map(|(items, cell)| Part { items, cell }));
     }
 
-    /// Continues as if the leaf were divided.
+    /// Continues as if the leaf were divided, for those that draw in tree order.
     fn arrange(&mut self, records: &mut [Record]) {
         if self.source != PlaneSource::Median || records.len() <= ARRANGED {
             return;

@@ -39,7 +39,7 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
     let (count, half) = (records.len(), records.len() / 2);
     let quarter = count.div_ceil(4);
-    // Few items may be divided unevenly: the depth of small subtrees is bounded separately.
+    // Few items may be divided unevenly: at most fifteen levels below.
     let sizes: &[usize] = match count <= ARRANGED {
         true => &[quarter, 1],
         false => &[quarter],

@@ -33,7 +33,7 @@ fn placed<T>(
 ) -> Option<Vec<(usize, Aabb)>> {
     let mut placed = Vec::with_capacity(moved.len());
     for &id in moved {
-        // Where no item is empty, the index is the id.
+        // If no item is empty, the index is the id.
         let at = match held.get(id as usize) {
             Some(own) if id_of(own) == id => Ok(id as usize),
             _ => held.binary_search_by_key(&id, &id_of),

@@ -142,3 +142,30 @@ fn what_has_ended_a_process_is_not_built_again() {
         assert!(part.tasks.iter().all(|t| !t.label.starts_with("bvh")));
     }
 }
+
+#[test]
+fn another_process_builds_in_another_order_and_keeps_that_of_the_plan() {
+    let mut plan = plan();
+    plan.scenes.truncate(1);
+    let share = Share {
+        process: 1,
+        ..Share::first(plan.groups_of(&plan.scenes[0]).len())
+    };
+    let building = std::cell::RefCell::new(Vec::new());
+    let notice = |structure: Option<&str>, step: &str| {
+        if let (Some(structure), "building") = (structure, step) {
+            building.borrow_mut().push(structure.to_owned());
+        }
+    };
+    let mut parts = Vec::new();
+    let mut keep = |part: Part, _| parts.push(part);
+    let done = measure_scene(&plan, &plan.scenes[0], &share, &mut keep, &notice, &|| {
+        false
+    });
+    assert!(done.unwrap());
+    assert_eq!(building.borrow()[..4], ["bvh", "octree", "bvh", "linear"]);
+    for part in &parts {
+        let labels = part.subjects.iter().map(|s| s.label.as_str());
+        assert!(labels.eq(["linear", "bvh", "octree", "bvh#twin"]));
+    }
+}

@@ -114,9 +114,10 @@ fn derived(volume: &ConvexVolume, other: &ConvexVolume, items: &[Aabb]) -> Vec<C
     let around = axes.flat_map(|axis| [axis, -axis].map(|n| Plane::new(n, reach.dot(axis))));
     let both = volume.planes().iter().chain(other.planes()).copied();
     let beside = vec![Plane::new(Vec3::X, -bounds.max.x.next_up())];
-    // No items have no bounds, and planes that are not finite are no volume.
-    let sets = [both.take(32).collect(), around.collect(), beside].into_iter();
-    sets.filter_map(|planes| ConvexVolume::from_planes(&planes).ok())
+    let sets: [Vec<Plane>; 3] = [both.take(32).collect(), around.collect(), beside];
+    // Nothing lies around or beside no items, or items that reach half the largest number.
+    let sets = sets.iter().filter(|set| set.iter().all(Plane::is_finite));
+    sets.map(|planes| ConvexVolume::from_planes(planes).expect("32 finite planes at most"))
         .collect()
 }
 

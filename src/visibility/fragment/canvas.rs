@@ -135,7 +135,7 @@ impl Screen {
     #[inline]
     fn place(&self, at: DVec3, off: f64) -> [f64; 4] {
         let [x, y, w] = each(self.axes, |axis| at.dot(axis));
-        // Of a point too far to be resolved, the depth is off too.
+        // The depth of a point too far to be resolved is off too.
         let size = at.abs().element_sum() + (self.eye_off + off) / ROUNDED;
         [x, y, w, size]
     }

@@ -257,7 +257,7 @@ fn is_outside(corners: [Vec3; 3], b: &Aabb) -> bool {
                     left &= side <= 0;
                     right &= side >= 0;
                 }
-                // Where the projection is a line, both sides of it are free; where it
+                // If the projection is a line, both sides of it are free; if it
                 // is a point, there is no line.
                 (left || right) && a != b0
             })

@@ -184,7 +184,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 }
                 continue;
             }
-            // What may be drawn comes first, the nearest before the others: it may hide them.
+            // Occluders come first, the nearest before the others: they may hide them.
             let large = lanes & (!flat | coverable_from(isa, &rects, B::COVERAGE, least_area));
             let mut order = [0; LANES];
             let count = by_depth(&rects.depth, large, &mut order);

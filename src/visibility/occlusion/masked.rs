@@ -315,7 +315,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
                 };
                 near[i] = nearness.within([left, right], lines);
             }
-            // Where nearer ones have been drawn all over, as front to back mostly.
+            // Nearer ones have been drawn all over, the usual case front to back.
             let below = isa.at_most(isa.load(&near), isa.load(reference));
             let adds = !below & first_lanes(last - column);
             for half in 0..2 {

@@ -320,7 +320,7 @@ fn inverses(mut row: [f32; LANES]) -> [f32; LANES] {
 /// The pixels that hold coordinates, or the nearest ones.
 #[inline(always)]
 fn pixels<I: Isa>(isa: I, at: I::Floats, size: f32) -> [i32; LANES] {
-    // Of a NaN and a bound, the bound.
+    // The bound, if the other is a NaN.
     let at = isa.max(at, isa.splat(0.0));
     isa.whole(isa.min(at, isa.splat(size - 1.0)))
 }

@@ -266,7 +266,7 @@ impl Projection {
             true => (10.0 * u_f64 * row.length()) as f32,
             false => (10.0 * u_f64 * (row.length() + 2.0 * size)) as f32,
         };
-        // Of subnormal coordinates about the eye 2^-149 of each is lost.
+        // Subnormal coordinates about the eye lose 2^-149 each.
         let lost = |row: DVec3| 4.0 * f64::from(f32::from_bits(1)) * row.abs().element_sum();
         let added = |row: DVec3, shift: f64, size: f64| {
             (lost(row) + 10.0 * u_f64 * (shift.abs() + 2.0 * size)) as f32

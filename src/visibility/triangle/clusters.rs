@@ -196,7 +196,7 @@ fn nodes(surfaces: &Surfaces, item: usize) -> Vec<Node> {
         }
     }
     edges.sort_unstable();
-    // Where more than two meet, they are chained in pairs.
+    // More than two that meet are chained in pairs.
     for run in edges.chunk_by(|a, b| a.0 == b.0) {
         for pair in run.chunks_exact(2) {
             let (a, b) = (pair[0].1 as usize, pair[1].1 as usize);

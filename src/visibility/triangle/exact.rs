@@ -92,7 +92,7 @@ pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
         u.z * v.x + u.x * v.z,
         u.x * v.y + u.y * v.x,
     );
-    // What the low part of the eye adds, doubled for the roundings here; and what
+    // Adds the share of the low part of the eye, doubled for the roundings here, and what
     // underflow may take.
     let bound = FILTER * w.dot(minors) + 2.0 * eye.low.abs().dot(minors) + 1e-300;
     if determinant.abs() > bound {

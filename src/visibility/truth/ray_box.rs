@@ -129,7 +129,7 @@ impl Probe {
         {
             return None;
         }
-        // As good as always the last entry is beyond doubt.
+        // The last entry is beyond doubt nearly always.
         let mut latest = 0;
         for axis in 1..3 {
             latest = if entries[axis] > entries[latest] {

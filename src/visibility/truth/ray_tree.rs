@@ -294,7 +294,7 @@ impl RayTree {
         let mut items = Record::numbered(boxes);
         let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
         let mut root = Child::new(0, 0);
-        // Where the number of the node is to be written.
+        // Nodes and lanes that the number of the node goes to.
         let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
         if !items.is_empty() {
             open.push((Part::of(&items, 0..items.len()), None));
@@ -399,7 +399,7 @@ fn halve(items: &mut [Record]) -> usize {
             let bin = &mut bins[bin(item, axis)];
             *bin = (bin.0.union(&item.bounds), bin.1 + 1);
         }
-        // What lies above each cut.
+        // Bounds and count above each cut.
         let mut above = [(Aabb::EMPTY, 0); BINS];
         for i in (1..BINS).rev() {
             let rest = above.get(i).copied().unwrap_or((Aabb::EMPTY, 0));

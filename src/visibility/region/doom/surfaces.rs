@@ -277,7 +277,7 @@ pub fn triangles(edges: &[[Point; 2]]) -> Option<Vec<[Point; 3]>> {
             return None;
         }
         made.push([a, b, c]);
-        // What is beyond the new sides remains, unless they were sides already.
+        // The part beyond the new sides remains, unless they were sides already.
         for (side, back) in [([a, c], [c, a]), ([c, b], [b, c])] {
             match front.iter().position(|edge| *edge == back) {
                 Some(place) => drop(front.swap_remove(place)),
