@@ -106,7 +106,7 @@ pub fn significant(value: f64) -> String {
 }
 
 /// The first and the last characters of a longer text, with the mark of a cut.
-fn without_middle(text: &str, [first, last]: [usize; 2]) -> String {
+pub fn without_middle(text: &str, [first, last]: [usize; 2]) -> String {
     let count = text.chars().count();
     if count <= first + last {
         return text.to_owned();

@@ -65,25 +65,6 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         threshold,
         &metrics,
     );
-    if changes.cells_in_common == 0 {
-        bail!(
-            "no cell in common: OLD has {}, NEW has {}; expected runs of the same scenes, \
-             paths, tests and structures",
-            counted(&changes.only_in_old),
-            counted(&changes.only_in_new)
-        );
-    }
-    if let Some(first) = changes.why_nothing_was_judged() {
-        bail!(
-            "nothing can be judged: of {} in common, {} not the same question, {} without \
-             a figure ({}: {}); expected runs of the same scenes, cameras and metrics",
-            text::counted(changes.cells_in_common, "cell"),
-            changes.count(Outcome::Different),
-            changes.count(Outcome::Unmeasured),
-            text::plain(&name(&first.cell)),
-            text::plain(&reason(first))
-        );
-    }
     let settings = settings(&old, &new);
     let table = CompareTable {
         args,
@@ -155,8 +136,33 @@ fn side(report: &Report) -> Side {
 /// Rows in the figure.
 const DRAWN: usize = 40;
 
+/// Refuses a comparison that judges nothing.
+fn expect_judged(changes: &Changes) -> anyhow::Result<()> {
+    if changes.cells_in_common == 0 {
+        bail!(
+            "no cell in common: OLD has {}, NEW has {}; expected runs of the same scenes, \
+             paths, tests and structures",
+            counted(&changes.only_in_old),
+            counted(&changes.only_in_new)
+        );
+    }
+    if let Some(first) = changes.why_nothing_was_judged() {
+        bail!(
+            "nothing can be judged: of {} in common, {} not the same question, {} without \
+             a figure ({}: {}); expected runs of the same scenes, cameras and metrics",
+            text::counted(changes.cells_in_common, "cell"),
+            changes.count(Outcome::Different),
+            changes.count(Outcome::Unmeasured),
+            text::plain(&name(&first.cell)),
+            text::plain(&reason(first))
+        );
+    }
+    Ok(())
+}
+
 /// Prints a comparison in the chosen format, and writes its page.
 fn show(table: &CompareTable) -> anyhow::Result<Ending> {
+    expect_judged(&table.changes)?;
     let shown = unread_is_fine(table.print());
     if let Some(file) = &table.args.html {
         let blocks = table.blocks(true, Some(usize::MAX));

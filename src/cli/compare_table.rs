@@ -18,7 +18,7 @@ use crate::report::{
     Basis, Changes, CommonShift, FEW_OTHERS, JudgedRow, Lone, Outcome, Setting, WORK, WorkChange,
     grouped,
 };
-use crate::shown::{number, shortened};
+use crate::shown::{number, plain, shortened, without_middle};
 
 /// Counters in the list; `--all` shows every one.
 const LISTED: usize = 20;
@@ -211,7 +211,7 @@ impl CompareTable<'_> {
         ));
         // Beside the widest other column, "vs the others [95 %]", and three gaps.
         let widest = |of: &dyn Fn(&JudgedRow) -> usize| rows.iter().map(|row| of(row)).max();
-        let structure = widest(&|row| shortened(&row.cell.structure, 17).chars().count());
+        let structure = widest(&|row| short_name(row).chars().count());
         let metric = widest(&|row| row.metric.map_or(0, str::len));
         let left = 54_usize.saturating_sub(structure.unwrap_or(0) + metric.unwrap_or(0));
         for row in rows {
@@ -221,7 +221,8 @@ impl CompareTable<'_> {
             let (scene, structure) = (&row.cell.group.scene, &row.cell.structure);
             let places = match room {
                 None => vec![scene.clone(), question(&row.cell), structure.clone()],
-                Some(_) => vec![shortened(structure, 17), place(&row.cell, left)],
+                Some(usize::MAX) => vec![structure.clone(), place(&row.cell, usize::MAX)],
+                Some(_) => vec![short_name(row), place(&row.cell, left)],
             };
             let figures = [
                 metric.to_owned(),
@@ -333,6 +334,11 @@ pub fn name(cell: &CellKey) -> String {
         cell.group.scene,
         question(cell)
     )
+}
+
+/// Structure in at most twenty characters; its last parameter stays.
+fn short_name(row: &JudgedRow) -> String {
+    without_middle(&plain(&row.cell.structure), [8, 9])
 }
 
 /// Scene and path in short, with the test and the cache state that are no defaults.

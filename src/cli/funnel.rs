@@ -350,6 +350,7 @@ const FATES: [Fate; 6] = [
     Fate::Visible,
     Fate::Lost,
 ];
+const _: () = assert!(FATES.len() == FATE_CLASSES.len());
 const FATE_CLASSES: &[Class] = rows! { Class { colour, words, is_key }
     "#e4e4e4", "region: not reached through portals", false;
     "#c0c8d0", "object: outside of the frustum", false;

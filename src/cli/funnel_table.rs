@@ -192,13 +192,17 @@ fn occluders(report: &FunnelReport) -> Table {
         add(place, row.box_count, row.volume_share, row.build_ns);
     }
     if let Some(row) = &report.ground {
-        let place = format!("below {} of ground", text::counted(row.item_count, "item"));
+        let items = text::counted(row.item_count, "item");
+        let place = format!("below {items} of ground, down to the lowest place");
         add(place, row.box_count, row.volume_share, row.build_ns);
     }
     if let Some(row) = &report.solid_blocks {
         let unclosed = match row.unclosed_sector_count {
             0 => String::new(),
-            count => format!(": {} not closed", text::counted(count, "sector")),
+            count => format!(
+                ": {} not closed or contradicting",
+                text::counted(count, "sector")
+            ),
         };
         let place = format!("solid between the rooms of the map{unclosed}");
         add(place, row.box_count, None, row.build_ns);

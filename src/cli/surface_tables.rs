@@ -91,21 +91,23 @@ fn two_digits(items: f64) -> usize {
 /// After how many queries each build is repaid against the linear scan.
 fn break_even(surface: &Surface) -> Option<Table> {
     let structures = surface.no_scans();
-    let cells = surface.places.iter().flat_map(|place| {
-        structures.iter().map(move |structure| {
-            let cell = place.cell(structure);
-            let told = match cell.map(|c| (c.value("break_even_queries"), c.value("speedup"))) {
-                None => String::new(),
-                Some((Some(queries), _)) => text::count(queries as usize),
-                // Built no more dearly than the scan's own copy of the items.
-                Some((None, Some(ratio))) if ratio > 1.0 => "0".to_owned(),
-                Some(_) => "never".to_owned(),
-            };
-            let (items, visible) = (text::count(place.items), text::percent(place.share));
-            [format!("{items}, {visible}"), (*structure).to_owned(), told]
-        })
-    });
-    (!structures.is_empty()).then(|| Table::grid("items, visible", cells))
+    let told = |place: &Place, structure: &str| {
+        let cell = place.cell(structure);
+        match cell.map(|c| (c.value("break_even_queries"), c.value("speedup"))) {
+            None => String::new(),
+            Some((Some(queries), _)) => text::count(queries as usize),
+            // Built no more dearly than the scan's own copy of the items.
+            Some((None, Some(ratio))) if ratio > 1.0 => "0".to_owned(),
+            Some(_) => "never".to_owned(),
+        }
+    };
+    let mut table = Table::of_numbers(["items, visible"].iter().chain(&structures).copied());
+    for place in &surface.places {
+        let (items, visible) = (text::count(place.items), text::percent(place.share));
+        let name = [format!("{items}, {visible}")].into_iter();
+        table.add_row(name.chain(structures.iter().map(|structure| told(place, structure))));
+    }
+    (!structures.is_empty()).then_some(table)
 }
 
 /// Crossovers and growth of a report, in tables and figures; a surface has as many

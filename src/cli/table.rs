@@ -50,9 +50,9 @@ impl Table {
         table
     }
 
-    /// A table of cells with the names of their rows and columns.
+    /// A table of cells with the names of their rows and columns, each pair once.
     ///
-    /// Both are in the order in which they first occur; cells are numbers.
+    /// Names are in the order in which they first occur; cells are numbers.
     pub fn grid(title: &str, cells: impl IntoIterator<Item = [String; 3]>) -> Table {
         let mut table = Table::new([title], &[]);
         for [name, head, cell] in cells {
@@ -68,6 +68,7 @@ impl Table {
             }
             let row = &mut table.rows[row];
             row.resize(row.len().max(column + 1), String::new());
+            debug_assert!(row[column].is_empty(), "two cells of one row and column");
             row[column] = cell;
         }
         let width = table.header.len();

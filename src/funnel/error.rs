@@ -99,3 +99,24 @@ pub fn fits_drawing(
         false => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn items_may_cover_sixteen_layers_of_a_large_image() {
+        let grid = SampleGrid::new(1500, 1000);
+        let full = Rectangle {
+            columns: 0..1500,
+            rows: 0..1000,
+        };
+        let of = |items| fits_drawing(grid, std::iter::repeat_n(full.clone(), items));
+        assert_eq!(of(16), Ok(()));
+        let refused = of(17).unwrap_err();
+        assert!(
+            refused.starts_with("25500000 samples drawn in a view"),
+            "{refused}"
+        );
+    }
+}

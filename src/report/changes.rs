@@ -1,6 +1,6 @@
-//! One report compared with an older one. Every cell is judged by its times
-//! relative to the other structures of its group, process by process: what moves
-//! a whole process, and most of what tells two days apart, drops out.
+//! Cells compared with older ones: of two programs in turns, pair by pair, or of two reports,
+//! where each is judged by its times relative to the other structures of its group, process by
+//! process: what moves a whole process, and most of what tells two days apart, drops out.
 
 use serde::Serialize;
 
@@ -54,7 +54,7 @@ pub fn changes(
         if asked_otherwise(pair).is_none() {
             found.work_changed.extend(work_changes(pair));
         }
-        match as_a_whole(pair) {
+        match as_a_whole(basis, pair) {
             Some(row) => found.rows.push(row),
             None => comparable.push(pair),
         }
@@ -111,7 +111,7 @@ fn row((old, new): Pair, outcome: Outcome, reason: Option<String>) -> JudgedRow 
 }
 
 /// Outcome of a pair by its statuses and questions alone; `None` if times decide.
-fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
+fn as_a_whole(basis: Basis, pair: Pair) -> Option<JudgedRow> {
     let (old, new) = pair;
     let by_status = Outcome::of_statuses(old.status, new.status);
     let different = |reason: String| row(pair, Outcome::Different, Some(reason));
@@ -124,6 +124,8 @@ fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
     match by_status {
         Some(Outcome::Gained) => Some(row(pair, Outcome::Gained, old.reason.clone())),
         Some(outcome) => Some(row(pair, outcome, new.reason.clone())),
+        // Two programs may round planes differently: their work has changed.
+        None if basis == Basis::Pairs => None,
         None => answered_otherwise(pair).map(different),
     }
 }
@@ -305,7 +307,7 @@ fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Option<Logs> {
 
 fn why_unmeasured(old: Option<f64>, new: Option<f64>) -> String {
     match (old, new) {
-        (None, None) => "in neither report".to_owned(),
+        (None, None) => "on neither side".to_owned(),
         (Some(_), None) => "only in OLD".to_owned(),
         (None, Some(_)) => "only in NEW".to_owned(),
         (Some(old), Some(new)) if is_sound(old) && is_sound(new) => {

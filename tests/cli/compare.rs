@@ -414,11 +414,11 @@ fn figures_that_no_ratio_can_be_taken_of_are_counted() {
     }
     let text = compare(gone.path(), "--metric query_ns,locate_ns", 0);
     assert!(last_line(&text).contains("10 unmeasured"), "{text}");
-    assert!(!text.contains("in neither report"), "{text}");
+    assert!(!text.contains("on neither side"), "{text}");
     all_refused(
         &gone,
         &[format!("{COMPARE} --metric locate_ns")],
-        "nothing can be judged | 10 without a figure | in neither report",
+        "nothing can be judged | 10 without a figure | on neither side",
     );
 }
 

@@ -127,8 +127,10 @@ fn other_cameras_or_batches_are_another_measurement() {
         assert_eq!(found.count(Outcome::Same), 4);
         new.cells.iter_mut().skip(2).for_each(change);
         change(&mut new.cells[0]);
-        let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
-        assert!(found.why_nothing_was_judged().is_some());
+        for basis in [Basis::Reports, Basis::Pairs] {
+            let found = changes(basis, [&old.cells, &new.cells], 0.05, QUERY);
+            assert!(found.why_nothing_was_judged().is_some());
+        }
     }
 }
 
