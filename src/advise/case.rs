@@ -144,8 +144,9 @@ impl<'a> Case<'a> {
         far.unwrap_or_else(|| f64::from(self.scene().bounds.extent().length()))
     }
 
-    /// Outward displacement of planes for rounding about an origin, in depths of the view:
-    /// the largest of all cameras and planes.
+    /// Outward displacement of planes for rounding about an origin, in depths.
+    ///
+    /// The largest of all cameras and planes, in depths of the view.
     pub fn margin(&self, around: &Surroundings) -> f64 {
         let bare = PlaneOptions {
             epsilon: 0.0,

@@ -226,9 +226,9 @@ impl Row<'_> {
     }
 }
 
-/// Delimiter of the first line that is not empty: the one that gives most of the names.
+/// Delimiter of the first line that is not empty.
 ///
-/// The most frequent one, outside of quotes, if none gives any.
+/// The one that gives most of the names; outside of quotes the most frequent if none does.
 fn delimiter(head: &[u8], names: &[&str]) -> u8 {
     let head = head.strip_prefix("\u{feff}".as_bytes()).unwrap_or(head);
     let mut lines = head.split(|byte| matches!(byte, b'\n' | b'\r'));

@@ -54,7 +54,7 @@ pub struct Workload<'a> {
 #[error("{place}: {error}")]
 #[non_exhaustive]
 pub struct WorkloadError {
-    /// Place in the path ([`CameraPath::place`]), or the motion that goes too far for it.
+    /// Place in the path ([`CameraPath::place`]), or the motion that goes too far.
     pub place: String,
     /// Reason.
     pub error: CullingError,

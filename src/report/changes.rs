@@ -1,6 +1,8 @@
-//! Cells compared with older ones: of two programs in turns, pair by pair, or of two reports,
-//! where each is judged by its times relative to the other structures of its group, process by
-//! process: what moves a whole process, and most of what tells two days apart, drops out.
+//! Cells compared with older ones, of two programs in turns or of two reports.
+//!
+//! Programs are judged pair by pair; a report's cell by its times relative to the other structures
+//! of its group, process by process: what moves a whole process, and most of what tells two days
+//! apart, drops out.
 
 use serde::Serialize;
 

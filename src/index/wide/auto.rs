@@ -82,7 +82,7 @@ const SCAN_NS: f64 = 0.32;
 ///
 /// Beyond it the time of an item grows with the cube root of their number.
 const NEAR: f64 = 32_768.0;
-/// An item that is overwritten, and an item of a scan that leaves or enters, more than that.
+/// An overwritten item, and (more) an item of a scan that leaves or enters.
 const MOVE_NS: f64 = 7.0;
 const ENTER_NS: f64 = 8.0;
 /// A refit, and a leaf whose bounds it fits.
