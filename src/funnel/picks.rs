@@ -217,6 +217,9 @@ impl<'w> Picks<'w> {
     }
 
     /// Every row, compared with the exact answers.
+    ///
+    /// Those of the tree that wide-ray searches too; in scenes that are small enough, linear
+    /// shares nothing with it and is compared as well.
     pub fn compared(&self) -> Vec<PickRow> {
         let exact: Box<dyn Pick> = match &self.world.shape {
             Shape::Boxes(solids) => Box::new(RayIndex::build(solids)),

@@ -10,7 +10,7 @@ use crate::visibility::truth::{Along, Body, Probe, SolidBox};
 use crate::visibility::{Rays, SampleGrid};
 
 /// Columns and rows of samples.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Rectangle {
     /// From the left.
     pub columns: Range<u32>,

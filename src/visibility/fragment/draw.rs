@@ -29,8 +29,8 @@ pub trait Drawable: Body {
     /// Tests whether the body is opaque where a ray meets it.
     fn is_opaque(&self, holes: &Holes, probe: &Self::Probe, at: &Self::At) -> bool;
 
-    /// Tests whether a part of an item holds the point where a ray meets the item.
-    fn is_in(part: Part, order: &dyn DepthOrder, probe: &Self::Probe, at: &Self::At) -> bool;
+    /// Test of parts of an item for the point where a ray meets the item.
+    fn is_in(order: &dyn DepthOrder, probe: &Self::Probe, at: &Self::At) -> impl Fn(Part) -> bool;
 }
 
 impl Drawable for SolidBox {
@@ -43,12 +43,14 @@ impl Drawable for SolidBox {
     }
 
     /// The part is entered where the item is.
-    fn is_in(part: Part, _: &dyn DepthOrder, probe: &Probe, at: &Crossing) -> bool {
-        let Part::Within(b) = part else {
-            return false;
-        };
-        let entered = probe.enter(&b, probe.ray().far);
-        entered.is_some_and(|of_part| probe.compare(at, &of_part).is_eq())
+    fn is_in(_: &dyn DepthOrder, probe: &Probe, at: &Crossing) -> impl Fn(Part) -> bool {
+        move |part| {
+            let Part::Within(b) = part else {
+                return false;
+            };
+            let entered = probe.enter(&b, probe.ray().far);
+            entered.is_some_and(|of_part| probe.compare(at, &of_part).is_eq())
+        }
     }
 }
 
@@ -61,10 +63,10 @@ impl Drawable for Facet {
         true
     }
 
-    fn is_in(part: Part, order: &dyn DepthOrder, probe: &TriangleProbe, at: &Meeting) -> bool {
+    fn is_in(order: &dyn DepthOrder, probe: &TriangleProbe, at: &Meeting) -> impl Fn(Part) -> bool {
         let [a, b, c] = each(at.corners(), |p| p.as_dvec3());
         let leaf = order.leaf(probe.local(at.depth), (b - a).cross(c - a));
-        leaf.map(Part::InLeaf) == Some(part)
+        move |part| leaf.map(Part::InLeaf) == Some(part)
     }
 }
 
@@ -87,9 +89,9 @@ pub struct Tally {
     pub covered: u64,
 }
 
-/// A fragment that was as near as the one in front, and lost by its id.
+/// A body at a sample whose ray meets it.
 #[derive(Clone, Copy, Debug)]
-struct Tie<At> {
+struct Fragment<At> {
     sample: usize,
     item: ItemId,
     at: At,
@@ -103,7 +105,8 @@ pub struct Drawn<B: Body = SolidBox> {
     pub tally: Tally,
     /// The exact front of each sample, of opaque items; of a tie the lowest id.
     front: Vec<Option<(B::At, ItemId)>>,
-    ties: Vec<Tie<B::At>>,
+    /// Fragments that were as near as the one in front, and lost by their id.
+    ties: Vec<Fragment<B::At>>,
     /// Items of triangles that hide nothing and are met before the front or with it.
     before: Vec<ItemId>,
 }
@@ -140,8 +143,8 @@ impl<B: Drawable> Drawn<B> {
 
     /// Draws more on the same image, each body by itself.
     ///
-    /// Those that hide nothing come last. A fragment is a body at a sample whose ray meets it. Θ(samples of the screen
-    /// rectangles).
+    /// Those that hide nothing come last. A fragment is a body at a sample whose ray meets
+    /// it. Θ(samples of the screen rectangles).
     pub fn draw(
         &mut self,
         canvas: &Canvas<B>,
@@ -163,7 +166,7 @@ impl<B: Drawable> Drawn<B> {
                 }
                 let is_before = |(front, _): (B::At, _)| probe.compare(&at, &front).is_le();
                 let passes = match body.hides() {
-                    true => self.test(probe, Tie { sample, item, at }),
+                    true => self.test(probe, Fragment { sample, item, at }),
                     false => self.front(sample).is_none_or(is_before),
                 };
                 self.tally.passed += u64::from(passes);
@@ -180,8 +183,8 @@ impl<B: Drawable> Drawn<B> {
     /// Draws the fragment, if it passes: its sample is empty, or holds an item that is
     /// deeper, or as deep with a higher id. Returns whether it passed.
     #[inline]
-    fn test(&mut self, probe: &B::Probe, fragment: Tie<B::At>) -> bool {
-        let Tie { sample, item, at } = fragment;
+    fn test(&mut self, probe: &B::Probe, fragment: Fragment<B::At>) -> bool {
+        let Fragment { sample, item, at } = fragment;
         let front = &mut self.front[sample];
         if let Some((other, other_item)) = *front {
             let order = probe.compare(&at, &other);
@@ -194,7 +197,7 @@ impl<B: Drawable> Drawn<B> {
                     return false;
                 }
                 let lost = item.max(other_item);
-                self.ties.push(Tie {
+                self.ties.push(Fragment {
                     item: lost,
                     ..fragment
                 });
@@ -224,7 +227,7 @@ impl<B: Drawable> Drawn<B> {
     /// All items that are in front anywhere, every item of a tie, and the items before them
     /// that hide nothing.
     pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
-        let in_front = |tie: &&Tie<B::At>| {
+        let in_front = |tie: &&Fragment<B::At>| {
             let front = self.front[tie.sample];
             let order = |front: (B::At, _)| canvas.probe(tie.sample).compare(&tie.at, &front.0);
             front.is_some_and(|front| order(front).is_eq())

@@ -5,6 +5,7 @@
 
 use std::cmp::Ordering;
 
+use super::canvas::{Rectangle, Screen};
 use super::draw::{Drawable, Tally};
 use super::order::{DepthOrder, Part, Piece};
 use crate::query::ItemId;
@@ -157,14 +158,49 @@ fn sort_and_dedup(pairs: &mut Vec<(ItemId, ItemId)>) {
     pairs.dedup();
 }
 
-/// The parts of an item with the place of each in the list.
-type Parts = Vec<(Option<Part>, u32)>;
+/// A part of an item, the samples that it may be met at, and its place in the list.
+type Placed = (Option<Part>, Rectangle, u32);
+
+/// The parts of an item, and those that may be met in a row of samples.
+#[derive(Clone, Default)]
+struct Parts {
+    all: Vec<Placed>,
+    row: Option<u32>,
+    in_row: Vec<Placed>,
+}
+
+impl Parts {
+    /// Place in the list of the first part that holds a point at a sample.
+    ///
+    /// A point that rounding has put into a leaf without a part of the item counts with the
+    /// first part.
+    fn when<B: Drawable>(
+        &mut self,
+        (row, column): (u32, u32),
+        order: &dyn DepthOrder,
+        (probe, at): (&B::Probe, &B::At),
+    ) -> Option<u32> {
+        let first = self.all.first()?.2;
+        if self.all.len() == 1 {
+            return Some(first);
+        }
+        if self.row.replace(row) != Some(row) {
+            let in_row = self.all.iter().filter(|(_, of, _)| of.rows.contains(&row));
+            self.in_row.clear();
+            self.in_row.extend(in_row.cloned());
+        }
+        let is_in = B::is_in(order, probe, at);
+        let holds =
+            |(part, of, _): &&Placed| of.columns.contains(&column) && part.is_none_or(&is_in);
+        Some(self.in_row.iter().find(holds).map_or(first, |part| part.2))
+    }
+}
 
 /// Cost and errors of several orders of the items that are left.
 ///
 /// `left` has their ids among those of `index`, ascending; pieces and `is_opaque` number items
-/// by the place there. Fragments are counted whether opaque or not. O(fragments log layers) and
-/// the pairs that are looked at.
+/// by the place there. Fragments are counted whether opaque or not. O(fragments log layers), for
+/// each of an item in parts those in its row of samples, and the pairs that are looked at.
 pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
     rays: &Rays,
     grid: SampleGrid,
@@ -173,20 +209,28 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
     is_opaque: &F,
     orders: &[(&dyn DepthOrder, Vec<Piece>)],
 ) -> Vec<(Tally, Result<OrderErrors, TooManyPairs>)> {
+    let screen = Screen::of(rays, grid);
     let parts_of = |pieces: &[Piece]| {
-        let mut parts: Vec<Parts> = vec![Vec::new(); left.len()];
-        for (piece, when) in pieces.iter().zip(0..) {
-            parts[piece.item as usize].push((piece.part, when));
+        let mut parts = vec![Parts::default(); left.len()];
+        for (Piece { item, part }, when) in pieces.iter().zip(0..) {
+            let place = match part {
+                Some(Part::Within(b)) => screen.rectangle(b).unwrap_or_default(),
+                _ => Rectangle {
+                    columns: 0..grid.width,
+                    rows: 0..grid.height,
+                },
+            };
+            parts[*item as usize].all.push((*part, place, when));
         }
         parts
     };
     let parts = orders.iter().map(|(_, pieces)| parts_of(pieces));
-    let parts: Vec<Vec<Parts>> = parts.collect();
+    let mut parts: Vec<Vec<Parts>> = parts.collect();
     let mut counts: Vec<(Tally, ErrorCount)> = Vec::new();
     counts.resize_with(orders.len(), Default::default);
     let mut layers: Vec<Layer<B::At>> = Vec::new();
-    for (row, column) in (0..grid.height).flat_map(|row| (0..grid.width).map(move |c| (row, c))) {
-        let ray = rays.sample(grid, column, row);
+    for sample in (0..grid.height).flat_map(|row| (0..grid.width).map(move |c| (row, c))) {
+        let ray = rays.sample(grid, sample.1, sample.0);
         let probe = index.probe(&ray);
         let mut met = index.all_along(&ray);
         met.retain_mut(|(item, _)| {
@@ -198,20 +242,12 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
         met.dedup_by_key(|(item, _)| *item);
         let fragments = met.len() as u64;
         met.retain(|(item, at)| is_opaque(*item, &probe, at));
-        for (((order, _), parts), (tally, errors)) in orders.iter().zip(&parts).zip(&mut counts) {
+        let drawn = orders.iter().zip(&mut parts).zip(&mut counts);
+        for (((order, _), parts), (tally, errors)) in drawn {
             layers.clear();
             layers.extend(met.iter().filter_map(|&(item, at)| {
-                // A point that rounding has put into a leaf without a part of the item counts
-                // with the first part.
-                let parts = &parts[item as usize];
-                let holds = |&&(part, _): &&(Option<Part>, u32)| {
-                    part.is_none_or(|part| B::is_in(part, *order, &probe, &at))
-                };
-                let own = match &parts[..] {
-                    [only] => Some(only),
-                    all => all.iter().find(holds).or(all.first()),
-                };
-                let when = own?.1;
+                let parts = &mut parts[item as usize];
+                let when = parts.when::<B>(sample, *order, (&probe, &at))?;
                 Some(Layer { when, item, at })
             }));
             errors.sample(&mut layers, |a, b| probe.compare(a, b));

@@ -1,6 +1,8 @@
 //! Back ends against arithmetic on integers of any size, which shares nothing
 //! with theirs.
 
+mod triangles;
+
 use glam::DVec3;
 
 use super::*;
@@ -8,10 +10,9 @@ use crate::camera::{Camera, Frame, Lens, Surroundings};
 use crate::index::{self, FrustumQuery, Input, RegionIndex};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
-use crate::scene::{Scene, SeededRng, Surfaces, WorldBox, load};
-use crate::visibility::region::doom::DoomMap;
+use crate::scene::{Scene, SeededRng, WorldBox, load};
 use crate::visibility::truth::judge::{self, Depth};
-use crate::visibility::truth::{Boxes, Facets, NO_ITEM, RayIndex, SampleTruth, SurfaceIndex};
+use crate::visibility::truth::{Boxes, NO_ITEM, RayIndex, SampleTruth};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid, Solids};
 
 /// All items that the ray meets, by depth and id.
@@ -377,93 +378,4 @@ fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_
         }
     }
     assert!(met > 100 && found > 300, "the premise: {met} {found}");
-}
-
-fn ray(origin: DVec3, direction: DVec3) -> Ray {
-    Ray {
-        origin,
-        direction,
-        near: 0.5,
-        far: 1e4,
-    }
-}
-
-/// Every back end over triangles.
-fn triangle_back_ends(facets: &Facets) -> Vec<(&'static BackEnd, Box<dyn Pick>)> {
-    let built = |row: &'static BackEnd| (row, (row.build.facets)(facets, Kernel::best()).unwrap());
-    BACK_ENDS.iter().map(built).collect()
-}
-
-fn items(hits: &[Hit]) -> Vec<ItemId> {
-    hits.iter().map(|hit| hit.item).collect()
-}
-
-#[test]
-fn boxes_as_triangles_are_picked_as_boxes_are() {
-    let scene = load("city:n=300", &Default::default()).unwrap();
-    let reference = Linear(Boxes::of(&Solids::of(&scene)));
-    let facets = Facets::solid(&Surfaces::from_boxes(&scene), scene.items.len());
-    let bounds = scene.bounds;
-    let (min, max) = bounds.in_world(scene.origin);
-    let built = triangle_back_ends(&facets);
-    assert!(built.len() >= 3);
-    let mut rng = SeededRng::new(11);
-    let (mut met, mut differ) = (0, 0);
-    let mut hits = Vec::new();
-    for _ in 0..3000 {
-        let origin = min + (max - min) * rng.point();
-        let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.2);
-        let ray = ray(origin, direction);
-        let first = reference.first(&ray).map(|hit| hit.item);
-        reference.nearest(&ray, 4, &mut hits);
-        let nearest = items(&hits);
-        met += usize::from(first.is_some());
-        for (row, pick) in &built {
-            pick.nearest(&ray, 4, &mut hits);
-            let same = pick.first(&ray).map(|hit| hit.item) == first && items(&hits) == nearest;
-            match row.guarantee {
-                Guarantee::Exact => assert!(same, "{}: {ray:?}", row.name),
-                _ => differ += usize::from(!same),
-            }
-        }
-    }
-    assert!(met > 400 && differ < 30 * built.len(), "{met} {differ}");
-}
-
-#[test]
-fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
-    let scene = load("freedm-map12", &Default::default()).unwrap();
-    let map = DoomMap::of_scene(&scene).unwrap();
-    let surfaces = map.surfaces(&scene);
-    let count = scene.items.len();
-    let truth = SurfaceIndex::of(&Facets::solid(&surfaces, count), Kernel::best());
-    let built = triangle_back_ends(&Facets::solid(&surfaces, count));
-    let mut rng = SeededRng::new(5);
-    let (mut hidden, mut differ) = (0, 0);
-    let [mut wanted, mut found] = [Vec::new(), Vec::new()];
-    for _ in 0..600 {
-        let eye = scene.places[rng.below(scene.places.len())].eye;
-        let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.5);
-        let ray = ray(eye, direction);
-        let first = truth.first(&ray).map(|hit| hit.item);
-        truth.nearest(&ray, 8, &mut wanted);
-        assert!(wanted.iter().all(|hit| (hit.item as usize) < count));
-        hidden += usize::from(first.is_none() && !wanted.is_empty());
-        for (row, pick) in &built {
-            pick.nearest(&ray, 8, &mut found);
-            let same = pick.first(&ray).map(|hit| hit.item) == first;
-            match row.guarantee {
-                Guarantee::Exact => {
-                    assert!(
-                        same && items(&found) == items(&wanted),
-                        "{}: {ray:?}",
-                        row.name
-                    );
-                }
-                _ => differ += usize::from(!same),
-            }
-        }
-    }
-    let most = 60 * built.len();
-    assert!(hidden > 0 && differ < most, "{hidden} {differ}");
 }

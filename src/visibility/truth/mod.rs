@@ -1,6 +1,6 @@
 //! The visible items, exact along the rays of a sample grid.
 //!
-//! Tests compare it with whole numbers of any length, which share nothing with it.
+//! Tests compare it with arithmetic on whole numbers of any length.
 
 mod body;
 mod ray_box;

@@ -45,7 +45,7 @@ impl RayTree {
 
     /// Offers the place of every item that the ray does not certainly miss, in f64.
     ///
-    /// For rays that the slab tests in f32 do not cover.
+    /// All bodies along the ray, whatever their depth: the slab tests do not cover it.
     pub fn search_in_f64(&self, ray: &Ray, mut offer: impl FnMut(u32)) {
         let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(self.root));
         while let Some(at) = open.pop() {
@@ -141,6 +141,7 @@ impl RayTree {
 /// the box on the plane of two axes are apart (Gottschalk, Lin and Manocha 1996,
 /// "OBBTree", the separating axes that are products of two directions). What is rounded
 /// is below 2^-50 of the largest number here times the direction; 2^-48 of it is added.
+/// No product overflows or underflows for numbers that a [`Probe`](super::Probe) takes.
 #[inline(always)]
 fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
     let start = ray.origin - zero;

@@ -1,0 +1,159 @@
+//! Back ends over triangles.
+
+use glam::{DVec3, Vec3};
+
+use super::*;
+use crate::geometry::Aabb;
+use crate::scene::Surfaces;
+use crate::visibility::region::doom::DoomMap;
+use crate::visibility::truth::{Facet, Facets, SurfaceIndex};
+
+fn ray(origin: DVec3, direction: DVec3) -> Ray {
+    Ray {
+        origin,
+        direction,
+        near: 0.5,
+        far: 1e4,
+    }
+}
+
+/// Every back end over triangles.
+fn triangle_back_ends(facets: &Facets) -> Vec<(&'static BackEnd, Box<dyn Pick>)> {
+    let built = |row: &'static BackEnd| (row, (row.build.facets)(facets, Kernel::best()).unwrap());
+    BACK_ENDS.iter().map(built).collect()
+}
+
+fn items(hits: &[Hit]) -> Vec<ItemId> {
+    hits.iter().map(|hit| hit.item).collect()
+}
+
+#[test]
+fn boxes_as_triangles_are_picked_as_boxes_are() {
+    let scene = load("city:n=300", &Default::default()).unwrap();
+    let reference = Linear(Boxes::of(&Solids::of(&scene)));
+    let facets = Facets::solid(&Surfaces::from_boxes(&scene), scene.items.len());
+    let bounds = scene.bounds;
+    let (min, max) = bounds.in_world(scene.origin);
+    let built = triangle_back_ends(&facets);
+    assert!(built.len() >= 3);
+    let mut rng = SeededRng::new(11);
+    let (mut met, mut differ) = (0, 0);
+    let mut hits = Vec::new();
+    for _ in 0..3000 {
+        let origin = min + (max - min) * rng.point();
+        let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.2);
+        let ray = ray(origin, direction);
+        let first = reference.first(&ray).map(|hit| hit.item);
+        reference.nearest(&ray, 4, &mut hits);
+        let nearest = items(&hits);
+        met += usize::from(first.is_some());
+        for (row, pick) in &built {
+            pick.nearest(&ray, 4, &mut hits);
+            let same = pick.first(&ray).map(|hit| hit.item) == first && items(&hits) == nearest;
+            match row.guarantee {
+                Guarantee::Exact => assert!(same, "{}: {ray:?}", row.name),
+                _ => differ += usize::from(!same),
+            }
+        }
+    }
+    assert!(met > 400 && differ < 30 * built.len(), "{met} {differ}");
+}
+
+#[test]
+fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
+    let scene = load("freedm-map12", &Default::default()).unwrap();
+    let map = DoomMap::of_scene(&scene).unwrap();
+    let surfaces = map.surfaces(&scene);
+    let count = scene.items.len();
+    let truth = SurfaceIndex::of(&Facets::solid(&surfaces, count), Kernel::best());
+    let built = triangle_back_ends(&Facets::solid(&surfaces, count));
+    let mut rng = SeededRng::new(5);
+    let (mut hidden, mut differ) = (0, 0);
+    let [mut wanted, mut found] = [Vec::new(), Vec::new()];
+    for _ in 0..600 {
+        let eye = scene.places[rng.below(scene.places.len())].eye;
+        let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.5);
+        let ray = ray(eye, direction);
+        let first = truth.first(&ray).map(|hit| hit.item);
+        truth.nearest(&ray, 8, &mut wanted);
+        assert!(wanted.iter().all(|hit| (hit.item as usize) < count));
+        hidden += usize::from(first.is_none() && !wanted.is_empty());
+        for (row, pick) in &built {
+            pick.nearest(&ray, 8, &mut found);
+            let same = pick.first(&ray).map(|hit| hit.item) == first;
+            match row.guarantee {
+                Guarantee::Exact => {
+                    assert!(
+                        same && items(&found) == items(&wanted),
+                        "{}: {ray:?}",
+                        row.name
+                    );
+                }
+                _ => differ += usize::from(!same),
+            }
+        }
+    }
+    let most = 60 * built.len();
+    assert!(hidden > 0 && differ < most, "{hidden} {differ}");
+}
+
+fn grid(rng: &mut SeededRng, most: usize) -> Vec3 {
+    let mut along = || rng.below(most) as f32 - (most / 2) as f32;
+    Vec3::new(along(), along(), along())
+}
+
+/// Corners on a grid: depths are equal, rays lie in planes, triangles have no area.
+///
+/// Directions hardly move along an axis, and origins lie beyond the error analysis.
+#[test]
+fn every_instruction_set_finds_what_testing_all_finds() {
+    let mut rng = SeededRng::new(17);
+    let sizes = [0.0, 1e-30, -6e-17, 0.25, -1.0, 1.0, 3000.0];
+    let (mut met, mut several) = (0, 0);
+    let [mut found, mut wanted] = [Vec::new(), Vec::new()];
+    for n in [0, 1, 15, 300] {
+        let mut facet = |i: usize| {
+            let at = grid(&mut rng, 12);
+            Facet {
+                corners: [at, at + grid(&mut rng, 5), at + grid(&mut rng, 5)],
+                item: (i / 2) as ItemId,
+                two_sided: i % 3 != 1,
+                hides: true,
+            }
+        };
+        let all: Vec<Facet> = (0..n).map(&mut facet).collect();
+        let facets = Facets {
+            bounds: all.iter().map(|of| Aabb::of_points(of.corners)).collect(),
+            all,
+            origin: DVec3::new(3.0, -7.0, 0.5),
+            // The last few are no items.
+            items: n * 2 / 5,
+        };
+        let wide = WideRay::of(&facets, Kernel::best());
+        let linear = Linear(facets.clone());
+        for _ in 0..1200 {
+            let mut ray = Ray {
+                origin: facets.origin + grid(&mut rng, 20).as_dvec3() * 0.5,
+                direction: grid(&mut rng, 7).as_dvec3(),
+                near: 0.25,
+                far: 40.0,
+            };
+            if rng.below(4) == 0 {
+                ray.direction = DVec3::from([(); 3].map(|()| sizes[rng.below(sizes.len())]));
+                ray.origin *= [1.0, -1e12][rng.below(2)];
+            }
+            let first = linear.first(&ray);
+            met += usize::from(first.is_some());
+            for count in [0, 1, 3, 9] {
+                linear.nearest(&ray, count, &mut wanted);
+                several += usize::from(wanted.len() > 1);
+                for kernel in Kernel::available() {
+                    wide.nearest_by(kernel, &ray, count, &mut found);
+                    assert_eq!(found, wanted, "{kernel} {count} {ray:?}");
+                    assert_eq!(wide.first_by(kernel, &ray), first, "{kernel} {ray:?}");
+                }
+            }
+        }
+    }
+    assert!(met > 300 && several > 300, "the premise: {met} {several}");
+}
