@@ -4,10 +4,12 @@
 //! needs no state but that number.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
 use crate::geometry::Aabb;
+use crate::input::is_readable;
 use crate::query::ItemId;
 use crate::scene::{CityGrid, Scene, UpAxis, mix64};
 use crate::spec::Spec;
@@ -44,6 +46,16 @@ fn street(grid: &CityGrid, place: DVec3) -> Option<DVec3> {
     }
 }
 
+/// Streets of a scene that is generated as a city, in world coordinates.
+fn city_grid(scene: &Scene) -> Option<CityGrid> {
+    let mut spec = Spec::parse(&scene.name).ok()?;
+    // A file may have that name.
+    let is_city = spec.name() == "city" && !is_readable(Path::new(&scene.name));
+    let mut grid = CityGrid::of(&mut spec, scene.items.len()).ok()?;
+    grid.corner += spec.number("offset", 0.0).ok()?;
+    is_city.then_some(grid)
+}
+
 impl World {
     pub(super) fn new(scene: &Scene, step: f64, seed: u64) -> World {
         let (low, high) = (scene.bounds.min.as_dvec3(), scene.bounds.max.as_dvec3());
@@ -60,10 +72,7 @@ impl World {
                 .unwrap_or(1.0),
             up: scene.up,
             origin: scene.origin,
-            city: Spec::parse(&scene.name)
-                .ok()
-                .filter(|spec| spec.name() == "city")
-                .and_then(|mut spec| CityGrid::of(&mut spec, scene.items.len()).ok()),
+            city: city_grid(scene),
             step,
             seed,
         }

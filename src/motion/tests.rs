@@ -78,6 +78,22 @@ fn a_step_is_as_long_as_it_says() {
     }
 }
 
+#[test]
+fn traffic_keeps_to_the_streets_of_a_city_that_is_moved() {
+    let movers = |source: &str| {
+        let scene = scene(source);
+        let motion = Motion::load("traffic:share=1,frames=1", &scene).unwrap();
+        frames(&motion, &scene)[0].0.clone()
+    };
+    for city in ["city:n=500", "city:n=200,block=60,street=0.25"] {
+        let here = movers(city);
+        assert!(here.len() > 100, "{city}");
+        for offset in ["40", "1e5", "-1e7"] {
+            assert_eq!(movers(&format!("{city},offset={offset}")), here, "{city}");
+        }
+    }
+}
+
 fn scene_of_cars() -> Scene {
     scene("city:n=500,block=60,street=20")
 }

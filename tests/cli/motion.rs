@@ -52,6 +52,15 @@ fn query_shows_the_world_after_a_frame() {
     refused("--motion motion.csv", "motion.csv, line 2: id '7' | 0 to 1");
 }
 
+#[test]
+fn a_file_named_city_has_no_streets() {
+    let boxes = format!("{BOXES}\n47,0,0,48,1,1\n");
+    let folder = folder(&[("city", boxes.as_bytes())]);
+    let line = "query --scene city --cameras spin:frames=1 --motion traffic";
+    let wanted = "no item of 'city' can move so | expected a generated city";
+    assert_refused(&cullbench(folder.path(), line), wanted, line);
+}
+
 /// The item lies 0.03 inside a side plane, where f32 planes err by 0.06.
 ///
 /// Planes that are rounded for the still scene drop it.
