@@ -108,7 +108,7 @@ fn rescaled(camera: &Camera, scale: f64) -> Result<Camera, CameraError> {
 }
 
 /// At most `most` elements, evenly spaced.
-fn every_nth<T: Copy>(all: &[T], most: usize) -> Vec<T> {
+pub(super) fn every_nth<T: Copy>(all: &[T], most: usize) -> Vec<T> {
     let step = all.len().div_ceil(most).max(1);
     all.iter().copied().step_by(step).collect()
 }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::CameraPath;
+use super::calibrate::every_nth;
 use crate::camera::{Camera, Frame, Lens, LensKind, PlaneOptions, ViewProjection};
 use crate::scene::{Scene, UpAxis};
 use crate::shown::counted;
@@ -249,12 +250,13 @@ fn unstraight(cameras: &[Camera]) -> Option<String> {
 fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     let bounds = scene.world_bounds();
     let diagonal = (bounds.max - bounds.min).length();
-    let most = FAR_OUTSIDE * if diagonal > 0.0 { diagonal } else { 1.0 };
+    let diagonal = if diagonal > 0.0 { diagonal } else { 1.0 };
     let outside = |camera: &Camera| {
         let eye = camera.frame.eye;
         let distance = eye.distance(eye.clamp(bounds.min, bounds.max));
         // Parallel lines of sight begin anywhere.
-        (distance > most && !camera.lens.is_orthographic()).then_some(distance / diagonal)
+        (distance > FAR_OUTSIDE * diagonal && !camera.lens.is_orthographic())
+            .then_some(distance / diagonal)
     };
     let far: Vec<f64> = cameras.iter().filter_map(outside).collect();
     let farthest = far.iter().copied().reduce(f64::max)?;
@@ -266,8 +268,13 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     ))
 }
 
-/// Views that all miss all items.
+/// Most boxes that are tested for [`blind`], of all cameras together.
+const MOST_TESTS: usize = 20_000_000;
+
+/// Views that all miss all items; of large scenes fewer views.
 fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {
+    let most = (MOST_TESTS / scene.items.len().max(1)).max(1);
+    let sample = every_nth(cameras, most);
     let around = scene.surroundings();
     let sees_any = |camera: &Camera| {
         let volume = camera.volume(&PlaneOptions::default(), &around);
@@ -276,9 +283,12 @@ fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {
             volume.sees(&scene.bounds) && scene.items.iter().any(|b| volume.sees(b))
         })
     };
-    let is_blind = !scene.items.is_empty() && !cameras.is_empty() && !cameras.iter().any(sees_any);
+    let is_blind = !scene.items.is_empty() && !sample.is_empty() && !sample.iter().any(sees_any);
     is_blind.then(|| {
-        let views = counted(cameras.len(), "view");
+        let views = match sample.len() == cameras.len() {
+            true => counted(cameras.len(), "view"),
+            false => format!("{} of {} views", sample.len(), cameras.len()),
+        };
         format!("nothing of {} is visible in any of {views}", scene.name)
     })
 }

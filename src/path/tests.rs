@@ -216,6 +216,21 @@ fn what_cannot_be_a_path_says_why() {
 }
 
 #[test]
+fn of_a_large_scene_some_views_are_tested_for_items() {
+    let scene = scene("uniform:n=100000");
+    let mut cameras = path("outside:frames=250", &scene).cameras;
+    assert!(warnings(&scene, "p", &cameras).is_empty());
+    for Camera { frame, .. } in &mut cameras {
+        *frame = Frame::looking_along(frame.eye, -frame.forward(), frame.v()).unwrap();
+    }
+    let nothing =
+        |views: &str| format!("p: nothing of uniform:n=100000 is visible in any of {views}");
+    let told = |cameras: &[Camera]| warnings(&scene, "p", cameras);
+    assert_eq!(told(&cameras), [nothing("125 of 250 views")]);
+    assert_eq!(told(&cameras[..200]), [nothing("200 views")]);
+}
+
+#[test]
 fn a_long_path_is_thinned_evenly() {
     let scene = scene::load("uniform:n=5", &Default::default()).unwrap();
     let mut all = path("orbit:frames=10", &scene);
