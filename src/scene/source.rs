@@ -187,11 +187,13 @@ pub fn read_bytes(
             ..WadMap::read(bytes, file, map)?.into_scene(name)?
         });
     }
-    if is_gltf(bytes) || is_named("gltf") || is_named("glb") {
-        return read_gltf(bytes, file, name, options);
-    }
-    if is_obj(bytes) || is_named("obj") {
-        return read_obj(bytes, file, name, options);
+    let is_gltf = is_gltf(bytes) || is_named("gltf") || is_named("glb");
+    if is_gltf || is_obj(bytes) || is_named("obj") {
+        if options.skip_bad_items {
+            note(&format!("{name}: --skip-bad-items is for boxes CSV"));
+        }
+        let read = if is_gltf { read_gltf } else { read_obj };
+        return read(bytes, file, name, options);
     }
     let rows = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
     options.check_fits(name, Some(rows), 0)?;

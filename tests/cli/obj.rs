@@ -38,6 +38,14 @@ fn fed(folder: &Path, line: &str, file: &str) -> Done {
     }
 }
 
+#[test]
+fn bad_items_of_a_mesh_are_not_left_out() {
+    let folder = folder(&[("y.obj", WORLD.as_bytes())]);
+    let done = cullbench(folder.path(), "scene info y.obj --skip-bad-items");
+    let note = "note: y.obj: --skip-bad-items is for boxes CSV\n";
+    assert_eq!((done.code, done.err.as_str()), (Some(0), note));
+}
+
 /// The file and the same world as a CSV with semicolons, from the same cameras.
 #[test]
 fn a_y_up_file_and_its_boxes_as_z_up_csv_are_seen_alike() {
