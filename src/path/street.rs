@@ -178,14 +178,33 @@ impl Column {
                 span.top = span.top.max(part.top);
                 span.is_ground &= part.is_ground;
             }
-            _ => self.spans.push(part),
+            _ => {
+                if self.spans.len() == self.spans.capacity() {
+                    self.merge();
+                    self.spans.reserve(self.spans.len().max(1));
+                }
+                self.spans.push(part);
+            }
         }
+    }
+
+    /// Sorts the spans and joins those that overlap above the lowest item.
+    fn merge(&mut self) {
+        self.spans.sort_by(|a, b| a.bottom.total_cmp(&b.bottom));
+        let lowest = self.spans.first().map(|span| span.item);
+        self.spans.dedup_by(|span, below| {
+            let is_within = Some(below.item) != lowest && span.bottom <= below.top;
+            if is_within {
+                below.top = below.top.max(span.top);
+            }
+            is_within
+        });
     }
 
     /// The lowest level with so much room above it: on the lowest item, or on what
     /// stands on that, or on the floor where there is no item at all.
     fn ground(&mut self, room: f64) -> f64 {
-        self.spans.sort_by(|a, b| a.bottom.total_cmp(&b.bottom));
+        self.merge();
         let mut ground = self.low;
         for (i, span) in self.spans.iter().enumerate() {
             // Below the lowest item is under the ground.
@@ -207,8 +226,56 @@ impl Column {
 mod tests {
     use glam::DVec3;
 
+    use super::{Column, Span};
     use crate::path::{self, LensDefaults};
-    use crate::scene;
+    use crate::scene::{self, SeededRng};
+
+    fn column(spans: impl IntoIterator<Item = [f64; 2]>) -> Column {
+        let mut column = Column {
+            x: 0.0,
+            y: 0.0,
+            low: 1.0,
+            high: 100.0,
+            spans: Vec::new(),
+        };
+        for (item, [bottom, top]) in spans.into_iter().enumerate() {
+            column.add(Span {
+                item,
+                bottom,
+                top,
+                is_ground: item == 0,
+            });
+        }
+        column
+    }
+
+    #[test]
+    fn spans_that_overlap_are_kept_as_one() {
+        let mut rng = SeededRng::new(1);
+        for _ in 0..300 {
+            let (range, thickness) = (rng.between(1.0, 100.0), rng.between(0.0, 5.0));
+            let mut spans: Vec<[f64; 2]> = Vec::new();
+            for _ in 0..rng.below(80) + 1 {
+                let bottom = rng.between(0.0, range).floor();
+                spans.push([bottom, bottom + rng.between(0.0, thickness)]);
+            }
+            let mut merged = column(spans.iter().copied());
+            // The lowest level, on the first or higher, with room below all that is higher.
+            let first = (0..spans.len()).min_by(|&i, &j| spans[i][0].total_cmp(&spans[j][0]));
+            let [foot, top] = spans.swap_remove(first.unwrap());
+            let is_free = |level: &f64| {
+                let mut others = spans.iter();
+                others.all(|[bottom, top]| bottom - level >= 2.0 || top <= level)
+            };
+            let tops = spans.iter().map(|span| span[1]).chain([top, 1.0]);
+            let levels = tops.filter(|level| *level >= top.max(1.0)).filter(is_free);
+            let wanted = levels.min_by(f64::total_cmp).unwrap();
+            assert_eq!((merged.ground(2.0), merged.foot()), (wanted, foot));
+            assert_eq!(merged.spans[0].top, top);
+        }
+        let many = column((0..10_000).map(|item| [5.0, 6.0 + f64::from(item % 7)]));
+        assert!(many.spans.capacity() <= 16, "{}", many.spans.capacity());
+    }
 
     #[test]
     fn eyes_stand_free_and_look_level() {
