@@ -99,11 +99,7 @@ impl Spec {
     /// The same of a name that begins with `prefix`, if the text does, and may hold a
     /// `:` there: `mesh:statue:n=1M`.
     pub fn parse_behind(prefix: &str, text: &str) -> Result<Spec, SpecError> {
-        let begun = if text.starts_with(prefix) {
-            prefix.len()
-        } else {
-            0
-        };
+        let begun = text.strip_prefix(prefix).map_or(0, |_| prefix.len());
         let end = text[begun..].find(':').map_or(text.len(), |at| begun + at);
         let (name, rest) = (&text[..end], text.get(end + 1..).unwrap_or_default());
         let mut given = BTreeMap::new();
@@ -182,10 +178,9 @@ impl Spec {
         if value > low && value < high {
             return Ok(value);
         }
-        let wanted = if high.is_finite() {
-            format!("a number between {low} and {high}")
-        } else {
-            format!("a number above {low}")
+        let wanted = match high.is_finite() {
+            true => format!("a number above {low} and below {high}"),
+            false => format!("a number above {low}"),
         };
         // A default can be out of range too; then it was not typed.
         let found = self.text(key).unwrap_or_else(|| format!("{value:?}"));
@@ -202,7 +197,8 @@ impl Spec {
         self.whole_of(key, default, 1..=most)
     }
 
-    fn whole_of(
+    /// A whole number in a range, or the default.
+    pub fn whole_of(
         &mut self,
         key: &'static str,
         default: u64,
@@ -221,28 +217,18 @@ impl Spec {
         let sound = exact.or(rounded).filter(|v| range.contains(v));
         sound.ok_or_else(|| {
             let (least, most) = (range.start(), range.end());
-            self.bad(
-                key,
-                &text,
-                &format!("a whole number from {least} to {most}"),
-            )
+            let expected = format!("a whole number from {least} to {most}");
+            self.bad(key, &text, &expected)
         })
     }
 
     /// Call last: refuses parameters that were not read.
     pub fn finish(&self) -> Result<(), SpecError> {
-        match self
-            .given
-            .keys()
-            .find(|k| !self.known.contains(&k.as_str()))
-        {
-            None => Ok(()),
-            Some(key) => Err(SpecError::unknown(
-                &format!("parameter of '{}':", self.name),
-                key,
-                self.known.iter().copied(),
-            )),
-        }
+        let known = self.known.iter().copied();
+        let what = format!("parameter of '{}':", self.name);
+        let is_unknown = |key: &&String| !self.known.contains(&key.as_str());
+        let unknown = self.given.keys().find(is_unknown);
+        unknown.map_or(Ok(()), |key| Err(SpecError::unknown(&what, key, known)))
     }
 
     fn bad(&self, key: &str, found: &str, expected: &str) -> SpecError {

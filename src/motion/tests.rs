@@ -106,7 +106,10 @@ fn wrong_specs_are_refused() {
         ("drift:speed=1", "unknown parameter of 'drift': 'speed'"),
         ("drift:share=0", "share=0; expected above 0, at most 1"),
         ("drift:share=200%", "share=2; expected above 0"),
-        ("drift:step=-1", "step is '-1'; expected a number between"),
+        (
+            "drift:step=-1",
+            "step is '-1'; expected a number above 0 and below",
+        ),
         ("drift:same=yes", "same=yes; expected true or false"),
         ("drift:frames=0", "frames is '0'; expected a whole number"),
         ("traffic", "expected a generated city"),

@@ -27,7 +27,7 @@ pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputEr
 /// A closed flight through `waypoints` seeded points within the scene's middle: the
 /// coherent path of a game or a film camera.
 pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
-    let count = spec.whole("waypoints", 8, 10_000)?.max(4) as usize;
+    let count = spec.whole_of("waypoints", 8, 4..=10_000)? as usize;
     let mut rng = stage.rng();
     let (low, extent) = (stage.bounds.min, stage.extent());
     let points: Vec<DVec3> = (0..count)
@@ -119,12 +119,8 @@ pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputEr
         let eye = (stage.bounds.min + stage.extent() * share).with_z(z);
         // Normal components: every direction is equally likely.
         let forward = rng.normal3();
-        let forward = if forward == DVec3::ZERO {
-            DVec3::X
-        } else {
-            forward
-        };
-        Pose::new(eye, forward)
+        let looking = forward != DVec3::ZERO;
+        Pose::new(eye, if looking { forward } else { DVec3::X })
     });
     Ok(poses.collect())
 }

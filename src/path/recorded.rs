@@ -245,7 +245,7 @@ fn eyes<'a>(
         let up = up.map_or(Ok(defaults.up), |columns| point(row, columns))?;
         let is_infinite = |column| {
             let text = row.text(column).to_lowercase();
-            ["", "inf", "+inf", "infinity"].contains(&text.as_str())
+            ["", "inf", "+inf", "infinity", "+infinity"].contains(&text.as_str())
         };
         let far = match far {
             Some(column) if is_infinite(column) => None,
@@ -314,9 +314,9 @@ mod tests {
     fn full_rows_in_any_order_and_bare_ones_with_defaults() {
         let full = "far,near,eye_x,eye_y,eye_z,note,look_x,look_y,look_z,up_x,up_y,up_z,fovy_deg,aspect\n\
                     inf,0.5,1,2,3,hello,1,2,-7,0,1,0,90,1.5\n,0.5,1,2,3,,1,2,-7,0,1,0,90,1.5\n\
-                    3.4028235e38,0.5,1,2,3,,1,2,-7,0,1,0,90,1.5\n";
+                    3.4028235e38,0.5,1,2,3,,1,2,-7,0,1,0,90,1.5\n+Infinity,0.5,1,2,3,,1,2,-7,0,1,0,90,1.5\n";
         let path = read(full).unwrap();
-        assert_eq!(path.cameras, [path.cameras[0]; 3]);
+        assert_eq!(path.cameras, [path.cameras[0]; 4]);
         assert_eq!(path.cameras[0].frame.eye, DVec3::new(1.0, 2.0, 3.0));
         assert_eq!(path.cameras[0].frame.forward(), -DVec3::Z);
         assert_eq!(

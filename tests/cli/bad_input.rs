@@ -172,7 +172,10 @@ fn a_scene_spec_that_is_none_is_refused_by_every_command() {
         ("uniform:n=9,side=0", "side is '0' | a number above 0"),
         ("uniform:n=9,side=nan", "side is 'nan' | a number"),
         ("uniform:n=9,offset=1e300,size=1e300", "f32"),
-        ("rooms:n=9,room=1e-300", "room is '1e-300' | between"),
+        (
+            "rooms:n=9,room=1e-300",
+            "room is '1e-300' | above 2 and below",
+        ),
         ("helsinki:n=5", "unknown parameter | 'n'"),
         ("two\nlines", "unknown scene 'two lines'"),
     ];
