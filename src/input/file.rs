@@ -24,6 +24,15 @@ pub fn is_readable(path: &Path) -> bool {
         || fs::metadata(path).is_ok_and(|found| !found.is_dir())
 }
 
+/// Returns true if a file has that name, or nothing else could.
+///
+/// A name with parameters has neither a slash nor a dot before them.
+pub fn names_file(source: &str) -> bool {
+    let name = source.split(':').next().unwrap_or_default();
+    let is_path = source.ends_with(".csv") || name.contains(['/', '\\', '.']);
+    is_path || is_readable(Path::new(source))
+}
+
 /// Returns true for the name of standard input.
 fn is_stdin(path: &Path) -> bool {
     path.as_os_str() == "-"

@@ -11,7 +11,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use crate::geometry::Aabb;
-use crate::input::{InputError, is_readable, read_file};
+use crate::input::{InputError, names_file, read_file};
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, hex};
 use crate::spec::{Spec, SpecError};
@@ -95,11 +95,9 @@ impl Motion {
             items,
             source: from,
         };
-        // A name has neither a slash nor a dot before its parameters.
-        let name = source.split(':').next().unwrap_or_default();
-        let file = Path::new(source);
-        if is_readable(file) || source.ends_with(".csv") || name.contains(['/', '\\', '.']) {
-            let recorded = recorded::read_motion_csv(&read_file(file)?[..], source, scene)?;
+        if names_file(source) {
+            let bytes = read_file(Path::new(source))?;
+            let recorded = recorded::read_motion_csv(&bytes[..], source, scene)?;
             return Ok(motion(recorded.frames(), Source::Recorded(recorded)));
         }
         let mut spec = Spec::parse(source)?;

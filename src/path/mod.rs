@@ -16,8 +16,8 @@ use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, LensKind, Surroundings};
 use crate::geometry::Aabb;
-use crate::input::{InputError, gigabytes, is_readable, read_file, warn};
-use crate::scene::{self, PlaceView, Scene, SeededRng, UpAxis, WorldBox};
+use crate::input::{InputError, names_file, read_file, warn};
+use crate::scene::{self, PlaceView, Scene, SeededRng, UpAxis, WorldBox, memory};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
@@ -265,11 +265,8 @@ fn read(
     defaults: &LensDefaults,
     scale: Option<f64>,
 ) -> Result<CameraPath, InputError> {
-    // A name has neither a slash nor a dot before its parameters.
-    let name = source.split(':').next().unwrap_or_default();
-    let file = Path::new(source);
-    if is_readable(file) || source.ends_with(".csv") || name.contains(['/', '\\', '.']) {
-        let bytes = read_file(file)?;
+    if names_file(source) {
+        let bytes = read_file(Path::new(source))?;
         let rows = bytes.iter().filter(|byte| **byte == b'\n').count();
         fits(source, rows as u64)?;
         return read_cameras_csv(&bytes[..], source, &defaults.of_scene(scene));
@@ -310,18 +307,10 @@ fn read(
 
 /// Refuses more cameras than there is memory for.
 fn fits(source: &str, cameras: u64) -> Result<(), InputError> {
-    /// Fewer are made without a look at the memory.
-    const ANYWHERE: u64 = 10_000;
     /// Bytes of a camera with its views and answers: 2,800 were measured.
     const PER_CAMERA: u64 = 3000;
-    let needed = cameras.saturating_mul(PER_CAMERA);
-    let free = (cameras > ANYWHERE).then(scene::available_bytes).flatten();
-    let Some(free) = free.filter(|free| needed > *free) else {
-        return Ok(());
-    };
-    let [needed, free] = [needed, free].map(gigabytes);
-    let reason = format!("{cameras} cameras need about {needed}, {free} are free; expected fewer");
-    Err(unfit(source, reason))
+    let label = format!("path '{source}', {cameras} cameras");
+    memory::check_fits(&label, cameras.saturating_mul(PER_CAMERA), 0, cameras)
 }
 
 /// The lens parameters of a generated path.
@@ -406,24 +395,16 @@ impl Optics {
             return Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far);
         };
         let [fovy, aspect, near, far] = self.named;
+        let [near, far] = [near, far].map(|is_named| is_named || self.visible.is_some());
         let aspect = own.aspect.filter(|_| !aspect).unwrap_or(self.aspect);
         let fovy_deg = own.fovy_deg.filter(|_| !fovy).unwrap_or(self.fovy_deg);
         let kind = match own.ortho_height.filter(|_| !fovy) {
             Some(height) => LensKind::Orthographic { height, aspect },
             None => LensKind::Perspective { fovy_deg, aspect },
         };
-        let is_scaled = self.visible.is_some();
-        let near = if near || is_scaled {
-            self.near
-        } else {
-            own.near
-        };
-        let far = if far || is_scaled {
-            self.far
-        } else {
-            own.far.filter(|far| *far <= FARTHEST)
-        };
-        Lens::new(kind, near, far)
+        let near = if near { self.near } else { own.near };
+        let far = if far { self.far } else { own.far };
+        Lens::new(kind, near, far.filter(|far| *far <= FARTHEST))
     }
 }
 

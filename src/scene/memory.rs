@@ -79,7 +79,7 @@ fn fits(
     };
     let (needed, free) = (gigabytes(needed), gigabytes(available));
     Err(InputError::new(format_args!(
-        "{scene}: needs about {needed}{held}, {free} are free; expected fewer items{or_fewer}"
+        "{scene}: needs about {needed}{held}, {free} are free; expected a smaller input{or_fewer}"
     )))
 }
 
@@ -170,7 +170,7 @@ mod tests {
         };
         let gigabyte = 1_000_000_000;
         let told = refused(100_000_000, 0, Some(8 * gigabyte)).expect("refused");
-        let wanted = "uniform:n=9: needs about 12.0 GB, 8.0 GB are free; expected fewer items";
+        let wanted = "uniform:n=9: needs about 12.0 GB, 8.0 GB are free; expected a smaller input";
         assert_eq!(told, wanted);
         // Structures count, and the line says how many.
         assert_eq!(refused(100_000_000, 0, Some(13 * gigabyte)), None);

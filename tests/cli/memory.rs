@@ -38,13 +38,14 @@ fn a_scene_beyond_the_limits_of_the_process_is_one_line() {
         for line in commands {
             let line = line.replace("SCENE", scene);
             let done = limited(folder.path(), 500_000, &line);
-            let wanted = format!("{scene}: needs about |  MB are free; expected fewer items");
+            let wanted = format!("{scene}: needs about |  MB are free; expected a smaller input");
             assert_refused(&done, &wanted, &line);
         }
     }
     assert!(!folder.path().join("out.csv").exists());
     let line = "query --scene uniform:n=5 --cameras orbit:frames=1000000";
-    let wanted = "orbit:frames=1000000 | 1000000 cameras need about 3.0 GB | expected fewer";
+    let wanted =
+        "path 'orbit:frames=1000000', 1000000 cameras: needs about 3.0 GB, | expected a smaller";
     assert_refused(&limited(folder.path(), 500_000, line), wanted, line);
 }
 

@@ -246,7 +246,7 @@ fn what_is_wrong_is_named_with_its_place() {
         (
             "/accessors/0/count",
             json!(u64::MAX),
-            "expected fewer items",
+            "expected a smaller input",
         ),
         ("/accessors/1/count", json!(13), "accessors[1]: 13 elements"),
         (
