@@ -9,6 +9,8 @@ use crate::scene::Scene;
 /// Maximum numbers of items and cameras sampled per step of the search.
 const MOST_ITEMS: usize = 8_000;
 const MOST_CAMERAS: usize = 128;
+/// Boxes tested per step of the search, unless sixteen cameras need more.
+const MOST_TESTS: usize = 160_000 * MOST_CAMERAS;
 /// Items of the sample that a camera sees at least, on average, at the cost of
 /// more items than that: a share of 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;
@@ -32,7 +34,7 @@ pub(super) fn for_visible_share(
 ) -> Result<f64, InputError> {
     let needed = (LEAST_SEEN / share).ceil() as usize;
     let items = every_nth(&scene.items, MOST_ITEMS.max(needed));
-    let sample = every_nth(cameras, MOST_CAMERAS);
+    let sample = every_nth(cameras, most_cameras(items.len()));
     let around = scene.surroundings();
     let visible = |scale: f64| -> Result<f64, InputError> {
         let mut seen = 0;
@@ -74,6 +76,11 @@ pub(super) fn for_visible_share(
         return Err(unreached(&found, "larger"));
     }
     Ok(high)
+}
+
+/// Most cameras of a sample with that many items.
+pub(super) fn most_cameras(items: usize) -> usize {
+    (MOST_TESTS / items.max(1)).clamp(16, MOST_CAMERAS)
 }
 
 /// The cameras with far and near scaled alike.

@@ -44,8 +44,9 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputE
     let height = spec.number_between("height", 1.7, 0.0, 1e6)?;
     let mut rng = stage.rng();
     let places = &stage.scene.places;
-    if !places.is_empty() {
-        // Places of the scene's author need no search.
+    let is_map = matches!(stage.scene.regions, Regions::Bsp(_) | Regions::Leaves(_));
+    if is_map && !places.is_empty() {
+        // Places of a map's author need no search.
         let poses = (0..stage.count).map(|_| {
             let eye = stage.up.to_z_up(places[rng.below(places.len())].eye);
             Pose::new(eye, level(&mut rng))

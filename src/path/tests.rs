@@ -189,11 +189,50 @@ fn the_maps_things_are_camera_places() {
 }
 
 #[test]
+fn of_more_items_fewer_cameras_set_the_share() {
+    let most = [0, 8_000, 160_000, 1_000_000, 100_000_000].map(calibrate::most_cameras);
+    assert_eq!(most, [128, 128, 128, 20, 16]);
+}
+
+/// One camera of a glTF file is no street.
+#[test]
+fn on_a_street_places_of_maps_alone_are_eyes() {
+    let mut city = scene("city:n=300");
+    let free = path("street:frames=5", &city).cameras;
+    city.places = path("orbit:frames=1", &city)
+        .cameras
+        .iter()
+        .map(place)
+        .collect();
+    assert_eq!(path("street:frames=5", &city).cameras, free);
+    let map = scene("freedm-map12");
+    for camera in path("street:frames=5", &map).cameras {
+        assert!(map.places.iter().any(|place| place.eye == camera.frame.eye));
+    }
+}
+
+fn place(camera: &Camera) -> scene::CameraPlace {
+    scene::CameraPlace {
+        eye: camera.frame.eye,
+        forward: camera.frame.forward(),
+        view: None,
+    }
+}
+
+#[test]
 fn what_cannot_be_a_path_says_why() {
     let scene = scene("city:n=10");
     for (source, wanted) in [
         ("orbt", "did you mean 'orbit'"),
         ("orbit:frame=3", "did you mean 'frames'"),
+        (
+            "flythrough:waypoints=3",
+            "waypoints is '3'; expected a whole number from 4 to 10000",
+        ),
+        (
+            "zoom:power=1",
+            "power is '1'; expected a number above 1 and below 1000000",
+        ),
         ("orbit:fovy=0", "field of view is 0"),
         ("orbit:near=5,far=5", "near < far"),
         ("orbit:visible=10", "visible=10; expected a share"),
