@@ -210,11 +210,35 @@ impl Auto {
         self.scan.is_some()
     }
 
+    /// Trees with a lane for each item, where a neighbour was if it is empty now.
+    fn trees_of(input: &Input<'_>, params: &AutoParams) -> Result<Moving, BuildError> {
+        let (items, order) = (input.items, params.order);
+        let gone = |&id: &ItemId| items[id as usize].is_empty();
+        let gone: Vec<ItemId> = (0..items.len() as ItemId).filter(gone).collect();
+        if gone.is_empty() || gone.len() == items.len() || params.structure == Use::Moving {
+            return Moving::resting(input, &WideParams { order });
+        }
+        let mut held = items.to_vec();
+        let mut last = *items.iter().find(|b| !b.is_empty()).unwrap_or(&Aabb::EMPTY);
+        for b in &mut held {
+            *b = if b.is_empty() { last } else { *b };
+            last = *b;
+        }
+        let mut trees = Moving::resting(
+            &Input {
+                items: &held,
+                ..*input
+            },
+            &WideParams { order },
+        )?;
+        trees.still.balls = None;
+        trees.still.take_over(items, &gone);
+        Ok(trees)
+    }
+
     /// Replaces the trees; false with nothing changed if they cannot be built.
     fn rebuild(&mut self, items: &[Aabb]) -> bool {
-        let order = self.params.order;
-        let built = Moving::resting(&Input::new(items), &WideParams { order });
-        let Ok(trees) = built else {
+        let Ok(trees) = Auto::trees_of(&Input::new(items), &self.params) else {
             return false;
         };
         self.trees = trees;
@@ -353,9 +377,8 @@ impl RegionIndex for Auto {
 
     /// O(n log n), that of [`Wide`](super::Wide), and a few queries.
     fn build(input: &Input<'_>, params: &AutoParams) -> Result<Self, BuildError> {
-        let order = params.order;
         let mut auto = Auto {
-            trees: Moving::resting(input, &WideParams { order })?,
+            trees: Auto::trees_of(input, params)?,
             params: *params,
             ..Auto::default()
         };

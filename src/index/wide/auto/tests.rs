@@ -261,6 +261,28 @@ fn a_tree_that_has_aged_is_built_again() {
 }
 
 #[test]
+fn items_that_come_and_go_have_a_lane_after_each_build() {
+    let mut rng = Pcg64::seed_from_u64(13);
+    let mut items = cubes(&mut rng, 20_000);
+    items[10_000..].fill(GONE);
+    let mut index = built(&items, ":use=wide");
+    for round in 0..60 {
+        let moved: Vec<ItemId> = (0..100).map(|i| (i * 200 + round) % 20_000).collect();
+        for &id in &moved {
+            let b = &mut items[id as usize];
+            let at = Aabb::around(point(&mut rng), Vec3::splat(0.7));
+            *b = if b.is_empty() { at } else { GONE };
+        }
+        if round == 30 {
+            assert!(index.rebuild(&items));
+        }
+        assert!(index.refit(&items, &moved));
+        assert_right(&index, &items, &mut rng, "come and gone");
+    }
+    assert_eq!(index.updates, [0, 60, 1]);
+}
+
+#[test]
 fn queries_between_updates_are_counted_up_to_a_number() {
     let mut rng = Pcg64::seed_from_u64(10);
     let items = cubes(&mut rng, 100);
