@@ -22,7 +22,7 @@ use super::study::progress;
 use super::{run_plan, text};
 use crate::index::Registry;
 use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Share};
-use crate::report::{Basis, Changes, JUDGED_METRICS, ReportCell, WORK, changes};
+use crate::report::{Basis, Changes, ReportCell, WORK, changes};
 use crate::scene;
 use crate::statistics::resolved;
 
@@ -259,7 +259,8 @@ impl Duel<'_> {
             groups.flat_map(|parts| Group::of(&parts).cells).collect()
         });
         let metrics = match self.args.gate {
-            Gate::Time => &JUDGED_METRICS[..1],
+            Gate::Time if self.plan.motions.is_empty() => &["query_ns"],
+            Gate::Time => &["frame_ns"][..],
             Gate::Work => WORK,
         };
         let [old, new] = &cells;

@@ -112,8 +112,6 @@ const RUN_HELP: &str = include_str!("assets/help/run.txt");
 pub struct RunArgs {
     #[command(flatten)]
     pub what: WhatArgs,
-    #[command(flatten)]
-    pub moves: MotionArgs,
     /// Folder for the page, the report, the samples and the stream [default: a
     /// new one under results/]
     #[arg(long, value_name = "DIR")]

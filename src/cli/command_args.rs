@@ -219,7 +219,7 @@ pub enum Gate {
 }
 
 #[derive(Args, Debug)]
-#[command(after_help = program::named(COMPARE_HELP))]
+#[command(after_help = program::named(COMPARE_HELP), mut_arg("motion", |arg| arg.conflicts_with("cold")))]
 pub struct CompareArgs {
     /// report.json of the older run, or the folder it is in; with --baseline NEW alone
     #[arg(value_name = "OLD.json", required_unless_present_any = ["against", "baseline"])]

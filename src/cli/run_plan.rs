@@ -34,8 +34,6 @@ pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
     if let Some(processes) = args.processes {
         planned.plan.effort.processes = processes;
     }
-    args.moves.enter(&mut planned.plan)?;
-    planned.check_motions()?;
     if let Some(text) = &args.shard {
         let (i, n) = shard(text)?;
         planned.whole = planned.plan.groups();
@@ -65,7 +63,7 @@ pub fn plan_of(
     cullings.iter().try_for_each(Culling::check)?;
     each_once("test", tests())?;
     let structures = args.kernel.structures(registry, &structures)?;
-    let plan = Plan {
+    let mut plan = Plan {
         scenes: scenes(args, suite)?,
         cullings,
         lens: args.lens.defaults()?,
@@ -77,16 +75,19 @@ pub fn plan_of(
         bounds: !args.no_bounds,
         seed: args.seed,
     };
+    args.moves.enter(&mut plan)?;
     each_once("scene", plan.scenes.iter().map(|scene| &scene.source))?;
     for scene in &plan.scenes {
         each_once("path", &scene.paths)?;
     }
-    Ok(RunPlan {
+    let planned = RunPlan {
         plan,
         suite,
         from_suite: args.scene.is_empty() && args.path.is_empty(),
         whole: Vec::new(),
-    })
+    };
+    planned.check_motions()?;
+    Ok(planned)
 }
 
 /// "2/4": the second of four shares.

@@ -81,6 +81,8 @@ pub struct WhatArgs {
     #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = values::whole(1..=u64::MAX))]
     pub timeout: u64,
     #[command(flatten)]
+    pub moves: MotionArgs,
+    #[command(flatten)]
     pub scene_args: SceneArgs,
     #[command(flatten)]
     pub lens: LensArgs,
@@ -94,7 +96,7 @@ pub struct WhatArgs {
 #[derive(Args, Debug)]
 pub struct MotionArgs {
     /// Move the items: a spec (see `list motions`) or a motion CSV. Measures frames, an
-    /// update and queries each, in place of still scenes; run: may be repeated
+    /// update and queries each, in place of still scenes; run and compare: may be repeated
     #[arg(long, value_name = "MOTION")]
     pub motion: Vec<String>,
     /// Queries per frame, along the path

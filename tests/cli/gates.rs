@@ -226,6 +226,25 @@ fn two_programs_are_compared_by_their_counters_alone() {
 }
 
 #[test]
+fn two_programs_are_compared_by_their_frames() {
+    let folder = folder(&[]);
+    let line = format!(
+        "compare --scene uniform:n=300 --path orbit:frames=4 --structure linear,wide \
+         --motion drift:share=0.1,frames=3 --update refit,rebuild --threshold 90% --format json --against {}",
+        super::PROGRAM
+    );
+    let changes = json(&works(folder.path(), &line));
+    let rows = changes["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 4, "{changes}");
+    for row in rows {
+        assert_eq!(row["metric"], "frame_ns");
+        assert_ne!(row["pairs_ln_ns"], Value::Null, "{row}");
+    }
+    let wanted = "--motion | cannot be used with | --cold";
+    all_refused(&folder, &[format!("{line} --cold")], wanted);
+}
+
+#[test]
 fn bencher_gets_every_right_cell_once() {
     let folder = with_change(|new| cells(new)[0]["status"] = json!("wrong"));
     let text = works(folder.path(), "report new.json --bencher b.json");

@@ -146,10 +146,14 @@ impl Auto {
         self.params.structure == Use::Moving
     }
 
-    /// Frusta of 60 degrees from the centre of an item to that of another one.
+    /// Frusta of 60 degrees from the centre of an item to that of another one; none is gone.
     fn views(&self, items: &[Aabb]) -> Vec<ConvexVolume> {
         let ids = &self.trees.still.ids[..];
-        let centre = |at: usize| Some(items.get(*ids.get(at % ids.len())? as usize)?.centre());
+        let centre = |at: usize| {
+            let from = ids.iter().cycle().skip(at % ids.len()).take(ids.len());
+            let present = from.filter_map(|&id| items.get(id as usize));
+            Some(present.copied().find(|b| !b.is_empty())?.centre())
+        };
         let view = |i: usize| {
             // Tree order is spread over space: half, a quarter, .. of the items between.
             let at = i * ids.len() / VIEWS;
@@ -447,16 +451,18 @@ impl RegionIndex for Auto {
         let others = |names: &[&str], costs: &[f64], taken: usize| {
             let others = (0..names.len()).filter(|&i| i != taken && costs[i].is_finite());
             let ratio = |i: usize| format!("{} ({:.3} x)", names[i], costs[i] / costs[taken]);
-            others.map(ratio).collect::<Vec<_>>().join(", ")
+            let others = others.map(ratio).collect::<Vec<_>>().join(", ");
+            let not = if others.is_empty() { "" } else { ", not " };
+            format!("{not}{others}")
         };
         let left_out = others(&SEARCHES, &self.costs, self.built);
-        let mut told = format!("{}, not {left_out}", SEARCHES[self.built]);
+        let mut told = format!("{}{left_out}", SEARCHES[self.built]);
         let count: u32 = self.updates.iter().sum();
         let most = (0..UPDATES.len()).max_by_key(|&kind| self.updates[kind]);
         if let Some(most) = most.filter(|_| count > 0) {
             let left_out = others(&UPDATES, &self.spent, most);
             let (name, here) = (UPDATES[most], self.updates[most]);
-            told += &format!("; {name} in {here} of {count} updates, not {left_out}");
+            told += &format!("; {name} in {here} of {count} updates{left_out}");
         }
         Some(told)
     }

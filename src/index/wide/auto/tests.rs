@@ -280,6 +280,12 @@ fn items_that_come_and_go_have_a_lane_after_each_build() {
         assert_right(&index, &items, &mut rng, "come and gone");
     }
     assert_eq!(index.updates, [0, 60, 1]);
+    // No frustum begins at an item that is gone.
+    let last = items.len() - 1;
+    items[..last].fill(GONE);
+    assert_eq!(index.views(&items).len(), 0);
+    items[..100].copy_from_slice(&cubes(&mut rng, 100));
+    assert_eq!(index.views(&items).len(), VIEWS);
 }
 
 #[test]
