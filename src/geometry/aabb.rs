@@ -122,6 +122,12 @@ impl Aabb {
         self.min * 0.5 + self.max * 0.5
     }
 
+    /// Half of the edge lengths; finite also of a box as wide as all of f32.
+    #[inline(always)]
+    pub fn half_extent(&self) -> Vec3 {
+        self.max * 0.5 - self.min * 0.5
+    }
+
     /// Bits of the six bounds, as a key of identical boxes.
     #[inline]
     pub fn bits(&self) -> [[u32; 3]; 2] {

@@ -159,7 +159,7 @@ mod tests {
                 .map(|(normal, point)| Plane::through(point, normal)).collect();
             let rows = PlaneRows::collect(planes.iter()).expect("eight at most");
             let scene = Aabb::union_of(&items);
-            let largest = items.iter().fold(Vec3::ZERO, |h, b| h.max(b.extent() * 0.5));
+            let largest = items.iter().fold(Vec3::ZERO, |h, b| h.max(b.half_extent()));
             let seen_from = of_planes(&rows, largest, &scene);
             let holding = of_point(p, largest, &scene);
             for b in &items {

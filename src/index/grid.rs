@@ -147,7 +147,7 @@ impl BoxTested for UniformGrid {
             false => cells_for(centres.extent(), items.len()),
         };
         let cells = counts.as_usizevec3().element_product();
-        let halves = items.iter().map(|item| item.bounds.extent() * 0.5);
+        let halves = items.iter().map(|item| item.bounds.half_extent());
         let mut grid = UniformGrid {
             centres,
             counts,

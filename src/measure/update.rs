@@ -40,7 +40,7 @@ pub(super) fn measure_updates(
     Ok(times)
 }
 
-/// Moves evenly spread items by their own extent; returns their ids.
+/// Moves evenly spread items by their own extent, within f32; returns their ids.
 pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
     let count = ((items.len() as f64 * share).round() as usize).clamp(1, items.len());
     let moved: Vec<ItemId> = (0..count)
@@ -49,7 +49,8 @@ pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
     for &id in &moved {
         let b = &mut items[id as usize];
         let step = b.extent();
-        *b = Aabb::new(b.min + step, b.max + step);
+        let moved = Aabb::new(b.min + step, b.max + step);
+        *b = if moved.is_finite() { moved } else { *b };
     }
     moved
 }

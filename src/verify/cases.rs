@@ -224,6 +224,8 @@ pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
     let growing = |i: u16| Aabb::new(Vec3::ZERO, Vec3::splat((f32::from(i) / 10.0).exp2()));
     let everything = Aabb::new(Vec3::splat(-1e6), Vec3::splat(1e6));
     let everything = [vec![everything; 50], row(500, 1.0)].concat();
+    let wide = Aabb::around(Vec3::ZERO, Vec3::new(1.75e38, 1.75e38, 1.0));
+    let wide = [vec![wide], row(100, 1.0)].concat();
     let mut third_inverted = row(300, 1.0);
     for b in third_inverted.iter_mut().step_by(3) {
         *b = Aabb::new(b.max, b.min);
@@ -241,6 +243,7 @@ pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
         ("huge and tiny", [row(200, 1e30), row(200, 1e-30)].concat()),
         ("subnormal", row(100, f32::from_bits(64))),
         ("near the largest float", row(100, 1e36)),
+        ("wider than the largest float", wide),
         ("far away", (0..500).map(far).collect()),
         ("everything overlaps", everything),
         ("nested", (0..500).map(nested).collect()),
@@ -250,14 +253,15 @@ pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
     ]
 }
 
-/// All of space, nothing, and half-spaces and slabs through the scene whose
-/// planes touch its boxes exactly.
+/// All of space, nothing, a plane with a short normal, and half-spaces and slabs through the
+/// scene whose planes touch its boxes exactly.
 pub fn edge_volumes(items: &[Aabb]) -> Vec<ConvexVolume> {
     let bounds = match Aabb::union_of(items) {
         b if b.is_empty() => cube(0.0, 0.0, 0.0, 1.0),
         b => b,
     };
-    let mut sets: Vec<Vec<Plane>> = vec![vec![], vec![Plane::new(Vec3::ZERO, -1.0)]];
+    let short = Plane::new(Vec3::X * 1e-3, 1.0);
+    let mut sets = vec![vec![], vec![Plane::new(Vec3::ZERO, -1.0)], vec![short]];
     for axis in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.3, -0.5, 0.8)] {
         let corners = items.iter().take(3).map(|b| b.max);
         for anchor in corners.chain([bounds.centre(), bounds.max]) {

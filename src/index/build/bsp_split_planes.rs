@@ -34,7 +34,7 @@ fn centres(records: &[Record]) -> Aabb {
 /// divided after all.
 pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     let centres = centres(records);
-    let width = centres.max * 0.5 - centres.min * 0.5;
+    let width = centres.half_extent();
     let mut axes = [0, 1, 2];
     axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
     let (count, half) = (records.len(), records.len() / 2);

@@ -75,7 +75,7 @@ impl TreeBuilder for QuadtreeBuilder {
 
 /// The two axes in which the bounds are widest, ascending.
 pub fn widest_axes(bounds: &Aabb) -> [usize; 2] {
-    let width = bounds.max * 0.5 - bounds.min * 0.5;
+    let width = bounds.half_extent();
     let narrowest = (0..3).rev().min_by(|&a, &b| width[a].total_cmp(&width[b]));
     match narrowest {
         Some(0) => [1, 2],
@@ -135,7 +135,7 @@ impl CellParams {
         let root = Cell {
             centre: bounds.centre(),
             // Halved before subtracting: bounds may span the range of f32.
-            half: (bounds.max * 0.5 - bounds.min * 0.5).max_element(),
+            half: bounds.half_extent().max_element(),
             level: 0,
         };
         let records = Record::all(items)?;
@@ -364,8 +364,8 @@ mod tests {
             .map(|([x, y], z)| Aabb::new(Vec3::new(x, y, z), Vec3::new(x, y, z + 1.0)))
             .collect();
         let tree = built(&items);
-        // The world, a tower, sixteen slabs of 62 or 63, two of those each.
-        assert_eq!(tree.depth(), 4);
+        // The world, four towers, sixteen slabs of 62 or 63 each, two of those each.
+        assert_eq!(tree.nodes().len(), 1 + 4 + 64 + 128);
         let leaves = (0..tree.nodes().len()).filter(|&node| tree.is_leaf(node));
         let highest = leaves.map(|leaf| tree.nodes()[leaf].bounds.extent().z);
         assert_eq!(highest.fold(0.0, f32::max), 32.0);

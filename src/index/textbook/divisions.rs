@@ -61,7 +61,7 @@ impl Division for QuadtreeCells {
 /// The cell of a whole scene: as wide on each of the axes that are cut.
 fn root_cell(scene: &Aabb, axes: &[usize]) -> Aabb {
     // Halved before subtracting and clamped: bounds may span the range of f32.
-    let half = scene.max * 0.5 - scene.min * 0.5;
+    let half = scene.half_extent();
     let widest = axes.iter().map(|&axis| half[axis]).fold(0.0, f32::max);
     let cube = Aabb::around(scene.centre(), Vec3::splat(widest));
     let mut cell = *scene;

@@ -21,8 +21,6 @@ pub struct PackedTree {
     boxes: BoxBlocks,
     /// Item ids in tree order.
     ids: Vec<ItemId>,
-    /// Levels from the root to the deepest leaf.
-    depth: usize,
     /// The nodes again, sixteen to a block, for queries by volumes.
     pub(super) wide_nodes: WideNodes,
     positions: Positions,
@@ -77,12 +75,10 @@ impl PackedTree {
             ids: Vec::with_capacity(items),
             ..PackedTree::default()
         };
-        let (mut tasks, mut groups, mut level) = (vec![Task::Open(root)], Vec::new(), 0);
+        let (mut tasks, mut groups) = (vec![Task::Open(root)], Vec::new());
         while let Some(task) = tasks.pop() {
             match task {
                 Task::Open(group) => {
-                    level += 1;
-                    tree.depth = tree.depth.max(level);
                     let node = tree.nodes.len();
                     tree.nodes.push(TreeNode {
                         bounds: Aabb::EMPTY,
@@ -97,7 +93,6 @@ impl PackedTree {
                     tasks.extend(groups.drain(..).rev().map(Task::Open));
                 }
                 Task::Close(node) => {
-                    level -= 1;
                     let (after, items) = (tree.nodes.len(), tree.ids.len());
                     let closed = &mut tree.nodes[node];
                     closed.count = items as u32 - closed.first;
@@ -141,11 +136,6 @@ impl PackedTree {
     #[inline(always)]
     pub fn is_leaf(&self, node: usize) -> bool {
         is_leaf(&self.nodes, node)
-    }
-
-    /// Levels from the root to the deepest leaf; 0 for no items.
-    pub fn depth(&self) -> usize {
-        self.depth
     }
 
     /// The root, and the lanes of the wide nodes below it.
@@ -280,7 +270,6 @@ mod tests {
     fn a_tree_of_a_hundred_thousand_levels_is_walked_without_recursion() {
         let items = row(100_000);
         let tree = comb(&items);
-        assert_eq!(tree.depth(), 100_001);
         assert!(tree.cells().len() > items.len());
         let mut all = Count::default();
         let everything = Aabb::new(Vec3::splat(-1e9), Vec3::splat(1e9));

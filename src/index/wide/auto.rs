@@ -217,24 +217,24 @@ impl Auto {
     /// Trees with a lane for each item, where a neighbour was if it is empty now.
     fn trees_of(input: &Input<'_>, params: &AutoParams) -> Result<Moving, BuildError> {
         let (items, order) = (input.items, params.order);
-        let gone = |&id: &ItemId| items[id as usize].is_empty();
-        let gone: Vec<ItemId> = (0..items.len() as ItemId).filter(gone).collect();
-        if gone.is_empty() || gone.len() == items.len() || params.structure == Use::Moving {
+        // A bound that is no number is refused by the build.
+        let is_gone = |b: &Aabb| b.is_empty() && b.is_finite();
+        let ids = (0..).zip(items).filter(|(_, b)| is_gone(b));
+        let gone: Vec<ItemId> = ids.map(|(id, _)| id).collect();
+        let held = items.iter().find(|b| !b.is_empty());
+        let (false, Some(mut last)) = (params.structure == Use::Moving || gone.is_empty(), held)
+        else {
             return Moving::resting(input, &WideParams { order });
-        }
-        let mut held = items.to_vec();
-        let mut last = *items.iter().find(|b| !b.is_empty()).unwrap_or(&Aabb::EMPTY);
-        for b in &mut held {
-            *b = if b.is_empty() { last } else { *b };
-            last = *b;
-        }
-        let mut trees = Moving::resting(
-            &Input {
-                items: &held,
-                ..*input
-            },
-            &WideParams { order },
-        )?;
+        };
+        let held = items.iter().map(|b| {
+            last = if is_gone(b) { last } else { b };
+            *last
+        });
+        let held = Input {
+            items: &held.collect::<Vec<_>>(),
+            ..*input
+        };
+        let mut trees = Moving::resting(&held, &WideParams { order })?;
         trees.still.balls = None;
         trees.still.take_over(items, &gone);
         Ok(trees)

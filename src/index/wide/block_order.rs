@@ -182,7 +182,7 @@ fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
     let bounds = bounds_of_centres(ids.iter().map(|&id| centre(id)));
     let cells = (1u32 << BITS) as f32;
     // In halves, so that the width of a scene of all numbers stays finite.
-    let half = bounds.max * 0.5 - bounds.min * 0.5;
+    let half = bounds.half_extent();
     let code = |id: ItemId| {
         let from = (centre(id) * 0.5 - bounds.min * 0.5) / half * cells;
         // A width of zero gives NaN, which becomes zero, as does all below.

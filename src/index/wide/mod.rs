@@ -169,14 +169,9 @@ impl Wide {
         self.blocks.last().map_or(Aabb::EMPTY, BoxBlock::union)
     }
 
-    /// Compares two trees bit for bit: ids, blocks, levels.
+    /// Compares two trees bit for bit: ids and blocks.
     pub fn same_as(&self, other: &Wide) -> bool {
-        self.depth() == other.depth() && self.ids == other.ids && self.blocks == other.blocks
-    }
-
-    /// Levels of blocks; 0 for no items.
-    pub fn depth(&self) -> usize {
-        self.levels.len()
+        self.ids == other.ids && self.blocks == other.blocks
     }
 
     /// The ids of each leaf.
