@@ -223,7 +223,7 @@ mod tests {
         });
         dimensions.push(Dimension::fixed(memory));
         let mut point = Point::new("linear", (), dimensions);
-        point.time = ns.map(|ns| Estimate::exact(ns));
+        point.time = ns.map(Estimate::exact);
         point.task = ns.map(|ns| ns as usize);
         point
     }

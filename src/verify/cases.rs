@@ -253,8 +253,9 @@ pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
     ]
 }
 
-/// All of space, nothing, a plane with a short normal, and half-spaces and slabs through the
-/// scene whose planes touch its boxes exactly.
+/// All of space, nothing, a short normal, and half-spaces and slabs of a scene.
+///
+/// Planes of the last two touch its boxes exactly.
 pub fn edge_volumes(items: &[Aabb]) -> Vec<ConvexVolume> {
     let bounds = match Aabb::union_of(items) {
         b if b.is_empty() => cube(0.0, 0.0, 0.0, 1.0),

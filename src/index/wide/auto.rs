@@ -146,7 +146,7 @@ impl Auto {
         self.params.structure == Use::Moving
     }
 
-    /// Frusta of 60 degrees from the centre of an item to that of another one; none is gone.
+    /// Frusta of 60 degrees from the centre of an item to that of another one.
     fn views(&self, items: &[Aabb]) -> Vec<ConvexVolume> {
         let ids = &self.trees.still.ids[..];
         let centre = |at: usize| {
