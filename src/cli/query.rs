@@ -26,12 +26,11 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
     let mut scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
-    let motion = args.motion.as_ref();
-    let motion = motion
-        .map(|motion| Motion::load(motion, &scene))
-        .transpose()?;
-    if let Some(motion) = &motion {
-        advance(&mut scene.items, motion, args.frame)?;
+    let mut motion = None;
+    if let Some(source) = &args.motion {
+        let own = Motion::load(source, &scene)?.seen_by(&cameras, 1);
+        advance(&mut scene.items, &own, args.frame)?;
+        motion = Some(own);
     }
     let workload = Workload::moving(&scene, &cameras, &culling, motion, 1)?;
     tell_warnings();

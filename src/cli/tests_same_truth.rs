@@ -57,6 +57,7 @@ fn missed(camera: Camera) -> [bool; 4] {
         name: "one".to_owned(),
         cameras: vec![camera],
         lines: Vec::new(),
+        times: Vec::new(),
         lens_scale: None,
     };
     let structures = Registry::builtin().structures("linear");

@@ -76,6 +76,8 @@ impl<'a> Workload<'a> {
 
     /// [`Workload::new`] with items that move, and `views` queries after each frame.
     ///
+    /// Recorded moves go by the times of recorded cameras ([`Motion::seen_by`]).
+    ///
     /// # Errors
     /// The errors of [`Workload::new`].
     pub fn moving(
@@ -86,6 +88,7 @@ impl<'a> Workload<'a> {
         views: usize,
     ) -> Result<Workload<'a>, WorkloadError> {
         let views_per_frame = views.max(1);
+        let motion = motion.map(|motion| motion.seen_by(path, views_per_frame));
         let mut around = scene.surroundings();
         let moved = motion.iter().map(Motion::reach);
         around.reach = moved.fold(around.reach, Vec3::max);

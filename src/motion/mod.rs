@@ -11,7 +11,8 @@ use std::path::Path;
 use glam::Vec3;
 
 use crate::geometry::Aabb;
-use crate::input::{InputError, names_file, read_file};
+use crate::input::{InputError, names_file, note, read_file, warn};
+use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, hex};
 use crate::spec::{Spec, SpecError};
@@ -144,6 +145,41 @@ impl Motion {
                 same,
             },
         ))
+    }
+
+    /// The frames that the cameras of a path see, `views` of them each.
+    ///
+    /// If both are recorded and have times: at the first camera of each frame, all moves up
+    /// to its time have happened. Otherwise frame k is seen by camera k.
+    pub fn seen_by(self, path: &CameraPath, views: usize) -> Motion {
+        let Source::Recorded(recorded) = &self.source else {
+            return self;
+        };
+        let (name, views) = (&self.name, views.max(1));
+        let Some(last) = path.times.iter().step_by(views).last() else {
+            let (seen, cameras) = (self.frames * views, path.lines.len());
+            if ![0, seen].contains(&cameras) {
+                warn(&format!(
+                    "{name}: frames with {seen} views, but {cameras} cameras in '{}', which have \
+                     no times: they are paired by their numbers",
+                    path.name
+                ));
+            }
+            return self;
+        };
+        let (late, all) = (recorded.after(*last), recorded.moves());
+        if late > 0 {
+            note(&format!(
+                "{name}: {late} of {all} moves come after the last frame of '{}' and are not used",
+                path.name
+            ));
+        }
+        let paced = recorded.at(path.times.iter().step_by(views).copied());
+        Motion {
+            frames: paced.frames(),
+            source: Source::Recorded(paced),
+            ..self
+        }
     }
 
     /// Number of frames.

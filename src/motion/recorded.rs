@@ -1,5 +1,7 @@
 //! Recorded motions: CSV rows of a time, an item and its new bounds.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec3, Vec3};
 
 use super::laws::REMOVED;
@@ -19,6 +21,8 @@ pub(super) struct Recorded {
     boxes: Vec<Aabb>,
     /// Number of rows up to the end of each frame.
     ends: Vec<usize>,
+    /// Time of each frame, s.
+    times: Vec<f64>,
 }
 
 impl Recorded {
@@ -36,6 +40,31 @@ impl Recorded {
         let first = n.checked_sub(1).map_or(0, |before| self.ends[before]);
         let rows = first..self.ends[n];
         (&self.ids[rows.clone()], &self.boxes[rows])
+    }
+
+    /// A frame for each time, with all rows since the one before; an item's last counts.
+    ///
+    /// Rows after the last time are left out.
+    pub(super) fn at(&self, times: impl Iterator<Item = f64>) -> Recorded {
+        let (mut paced, mut next) = (Recorded::default(), 0);
+        for time in times {
+            let first = next;
+            next += self.times[first..].partition_point(|own| *own <= time);
+            let frames = (first..next).map(|n| self.frame(n));
+            let rows = frames.flat_map(|(ids, boxes)| ids.iter().zip(boxes));
+            let rows: BTreeMap<ItemId, Aabb> = rows.map(|(id, b)| (*id, *b)).collect();
+            paced.ids.extend(rows.keys());
+            paced.boxes.extend(rows.values());
+            paced.ends.push(paced.ids.len());
+            paced.times.push(time);
+        }
+        paced
+    }
+
+    /// Number of rows after a time.
+    pub(super) fn after(&self, time: f64) -> usize {
+        let frames = self.times.partition_point(|own| *own <= time);
+        self.moves() - frames.checked_sub(1).map_or(0, |last| self.ends[last])
     }
 
     pub(super) fn reach(&self) -> Vec3 {
@@ -59,6 +88,7 @@ impl Recorded {
     fn end_frame(
         &mut self,
         rows: &mut Vec<(ItemId, u64, Aabb)>,
+        time: f64,
         file: &str,
     ) -> Result<(), InputError> {
         rows.sort_by_key(|row| (row.0, row.1));
@@ -69,6 +99,7 @@ impl Recorded {
         self.ids.extend(rows.iter().map(|row| row.0));
         self.boxes.extend(rows.iter().map(|row| row.2));
         self.ends.push(self.ids.len());
+        self.times.push(time);
         rows.clear();
         Ok(())
     }
@@ -106,7 +137,7 @@ pub(super) fn read_motion_csv(
                 let found = format!("time_s {time} after {before}");
                 return Err(row.error(found, "times in ascending order".to_owned()));
             }
-            Some(before) if time > before => recorded.end_frame(&mut rows, file)?,
+            Some(before) if time > before => recorded.end_frame(&mut rows, before, file)?,
             _ => (),
         }
         last = Some(time);
@@ -116,11 +147,11 @@ pub(super) fn read_motion_csv(
             bounds(&row, &columns, scene)?,
         ));
     }
-    if last.is_none() {
+    let Some(last) = last else {
         let expected = "at least one row after the header";
         return Err(InputError::line(file, 2, "no motion", expected));
-    }
-    recorded.end_frame(&mut rows, file)?;
+    };
+    recorded.end_frame(&mut rows, last, file)?;
     Ok(recorded)
 }
 

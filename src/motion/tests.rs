@@ -1,6 +1,7 @@
 //! Laws stay within the scene and repeat themselves; files are read or refused.
 
 use super::*;
+use crate::path::read_cameras_csv;
 use crate::scene;
 
 fn scene(source: &str) -> Scene {
@@ -127,13 +128,7 @@ const HEADER: &str = "time_s,id,min_x,min_y,min_z,max_x,max_y,max_z\n";
 fn recorded_rows_move_and_remove_items() {
     let scene = scene("uniform:n=5");
     let text = format!("{HEADER}0,3,1,2,3,4,5,0.1e2\n0,1,,,,,,\n0.5,1,0,0,0,0.1,1,1\n");
-    let recorded = recorded::read_motion_csv(text.as_bytes(), "m.csv", &scene).unwrap();
-    let motion = Motion {
-        name: "m.csv".to_owned(),
-        frames: recorded.frames(),
-        items: 5,
-        source: Source::Recorded(recorded),
-    };
+    let motion = recorded_motion(&text, &scene);
     let all = frames(&motion, &scene);
     assert_eq!(all.len(), 2);
     assert_eq!((&all[0].0[..], &all[1].0[..]), (&[1, 3][..], &[1][..]));
@@ -141,6 +136,50 @@ fn recorded_rows_move_and_remove_items() {
     // Outward: 0.1 is not in f32.
     assert!(f64::from(all[1].1[1].max.x) > 0.1);
     assert_eq!(all[1].1[0], scene.items[0]);
+}
+
+fn recorded_motion(text: &str, scene: &Scene) -> Motion {
+    let recorded = recorded::read_motion_csv(text.as_bytes(), "m.csv", scene).unwrap();
+    Motion {
+        name: "m.csv".to_owned(),
+        frames: recorded.frames(),
+        items: scene.items.len(),
+        source: Source::Recorded(recorded),
+    }
+}
+
+/// A still frame, a camera between two moves, and moves after the last camera.
+#[test]
+fn frames_are_those_of_cameras_with_times() {
+    let scene = scene("uniform:n=5");
+    let rows = "0,1,0,0,0,1,1,1\n1,1,0,0,0,2,2,2\n1,2,,,,,,\n2,1,0,0,0,3,3,3\n9,0,,,,,,\n";
+    let text = format!("{HEADER}{rows}");
+    let seen = |times: &str, views| {
+        let eyes = "eye_x,eye_y,eye_z,look_x,look_y,look_z";
+        let row = |time: &str| format!("{time},0,0,0,1,0,0\n");
+        let csv = format!(
+            "time_s,{eyes}\n{}",
+            times.split(' ').map(row).collect::<String>()
+        );
+        let path = read_cameras_csv(csv.as_bytes(), "c.csv", &Default::default()).unwrap();
+        let motion = recorded_motion(&text, &scene).seen_by(&path, views);
+        let again = recorded_motion(&text, &scene).seen_by(&path, views);
+        assert_eq!(motion.digest(), again.seen_by(&path, views).digest());
+        let frames = frames(&motion, &scene).into_iter();
+        let shown = |(ids, items): (Vec<ItemId>, Vec<Aabb>)| (ids, items[1].max.x);
+        frames.map(shown).collect::<Vec<_>>()
+    };
+    let first = scene.items[1].max.x;
+    let wanted = [
+        (vec![], first),
+        (vec![1], 1.0),
+        (vec![], 1.0),
+        (vec![1, 2], 3.0),
+    ];
+    assert_eq!(seen("-1 0 0.5 2.5", 1), wanted);
+    assert_eq!(seen("0 0 1 1", 2), [(vec![1], 1.0), (vec![1, 2], 2.0)]);
+    // Without a time for each camera a frame is the rows of one time.
+    assert_eq!(seen("0  1", 1).len(), 4);
 }
 
 #[test]

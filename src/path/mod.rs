@@ -33,6 +33,8 @@ pub struct CameraPath {
     pub cameras: Vec<Camera>,
     /// The line of each camera in the file that it was read from; empty for a spec.
     pub lines: Vec<u64>,
+    /// Times of all cameras of the file in seconds, ascending; empty if one has none.
+    pub times: Vec<f64>,
     /// Scale of far and near that `visible=` has found.
     pub lens_scale: Option<f64>,
 }
@@ -297,6 +299,7 @@ fn read(
         name: source.to_owned(),
         cameras,
         lines: Vec::new(),
+        times: Vec::new(),
         lens_scale: None,
     };
     match optics.visible {

@@ -104,7 +104,7 @@ pub fn read_cameras_csv(
     } else {
         eyes(&table, defaults)?
     };
-    let (clock, mut last) = (table.column("time_s"), f64::NEG_INFINITY);
+    let (clock, mut last, mut times) = (table.column("time_s"), f64::NEG_INFINITY, Vec::new());
     let (lines, cameras): (Vec<u64>, Vec<Camera>) = rows(&mut table, file, "no camera", |row| {
         if let Some(column) = clock.filter(|column| !row.text(*column).is_empty()) {
             let time = row.finite_number(column)?;
@@ -113,6 +113,7 @@ pub fn read_cameras_csv(
                 return Err(row.error(found, "times in ascending order".to_owned()));
             }
             last = time;
+            times.push(time);
         }
         let camera = read(row)?.map_err(|error| refused(row, &error))?;
         Ok((row.line(), camera))
@@ -126,6 +127,9 @@ pub fn read_cameras_csv(
     Ok(CameraPath {
         lens_scale: None,
         name: file.to_owned(),
+        times: Some(times)
+            .filter(|times| times.len() == cameras.len())
+            .unwrap_or_default(),
         cameras,
         lines,
     })
