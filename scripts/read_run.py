@@ -2,8 +2,9 @@
 
 usage: python3 scripts/read_run.py RUN [PICTURE.svg]
 
-Prints the time per query of each structure by scene, path, cache and test, once as report.json
-has it and once computed here from samples.csv, and draws the former. Needs pandas, and
+Prints the time per query (of items that move, per frame) of each structure by scene, path, cache
+and test, once as report.json has it and once computed here from samples.csv, and draws the former.
+Needs pandas, and
 matplotlib for the picture. `python3 -i scripts/read_run.py RUN` leaves `summary` and `samples`
 to work with; docs/METHODOLOGY.md describes the columns.
 """
@@ -22,7 +23,18 @@ CELL = ["scene", "path", "cache", "test", "structure"]
 
 def read(run):
     """The rows of summary.csv (one per cell) and of samples.csv (one per clock reading)."""
-    return pd.read_csv(Path(run) / "summary.csv"), pd.read_csv(Path(run) / "samples.csv")
+    for name in ("summary", "samples"):
+        if not (Path(run) / f"{name}.csv").is_file():
+            sys.exit(f"read_run.py: {run}: {name}.csv was not kept; expected the folder of a whole run")
+    summary, samples = (pd.read_csv(Path(run) / f"{name}.csv") for name in ("summary", "samples"))
+    moves = summary.motion.notna()
+    summary.loc[moves, "path"] += " + " + summary.motion[moves].astype(str)  # as in the samples
+    return summary, samples
+
+
+def task_of(summary):
+    """What structures are ranked by: the frame of items that move, otherwise the query."""
+    return "frame" if summary.motion.notna().any() else "query"
 
 
 def times_of(samples, task="query"):
@@ -50,19 +62,19 @@ def draw(summary, file):
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    ok = summary[(summary.status == "ok") & summary.query_ns.notna()]
+    time = f"{task_of(summary)}_ns"
+    ok = summary[(summary.status == "ok") & summary[time].notna()]
     groups = list(ok.groupby(CELL[:-1], sort=False))
     figure, panels = plt.subplots(len(groups), squeeze=False, layout="constrained",
                                   figsize=(7, sum(1.2 + 0.22 * len(rows) for _, rows in groups)),
-                                  height_ratios=[4 + len(rows) for _, rows in groups])
+                                  height_ratios=[4 + len(rows) for _, rows in groups], sharex=True)
     for panel, (names, rows) in zip(panels[:, 0], groups):
-        rows = rows.sort_values("query_ns", ascending=False)
-        low = rows.query_ns_lower.fillna(rows.query_ns)
-        high = rows.query_ns_upper.fillna(rows.query_ns)
-        panel.errorbar(rows.query_ns, rows.structure, fmt="o", capsize=3,
-                       xerr=[rows.query_ns - low, high - rows.query_ns])
+        rows = rows.sort_values(time, ascending=False)
+        middle = rows[time]
+        low, high = (rows.get(f"{time}_{end}", middle).fillna(middle) for end in ("lower", "upper"))
+        panel.errorbar(middle, rows.structure, fmt="o", capsize=3, xerr=[middle - low, high - middle])
         panel.set(xscale="log", title=", ".join(names))
-    panels[-1, 0].set_xlabel("time per query, ns (CPU time; 95 % interval)")
+    panels[-1, 0].set_xlabel(f"time per {task_of(summary)}, ns (CPU time; 95 % interval)")
     figure.savefig(file)
 
 
@@ -70,8 +82,10 @@ if __name__ == "__main__":
     if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
     summary, samples = read(sys.argv[1])
-    table = summary.set_index(CELL)[["query_ns", "query_ns_lower", "query_ns_upper"]]
-    table["from samples"] = times_of(samples).median(axis=1)
+    task = task_of(summary)
+    times = [f"{task}_ns", f"{task}_ns_lower", f"{task}_ns_upper"]
+    table = summary.set_index(CELL).reindex(columns=times)
+    table["from samples"] = times_of(samples, task).median(axis=1)
     print(table.to_string())
     if len(sys.argv) == 3:
         draw(summary, sys.argv[2])

@@ -62,6 +62,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let step = "with and without every rule";
     let times = study.times(step, setting.path.lens_scale, trials)?;
     let advice = prepared.conclude(&input, &times);
+    setting.note_solid();
     print(args.format, &advice, || show(&advice, args.all_columns))?;
     Ok(Ending::of(!advice.found_wrong_answers()))
 }

@@ -137,7 +137,7 @@ impl CompareTable<'_> {
     fn head(&self) -> &str {
         match self.args.gate {
             Gate::Time => &self.head,
-            Gate::Work => "nodes, items and planes tested per query",
+            Gate::Work => "nodes, items and planes tested per query, bounds per region search",
         }
     }
 

@@ -75,6 +75,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         );
     }
     let report = prepared.conclude(&times);
+    stages.setting.note_solid();
     let shown = print(args.format, &report, || {
         show(&funnel_table::blocks(&report, args.all))
     });

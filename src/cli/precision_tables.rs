@@ -1,6 +1,8 @@
 //! Tables of `cullbench precision`: errors and times, the Pareto fronts and the
 //! sweeps. Sentences about them are in `precision_conclusions`.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::document::Block;
@@ -79,11 +81,17 @@ pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
             add(title, table, &note);
         }
     }
-    let failed = p.points.iter().filter_map(|point| {
-        let (name, status) = (named(point), point.status.name());
-        Some(format!("{name}: {status}: {}", point.reason.as_ref()?))
-    });
-    blocks.extend(failed.map(Block::Line));
+    let mut failed: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for point in &p.points {
+        let why = point.reason.iter();
+        let why = why.map(|reason| format!("{}: {reason}", point.status.name()));
+        why.for_each(|why| failed.entry(why).or_default().push(named(point)));
+    }
+    let line = |(why, names): (&String, &Vec<String>)| match &names[..] {
+        [first, _, ..] => format!("{} points, such as {first}: {why}", names.len()),
+        _ => format!("{}: {why}", names.concat()),
+    };
+    blocks.extend(failed.iter().map(line).map(Block::Line));
     blocks
 }
 

@@ -118,11 +118,11 @@ pub const FIGURES: [Figure; 19] = [
     ("repaid after", "break_even_queries", |n| {
         text::count(n as usize)
     }),
+    ("false positives", "excess", text::percent),
     ("worst", "worst_frame_ns", text::time),
     ("update", "update_ns", text::time),
     ("query", "query_ns", text::time),
     ("x after 100", "ageing_100", text::significant),
-    ("false positives", "excess", text::percent),
     ("further query", "further_query_ns", text::time),
     ("x after 1", "ageing_1", text::significant),
     ("x after 10", "ageing_10", text::significant),

@@ -39,6 +39,12 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     told.extend(gains(&SharedWork::of(comparison.sound())));
     told.extend(checked(&[comparison]));
     told.extend(failed(&[comparison]));
+    let is_fat = |cell: &&ReportCell| {
+        let is_unranked = cell.status == Status::Ok && cell.rank.is_none();
+        is_unranked && cell.structure.contains("@fat=")
+    };
+    let fat = comparison.cells.iter().any(is_fat);
+    told.extend(fat.then(|| "Rank -: none, as fat bounds return false positives.".to_owned()));
     told.join(" ")
 }
 
@@ -92,15 +98,21 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     };
     let base = base.filter(|base| !names.contains(base) && *base != next.structure);
     let of_base = base.and_then(|base| comparison.sound_cell(base));
-    let tie = if names.len() > 1 { " (a tie)" } else { "" };
+    let other = described(&next.structure);
+    let is_proven = best.time().is_none_or(|time| time.upper.is_some());
+    let leads = format!(": {} as fast as {other}, the next best", lead(next));
+    let said = match names[..] {
+        // Prints as 1.01 x at most.
+        [one] if !is_proven && times_as_fast(next, best).is_some_and(|ratio| ratio < 1.015) => {
+            format!(
+                "{one} or {other}: {one} is less than 2 % ahead, unproven (--processes 10 tells)"
+            )
+        }
+        [one] => format!("{}{leads}", described(one)),
+        _ => format!("{} (a tie){leads}", listed(&names, "or")),
+    };
     format!(
-        "Take {}{tie}: {} as fast as {}, the next best{}.",
-        match names[..] {
-            [one] => described(one),
-            _ => listed(&names, "or"),
-        },
-        lead(next),
-        described(&next.structure),
+        "Take {said}{}.",
         text::some(of_base, |cell| format!(
             ", and {} as fast as {}",
             lead(cell),

@@ -3,6 +3,7 @@
 //! processes come together.
 
 use std::io::{self, Write as _};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
@@ -12,10 +13,10 @@ use super::processes::{Job, Message, Timing, Workers};
 use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
 use super::{Ending, interrupt, load_scene_by, print, tell, text};
 use crate::index::{Registry, StructureSpec};
-use crate::input::tell_warnings;
+use crate::input::{is_readable, tell_warnings};
 use crate::measure::{NO_ITEMS, ProcessTimes, Protocol, Status};
 use crate::path::{self, CameraPath};
-use crate::scene::{self, LoadOptions, Scene};
+use crate::scene::{self, LoadOptions, Scene, split_part};
 
 /// A progress bar of `parts` parts, with a word for them.
 pub fn progress(parts: u64, word: &str) -> ProgressBar {
@@ -71,6 +72,20 @@ impl Setting {
             structures,
             scene,
         })
+    }
+
+    /// Tells that boxes of a file are taken as what is drawn.
+    pub fn note_solid(&self) {
+        let Scene {
+            name,
+            surfaces,
+            own_tree,
+            ..
+        } = &self.scene;
+        let is_file = is_readable(Path::new(split_part(name).0));
+        if is_file && surfaces.is_none() && own_tree.is_none() {
+            tell("note: items count as solid boxes: of meshes less is hidden");
+        }
     }
 }
 

@@ -33,8 +33,14 @@ pub static COUNTERS: &[&str] = &[
     "memory_bytes_per_item",
 ];
 
-/// The counters of the work of a frustum query, which `compare --gate work` judges.
-pub static WORK: &[&str] = &["nodes_tested", "items_tested", "planes_tested"];
+/// The counters of the work of a query and of a region search (`comparisons`), which
+/// `compare --gate work` judges.
+pub static WORK: &[&str] = &[
+    "nodes_tested",
+    "items_tested",
+    "planes_tested",
+    "comparisons",
+];
 
 named! {
     /// Outcome of a cell, worst first.

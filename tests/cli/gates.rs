@@ -25,7 +25,7 @@ fn with_planes(factor: f64) -> TempDir {
 fn work_beyond_the_threshold_is_a_regression() {
     let more = with_planes(1.1);
     let text = compare(more.path(), "--gate work", 3);
-    let verdict = "1 more work, 0 less work, 29 same of 30 figures of 10 cells";
+    let verdict = "1 more work, 0 less work, 39 same of 40 figures of 10 cells";
     assert_eq!(last_line(&text), verdict, "{text}");
     let row = row_with(&text, "more work");
     assert!(
@@ -211,9 +211,9 @@ fn two_programs_are_compared_by_their_counters_alone() {
     let line = "compare --scene uniform:n=50 --path orbit:frames=4 --structure linear,bvh \
         --gate work --threshold 0 --against";
     let text = works(folder.path(), &format!("{line} {}", super::PROGRAM));
-    let verdict = "0 more work, 0 less work, 6 same of 6 figures of 2 cells";
+    let verdict = "0 more work, 0 less work, 8 same of 8 figures of 2 cells";
     assert_eq!(last_line(&text), verdict, "{text}");
-    assert!(text.contains("nodes, items and planes tested per query, threshold 0.00 %"));
+    assert!(text.contains("bounds per region search, threshold 0.00 %"));
     assert!(!text.contains("not compared"), "{text}");
     let line = line.replace(" --structure linear,bvh", "");
     let text = works(folder.path(), &format!("{line} {}", super::PROGRAM));
