@@ -42,9 +42,9 @@ impl Recorded {
         (&self.ids[rows.clone()], &self.boxes[rows])
     }
 
-    /// A frame for each time, with all rows since the one before; an item's last counts.
+    /// A frame for each time, with all rows since the one before.
     ///
-    /// Rows after the last time are left out.
+    /// Of several rows of an item the last counts; rows after the last time are left out.
     pub(super) fn at(&self, times: impl Iterator<Item = f64>) -> Recorded {
         let (mut paced, mut next) = (Recorded::default(), 0);
         for time in times {

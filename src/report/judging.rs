@@ -33,8 +33,7 @@ pub static COUNTERS: &[&str] = &[
     "memory_bytes_per_item",
 ];
 
-/// The counters of the work of a query and of a region search (`comparisons`), which
-/// `compare --gate work` judges.
+/// The counters that `compare --gate work` judges: of a query, of a region search.
 pub static WORK: &[&str] = &[
     "nodes_tested",
     "items_tested",
