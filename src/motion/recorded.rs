@@ -44,7 +44,7 @@ impl Recorded {
 
     /// A frame for each time, with all rows since the one before.
     ///
-    /// Of several rows of an item the last counts; rows after the last time are left out.
+    /// An item's last row counts; rows after the last time are left out.
     pub(super) fn at(&self, times: impl Iterator<Item = f64>) -> Recorded {
         let (mut paced, mut next) = (Recorded::default(), 0);
         for time in times {
