@@ -213,38 +213,32 @@ impl Obj<'_> {
         let ends = self.items.iter().skip(1).map(|(_, first)| *first);
         let ranges = self.items.iter().map(|(_, first)| *first);
         let ranges: Vec<_> = ranges.zip(ends.chain(once(end))).collect();
-        let boxes = ranges.iter().map(|&(first, end)| {
-            let points = self.corners[first..end].iter().flatten();
-            let points = points.map(|&corner| self.points[corner as usize]);
-            WorldBox::union_of(points.map(WorldBox::at))
-        });
-        let boxes: Vec<WorldBox> = boxes.collect();
-        let origin = choose_origin(boxes.iter().copied());
-        let scene = Scene::about(name, &boxes, origin)?;
-        let (mut surfaces, mut labels) = (Surfaces::about(origin), Labels::new("name"));
+        let corners = self.corners.iter().flatten();
+        let corners = corners.map(|&corner| WorldBox::at(self.points[corner as usize]));
+        let mut surfaces = Surfaces::about(choose_origin(corners));
+        let mut labels = Labels::new("name");
         // The item that a point was last needed by, from 1, and its number there.
         let mut known = vec![(0, 0); self.points.len()];
-        let mut local = Vec::new();
+        let mut points = Vec::new();
         for (item, &(first, end)) in (1u32..).zip(&ranges) {
-            local.clear();
+            points.clear();
             let own = self.corners[first..end].iter().map(|corners| {
                 corners.map(|corner| {
                     let known = &mut known[corner as usize];
                     if known.0 != item {
-                        *known = (item, local.len() as u32);
-                        local.push((self.points[corner as usize] - origin).as_vec3());
+                        *known = (item, points.len() as u32);
+                        points.push(self.points[corner as usize]);
                     }
                     known.1
                 })
             });
             let own: Vec<[u32; 3]> = own.collect();
-            surfaces.push(SurfaceKind::Opaque, false, &local, &own);
+            surfaces.push_written(SurfaceKind::Opaque, false, &points, &own);
             labels.push(&self.items[item as usize - 1].0);
         }
         Ok(Scene {
-            surfaces: Some(surfaces.into()),
             labels: vec![labels],
-            ..scene
+            ..surfaces.into_scene(name)?
         })
     }
 }
@@ -333,7 +327,13 @@ f 1 2 3 4";
         assert_eq!(scene.items.len(), 6);
         assert_eq!(scene.labels[0].get(3), "other  part");
         let surfaces = scene.surfaces.as_ref().unwrap();
-        assert!((0..6).all(|item| surfaces.bounds(item) == scene.items[item]));
+        // The first three points, and the first, second and fourth.
+        for (written, item) in scene.written().zip([0, 1, 2, 3, 4, 5]) {
+            let (b, held) = (scene.items[item], surfaces.bounds(item));
+            assert!(b.min.cmple(held.min).all() && b.max.cmpge(held.max).all());
+            let x = (written.min.x, written.max.x);
+            assert!(x == (1_000_000.1, 1_000_001.7) || item % 2 == 1, "{x:?}");
+        }
         let boxes = Scene::from_boxes("b", &[]).unwrap().by_triangle(&options);
         let error = boxes.map(|_| ()).unwrap_err().to_string();
         assert!(error.contains("no triangles; expected"), "{error}");

@@ -45,6 +45,8 @@ pub struct Surfaces {
     pub kinds: Vec<SurfaceKind>,
     /// `true` for each item whose triangles are seen from both sides.
     pub two_sided: Vec<bool>,
+    /// The points as a file states them, in the world; empty where `points` are exact.
+    written: Vec<DVec3>,
 }
 
 /// The six faces of a box, two triangles each: corners as [`Aabb::corner`] numbers
@@ -159,6 +161,20 @@ impl Surfaces {
         self.two_sided.push(two_sided);
     }
 
+    /// Appends an item by its points in the world: all items of a surface or none.
+    pub(super) fn push_written(
+        &mut self,
+        kind: SurfaceKind,
+        two_sided: bool,
+        points: &[DVec3],
+        triangles: &[[u32; 3]],
+    ) {
+        let local = points.iter().map(|p| (p - self.origin).as_vec3());
+        let local: Vec<Vec3> = local.collect();
+        self.push(kind, two_sided, &local, triangles);
+        self.written.extend_from_slice(points);
+    }
+
     /// How many items there are.
     pub fn items(&self) -> usize {
         self.of_item.len()
@@ -189,16 +205,31 @@ impl Surfaces {
         })
     }
 
+    /// Smallest box in the world that holds triangles as they were written.
+    fn world_box(&self, triangles: &Range<u32>) -> WorldBox {
+        let corners = self.triangles[triangles.start as usize..triangles.end as usize].iter();
+        let corner = |&at: &u32| match self.written.get(at as usize) {
+            Some(point) => WorldBox::at(*point),
+            None => {
+                let point = self.points[at as usize];
+                WorldBox::of(&Aabb::new(point, point), self.origin)
+            }
+        };
+        WorldBox::union_of(corners.flatten().map(corner))
+    }
+
     /// The scene of these triangles: its items are the smallest f32 boxes that hold
-    /// those of each item.
+    /// those of each item, as they were written.
     ///
     /// # Errors
     /// An item without triangles, which has no box.
     pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
-        let boxes: Vec<WorldBox> = (0..self.items())
-            .map(|item| WorldBox::of(&self.bounds(item), self.origin))
-            .collect();
-        let scene = Scene::about(name, &boxes, self.origin)?;
+        let boxes: Vec<_> = self.of_item.iter().map(|t| self.world_box(t)).collect();
+        self.with_boxes(name, &boxes)
+    }
+
+    fn with_boxes(self, name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene, InputError> {
+        let scene = Scene::about(name, boxes, self.origin)?;
         Ok(Scene {
             surfaces: Some(Arc::new(self)),
             ..scene
@@ -250,10 +281,12 @@ impl Scene {
         let mut single = Surfaces::about(surfaces.origin);
         let empty = |labels: &Labels| Labels::new(labels.column.clone());
         let mut labels: Vec<Labels> = self.labels.iter().map(empty).collect();
+        let mut boxes = Vec::with_capacity(surfaces.triangles.len());
         for item in 0..surfaces.items() {
-            for corners in surfaces.of(item) {
+            for triangle in surfaces.of_item[item].clone() {
                 let (kind, two_sided) = (surfaces.kinds[item], surfaces.two_sided[item]);
-                single.push(kind, two_sided, &corners, &[[0, 1, 2]]);
+                single.push(kind, two_sided, &surfaces.corners(triangle), &[[0, 1, 2]]);
+                boxes.push(surfaces.world_box(&(triangle..triangle + 1)));
                 for (own, all) in labels.iter_mut().zip(&self.labels) {
                     own.push(all.get(item));
                 }
@@ -265,7 +298,7 @@ impl Scene {
             labels,
             places: self.places,
             animation: self.animation,
-            ..single.into_scene(self.name)?
+            ..single.with_boxes(self.name, &boxes)?
         })
     }
 }

@@ -115,6 +115,12 @@ impl File<'_> {
                 &expected,
             ));
         }
+        let is_bad = |&&index: &&u32| !points[index as usize].is_finite();
+        if let Some(&index) = order.iter().find(is_bad) {
+            let found = format!("point {index} is {}", points[index as usize]);
+            let place = format!("accessors[{}]", positions.value());
+            return Err(self.error(place, found, "finite numbers"));
+        }
         let corners: Vec<[u32; 3]> = match primitive.mode {
             Checked::Valid(Mode::Triangles) => {
                 order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()

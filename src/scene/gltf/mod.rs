@@ -11,7 +11,7 @@ mod mesh;
 
 use std::sync::Arc;
 
-use glam::{BVec3, DAffine3, DMat4, DVec3, Vec3};
+use glam::{BVec3, DAffine3, DMat4, DVec3};
 use gltf::json::{Index, Value};
 use serde::Deserialize;
 
@@ -223,30 +223,22 @@ impl File<'_> {
             let found = format!("{triangles} triangles");
             return Err(self.error("meshes".to_owned(), found, "at most a billion"));
         }
-        let world = |item: &'_ Placed| {
-            let place = item.world;
-            plain(item)
-                .points
-                .iter()
-                .map(move |&p| place.transform_point3(p))
+        let world = |item: &Placed| -> Vec<DVec3> {
+            let points = plain(item).points.iter();
+            points.map(|&p| item.world.transform_point3(p)).collect()
         };
-        let boxes = placed
-            .iter()
-            .map(|item| WorldBox::union_of(world(item).map(WorldBox::at)));
-        let mut surfaces = Surfaces::about(choose_origin(boxes));
-        let mut local: Vec<Vec3> = Vec::new();
+        let corners = placed.iter().flat_map(|item| {
+            let (points, corners) = (world(item), plain(item).corners.iter().flatten());
+            corners.map(move |&corner| WorldBox::at(points[corner as usize]))
+        });
+        let mut surfaces = Surfaces::about(choose_origin(corners));
         for item in placed {
             let mesh = &meshes[item.mesh];
-            local.clear();
-            local.extend(world(item).map(|p| (p - surfaces.origin).as_vec3()));
-            let corners = &plain(item).corners;
-            match item.world.matrix3.determinant() < 0.0 {
-                false => surfaces.push(mesh.kind, mesh.two_sided, &local, corners),
-                true => {
-                    let turned: Vec<_> = corners.iter().map(|&[a, b, c]| [a, c, b]).collect();
-                    surfaces.push(mesh.kind, mesh.two_sided, &local, &turned);
-                }
+            let mut corners = plain(item).corners.clone();
+            if item.world.matrix3.determinant() < 0.0 {
+                corners.iter_mut().for_each(|corners| corners.swap(1, 2));
             }
+            surfaces.push_written(mesh.kind, mesh.two_sided, &world(item), &corners);
         }
         surfaces.into_scene(name)
     }
@@ -260,7 +252,7 @@ impl File<'_> {
                 self.error(
                     place,
                     "no bounds of positions",
-                    "min and max of three numbers",
+                    "min <= max of three numbers each",
                 )
             };
             let positions = positions(primitive).ok_or_else(|| missing(place.clone()))?;
@@ -272,6 +264,7 @@ impl File<'_> {
                 Some(corner.into())
             };
             let ends = corner(&accessor.min).zip(corner(&accessor.max));
+            let ends = ends.filter(|(min, max)| min.cmple(*max).all());
             let (min, max) =
                 ends.ok_or_else(|| missing(format!("accessors[{}]", positions.value())))?;
             let corners = (0..8).map(|i| {

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::super::{LoadOptions, SeededRng, SurfaceKind, UpAxis};
 use super::*;
+use crate::geometry::Aabb;
 
 /// A tetrahedron, its indices as u16 behind its points.
 const POINTS: [[f32; 3]; 4] = [
@@ -80,24 +81,27 @@ fn items_are_the_boxes_of_the_transformed_triangles() {
         (surfaces.kinds[0], surfaces.two_sided[0]),
         (SurfaceKind::CutOut, true)
     );
+    let single = scene.clone().by_triangle(&LoadOptions::default()).unwrap();
     for (item, points) in world().iter().enumerate() {
-        let all = WorldBox::union_of(points.iter().map(|p| WorldBox::new(*p, *p)));
-        for axis in 0..3 {
-            let b = scene.items[item];
-            let ends = [
-                (b.min[axis], all.min[axis], -1.0),
-                (b.max[axis], all.max[axis], 1.0),
-            ];
-            for (stored, exact, outward) in ends {
-                // The points are rounded to nearest, the box of them is exact.
-                let exact = exact - scene.origin[axis];
-                let off = (f64::from(stored) - exact) * outward;
-                let ulp = f64::from(stored.abs().next_up() - stored.abs());
-                assert!(off.abs() <= ulp, "{item}, {axis}: {stored} for {exact}");
-            }
+        let wanted = WorldBox::union_of(points.iter().copied().map(WorldBox::at));
+        let of_triangles = single.written().skip(4 * item).take(4);
+        for written in [
+            scene.written().nth(item).unwrap(),
+            WorldBox::union_of(of_triangles),
+        ] {
+            let ends = [(written.min, wanted.min), (written.max, wanted.max)];
+            assert!(ends.iter().all(|(a, b)| a.distance(*b) < 1e-12));
         }
         // A negative scale turns them; they are wound outward again.
         assert!(surfaces.volume(item) > 0.0);
+    }
+    for (written, b) in scene
+        .written()
+        .zip(&scene.items)
+        .chain(single.written().zip(&single.items))
+    {
+        let rounded = Aabb::rounded_outward(written.min, written.max, scene.origin);
+        assert_eq!((*b, single.origin), (rounded, scene.origin));
     }
     let [place] = &scene.places[..] else {
         panic!("one camera");
@@ -196,6 +200,11 @@ fn compressed_meshes_and_points_have_the_boxes_of_their_bounds() {
     compressed["meshes"][0]["primitives"][0]["extensions"] = draco;
     let mut points = file();
     points["meshes"][0]["primitives"][0]["mode"] = json!(0);
+    let mut inverted = points.clone();
+    inverted["accessors"][0]["min"][0] = json!(9);
+    let error = read(&inverted).map(|_| ()).unwrap_err().to_string();
+    let wanted = "accessors[0]: no bounds of positions; expected min <= max";
+    assert!(error.contains(wanted), "{error}");
     let whole = read(&file()).unwrap();
     for file in [compressed, points] {
         let scene = read(&file).unwrap();
@@ -203,7 +212,7 @@ fn compressed_meshes_and_points_have_the_boxes_of_their_bounds() {
         for item in 0..2 {
             let all = scene.written().nth(item).unwrap();
             let triangles = whole.written().nth(item).unwrap();
-            let margin = DVec3::splat(1e-5);
+            let margin = DVec3::splat(1e-12);
             assert!(all.min.cmple(triangles.min + margin).all());
             assert!(all.max.cmpge(triangles.max - margin).all());
         }
@@ -220,7 +229,18 @@ fn instances_are_items() {
 
 #[test]
 fn what_is_wrong_is_named_with_its_place() {
-    let cases: [(&str, Value, &str); 12] = [
+    let whole = file();
+    let uri = whole["buffers"][0]["uri"].as_str().unwrap();
+    // The x of the second point is NaN.
+    let bytes = STANDARD.decode(uri.split_once(',').unwrap().1).unwrap();
+    let bytes = [&bytes[..12], &[0xff; 4], &bytes[16..]].concat();
+    let nan = format!("data:;base64,{}", STANDARD.encode(bytes));
+    let cases: [(&str, Value, &str); 13] = [
+        (
+            "/buffers/0/uri",
+            json!(nan),
+            "accessors[0]: point 1 is [NaN, 0, 0]; expected finite",
+        ),
         (
             "/nodes/1/children",
             json!([0]),
