@@ -3,6 +3,7 @@
 //! Rows are read one by one with errors that name file, line and column. It defines the
 //! mechanics that the box, camera and point readers share; what the columns mean is theirs.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use super::{InputError, finite, note};
@@ -203,14 +204,14 @@ impl<'b> TableReader<'b> {
 
 impl Row<'_> {
     /// The field as text; bytes that are no UTF-8 are replaced.
-    pub fn text(&self, column: usize) -> &str {
-        std::str::from_utf8(&self.record[column]).unwrap_or("\u{fffd}")
+    pub fn text(&self, column: usize) -> Cow<'_, str> {
+        String::from_utf8_lossy(&self.record[column])
     }
 
     /// A finite f64.
     pub fn finite_number(&self, column: usize) -> Result<f64, InputError> {
-        finite(self.text(column)).map_err(|expected| {
-            let (name, text) = (&self.header[column], shortened(self.text(column), 60));
+        finite(&self.text(column)).map_err(|expected| {
+            let (name, text) = (&self.header[column], shortened(&self.text(column), 60));
             self.error(format!("{name} '{text}'"), expected.to_owned())
         })
     }

@@ -159,7 +159,7 @@ fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
     let (text, items) = (row.text(column), scene.items.len());
     let id = text.parse::<ItemId>().ok();
     id.filter(|id| (*id as usize) < items).ok_or_else(|| {
-        let found = format!("id '{}'", crate::shown::shortened(text, 60));
+        let found = format!("id '{}'", crate::shown::shortened(&text, 60));
         let most = items.saturating_sub(1);
         row.error(found, format!("an item of '{}', 0 to {most}", scene.name))
     })

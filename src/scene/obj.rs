@@ -98,12 +98,15 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 /// Returns a line with those that backslashes at ends add, and their number.
+///
+/// A comment ends with its line.
 fn first_line(text: &[u8]) -> (&[u8], u64) {
     let (mut end, mut lines) = (0, 0);
     while let Some(length) = text[end..].iter().position(|byte| *byte == b'\n') {
         let own = &text[end..=end + length];
         (end, lines) = (end + own.len(), lines + 1);
-        if text[0] == b'#' || !own.trim_ascii_end().ends_with(b"\\") {
+        let is_continued = own.trim_ascii_end().ends_with(b"\\");
+        if !is_continued || words(own).any(|word| word.starts_with(b"#")) {
             return (&text[..end], lines);
         }
     }
@@ -126,8 +129,8 @@ impl Obj<'_> {
     }
 
     fn line(&mut self, line: &[u8], number: u64) -> Result<(), InputError> {
-        let mut words = words(line);
-        let Some(word) = words.next().filter(|word| !word.starts_with(b"#")) else {
+        let mut words = words(line).take_while(|word| !word.starts_with(b"#"));
+        let Some(word) = words.next() else {
             return Ok(());
         };
         match word {
@@ -253,14 +256,14 @@ mod tests {
 mtllib none.mtl
 o solid
 v 1000000.1 0 0 1.0
-v 1000001.7 +0. -0 0.1 0.2 0.3
+v 1000001.7 +0. -0 0.1 0.2 0.3 # weight
 v\t1000000.1 2e0 .5 \r
 v 1000000.1 0 3
 vt 0 0
 vn 0 0 1
 s off
 f 1/1/1 3/-1/-9 2//7
-f 1 2 4
+f 1 2 4 # a comment \\
 g empty
 g other  part
 usemtl steel

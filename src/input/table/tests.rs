@@ -215,3 +215,10 @@ fn header_errors_fit_one_line() {
     );
     assert!(!error.contains('\n') && error.len() < 150, "{error}");
 }
+
+#[test]
+fn only_bytes_that_are_no_utf_8_are_replaced() {
+    let mut table = TableReader::open(b"x,y,kind\n1,2,caf\xe9 a\n", "t.csv", &NAMES).unwrap();
+    let row = table.next_row().unwrap().unwrap();
+    assert_eq!(row.text(2), "caf\u{fffd} a");
+}

@@ -50,7 +50,11 @@ impl File<'_> {
             if let Some(material) = primitive.material {
                 let material = self.get(&self.root.materials, material, &place)?;
                 two_sided |= material.double_sided;
+                let extensions = material.extensions.as_ref();
+                let is_glass =
+                    extensions.is_some_and(|e| e.others.contains_key("KHR_materials_transmission"));
                 match material.alpha_mode {
+                    _ if is_glass => kind = SurfaceKind::Clear,
                     Checked::Valid(AlphaMode::Blend) => kind = SurfaceKind::Clear,
                     Checked::Valid(AlphaMode::Mask) if kind == SurfaceKind::Opaque => {
                         kind = SurfaceKind::CutOut;

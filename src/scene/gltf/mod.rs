@@ -14,6 +14,7 @@ use std::sync::Arc;
 use glam::{BVec3, DAffine3, DMat4, DVec3};
 use gltf::json::{Index, Value};
 use serde::Deserialize;
+use serde_json::Map;
 
 pub use self::animation::CameraAnimation;
 use self::animation::{Parts, place_of, transform};
@@ -26,6 +27,8 @@ use crate::input::{InputError, note};
 
 /// Bytes of a number of a mesh while it is read: in f64, and as a point or corner.
 const BYTES_PER_NUMBER: u64 = 20;
+/// Bytes of an instance while it is read: its transform and that of its item.
+const BYTES_PER_INSTANCE: u64 = (2 * size_of::<Placed>()) as u64;
 /// Most items of a file: instances of few bytes are many.
 const MOST_ITEMS: usize = 1 << 24;
 
@@ -191,9 +194,26 @@ impl File<'_> {
             return Ok(vec![DAffine3::IDENTITY]);
         };
         let place = format!("nodes[{index}].extensions.EXT_mesh_gpu_instancing");
+        let index = |at: &Value| Some(Index::new(u32::try_from(at.as_u64()?).unwrap_or(u32::MAX)));
+        let all = attributes.as_object().into_iter().flat_map(Map::values);
+        let counts = all.filter_map(index).map(|at| {
+            let accessor = self.get(&self.root.accessors, at, &place)?;
+            Ok(accessor.count.0)
+        });
+        let counts: Vec<u64> = counts.collect::<Result<_, InputError>>()?;
+        let [least, count] = [counts.iter().min(), counts.iter().max()].map(|c| *c.unwrap_or(&0));
+        if least != count || count == 0 {
+            let found = format!("attributes of {least} to {count} elements");
+            return Err(self.error(place, found, "as many of each, one or more"));
+        }
+        memory::check_fits(
+            self.name,
+            count.saturating_mul(BYTES_PER_INSTANCE),
+            0,
+            count,
+        )?;
         let column = |(name, width)| {
-            let accessor = attributes[name].as_u64();
-            let accessor = accessor.map(|at| Index::new(u32::try_from(at).unwrap_or(u32::MAX)));
+            let accessor = index(&attributes[name]);
             accessor
                 .map(|at| self.vectors(at, width, &place))
                 .transpose()
@@ -201,9 +221,8 @@ impl File<'_> {
         let [moved, turned, scaled] =
             [("TRANSLATION", 3), ("ROTATION", 4), ("SCALE", 3)].map(column);
         let columns = [moved?, turned?, scaled?];
-        let count = columns.iter().flatten().map(Vec::len).min();
         let of = |i: usize| columns.each_ref().map(|column| Some(column.as_ref()?[i]));
-        Ok((0..count.unwrap_or(0)).map(|i| transform(of(i))).collect())
+        Ok((0..count as usize).map(|i| transform(of(i))).collect())
     }
 
     /// The scene of all triangles.

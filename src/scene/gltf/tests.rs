@@ -222,9 +222,28 @@ fn compressed_meshes_and_points_have_the_boxes_of_their_bounds() {
 #[test]
 fn instances_are_items() {
     let mut file = file();
-    let attributes = json!({"TRANSLATION": 0});
-    file["nodes"][1]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
-    assert_eq!(read(&file).unwrap().items.len(), 1 + 4);
+    let mut instances = |attributes: Value| {
+        let instancing = json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
+        file["nodes"][1]["extensions"] = instancing;
+        let read = read(&file).map(|scene| scene.items.len());
+        read.map_err(|error| error.to_string())
+    };
+    for attributes in [json!({"TRANSLATION": 0}), json!({"_COLOR": 0})] {
+        assert_eq!(instances(attributes), Ok(1 + 4));
+    }
+    let error = instances(json!({"TRANSLATION": 0, "_ID": 1})).unwrap_err();
+    let wanted = "instancing: attributes of 4 to 12 elements; expected as many of each";
+    assert!(error.contains(wanted), "{error}");
+    assert!(instances(json!({})).unwrap_err().contains("0 elements"));
+}
+
+#[test]
+fn glass_is_clear() {
+    let mut glass = file();
+    let transmission = json!({"KHR_materials_transmission": {"transmissionFactor": 1}});
+    glass["materials"][0] = json!({"extensions": transmission});
+    let surfaces = read(&glass).unwrap().surfaces.expect("triangles");
+    assert_eq!(surfaces.kinds, [SurfaceKind::Clear; 2]);
 }
 
 #[test]
