@@ -263,14 +263,14 @@ vt 0 0
 vn 0 0 1
 s off
 f 1/1/1 3/-1/-9 2//7
-f 1 2 4 # a comment \\
+f 1 2 4
 g empty
 g other  part
 usemtl steel
 f -3 -2 -1
 f 1 4 \\
   3
-l 1 2 3 4
+l 1 2 3 4 # a line \\
 g last
 f 1 2 3 4";
 

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use super::generate::{Build, COUNT, MOST};
-use super::gltf::{is_gltf, read_gltf};
+use super::gltf::{self, Beside, beside, is_gltf};
 use super::ibsp::{is_ibsp, read_ibsp};
 use super::obj::{is_obj, read_obj};
 use super::zip::{self, is_zip};
@@ -166,15 +166,30 @@ fn check_generated(
 /// The errors of [`load`].
 pub fn read_bytes(
     bytes: &[u8],
+    names: [&str; 2],
+    map: Option<&str>,
+    options: &LoadOptions,
+) -> Result<Scene, InputError> {
+    read_beside(bytes, names, map, options, &|uri| beside(names[0], uri))
+}
+
+fn read_beside(
+    bytes: &[u8],
     [file, name]: [&str; 2],
     map: Option<&str>,
     options: &LoadOptions,
+    beside: Beside,
 ) -> Result<Scene, InputError> {
     refuse(bytes, file)?;
     if is_zip(bytes) {
         let entry = zip::unpack(bytes, file, map)?;
-        let file = format!("{file}#{}", entry.name);
-        return read_bytes(&entry.bytes, [&file, name], entry.map, options);
+        let names = [&format!("{file}#{}", entry.name), name];
+        let folder = entry.name.rfind('/').map_or("", |end| &entry.name[..=end]);
+        let beside = |uri: &str| {
+            let wanted = format!("{folder}{}", uri.trim_start_matches("./"));
+            Ok(zip::unpack(bytes, file, Some(&wanted))?.bytes)
+        };
+        return read_beside(&entry.bytes, names, entry.map, options, &beside);
     }
     let extension = Path::new(file).extension();
     let is_named = |name: &str| extension.is_some_and(|e| e.eq_ignore_ascii_case(name));
@@ -192,8 +207,10 @@ pub fn read_bytes(
         if options.skip_bad_items {
             note(&format!("{name}: --skip-bad-items is for boxes CSV"));
         }
-        let read = if is_gltf { read_gltf } else { read_obj };
-        return read(bytes, file, name, options);
+        return match is_gltf {
+            true => gltf::read_beside(bytes, [file, name], options, beside),
+            false => read_obj(bytes, file, name, options),
+        };
     }
     let rows = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
     options.check_fits(name, Some(rows), 0)?;

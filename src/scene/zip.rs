@@ -261,6 +261,26 @@ mod tests {
     }
 
     #[test]
+    fn the_buffers_of_a_gltf_are_entries_beside_it() {
+        let text = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "buffers": [{"byteLength": 36, "uri": "URI"}]}"#;
+        let with = |uri: &str, name: &str| {
+            let text = text.replace("URI", uri);
+            packed(&[("in/s.gltf", text.as_bytes(), 8), (name, &[0; 36], 8)])
+        };
+        for (uri, name) in [
+            ("./caf%C3%A9%20%281%29.bin", "in/caf\u{e9} (1).bin"),
+            ("100%/%+f%", "in/100%/%+f%"),
+        ] {
+            assert_eq!(read(&with(uri, name), None), Ok(1), "{uri}");
+        }
+        refused(&with("b.bin", "b.bin"), None, "no 'in/b.bin' among");
+    }
+
+    #[test]
     fn damage_is_found_and_sizes_are_not_believed() {
         let good = packed(&[("one.csv", BOX, 8)]);
         let entry = good.windows(4).position(|w| w == b"PK\x01\x02").unwrap();

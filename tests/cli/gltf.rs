@@ -66,6 +66,16 @@ fn rows_of(csv: &str) -> Vec<(String, String)> {
 }
 
 #[test]
+fn a_note_tells_of_skins() {
+    let text = fs::read_to_string(turned()).expect("readable");
+    let skinned = text.replacen("\"mesh\"", "\"skin\": 0, \"mesh\"", 1);
+    let folder = folder(&[("s.gltf", skinned.as_bytes())]);
+    let done = cullbench(folder.path(), "scene info s.gltf");
+    let note = "note: s.gltf: 1 item with a skin, placed by its node and not by joints\n";
+    assert_eq!((done.code, done.err.as_str()), (Some(0), note));
+}
+
+#[test]
 fn its_triangles_and_cameras_reach_the_later_stages() {
     let folder = folder(&[]);
     let path = "--path outside:frames=4 --processes 1 --samples 48x32 --format json";

@@ -1,7 +1,7 @@
 //! Cameras of a glTF file: lenses, and the animation that moves one.
 //!
 //! Between keys, translations and scales are interpolated linearly and rotations along the
-//! arc, also for cubic splines.
+//! arc; cubic splines by Hermite's polynomials.
 
 use std::array;
 use std::collections::HashMap;
@@ -15,6 +15,7 @@ use gltf::json::validation::Checked;
 use super::file::File;
 use crate::input::InputError;
 use crate::scene::{CameraPlace, PlaceView};
+use crate::shown::counted;
 
 /// The animated camera of a file.
 #[derive(Clone, Debug)]
@@ -51,6 +52,7 @@ struct Motion {
 #[derive(Clone, Debug)]
 struct Track {
     times: Vec<f64>,
+    /// One for each time; of a cubic spline three: a value between its tangents.
     values: Vec<DVec4>,
     interpolation: Interpolation,
 }
@@ -71,17 +73,25 @@ impl Track {
     fn at(&self, time: f64, is_rotation: bool) -> DVec4 {
         let next = self.times.partition_point(|key| *key <= time);
         let last = next.saturating_sub(1);
-        let (from, Some(to)) = (self.values[last], self.values.get(next)) else {
-            return self.values[last];
-        };
-        if next == 0 || self.interpolation == Interpolation::Step {
-            return from;
+        let is_cubic = self.interpolation == Interpolation::CubicSpline;
+        let value = |key: usize| self.values[if is_cubic { 3 * key + 1 } else { key }];
+        let is_between = next > 0 && next < self.times.len();
+        if !is_between || self.interpolation == Interpolation::Step {
+            return value(last);
         }
-        let share = (time - self.times[last]) / (self.times[next] - self.times[last]);
+        let (from, to) = (value(last), value(next));
+        let length = self.times[next] - self.times[last];
+        let share = (time - self.times[last]) / length;
         match is_rotation {
-            false => from.lerp(*to, share),
+            _ if is_cubic => {
+                let (square, rest) = (share * share, 1.0 - share);
+                let [leaves, arrives] = [self.values[3 * last + 2], self.values[3 * next]];
+                let bent = leaves * (rest * rest * share) - arrives * (square * rest);
+                from.lerp(to, square * (3.0 - 2.0 * share)) + bent * length
+            }
+            false => from.lerp(to, share),
             true => {
-                let [from, to] = [from, *to].map(|v| DQuat::from_vec4(v).normalize());
+                let [from, to] = [from, to].map(|v| DQuat::from_vec4(v).normalize());
                 from.slerp(to, share).into()
             }
         }
@@ -116,7 +126,7 @@ fn lens(camera: &Camera) -> Option<PlaceView> {
         ortho_height: Some(2.0 * f64::from(lens.ymag)),
         aspect: Some(f64::from(lens.xmag) / f64::from(lens.ymag)),
         near: lens.znear.into(),
-        far: Some(lens.zfar.into()),
+        far: Some(lens.zfar.into()).filter(|far: &f64| far.is_finite()),
     });
     let perspective = camera.perspective.as_ref().map(|lens| PlaceView {
         up: DVec3::Y,
@@ -124,7 +134,7 @@ fn lens(camera: &Camera) -> Option<PlaceView> {
         ortho_height: None,
         aspect: lens.aspect_ratio.map(f64::from),
         near: lens.znear.into(),
-        far: lens.zfar.map(f64::from),
+        far: lens.zfar.map(f64::from).filter(|far| far.is_finite()),
     });
     perspective.or(parallel)
 }
@@ -207,19 +217,19 @@ impl File<'_> {
         let width = if part == 1 { 4 } else { 3 };
         let times = self.vectors(sampler.input, 1, place)?;
         let times: Vec<f64> = times.iter().map(|time| time.x).collect();
-        let mut values = self.vectors(sampler.output, width, place)?;
+        let values = self.vectors(sampler.output, width, place)?;
         let Checked::Valid(interpolation) = sampler.interpolation else {
             return Err(self.error(place.to_owned(), "an unknown interpolation", "LINEAR"));
         };
-        if interpolation == Interpolation::CubicSpline {
-            // Each between its tangents.
-            values = values.into_iter().skip(1).step_by(3).collect();
-        }
+        let each = match interpolation {
+            Interpolation::CubicSpline => 3,
+            _ => 1,
+        };
         let ascend = times.is_sorted_by(|a, b| a < b) && times.iter().all(|t| t.is_finite());
-        if !ascend || times.is_empty() || times.len() != values.len() {
+        if !ascend || times.is_empty() || each * times.len() != values.len() {
             let found = format!("{} times and {} values", times.len(), values.len());
-            let expected = "ascending times with a value each";
-            return Err(self.error(place.to_owned(), found, expected));
+            let expected = format!("ascending times with {} each", counted(each, "value"));
+            return Err(self.error(place.to_owned(), found, &expected));
         }
         Ok(Track {
             times,

@@ -12,22 +12,68 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root, Value};
 
 use crate::input::{InputError, read_file};
-use crate::shown::{message, shortened};
+use crate::shown::{message, plain, shortened};
 
 /// JSON and binary chunk of a GLB of version 2; `None` if they are cut off.
 fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
     let number = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
-    let chunk = |at: usize, kind: &[u8]| {
-        let length = number(at)? as usize;
-        let is_kind = bytes.get(at + 4..at + 8)? == kind;
-        bytes.get(at + 8..at + 8 + length).filter(|_| is_kind)
+    let chunk = |at: usize| {
+        let end = at + 8 + number(at)? as usize;
+        Some((bytes.get(at + 4..at + 8)?, bytes.get(at + 8..end)?))
     };
-    let json = chunk(12, b"JSON").filter(|_| number(4) == Some(2))?;
-    let after = 20 + json.len();
-    match after + 8 <= bytes.len() {
-        true => Some((json, Some(chunk(after, b"BIN\0")?))),
-        false => Some((json, None)),
+    let (_, json) = chunk(12).filter(|(kind, _)| *kind == b"JSON" && number(4) == Some(2))?;
+    let mut at = 20 + json.len();
+    while at + 8 <= bytes.len() {
+        let (kind, body) = chunk(at)?;
+        if kind == b"BIN\0" {
+            return Some((json, Some(body)));
+        }
+        at += 8 + body.len();
     }
+    Some((json, None))
+}
+
+/// Reads what glTF 2.0 allows and the typed form refuses.
+///
+/// Channels without a node, scenes without nodes, numbers beyond f32.
+fn lenient(mut json: Value) -> Option<Root> {
+    for scene in json.get_mut("scenes")?.as_array_mut()? {
+        let nodes = scene.as_object_mut()?.entry("nodes");
+        nodes.or_insert_with(|| Value::Array(Vec::new()));
+    }
+    let animations = json.get_mut("animations").and_then(Value::as_array_mut);
+    for animation in animations.into_iter().flatten() {
+        let channels = animation.get_mut("channels")?.as_array_mut()?;
+        channels.retain(|channel| !channel["target"]["node"].is_null());
+    }
+    serde_json::from_value(json).ok()
+}
+
+/// Reads a file that a scene names relative to itself.
+pub type Beside<'b> = &'b dyn Fn(&str) -> Result<Vec<u8>, InputError>;
+
+/// The file in the folder of a scene.
+pub fn beside(file: &str, name: &str) -> Result<Vec<u8>, InputError> {
+    let folder = Path::new(file).parent().unwrap_or(Path::new(""));
+    let path = folder.join(name);
+    match path.is_file() || !path.exists() {
+        true => Ok(read_file(&path)?.to_vec()),
+        false => Err(InputError::at(file, "buffers", plain(name), "a plain file")),
+    }
+}
+
+/// A URI without percent-encoding.
+fn decoded(uri: &str) -> String {
+    let mut parts = uri.split('%');
+    let mut bytes = parts.next().unwrap_or_default().as_bytes().to_vec();
+    for part in parts {
+        let hex = part.get(..2).filter(|_| !part.starts_with('+'));
+        match hex.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
+            Some(byte) => bytes.extend([&[byte], &part.as_bytes()[2..]].concat()),
+            None => bytes.extend([b"%", part.as_bytes()].concat()),
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 /// A file with all of its buffers.
@@ -38,7 +84,7 @@ pub struct File<'f> {
 }
 
 impl<'f> File<'f> {
-    pub fn open(bytes: &'f [u8], name: &'f str) -> Result<File<'f>, InputError> {
+    pub fn open(bytes: &'f [u8], name: &'f str, beside: Beside) -> Result<File<'f>, InputError> {
         let error = |found: String| InputError::at(name, "JSON", found, "glTF 2.0");
         let (json, mut bin) = match bytes.starts_with(b"glTF") {
             true => glb(bytes).ok_or_else(|| {
@@ -48,14 +94,16 @@ impl<'f> File<'f> {
             false => (bytes, None),
         };
         let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-        let root: Root = serde_json::from_slice(json).map_err(|e| {
-            // In glTF 1.0, what 2.0 numbers has names.
+        let root = serde_json::from_slice(json).or_else(|e| {
             let json: Value = serde_json::from_slice(json).unwrap_or_default();
-            error(match json["meshes"].is_object() {
+            // In glTF 1.0, what 2.0 numbers has names.
+            let found = match json["meshes"].is_object() {
                 true => "glTF 1.0".to_owned(),
                 false => message(&e.to_string()),
-            })
-        })?;
+            };
+            lenient(json).ok_or_else(|| error(found))
+        });
+        let root: Root = root?;
         if !root.asset.version.starts_with("2.") {
             let version = shortened(&root.asset.version, 20);
             return Err(error(format!("glTF of version '{version}'")));
@@ -69,14 +117,14 @@ impl<'f> File<'f> {
             let buffer = &file.root.buffers[index];
             let bytes = match &buffer.uri {
                 None => Cow::Borrowed(bin.take().unwrap_or_default()),
-                Some(uri) => Cow::Owned(file.linked(index, uri)?),
+                Some(uri) => Cow::Owned(file.linked(index, uri, beside)?),
             };
             file.buffers.push(bytes);
         }
         Ok(file)
     }
 
-    fn linked(&self, buffer: usize, uri: &str) -> Result<Vec<u8>, InputError> {
+    fn linked(&self, buffer: usize, uri: &str, beside: Beside) -> Result<Vec<u8>, InputError> {
         let error = |found: String, expected| {
             Err(self.error(format!("buffers[{buffer}].uri"), found, expected))
         };
@@ -89,14 +137,7 @@ impl<'f> File<'f> {
                 format!("'{}'", shortened(uri, 60)),
                 "a file beside this one",
             ),
-            None => {
-                let beside = Path::new(self.name).parent().unwrap_or(Path::new(""));
-                let path = beside.join(uri.replace("%20", " "));
-                match path.is_file() || !path.exists() {
-                    true => Ok(read_file(&path)?.to_vec()),
-                    false => error(format!("'{}'", shortened(uri, 60)), "a plain file"),
-                }
-            }
+            None => beside(&decoded(uri)),
         }
     }
 

@@ -47,6 +47,9 @@ impl File<'_> {
         let (mut kind, mut two_sided) = (SurfaceKind::Opaque, false);
         for (place, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("meshes[{index}].primitives[{place}]");
+            let Some(positions) = positions(primitive) else {
+                continue;
+            };
             if let Some(material) = primitive.material {
                 let material = self.get(&self.root.materials, material, &place)?;
                 two_sided |= material.double_sided;
@@ -62,7 +65,7 @@ impl File<'_> {
                     _ => {}
                 }
             }
-            let own = self.primitive(primitive, &place)?;
+            let own = self.primitive(primitive, positions, &place)?;
             match (&mut all, own) {
                 (Ok(all), Ok(own)) => {
                     let first = all.points.len() as u32;
@@ -89,6 +92,7 @@ impl File<'_> {
     fn primitive(
         &self,
         primitive: &Primitive,
+        positions: Index<Accessor>,
         place: &str,
     ) -> Result<Result<Triangles, String>, InputError> {
         let extensions = primitive.extensions.as_ref();
@@ -97,9 +101,6 @@ impl File<'_> {
         {
             return Ok(Err(format!("is compressed ({})", shortened(name, 40))));
         }
-        let Some(positions) = positions(primitive) else {
-            return Ok(Err("has no positions".to_owned()));
-        };
         let points: Vec<DVec3> = match self.values(positions, 3, place)? {
             Ok(values) => values.chunks_exact(3).map(DVec3::from_slice).collect(),
             Err(reason) => return Ok(Err(reason)),
@@ -143,6 +144,7 @@ impl File<'_> {
     }
 }
 
+/// The accessor of positions; `None` where nothing is drawn.
 pub fn positions(primitive: &Primitive) -> Option<Index<Accessor>> {
     let semantic = Checked::Valid(Semantic::Positions);
     primitive.attributes.get(&semantic).copied()

@@ -2,8 +2,9 @@
 //!
 //! Coordinates are the file's own. Triangles are read where all meshes have plain ones.
 //! Compressed meshes, points and lines have the boxes of their accessors' bounds instead,
-//! and then no item of the file has triangles. Skins and morph targets stay in their rest
-//! pose. Source: Khronos Group, glTF 2.0 Specification, 2021.
+//! and then no item of the file has triangles; so have sparse ones. Vertices stand as they
+//! are stored, moved by their node alone: joints of skins and weights of morph targets change
+//! nothing. Source: Khronos Group, glTF 2.0 Specification, 2021.
 
 mod animation;
 mod file;
@@ -18,12 +19,14 @@ use serde_json::Map;
 
 pub use self::animation::CameraAnimation;
 use self::animation::{Parts, place_of, transform};
+pub use self::file::{Beside, beside};
 use self::file::{File, component, normalised};
 use self::mesh::{Mesh, Triangles, positions};
 use super::{
     CameraPlace, Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory,
 };
 use crate::input::{InputError, note};
+use crate::shown::counted;
 
 /// Bytes of a number of a mesh while it is read: in f64, and as a point or corner.
 const BYTES_PER_NUMBER: u64 = 20;
@@ -41,17 +44,37 @@ pub fn is_gltf(bytes: &[u8]) -> bool {
 /// Reads a scene; `file` is the path that other files are named relative to.
 ///
 /// # Errors
-/// The first value that is none of glTF 2.0, by its place in the file; a node that is
-/// reached twice; a mesh without triangles and without bounds; a scene that does not fit
-/// into memory.
+/// The errors of [`read_beside`].
 pub fn read_gltf(
     bytes: &[u8],
     file: &str,
     name: &str,
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
-    let file = File::open(bytes, file)?;
+    read_beside(bytes, [file, name], options, &|uri| beside(file, uri))
+}
+
+/// Reads a scene; `beside` reads the files that it names.
+///
+/// # Errors
+/// The first value that is none of glTF 2.0, by its place in the file; a node that is
+/// reached twice; a mesh without triangles and without bounds; a scene that does not fit
+/// into memory.
+pub(super) fn read_beside(
+    bytes: &[u8],
+    [file, name]: [&str; 2],
+    options: &LoadOptions,
+    beside: Beside,
+) -> Result<Scene, InputError> {
+    let file = File::open(bytes, file, beside)?;
     let (placed, places, order) = file.placed()?;
+    let is_skinned = |item: &&Placed| file.root.nodes[item.node].skin.is_some();
+    let skinned = placed.iter().filter(is_skinned).count();
+    if skinned > 0 {
+        let skinned = counted(skinned, "item");
+        let what = "with a skin, placed by its node and not by joints";
+        note(&format!("{}: {skinned} {what}", file.name));
+    }
     let animation = file.camera_animation(&order)?;
     let meshes = 0..file.root.meshes.len();
     let numbers = meshes.clone().map(|mesh| file.numbers(mesh));
@@ -66,12 +89,8 @@ pub fn read_gltf(
         let node = file.root.nodes[item.node].name.as_deref();
         labels.push(node.unwrap_or_default());
     }
-    let unplain = placed.iter().find_map(|item| match &meshes[item.mesh] {
-        Mesh { plain: Ok(_), .. } => None,
-        Mesh {
-            plain: Err(reason), ..
-        } => Some((item.mesh, reason)),
-    });
+    let reason = |mesh: usize| Some((mesh, meshes[mesh].plain.as_ref().err()?));
+    let unplain = placed.iter().find_map(|item| reason(item.mesh));
     let scene = match unplain {
         None if placed.is_empty() => Scene::from_boxes(name, &[])?,
         None => file.triangles(&placed, &meshes, name, options)?,
@@ -138,9 +157,12 @@ impl File<'_> {
             order.push((index, above));
             let world = parent * self.local(index)?;
             if let Some(mesh) = node.mesh {
-                self.get(&self.root.meshes, mesh, &format!("{place}.mesh"))?;
+                let all = self.get(&self.root.meshes, mesh, &format!("{place}.mesh"))?;
                 let mesh = mesh.value();
-                let instances = self.instances(index)?;
+                let instances = match all.primitives.iter().any(|p| positions(p).is_some()) {
+                    true => self.instances(index)?,
+                    false => Vec::new(),
+                };
                 if placed.len() + instances.len() > MOST_ITEMS {
                     let found = format!("{} instances", instances.len());
                     let expected = format!("at most {MOST_ITEMS} items in the file");
@@ -265,16 +287,9 @@ impl File<'_> {
     /// World box of the bounds that the accessors of an item state.
     fn bounds(&self, item: &Placed) -> Result<WorldBox, InputError> {
         let mut all = WorldBox::union_of([]);
-        for primitive in &self.root.meshes[item.mesh].primitives {
+        let primitives = self.root.meshes[item.mesh].primitives.iter();
+        for positions in primitives.filter_map(positions) {
             let place = format!("meshes[{}]", item.mesh);
-            let missing = |place: String| {
-                self.error(
-                    place,
-                    "no bounds of positions",
-                    "min <= max of three numbers each",
-                )
-            };
-            let positions = positions(primitive).ok_or_else(|| missing(place.clone()))?;
             let accessor = self.get(&self.root.accessors, positions, &place)?;
             let corner = |value: &Option<Value>| -> Option<DVec3> {
                 let corner = <[f64; 3]>::deserialize(value.as_ref()?).ok()?;
@@ -284,8 +299,11 @@ impl File<'_> {
             };
             let ends = corner(&accessor.min).zip(corner(&accessor.max));
             let ends = ends.filter(|(min, max)| min.cmple(*max).all());
-            let (min, max) =
-                ends.ok_or_else(|| missing(format!("accessors[{}]", positions.value())))?;
+            let (min, max) = ends.ok_or_else(|| {
+                let place = format!("accessors[{}]", positions.value());
+                let expected = "min <= max of three numbers each";
+                self.error(place, "no bounds of positions", expected)
+            })?;
             let corners = (0..8).map(|i| {
                 let is_low = BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0);
                 let corner = DVec3::select(is_low, min, max);

@@ -114,26 +114,32 @@ fn items_are_the_boxes_of_the_transformed_triangles() {
 
 /// The file with its camera turned by 90 degrees about y, from second 1 to 3.
 fn animated() -> Value {
-    let mut file = file();
     let half = std::f32::consts::FRAC_1_SQRT_2;
-    let numbers = [1.0, 3.0, 0.0, 0.0, 0.0, 1.0, 0.0, half, 0.0, half];
+    let turns = [0.0, 0.0, 0.0, 1.0, 0.0, half, 0.0, half];
+    animated_by("rotation", "VEC4", 2, &turns)
+}
+
+/// The file with values for the camera at seconds 1 and 3.
+fn animated_by(path: &str, kind: &str, count: usize, values: &[f32]) -> Value {
+    let mut file = file();
+    let numbers = [&[1.0, 3.0], values].concat();
     let bytes: Vec<u8> = numbers.iter().flat_map(|n: &f32| n.to_le_bytes()).collect();
     let mut push = |place: &str, value: Value| {
         let all = file[place].as_array_mut().expect("an array");
         all.push(value);
     };
-    let uri = format!("data:;base64,{}", STANDARD.encode(bytes));
-    push("buffers", json!({"byteLength": 40, "uri": uri}));
+    let uri = format!("data:;base64,{}", STANDARD.encode(&bytes));
+    push("buffers", json!({"byteLength": bytes.len(), "uri": uri}));
     push("bufferViews", json!({"buffer": 1, "byteLength": 8}));
     push(
         "bufferViews",
-        json!({"buffer": 1, "byteOffset": 8, "byteLength": 32}),
+        json!({"buffer": 1, "byteOffset": 8, "byteLength": bytes.len() - 8}),
     );
-    let accessor = |view: u32, kind: &str| json!({"bufferView": view, "componentType": 5126, "count": 2, "type": kind});
-    push("accessors", accessor(2, "SCALAR"));
-    push("accessors", accessor(3, "VEC4"));
+    let accessor = |view: u32, kind: &str, count: usize| json!({"bufferView": view, "componentType": 5126, "count": count, "type": kind});
+    push("accessors", accessor(2, "SCALAR", 2));
+    push("accessors", accessor(3, kind, count));
     file["animations"] = json!([{
-        "channels": [{"sampler": 0, "target": {"node": 2, "path": "rotation"}}],
+        "channels": [{"sampler": 0, "target": {"node": 2, "path": path}}],
         "samplers": [{"input": 2, "output": 3}],
     }]);
     file
@@ -191,6 +197,74 @@ fn cameras_have_their_lens_and_move_as_animated() {
         let error = read(&file).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(wanted), "{place}: {error}");
     }
+}
+
+#[test]
+fn cubic_splines_bend_by_their_tangents() {
+    // The x of (t - 1)^3, and its slope on both sides of each key.
+    let slope = |x: f32| [x, 0.0, 0.0];
+    let keys = [9.0, 0.0, 0.0, 12.0, 8.0, 9.0].map(slope);
+    let mut cubic = animated_by("translation", "VEC3", 6, keys.as_flattened());
+    cubic["animations"][0]["samplers"][0]["interpolation"] = json!("CUBICSPLINE");
+    let animation = read(&cubic).unwrap().animation.expect("an animation");
+    for (time, x) in [
+        (0.5, 0.0),
+        (1.0, 0.0),
+        (1.5, 0.125),
+        (2.0, 1.0),
+        (3.0, 8.0),
+        (4.0, 8.0),
+    ] {
+        assert_eq!(animation.at(time).expect("a direction").eye.x, x, "{time}");
+    }
+    cubic["accessors"][3]["count"] = json!(5);
+    let error = read(&cubic).map(|_| ()).unwrap_err().to_string();
+    assert!(
+        error.contains("2 times and 5 values; expected ascending times with 3 values each"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_the_specification_allows_is_read() {
+    let mut file = animated();
+    let push = |all: &mut Value, value: Value| all.as_array_mut().unwrap().push(value);
+    push(&mut file["scenes"], json!({"name": "empty"}));
+    let pointer = json!({"sampler": 0, "target": {"path": "pointer"}});
+    push(&mut file["animations"][0]["channels"], pointer);
+    file["cameras"][0]["perspective"]["zfar"] = json!(1e39);
+    let bare = json!({"attributes": {"COLOR_0": 0}, "mode": 0});
+    push(&mut file["meshes"][0]["primitives"], bare.clone());
+    push(&mut file["meshes"], json!({"primitives": [bare]}));
+    file["nodes"][2]["mesh"] = json!(1);
+    let scene = read(&file).unwrap();
+    assert_eq!(scene.items, read(&animated()).unwrap().items);
+    assert_eq!(scene.surfaces.expect("triangles").triangles.len(), 8);
+    assert_eq!(scene.animation.expect("one").seconds, [1.0, 3.0]);
+    assert_eq!(scene.places[0].view.expect("a lens").far, None);
+}
+
+#[test]
+fn unknown_chunks_of_a_glb_are_passed_over() {
+    let mut file = file();
+    let buffer = &mut file["buffers"][0];
+    let uri = buffer["uri"].take();
+    let bin = STANDARD
+        .decode(uri.as_str().unwrap().split_once(',').unwrap().1)
+        .unwrap();
+    buffer.as_object_mut().unwrap().remove("uri");
+    let json = file.to_string();
+    let chunk =
+        |kind: &[u8], body: &[u8]| [&(body.len() as u32).to_le_bytes(), kind, body].concat();
+    let json = chunk(b"JSON", json.as_bytes());
+    let [odd, bin] = [chunk(b"ODD\0", &[1; 9]), chunk(b"BIN\0", &bin)];
+    let read = |chunks: &[&[u8]]| {
+        let bytes = [&b"glTF\x02\0\0\0\0\0\0\0"[..], &chunks.concat()].concat();
+        read_gltf(&bytes, "t.glb", "t", &LoadOptions::default()).map(|scene| scene.items.len())
+    };
+    assert_eq!(read(&[&json, &odd, &bin]).unwrap(), 2);
+    assert_eq!(read(&[&json, &bin, &odd]).unwrap(), 2);
+    assert!(read(&[&json, &odd[..12], &bin]).is_err());
 }
 
 #[test]
