@@ -94,7 +94,8 @@ fn taken(advice: &Advice) -> String {
     let test = some(advice.test.name, |test| {
         format!(", test {test}{}", ties(&advice.test.ties))
     });
-    let repaid = some(row.and_then(|row| row.break_even_queries), |n| {
+    let repaid = row.and_then(|row| row.break_even_queries);
+    let repaid = some(repaid.filter(|n| *n > 0.0), |n| {
         format!(
             " Its build is repaid after {}.",
             text::counted(n as usize, "query")

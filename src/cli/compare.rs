@@ -18,7 +18,7 @@ use super::{Ending, expect_places, run_plan, text, unread_is_fine, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
-    Basis, Changes, JUDGED_METRICS, Outcome, Report, ReportCell, Setting, WORK, changes,
+    Basis, Changes, JUDGED_METRICS, JudgedRow, Outcome, Report, ReportCell, Setting, WORK, changes,
     read_report, settings, write_atomically,
 };
 
@@ -146,17 +146,21 @@ fn expect_judged(changes: &Changes) -> anyhow::Result<()> {
             counted(&changes.only_in_new)
         );
     }
-    if let Some(first) = changes.why_nothing_was_judged() {
-        bail!(
-            "nothing can be judged: of {} in common, {} not the same question, {} without \
-             a figure ({}: {}); expected runs of the same scenes, cameras and metrics",
-            text::counted(changes.cells_in_common, "cell"),
-            changes.count(Outcome::Different),
-            changes.count(Outcome::Unmeasured),
-            text::plain(&name(&first.cell)),
-            text::plain(&reason(first))
-        );
-    }
+    let cells = changes.cells_in_common;
+    // A cell has a row per metric.
+    let different = changes.count(Outcome::Different).min(cells);
+    let of_first = |row: &JudgedRow| {
+        let why = format!(" ({}: {})", name(&row.cell), reason(row));
+        text::plain(&why)
+    };
+    ensure!(
+        !changes.judges_nothing(),
+        "nothing can be judged: of {} in common, {different} not the same question, {} without \
+         a figure{}; expected runs of the same scenes, cameras and metrics",
+        text::counted(cells, "cell"),
+        cells - different,
+        text::some(changes.rows.first(), of_first)
+    );
     Ok(())
 }
 
@@ -191,7 +195,8 @@ fn figure(changes: &Changes) -> Option<Figure> {
     let shown: Vec<Row> = all.take(DRAWN).collect();
     shown.first()?;
     let change = |ratio: f64| format!("{:+.0} %", (ratio - 1.0) * 100.0);
-    let limits = [1.0 - changes.threshold, 1.0, 1.0 + changes.threshold];
+    let most = 1.0 + changes.threshold;
+    let limits = [1.0 / most, 1.0, most];
     let values = shown
         .iter()
         .flat_map(|row| row.ends.unwrap_or([row.value; 2]));

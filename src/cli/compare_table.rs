@@ -75,7 +75,9 @@ impl CompareTable<'_> {
             |row: &&JudgedRow| row.outcome < Outcome::Different && self.ending() != Ending::Ok;
         let worst = self.changes.rows.first().filter(is_bad);
         let worst = worst.map(|row| {
-            let change = row.metric.zip(row.ratio());
+            let change = row
+                .metric
+                .zip(row.ratio().filter(|ratio| ratio.is_finite()));
             let change =
                 change.map(|(metric, ratio)| format!(": {metric} {}", change_of(ratio, None)));
             format!("; worst: {}{}", name(&row.cell), change.unwrap_or_default())

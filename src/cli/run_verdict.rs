@@ -129,7 +129,7 @@ fn fallback(base: &str) -> Option<String> {
 
 fn repaid(comparison: &Comparison) -> Option<String> {
     let best = comparison.winners().next()?;
-    let queries = best.value("break_even_queries")? as usize;
+    let queries = best.value("break_even_queries").filter(|n| *n > 0.0)? as usize;
     let whose = match comparison.winners().count() {
         1 => "Its build".to_owned(),
         _ => format!("The build of {}", best.structure),

@@ -93,7 +93,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "update_ms_100_percent", "ms", Of::Process(|s| s.update_ms.get(3).copied()), "as update_ms, after all have moved";
     "refitted_over_rebuilt", "1", Of::Log(|s| s.refitted_ln), "time per query after 32 refits, each after 1 % of the items have moved / time per query on a fresh build of the same boxes (query after 32 in tables); only structures that refit";
     "memory_bytes_per_item", "bytes", Of::Bytes(|s| s.memory_bytes), "nodes, item bounds and ids / items";
-    "break_even_queries", "queries", Of::BreakEven, "queries after which the build is repaid against linear; empty if never";
+    "break_even_queries", "queries", Of::BreakEven, "queries after which the build is repaid against linear; 0: at once; empty: never";
     "locate_ns", "ns", Of::Time(TaskKind::Locate), "thread CPU time of a region search at the eye, mean over the timed cameras; as query_ns";
     "locate_batched_ns", "ns", Of::Time(TaskKind::LocateBatched), "thread CPU time of a region search of all points of the path in one batch, per point; as query_ns";
     "locate_speedup", "1", Of::Speedup(Some(TaskKind::Locate)), "as speedup, for region search";

@@ -362,7 +362,7 @@ impl<'p> MergedParts<'p> {
         let [build, query] = cost(label).filter(|_| is_paid)?;
         let [linear_build, linear_query] = cost(YARDSTICK)?;
         let (price, gain) = (build - linear_build, linear_query - query);
-        (gain > 0.0 && price > 0.0).then(|| (price / gain).ceil())
+        (gain > 0.0).then(|| (price.max(0.0) / gain).ceil())
     }
 
     /// Time of `label` / time of `other`, equal to the ratio of the two shown values.

@@ -25,15 +25,11 @@ impl SharedWork {
         let cells: Vec<&ReportCell> = cells.into_iter().collect();
         let shared = cells.iter().filter_map(|cell| {
             let label = &cell.structure;
-            let own = label.rsplit_once("threads=");
-            // Behind a colon or a comma.
-            let own = own.map(|(alone, _)| &alone[..alone.len() - 1]);
-            let alone = own.map_or(Some(cell), |own| {
-                cells.iter().find(|cell| cell.structure == own)
-            })?;
-            let [wall, cpu] = match own {
-                Some(_) => ["query_wall_ns", "query_ns"],
-                None => ["views_wall_ns", "views_ns"],
+            let own = on_one_thread(label);
+            let is_alone = |cell: &&&ReportCell| Some(&cell.structure) == own.as_ref();
+            let (alone, [wall, cpu]) = match &own {
+                Some(_) => (cells.iter().find(is_alone)?, ["query_wall_ns", "query_ns"]),
+                None => (cell, ["views_wall_ns", "views_ns"]),
             };
             let wall_ns = cell.value(wall)?;
             Some(SharedWork {
@@ -48,5 +44,30 @@ impl SharedWork {
             })
         });
         shared.collect()
+    }
+}
+
+/// Label without its threads: `linear@rebuild` of `linear:threads=2@rebuild`.
+fn on_one_thread(label: &str) -> Option<String> {
+    let (before, after) = label.rsplit_once("threads=")?;
+    let after = after.trim_start_matches(|c: char| c.is_ascii_digit());
+    Some(before.strip_suffix([':', ','])?.to_owned() + after)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_partner_has_the_policy_and_no_threads() {
+        for (label, wanted) in [
+            ("linear:threads=2", Some("linear")),
+            ("linear:leaf=4,threads=16", Some("linear:leaf=4")),
+            ("linear:threads=2@rebuild", Some("linear@rebuild")),
+            ("threads=2", None),
+            ("\u{e9}threads=2", None),
+        ] {
+            assert_eq!(on_one_thread(label).as_deref(), wanted, "{label}");
+        }
     }
 }

@@ -254,12 +254,11 @@ impl Changes {
         self.rows.iter().any(|row| worse.contains(&row.outcome))
     }
 
-    /// The first row, if no row at all could be judged.
-    pub fn why_nothing_was_judged(&self) -> Option<&JudgedRow> {
-        let unjudged =
-            |row: &&JudgedRow| matches!(row.outcome, Outcome::Different | Outcome::Unmeasured);
-        let first = self.rows.first().filter(unjudged)?;
-        (self.rows.iter().all(|row| unjudged(&row)) && !self.is_wrong()).then_some(first)
+    /// Returns true if no row at all could be judged, and nothing is wrong.
+    pub fn judges_nothing(&self) -> bool {
+        use Outcome::{Different, FailedInBoth, Unmeasured};
+        let mut outcomes = self.rows.iter().map(|row| row.outcome);
+        outcomes.all(|o| matches!(o, Different | Unmeasured | FailedInBoth)) && !self.is_wrong()
     }
 
     /// More processes or pairs that would decide all inconclusive cells, as far

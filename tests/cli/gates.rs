@@ -78,7 +78,7 @@ fn the_gate_of_the_work_sees_lost_and_wrong_answers() {
         }
     });
     let work = format!("{COMPARE} --gate work");
-    let wanted = "nothing can be judged | 30 without a figure | only in OLD";
+    let wanted = "nothing can be judged | 10 without a figure | only in OLD";
     all_refused(&uncounted, std::slice::from_ref(&work), wanted);
     for (options, wanted) in [
         (

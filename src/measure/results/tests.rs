@@ -265,6 +265,16 @@ fn a_build_breaks_even_by_the_times_that_are_shown() {
     let gain = value(linear, "query_ns") - value(fast, "query_ns");
     assert_eq!(value(fast, "break_even_queries"), (price / gain).ceil());
     assert!(!linear.metrics.contains_key("break_even_queries"));
+    // Faster, and no dearer to build.
+    let mut cheap = parts(&[
+        ("linear", TaskKind::Query, &times(1.0, 1)),
+        ("fast", TaskKind::Query, &times(0.2, 2)),
+    ]);
+    for part in &mut cheap {
+        part.subjects[1].build_ms = Some(1e-9);
+    }
+    let cells = Group::of(&cheap).cells;
+    assert_eq!(value(&cells[1], "break_even_queries"), 0.0);
 }
 
 #[test]

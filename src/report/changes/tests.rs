@@ -129,7 +129,7 @@ fn other_cameras_or_batches_are_another_measurement() {
         change(&mut new.cells[0]);
         for basis in [Basis::Reports, Basis::Pairs] {
             let found = changes(basis, [&old.cells, &new.cells], 0.05, QUERY);
-            assert!(found.why_nothing_was_judged().is_some());
+            assert!(found.judges_nothing());
         }
     }
 }
@@ -224,14 +224,22 @@ fn only_what_has_times_is_judged() {
     // What neither side ever had is no news.
     let news = found.rows.iter().filter(|row| row.is_news());
     assert_eq!(news.count(), 5);
-    assert!(found.why_nothing_was_judged().is_none());
+    assert!(!found.judges_nothing());
     let found = changes(
         Basis::Reports,
         [&old.cells, &new.cells],
         0.05,
         &["locate_ns"],
     );
-    assert!(found.why_nothing_was_judged().is_some());
+    assert!(found.judges_nothing());
+    // A time of frames has no row at rest.
+    let sides = [&old.cells[..], &new.cells];
+    assert!(changes(Basis::Reports, sides, 0.05, &["frame_ns"]).judges_nothing());
+    for cell in old.cells.iter_mut().chain(&mut new.cells) {
+        cell.status = Status::TimedOut;
+    }
+    let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
+    assert!(found.judges_nothing() && found.count(Outcome::FailedInBoth) > 4);
 }
 
 #[test]
