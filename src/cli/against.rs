@@ -78,7 +78,7 @@ pub fn compare_against<'a>(
     let note = |busy| {
         format!(
             "the machine was busy (load average {busy:.1} on {} cores): both sides suffered \
-             alike, and it took more pairs",
+             alike, and it may take more pairs",
             load.cores
         )
     };
@@ -342,10 +342,12 @@ impl Duel<'_> {
         let first: usize = rng.random_range(0..2);
         let begins: usize = rng.random_range(0..2);
         let mut workers = [None, None];
+        // A side is held for half of the time.
+        let patience = Duration::from_secs(self.args.what.timeout).saturating_mul(2);
         for side in [first, 1 - first] {
             let share = self.share(scene, pair, [&seen[NEW], &seen[side]]);
             let request = self.request(scene, share, rng.random());
-            workers[side] = Some(Worker::start(&self.programs[side], &request)?);
+            workers[side] = Some(Worker::start(&self.programs[side], &request, patience)?);
         }
         let mut turn = 0;
         workers[1 - begins]

@@ -23,11 +23,8 @@ use crate::report::{
 };
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
-    let inputs: Vec<&Path> = [&args.old, &args.new]
-        .into_iter()
-        .flatten()
-        .map(PathBuf::as_path)
-        .collect();
+    let inputs = [&args.old, &args.new].into_iter().flatten();
+    let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
     expect_places(&[("--html", args.html.as_deref())], &inputs)?;
     let threshold = args.threshold;
     if let Some(binary) = &args.against {
@@ -197,9 +194,8 @@ fn figure(changes: &Changes) -> Option<Figure> {
     let change = |ratio: f64| format!("{:+.0} %", (ratio - 1.0) * 100.0);
     let most = 1.0 + changes.threshold;
     let limits = [1.0 / most, 1.0, most];
-    let values = shown
-        .iter()
-        .flat_map(|row| row.ends.unwrap_or([row.value; 2]));
+    let ends = |row: &Row| row.ends.unwrap_or([row.value; 2]);
+    let values = shown.iter().flat_map(ends);
     let mut axis = Axis::log("", values.chain(limits), 1.05, &change);
     axis.ticks = limits.to_vec();
     let caption = format!(

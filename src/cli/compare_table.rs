@@ -19,6 +19,7 @@ use crate::report::{
     grouped,
 };
 use crate::shown::{number, plain, shortened, without_middle};
+use crate::statistics::{Change, Judgement};
 
 /// Counters in the list; `--all` shows every one.
 const LISTED: usize = 20;
@@ -240,11 +241,7 @@ impl CompareTable<'_> {
                     (Basis::Reports, [old, new]) => format!("{old} vs {new}"),
                 },
                 row.outcome.name().replace('_', " "),
-                if room.is_none() {
-                    reason(row)
-                } else {
-                    String::new()
-                },
+                text::some(room.is_none().then_some(row), |row| reason(row)),
             ];
             table.add_row(places.into_iter().chain(figures));
         }
@@ -302,11 +299,19 @@ impl CompareTable<'_> {
         let more = self.changes.more_pairs();
         let mut rows = self.changes.rows.iter();
         let lacks_others = rows.any(|row| row.reason.as_deref() == Some(FEW_OTHERS));
+        let judged = self.changes.rows.iter().filter_map(|row| row.judgement);
+        let mut undecided = judged.filter(|found| found.change == Change::Inconclusive);
+        let is_hopeless = |found: Judgement| found.lower.is_some() && found.more_pairs.is_none();
         let told = match (self.basis, more) {
             (Basis::Pairs, Some(more)) => {
                 format!("about {} would decide", text::counted(more, "more pair"))
             }
             (Basis::Pairs, None) => "more pairs would not decide".to_owned(),
+            (Basis::Reports, _) if undecided.any(is_hopeless) => {
+                "more processes would not decide, as two runs scatter by more than their \
+                 processes: run both again, or compare --against BINARY"
+                    .to_owned()
+            }
             (Basis::Reports, _) => {
                 let runs = match more {
                     None if lacks_others => {

@@ -6,7 +6,7 @@ use super::figure::{Axis, ends, is_drawn};
 use super::table::{Column, Table};
 use super::{program, text};
 use crate::measure::Metric;
-use crate::report::{Report, grouped, settings};
+use crate::report::{Report, asked_otherwise, grouped, settings, timed_otherwise};
 
 /// Digits of a commit that name it.
 const COMMIT: usize = 7;
@@ -38,6 +38,13 @@ pub fn page(mut reports: Vec<Report>) -> String {
         let mut series = Vec::new();
         for (structure, cells) in grouped(cells.into_iter()) {
             let sound = cells.iter().filter(|(_, cell)| cell.rank.is_some());
+            let last = sound.clone().next_back().map(|(_, cell)| *cell);
+            // The same name does not make it the same question.
+            let differs = |cell| {
+                let pair = (cell, last?);
+                asked_otherwise(pair).or_else(|| timed_otherwise(pair))
+            };
+            let sound = sound.filter(|(_, cell)| differs(*cell).is_none());
             let times = sound.filter_map(|&(run, cell)| Some((run, cell.time()?)));
             let times = times.filter(|(_, time)| is_drawn(time.value));
             let times: Vec<(usize, &Metric)> = times.collect();
@@ -56,7 +63,10 @@ pub fn page(mut reports: Vec<Report>) -> String {
                 let cell = cells.iter().find(|cell| cell.0 == run);
                 match times.iter().find(|time| time.0 == run) {
                     Some((_, time)) => text::time_with(time),
-                    None => text::some(cell, |(_, cell)| cell.status.name().to_owned()),
+                    None => text::some(cell, |(_, cell)| {
+                        let why = cell.rank.and_then(|_| differs(*cell));
+                        why.unwrap_or_else(|| cell.status.name().to_owned())
+                    }),
                 }
             });
             table.add_row(

@@ -71,12 +71,15 @@ pub struct Worker {
     last_words: Option<JoinHandle<Vec<u8>>>,
     doing: (Option<String>, String),
     since: Instant,
+    patience: Duration,
 }
 
 impl Worker {
+    /// A worker that is given up after `patience` without a message.
+    ///
     /// # Errors
     /// The program cannot be started.
-    pub fn start(program: &Path, request: &Request) -> anyhow::Result<Worker> {
+    pub fn start(program: &Path, request: &Request, patience: Duration) -> anyhow::Result<Worker> {
         let mut child = Command::new(program)
             .arg("worker")
             .stdin(Stdio::piped())
@@ -126,16 +129,20 @@ impl Worker {
             last_words,
             doing: (None, "starting".to_owned()),
             since: Instant::now(),
+            patience,
         })
     }
 
-    /// Waits for the next message or the end, reported or observed; none within `wait`.
+    /// Waits for the next message or the end, reported, observed or made; none within `wait`.
     ///
     /// # Errors
     /// A message that no worker of this version sends.
     pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Result<Message, Ended>>> {
         let line = match self.lines.recv_timeout(wait) {
             Ok(line) => line?,
+            Err(RecvTimeoutError::Timeout) if self.since.elapsed() > self.patience => {
+                return Ok(Some(Err(self.give_up())));
+            }
             Err(RecvTimeoutError::Timeout) => return Ok(None),
             Err(RecvTimeoutError::Disconnected) => return Ok(Some(Err(self.obituary()?))),
         };
@@ -171,10 +178,10 @@ impl Worker {
     }
 
     /// Ends the process; its current step is what took too long.
-    fn give_up(mut self, patience: Duration) -> Ended {
+    fn give_up(&mut self) -> Ended {
         self.kill();
         let (structure, step) = &self.doing;
-        let reason = format!("{step} took longer than {} s", patience.as_secs());
+        let reason = format!("{step} took longer than {} s", self.patience.as_secs());
         Ended::Died(structure.clone(), Verdict::new(Status::TimedOut, reason))
     }
 
@@ -248,7 +255,7 @@ pub fn see_through(
     keep: &mut dyn FnMut(Message) -> anyhow::Result<()>,
     step: &dyn Fn(&str),
 ) -> anyhow::Result<Ended> {
-    let mut worker = Worker::start(program, request)?;
+    let mut worker = Worker::start(program, request, patience)?;
     loop {
         if interrupt::asked() {
             return Err(Interrupted.into());
@@ -263,7 +270,6 @@ pub fn see_through(
             }
             Some(Ok(found)) => keep(found)?,
             Some(Err(ended)) => return Ok(ended),
-            None if worker.since.elapsed() > patience => return Ok(worker.give_up(patience)),
             None => {}
         }
     }

@@ -164,9 +164,8 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         figures.push(diagram.draw());
     }
     if !spread.is_empty() {
-        let values = spread
-            .iter()
-            .flat_map(|row| row.ends.unwrap_or([row.value; 2]));
+        let ends = |row: &Row| row.ends.unwrap_or([row.value; 2]);
+        let values = spread.iter().flat_map(ends);
         let axis = Axis::log("", values, 1.1, &text::time);
         let caption = format!(
             "{about}: distribution over the views{each}; median, middle half, and 5 to 95 %"

@@ -39,23 +39,19 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     let (scene, path) = (&cell.scene, &cell.path);
     let bad = (scene.skipped_items > 0).then(|| text::counted(scene.skipped_items, "bad item"));
     let axes = (!scene.up.is_empty()).then(|| scene_facts::axes(scene));
-    let of_scene = [
+    let of_scene = text::joined([
         text::counted(scene.total_count, "item"),
         text::counted(scene.region_count, "region"),
         axes.unwrap_or_default(),
         text::some(bad, |bad| format!("{bad} left out")),
-    ];
-    let empty = if scene.total_count == 0 {
-        "; nothing is ranked"
-    } else {
-        ""
+    ]);
+    let of_scene = match scene.total_count {
+        0 if scene.digest.is_empty() => "not loaded".to_owned(),
+        0 => of_scene + "; nothing is ranked",
+        _ => of_scene,
     };
     let views = text::counted(path.camera_count, "view");
-    let cache = if path.cache == "warm" {
-        ""
-    } else {
-        &path.cache
-    };
+    let cache = Some(&*path.cache).filter(|cache| *cache != "warm");
     let motion = text::some(path.views_per_frame.checked_sub(1), |queries| {
         let checked = comparison.range(|cell| cell.times.cameras_checked);
         let frames = checked.unwrap_or_default().1 / (queries + 1);
@@ -75,11 +71,11 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     let lens = path.lens.as_ref();
     let matrix = lens.and_then(|lens| lens.matrix.as_ref());
     let lines = [
-        format!("{}: {}{empty}", scene.name, text::joined(of_scene)),
+        format!("{}: {of_scene}", scene.name),
         format!(
             "{}: {}",
             path.name,
-            text::joined([&views, &cell.test, cache])
+            text::joined([&views, &cell.test, cache.unwrap_or_default()])
         ),
         motion,
         text::some(lens, scene_facts::lens),
@@ -158,11 +154,7 @@ pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) ->
         let figure = |(_, metric, show): &Figure| text::some(cell.value(metric), show);
         let last = [
             text::some(of_peer.filter(|_| is_ok), text::significant),
-            if is_full && !is_ok {
-                status
-            } else {
-                String::new()
-            },
+            text::some((is_full && !is_ok).then_some(status), |status| status),
         ];
         let row = row.into_iter().chain(figures.iter().map(figure));
         table.add_row(row.chain(last));

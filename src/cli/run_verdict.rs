@@ -51,10 +51,9 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
 /// Wall time, gain and CPU time of work that threads share.
 pub fn gains(shared: &[SharedWork]) -> Option<String> {
     let told = shared.iter().map(|work| {
-        let what = if work.shares_views {
-            " with shared views"
-        } else {
-            ""
+        let what = match work.shares_views {
+            true => " with shared views",
+            false => "",
         };
         let cpu = text::some(work.cpu_ratio, |ratio| {
             format!(", {} the CPU time", times(ratio))
@@ -74,7 +73,11 @@ pub fn gains(shared: &[SharedWork]) -> Option<String> {
 fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     let winners: Vec<&ReportCell> = comparison.winners().collect();
     let Some(best) = winners.first() else {
-        return match comparison.about().scene.total_count {
+        let scene = &comparison.about().scene;
+        return match scene.total_count {
+            0 if scene.digest.is_empty() => {
+                "Nothing is ranked: the scene was not loaded.".to_owned()
+            }
             0 => "Nothing is ranked: the scene has no items.".to_owned(),
             _ => "Nothing is ranked: no structure has times of right answers.".to_owned(),
         };

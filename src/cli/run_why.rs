@@ -80,15 +80,12 @@ impl Pair<'_> {
         let [Some(time), Some(tests), Some(per_test)] = ratios else {
             return "A query without tests cannot be explained by their number.".to_owned();
         };
-        let rank = match time < 1.0 {
-            true => ", the best of the others",
-            false => ", the best",
-        };
+        let others = if time < 1.0 { " of the others" } else { "" };
         let (own, other) = (&self.own.structure, &self.other.structure);
         let parts = parts(tests, per_test);
         let Some(frame) = self.ratio(frame_ns) else {
             return format!(
-                "{own} takes {} the time of {other}{rank}: {parts}.",
+                "{own} takes {} the time of {other}, the best{others}: {parts}.",
                 times(time)
             );
         };

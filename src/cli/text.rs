@@ -37,11 +37,14 @@ pub fn conclusion(report: &Report) -> String {
         None if least < planned => format!("{} of {planned} processes", count(least)),
         _ => processes,
     };
+    if least == 0 {
+        return "nothing was timed".to_owned();
+    }
     if least < 3 {
         return format!(
             "{}: times without intervals, ranks by their order alone (--processes 10 gives \
              intervals)",
-            of_planned(counted(least.max(1), "process"))
+            of_planned(counted(least, "process"))
         );
     }
     let few = if least < 10 {

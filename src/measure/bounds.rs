@@ -106,10 +106,8 @@ fn memcpy<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
 
 /// Only beside `wide` itself. The tree is a copy of its own.
 fn replay<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
-    let wide = material
-        .subjects
-        .iter()
-        .find(|c| c.spec.row.info.name == Wide::INFO.name && c.built.is_ok())?;
+    let is_wide = |c: &&Subject| c.spec.row.info.name == Wide::INFO.name && c.built.is_ok();
+    let wide = material.subjects.iter().find(is_wide)?;
     let params = serde_json::from_value(wide.spec.params.clone()).ok()?;
     let tree = Wide::build(&Input::new(&material.workload.items), &params).ok()?;
     let views = material.workload.views.iter();

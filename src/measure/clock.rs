@@ -5,6 +5,8 @@ use std::time::Instant;
 
 use cpu_time::{ProcessTime, ThreadTime};
 
+use crate::statistics::median;
+
 /// Time between two readings, in nanoseconds.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct Lap {
@@ -12,6 +14,19 @@ pub struct Lap {
     pub cpu_ns: f64,
     /// Wall time, other programs included.
     pub wall_ns: f64,
+}
+
+impl Lap {
+    /// The work of a lap, less the cost of an `empty` one.
+    ///
+    /// No less than a thirty-second of that cost, which is how well it is known.
+    pub fn less(self, empty: Lap) -> Lap {
+        let less = |lap: f64, empty: f64| (lap - empty).max(empty / 32.0);
+        Lap {
+            cpu_ns: less(self.cpu_ns, empty.cpu_ns),
+            wall_ns: less(self.wall_ns, empty.wall_ns),
+        }
+    }
 }
 
 /// Both clocks, read together. The CPU clock is read innermost: it is the one
@@ -37,6 +52,16 @@ impl Stopwatch {
             wall,
             process: all_threads.then(ProcessTime::now),
             cpu: ThreadTime::now(),
+        }
+    }
+
+    /// Cost of a lap: the medians of a few without work, at the speed of the moment.
+    pub fn empty_lap(all_threads: bool) -> Lap {
+        let laps = [(); 9].map(|()| Stopwatch::start_for(all_threads).lap());
+        let middle = |of: fn(&Lap) -> f64| median(&laps.each_ref().map(of)).unwrap_or(0.0);
+        Lap {
+            cpu_ns: middle(|lap| lap.cpu_ns),
+            wall_ns: middle(|lap| lap.wall_ns),
         }
     }
 

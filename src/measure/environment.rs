@@ -124,11 +124,8 @@ impl Machine {
     pub fn slug(&self) -> String {
         let brand = self.cpu.as_deref().unwrap_or("unknown");
         let words = brand.split(|c: char| !c.is_ascii_alphanumeric());
-        let short: Vec<String> = words
-            .filter(|w| !w.is_empty())
-            .take(3)
-            .map(str::to_ascii_lowercase)
-            .collect();
+        let words = words.filter(|w| !w.is_empty()).take(3);
+        let short: Vec<String> = words.map(str::to_ascii_lowercase).collect();
         format!("{}-{}c", short.join("-"), self.cores)
     }
 }

@@ -193,10 +193,8 @@ impl Plan {
         share: &Share,
         notice: Notice,
     ) -> Vec<Subject> {
-        let preferred = self
-            .structures
-            .iter()
-            .find(|s| s.row.info.kind != Kind::Scan);
+        let mut structures = self.structures.iter();
+        let preferred = structures.find(|s| s.row.info.kind != Kind::Scan);
         let twin = preferred.or(self.structures.first());
         let once = self.structures.iter().map(|s| (s, false));
         // A structure that has ended a process is not tried again, not as a twin either.

@@ -7,7 +7,7 @@
 
 use super::clock::Stopwatch;
 use super::group::{GroupPlan, counts, measure_part, task_part};
-use super::moving::{Frames, Laps, Moving, ageing, lap_ns, replay};
+use super::moving::{Frames, Laps, Moving, ageing, replay, times_of};
 use super::process_result::{Known, Part, SubjectPart, TaskSamples};
 use super::schedule::Orders;
 use super::{
@@ -201,17 +201,17 @@ impl Entry<'_> {
         let mut timed = Timed::default();
         for (round, laps) in (0..).zip(&self.rounds) {
             let frames = (0..).zip(frames.right.chunks(views)).zip(laps);
-            timed
-                .samples
-                .extend(frames.map(|((frame, answers), laps)| Sample {
+            timed.samples.extend(frames.map(|((frame, answers), laps)| {
+                let [cpu_ns, wall_ns] = times_of(laps, kind, workload);
+                Sample {
                     round,
                     frame,
                     queries: 1,
-                    cpu_ns: laps.of(kind, workload),
-                    wall_ns: laps.wall * laps.of(kind, workload)
-                        / laps.of(TaskKind::Frame, workload),
+                    cpu_ns,
+                    wall_ns,
                     returned: answers.iter().map(|answer| answer.count).sum(),
-                }));
+                }
+            }));
         }
         Ok(timed)
     }
@@ -229,10 +229,8 @@ fn schedule(
     let (mut keys, mut tasks) = (Vec::new(), Vec::new());
     for entry in timed {
         let several = frames.workload.views_per_frame > 1;
-        for kind in KINDS
-            .into_iter()
-            .filter(|k| several || *k != TaskKind::Further)
-        {
+        let kinds = KINDS.into_iter();
+        for kind in kinds.filter(|k| several || *k != TaskKind::Further) {
             keys.push((entry.part.label.clone(), kind));
             let every = (rounds / own(entry)) as u32;
             tasks.push(TaskPlan { batch: 1, every });
@@ -258,7 +256,7 @@ fn time(
     notice: Notice,
     stop: &dyn Fn() -> bool,
 ) -> Option<()> {
-    let lap_ns = lap_ns();
+    let lap_ns = Stopwatch::empty_lap(false).cpu_ns;
     let mut orders = Orders::new(entries.len(), plan.protocol.seed);
     for round in 0..planned.schedule.rounds {
         for n in orders.next() {

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::clock::Stopwatch;
+use super::clock::{Lap, Stopwatch};
 use super::index_under_test::not_built;
 use super::process_result::Known;
 use super::update::{MOST_UPDATED, USUAL_SHARE, move_share};
@@ -18,7 +18,6 @@ use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec, UpdatePolicy};
 use crate::motion::{Motion, Replay};
 use crate::query::ItemId;
-use crate::statistics::median;
 use crate::verify::{Trial, explain_visibility, scan};
 
 /// Number of updates before queries are timed.
@@ -71,12 +70,8 @@ impl<'w> Frames<'w> {
         &self,
         frame: usize,
     ) -> impl Iterator<Item = (usize, &'w CameraView)> + use<'w> {
-        let Workload {
-            views,
-            views_per_frame,
-            ..
-        } = self.workload;
-        let queries = (0..*views_per_frame).map(move |n| frame * views_per_frame + n);
+        let (views, views_per_frame) = (&self.workload.views, self.workload.views_per_frame);
+        let queries = (0..views_per_frame).map(move |n| frame * views_per_frame + n);
         queries.map(|query| (query, &views[query % views.len()]))
     }
 
@@ -127,9 +122,7 @@ pub(super) struct Moving<'w> {
 
 impl<'w> Moving<'w> {
     pub(super) fn build(frames: &Frames<'w>, spec: &'w StructureSpec) -> Result<Self, Verdict> {
-        let Frames {
-            workload, motion, ..
-        } = *frames;
+        let (workload, motion) = (frames.workload, frames.motion);
         let items = workload.items.to_vec();
         let fat = match spec.policy {
             UpdatePolicy::Fat(margin) => Some(Fat::of(&items, margin as f32)),
@@ -252,25 +245,22 @@ fn enlarged(b: &Aabb, margin: f32) -> Aabb {
     if larger.is_finite() { larger } else { *b }
 }
 
-/// CPU ns of update, first query and further queries; wall ns of the frame.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Laps {
-    cpu: [f64; 3],
-    pub(super) wall: f64,
-}
+/// Update, first query and further queries of a frame.
+pub(super) type Laps = [Lap; 3];
 
-impl Laps {
-    /// CPU ns of a kind; of a further query their mean. Above zero.
-    pub(super) fn of(&self, kind: TaskKind, workload: &Workload) -> f64 {
-        let further = workload.views_per_frame.saturating_sub(1).max(1) as f64;
+/// CPU and wall ns of a kind; of a further query their mean. Above zero.
+pub(super) fn times_of(laps: &Laps, kind: TaskKind, workload: &Workload) -> [f64; 2] {
+    let further = workload.views_per_frame.saturating_sub(1).max(1) as f64;
+    [|lap: &Lap| lap.cpu_ns, |lap: &Lap| lap.wall_ns].map(|clock| {
+        let ns = laps.each_ref().map(clock);
         let ns = match kind {
-            TaskKind::Update => self.cpu[0],
-            TaskKind::Query => self.cpu[1],
-            TaskKind::Further => self.cpu[2] / further,
-            _ => self.cpu.iter().sum(),
+            TaskKind::Update => ns[0],
+            TaskKind::Query => ns[1],
+            TaskKind::Further => ns[2] / further,
+            _ => ns.iter().sum(),
         };
         ns.max(1.0)
-    }
+    })
 }
 
 /// Times every frame of one replay; `Ok(None)` if stopped.
@@ -303,39 +293,21 @@ pub(super) fn replay(
         for ((_, view), out) in views {
             moving.index.query(view.as_any(), out);
         }
-        let end = watch.lap();
-        let further = if outs.len() > 1 {
-            end.cpu_ns - first.cpu_ns - lap_ns
-        } else {
-            0.0
-        };
-        let cpu = [updated.cpu_ns, first.cpu_ns - updated.cpu_ns].map(|ns| (ns - lap_ns).max(0.0));
-        all.push(Laps {
-            cpu: [cpu[0], cpu[1], further.max(0.0)],
-            wall: end.wall_ns,
-        });
+        let end = if outs.len() > 1 { watch.lap() } else { first };
+        let laps = [(Lap::default(), updated), (updated, first), (first, end)];
+        all.push(laps.map(|(from, to)| Lap {
+            cpu_ns: (to.cpu_ns - from.cpu_ns - lap_ns).max(0.0),
+            wall_ns: (to.wall_ns - from.wall_ns - lap_ns).max(0.0),
+        }));
         for ((query, _), out) in frames.views(frame).zip(&outs) {
-            let is_right = frames
-                .right
-                .get(query)
-                .is_some_and(|r| r.count == out.len() as u64);
+            let right = frames.right.get(query);
+            let is_right = right.is_some_and(|r| r.count == out.len() as u64);
             if compares_sets || !is_right {
                 frames.check(&moving, query, out)?;
             }
         }
     }
     Ok(Some(all))
-}
-
-/// CPU time of reading the clock, ns; it is subtracted from each lap.
-pub(super) fn lap_ns() -> f64 {
-    let watch = Stopwatch::start();
-    let mut gaps = [0.0; 255];
-    for gap in &mut gaps {
-        let before = watch.lap();
-        *gap = watch.lap().cpu_ns - before.cpu_ns;
-    }
-    median(&gaps).unwrap_or(0.0)
 }
 
 /// ln of (query time / query time on a fresh build of the same boxes), by frame.
@@ -435,6 +407,21 @@ mod tests {
     use crate::culling::Culling;
     use crate::path::{self, LensDefaults};
     use crate::scene;
+
+    #[test]
+    fn times_of_a_frame_are_those_of_its_laps() {
+        let scene = scene::load("uniform:n=20", &Default::default()).unwrap();
+        let way = path::load("orbit:frames=8", &scene, &LensDefaults::default()).unwrap();
+        let mut workload = Workload::new(&scene, &way, &Culling::default()).unwrap();
+        workload.views_per_frame = 3;
+        let laps = [(50.0, 80.0), (20.0, 21.0), (30.0, 90.0)];
+        let laps = laps.map(|(cpu_ns, wall_ns)| Lap { cpu_ns, wall_ns });
+        let of = |kind| times_of(&laps, kind, &workload);
+        assert_eq!(of(TaskKind::Update), [50.0, 80.0]);
+        assert_eq!(of(TaskKind::Query), [20.0, 21.0]);
+        assert_eq!(of(TaskKind::Further), [15.0, 45.0]);
+        assert_eq!(of(TaskKind::Frame), [100.0, 191.0]);
+    }
 
     #[test]
     fn a_structure_that_refits_is_timed_again_and_no_other() {

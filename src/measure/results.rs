@@ -43,10 +43,9 @@ impl Group {
         let merged = MergedParts::of(parts);
         let first = &parts[0];
         let subjects = first.subjects.iter();
-        let mut cells: Vec<ReportCell> = subjects
-            .filter(|s| !s.label.ends_with(TWIN))
-            .map(|subject| merged.cell(&subject.label, Some(subject)))
-            .collect();
+        let subjects = subjects.filter(|s| !s.label.ends_with(TWIN));
+        let cells = subjects.map(|subject| merged.cell(&subject.label, Some(subject)));
+        let mut cells: Vec<ReportCell> = cells.collect();
         for (i, rank) in merged.ranks(&cells) {
             cells[i].rank = Some(rank);
         }
@@ -63,6 +62,8 @@ impl Group {
 /// The parts of a group, with times by structure and task.
 struct MergedParts<'p> {
     parts: &'p [Part],
+    /// The first that has loaded the scene, or else the first.
+    loaded: &'p Part,
     /// Answers and schedules of the first process.
     known: Option<&'p Known>,
     /// Structures whose timed pass differs from the schedule.
@@ -91,8 +92,10 @@ impl<'p> MergedParts<'p> {
             let of_part = |part: &'p Part| part.contradictions(known);
             parts.iter().flat_map(of_part).collect()
         });
+        let mut loaded = parts.iter().filter(|part| !part.scene.digest.is_empty());
         let mut merged = MergedParts {
             parts,
+            loaded: loaded.next().unwrap_or(&parts[0]),
             known,
             contradictions,
             ln_ns: logs,
@@ -188,8 +191,8 @@ impl<'p> MergedParts<'p> {
         let is_answered = is_right || verdict.status == Status::Unsafe;
         let judged = subject.and(first.judged).filter(|_| is_answered);
         ReportCell {
-            scene: first.scene.clone(),
-            path: first.path.clone(),
+            scene: self.loaded.scene.clone(),
+            path: self.loaded.path.clone(),
             structure: label.to_owned(),
             kind: subject.map(|subject| subject.kind),
             origin: subject.map(|subject| subject.origin.clone()),
@@ -216,9 +219,11 @@ impl<'p> MergedParts<'p> {
             let left_out = "query_ns_p95, locate_ns, excess: not measured of items that move";
             return vec![left_out.to_owned()];
         }
-        let is_large = self.parts[0].scene.total_count > MOST_UPDATED;
+        let is_large = self.loaded.scene.total_count > MOST_UPDATED;
         let has_few_groups = |task: &TaskPart| task.tail_ns.len() < LEAST_TAIL;
         let reasons = [
+            (self.ln_ns(label, TaskKind::Query).is_none())
+                .then(|| "query_ns: no time in some process".to_owned()),
             is_large.then(|| {
                 format!("update_ms: scenes of more than {MOST_UPDATED} items are not moved")
             }),
@@ -285,7 +290,7 @@ impl<'p> MergedParts<'p> {
         judged: Option<&Judged>,
         is_right: bool,
     ) -> BTreeMap<String, Metric> {
-        let items = self.parts[0].scene.total_count as f64;
+        let items = self.loaded.scene.total_count as f64;
         let counted = |name: &str| {
             let count = subject.filter(|_| is_right)?.counts.get(name)?;
             Some(Estimate::exact(*count))
@@ -327,17 +332,12 @@ impl<'p> MergedParts<'p> {
             Of::BreakEven => self.break_even(label).map(Estimate::exact),
         };
         let found = METRICS.iter().filter_map(|info| {
-            let Estimate {
-                value,
-                lower,
-                upper,
-            } = value(info).filter(|found| found.value.is_finite())?;
-            let unit = info.unit.to_owned();
+            let found = value(info).filter(|found| found.value.is_finite())?;
             let metric = Metric {
-                value,
-                lower,
-                upper,
-                unit,
+                value: found.value,
+                lower: found.lower,
+                upper: found.upper,
+                unit: info.unit.to_owned(),
             };
             Some((info.name.to_owned(), metric))
         });

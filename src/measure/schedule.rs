@@ -148,9 +148,8 @@ impl Schedule {
 /// Median CPU time of a query, ns, from a few cameras.
 fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
     let some = cameras.len().min(PILOT);
-    let mut queried: Vec<u32> = (0..some)
-        .map(|k| cameras[k * cameras.len() / some])
-        .collect();
+    let spread = (0..some).map(|k| cameras[k * cameras.len() / some]);
+    let mut queried: Vec<u32> = spread.collect();
     if task.ask_many.is_some() {
         queried = cameras.to_vec();
         let watch = Stopwatch::start();
@@ -276,11 +275,7 @@ impl Orders {
     /// The next round's order.
     pub fn next(&mut self) -> Vec<usize> {
         let count = self.names.len();
-        let block = if count.is_multiple_of(2) {
-            count
-        } else {
-            2 * count
-        };
+        let block = count * (1 + count % 2);
         let turn = self.turn.checked_rem(block).unwrap_or(0);
         if turn == 0 {
             for i in (1..count).rev() {

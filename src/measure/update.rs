@@ -43,9 +43,8 @@ pub(super) fn measure_updates(
 /// Moves evenly spread items by their own extent, within f32; returns their ids.
 pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
     let count = ((items.len() as f64 * share).round() as usize).clamp(1, items.len());
-    let moved: Vec<ItemId> = (0..count)
-        .map(|i| (i * items.len() / count) as ItemId)
-        .collect();
+    let spread = (0..count).map(|i| (i * items.len() / count) as ItemId);
+    let moved: Vec<ItemId> = spread.collect();
     for &id in &moved {
         let b = &mut items[id as usize];
         let step = b.extent();

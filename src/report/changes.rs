@@ -222,10 +222,9 @@ fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
         known.map(|logs| logs[side].clone()).collect()
     });
     let with_others = timed.iter().zip(&relative);
-    let structures: Vec<&str> = with_others
-        .filter(|(_, relative)| relative.is_some())
-        .map(|((row, _), _)| row.cell.structure.as_str())
-        .collect();
+    let with_others = with_others.filter(|(_, relative)| relative.is_some());
+    let structures = with_others.map(|((row, _), _)| row.cell.structure.as_str());
+    let structures: Vec<&str> = structures.collect();
     let mut judged = judge_unpaired(&was, &is, &structures, threshold).into_iter();
     for ((row, _), relative) in timed.into_iter().zip(relative) {
         let judgement = relative.as_ref().and_then(|_| judged.next().flatten());
@@ -261,9 +260,8 @@ fn conclude(row: &mut JudgedRow, judgement: Option<Judgement>) {
         Some(Judgement::without_interval(ratio, pairs))
     };
     row.judgement = judgement.or_else(by_values);
-    row.outcome = row
-        .judgement
-        .map_or(Outcome::Unmeasured, |j| j.change.into());
+    let change = row.judgement.map(|found| found.change.into());
+    row.outcome = change.unwrap_or(Outcome::Unmeasured);
 }
 
 /// The rows of one counter, which is exact.

@@ -24,7 +24,7 @@ pub use judging::{
 pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
 pub use ranking::{Comparison, Mean, Overall, Speedup, comparisons, times_as_fast};
-pub use ranking::{grouped, unique};
+pub use ranking::{asked_otherwise, grouped, timed_otherwise, unique};
 pub use reading::{Reading, Views, views};
 pub use reading::{read_report, read_stream};
 pub use stream::{Header, KeptPart, Line, Stream, dated, utc};

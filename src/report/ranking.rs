@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Report, ReportCell};
 use crate::measure::{Judged, Metric, Status, YARDSTICK};
-use crate::statistics::geometric_mean;
+use crate::statistics::{ALPHA, geometric_mean, is_less};
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
@@ -174,7 +174,7 @@ fn keyed(cells: &[ReportCell]) -> Vec<(Numbered<'_>, &ReportCell)> {
 }
 
 /// A cell in both reports.
-pub(super) type Pair<'r> = (&'r ReportCell, &'r ReportCell);
+pub type Pair<'r> = (&'r ReportCell, &'r ReportCell);
 
 /// Cells of the same name, and those that only one side has, in their order.
 pub(super) struct Matched<'r> {
@@ -203,7 +203,7 @@ pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Match
 }
 
 /// Why the two cells are not the same question, if they are not.
-pub(super) fn asked_otherwise((old, new): Pair) -> Option<String> {
+pub fn asked_otherwise((old, new): Pair) -> Option<String> {
     let digests = |what: &str, old: &str, new: &str| {
         let short = |digest: &str| digest.chars().take(8).collect::<String>();
         (old != new).then(|| format!("{what}: digest {} and {}", short(old), short(new)))
@@ -223,7 +223,7 @@ pub(super) fn asked_otherwise((old, new): Pair) -> Option<String> {
 
 /// Why the times are not of the same work, if they are not: the mean over other
 /// cameras, or of shorter batches, is another figure.
-pub(super) fn timed_otherwise((old, new): Pair) -> Option<String> {
+pub fn timed_otherwise((old, new): Pair) -> Option<String> {
     let (was, is) = (&old.times, &new.times);
     if was.cameras_timed != is.cameras_timed {
         let (was, is) = (was.cameras_timed, is.cameras_timed);
@@ -249,16 +249,15 @@ pub struct Mean<'r> {
     pub speedup: Option<f64>,
     /// Comparisons in which it has the first rank, alone or not.
     pub first_in: usize,
-    /// Half the 95 % interval of the logarithm of its mean time; 0 without intervals.
-    margin: f64,
+    /// Logarithm of its mean time, less the base's, in each process.
+    logs: Vec<f64>,
 }
 
 impl Mean<'_> {
-    /// True if the geometric means are not told apart. Conservative: the times of two
-    /// structures are paired, which this leaves unused.
+    /// True if no paired test over the processes tells the means apart.
     pub fn ties_with(&self, other: &Mean) -> bool {
-        let ratio = self.speedup.zip(other.speedup).map(|(a, b)| (a / b).ln());
-        ratio.is_some_and(|ratio| ratio.abs() <= self.margin.hypot(other.margin))
+        let (own, other) = (&self.logs, &other.logs);
+        !is_less(own, other, ALPHA) && !is_less(other, own, ALPHA)
     }
 }
 
@@ -272,21 +271,39 @@ impl<'r> Overall<'r> {
             ranked().map(|c| c.sound_cell(name)).collect()
         };
         let mean = |name: &str| {
-            let times = cells(name)?
-                .into_iter()
-                .map(|cell| Some(cell.time()?.value));
+            let cells = cells(name)?.into_iter();
+            let times = cells.map(|cell| Some(cell.time()?.value));
             geometric_mean(&times.collect::<Option<Vec<f64>>>()?)
+        };
+        let logs = |name: &str| -> Option<Vec<f64>> {
+            let cells = cells(name)?.into_iter();
+            let times = cells.map(|cell| cell.times.by_process.get(cell.ranked_by()));
+            let times: Vec<&Vec<f64>> = times.collect::<Option<_>>()?;
+            let processes = 0..times.iter().map(|own| own.len()).min()?;
+            let of_process = |process: usize| {
+                let own: Vec<f64> = times.iter().map(|own| own[process]).collect();
+                geometric_mean(&own).map(f64::ln)
+            };
+            processes.map(of_process).collect()
         };
         let timed = || names.iter().copied().filter_map(|n| Some((n, mean(n)?)));
         let base = timed().find(|(name, _)| *name == YARDSTICK);
         let base = base.or_else(|| timed().max_by(|a, b| a.1.total_cmp(&b.1)));
+        let of_base = base.and_then(|(name, _)| logs(name)).unwrap_or_default();
         let standing = |&structure: &&'r str| Mean {
             structure,
             speedup: base.zip(mean(structure)).map(|(base, mean)| base.1 / mean),
             first_in: ranked()
                 .filter(|c| c.winners().any(|cell| cell.structure == structure))
                 .count(),
-            margin: cells(structure).map_or(0.0, |cells| margin(&cells)),
+            logs: match logs(structure) {
+                Some(own) if !of_base.is_empty() => own
+                    .iter()
+                    .zip(&of_base)
+                    .map(|(own, base)| own - base)
+                    .collect(),
+                _ => mean(structure).map(f64::ln).into_iter().collect(),
+            },
         };
         let mut standings: Vec<Mean> = names.iter().map(standing).collect();
         let speed = |standing: &Mean| standing.speedup.unwrap_or(0.0);
@@ -296,17 +313,6 @@ impl<'r> Overall<'r> {
             standings,
         }
     }
-}
-
-/// Half the interval of the mean logarithm of independent times.
-fn margin(cells: &[&ReportCell]) -> f64 {
-    let halves = cells.iter().map(|cell| {
-        let time = cell.time();
-        let ends = time.and_then(|time| Some((time.lower?, time.upper?)));
-        ends.map_or(0.0, |(lower, upper)| (upper / lower).ln() / 2.0)
-    });
-    let squares: f64 = halves.map(|half| half * half).sum();
-    squares.sqrt() / cells.len().max(1) as f64
 }
 
 #[cfg(test)]

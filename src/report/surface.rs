@@ -48,10 +48,9 @@ pub fn world_of(scene: &str) -> String {
     let Some((name, parameters)) = scene.rsplit_once(':') else {
         return scene.to_owned();
     };
-    let others: Vec<&str> = parameters
-        .split(',')
-        .filter(|pair| !pair.trim_start().starts_with("n="))
-        .collect();
+    let parameters = parameters.split(',');
+    let others = parameters.filter(|pair| !pair.trim_start().starts_with("n="));
+    let others: Vec<&str> = others.collect();
     match others.is_empty() {
         true => name.to_owned(),
         false => format!("{name}:{}", others.join(",")),
@@ -152,10 +151,7 @@ impl Surface<'_> {
     }
 
     fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
-        let cells = self
-            .places
-            .iter()
-            .flat_map(|place| place.comparison.sound());
+        let cells = self.places.iter().flat_map(|p| p.comparison.sound());
         let cells = cells.filter(|cell| is_one(cell));
         unique(cells.map(|cell| cell.structure.as_str()))
     }
@@ -179,10 +175,8 @@ impl Surface<'_> {
     /// in between, the logarithms of the speed-ups are interpolated.
     pub fn crossing(&self, structure: &str, class: f64) -> Option<Crossing> {
         let curve = self.curve(structure, class, "speedup");
-        let faster: Vec<bool> = curve
-            .iter()
-            .map(|point| self.is_faster(structure, class, point.0))
-            .collect();
+        let is_faster = |point: &(usize, f64)| self.is_faster(structure, class, point.0);
+        let faster: Vec<bool> = curve.iter().map(is_faster).collect();
         let (first, last) = (curve.first()?, curve.last()?);
         if curve.len() < 2 {
             return None;
@@ -274,10 +268,8 @@ fn of_series<'r>((key, mut points): (Key<'r>, Vec<Point>)) -> Vec<Growth<'r>> {
         let mut same: Vec<Point> = points.drain(..end).collect();
         same.sort_by_key(|p| p.0);
         same.dedup_by_key(|p| p.0);
-        let logs: Vec<(f64, f64)> = same
-            .iter()
-            .map(|&(items, _, ns)| ((items as f64).ln(), ns.ln()))
-            .collect();
+        let log = |&(items, _, ns): &Point| ((items as f64).ln(), ns.ln());
+        let logs: Vec<(f64, f64)> = same.iter().map(log).collect();
         let Some(exponent) = slope(&logs).filter(|_| same.len() >= LEAST_SIZES) else {
             continue;
         };

@@ -2,20 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::trimmed::kept;
-use super::{Trimmed, moderate, student, trimmed_mean};
+use super::trimmed::{kept, moderate};
+use super::{Trimmed, student, trimmed_mean};
 
 /// Which hypotheses are rejected so that the chance of even one false rejection
 /// among all of them is at most `alpha` (Holm 1979, "A simple sequentially
 /// rejective multiple test procedure", sec. 2). A NaN is never rejected, but
 /// counts as a test.
-///
-/// ```
-/// use cullbench::statistics::holm;
-/// // 0.01 <= 0.05 / 3, 0.02 <= 0.05 / 2, 0.06 > 0.05 / 1.
-/// assert_eq!(holm(&[0.02, 0.06, 0.01], 0.05), [true, false, true]);
-/// ```
-pub fn holm(p: &[f64], alpha: f64) -> Vec<bool> {
+fn holm(p: &[f64], alpha: f64) -> Vec<bool> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
     let mut rejected = vec![false; p.len()];
@@ -236,6 +230,8 @@ mod tests {
         // 0.01 <= .05/4, 0.02 > .05/3: then 0.03 <= .05/1 does not count.
         let p = [0.03, 0.02, 0.01, 0.9];
         assert_eq!(holm(&p, 0.05), [false, false, true, false]);
+        // 0.01 <= 0.05 / 3, 0.02 <= 0.05 / 2, 0.06 > 0.05 / 1.
+        assert_eq!(holm(&[0.02, 0.06, 0.01], 0.05), [true, false, true]);
         assert_eq!(holm(&[0.01, f64::NAN], 0.05), [true, false]);
         assert_eq!(holm(&[0.03, f64::NAN], 0.05), [false, false]);
         assert!(holm(&[], 0.05).is_empty());

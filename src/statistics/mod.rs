@@ -14,7 +14,6 @@ mod tests_simulation;
 mod trimmed;
 mod unpaired;
 
-pub use judgement::holm;
 pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::two_speeds;
 pub use means::{geometric_mean, interquartile_mean};
@@ -24,5 +23,5 @@ pub use ranking::{ALPHA, is_less, ranks};
 pub use ranking::{Standing, dominance};
 pub use rate::{Rate, rate, shows_less, shows_less_in_sum};
 pub use student::slope;
-pub use trimmed::{Trimmed, moderate, trimmed_mean};
+pub use trimmed::{Trimmed, trimmed_mean};
 pub use unpaired::judge_unpaired;

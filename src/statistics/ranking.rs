@@ -15,10 +15,8 @@ pub const ALPHA: f64 = 0.05;
 /// Equal means are ordered by index, a structure with no values or with one
 /// that is not finite comes last: the ranks are the same for the same input.
 pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<usize> {
-    let means: Vec<f64> = values
-        .iter()
-        .map(|values| centre(values).unwrap_or(f64::INFINITY))
-        .collect();
+    let mean = |values: &Vec<f64>| centre(values).unwrap_or(f64::INFINITY);
+    let means: Vec<f64> = values.iter().map(mean).collect();
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| means[a].total_cmp(&means[b]));
     let mut ranks = vec![0; values.len()];

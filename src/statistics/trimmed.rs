@@ -146,7 +146,7 @@ pub(super) fn paired_difference(a: &[f64], b: &[f64]) -> Option<Trimmed> {
 /// empirical Bayes methods ...", sec. 4, with a fixed prior). It is never worth
 /// more than what the other cells have together: a single cell stays as it is,
 /// for its own variance is no news about itself.
-pub fn moderate(cells: &mut [Trimmed]) {
+pub(super) fn moderate(cells: &mut [Trimmed]) {
     let variances: Vec<f64> = cells.iter().map(|c| c.standard_error.powi(2)).collect();
     let Some(typical) = median(&variances) else {
         return;

@@ -44,20 +44,31 @@ pub fn judge_unpaired(
         Some(difference(&trimmed_mean(old)?, &trimmed_mean(new)?))
     };
     let estimates: Vec<Option<Trimmed>> = sides().map(estimate).collect();
-    let of_judged = estimates.iter().zip(structures);
-    let names: Vec<&str> = of_judged
+    let names = estimates.iter().zip(structures);
+    let names: Vec<&str> = names
         .filter_map(|(found, name)| found.map(|_| *name))
         .collect();
-    let judged = judge_estimates(estimates, [threshold, FLOOR_OF_RUNS], |cells| {
-        add_scatter_of_runs(cells, &names);
+    let mut widened = Vec::new();
+    let mut judged = judge_estimates(estimates, [threshold, FLOOR_OF_RUNS], |cells| {
+        widened = add_scatter_of_runs(cells, &names);
     });
+    // More processes leave the scatter of the runs as it is.
+    for (found, _) in judged
+        .iter_mut()
+        .flatten()
+        .zip(widened)
+        .filter(|(_, by)| *by > 0.0)
+    {
+        found.more_pairs = None;
+    }
     sides()
         .zip(judged)
         .map(|((old, new), judged)| judged.or_else(|| without_interval(old, new)))
         .collect()
 }
 
-fn add_scatter_of_runs(cells: &mut [Trimmed], structures: &[&str]) {
+/// Adds the scatter of the runs; the standard deviation that each cell got.
+fn add_scatter_of_runs(cells: &mut [Trimmed], structures: &[&str]) -> Vec<f64> {
     let mut of_structure: BTreeMap<&str, Vec<Trimmed>> = BTreeMap::new();
     for (cell, &structure) in cells.iter().zip(structures) {
         of_structure.entry(structure).or_default().push(*cell);
@@ -67,15 +78,18 @@ fn add_scatter_of_runs(cells: &mut [Trimmed], structures: &[&str]) {
         true => excess_variance(cells, 0.0),
         false => 0.0,
     };
-    for (cell, structure) in cells.iter_mut().zip(structures) {
+    let added = cells.iter_mut().zip(structures).map(|(cell, structure)| {
         let own = &of_structure[structure];
         let middle = median(&own.iter().map(|cell| cell.mean).collect::<Vec<_>>());
         let of_own = match middle.filter(|_| own.len() >= LEAST_OF_ONE) {
             Some(middle) => excess_variance(own, middle),
             None => 0.0,
         };
-        cell.standard_error = cell.standard_error.hypot(of_all.max(of_own).sqrt());
-    }
+        let scatter = of_all.max(of_own).sqrt();
+        cell.standard_error = cell.standard_error.hypot(scatter);
+        scatter
+    });
+    added.collect()
 }
 
 /// Variance of the means about `middle` beyond their standard errors, by the median
@@ -117,22 +131,22 @@ mod tests {
     }
 
     /// Ten structures in four scenes each, all of which moved by what `of` says.
-    fn judged(of: impl Fn(usize, usize) -> f64) -> Vec<Change> {
+    fn judged(of: impl Fn(usize, usize) -> f64) -> Vec<Judgement> {
         let names: Vec<String> = (0..40).map(|cell| format!("s{}", cell / 4)).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let old = vec![side(0.0); 40];
         let new: Vec<Vec<f64>> = (0..40).map(|cell| side(of(cell / 4, cell % 4))).collect();
         let found = judge_unpaired(&old, &new, &names, 0.05);
-        found
-            .into_iter()
-            .map(|found| found.unwrap().change)
-            .collect()
+        found.into_iter().map(Option::unwrap).collect()
     }
 
     #[test]
     fn what_two_runs_scatter_by_is_no_change() {
         let calm = judged(|structure, _| if structure == 3 { 0.12 } else { 0.0 });
-        let slower = |found: &[Change]| found.iter().filter(|c| **c == Change::Slower).count();
+        let slower = |found: &[Judgement]| {
+            let slower = found.iter().filter(|found| found.change == Change::Slower);
+            slower.count()
+        };
         assert_eq!(slower(&calm), 4, "a structure that moved as a whole");
         // The same where every cell moves by as much, up or down.
         let wild = judged(|structure, scene| match (structure + scene) % 2 {
@@ -140,6 +154,10 @@ mod tests {
             _ => -0.12,
         });
         assert_eq!(slower(&wild), 0);
+        // As many processes as one likes leave it as it is.
+        assert!(wild.iter().all(|found| found.more_pairs.is_none()));
+        let unclear = judge_unpaired(&[side(0.0)], &[side(0.06)], &["a"], 0.05)[0].unwrap();
+        assert!(unclear.more_pairs.is_some());
         // One structure alone that scatters is found by its own cells.
         let one = judged(|structure, scene| match (structure, scene) {
             (3, 0 | 2) => 0.12,

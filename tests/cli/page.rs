@@ -168,6 +168,15 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     assert_eq!(plots.len(), 1);
     assert_eq!(plots[0].matches("<polygon class=\"mark").count(), 4);
     assert_eq!(plots[0].matches("class=\"interval\"").count(), 4);
+    // Another question of the same name is left out, and says so.
+    for cell in new["cells"].as_array_mut().expect("an array") {
+        cell["path"]["camera_count"] = json!(80);
+    }
+    fs::write(folder.path().join("new.json"), new.to_string()).expect("writable");
+    works(folder.path(), "report new.json old --history other.html");
+    let page = fs::read_to_string(folder.path().join("other.html")).expect("a page");
+    assert!(page.contains("0 of 0 times took longer and 0 took less time"));
+    assert_eq!(page.matches("8 cameras and 80</td>").count(), 2);
     let wanted = "2 reports; expected one, or --history FILE";
     all_refused(&folder, &["report old new.json".to_owned()], wanted);
 }

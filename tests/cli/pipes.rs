@@ -238,6 +238,31 @@ fn scenes_and_cameras_come_from_pipes() {
     );
 }
 
+/// A program that hangs once the pairs have begun is given up.
+#[cfg(unix)]
+#[test]
+fn a_program_that_hangs_in_a_pair_is_one_error_line() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = folder.path().join("other");
+    let script = format!(
+        "#!/bin/sh\nif [ -e counted ]; then\n  printf '{{\"ready\":{{\"protocol\":5}}}}\\n'\n  \
+         exec sleep 60\nfi\n: > counted\nexec {} \"$@\"\n",
+        crate::PROGRAM
+    );
+    std::fs::write(&program, script).expect("written");
+    let executable = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(&program, executable).expect("executable");
+    let line = "compare --against ./other --scene city:n=100 --structure linear --timeout 1";
+    let done = cullbench(folder.path(), line);
+    assert_refused(
+        &done,
+        "took longer than 2 s; expected one that finishes",
+        "a hang",
+    );
+}
+
 /// Output that is not of a worker is one error line that quotes it, and no times.
 #[cfg(unix)]
 #[test]

@@ -251,6 +251,33 @@ fn what_failed_in_one_process_is_not_ok_and_has_no_time() {
 }
 
 #[test]
+fn a_scene_is_the_one_that_some_process_has_loaded() {
+    let linear = times(1.0, 1);
+    let mut parts = parts(&[("linear", TaskKind::Query, &linear)]);
+    parts[0].scene = SceneInfo::unknown("s");
+    parts[2].scene.digest = "d".to_owned();
+    let scene = &Group::of(&parts).cells[0].scene;
+    assert_eq!((scene.total_count, scene.digest.as_str()), (1000, "d"));
+}
+
+#[test]
+fn a_time_that_a_process_lacks_is_left_out_by_name() {
+    let (linear, fast) = (times(1.0, 1), times(0.2, 2));
+    let mut parts = parts(&[
+        ("linear", TaskKind::Query, &linear),
+        ("fast", TaskKind::Query, &fast),
+    ]);
+    parts[7].tasks[1].rounds_ns.clear();
+    let cells = Group::of(&parts).cells;
+    let named = |cell: &ReportCell| {
+        cell.left_out
+            .iter()
+            .any(|why| why.starts_with("query_ns: "))
+    };
+    assert!(!named(&cells[0]) && named(&cells[1]));
+}
+
+#[test]
 fn a_build_breaks_even_by_the_times_that_are_shown() {
     let (linear, fast) = (times(1.0, 1), times(0.2, 2));
     let group = Group::of(&parts(&[

@@ -156,7 +156,7 @@ fn means_are_geometric_and_refer_to_linear_or_else_to_the_slowest() {
 }
 
 #[test]
-fn means_within_their_intervals_tie() {
+fn means_tie_unless_the_processes_tell_them_apart() {
     let mut cells = cells(&[("linear", [400.0; 2]), ("a", [100.0; 2]), ("b", [103.0; 2])]);
     let ties = |cells: &[ReportCell], wanted: [bool; 2]| {
         overall(cells, |overall| {
@@ -167,12 +167,15 @@ fn means_within_their_intervals_tie() {
         });
     };
     ties(&cells, [false, false]);
-    for cell in &mut cells {
-        if let Some(time) = cell.metrics.get_mut("query_ns") {
-            time.lower = Some(time.value / 1.05);
-            time.upper = Some(time.value * 1.05);
+    // Processes differ tenfold, and the two structures within them by 3 % or by more.
+    for (swing, wanted) in [(0.0, [false, false]), (0.2, [true, false])] {
+        for cell in &mut cells {
+            let ns = cell.value("query_ns").unwrap();
+            let own = if cell.structure == "b" { swing } else { 0.0 };
+            let of_process = |p: i32| ns * 1.3f64.powi(p) * (own * f64::from(p % 2 * 2 - 1)).exp();
+            let times = (0..10).map(of_process).collect();
+            cell.times.by_process.insert("query_ns".to_owned(), times);
         }
+        ties(&cells, wanted);
     }
-    // Over two paths, 5 % of each of two structures are 5 % of the ratio.
-    ties(&cells, [true, false]);
 }
