@@ -133,7 +133,7 @@ impl Worker {
         })
     }
 
-    /// Waits for the next message or the end, reported, observed or made; none within `wait`.
+    /// Waits for the next message or the end, told, seen or made; none within `wait`.
     ///
     /// # Errors
     /// A message that no worker of this version sends.
