@@ -285,9 +285,9 @@ fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     };
     let is_blind = !scene.items.is_empty() && !sample.is_empty() && !sample.iter().any(sees_any);
     is_blind.then(|| {
-        let views = match sample.len() == cameras.len() {
-            true => counted(cameras.len(), "view"),
-            false => format!("{} of {} views", sample.len(), cameras.len()),
+        let views = match (sample.len(), counted(cameras.len(), "view")) {
+            (some, all) if some < cameras.len() => format!("{some} of {all}"),
+            (_, all) => all,
         };
         format!("nothing of {} is visible in any of {views}", scene.name)
     })
