@@ -54,7 +54,7 @@ impl UpAxis {
     }
 
     /// Inverse of [`UpAxis::to_z_up`].
-    pub fn from_z_up(self, v: DVec3) -> DVec3 {
+    pub fn from_z_up<V: Vec3Swizzles>(self, v: V) -> V {
         match self {
             UpAxis::Y => v.yzx(),
             UpAxis::Z => v,

@@ -17,7 +17,7 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::geometry::Aabb;
-use crate::scene::{Scene, SurfaceKind, Surfaces};
+use crate::scene::{Scene, SurfaceKind, UpAxis};
 use crate::visibility::Rays;
 use crate::visibility::inscribed::{Cells, turn};
 
@@ -50,6 +50,8 @@ pub struct Ground {
     pub boxes: Vec<Aabb>,
     /// Their number and share.
     pub row: GroundRow,
+    up: UpAxis,
+    /// Turned so that z is up, and so is all that follows.
     triangles: Vec<[Vec3; 3]>,
     /// Bounds of all triangles.
     bounds: Aabb,
@@ -61,17 +63,23 @@ impl Ground {
     pub fn of(scene: &Scene) -> Option<Ground> {
         let surfaces = scene.surfaces.as_ref()?;
         let begun = Instant::now();
-        let items = (0..surfaces.items()).filter(|&item| faces_up(surfaces, item));
+        let up = scene.up;
+        let of_item = |item| surfaces.of(item).map(|t| t.map(|p| up.to_z_up(p) + 0.0));
+        let items = (0..surfaces.items()).filter(|&item| {
+            surfaces.kinds[item] == SurfaceKind::Opaque
+                && !surfaces.of_item[item].is_empty()
+                && of_item(item).all(faces_up)
+        });
         let items: Vec<usize> = items.collect();
-        let triangles = items.iter().flat_map(|&item| surfaces.of(item));
-        let triangles: Vec<[Vec3; 3]> = triangles.map(|t| t.map(|p| p + 0.0)).collect();
+        let triangles: Vec<[Vec3; 3]> = items.iter().flat_map(|&item| of_item(item)).collect();
         let bounds = height_over(&triangles)?;
         let heights = Heights::of(&triangles, &bounds);
         let filled = heights.filled();
         let share = |cells: u32| f64::from(cells) / (CELLS as f64).powi(3);
         let below = share(filled.iter().map(|row| row.count_ones()).sum());
         let (mut boxes, mut held) = (Vec::new(), 0.0);
-        let bottom = scene.bounds.min.z - scene.bounds.extent().z - 1.0;
+        let [least, extent] = [scene.bounds.min, scene.bounds.extent()].map(|v| up.to_z_up(v).z);
+        let bottom = least - extent - 1.0;
         let mut cells = Cells::new(CELLS, filled);
         while boxes.len() < MOST_BOXES {
             // All columns of cells begin at the lowest place.
@@ -81,7 +89,8 @@ impl Ground {
                 break;
             };
             held += share(count);
-            boxes.push(heights.to_box(found, bottom));
+            let Aabb { min, max } = heights.to_box(found, bottom);
+            boxes.push(Aabb::new(up.from_z_up(min), up.from_z_up(max)));
         }
         Some(Ground {
             row: GroundRow {
@@ -91,9 +100,10 @@ impl Ground {
                 build_ns: begun.elapsed().as_nanos() as f64,
             },
             boxes,
+            up,
             triangles,
             bounds,
-            origin: scene.origin,
+            origin: up.to_z_up(scene.origin),
         })
     }
 
@@ -102,7 +112,7 @@ impl Ground {
     /// From above all of it hills hide little, and boxes all over the image displace other
     /// occluders.
     pub fn rises_above(&self, rays: &Rays) -> bool {
-        let eye = rays.camera().frame.eye.z - self.origin.z;
+        let eye = self.up.to_z_up(rays.camera().frame.eye).z - self.origin.z;
         eye < f64::from(self.bounds.max.z)
     }
 
@@ -114,7 +124,8 @@ impl Ground {
             false => camera.lens.near().max(0.0),
         };
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-        let corners = corners.map(|[x, y]| rays.through(x, y).at(near) - self.origin);
+        let corners =
+            corners.map(|[x, y]| self.up.to_z_up(rays.through(x, y).at(near)) - self.origin);
         let low = corners.into_iter().reduce(DVec3::min).unwrap_or_default();
         let high = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
         // More than rounding of the corners, and of what begins at them, can be.
@@ -136,14 +147,10 @@ impl Ground {
     }
 }
 
-/// Returns `true` if an item hides and every triangle of it faces up.
-fn faces_up(surfaces: &Surfaces, item: usize) -> bool {
-    let flat = |p: Vec3| [p.x, p.y];
-    surfaces.kinds[item] == SurfaceKind::Opaque
-        && !surfaces.of_item[item].is_empty()
-        && surfaces
-            .of(item)
-            .all(|[a, b, c]| turn(flat(a), flat(b), flat(c)) > 0)
+/// Returns `true` if a triangle faces up.
+fn faces_up(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| [p.x, p.y]);
+    turn(a, b, c) > 0
 }
 
 /// The bounds of triangles that all face up, if they are a height over a rectangle.
@@ -263,7 +270,7 @@ impl Heights {
 mod tests {
     use super::*;
     use crate::camera::{Camera, Lens, look_at};
-    use crate::scene::{SeededRng, load};
+    use crate::scene::{SeededRng, Surfaces, load};
 
     fn terrain() -> Scene {
         load("mesh:terrain:n=8000", &Default::default()).unwrap()
@@ -303,6 +310,33 @@ mod tests {
             nearest = nearest.min(above);
         }
         assert!(nearest < 0.5, "{nearest}");
+    }
+
+    #[test]
+    fn ground_of_another_up_axis_is_the_same_ground() {
+        let [z, y] = [UpAxis::Z, UpAxis::Y].map(|up| {
+            let mut surfaces = Surfaces::about(up.from_z_up(DVec3::new(5.0, 6.0, 7.0)));
+            for [a, b, c] in triangles() {
+                let corners = [a, b, c].map(|p| up.from_z_up(p));
+                surfaces.push(SurfaceKind::Opaque, false, &corners, &[[0, 1, 2]]);
+            }
+            let scene = surfaces.into_scene("turned").unwrap();
+            let ground = Ground::of(&Scene { up, ..scene }).unwrap();
+            let turned = |b: &Aabb| Aabb::new(up.to_z_up(b.min), up.to_z_up(b.max));
+            let boxes: Vec<Aabb> = ground.boxes.iter().map(turned).collect();
+            let middle = (ground.bounds.min + ground.bounds.max).as_dvec3() / 2.0;
+            let sees = [0.4, 0.6, 0.9, 1.1].map(|height| {
+                let at = DVec3::new(middle.x, middle.y, f64::from(ground.bounds.max.z) * height);
+                let [eye, ahead] = [at, at + DVec3::X].map(|p| up.from_z_up(p + ground.origin));
+                let lens = Lens::perspective(60.0, 1.5, 0.1, None).unwrap();
+                let frame = look_at(eye, ahead, up.vector()).unwrap();
+                let rays = Rays::of(&Camera { frame, lens }).unwrap();
+                [ground.rises_above(&rays), ground.is_below(&rays)]
+            });
+            (boxes, sees)
+        });
+        assert!(z.1.contains(&[true, true]) && z.1.contains(&[false, true]));
+        assert_eq!(z, y);
     }
 
     #[test]
