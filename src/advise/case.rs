@@ -57,6 +57,7 @@ impl<'a> Case<'a> {
             protocol: all.protocol,
             claim: None,
             inner_boxes: None,
+            loading: Default::default(),
             execution: spec.execution,
             all: true,
             picks: false,
@@ -139,9 +140,15 @@ impl<'a> Case<'a> {
     }
 
     /// The depth of a camera's view, or of the scene where that is infinite.
+    ///
+    /// The distance from the eye for a scene that is a point, and not zero even there.
     pub fn depth(&self, camera: usize) -> f64 {
-        let far = self.workload.cameras[camera].lens.far();
-        far.unwrap_or_else(|| f64::from(self.scene().bounds.extent().length()))
+        let camera = &self.workload.cameras[camera];
+        let Scene { bounds, origin, .. } = self.scene();
+        let [low, high] = [bounds.min, bounds.max].map(Vec3::as_dvec3);
+        let depths = [high, camera.frame.eye - *origin].map(|end| end.distance(low));
+        let depth = depths.into_iter().find(|depth| *depth > 0.0);
+        camera.lens.far().or(depth).unwrap_or(1.0)
     }
 
     /// Outward displacement of planes for rounding about an origin, in depths.

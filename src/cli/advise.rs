@@ -99,7 +99,7 @@ fn setting(
 ) -> anyhow::Result<(Setting, usize)> {
     let study = &args.study;
     let held = |structures| study.scene_args.options(structures);
-    let mut setting = Setting::load(registry, study, &study.path, ROUNDS, timing, held)?;
+    let mut setting = Setting::load(registry, study, ROUNDS, timing, held)?;
     setting.structures = plan(registry, args)?.structures;
     let all = setting.path.cameras.len();
     setting.path = setting.path.at_most(MOST_CAMERAS);

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 
 use crate::drift::{ARMS, ArmKind};
 use crate::funnel::StageKind;
+use crate::stress::extremes::DEFAULT_CASES;
+use clap::builder::ArgPredicate;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::command_args::CompareArgs;
@@ -17,6 +19,9 @@ use super::shared_args::{
     TableFormat, WhatArgs,
 };
 use super::{program, text, values};
+
+/// The default path of a stage: those behind the frustum have work there.
+const STREET: &str = "street:frames=32";
 
 /// Benchmarks spatial indexes: frustum culling, region search, checked answers
 #[derive(Parser, Debug)]
@@ -281,6 +286,7 @@ pub struct VerifyArgs {
 }
 
 #[derive(Args, Debug)]
+#[command(mut_arg("path", |arg| arg.default_value_if("stage", ArgPredicate::IsPresent, STREET)))]
 pub struct PrecisionArgs {
     #[command(flatten)]
     pub study: StudyArgs,
@@ -302,7 +308,7 @@ pub struct PrecisionArgs {
     /// Study another stage of the funnel instead of the object stage: occlusion (sizes
     /// of its buffer), region (portals) or triangle (cones). The first structure runs
     /// the object stage; the default path is street
-    #[arg(long, value_name = "STAGE", value_parser = values::stage)]
+    #[arg(long, value_name = "STAGE", value_parser = values::stage, conflicts_with_all = ["cubes", "all", "html", "svg"])]
     pub stage: Option<StageKind>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
@@ -405,10 +411,12 @@ pub struct StressArgs {
     /// Cases of each generated extreme, 0 for none [default: 66, ten million boxes; 0
     /// with --vectors]
     #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX))]
-    pub cases: Option<u64>,
-    /// Seed of the first case; case i has seed N + i
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
-    pub seed: u64,
+    #[arg(default_value_t = DEFAULT_CASES, hide_default_value = true)]
+    #[arg(default_value_if("vectors", ArgPredicate::IsPresent, "0"))]
+    pub cases: u64,
+    /// Seed of the first case; case i has seed N + i [default: 1]
+    #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX))]
+    pub seed: Option<u64>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
     #[command(flatten)]

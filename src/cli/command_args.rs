@@ -181,6 +181,10 @@ const DRAW_HELP: &str = include_str!("assets/help/draw.txt");
 
 #[derive(Args, Debug)]
 #[command(after_help = program::named(DRAW_HELP))]
+#[command(mut_args(|arg| match arg.get_id().as_str() {
+    "frame" | "fovy" | "aspect" | "near" | "far" | "matrix_convention" => arg.requires("camera"),
+    _ => arg,
+}))]
 pub struct SceneDrawArgs {
     /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(value_name = "SCENE")]
@@ -192,10 +196,10 @@ pub struct SceneDrawArgs {
     #[arg(long, value_name = "PATH")]
     pub camera: Option<String>,
     /// The camera of the path, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "camera")]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     pub frame: usize,
     /// Deepest level of cells that is drawn; 0 is the root
-    #[arg(long, value_name = "LEVEL", default_value_t = 3, value_parser = values::whole(0..=1000u32))]
+    #[arg(long, value_name = "LEVEL", default_value_t = 3, requires = "structure", value_parser = values::whole(0..=1000u32))]
     pub depth: u32,
     /// The SVG file to write
     #[arg(long, short, value_name = "FILE")]

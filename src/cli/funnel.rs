@@ -21,7 +21,8 @@ use super::sheet::Class;
 use super::study::{Setting, Study};
 use super::{Ending, expect_folder, expect_places, funnel_table, print, text, write_text};
 use crate::funnel::{
-    self, Chain, Fate, FunnelInput, FunnelPlan, FunnelReport, NONE, StageKind, StageRow,
+    self, Chain, Fate, FunnelInput, FunnelPlan, FunnelReport, NONE, OrderRow, PickRow, StageKind,
+    StageRow,
 };
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
@@ -94,7 +95,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         write_text(file, &page)?;
     }
     shown?;
-    Ok(Ending::of(keep_their_word(&report.stages)))
+    let (stages, orders, picks) = (&report.stages, &report.orders, &report.picks);
+    Ok(Ending::of(keep_their_word(stages, orders, picks)))
 }
 
 /// Amount of work.
@@ -107,10 +109,11 @@ fn work(input: &FunnelInput) -> String {
     )
 }
 
-/// Returns true if no back end with a guarantee lost a visible item. Stages behind
-/// an unproven one of the chain miss what that has lost.
-fn keep_their_word(stages: &[StageRow]) -> bool {
-    let is_unproven = |row: &&StageRow| row.back_end.guarantee == Guarantee::Unproven;
+/// Returns true if all have what they declare: nothing visible lost, and nothing wrong
+/// where that is exact. Stages behind an unproven one of the chain miss what that has lost.
+fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) -> bool {
+    use Guarantee::{Exact, SampleExact, Unproven};
+    let is_unproven = |row: &&StageRow| row.back_end.guarantee == Unproven;
     let chosen = stages.iter().filter(|row| row.is_chosen);
     let first = chosen
         .filter(is_unproven)
@@ -119,7 +122,15 @@ fn keep_their_word(stages: &[StageRow]) -> bool {
     let mut judged = stages
         .iter()
         .filter(|row| !is_unproven(row) && first.is_none_or(|first| row.back_end.stage <= first));
-    judged.all(|row| row.errors.false_negative_count == 0.0)
+    let keeps_too_much = |row: &StageRow| {
+        matches!(row.back_end.guarantee, Exact | SampleExact)
+            && row.errors.false_positive_count > 0.0
+    };
+    let mut orders = orders.iter().filter(|row| row.exceptions.is_empty());
+    let mut picks = picks.iter();
+    judged.all(|row| row.errors.false_negative_count == 0.0 && !keeps_too_much(row))
+        && orders.all(|row| row.guarantee != Exact || row.wrong_sample_count == 0.0)
+        && picks.all(|row| row.guarantee != Exact || row.wrong_count == 0)
 }
 
 /// The back ends that were named, and those that suit the scene.
@@ -185,14 +196,7 @@ impl Stages {
             per_triangle: funnel::BYTES_PER_TRIANGLE,
             ..args.study.scene_args.options(structures + 2)
         };
-        let setting = Setting::load(
-            registry,
-            &args.study,
-            &args.study.path,
-            ROUNDS,
-            timing,
-            held,
-        )?;
+        let setting = Setting::load(registry, &args.study, ROUNDS, timing, held)?;
         Ok(Stages {
             chain: chain(args, &setting.scene, &setting.structures)?,
             claim: claim(args.pvs.as_deref())?,
@@ -243,6 +247,7 @@ pub fn plain_input<'s>(
         protocol: &setting.protocol,
         claim: None,
         inner_boxes: None,
+        loading: args.scene_args.options(0),
         execution: args.kernel.execution()?,
         all: true,
         picks: true,
@@ -414,7 +419,7 @@ mod tests {
         use Guarantee::{Conservative, Unproven};
         let region = |guarantee, lost| row(StageKind::Region, guarantee, lost);
         let occlusion = |guarantee, lost| row(StageKind::Occlusion, guarantee, lost);
-        let keeps = |rows: [StageRow; 2]| keep_their_word(&rows);
+        let keeps = |rows: [StageRow; 2]| keep_their_word(&rows, &[], &[]);
         assert!(keeps([region(Conservative, 0.0), occlusion(Unproven, 2.0)]));
         assert!(!keeps([
             region(Conservative, 0.0),
@@ -431,5 +436,49 @@ mod tests {
             ..region(Unproven, 1.0)
         };
         assert!(!keeps([other, occlusion(Conservative, 1.0)]));
+    }
+
+    #[test]
+    fn what_is_declared_exact_has_nothing_wrong() {
+        use Guarantee::{Conservative, Exact, SampleExact, Unproven};
+        let keeps_more = |guarantee| {
+            let mut kept = row(StageKind::Triangle, guarantee, 0.0);
+            kept.errors.false_positive_count = 0.5;
+            keep_their_word(&[kept], &[], &[])
+        };
+        assert!(keeps_more(Conservative) && !keeps_more(Exact) && !keeps_more(SampleExact));
+        let order = |guarantee, reasons: &[&'static str]| {
+            let order = OrderRow {
+                name: "an order",
+                summary: "",
+                fragment_count: 9.0,
+                shaded_count: 9.0,
+                covered_count: 9.0,
+                overdraw: None,
+                pair_count: 1.0,
+                wrong_pair_count: 1.0,
+                wrong_sample_count: 0.5,
+                cyclic_count: 0.0,
+                guarantee,
+                exceptions: reasons.iter().map(|reason| (*reason, 1)).collect(),
+                time: None,
+            };
+            keep_their_word(&[], &[order], &[])
+        };
+        assert!(order(Unproven, &[]) && order(Exact, &["a reason"]) && !order(Exact, &[]));
+        let pick = |guarantee, wrong_count| {
+            let pick = PickRow {
+                question: serde_json::from_value("first item".into()).unwrap(),
+                name: "a back end".to_owned(),
+                summary: "",
+                guarantee,
+                ray_count: 9,
+                wrong_count,
+                time: None,
+                ns_per_ray: None,
+            };
+            keep_their_word(&[], &[], &[pick])
+        };
+        assert!(pick(Unproven, 1) && pick(Exact, 0) && !pick(Exact, 1));
     }
 }

@@ -20,7 +20,6 @@ use crate::index::Registry;
 use crate::measure::{ProcessTimes, Status};
 use crate::precision::{self, PointPlan, PrecisionInput, SWEEPS, size_sweep, sweep};
 use crate::scene::LoadOptions;
-use crate::suite::DEFAULT_PATH;
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Rounds of a point, if one process has them all.
@@ -116,14 +115,7 @@ fn setting(
     timing: Option<&Timing>,
 ) -> anyhow::Result<Setting> {
     let held = |structures| args.study.scene_args.options(2 * structures);
-    Setting::load(
-        registry,
-        &args.study,
-        &args.study.path,
-        ROUNDS,
-        timing,
-        held,
-    )
+    Setting::load(registry, &args.study, ROUNDS, timing, held)
 }
 
 fn input<'s>(args: &PrecisionArgs, setting: &'s Setting) -> PrecisionInput<'s> {
@@ -151,8 +143,6 @@ pub fn time(
 const STAGE_ROUNDS: [usize; 2] = [3, 9];
 /// The samples of a view, beside its random rays.
 const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
-/// The default path: stages behind the frustum have work there.
-const STREET: &str = "street:frames=32";
 
 /// The inputs of the command itself, or of a worker.
 fn stage_setting(
@@ -164,11 +154,8 @@ fn stage_setting(
         per_triangle: funnel::BYTES_PER_TRIANGLE,
         ..args.study.scene_args.options(3)
     };
-    let path = match args.study.path.as_str() {
-        DEFAULT_PATH => STREET,
-        typed => typed,
-    };
-    let mut setting = Setting::load(registry, &args.study, path, STAGE_ROUNDS, timing, held)?;
+    let (study, rounds) = (&args.study, STAGE_ROUNDS);
+    let mut setting = Setting::load(registry, study, rounds, timing, held)?;
     setting.structures.truncate(1);
     let object = setting.structures.first().map_or(NONE, |spec| &spec.label);
     let chain = Chain::for_scene(&setting.scene, false).with(StageKind::Object, object);
@@ -180,9 +167,6 @@ fn sweep_stage(
     args: &PrecisionArgs,
     stage: StageKind,
 ) -> anyhow::Result<Ending> {
-    if args.svg.is_some() || args.html.is_some() {
-        bail!("--svg and --html draw the frustum's diagram; expected them or --stage, not both");
-    }
     let (setting, chain) = stage_setting(registry, args, None)?;
     let scene = &setting.scene;
     if funnel::back_ends(stage, scene, false)
@@ -233,12 +217,13 @@ pub fn time_stage(
 /// The points of a stage, and the number of those that dropped visible items.
 fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
     let (scene, path, stage) = (&sweep.scene, &sweep.path, sweep.stage.name());
+    let (views, SampleGrid { width, height }) = (text::counted(sweep.views, "view"), SAMPLES);
+    let by = match sweep.rays_per_view {
+        0 => "the exact side of each triangle".to_owned(),
+        rays => format!("{rays} random rays each beside {width} x {height} samples"),
+    };
     let basis = format!(
-        "{} with {} random rays each beside {} x {} samples; {}.",
-        text::counted(sweep.views, "view"),
-        sweep.rays_per_view,
-        SAMPLES.width,
-        SAMPLES.height,
+        "{views} with {by}; {}.",
         funnel_table::spread(sweep.processes)
     );
     let columns: &[Column<&SweepPoint>] = &[
@@ -258,8 +243,8 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
     let lossy = sweep.points.iter().filter(is_lossy);
     let told = format!(
         "{} of {} points dropped visible items; {} of these have a guarantee. * On the Pareto \
-         front: no other point is significantly better in time or an error and as good in the \
-         rest.",
+         front: no other point has fewer errors in these views, or is shown to be faster, and is \
+         as good in the rest.",
         lossy.clone().count(),
         sweep.points.len(),
         lossy.filter(|point| is_guaranteed(point)).count()

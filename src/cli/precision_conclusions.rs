@@ -21,10 +21,11 @@ pub fn conclusions(outcome: &Outcome) -> Vec<String> {
         .collect()
 }
 
-/// No visible item missed, and a time.
-fn is_sound(point: &&CullingPoint) -> bool {
+/// No visible item missed, a margin that is proven (docs/NUMERICS.md), and a time.
+fn is_safe(point: &&CullingPoint) -> bool {
     let errors = point.errors.counts.unwrap_or_default();
-    point.time.is_some() && errors.false_negatives + errors.touch_dropped == 0
+    let missed = errors.false_negatives + errors.touch_dropped;
+    point.time.is_some() && missed == 0 && point.errors.names.epsilon > 0.0
 }
 
 fn missed(point: &CullingPoint) -> u64 {
@@ -37,9 +38,7 @@ fn ratio(a: &CullingPoint, b: &CullingPoint) -> String {
 }
 
 fn of_points(p: &Precision) -> Vec<String> {
-    // The margin is proven for these: docs/NUMERICS.md.
-    let safe = |point: &&CullingPoint| point.errors.names.epsilon > 0.0;
-    let mut sound = p.points.iter().filter(is_sound).filter(safe);
+    let mut sound = p.points.iter().filter(is_safe);
     let Some(fastest) = sound.clone().next() else {
         return vec!["No point that is safe by its margin has a time.".to_owned()];
     };
@@ -75,7 +74,7 @@ fn of_points(p: &Precision) -> Vec<String> {
 
 fn of_storage(p: &Precision) -> Option<String> {
     let memory = |point: &&CullingPoint| point.errors.memory_bytes_per_item;
-    let least = p.points.iter().filter(is_sound);
+    let least = p.points.iter().filter(is_safe);
     let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
     Some(format!(
         "Least memory: {} at {} B/item, false positives {} %, {}.",

@@ -302,12 +302,14 @@ fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
     let head = |value: &f64| swept(*value);
     let header = ["six-plane".to_owned()].into_iter();
     let mut table = Table::of_numbers(header.chain(values.iter().map(head)));
-    let mut sound = Vec::new();
+    let (mut sound, mut bound) = (Vec::new(), 0.0);
     for kind in rows.iter().filter(|row| row.value == values[0]) {
         let own: Vec<&&SweepRow> = rows.iter().filter(|row| row.names == kind.names).collect();
         let is_sound = |row: &&&SweepRow| row.errors.is_some_and(|e| e.false_negatives == 0);
         if own.iter().all(is_sound) {
             sound.push(numbers(&kind.names));
+            let uppers = own.iter().filter_map(|row| row.false_negative_ppm?.upper);
+            bound = uppers.fold(bound, f64::max);
             continue;
         }
         let ppm = own.iter().map(|row| match &row.refused {
@@ -320,15 +322,44 @@ fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
         let label = short.unwrap_or(&label).to_owned();
         table.add_row([label].into_iter().chain(ppm));
     }
-    let least = rows.iter().filter_map(|row| row.false_negative_ppm?.upper);
-    let least = least.fold(f64::INFINITY, f64::min);
     let sound = match sound.is_empty() {
         true => String::new(),
         false => format!(
             "Nothing missed (below {} ppm): {}.",
-            significant(least),
+            significant(bound),
             sound.join(", ")
         ),
     };
     (table, sound)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::precision::{SWEEPS, sweep};
+
+    #[test]
+    fn what_nothing_missed_means_is_the_largest_bound() {
+        let mut rows = sweep(SWEEPS[0].0, 1, 1);
+        let (first, last) = (rows[0].names, rows.last().expect("a row").names);
+        assert_ne!(first, last);
+        for (row, bound) in rows.iter_mut().zip([2.0, 1.0].into_iter().cycle()) {
+            let misses = u64::from(row.names == last);
+            row.errors = Some(crate::verify::ErrorCount {
+                false_negatives: misses,
+                ..Default::default()
+            });
+            row.false_negative_ppm = Some(crate::statistics::Rate {
+                value: misses as f64,
+                lower: None,
+                upper: Some(bound + 9.0 * misses as f64),
+                elsewhere: None,
+            });
+        }
+        let (_, told) = swept_errors(&rows.iter().collect::<Vec<_>>());
+        assert!(
+            told.starts_with("Nothing missed (below 2.00 ppm): "),
+            "{told}"
+        );
+    }
 }

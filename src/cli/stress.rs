@@ -14,7 +14,7 @@ use super::table::{Column, Table};
 use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
-use crate::stress::extremes::{DEFAULT_CASES, Extremes, Tally};
+use crate::stress::extremes::{Extremes, Tally};
 use crate::stress::{Section, Status, Vector, built_in, read_vectors_file, replay};
 
 pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
@@ -29,16 +29,15 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     if vectors.is_empty() {
         bail!("nothing to do: no vector in the file; expected at least one");
     }
+    let cases = args.cases;
+    if args.seed.is_some() && cases == 0 {
+        bail!("--seed is for generated cases, of which there are none; expected --cases with it");
+    }
     interrupt::from_now_on_finish();
     let started = Instant::now();
-    let cases = match (args.cases, &args.vectors[..]) {
-        (Some(cases), _) => cases,
-        (None, []) => DEFAULT_CASES,
-        (None, _) => 0,
-    };
     let extremes = Extremes {
         structures: &structures,
-        seed: args.seed,
+        seed: args.seed.unwrap_or(1),
         cases,
         threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
     };

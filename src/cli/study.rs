@@ -49,7 +49,6 @@ impl Setting {
     pub fn load(
         registry: &Registry,
         args: &StudyArgs,
-        path: &str,
         rounds: [usize; 2],
         timing: Option<&Timing>,
         held: impl Fn(usize) -> LoadOptions,
@@ -67,7 +66,7 @@ impl Setting {
         let lens_scale = timing.and_then(|timing| timing.lens_scale);
         let process = timing.map_or(0, |timing| timing.process);
         Ok(Setting {
-            path: path::load_scaled(path, &scene, &lens, lens_scale)?,
+            path: path::load_scaled(&args.path, &scene, &lens, lens_scale)?,
             protocol: args.spread.protocol(rounds, process, usize::MAX),
             structures,
             scene,

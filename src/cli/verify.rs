@@ -18,7 +18,7 @@ use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
 use crate::measure::{Status, Subject, Verdict, Workload, count_pass, guarded, judge};
 use crate::path::{self, CameraPath};
 use crate::query::Located;
-use crate::scene::{FAMILIES, Regions, SAMPLES, Scene, every_part};
+use crate::scene::{FAMILIES, ItemKind, Regions, SAMPLES, Scene, every_part};
 use crate::verify::{
     ErrorCount, Fault, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment,
     explain_visibility, points_on_faces, variants,
@@ -150,7 +150,7 @@ fn paths(args: &VerifyArgs, scene: &Scene) -> Vec<String> {
 
 /// The command that checks this scene and path alone.
 fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
-    let (lens, culling) = (&args.lens, &args.culling);
+    let (lens, culling, read) = (&args.lens, &args.culling, &args.scene_args);
     let mut command = format!(
         "{} verify --scene '{scene}' --path '{path}' --planes {} --epsilon {} \
          --arithmetic {} --fovy {} --aspect {}",
@@ -161,12 +161,28 @@ fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
         lens.fovy,
         lens.aspect
     );
-    for (option, plane) in [("near", lens.near), ("far", lens.far)] {
-        command += &text::some(plane, |plane| format!(" --{option} {plane}"));
+    let threads: Vec<String> = args.kernel.threads.iter().map(usize::to_string).collect();
+    let differs = |value: &str, from: &str| (value != from).then(|| value.to_owned());
+    let mut add = |option: &str, value: Option<String>| {
+        command += &text::some(value, |value| format!(" --{option} {value}"));
+    };
+    add("near", lens.near.map(|near| near.to_string()));
+    add("far", lens.far.map(|far| far.to_string()));
+    add("matrix-convention", lens.matrix_convention.clone());
+    add("up", read.up.map(|up| up.name().to_owned()));
+    add(
+        "items",
+        differs(read.items.name(), ItemKind::default().name()),
+    );
+    add("structure", differs(&args.structure, "all"));
+    add("threads", differs(&threads.join(","), "1"));
+    add(
+        "kernel",
+        args.kernel.name.map(|kernel| kernel.name().to_owned()),
+    );
+    if read.skip_bad_items {
+        command += " --skip-bad-items";
     }
-    let convention = lens.matrix_convention.as_deref();
-    command += &text::some(convention, |name| format!(" --matrix-convention {name}"));
-    command += &text::some(args.scene_args.up, |up| format!(" --up {}", up.name()));
     command
 }
 
@@ -346,11 +362,13 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             if let Err(Verdict { status, reason }) = found {
                 check.status = status.name();
                 check.difference = Some(format!(
-                    "{} volume, {}: {}\n  again: {} verify --cases 1 --seed {case_seed}",
+                    "{} volume, {}: {}\n  again: {} verify --cases 1 --seed {case_seed} --structure '{}' --kernel {}",
                     VOLUME_KINDS[case.kind],
                     text::counted(case.items.len(), "item"),
                     reason.unwrap_or_default(),
-                    program::name()
+                    program::name(),
+                    spec.label,
+                    spec.execution.kernel.name()
                 ));
             }
         }
@@ -421,7 +439,8 @@ mod tests {
         assert_eq!([checks[0].status, checks[1].status], ["panicked", "ok"]);
         let told = checks[0].difference.as_deref().unwrap_or_default();
         assert!(
-            told.contains("deep in a peer's code") && told.contains("--seed 5"),
+            told.contains("deep in a peer's code")
+                && told.contains("--seed 5 --structure 'panics'"),
             "{told}"
         );
     }

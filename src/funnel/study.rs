@@ -226,7 +226,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
         cameras: input.path.cameras.len(),
         samples: [input.samples.width, input.samples.height],
         processes: 0,
-        level: Level::of(&input.scene.name, input.scene)?,
+        level: Level::of(&input.scene.name, input.scene, &input.loading)?,
         cut_outs: input
             .cut_outs
             .zip(world.cut_outs.as_ref())

@@ -39,7 +39,8 @@ pub struct SweepPoint {
     pub time: Option<Estimate>,
     /// `true` for a point of the Pareto front of time and both errors.
     ///
-    /// No other point is at least as good in all three and shown to be better in one.
+    /// No other point has fewer errors in these views, or is shown to be faster, and is as
+    /// good in the rest.
     pub on_front: bool,
 }
 

@@ -13,7 +13,7 @@ use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::{self, Dispute, ItemShape, Scene, Surfaces};
+use crate::scene::{self, Dispute, ItemShape, LoadOptions, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
@@ -52,6 +52,8 @@ pub struct FunnelInput<'a> {
     pub claim: Option<&'a Arc<Pvs>>,
     /// Most boxes inside each item of a mesh, at least 1; `None` for [`BOXES`].
     pub inner_boxes: Option<usize>,
+    /// How the scene was read: so are the other levels of its file.
+    pub loading: LoadOptions,
     /// Instruction set of every stage, and threads that compute the truth.
     pub execution: Execution,
     /// Every back end of every stage, depth orders and lower bounds beside the chain.
@@ -432,6 +434,7 @@ mod tests {
             },
             claim: None,
             inner_boxes: None,
+            loading: Default::default(),
             execution: Execution::default(),
             all: true,
             picks: true,

@@ -13,7 +13,7 @@ use crate::measure::{Status, blamed};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
-use crate::statistics::{Rate, rate};
+use crate::statistics::{Rate, rate, share};
 use crate::verify::{ErrorCount, Truth, scan};
 
 /// Names of a culling: test, arithmetic, planes and epsilon.
@@ -196,17 +196,17 @@ impl Judged {
         let known = || self.by_camera.iter().filter(|_| is_judged);
         let mut counts = ErrorCount::default();
         known().for_each(|camera| counts += camera.counts);
-        let rate_of = |count: fn(&CameraErrors) -> u64| -> Option<Rate> {
-            let clusters = known().map(|c| [count(c) as f64, c.counts.visible as f64]);
-            rate(&clusters.collect::<Vec<_>>())
+        let of = |count: fn(&CameraErrors) -> u64| -> Vec<[f64; 2]> {
+            (known().map(|c| [count(c) as f64, c.counts.visible as f64])).collect()
         };
         let has_neighbours = self.by_camera.iter().any(|c| c.flicker.is_some());
-        let flicker = rate_of(|c| c.flicker.unwrap_or(0)).filter(|_| has_neighbours);
+        let flicker = rate(&of(|c| c.flicker.unwrap_or(0))).filter(|_| has_neighbours);
         let worst_miss_px = known().map(|c| c.worst_miss_px).fold(0.0, f64::max);
         let errors = CullingErrors {
             names: Names::of(&self.culling),
-            excess: rate_of(|c| c.counts.false_positives),
-            false_negative_ppm: rate_of(|c| c.counts.false_negatives).map(|share| share.per(1e6)),
+            excess: rate(&of(|c| c.counts.false_positives)),
+            false_negative_ppm: share(&of(|c| c.counts.false_negatives))
+                .map(|share| share.per(1e6)),
             flicker,
             counts: is_judged.then_some(counts),
             worst_miss_px: is_judged.then_some(worst_miss_px),

@@ -15,7 +15,7 @@ use crate::culling::{Arithmetic, CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
-use crate::statistics::{Rate, rate};
+use crate::statistics::{Rate, rate, share};
 use crate::verify::{ErrorCount, Truth, scan};
 
 named! {
@@ -165,10 +165,9 @@ struct Judged {
 
 impl Judged {
     fn row(self, sweep: Sweep, value: f64, test: &SweptTest) -> SweepRow {
-        let rate_of = |count: fn(&ErrorCount) -> u64| {
-            let errors = self.errors.iter();
-            let clusters = errors.map(|e| [count(e) as f64, e.visible as f64]);
-            rate(&clusters.collect::<Vec<_>>()).filter(|_| self.refused.is_none())
+        let of = |count: fn(&ErrorCount) -> u64| -> Vec<[f64; 2]> {
+            let errors = self.errors.iter().filter(|_| self.refused.is_none());
+            (errors.map(|e| [count(e) as f64, e.visible as f64])).collect()
         };
         let mut errors = ErrorCount::default();
         self.errors.iter().for_each(|own| errors += *own);
@@ -176,8 +175,8 @@ impl Judged {
             sweep,
             value,
             names: test.names(),
-            false_negative_ppm: rate_of(|e| e.false_negatives).map(|share| share.per(1e6)),
-            excess: rate_of(|e| e.false_positives),
+            false_negative_ppm: share(&of(|e| e.false_negatives)).map(|share| share.per(1e6)),
+            excess: rate(&of(|e| e.false_positives)),
             errors: Some(errors).filter(|_| self.refused.is_none()),
             refused: self.refused,
         }

@@ -36,7 +36,7 @@ impl Level {
     ///
     /// # Errors
     /// The file cannot be read again.
-    pub fn of(source: &str, scene: &Scene) -> Result<Level, InputError> {
+    pub fn of(source: &str, scene: &Scene, options: &LoadOptions) -> Result<Level, InputError> {
         // A source without maps is the scene itself.
         let alone = Level {
             map_count: 1,
@@ -53,8 +53,7 @@ impl Level {
         };
         let decode = |name: &str| {
             let begun = Instant::now();
-            let options = LoadOptions::default();
-            let map = read_bytes(&bytes, [file, name], Some(name), &options).ok()?;
+            let map = read_bytes(&bytes, [file, name], Some(name), options).ok()?;
             Some((map.items.len(), begun.elapsed().as_nanos() as f64))
         };
         // The first time is of memory that has not been read yet, and not used.
@@ -131,7 +130,7 @@ mod tests {
         let file = written(folder.path(), &["freedm-map12", "freedm-map20"]);
         let source = format!("{file}#map20");
         let scene = scene::load(&source, &Default::default()).expect("a map");
-        let level = Level::of(&source, &scene).expect("a level");
+        let level = Level::of(&source, &scene, &Default::default()).expect("a level");
         let other = scene::load(&format!("{file}#map12"), &Default::default()).expect("a map");
         assert_eq!((level.map_count, &level.selected[..]), (2, "MAP20"));
         assert_eq!(level.output_count, scene.items.len());
@@ -163,20 +162,35 @@ mod tests {
         refused(&many, &["2 maps, MAP20, MAP12;"]);
         let source = format!("{many}#MAP12");
         let scene = scene::load(&source, &Default::default()).expect("a map");
-        let level = Level::of(&source, &scene).expect("a level");
+        let level = Level::of(&source, &scene, &Default::default()).expect("a level");
         assert_eq!((level.map_count, &level.selected[..]), (2, "MAP12"));
         let one = written(folder.path(), &["freedm-map12"]);
         for source in [one.clone(), format!("{one}#MAP12")] {
-            let level = |scene: &Scene| Level::of(&source, scene).expect("a level");
+            let level =
+                |scene: &Scene| Level::of(&source, scene, &Default::default()).expect("a level");
             let scene = scene::load(&source, &Default::default()).expect("a map");
             assert_eq!(level(&scene).input_count, scene.items.len());
         }
     }
 
     #[test]
+    fn levels_are_read_as_the_scene_was() {
+        let source = "tests/data/two_rooms.bsp";
+        let items = scene::ItemKind::Brushes;
+        let options = LoadOptions {
+            items,
+            ..Default::default()
+        };
+        let scene = scene::load(source, &options).expect("a map");
+        let level = Level::of(source, &scene, &options).expect("a level");
+        assert_eq!(level.input_count, scene.items.len());
+        assert_eq!(level.output_count, scene.items.len());
+    }
+
+    #[test]
     fn what_has_no_maps_is_one_level() {
         let scene = scene::load("city:n=50", &Default::default()).expect("a scene");
-        let level = Level::of("city:n=50", &scene).expect("a level");
+        let level = Level::of("city:n=50", &scene, &Default::default()).expect("a level");
         assert_eq!((level.input_count, level.output_count), (50, 50));
         assert_eq!(level.saved_load, None, "no other map, and so no time");
     }

@@ -337,6 +337,39 @@ fn far_scenes_are_moved_and_flat_ones_known() {
 }
 
 #[test]
+fn scenes_of_any_extent_have_a_depth() {
+    let head = "min_x,min_y,min_z,max_x,max_y,max_z\n";
+    let point = format!("{head}3,4,5,3,4,5\n");
+    let huge =
+        format!("{head}-2e37,-2e37,-2e37,-1e37,-1e37,-1e37\n1e37,1e37,1e37,2e37,2e37,3e37\n");
+    let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,near,far\n0,0,0,3,4,5,0.1,inf\n";
+    let files = [
+        ("point.csv", &point[..]),
+        ("huge.csv", &huge),
+        ("cameras.csv", cameras),
+    ];
+    let folder = folder(&files.map(|(name, text)| (name, text.as_bytes())));
+    for scene in ["point.csv", "huge.csv"] {
+        let line = format!("advise --scene {scene} --path cameras.csv --structure linear,bvh");
+        let advice = advice(folder.path(), &line);
+        let reason = |name: &str| {
+            rule(&advice, name)["reason"]
+                .as_str()
+                .expect("a reason")
+                .to_owned()
+        };
+        for name in ["rebasing", "f64-kernel", "six-planes", "third-dimension"] {
+            let reason = reason(name);
+            let is_number = |word: &str| !["inf", "NaN"].contains(&word) && word.len() < 24;
+            assert!(
+                reason.split([' ', '(', ')']).all(is_number),
+                "{scene}: {reason}"
+            );
+        }
+    }
+}
+
+#[test]
 fn options_turn_the_decisions_that_are_theirs() {
     // Items as large as the view is deep, so that six planes let many through.
     let of = |more: &str| {

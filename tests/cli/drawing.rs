@@ -115,6 +115,9 @@ fn what_cannot_be_drawn_is_refused() {
             "--frame is 4; expected 0 to 3",
         ),
         ("--frame 1 -o x.svg", "--camera"),
+        ("--near 5 -o x.svg", "--camera"),
+        ("--matrix-convention row-gl -o x.svg", "--camera"),
+        ("--depth 7 -o x.svg", "--structure"),
         ("-o no/such/x.svg", "expected an existing folder for --out"),
         ("-o .", "a folder; expected a file"),
     ] {

@@ -78,6 +78,11 @@ fn tables_fit_the_terminal_and_end_with_conclusions() {
             >= 6,
         "{shown}"
     );
+    let least = conclusions
+        .lines()
+        .find(|line| line.contains("Least memory"));
+    let least = least.expect("the least memory");
+    assert!(!least.contains("c=0"), "a margin of none: {least}");
     for figure in [
         "Region search in f32 is wrong",
         "misses no items; others miss items",
@@ -103,7 +108,23 @@ fn mistakes_are_one_line() {
             "avx3 | did you mean 'avx2'",
         ),
         ("--scene city:n=10 --processes 0", "0 | --processes"),
+        ("--scene city:n=10 --stage region", "--cubes | --stage"),
     ] {
         all_refused(&folder, &[format!("{line} {more}")], wanted);
+    }
+    for option in ["--all", "--svg a.svg", "--html a.html"] {
+        let line = format!("precision --scene city:n=10 --stage occlusion {option}");
+        all_refused(&folder, &[line], "--stage");
+    }
+}
+
+#[test]
+fn a_stage_has_its_own_path_unless_one_is_typed() {
+    let line = "precision --scene city:n=50 --stage triangle --frames 1 --processes 1 \
+                --structure linear --format json";
+    let by = |more: &str| json(&works(Path::new("."), &format!("{line}{more}")))["path"].clone();
+    assert_eq!(by(""), "street:frames=32");
+    for typed in ["flythrough", "orbit:frames=1"] {
+        assert_eq!(by(&format!(" --path {typed}")), typed);
     }
 }

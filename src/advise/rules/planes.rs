@@ -268,7 +268,7 @@ fn predicted_excess(case: &Case) -> f64 {
     let items = &case.scene().items;
     let squares = items
         .iter()
-        .map(|item| f64::from(item.extent().length_squared()) / 3.0);
+        .map(|item| item.min.as_dvec3().distance_squared(item.max.as_dvec3()) / 3.0);
     let square = squares.sum::<f64>() / items.len() as f64;
     let cameras = case.workload.cameras.len();
     let depth = (0..cameras).map(|frame| case.depth(frame)).sum::<f64>() / cameras as f64;

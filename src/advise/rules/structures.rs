@@ -7,6 +7,7 @@ use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::drift::rotations;
 use crate::measure::{Stopwatch, input_of, move_share};
+use crate::shown::significant;
 use crate::statistics::Estimate;
 
 /// The index itself: below some number of items a scan is as fast.
@@ -60,11 +61,11 @@ pub(super) fn third_dimension(trials: &mut Trials) -> Result<Draft, Unfit> {
     let mut extents = extent.to_array();
     extents.sort_by(f64::total_cmp);
     let [height, widths @ ..] = extents;
+    let [low, narrow, wide] = extents.map(significant);
     let cell = 2.0 * (widths[0] * widths[1]).sqrt() / (scene.items.len() as f64 / leaf).sqrt();
     let reason = format!(
-        "height {height:.4} by widths {:.4} and {:.4}; the threshold is two leaves of {leaf} items, \
-         2 W / sqrt(N / leaf)",
-        widths[0], widths[1]
+        "height {low} by widths {narrow} and {wide}; the threshold is two leaves of {leaf} items, \
+         2 W / sqrt(N / leaf)"
     );
     let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
         .map(|index| trials.index(index, case.views()));
