@@ -70,10 +70,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let lens_scale = stages.setting.path.lens_scale;
     let times = study.times("every stage, timed", lens_scale, job)?;
     if let Some(verdict) = funnel::failure(&times) {
-        bail!(
-            "a stage failed when it was timed: {}",
-            verdict.reason.as_deref().unwrap_or("no reason")
-        );
+        let reason = verdict.reason.as_deref().unwrap_or("no reason");
+        bail!("a stage failed when it was timed: {reason}");
     }
     let report = prepared.conclude(&times);
     stages.setting.note_solid();
@@ -115,10 +113,8 @@ fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) 
     use Guarantee::{Exact, SampleExact, Unproven};
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Unproven;
     let chosen = stages.iter().filter(|row| row.is_chosen);
-    let first = chosen
-        .filter(is_unproven)
-        .map(|row| row.back_end.stage)
-        .min();
+    let unproven = chosen.filter(is_unproven);
+    let first = unproven.map(|row| row.back_end.stage).min();
     let mut judged = stages
         .iter()
         .filter(|row| !is_unproven(row) && first.is_none_or(|first| row.back_end.stage <= first));
@@ -205,13 +201,8 @@ impl Stages {
     }
 
     fn input<'s>(&'s self, args: &'s FunnelArgs) -> anyhow::Result<FunnelInput<'s>> {
-        let plain = plain_input(
-            &self.setting,
-            &self.chain,
-            args.frames,
-            args.samples,
-            &args.study,
-        )?;
+        let (setting, chain, study) = (&self.setting, &self.chain, &args.study);
+        let plain = plain_input(setting, chain, args.frames, args.samples, study)?;
         Ok(FunnelInput {
             cut_outs: args.cut_out.as_ref(),
             mirror: args.mirror,
@@ -282,12 +273,8 @@ pub fn write(report: &FunnelReport, folder: &Path) -> anyhow::Result<()> {
         };
         let mut out = csv::Writer::from_writer(Vec::new());
         let columns = fields.split_whitespace().map(column);
-        out.write_record(
-            ["scene", "path"]
-                .map(str::to_owned)
-                .into_iter()
-                .chain(columns),
-        )?;
+        let about = ["scene", "path"].map(str::to_owned).into_iter();
+        out.write_record(about.chain(columns))?;
         for row in rows {
             let own = [&report.scene, &report.path].map(|name| shown_field(name));
             let fields = fields.split_whitespace();

@@ -40,11 +40,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     }
     let setting = setting(registry, args, None)?;
     let spread = &args.study.spread;
-    let study = Study::new(
-        format!("{}, {}: ", args.study.scene, args.study.path),
-        0,
-        spread,
-    )?;
+    let about = format!("{}, {}: ", args.study.scene, args.study.path);
+    let study = Study::new(about, 0, spread)?;
     study.begin("every point, checked");
     let prepared = precision::prepare(&input(args, &setting))?;
     let items = text::counted(setting.scene.items.len(), "item");
@@ -53,10 +50,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     if args.cubes > 0 {
         study.begin("the sweep over sizes");
         sizes = size_sweep(args.cubes, spread.seed)?;
-        let cameras = args
-            .cubes
-            .div_ceil(CUBES_PER_CAMERA)
-            .clamp(2, SWEEP_CAMERAS);
+        let cameras = args.cubes.div_ceil(CUBES_PER_CAMERA);
+        let cameras = cameras.clamp(2, SWEEP_CAMERAS);
         for (which, name, _) in SWEEPS {
             study.begin(&format!("the sweep over {name}"));
             sweeps.extend(sweep(which, cameras, spread.seed));
@@ -65,10 +60,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     let points = |timing| Job::Points(prepared.plan.clone(), timing);
     let times = study.times("every point, timed", setting.path.lens_scale, points)?;
     let precision = prepared.conclude(&times);
-    let wrong = precision
-        .points
-        .iter()
-        .any(|p| matches!(p.status, Status::Wrong | Status::Panicked));
+    let mut points = precision.points.iter();
+    let wrong = points.any(|p| matches!(p.status, Status::Wrong | Status::Panicked));
     let outcome = precision_tables::Outcome {
         precision,
         seed: spread.seed,
@@ -169,10 +162,8 @@ fn sweep_stage(
 ) -> anyhow::Result<Ending> {
     let (setting, chain) = stage_setting(registry, args, None)?;
     let scene = &setting.scene;
-    if funnel::back_ends(stage, scene, false)
-        .iter()
-        .all(|row| row.name == NONE)
-    {
+    let known = funnel::back_ends(stage, scene, false);
+    if known.iter().all(|row| row.name == NONE) {
         // Every scene has something for the others.
         let (name, stage) = (&scene.name, stage.name());
         let why = funnel::left_out_of(scene);
@@ -217,6 +208,7 @@ pub fn time_stage(
 /// The points of a stage, and the number of those that dropped visible items.
 fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
     let (scene, path, stage) = (&sweep.scene, &sweep.path, sweep.stage.name());
+    let title = format!("{scene}, {path}: {stage} stage, error against run time");
     let (views, SampleGrid { width, height }) = (text::counted(sweep.views, "view"), SAMPLES);
     let by = match sweep.rays_per_view {
         0 => "the exact side of each triangle".to_owned(),
@@ -250,9 +242,7 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
         lossy.filter(|point| is_guaranteed(point)).count()
     );
     vec![
-        Block::Line(format!(
-            "{scene}, {path}: {stage} stage, error against run time"
-        )),
+        Block::Line(title),
         Block::Line(basis),
         Block::Table(Table::with(&sweep.points, columns)),
         Block::line(""),

@@ -84,10 +84,8 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
             }));
         }
         if kernel != chosen {
-            by_others += found
-                .iter()
-                .map(|section| section.rows.len())
-                .sum::<usize>();
+            let rows = |section: &Section| section.rows.len();
+            by_others += found.iter().map(rows).sum::<usize>();
             found = failures(found, kernel);
         }
         sections.extend(found);
@@ -108,10 +106,11 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     if interrupted {
         tell("interrupted: only the cases shown were checked");
     }
-    let failed = sections
-        .iter()
-        .any(|section| section.count(Status::Fail) > 0);
-    Ok(Ending::of_checks(!failed, interrupted))
+    let has_failed = |section: &Section| section.count(Status::Fail) > 0;
+    Ok(Ending::of_checks(
+        !sections.iter().any(has_failed),
+        interrupted,
+    ))
 }
 
 /// Cases of each extreme by another instruction set than the chosen one.

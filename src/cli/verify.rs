@@ -63,10 +63,8 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         bar.set_message(text::plain(source));
         let scene = load_scene(source, &args.scene_args, 2 * structures.len())?;
         let subjects = [CullingTest::SixPlane, CullingTest::Sphere].map(|test| {
-            let specs = structures.iter().cloned();
-            specs
-                .map(|spec| Subject::build(spec, false, &scene, test))
-                .collect()
+            let build = |spec| Subject::build(spec, false, &scene, test);
+            structures.iter().cloned().map(build).collect()
         });
         for path in paths(args, &scene) {
             interrupted = interrupt::asked();

@@ -140,10 +140,8 @@ impl<'w> Swept<'w> {
             let sized = rows.flat_map(|row| WIDTHS.map(|width| (row, width)));
             let points = sized.map(|(row, width)| {
                 let grid = SampleGrid::new(width, (width * 9).div_ceil(16));
-                let point = SweepPoint::new(
-                    BackEnd::of(self.stage, row),
-                    Some([grid.width, grid.height]),
-                );
+                let size = Some([grid.width, grid.height]);
+                let point = SweepPoint::new(BackEnd::of(self.stage, row), size);
                 self.with_task(point, self.world.run_occlusion(row, grid))
             });
             return points.collect();

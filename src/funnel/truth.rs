@@ -16,6 +16,9 @@ use crate::visibility::{Ray, Rays, SampleGrid, fragment};
 /// Samples that estimate how many items are in front at all samples.
 const FEW: SampleGrid = SampleGrid::new(16, 9);
 
+/// Tests of items by rays that take as long as a front item.
+const TESTS_PER_ITEM: u64 = 16;
+
 /// Visible items of each view with the samples of each, ascending.
 pub type Truth = Vec<Vec<(ItemId, u32)>>;
 
@@ -76,14 +79,24 @@ impl RaysEnd<'_> {
         threads: usize,
     ) -> Result<SampleTruth, String> {
         let at_few = self.at_samples(rays, FEW, threads).samples_of;
-        let at_few: u64 = at_few.into_iter().map(u64::from).sum();
-        let in_front = at_few * samples.samples() as u64 / FEW.samples() as u64;
+        let in_front = at_few.into_iter().map(u64::from).sum();
+        let tests = match self {
+            RaysEnd::Boxes(index, _) => index.tests(rays, FEW),
+            RaysEnd::Triangles(index) => index.tests(rays, FEW),
+        };
         let most = most_drawn(samples);
-        if in_front > most {
-            return Err(format!(
-                "about {in_front} front items, summed over the samples; expected at most {most}: \
-                 fewer --samples or fewer items with a common face"
-            ));
+        let most_tests = most * TESTS_PER_ITEM;
+        for (at_few, what, most, fewer) in [
+            (in_front, "front items", most, "with a common face"),
+            (tests, "surfaces to test", most_tests, "around the eye"),
+        ] {
+            let all = at_few * samples.samples() as u64 / FEW.samples() as u64;
+            if all > most {
+                return Err(format!(
+                    "about {all} {what}, summed over the samples; expected at most {most}: \
+                     fewer --samples or fewer items {fewer}"
+                ));
+            }
         }
         Ok(self.at_samples(rays, samples, threads))
     }

@@ -261,6 +261,10 @@ fn what_cannot_be_viewed_is_one_line() {
             "--scene city:n=9 --path street:frames=x -o view.html",
             "frames",
         ),
+        (
+            "--scene stack:n=9000,piles=1 --path orbit:frames=1 --samples 320x180 -o view.html",
+            "camera 0 | surfaces to test | around the eye",
+        ),
     ] {
         let done = cullbench(folder.path(), &format!("view {options}"));
         assert_refused(&done, wanted, options);

@@ -15,7 +15,7 @@ use crate::index::{DynIndex, FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::measure::Workload;
 use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume};
-use crate::shown::counted;
+use crate::shown::{counted, significant};
 
 /// Share of the planes below which the saving is lost in noise.
 const LEAST_NEEDLESS: f64 = 0.01;
@@ -333,11 +333,9 @@ pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
         case.margin(&at_zero.surroundings()),
         case.margin(&moved.surroundings()),
     );
+    let [x, y, z] = moved.origin.to_array().map(significant);
     let reason = format!(
-        "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({}, {}, {}); this scene {}",
-        moved.origin.x,
-        moved.origin.y,
-        moved.origin.z,
+        "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({x}, {y}, {z}); this scene {}",
         if is_moved {
             "is moved"
         } else {

@@ -129,12 +129,8 @@ impl Ground {
         let low = corners.into_iter().reduce(DVec3::min).unwrap_or_default();
         let high = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
         // More than rounding of the corners, and of what begins at them, can be.
-        let size = low
-            .abs()
-            .max(high.abs())
-            .max(self.origin.abs())
-            .max_element();
-        let slack = 1e-9 * size + 1e-6 * (high - low).max_element() + 1e-8 * near;
+        let size = low.abs().max(high.abs()).max(self.origin.abs());
+        let slack = 1e-9 * size.max_element() + 1e-6 * (high - low).max_element() + 1e-8 * near;
         let (low, high) = (low - slack, high + slack);
         let [least, most] = [self.bounds.min, self.bounds.max].map(Vec3::as_dvec3);
         let is_over = low.x >= least.x && high.x <= most.x && low.y >= least.y && high.y <= most.y;
@@ -156,10 +152,7 @@ fn faces_up(corners: [Vec3; 3]) -> bool {
 /// The bounds of triangles that all face up, if they are a height over a rectangle.
 fn height_over(triangles: &[[Vec3; 3]]) -> Option<Aabb> {
     let bounds = Aabb::of_points(triangles.iter().flatten().copied());
-    let Aabb {
-        min: low,
-        max: high,
-    } = bounds;
+    let [low, high] = [bounds.min, bounds.max];
     let bits = |p: Vec3| p.to_array().map(f32::to_bits);
     let mut rim: HashMap<[[u32; 3]; 2], [Vec3; 2]> = HashMap::new();
     for corners in triangles {
@@ -233,9 +226,8 @@ impl Heights {
     /// The cells that have a point between two positions.
     fn cells(&self, axis: usize, low: f32, high: f32) -> std::ops::Range<usize> {
         let cells = 0..CELLS;
-        let first = cells
-            .clone()
-            .position(|cell| self.edge(axis, cell + 1) >= low);
+        let reaches = |cell| self.edge(axis, cell + 1) >= low;
+        let first = cells.clone().position(reaches);
         let end = cells.rev().position(|cell| self.edge(axis, cell) <= high);
         first.unwrap_or(0)..CELLS - end.unwrap_or(0)
     }

@@ -9,7 +9,7 @@ use super::slabs::around;
 use crate::kernel::{Isa, Kernel, Work};
 use crate::query::ItemId;
 use crate::scene::Surfaces;
-use crate::visibility::{Ray, Solids};
+use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
 /// A body in one cache line.
 #[derive(Clone, Copy, Debug)]
@@ -120,6 +120,21 @@ impl<B: Body> BodyIndex<B> {
             before: search.before,
             meeting,
         }
+    }
+
+    /// Number of bodies that rays to all samples of a grid are at least tested against.
+    pub fn tests(&self, rays: &Rays, grid: SampleGrid) -> u64 {
+        let mut tests = 0;
+        for (column, row) in (0..grid.width).flat_map(|x| (0..grid.height).map(move |y| (x, y))) {
+            let ray = rays.sample(grid, column, row);
+            let meeting = self.front_of(&ray).meeting;
+            let end = meeting.map_or(ray.far, |at| B::Probe::at_most(&at));
+            self.walk(self.kernel, &ray, &mut |_: &B| {
+                tests += 1;
+                end
+            });
+        }
+        tests
     }
 
     /// Every meeting of a ray with a body from near to far, in no order.
