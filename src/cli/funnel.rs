@@ -107,8 +107,9 @@ fn work(input: &FunnelInput) -> String {
     )
 }
 
-/// Returns true if all have what they declare: nothing visible lost, and nothing wrong
-/// where that is exact. Stages behind an unproven one of the chain miss what that has lost.
+/// Returns true if nothing visible is lost against a guarantee.
+///
+/// Nor is anything wrong that is declared exact. Stages behind an unproven one of the chain miss what that has lost.
 fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) -> bool {
     use Guarantee::{Exact, SampleExact, Unproven};
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Unproven;
