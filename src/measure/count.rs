@@ -114,9 +114,9 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 let cost = &mut counted.costs[pass as usize];
                 let counting = trial.ask(|out| built.count(workload, pass, n, out, cost));
                 // The timed traversal is compiled without the recorder: checked as well.
-                let mut timed = |out: &mut Vec<ItemId>| built.answer(workload, pass, n, out);
+                let timed = |out: &mut Vec<ItemId>| built.answer(workload, pass, n, out);
                 let answered = counting.map(drop);
-                let answered = answered.and_then(|()| trial.ask(&mut timed).map(drop));
+                let answered = answered.and_then(|()| trial.ask(timed).map(drop));
                 spent[i] += start.elapsed();
                 let question = format!("{} {n}", pass.question());
                 counted.verdict = verdict(answered, spent[i], &question, |id| match pass {
