@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::error::{StudyError, most_drawn};
 use super::world::{Shape, World};
 use crate::query::ItemId;
-use crate::statistics::{Rate, rate, share};
+use crate::statistics::{Rate, rate};
 use crate::visibility::truth::{
     RayIndex, SampleTruth, SolidBox, SurfaceIndex, visible_by_random_rays,
 };
@@ -224,7 +224,7 @@ impl Errors {
         let clusters = |of: fn(&ViewCounts) -> [u64; 2]| -> Vec<[f64; 2]> {
             views.iter().map(|v| of(v).map(|n| n as f64)).collect()
         };
-        let share = |of| share(&clusters(of));
+        let share = |of| rate(&clusters(of));
         let streaks = views.split(|view| view.false_negatives == 0);
         let worst = views.iter().map(|v| v.worst_missing_samples).max();
         Errors {

@@ -13,7 +13,7 @@ use crate::measure::{Status, blamed};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
-use crate::statistics::{Rate, rate, share};
+use crate::statistics::{Rate, rate};
 use crate::verify::{ErrorCount, Truth, scan};
 
 /// Names of a culling: test, arithmetic, planes and epsilon.
@@ -205,8 +205,7 @@ impl Judged {
         let errors = CullingErrors {
             names: Names::of(&self.culling),
             excess: rate(&of(|c| c.counts.false_positives)),
-            false_negative_ppm: share(&of(|c| c.counts.false_negatives))
-                .map(|share| share.per(1e6)),
+            false_negative_ppm: rate(&of(|c| c.counts.false_negatives)).map(|share| share.per(1e6)),
             flicker,
             counts: is_judged.then_some(counts),
             worst_miss_px: is_judged.then_some(worst_miss_px),

@@ -15,7 +15,7 @@ use crate::index::DynIndex;
 use crate::measure::Status;
 use crate::query::ItemId;
 use crate::scene::{Regions, Scene, SeededRng, Sought};
-use crate::statistics::{Rate, share};
+use crate::statistics::{Rate, rate};
 
 named! {
     /// In which numbers a point and a region are compared.
@@ -243,7 +243,7 @@ impl RegionJudged {
         let wrong: Vec<[f64; 2]> = column(0).map(|n| [n, POINTS_PER_CAMERA as f64]).collect();
         let errors = RegionErrors {
             numbers: self.numbers.name(),
-            wrong: share(&wrong),
+            wrong: rate(&wrong),
             points: (self.by_camera.len() * POINTS_PER_CAMERA) as u64,
             false_region_count: falsely as u64,
             missed_region_count: missed as u64,

@@ -15,7 +15,7 @@ use crate::culling::{Arithmetic, CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
-use crate::statistics::{Rate, rate, share};
+use crate::statistics::{Rate, rate};
 use crate::verify::{ErrorCount, Truth, scan};
 
 named! {
@@ -175,7 +175,7 @@ impl Judged {
             sweep,
             value,
             names: test.names(),
-            false_negative_ppm: share(&of(|e| e.false_negatives)).map(|share| share.per(1e6)),
+            false_negative_ppm: rate(&of(|e| e.false_negatives)).map(|share| share.per(1e6)),
             excess: rate(&of(|e| e.false_positives)),
             errors: Some(errors).filter(|_| self.refused.is_none()),
             refused: self.refused,

@@ -93,17 +93,6 @@ pub fn rate(clusters: &[[f64; 2]]) -> Option<Rate> {
     })
 }
 
-/// The rate of events that are some of the units, so at most 1.
-pub fn share(clusters: &[[f64; 2]]) -> Option<Rate> {
-    let share = rate(clusters)?;
-    let farthest = share.value.max(1.0 - share.value);
-    Some(Rate {
-        upper: share.upper.map(|upper| upper.min(1.0)),
-        elsewhere: share.elsewhere.map(|apart| apart.min(farthest)),
-        ..share
-    })
-}
-
 /// Returns true if the clusters, paired by index, show the mean of `a` to be
 /// below that of `b`: Student's paired t, two-sided at `alpha`. From one
 /// cluster, or where all differences are the same, the order of the means
@@ -181,17 +170,6 @@ mod tests {
         // Of many clusters none with an event: z^2 / n, z = 4.42.
         let elsewhere = rate(&[[0.0, 1e3]; 5000]).unwrap().elsewhere.unwrap();
         assert!((elsewhere * 5e6 - 19.5).abs() < 0.1, "{elsewhere}");
-    }
-
-    #[test]
-    fn an_interval_of_shares_ends_at_one() {
-        let few = [[1.0, 2.0], [0.0, 1.0], [2.0, 2.0]];
-        let (free, share) = (rate(&few).unwrap(), share(&few).unwrap());
-        assert!(free.upper > Some(1.0) && free.elsewhere > Some(1.0));
-        assert_eq!((share.value, share.lower), (free.value, free.lower));
-        assert_eq!((share.upper, share.elsewhere), (Some(1.0), Some(0.6)));
-        let many = sample(3, 40);
-        assert_eq!(super::share(&many), rate(&many));
     }
 
     /// Cameras with rates of their own, as frusta of other directions have them.
