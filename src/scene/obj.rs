@@ -6,7 +6,6 @@
 //! appendix B1, "Object Files (.obj)".
 
 use std::collections::BTreeSet;
-use std::iter::once;
 
 use glam::DVec3;
 
@@ -213,9 +212,7 @@ impl Obj<'_> {
     fn into_scene(mut self, name: &str) -> Result<Scene, InputError> {
         let end = self.corners.len();
         self.items.pop_if(|(_, first)| *first == end);
-        let ends = self.items.iter().skip(1).map(|(_, first)| *first);
-        let ranges = self.items.iter().map(|(_, first)| *first);
-        let ranges: Vec<_> = ranges.zip(ends.chain(once(end))).collect();
+        self.items.push((String::new(), end));
         let corners = self.corners.iter().flatten();
         let corners = corners.map(|&corner| WorldBox::at(self.points[corner as usize]));
         let mut surfaces = Surfaces::about(choose_origin(corners));
@@ -223,9 +220,9 @@ impl Obj<'_> {
         // The item that a point was last needed by, from 1, and its number there.
         let mut known = vec![(0, 0); self.points.len()];
         let mut points = Vec::new();
-        for (item, &(first, end)) in (1u32..).zip(&ranges) {
+        for (item, pair) in (1u32..).zip(self.items.windows(2)) {
             points.clear();
-            let own = self.corners[first..end].iter().map(|corners| {
+            let own = self.corners[pair[0].1..pair[1].1].iter().map(|corners| {
                 corners.map(|corner| {
                     let known = &mut known[corner as usize];
                     if known.0 != item {
@@ -237,7 +234,7 @@ impl Obj<'_> {
             });
             let own: Vec<[u32; 3]> = own.collect();
             surfaces.push_written(SurfaceKind::Opaque, false, &points, &own);
-            labels.push(&self.items[item as usize - 1].0);
+            labels.push(&pair[0].0);
         }
         Ok(Scene {
             labels: vec![labels],

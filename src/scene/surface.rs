@@ -225,11 +225,7 @@ impl Surfaces {
     /// An item without triangles, which has no box.
     pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
         let boxes: Vec<_> = self.of_item.iter().map(|t| self.world_box(t)).collect();
-        self.with_boxes(name, &boxes)
-    }
-
-    fn with_boxes(self, name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene, InputError> {
-        let scene = Scene::about(name, boxes, self.origin)?;
+        let scene = Scene::about(name, &boxes, self.origin)?;
         Ok(Scene {
             surfaces: Some(Arc::new(self)),
             ..scene
@@ -298,7 +294,8 @@ impl Scene {
             labels,
             places: self.places,
             animation: self.animation,
-            ..single.with_boxes(self.name, &boxes)?
+            surfaces: Some(Arc::new(single)),
+            ..Scene::about(self.name, &boxes, surfaces.origin)?
         })
     }
 }

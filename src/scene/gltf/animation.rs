@@ -120,21 +120,23 @@ pub fn transform([moved, turned, scaled]: Parts) -> DAffine3 {
 
 /// The lens of a camera; its up vector is of no meaning.
 fn lens(camera: &Camera) -> Option<PlaceView> {
-    let parallel = camera.orthographic.as_ref().map(|lens| PlaceView {
+    let between = |near: f32, far: Option<f32>| PlaceView {
         up: DVec3::Y,
         fovy_deg: None,
+        ortho_height: None,
+        aspect: None,
+        near: near.into(),
+        far: far.map(f64::from).filter(|far| far.is_finite()),
+    };
+    let parallel = camera.orthographic.as_ref().map(|lens| PlaceView {
         ortho_height: Some(2.0 * f64::from(lens.ymag)),
         aspect: Some(f64::from(lens.xmag) / f64::from(lens.ymag)),
-        near: lens.znear.into(),
-        far: Some(lens.zfar.into()).filter(|far: &f64| far.is_finite()),
+        ..between(lens.znear, Some(lens.zfar))
     });
     let perspective = camera.perspective.as_ref().map(|lens| PlaceView {
-        up: DVec3::Y,
         fovy_deg: Some(f64::from(lens.yfov).to_degrees()),
-        ortho_height: None,
         aspect: lens.aspect_ratio.map(f64::from),
-        near: lens.znear.into(),
-        far: lens.zfar.map(f64::from).filter(|far| far.is_finite()),
+        ..between(lens.znear, lens.zfar)
     });
     perspective.or(parallel)
 }

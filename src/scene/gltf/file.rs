@@ -76,6 +76,12 @@ fn decoded(uri: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
+/// Some of the bytes, by the first and their number.
+fn part(bytes: &[u8], first: u64, length: u64) -> Option<&[u8]> {
+    let end = usize::try_from(first.checked_add(length)?).ok()?;
+    bytes.get(first as usize..end)
+}
+
 /// A file with all of its buffers.
 pub struct File<'f> {
     pub name: &'f str,
@@ -212,20 +218,12 @@ impl<'f> File<'f> {
         let size = kind.size() * width;
         let stride = view.byte_stride.filter(|_| accessor.count.0 > 1);
         let stride = stride.map_or(size, |stride| stride.0);
-        let range = |start: u64, length: u64, of: &'_ [u8]| {
-            let end = start.checked_add(length)?;
-            (end <= of.len() as u64).then_some(start as usize..end as usize)
-        };
         let count = accessor.count.0;
         let offset = accessor.byte_offset.unwrap_or_default().0;
-        let bytes = range(
-            view.byte_offset.unwrap_or_default().0,
-            view.byte_length.0,
-            buffer,
-        );
+        let first = view.byte_offset.unwrap_or_default().0;
+        let bytes = part(buffer, first, view.byte_length.0);
         let needed = (count.saturating_sub(1)).saturating_mul(stride as u64) + size as u64;
-        let bytes = bytes.map(|range| &buffer[range]);
-        let own = bytes.and_then(|bytes| Some(&bytes[range(offset, needed, bytes)?]));
+        let own = bytes.and_then(|bytes| part(bytes, offset, needed));
         let Some(own) = own.filter(|_| stride >= size) else {
             let found = format!("{count} elements that end behind their buffer");
             return Err(self.error(place, found, "elements within it"));

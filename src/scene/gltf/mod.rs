@@ -10,6 +10,7 @@ mod animation;
 mod file;
 mod mesh;
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use glam::{BVec3, DAffine3, DMat4, DVec3};
@@ -135,13 +136,8 @@ impl File<'_> {
             }
             None => {
                 let children = nodes.iter().flat_map(|node| node.children.iter().flatten());
-                let mut is_root = vec![true; nodes.len()];
-                for child in children.map(|child| child.value()) {
-                    if let Some(is_root) = is_root.get_mut(child) {
-                        *is_root = false;
-                    }
-                }
-                (0..nodes.len()).filter(|&node| is_root[node]).collect()
+                let inner: HashSet<usize> = children.map(|child| child.value()).collect();
+                (0..nodes.len()).filter(|n| !inner.contains(n)).collect()
             }
         };
         let (mut placed, mut places, mut order) = (Vec::new(), Vec::new(), Vec::new());
@@ -235,10 +231,8 @@ impl File<'_> {
             count,
         )?;
         let column = |(name, width)| {
-            let accessor = index(&attributes[name]);
-            accessor
-                .map(|at| self.vectors(at, width, &place))
-                .transpose()
+            let column = index(&attributes[name]).map(|at| self.vectors(at, width, &place));
+            column.transpose()
         };
         let [moved, turned, scaled] =
             [("TRANSLATION", 3), ("ROTATION", 4), ("SCALE", 3)].map(column);
