@@ -114,7 +114,7 @@ pub const FIGURES: [Figure; 19] = [
     ("repaid after", "break_even_queries", |n| {
         text::count(n as usize)
     }),
-    ("false positives", "excess", text::percent),
+    ("returned in excess", "fat_excess", text::percent),
     ("worst", "worst_frame_ns", text::time),
     ("update", "update_ns", text::time),
     ("query", "query_ns", text::time),

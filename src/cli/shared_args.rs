@@ -103,7 +103,7 @@ pub struct MotionArgs {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "motion", value_parser = values::whole(1..=1000usize))]
     pub views: usize,
     /// Work of a frame, a row for each: refit, rebuild, every=N (rebuilt in every n-th
-    /// frame), fat=M (bounds enlarged by M item sizes: fewer updates, false positives)
+    /// frame), fat=M (bounds enlarged by M item sizes: fewer updates, more is returned)
     #[arg(long, value_name = "LIST", requires = "motion")]
     pub update: Option<String>,
 }
@@ -246,7 +246,8 @@ pub struct LensArgs {
     /// Width / height for cameras without one
     #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero)]
     pub aspect: f64,
-    /// Near plane for cameras without one [default: far/1000]
+    /// Near plane for cameras without one [default: a thousandth of far, or of twice the
+    /// scene's diagonal where that is less]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf; beyond 1.7e38 counts as inf [default:

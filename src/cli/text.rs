@@ -228,9 +228,7 @@ pub fn basis(comparison: &Comparison) -> String {
 
 /// False positives of the truly visible items: "0.08±0.03 %".
 pub fn false_positives(comparison: &Comparison) -> Option<String> {
-    // Those of fat bounds are one policy's.
-    let is_still = comparison.about().path.motion.is_empty();
-    let share = comparison.metric_of_any("excess").filter(|_| is_still)?;
+    let share = comparison.metric_of_any("excess")?;
     let margin = share.upper.map(|upper| (upper - share.value) * 100.0);
     Some(format!("{} %", plus_minus(share.value * 100.0, margin)))
 }

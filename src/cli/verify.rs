@@ -118,9 +118,7 @@ fn check_path(
         };
         let mut checked = check(&workload, subjects, &kind, again);
         if rows.is_empty() {
-            if is_safe(culling) {
-                judge_camera_level(&workload, &mut checked, again);
-            }
+            judge_camera_level(&workload, &mut checked, again);
             rows = checked;
             continue;
         }
@@ -241,10 +239,14 @@ fn is_safe(culling: &Culling) -> bool {
 }
 
 /// Checks the reference's answers, which all structures that agreed share, against
-/// the oracle, for some of the cameras.
+/// the oracle, for some of the cameras; points on their faces where the planes are safe.
 pub(super) fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
     let mut errors = judge(workload, MOST_JUDGED).errors;
-    errors += on_the_faces(workload);
+    match is_safe(&workload.culling) {
+        true => errors += on_the_faces(workload),
+        // Contacts are not promised.
+        false => errors.touch_dropped = 0,
+    }
     if errors.false_negatives + errors.touch_dropped == 0 {
         return;
     }

@@ -97,8 +97,8 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
     );
     writeln!(out, "{}", text::wrapped(&checked, width))?;
     if !outcome.against_cameras {
-        let doubt = "Planes without the full margin may drop visible items: structures were \
-                     compared with each other, not with the cameras.";
+        let doubt = "Planes without the full margin may drop visible items: a few cameras were \
+                     checked, points on their faces were not.";
         writeln!(out, "{}", text::wrapped(doubt, width))?;
     }
     Ok(())

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::key::Pass;
 use super::{Built, Notice, Status, Subject, Verdict, Workload, guarded};
 use crate::culling::CullingTest;
+use crate::geometry::Aabb;
 use crate::index::Kind;
 use crate::query::{ItemId, Located, QueryCost};
 use crate::statistics::rate;
@@ -75,6 +76,8 @@ impl Counted {
     }
 }
 
+/// Most verdicts of the oracle per group; one takes about 50 ns.
+pub(super) const MOST_JUDGED: usize = 400_000;
 /// Time limit of the whole count pass of a subject.
 const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -179,26 +182,68 @@ pub struct Judged {
 /// Checks as many cameras as `most` verdicts of the oracle allow, from 1 to 16.
 pub fn judge(workload: &Workload, most: usize) -> Judged {
     let scene = workload.scene;
-    let count = workload.cameras.len();
-    let wanted = (most / scene.items.len().max(1)).clamp(1, 16).min(count);
-    let mut judged = Judged::default();
-    let mut by_camera = Vec::with_capacity(wanted);
-    for n in 0..wanted {
-        let frame = n * count / wanted;
-        let camera = &workload.cameras[frame];
-        let Some(truth) = Truth::of_scene(camera, scene) else {
-            continue;
-        };
-        let view = workload.views[frame].as_any();
-        let answer: Vec<ItemId> = scan(&workload.items, |b| view.sees(b)).collect();
-        let errors = truth.errors(&scene.items, &answer);
-        judged.errors += blamed(workload.culling.test, errors);
-        judged.judged_queries += 1;
-        by_camera.push([errors.false_positives as f64, errors.visible as f64]);
+    let mut sums = Judging::default();
+    for n in spread(scene.items.len(), most, workload.cameras.len()) {
+        let truth = Truth::of_scene(&workload.cameras[n], scene);
+        sums.add(workload, n, truth, &scene.items, &workload.items);
     }
-    let excess = rate(&by_camera);
-    judged.excess_interval = excess.and_then(|found| Some([found.lower?, found.upper?]));
-    judged
+    sums.judged()
+}
+
+/// Queries that are judged, evenly spread: as many as `most` verdicts allow, from 1 to 16.
+pub(super) fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item = usize> {
+    let wanted = (most / items.max(1)).clamp(1, 16).min(queries);
+    (0..wanted).map(move |n| n * queries / wanted)
+}
+
+/// Sums over the queries that are judged.
+#[derive(Default)]
+pub(super) struct Judging {
+    sums: Judged,
+    by_query: Vec<[f64; 2]>,
+}
+
+impl Judging {
+    /// Compares the answer about items, `held` as the test has them, with the truth.
+    pub(super) fn add(
+        &mut self,
+        workload: &Workload,
+        camera: usize,
+        truth: Option<Truth>,
+        items: &[Aabb],
+        held: &[Aabb],
+    ) {
+        let Some(truth) = truth else { return };
+        let view = workload.views[camera].as_any();
+        let answer: Vec<ItemId> = scan(held, |b| view.sees(b)).collect();
+        let errors = truth.errors(items, &answer);
+        self.sums.errors += blamed(workload.culling.test, errors);
+        self.sums.judged_queries += 1;
+        let of_query = [errors.false_positives as f64, errors.visible as f64];
+        self.by_query.push(of_query);
+    }
+
+    pub(super) fn judged(self) -> Judged {
+        let excess = rate(&self.by_query);
+        Judged {
+            excess_interval: excess.and_then(|found| Some([found.lower?, found.upper?])),
+            ..self.sums
+        }
+    }
+}
+
+impl Judged {
+    /// The verdict of every structure, if visible items are missed.
+    pub(super) fn unsafe_verdict(&self) -> Option<Verdict> {
+        let errors = &self.errors;
+        (errors.false_negatives > 0).then(|| {
+            let reason = format!(
+                "{} of {} visible items are missed at camera level, the deepest by {:e}",
+                errors.false_negatives, errors.visible, errors.worst_miss
+            );
+            Verdict::new(Status::Unsafe, reason)
+        })
+    }
 }
 
 /// Errors with their false positives attributed to the planes or to the test.

@@ -80,7 +80,9 @@ fn measure_frames(
         if answered.is_none() && entry.runs() {
             notice(Some(&entry.part.label), "counting");
             let counted = guarded(|| entry.count(frames, stop));
-            entry.part.verdict = counted.unwrap_or_else(Err).err().unwrap_or_default();
+            let failed = counted.unwrap_or_else(Err).err();
+            let missed = frames.judged.and_then(|judged| judged.unsafe_verdict());
+            entry.part.verdict = failed.or(missed).unwrap_or_default();
         }
         if stop() {
             return None;
@@ -125,6 +127,7 @@ fn measure_frames(
         lens_scale: workload.lens_scale,
     };
     let part = Part {
+        judged: frames.judged,
         subjects: entries.into_iter().map(|entry| entry.part).collect(),
         tasks,
         ..plan.part(workload, answered.is_none().then_some(known))
@@ -181,9 +184,8 @@ impl Entry<'_> {
         let mut counts = counts(&counted, frames.workload.scene.items.len());
         if let UpdatePolicy::Fat(_) = self.subject.spec.policy {
             let visible = frames.right.iter().map(|answer| answer.count).sum::<u64>();
-            let (extra, queries) = (false_positives as f64, frames.right.len() as f64);
-            counts.insert("false_positive_count".to_owned(), extra / queries);
-            counts.insert("excess".to_owned(), extra / (visible as f64).max(1.0));
+            let excess = false_positives as f64 / (visible as f64).max(1.0);
+            counts.insert("fat_excess".to_owned(), excess);
         }
         self.part.counts = counts;
         self.part.memory_after_bytes = Some(moving.index.memory().total() as u64);

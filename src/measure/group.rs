@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
-use super::count::{Counted, count_pass, judge};
+use super::count::{Counted, MOST_JUDGED, count_pass, judge};
 use super::index_under_test::TWIN;
 use super::key::{GroupKey, Pass, TaskKey};
 use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
@@ -17,8 +17,6 @@ use super::{
 };
 use crate::statistics::{interquartile_mean, median};
 
-/// Most verdicts of the oracle per group; one takes about 50 ns.
-const MOST_JUDGED: usize = 400_000;
 /// Reason of what is left out of a scene without items.
 pub const NO_ITEMS: &str = "the scene has no items: there is nothing to time";
 /// Fewest groups of cameras for quantiles of the query time.
@@ -277,17 +275,10 @@ fn count<'a>(
     let counted = count_pass(workload, subjects, notice);
     let judged = judge(workload, MOST_JUDGED);
     // All right answers are the same set, and so are its errors.
-    let of_all = match &judged.errors {
+    let of_all = match workload.scene.items.is_empty() {
         // Among no items nothing is found faster.
-        _ if workload.scene.items.is_empty() => Some(Verdict::new(Status::LeftOut, NO_ITEMS)),
-        errors if errors.false_negatives > 0 => {
-            let reason = format!(
-                "{} of {} visible items are missed at camera level, the deepest by {:e}",
-                errors.false_negatives, errors.visible, errors.worst_miss
-            );
-            Some(Verdict::new(Status::Unsafe, reason))
-        }
-        _ => None,
+        true => Some(Verdict::new(Status::LeftOut, NO_ITEMS)),
+        false => judged.unsafe_verdict(),
     };
     let entries = subjects.iter().zip(counted).map(|(subject, counted)| {
         let is_ok = counted.verdict.status == Status::Ok;

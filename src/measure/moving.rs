@@ -6,11 +6,12 @@
 use std::collections::BTreeMap;
 
 use super::clock::{Lap, Stopwatch};
+use super::count::{Judging, MOST_JUDGED, spread};
 use super::index_under_test::not_built;
 use super::process_result::Known;
 use super::update::{MOST_UPDATED, USUAL_SHARE, move_share};
 use super::{
-    Answer, Protocol, Status, TaskKind, TimedTask, Verdict, Workload, guarded, input_of,
+    Answer, Judged, Protocol, Status, TaskKind, TimedTask, Verdict, Workload, guarded, input_of,
     timed_rounds,
 };
 use crate::culling::CameraView;
@@ -18,7 +19,7 @@ use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec, UpdatePolicy};
 use crate::motion::{Motion, Replay};
 use crate::query::ItemId;
-use crate::verify::{Trial, explain_visibility, scan};
+use crate::verify::{Trial, Truth, explain_visibility, scan};
 
 /// Number of updates before queries are timed.
 const REFITS: usize = 32;
@@ -35,6 +36,8 @@ pub(super) struct Frames<'w> {
     pub(super) motion: &'w Motion,
     /// Answers of all queries, frame by frame.
     pub(super) right: Vec<Answer>,
+    /// How the first answers of some frames differ from the exact truth about the boxes there.
+    pub(super) judged: Option<Judged>,
 }
 
 impl<'w> Frames<'w> {
@@ -48,12 +51,23 @@ impl<'w> Frames<'w> {
             workload,
             motion,
             right: known.map(|known| known.visible.clone()).unwrap_or_default(),
+            judged: None,
         };
         if known.is_none() {
             let (mut items, mut replay) = (workload.items.to_vec(), motion.replay());
+            let (mut boxes, mut shown) = (workload.scene.items.to_vec(), motion.replay());
             let (mut answers, mut ids) = (Vec::new(), Vec::new());
+            let (mut judging, cameras) = (Judging::default(), &workload.cameras);
+            let mut due = spread(items.len(), MOST_JUDGED, motion.frames()).peekable();
             for frame in 0..motion.frames() {
                 advance(&mut replay, workload, &mut items);
+                shown.advance(&mut boxes);
+                if due.next_if_eq(&frame).is_some() {
+                    let camera = frame * workload.views_per_frame % cameras.len();
+                    let origin = workload.scene.origin;
+                    let truth = Truth::of_camera(&cameras[camera], origin, &boxes);
+                    judging.add(workload, camera, truth, &boxes, &items);
+                }
                 for (_, view) in frames.views(frame) {
                     ids.clear();
                     ids.extend(scan(&items, |b| view.as_any().sees(b)));
@@ -61,6 +75,7 @@ impl<'w> Frames<'w> {
                 }
             }
             frames.right = answers;
+            frames.judged = Some(judging.judged());
         }
         frames
     }

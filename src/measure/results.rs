@@ -216,7 +216,7 @@ impl<'p> MergedParts<'p> {
     /// Metrics that this cell lacks though its structure is right, with the reason.
     fn left_out(&self, label: &str) -> Vec<String> {
         if self.ranked() == TaskKind::Frame {
-            let left_out = "query_ns_p95, locate_ns, excess: not measured of items that move";
+            let left_out = "query_ns_p95, locate_ns: not measured of items that move";
             return vec![left_out.to_owned()];
         }
         let is_large = self.loaded.scene.total_count > MOST_UPDATED;
@@ -382,8 +382,8 @@ impl<'p> MergedParts<'p> {
         let ok = cells.iter().enumerate();
         let ok = ok.filter(|(_, cell)| cell.status == Status::Ok);
         // Fat bounds answer another question: no rank beside exact ones.
-        let is_exact = |cell: &ReportCell| cell.value("false_positive_count").unwrap_or(0.0) == 0.0;
-        let ok = ok.filter(|(_, c)| c.path.motion.is_empty() || is_exact(c));
+        let is_exact = |cell: &ReportCell| cell.value("fat_excess").unwrap_or(0.0) == 0.0;
+        let ok = ok.filter(|(_, c)| is_exact(c));
         let timed = ok.filter_map(|(i, cell)| {
             let [reference, own] = self.paired(&cell.structure, self.ranked())?;
             let relative = own.iter().zip(reference).map(|(own, r)| own - r);

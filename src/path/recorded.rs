@@ -55,12 +55,17 @@ impl LensDefaults {
     pub fn depths(&self, eye: DVec3) -> (f64, Option<f64>) {
         let side = eye.distance(self.middle) + self.reach / 4.0;
         let far = self.far.unwrap_or(Some(side.max(self.reach).min(FARTHEST)));
-        (self.near.unwrap_or_else(|| self.near_of(far)), far)
+        let near = self
+            .near
+            .unwrap_or(far.unwrap_or(self.reach) / FAR_IN_NEARS);
+        (near, far)
     }
 
-    /// Near plane of a recorded camera with this far plane.
+    /// Near plane of a recorded camera with this far plane, which may lie far behind the scene.
     fn near_of(&self, far: Option<f64>) -> f64 {
-        far.filter(|far| *far > 0.0).unwrap_or(self.reach) / FAR_IN_NEARS
+        far.filter(|far| *far > 0.0)
+            .map_or(self.reach, |far| far.min(self.reach))
+            / FAR_IN_NEARS
     }
 
     /// The same with up axis and size of a scene.
@@ -331,6 +336,16 @@ mod tests {
         let path = read(bare).unwrap();
         assert_eq!(path.cameras[0].frame.forward(), DVec3::Y);
         assert_eq!(path.cameras[0].frame.v(), DVec3::Z);
+    }
+
+    /// A far plane behind the scene does not push the near one into it.
+    #[test]
+    fn near_is_a_thousandth_of_the_nearer_of_far_and_scene() {
+        let header = "eye_x,eye_y,eye_z,look_x,look_y,look_z,far\n";
+        for (far, near) in [("10", 0.01), ("1e4", 1.0), ("1e38", 1.0), ("inf", 1.0)] {
+            let path = read(&format!("{header}0,0,0,1,0,0,{far}\n")).unwrap();
+            assert_eq!(path.cameras[0].lens.near(), near, "{far}");
+        }
     }
 
     /// Line by line: a height makes a lens orthographic, none leaves it perspective.

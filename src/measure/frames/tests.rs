@@ -194,13 +194,13 @@ fn policies_are_right_and_fat_bounds_say_what_they_cost() {
         let part = part(&specs, motion, CullingTest::SixPlane, None);
         assert_eq!(part.contradictions(part.known.as_ref().unwrap()), []);
         let cells = Group::of(&[part]).cells;
-        let extra = |n: usize| cells[n].value("false_positive_count");
+        let extra = |n: usize| cells[n].value("fat_excess");
         assert!(
             cells.iter().all(|cell| cell.status == Status::Ok),
             "{cells:?}"
         );
         assert!(cells[..3].iter().all(|cell| cell.rank.is_some()));
         assert_eq!((extra(0), cells[3].rank), (None, None));
-        assert!(extra(3) > Some(0.0) && cells[3].value("excess") > Some(0.0));
+        assert!(extra(3) > Some(0.0));
     }
 }
