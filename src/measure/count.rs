@@ -190,7 +190,9 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
     sums.judged()
 }
 
-/// Queries that are judged, evenly spread: as many as `most` verdicts allow, from 1 to 16.
+/// Queries that are judged, evenly spread.
+///
+/// As many as `most` verdicts allow, from 1 to 16.
 pub(super) fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item = usize> {
     let wanted = (most / items.max(1)).clamp(1, 16).min(queries);
     (0..wanted).map(move |n| n * queries / wanted)

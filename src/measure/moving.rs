@@ -36,7 +36,7 @@ pub(super) struct Frames<'w> {
     pub(super) motion: &'w Motion,
     /// Answers of all queries, frame by frame.
     pub(super) right: Vec<Answer>,
-    /// How the first answers of some frames differ from the exact truth about the boxes there.
+    /// Difference of the first answers of some frames from the truth about the boxes there.
     pub(super) judged: Option<Judged>,
 }
 

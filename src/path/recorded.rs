@@ -61,7 +61,7 @@ impl LensDefaults {
         (near, far)
     }
 
-    /// Near plane of a recorded camera with this far plane, which may lie far behind the scene.
+    /// Near plane of a recorded camera whose far plane may lie far behind the scene.
     fn near_of(&self, far: Option<f64>) -> f64 {
         far.filter(|far| *far > 0.0)
             .map_or(self.reach, |far| far.min(self.reach))
