@@ -192,7 +192,7 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
 
 /// Queries that are judged, evenly spread.
 ///
-/// As many as `most` verdicts allow, from 1 to 16.
+/// Their number is from 1 to 16, as `most` verdicts allow.
 pub(super) fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item = usize> {
     let wanted = (most / items.max(1)).clamp(1, 16).min(queries);
     (0..wanted).map(move |n| n * queries / wanted)

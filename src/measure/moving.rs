@@ -36,7 +36,7 @@ pub(super) struct Frames<'w> {
     pub(super) motion: &'w Motion,
     /// Answers of all queries, frame by frame.
     pub(super) right: Vec<Answer>,
-    /// Difference of the first answers of some frames from the truth about the boxes there.
+    /// Errors of the first answers of some frames, about the boxes there.
     pub(super) judged: Option<Judged>,
 }
 

@@ -156,7 +156,7 @@ impl Motion {
             return self;
         };
         let (name, views) = (&self.name, views.max(1));
-        let Some(last) = path.times.iter().step_by(views).last() else {
+        let Some(last) = path.times.iter().step_by(views).next_back() else {
             let (seen, cameras) = (self.frames * views, path.lines.len());
             if ![0, seen].contains(&cameras) {
                 warn(&format!(
