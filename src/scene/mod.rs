@@ -60,6 +60,8 @@ pub(crate) use surface::volume_within;
 pub use surface::{ItemShape, SurfaceKind, Surfaces};
 pub use wad::{WadMap, map_names};
 pub use written::{Originals, Sought, SoughtBox};
+#[cfg(test)]
+pub use zip::tests::packed;
 
 /// A box in world coordinates, as a file or a generator states it.
 #[derive(Clone, Copy, PartialEq, Debug)]

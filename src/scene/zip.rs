@@ -169,7 +169,7 @@ fn chosen<'e, 'r, 'w>(
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::super::{LoadOptions, part_names, read_bytes};
     use super::*;
     use miniz_oxide::deflate::compress_to_vec;

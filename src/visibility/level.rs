@@ -175,7 +175,12 @@ mod tests {
 
     #[test]
     fn levels_are_read_as_the_scene_was() {
-        let source = "tests/data/two_rooms.bsp";
+        let map = include_bytes!("../../tests/data/two_rooms.bsp");
+        let maps = scene::packed(&[("maps/a.bsp", map, 0), ("maps/b.bsp", map, 0)]);
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("two.pk3");
+        std::fs::write(&file, maps).expect("writable");
+        let source = &format!("{}#maps/b.bsp", file.display());
         let items = scene::ItemKind::Brushes;
         let options = LoadOptions {
             items,
@@ -183,8 +188,10 @@ mod tests {
         };
         let scene = scene::load(source, &options).expect("a map");
         let level = Level::of(source, &scene, &options).expect("a level");
-        assert_eq!(level.input_count, scene.items.len());
+        assert_eq!(level.input_count, 2 * scene.items.len());
         assert_eq!(level.output_count, scene.items.len());
+        let plain = Level::of(source, &scene, &Default::default()).expect("a level");
+        assert_ne!(plain.output_count, scene.items.len());
     }
 
     #[test]
