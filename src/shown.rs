@@ -92,7 +92,7 @@ pub fn unit(ns: f64) -> (f64, &'static str) {
     }
 }
 
-/// Three significant digits: 0.0123, 1.23, 12.3, 123, 12345; an exponent only
+/// Three significant digits: 0.0123, 1.23, 12.3, 123, 12,345; an exponent only
 /// where the number would be longer than anything measured.
 pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -100,6 +100,10 @@ pub fn significant(value: f64) -> String {
     }
     if !(1e-9..1e15).contains(&value.abs()) {
         return format!("{value:.2e}");
+    }
+    if value.abs() >= 999.5 {
+        let sign = if value < 0.0 { "-" } else { "" };
+        return sign.to_owned() + &count(value.abs().round() as usize);
     }
     let digits = 2 - value.abs().log10().floor() as i32;
     format!("{value:.*}", digits.clamp(0, 12) as usize)

@@ -62,7 +62,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let step = "with and without every rule";
     let times = study.times(step, setting.path.lens_scale, trials)?;
     let advice = prepared.conclude(&input, &times);
-    setting.note_solid();
+    setting.note_solid(args.format);
     print(args.format, &advice, || show(&advice, args.all_columns))?;
     Ok(Ending::of(!advice.found_wrong_answers()))
 }

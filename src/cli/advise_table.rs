@@ -52,9 +52,10 @@ pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
         ("WRONG: answers with and without differ: ", &|rule| {
             rule.checks.iter().any(Check::is_wrong)
         }),
-        ("\nPredicted otherwise, decided as measured: ", &|rule| {
-            rule.confirmed == Some(false) && no(rule).is_none()
-        }),
+        (
+            "\nEstimated otherwise; the measured times decide: ",
+            &|rule| rule.confirmed == Some(false) && no(rule).is_none(),
+        ),
     ];
     for (what, is_in) in lines {
         let named = advice.omissions.iter().filter(|rule| is_in(rule));

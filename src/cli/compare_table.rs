@@ -185,6 +185,9 @@ impl CompareTable<'_> {
         lines.extend(lone_lines("OLD", &changes.only_in_old));
         lines.extend(lone_lines("NEW", &changes.only_in_new));
         lines.extend(self.advice());
+        if rows.is_empty() && !all && room.is_some() {
+            lines.push("every cell with its change: --all".to_owned());
+        }
         let summary = self.summary();
         lines.push(match room {
             // It stands above the fold.

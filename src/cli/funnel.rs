@@ -74,7 +74,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         bail!("a stage failed when it was timed: {reason}");
     }
     let report = prepared.conclude(&times);
-    stages.setting.note_solid();
+    stages.setting.note_solid(args.format);
     let shown = print(args.format, &report, || {
         show(&funnel_table::blocks(&report, args.all))
     });

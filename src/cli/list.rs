@@ -34,7 +34,16 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
                 all.insert(name.to_owned(), rows.into_iter().map(as_json).collect());
             }
             TableFormat::Table => {
-                let rows = rows.into_iter().map(told);
+                let rows: Vec<_> = rows.into_iter().map(told).collect();
+                let in_line = rows.iter().all(|row| row.1.join("; ").len() < 60);
+                let rows = rows
+                    .into_iter()
+                    .map(|(name, columns, summary)| match in_line {
+                        true if !columns.is_empty() => {
+                            [name, format!("{summary} ({})", columns.join("; "))]
+                        }
+                        _ => [name, [vec![summary], columns].concat().join("\n")],
+                    });
                 let entries = text::entries(&rows.collect::<Vec<_>>(), text::width());
                 writeln!(out, "{name}\n{entries}")?;
                 if !note.is_empty() {
@@ -54,8 +63,8 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// A row for people: its name and its summary with what the columns hold.
-fn told((name, columns, summary): Row) -> [String; 2] {
+/// A row for people: its name, what the columns hold, its summary.
+fn told((name, columns, summary): Row) -> (String, Vec<String>, String) {
     let of = |value: &Value| match value {
         Value::String(text) => text.clone(),
         Value::Array(words) => {
@@ -70,14 +79,8 @@ fn told((name, columns, summary): Row) -> [String; 2] {
         (column, value)
     });
     let told = told.filter(|(_, value)| !value.is_empty());
-    let told: Vec<String> = told
-        .map(|(column, value)| format!("{column} {value}"))
-        .collect();
-    let columns = told.iter().map(|column| format!("\n{column}"));
-    match told.join("; ") {
-        short if short.len() < 60 && !told.is_empty() => [name, format!("{summary} ({short})")],
-        _ => [name, summary + &columns.collect::<String>()],
-    }
+    let told = told.map(|(column, value)| format!("{column} {value}"));
+    (name, told.collect(), summary)
 }
 
 fn entries<'r>(rows: impl Iterator<Item = [&'r str; 2]>) -> String {

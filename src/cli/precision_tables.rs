@@ -1,8 +1,6 @@
 //! Tables of `cullbench precision`: errors and times, the Pareto fronts and the
 //! sweeps. Sentences about them are in `precision_conclusions`.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
 use super::document::Block;
@@ -12,6 +10,7 @@ use crate::precision::{
     CullingErrors, Names, Point, Precision, RegionErrors, SIZE_RATIOS, SWEEPS, SizeRow,
     StableAfter, SweepRow,
 };
+use crate::report::grouped;
 use crate::statistics::Rate;
 use crate::verify::ErrorCount;
 
@@ -81,17 +80,15 @@ pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
             add(title, table, &note);
         }
     }
-    let mut failed: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for point in &p.points {
-        let why = point.reason.iter();
-        let why = why.map(|reason| format!("{}: {reason}", point.status.name()));
-        why.for_each(|why| failed.entry(why).or_default().push(named(point)));
-    }
-    let line = |(why, names): (&String, &Vec<String>)| match &names[..] {
+    let failed = p.points.iter().filter_map(|point| {
+        let why = format!("{}: {}", point.status.name(), point.reason.as_ref()?);
+        Some((why, named(point)))
+    });
+    let line = |(why, names): (String, Vec<String>)| match &names[..] {
         [first, _, ..] => format!("{} points, such as {first}: {why}", names.len()),
         _ => format!("{}: {why}", names.concat()),
     };
-    blocks.extend(failed.iter().map(line).map(Block::Line));
+    blocks.extend(grouped(failed).into_iter().map(line).map(Block::Line));
     blocks
 }
 

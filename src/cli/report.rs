@@ -1,7 +1,7 @@
 //! `cullbench report`: the results of a run as Markdown, pictures or one HTML page,
 //! from its report.json; their summary on the terminal, at the end of `run`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -76,24 +76,39 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
 /// The page of a run; `folder` has its stream and samples.
 pub fn page(report: &Report, folder: &Path) -> String {
     let mut blocks = blocks(report, &views(folder, report));
-    blocks.extend(glossary());
+    blocks.extend(glossary(&blocks));
     to_html(&title(report), &blocks)
 }
 
-/// Meaning of every column of figures.
-fn glossary() -> [Block; 2] {
-    let mut table = Table::of("column | meaning");
-    for line in MEANINGS {
-        table.add_row(line.split(" | "));
-    }
+/// Meaning of the columns and labels that occur in tables.
+fn glossary(blocks: &[Block]) -> [Block; 2] {
+    let texts = blocks.iter().flat_map(|block| match block {
+        Block::Table(table) | Block::Heat(table) => {
+            [&[table.header.clone()], &table.rows[..]].concat().concat()
+        }
+        _ => Vec::new(),
+    });
+    let texts: BTreeSet<String> = texts.collect();
+    let is_of = |text: &str, name: &str| {
+        text.split(", ").next() == Some(name) || name.contains('[') && text.contains(" [")
+    };
+    let occurs = |name: &str| texts.iter().any(|text| is_of(text, name));
     let figures = run_table::FIGURES.iter().map(|figure| (figure.0, figure.1));
     let figures = [("vs linear", "speedup")].into_iter().chain(figures);
-    for (column, metric) in figures {
+    let figures = figures.map(|(column, metric)| {
         let info = METRICS.iter().find(|info| info.name == metric);
-        table.add_row([column, info.map_or("", |info| info.summary)]);
-    }
-    for bound in BOUNDS {
-        table.add_row([bound.name, bound.summary]);
+        [column, info.map_or("", |info| info.summary)]
+    });
+    let bounds = BOUNDS.iter().map(|bound| [bound.name, bound.summary]);
+    let meanings = MEANINGS
+        .iter()
+        .filter_map(|line| line.split_once(" | "))
+        .map(<[&str; 2]>::from)
+        .chain(figures)
+        .chain(bounds);
+    let mut table = Table::of("column | meaning");
+    for row in meanings.filter(|row| occurs(row[0])) {
+        table.add_row(row);
     }
     [Block::Heading(2, "Columns".to_owned()), Block::Table(table)]
 }

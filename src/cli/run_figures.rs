@@ -64,7 +64,12 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     };
     let structures: Vec<Row> = drawn.iter().enumerate().map(row).collect();
     let caption = format!(
-        "Speed-ups over {base}, 95 % interval; a line joins structures of one rank{}",
+        "Speed-ups over {base}{}; a line joins structures of one rank{}",
+        if drawn.iter().any(|row| row.1.1.is_some()) {
+            ", 95 % interval"
+        } else {
+            ""
+        },
         left_out(all.len() - drawn.len())
     );
     Some(rows(caption, &axis, Some(1.0), &structures))

@@ -39,10 +39,7 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     told.extend(gains(&SharedWork::of(comparison.sound())));
     told.extend(checked(&[comparison]));
     told.extend(failed(&[comparison]));
-    let is_fat = |cell: &&ReportCell| {
-        let is_unranked = cell.status == Status::Ok && cell.rank.is_none();
-        is_unranked && cell.structure.contains("@fat=")
-    };
+    let is_fat = |cell: &&ReportCell| cell.rank.is_none() && cell.structure.contains("@fat=");
     let fat = comparison.cells.iter().any(is_fat);
     told.extend(fat.then(|| "Rank -: none, as fat bounds return false positives.".to_owned()));
     told.join(" ")

@@ -73,17 +73,16 @@ impl Setting {
         })
     }
 
-    /// Tells that boxes of a file are taken as what is drawn.
-    pub fn note_solid(&self) {
-        let Scene {
-            name,
-            surfaces,
-            own_tree,
-            ..
-        } = &self.scene;
-        let is_file = is_readable(Path::new(split_part(name).0));
-        if is_file && surfaces.is_none() && own_tree.is_none() {
-            tell("note: items count as solid boxes: of meshes less is hidden");
+    /// Tells readers of tables that boxes of a file are taken as what is drawn.
+    pub fn note_solid(&self, format: TableFormat) {
+        let scene = &self.scene;
+        let is_file = is_readable(Path::new(split_part(&scene.name).0));
+        if format == TableFormat::Table
+            && is_file
+            && scene.surfaces.is_none()
+            && scene.own_tree.is_none()
+        {
+            tell("warning: items count as solid boxes: of meshes less is hidden");
         }
     }
 }

@@ -190,7 +190,7 @@ pub fn entries(rows: &[[String; 2]], width: usize) -> String {
 pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
     match ends {
         [Some(lower), Some(upper)] => {
-            let [lower, upper] = [lower, upper].map(|end| significant(end / unit));
+            let [lower, upper] = [lower, upper].map(|end| significant(end / unit).replace(',', ""));
             format!(" [{lower}, {upper}]")
         }
         _ => String::new(),
@@ -198,11 +198,11 @@ pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
 }
 
 /// Basis of the times of a study, with the ratio of a thing that was measured
-/// twice: "10 processes (a twin took 1.00 [0.99, 1.01] times as long)".
+/// twice: "10 processes (measured twice: 1.00 [0.99, 1.01] times as long)".
 pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     let count = counted(processes, "process");
     match twin.filter(|twin| twin.lower.is_some()) {
-        Some(twin) => format!("{count} (a twin took {} times as long)", within(*twin)),
+        Some(twin) => format!("{count} (measured twice: {} times as long)", within(*twin)),
         None => format!("{count}: times without intervals, no ties (--processes 10 gives both)"),
     }
 }
@@ -347,7 +347,7 @@ mod tests {
             assert_eq!(time(ns), text);
         }
         assert_eq!(significant(0.012_34), "0.0123");
-        assert_eq!(significant(12_345.6), "12346");
+        assert_eq!([999.4, -12_345.6].map(significant), ["999", "-12,346"]);
         assert_eq!(
             [1e308, -1e15, 5e-324, 1e-9].map(significant),
             ["1.00e308", "-1.00e15", "4.94e-324", "0.00000000100"]
@@ -368,7 +368,7 @@ mod tests {
             unit: "ns".to_owned(),
         };
         assert_eq!(time_within(metric.estimate()), "1.81 us [0.990, 1900]");
-        assert_eq!(within(metric.estimate()), "1810 [990, 1900000]");
+        assert_eq!(within(metric.estimate()), "1,810 [990, 1900000]");
         let bare = Metric {
             lower: None,
             ..metric

@@ -182,14 +182,11 @@ fn fates(
 fn conclusion(data: &ViewData, totals: [usize; FATES], agree: bool) -> String {
     let views = data.frames.len();
     let of = |fate: Fate| totals[fate as usize];
-    let mean = |count: usize| match count as f64 / views as f64 {
-        few if few < 100.0 => text::significant(few),
-        many => text::count(many.round() as usize),
-    };
+    let mean = |count: usize| text::significant(count as f64 / views as f64);
     let returned = of(Fate::Visible) + of(Fate::FalsePositive) + of(Fate::Hidden);
     let mut parts = vec![match of(Fate::FalsePositive) {
         0 => "no false positive".to_owned(),
-        count => format!("{} of them false positives", mean(count)),
+        count => format!("{} false positives per view", mean(count)),
     }];
     if let Some(samples) = &data.samples {
         let hidden = mean(of(Fate::Hidden));

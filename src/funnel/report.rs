@@ -307,9 +307,11 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     let (stencil, with) = test(STENCIL)?;
     let (other, without) = test(default_test(report.cut_outs.is_some()))?;
     Some(format!(
-        "fragment {} tests {with:.0} samples per view instead of {without:.0} ({:.1} % fewer) and \
-         leaves {} items as {} does.",
+        "fragment {} tests {} samples per view instead of {} ({:.1} % fewer) and leaves {} items as \
+         {} does.",
         stencil.back_end.name,
+        significant(with),
+        significant(without),
         (1.0 - with / without) * 100.0,
         match stencil.errors.output_count == other.errors.output_count {
             true => "as many",
@@ -323,16 +325,15 @@ impl MirrorRow {
     /// A sentence on the reflected items and what the stencil saves.
     pub fn sentence(&self) -> String {
         format!(
-            "In item {} as a mirror across {} (in front in {}, at {:.1} samples per view) {:.1} items \
-         are seen; with the stencil, {:.0} samples per view are tested instead of {:.0}, and {} \
-         differ.",
+            "In item {} as a mirror across {} (in front in {}, at {} samples per view) {} items are \
+         seen; with the stencil, {} samples per view are tested instead of {}, and {} differ.",
             self.item,
             self.axis,
             counted(self.view_count, "view"),
-            self.marked_count,
-            self.shown_count,
-            self.with_stencil.asked_count,
-            self.without_stencil.asked_count,
+            significant(self.marked_count),
+            significant(self.shown_count),
+            significant(self.with_stencil.asked_count),
+            significant(self.without_stencil.asked_count),
             counted(self.wrong_sample_count as usize, "sample")
         )
     }

@@ -155,26 +155,24 @@ impl Motion {
         let Source::Recorded(recorded) = &self.source else {
             return self;
         };
-        let (name, views) = (&self.name, views.max(1));
-        let Some(last) = path.times.iter().step_by(views).next_back() else {
-            let (seen, cameras) = (self.frames * views, path.lines.len());
+        let (name, path_name, views) = (&self.name, &path.name, views.max(1));
+        let (seen, cameras) = (self.frames * views, path.lines.len());
+        if path.times.is_empty() {
             if ![0, seen].contains(&cameras) {
+                let paired = "which have no times: they are paired by their numbers";
                 warn(&format!(
-                    "{name}: frames with {seen} views, but {cameras} cameras in '{}', which have \
-                     no times: they are paired by their numbers",
-                    path.name
+                    "{name}: frames with {seen} views, but {cameras} cameras in '{path_name}', {paired}"
                 ));
             }
             return self;
-        };
-        let (late, all) = (recorded.after(*last), recorded.moves());
+        }
+        let (paced, late) = recorded.at(path.times.iter().step_by(views));
         if late > 0 {
+            let of = format!("{late} of {} moves", recorded.moves());
             note(&format!(
-                "{name}: {late} of {all} moves come after the last frame of '{}' and are not used",
-                path.name
+                "{name}: {of} come after the last frame of '{path_name}' and are not used"
             ));
         }
-        let paced = recorded.at(path.times.iter().step_by(views).copied());
         Motion {
             frames: paced.frames(),
             source: Source::Recorded(paced),

@@ -42,29 +42,24 @@ impl Recorded {
         (&self.ids[rows.clone()], &self.boxes[rows])
     }
 
-    /// A frame for each time, with all rows since the one before.
+    /// A frame for each time with all rows since the one before; the rows left over.
     ///
-    /// An item's last row counts; rows after the last time are left out.
-    pub(super) fn at(&self, times: impl Iterator<Item = f64>) -> Recorded {
+    /// An item's last row counts.
+    pub(super) fn at<'t>(&self, times: impl Iterator<Item = &'t f64>) -> (Recorded, usize) {
         let (mut paced, mut next) = (Recorded::default(), 0);
         for time in times {
             let first = next;
-            next += self.times[first..].partition_point(|own| *own <= time);
+            next += self.times[first..].partition_point(|own| own <= time);
             let frames = (first..next).map(|n| self.frame(n));
             let rows = frames.flat_map(|(ids, boxes)| ids.iter().zip(boxes));
             let rows: BTreeMap<ItemId, Aabb> = rows.map(|(id, b)| (*id, *b)).collect();
             paced.ids.extend(rows.keys());
             paced.boxes.extend(rows.values());
             paced.ends.push(paced.ids.len());
-            paced.times.push(time);
+            paced.times.push(*time);
         }
-        paced
-    }
-
-    /// Number of rows after a time.
-    pub(super) fn after(&self, time: f64) -> usize {
-        let frames = self.times.partition_point(|own| *own <= time);
-        self.moves() - frames.checked_sub(1).map_or(0, |last| self.ends[last])
+        let used = self.ends[..next].last().copied().unwrap_or_default();
+        (paced, self.moves() - used)
     }
 
     pub(super) fn reach(&self) -> Vec3 {
@@ -88,7 +83,6 @@ impl Recorded {
     fn end_frame(
         &mut self,
         rows: &mut Vec<(ItemId, u64, Aabb)>,
-        time: f64,
         file: &str,
     ) -> Result<(), InputError> {
         rows.sort_by_key(|row| (row.0, row.1));
@@ -99,7 +93,6 @@ impl Recorded {
         self.ids.extend(rows.iter().map(|row| row.0));
         self.boxes.extend(rows.iter().map(|row| row.2));
         self.ends.push(self.ids.len());
-        self.times.push(time);
         rows.clear();
         Ok(())
     }
@@ -128,30 +121,31 @@ pub(super) fn read_motion_csv(
     let columns = table.columns(&COLUMNS)?;
     table.note_unread(&COLUMNS, &[]);
     let (mut recorded, mut rows) = (Recorded::default(), Vec::new());
-    let mut last = None;
     while let Some(row) = table.next_row() {
         let row = row?;
         let time = row.finite_number(columns[0])?;
-        match last {
-            Some(before) if time < before => {
+        match recorded.times.last() {
+            Some(&before) if time < before => {
                 let found = format!("time_s {time} after {before}");
                 return Err(row.error(found, "times in ascending order".to_owned()));
             }
-            Some(before) if time > before => recorded.end_frame(&mut rows, before, file)?,
+            Some(&before) if time > before => recorded.end_frame(&mut rows, file)?,
             _ => (),
         }
-        last = Some(time);
+        if recorded.times.last() != Some(&time) {
+            recorded.times.push(time);
+        }
         rows.push((
             item(&row, columns[1], scene)?,
             row.line(),
             bounds(&row, &columns, scene)?,
         ));
     }
-    let Some(last) = last else {
+    if recorded.times.is_empty() {
         let expected = "at least one row after the header";
         return Err(InputError::line(file, 2, "no motion", expected));
-    };
-    recorded.end_frame(&mut rows, last, file)?;
+    }
+    recorded.end_frame(&mut rows, file)?;
     Ok(recorded)
 }
 

@@ -34,12 +34,8 @@ pub static COUNTERS: &[&str] = &[
 ];
 
 /// The counters that `compare --gate work` judges: of a query, of a region search.
-pub static WORK: &[&str] = &[
-    "nodes_tested",
-    "items_tested",
-    "planes_tested",
-    "comparisons",
-];
+#[rustfmt::skip]
+pub static WORK: &[&str] = &["nodes_tested", "items_tested", "planes_tested", "comparisons"];
 
 named! {
     /// Outcome of a cell, worst first.
