@@ -45,7 +45,7 @@ fn a_run_is_reported_as_markdown_as_pictures_and_as_a_page() {
     for bound in bounds {
         let cells: Vec<&str> = bound.split('|').map(str::trim).collect();
         let speedup = cells.get(4).and_then(|cell| cell.split(' ').next());
-        let speedup = speedup.and_then(|cell| cell.parse::<f64>().ok());
+        let speedup = speedup.and_then(|cell| cell.replace(',', "").parse::<f64>().ok());
         assert!(speedup.is_some_and(|ratio| ratio > 0.0), "{bound}");
     }
     assert!(!text.contains("| p95 |"), "{text}");
