@@ -94,7 +94,10 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     shown?;
     let (stages, orders, picks) = (&report.stages, &report.orders, &report.picks);
-    Ok(Ending::of(keep_their_word(stages, orders, picks)))
+    let mirror = report.mirror.as_ref();
+    let is_mirrored = mirror.is_none_or(|row| row.wrong_sample_count == 0);
+    let is_right = is_mirrored && keep_their_word(stages, orders, picks);
+    Ok(Ending::of(is_right))
 }
 
 /// Amount of work.
@@ -107,9 +110,9 @@ fn work(input: &FunnelInput) -> String {
     )
 }
 
-/// Returns true if nothing visible is lost against a guarantee.
+/// Returns true if nothing visible is lost and nothing exact wrong.
 ///
-/// Nor is anything wrong that is declared exact. Stages behind an unproven one of the chain miss what that has lost.
+/// Stages behind an unproven one of the chain miss what that has lost.
 fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) -> bool {
     use Guarantee::{Exact, SampleExact, Unproven};
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Unproven;

@@ -27,7 +27,7 @@ pub type Truth = Vec<Vec<(ItemId, u32)>>;
 /// Items that only some of the `random_rays` rays meet count as one sample each.
 ///
 /// # Errors
-/// Too many items in front at the same samples.
+/// Too many items in front at the same samples, or too many bodies around the eye.
 pub fn visible(world: &World, random_rays: usize, threads: usize) -> Result<Truth, StudyError> {
     let rays_end = RaysEnd::at(&world.shape, world.cut_outs.as_ref());
     let samples = world.samples;
@@ -71,7 +71,7 @@ impl RaysEnd<'_> {
     /// Items in front at the samples of a view.
     ///
     /// # Errors
-    /// Too many items in front at the same samples.
+    /// Too many items in front at the same samples, or too many bodies around the eye.
     pub fn visible(
         &self,
         rays: &Rays,

@@ -214,9 +214,10 @@ impl Auto {
         self.scan.is_some()
     }
 
-    /// Trees with a lane for each item, where a neighbour was if it is empty now.
-    fn trees_of(input: &Input<'_>, params: &AutoParams) -> Result<Moving, BuildError> {
-        let (items, order) = (input.items, params.order);
+    /// Trees with a lane for each item, one that is gone beside the item before it.
+    fn trees_of(items: &[Aabb], params: &AutoParams) -> Result<Moving, BuildError> {
+        let order = params.order;
+        let resting = |items: &[Aabb]| Moving::resting(&Input::new(items), &WideParams { order });
         // A bound that is no number is refused by the build.
         let is_gone = |b: &Aabb| b.is_empty() && b.is_finite();
         let ids = (0..).zip(items).filter(|(_, b)| is_gone(b));
@@ -224,25 +225,20 @@ impl Auto {
         let held = items.iter().find(|b| !b.is_empty());
         let (false, Some(mut last)) = (params.structure == Use::Moving || gone.is_empty(), held)
         else {
-            return Moving::resting(input, &WideParams { order });
+            return resting(items);
         };
         let held = items.iter().map(|b| {
             last = if is_gone(b) { last } else { b };
             *last
         });
-        let held = Input {
-            items: &held.collect::<Vec<_>>(),
-            ..*input
-        };
-        let mut trees = Moving::resting(&held, &WideParams { order })?;
-        trees.still.balls = None;
+        let mut trees = resting(&held.collect::<Vec<_>>())?;
         trees.still.take_over(items, &gone);
         Ok(trees)
     }
 
     /// Replaces the trees; false with nothing changed if they cannot be built.
     fn rebuild(&mut self, items: &[Aabb]) -> bool {
-        let Ok(trees) = Auto::trees_of(&Input::new(items), &self.params) else {
+        let Ok(trees) = Auto::trees_of(items, &self.params) else {
             return false;
         };
         self.trees = trees;
@@ -381,8 +377,9 @@ impl RegionIndex for Auto {
 
     /// O(n log n), that of [`Wide`](super::Wide), and a few queries.
     fn build(input: &Input<'_>, params: &AutoParams) -> Result<Self, BuildError> {
+        let order = params.order;
         let mut auto = Auto {
-            trees: Auto::trees_of(input, params)?,
+            trees: Moving::resting(input, &WideParams { order })?,
             params: *params,
             ..Auto::default()
         };

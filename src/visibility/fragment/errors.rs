@@ -199,8 +199,9 @@ impl Parts {
 /// Cost and errors of several orders of the items that are left.
 ///
 /// `left` has their ids among those of `index`, ascending; pieces and `is_opaque` number items
-/// by the place there. Fragments are counted whether opaque or not. O(fragments log layers), for
-/// each of an item in parts those in its row of samples, and the pairs that are looked at.
+/// by the place there. Fragments are counted whether opaque or not. O(fragments log layers),
+/// plus the parts in its row of samples for each fragment of a cut item, plus the pairs that are
+/// looked at.
 pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
     rays: &Rays,
     grid: SampleGrid,

@@ -122,7 +122,7 @@ impl<B: Body> BodyIndex<B> {
         }
     }
 
-    /// Number of bodies that rays to all samples of a grid are at least tested against.
+    /// Least number of tests of bodies by the rays to all samples of a grid.
     pub fn tests(&self, rays: &Rays, grid: SampleGrid) -> u64 {
         let mut tests = 0;
         for (column, row) in (0..grid.width).flat_map(|x| (0..grid.height).map(move |y| (x, y))) {
