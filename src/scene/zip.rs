@@ -272,7 +272,7 @@ pub mod tests {
             packed(&[("in/s.gltf", text.as_bytes(), 8), (name, &[0; 36], 8)])
         };
         for (uri, name) in [
-            ("./caf%C3%A9%20%281%29.bin", "in/caf\u{e9} (1).bin"),
+            ("./%C3%BC%20%281%29.bin", "in/\u{fc} (1).bin"),
             ("100%/%+f%", "in/100%/%+f%"),
         ] {
             assert_eq!(read(&with(uri, name), None), Ok(1), "{uri}");

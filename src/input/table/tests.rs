@@ -218,7 +218,7 @@ fn header_errors_fit_one_line() {
 
 #[test]
 fn only_bytes_that_are_no_utf_8_are_replaced() {
-    let mut table = TableReader::open(b"x,y,kind\n1,2,caf\xe9 a\n", "t.csv", &NAMES).unwrap();
+    let mut table = TableReader::open(b"x,y,kind\n1,2,gr\xfcn a\n", "t.csv", &NAMES).unwrap();
     let row = table.next_row().unwrap().unwrap();
-    assert_eq!(row.text(2), "caf\u{fffd} a");
+    assert_eq!(row.text(2), "gr\u{fffd}n a");
 }
