@@ -84,7 +84,9 @@ pub fn page(report: &Report, folder: &Path) -> String {
 fn glossary(blocks: &[Block]) -> [Block; 2] {
     let texts = blocks.iter().flat_map(|block| match block {
         Block::Table(table) | Block::Heat(table) => {
-            [&[table.header.clone()], &table.rows[..]].concat().concat()
+            [std::slice::from_ref(&table.header), &table.rows[..]]
+                .concat()
+                .concat()
         }
         _ => Vec::new(),
     });

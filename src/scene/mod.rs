@@ -47,6 +47,7 @@ pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS
 pub use gltf::{CameraAnimation, read_gltf};
 pub use ibsp::{LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
+#[cfg(feature = "cli")]
 pub(crate) use memory::available_bytes;
 pub use obj::read_obj;
 pub use options::{CameraPlace, ITEM_KINDS, ItemKind, LoadOptions, PlaceView, UP_AXES, UpAxis};
