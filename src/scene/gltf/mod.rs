@@ -45,7 +45,7 @@ pub fn is_gltf(bytes: &[u8]) -> bool {
 /// Reads a scene; `file` is the path that other files are named relative to.
 ///
 /// # Errors
-/// The errors of [`read_beside`].
+/// A file that is no glTF, or has what is not read; buffers that cannot be read or are too short.
 pub fn read_gltf(
     bytes: &[u8],
     file: &str,
