@@ -212,10 +212,10 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
     let (views, SampleGrid { width, height }) = (text::counted(sweep.views, "view"), SAMPLES);
     let by = match sweep.rays_per_view {
         0 => "the exact side of each triangle".to_owned(),
-        rays => format!("{rays} random rays each beside {width} x {height} samples"),
+        rays => format!("{rays} random rays each and {width} x {height} samples"),
     };
     let basis = format!(
-        "{views} with {by}; {}.",
+        "{views} against {by}; {}.",
         funnel_table::spread(sweep.processes)
     );
     let columns: &[Column<&SweepPoint>] = &[

@@ -246,8 +246,8 @@ pub struct LensArgs {
     /// Width / height for cameras without one
     #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero)]
     pub aspect: f64,
-    /// Near plane for cameras without one [default: a thousandth of far, or of
-    /// twice the scene's diagonal where that is less]
+    /// Near plane for cameras without one [default: a thousandth of far; of recorded
+    /// cameras, of twice the scene's diagonal where that is less]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf; beyond 1.7e38 counts as inf [default:

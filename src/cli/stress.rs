@@ -31,7 +31,9 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     }
     let cases = args.cases;
     if args.seed.is_some() && cases == 0 {
-        bail!("--seed is for generated cases, of which there are none; expected --cases with it");
+        bail!(
+            "--seed is for generated cases, of which there are none; expected --cases above 0 with it"
+        );
     }
     interrupt::from_now_on_finish();
     let started = Instant::now();

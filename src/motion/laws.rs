@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use crate::geometry::Aabb;
 use crate::input::is_readable;
 use crate::query::ItemId;
-use crate::scene::{CityGrid, Scene, UpAxis, mix64};
+use crate::scene::{COUNT, CityGrid, Scene, UpAxis, mix64};
 use crate::spec::Spec;
 
 /// Bounds of a removed item: an empty box with finite bounds.
@@ -51,7 +51,9 @@ fn city_grid(scene: &Scene) -> Option<CityGrid> {
     let mut spec = Spec::parse(&scene.name).ok()?;
     // A file may have that name.
     let is_city = spec.name() == "city" && !is_readable(Path::new(&scene.name));
-    let mut grid = CityGrid::of(&mut spec, scene.items.len()).ok()?;
+    // The scene may be a part of the city.
+    let n = spec.whole("n", COUNT, u64::MAX).ok()?;
+    let mut grid = CityGrid::of(&mut spec, n as usize).ok()?;
     grid.corner += spec.number("offset", 0.0).ok()?;
     is_city.then_some(grid)
 }

@@ -15,6 +15,7 @@ use crate::input::{InputError, names_file, note, read_file, warn};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, hex};
+use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
 pub use laws::REMOVED;
@@ -159,14 +160,17 @@ impl Motion {
         let (seen, cameras) = (self.frames * views, path.lines.len());
         if path.times.is_empty() {
             if ![0, seen].contains(&cameras) {
-                let paired = "which have no times: they are paired by their numbers";
+                let cameras = counted(cameras, "camera");
                 warn(&format!(
-                    "{name}: frames with {seen} views, but {cameras} cameras in '{path_name}', {paired}"
+                    "{name}: its frames have {seen} views, but '{path_name}' has {cameras} and not a \
+                     time for each: they are paired by their numbers"
                 ));
             }
             return self;
         }
-        let (paced, late) = recorded.at(path.times.iter().step_by(views));
+        // Without the last frame if it lacks cameras.
+        let complete = (path.times.len() / views).max(1);
+        let (paced, late) = recorded.at(path.times.iter().step_by(views).take(complete));
         if late > 0 {
             let of = format!("{late} of {} moves", recorded.moves());
             note(&format!(

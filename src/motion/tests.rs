@@ -61,6 +61,20 @@ fn every_motion_repeats_itself_and_stays_within_the_scene() {
     }
 }
 
+/// In the streets of the whole city, whatever is left out.
+#[test]
+fn the_same_items_of_a_part_of_a_city_move() {
+    let whole = scene("city:n=4000");
+    let mut part = whole.clone();
+    part.items.truncate(40);
+    let movers = |scene: &Scene| {
+        let motion = Motion::load("traffic:share=1,frames=1", scene).unwrap();
+        let ids = frames(&motion, scene)[0].0.clone();
+        ids.into_iter().filter(|id| *id < 40).collect::<Vec<_>>()
+    };
+    assert_eq!(movers(&part), movers(&whole));
+}
+
 #[test]
 fn a_step_is_as_long_as_it_says() {
     let scene = scene("uniform:n=300");
@@ -177,7 +191,10 @@ fn frames_are_those_of_cameras_with_times() {
         (vec![1, 2], 3.0),
     ];
     assert_eq!(seen("-1 0 0.5 2.5", 1), wanted);
-    assert_eq!(seen("0 0 1 1", 2), [(vec![1], 1.0), (vec![1, 2], 2.0)]);
+    for times in ["0 0 1 1", "0 0 1 1 9"] {
+        assert_eq!(seen(times, 2), [(vec![1], 1.0), (vec![1, 2], 2.0)]);
+    }
+    assert_eq!(seen("0", 2), [(vec![1], 1.0)]);
     // Without a time for each camera a frame is the rows of one time.
     assert_eq!(seen("0  1", 1).len(), 4);
 }

@@ -10,7 +10,9 @@ use crate::scene::Scene;
 const MOST_ITEMS: usize = 8_000;
 const MOST_CAMERAS: usize = 128;
 /// Boxes tested per step of the search, unless sixteen cameras need more.
-const MOST_TESTS: usize = 160_000 * MOST_CAMERAS;
+///
+/// The same number is tested for the warning that no view sees anything.
+pub(super) const MOST_TESTS: usize = 160_000 * MOST_CAMERAS;
 /// Items of the sample that a camera sees at least, on average, at the cost of
 /// more items than that: a share of 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;

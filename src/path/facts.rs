@@ -5,7 +5,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::CameraPath;
-use super::calibrate::every_nth;
+use super::calibrate::{MOST_TESTS, every_nth};
 use crate::camera::{Camera, Frame, Lens, LensKind, PlaneOptions, ViewProjection};
 use crate::scene::{Scene, UpAxis};
 use crate::shown::counted;
@@ -267,9 +267,6 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
         scene.name
     ))
 }
-
-/// Most boxes that are tested for [`blind`], of all cameras together.
-const MOST_TESTS: usize = 20_000_000;
 
 /// Views that all miss all items; of large scenes fewer views.
 fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {

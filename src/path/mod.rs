@@ -42,14 +42,9 @@ pub struct CameraPath {
 impl CameraPath {
     /// At most `most` of the cameras, evenly spread from the first on.
     pub fn at_most(mut self, most: usize) -> CameraPath {
-        let count = self.cameras.len();
-        if count > most {
-            let kept = |n: usize| n * count / most;
-            self.cameras = (0..most).map(|n| self.cameras[kept(n)]).collect();
-            if !self.lines.is_empty() {
-                self.lines = (0..most).map(|n| self.lines[kept(n)]).collect();
-            }
-        }
+        thin(&mut self.cameras, most);
+        thin(&mut self.lines, most);
+        thin(&mut self.times, most);
         self
     }
 
@@ -78,6 +73,14 @@ impl CameraPath {
             Some(line) => format!("{}, line {line}", self.name),
             None => format!("path '{}', camera {index}", self.name),
         }
+    }
+}
+
+/// Keeps `most` of more, evenly spread from the first on.
+fn thin<T: Copy>(all: &mut Vec<T>, most: usize) {
+    let count = all.len();
+    if count > most {
+        *all = (0..most).map(|n| all[n * count / most]).collect();
     }
 }
 

@@ -51,21 +51,17 @@ impl LensDefaults {
     /// Near and far plane of a recorded camera without either.
     ///
     /// Far is twice the scene's diagonal, or the far side of the scene from an eye
-    /// farther outside; near is a thousandth of that.
+    /// farther outside; near is a thousandth of the nearer of far and that diagonal's double.
     pub fn depths(&self, eye: DVec3) -> (f64, Option<f64>) {
         let side = eye.distance(self.middle) + self.reach / 4.0;
         let far = self.far.unwrap_or(Some(side.max(self.reach).min(FARTHEST)));
-        let near = self
-            .near
-            .unwrap_or(far.unwrap_or(self.reach) / FAR_IN_NEARS);
-        (near, far)
+        (self.near.unwrap_or_else(|| self.near_of(far)), far)
     }
 
     /// Near plane of a recorded camera whose far plane may lie far behind the scene.
     fn near_of(&self, far: Option<f64>) -> f64 {
-        far.filter(|far| *far > 0.0)
-            .map_or(self.reach, |far| far.min(self.reach))
-            / FAR_IN_NEARS
+        let far = far.filter(|far| *far > 0.0).unwrap_or(f64::INFINITY);
+        far.min(self.reach) / FAR_IN_NEARS
     }
 
     /// The same with up axis and size of a scene.
@@ -346,6 +342,12 @@ mod tests {
             let path = read(&format!("{header}0,0,0,1,0,0,{far}\n")).unwrap();
             assert_eq!(path.cameras[0].lens.near(), near, "{far}");
         }
+        let far = Some(Some(1e6));
+        let defaults = LensDefaults {
+            far,
+            ..LensDefaults::default()
+        };
+        assert_eq!(defaults.depths(DVec3::ZERO), (1.0, Some(1e6)));
     }
 
     /// Line by line: a height makes a lens orthographic, none leaves it perspective.

@@ -274,8 +274,10 @@ fn a_long_path_is_thinned_evenly() {
     let scene = scene::load("uniform:n=5", &Default::default()).unwrap();
     let mut all = path("orbit:frames=10", &scene);
     all.lines = (2..12).collect();
+    all.times = (0..10).map(f64::from).collect();
     assert_eq!(all.clone().at_most(10).lines, all.lines);
     let some = all.clone().at_most(4);
     assert_eq!(some.lines, [2, 4, 7, 9]);
+    assert_eq!(some.times, [0.0, 2.0, 5.0, 7.0]);
     assert_eq!(some.cameras[3], all.cameras[7]);
 }

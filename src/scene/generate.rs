@@ -84,7 +84,7 @@ pub static MESHES: &[Family] = rows! { Family { name, summary, params, build }
 pub const SCENE_PARAMS: &str = "n=100000, seed=1, offset=0";
 
 /// Default of `n`.
-pub(super) const COUNT: u64 = 100_000;
+pub(crate) const COUNT: u64 = 100_000;
 /// Most items or triangles of a scene: 12 GB while boxes are made, 7.2 GB then; the
 /// corners of triangles fit u32.
 pub(super) const MOST: u64 = 100_000_000;

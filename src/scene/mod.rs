@@ -43,6 +43,7 @@ pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
 pub use bsp::BspChild;
 pub use disputes::{Dispute, Linedef};
 pub(crate) use families::CityGrid;
+pub(crate) use generate::COUNT;
 pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
 pub use gltf::{CameraAnimation, read_gltf};
 pub use ibsp::{LeafNode, LeafTree, QuakeMap, read_ibsp};

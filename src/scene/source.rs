@@ -16,6 +16,7 @@ use super::{
     boxes_csv, map_names,
 };
 use crate::input::{InputError, is_readable, note, read_file};
+use crate::shown::shortened;
 use crate::spec::{Spec, SpecError, nearest};
 
 /// First part of the name of every mesh.
@@ -187,7 +188,19 @@ fn read_beside(
         let folder = entry.name.rfind('/').map_or("", |end| &entry.name[..=end]);
         let beside = |uri: &str| {
             let wanted = format!("{folder}{}", uri.trim_start_matches("./"));
-            Ok(zip::unpack(bytes, file, Some(&wanted))?.bytes)
+            let entry = zip::unpack(bytes, file, Some(&wanted))?;
+            match entry.map {
+                None => Ok(entry.bytes),
+                Some(_) => {
+                    let found = format!("no '{}'", shortened(&wanted, 80));
+                    Err(InputError::at(
+                        file,
+                        "directory",
+                        found,
+                        "the name of an entry",
+                    ))
+                }
+            }
         };
         return read_beside(&entry.bytes, names, entry.map, options, &beside);
     }

@@ -1,6 +1,7 @@
 //! Zip archives (zip, pk3), read in place: one entry is unpacked at a time.
 //!
-//! No size is believed before the bytes are there. Source: PKWARE, APPNOTE.TXT 6.3.
+//! No size is believed before the bytes are there. Buffers of a glTF are entries in its
+//! folder or below: `..` leads nowhere. Source: PKWARE, APPNOTE.TXT 6.3.
 
 use std::fmt::Display;
 
@@ -9,7 +10,7 @@ use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive
 
 use super::memory;
 use crate::input::InputError;
-use crate::shown::{first_of, plain, shortened};
+use crate::shown::{counted, first_of, plain, shortened};
 
 /// Endings of the names of scenes.
 const SCENES: [&str; 6] = [".bsp", ".wad", ".gltf", ".glb", ".obj", ".csv"];
@@ -139,10 +140,11 @@ fn chosen<'e, 'r, 'w>(
     let scenes: Vec<_> = scenes.collect();
     let names: Vec<String> = scenes.iter().map(|(name, _)| shortened(name, 80)).collect();
     let listed = first_of(&names, MOST_NAMED);
+    let all = counted(entries.len(), "entry");
     let (found, expected) = match (wanted, &scenes[..]) {
         (None, [(name, record)]) => return Ok((name, record, None)),
         (None, []) => (
-            format!("no scene among {} entries", entries.len()),
+            format!("no scene among {all}"),
             format!("a name that ends in {}", SCENES.join(", ")),
         ),
         (None, _) => (
@@ -160,7 +162,10 @@ fn chosen<'e, 'r, 'w>(
                 return Ok((name, record, map));
             }
             (
-                format!("no '{}' among the scenes {listed}", shortened(wanted, 80)),
+                format!(
+                    "no '{}' among {all}; scenes: {listed}",
+                    shortened(wanted, 80)
+                ),
                 "the name of an entry".to_owned(),
             )
         }
@@ -246,15 +251,15 @@ pub mod tests {
         refused(
             &wad,
             Some("q.bsp"),
-            "no 'q.bsp' among the scenes maps/d.wad, two.csv",
+            "no 'q.bsp' among 2 entries; scenes: maps/d.wad, two.csv; expected",
         );
         refused(&wad, Some("maps/d.wad#E1M1"), "no map 'E1M1' among MAP12");
         refused(
             &packed(&[("readme.txt", b"", 0)]),
             None,
-            "no scene among 1 entries",
+            "no scene among 1 entry",
         );
-        refused(&packed(&[]), None, "no scene among 0 entries");
+        refused(&packed(&[]), None, "no scene among no entries");
         // The archive in an archive.
         let outer = packed(&[("inner.pk3", &one, 8)]);
         assert_eq!(read(&outer, Some("inner.pk3")), Ok(1));
@@ -278,6 +283,8 @@ pub mod tests {
             assert_eq!(read(&with(uri, name), None), Ok(1), "{uri}");
         }
         refused(&with("b.bin", "b.bin"), None, "no 'in/b.bin' among");
+        // No map in the entry before the sign.
+        refused(&with("b%231.bin", "in/b"), None, "no 'in/b#1.bin'");
     }
 
     #[test]

@@ -37,7 +37,8 @@ fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
 ///
 /// Channels without a node, scenes without nodes, numbers beyond f32.
 fn lenient(mut json: Value) -> Option<Root> {
-    for scene in json.get_mut("scenes")?.as_array_mut()? {
+    let scenes = json.get_mut("scenes").and_then(Value::as_array_mut);
+    for scene in scenes.into_iter().flatten() {
         let nodes = scene.as_object_mut()?.entry("nodes");
         nodes.or_insert_with(|| Value::Array(Vec::new()));
     }
@@ -86,7 +87,7 @@ fn part(bytes: &[u8], first: u64, length: u64) -> Option<&[u8]> {
 pub struct File<'f> {
     pub name: &'f str,
     pub root: Root,
-    buffers: Vec<Cow<'f, [u8]>>,
+    pub buffers: Vec<Cow<'f, [u8]>>,
 }
 
 impl<'f> File<'f> {

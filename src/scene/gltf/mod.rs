@@ -1,9 +1,9 @@
 //! glTF 2.0 and GLB: every node with a mesh is an item.
 //!
 //! Coordinates are the file's own. Triangles are read where all meshes have plain ones.
-//! Compressed meshes, points and lines have the boxes of their accessors' bounds instead,
-//! and then no item of the file has triangles; so have sparse ones. Vertices stand as they
-//! are stored, moved by their node alone: joints of skins and weights of morph targets change
+//! Meshes that are compressed or sparse, points and lines have the boxes of their accessors'
+//! bounds instead, and then no item of the file has triangles. Vertices stand as they are
+//! stored, moved by their node alone: joints of skins and weights of morph targets change
 //! nothing. Source: Khronos Group, glTF 2.0 Specification, 2021.
 
 mod animation;
@@ -156,14 +156,9 @@ impl File<'_> {
                 let all = self.get(&self.root.meshes, mesh, &format!("{place}.mesh"))?;
                 let mesh = mesh.value();
                 let instances = match all.primitives.iter().any(|p| positions(p).is_some()) {
-                    true => self.instances(index)?,
+                    true => self.instances(index, placed.len())?,
                     false => Vec::new(),
                 };
-                if placed.len() + instances.len() > MOST_ITEMS {
-                    let found = format!("{} instances", instances.len());
-                    let expected = format!("at most {MOST_ITEMS} items in the file");
-                    return Err(self.error(place, found, &expected));
-                }
                 placed.extend(instances.into_iter().map(|instance| Placed {
                     node: index,
                     mesh,
@@ -205,7 +200,9 @@ impl File<'_> {
     }
 
     /// Instances of a node by EXT_mesh_gpu_instancing; the node itself without them.
-    fn instances(&self, index: usize) -> Result<Vec<DAffine3>, InputError> {
+    ///
+    /// `before` items are placed already. Each instance has a byte in a buffer or more.
+    fn instances(&self, index: usize, before: usize) -> Result<Vec<DAffine3>, InputError> {
         let extensions = self.root.nodes[index].extensions.as_ref();
         let instancing = extensions.and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
         let Some(attributes) = instancing.map(|instancing| &instancing["attributes"]) else {
@@ -220,16 +217,15 @@ impl File<'_> {
         });
         let counts: Vec<u64> = counts.collect::<Result<_, InputError>>()?;
         let [least, count] = [counts.iter().min(), counts.iter().max()].map(|c| *c.unwrap_or(&0));
-        if least != count || count == 0 {
+        let bytes: usize = self.buffers.iter().map(|buffer| buffer.len()).sum();
+        let most = MOST_ITEMS.saturating_sub(before).min(bytes) as u64;
+        if least != count || !(1..=most).contains(&count) {
             let found = format!("attributes of {least} to {count} elements");
-            return Err(self.error(place, found, "as many of each, one or more"));
+            let expected = format!("as many of each, 1 to {most}");
+            return Err(self.error(place, found, &expected));
         }
-        memory::check_fits(
-            self.name,
-            count.saturating_mul(BYTES_PER_INSTANCE),
-            0,
-            count,
-        )?;
+        let all = before as u64 + count;
+        memory::check_fits(self.name, all * BYTES_PER_INSTANCE, 0, all)?;
         let column = |(name, width)| {
             let column = index(&attributes[name]).map(|at| self.vectors(at, width, &place));
             column.transpose()

@@ -242,6 +242,9 @@ fn what_the_specification_allows_is_read() {
     assert_eq!(scene.surfaces.expect("triangles").triangles.len(), 8);
     assert_eq!(scene.animation.expect("one").seconds, [1.0, 3.0]);
     assert_eq!(scene.places[0].view.expect("a lens").far, None);
+    let whole = file.as_object_mut().unwrap();
+    assert!(whole.remove("scene").is_some() && whole.remove("scenes").is_some());
+    assert_eq!(read(&file).unwrap().items, scene.items);
 }
 
 #[test]
@@ -309,6 +312,14 @@ fn instances_are_items() {
     let wanted = "instancing: attributes of 4 to 12 elements; expected as many of each";
     assert!(error.contains(wanted), "{error}");
     assert!(instances(json!({})).unwrap_err().contains("0 elements"));
+    // Of 72 bytes.
+    file["accessors"][1]["count"] = json!(73);
+    file["nodes"][1]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = json!({"_ID": 1});
+    let error = read(&file).map(|_| ()).unwrap_err().to_string();
+    assert!(
+        error.contains("73 elements; expected as many of each, 1 to 72"),
+        "{error}"
+    );
 }
 
 #[test]
