@@ -102,7 +102,10 @@ pub fn compare_against<'a>(
 /// Line on the default structures of a run that a comparison lacks.
 fn left_out(registry: &Registry, plan: &Plan) -> anyhow::Result<Option<String>> {
     let default = registry.structures("default")?.into_iter();
-    let is_in = |name: &String| plan.structures.iter().any(|spec| spec.label == *name);
+    // As labels stand before a policy of updates.
+    let compared = plan.structures.iter();
+    let compared: Vec<_> = compared.map(|s| s.label.split('@').next()).collect();
+    let is_in = |name: &String| compared.contains(&Some(name));
     let names = default.map(|spec| spec.label).filter(|name| !is_in(name));
     let names: Vec<String> = names.collect();
     let note = "not compared by default";

@@ -311,8 +311,7 @@ impl CompareTable<'_> {
             }
             (Basis::Pairs, None) => "more pairs would not decide".to_owned(),
             (Basis::Reports, _) if undecided.any(is_hopeless) => {
-                "more processes would not decide, as two runs scatter by more than their \
-                 processes: run both again, or compare --against BINARY"
+                "more processes would not decide: run both again, or compare --against BINARY"
                     .to_owned()
             }
             (Basis::Reports, _) => {

@@ -160,7 +160,7 @@ fn errors_table(points: &[&CullingPoint]) -> Table {
         ("culling", |p| culling(p)),
         (">FP %", |p| percent(p.errors.excess)),
         (">by source", |p| some(p.errors.counts.as_ref(), by_source)),
-        (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
+        (">FN ppm", |p| text::share(p.errors.false_negative_ppm, 1e6)),
         (">px", |p| some(p.errors.worst_miss_px, significant)),
         (">flicker %", |p| percent(p.errors.flicker)),
     ];
@@ -195,7 +195,7 @@ fn front_table(p: &Precision) -> Table {
         ("culling", |p| culling(p)),
         (">query", |p| time_plus_minus(p.time)),
         (">FP %", |p| percent(p.errors.excess)),
-        (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
+        (">FN ppm", |p| text::share(p.errors.false_negative_ppm, 1e6)),
         (">B/item", |p| {
             format!("{:.1}", p.errors.memory_bytes_per_item)
         }),
@@ -311,7 +311,7 @@ fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
         }
         let ppm = own.iter().map(|row| match &row.refused {
             Some(_) => "refused".to_owned(),
-            None => text::rate(row.false_negative_ppm, 1.0),
+            None => text::share(row.false_negative_ppm, 1e6),
         });
         let label = numbers(&kind.names);
         let is_named = kind.names.planes != "frame";

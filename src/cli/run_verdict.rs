@@ -41,7 +41,7 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     told.extend(failed(&[comparison]));
     let is_fat = |cell: &&ReportCell| cell.rank.is_none() && cell.structure.contains("@fat=");
     let fat = comparison.cells.iter().any(is_fat);
-    told.extend(fat.then(|| "Rank -: none, as fat bounds return false positives.".to_owned()));
+    told.extend(fat.then(|| "Rank -: none, as fat bounds return more than exact ones.".to_owned()));
     told.join(" ")
 }
 

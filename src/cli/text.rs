@@ -146,6 +146,15 @@ pub fn rate(rate: Option<Rate>, units: f64) -> String {
     })
 }
 
+/// A share of `whole`, which it does not exceed, with half of its 95 % interval.
+pub fn share(found: Option<Rate>, whole: f64) -> String {
+    let within = |found: Rate| Rate {
+        upper: found.upper.map(|upper| upper.min(whole)),
+        ..found
+    };
+    rate(found.map(within), 1.0)
+}
+
 /// Text with line breaks in place of spaces in lines longer than `width`.
 pub fn wrapped(text: &str, width: usize) -> String {
     let mut lines: Vec<String> = Vec::new();

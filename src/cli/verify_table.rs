@@ -81,13 +81,14 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
     let differ = |name: &&&str| of(name).iter().any(|check| check.difference.is_some());
     let all = text::counted(names.len(), "structure");
     let checked = format!(
-        "{} the sets of the reference scan: {} in {:.1} s ({:.1} million/s), {}",
+        "{}: {} in {:.1} s ({:.1} million/s), {}",
         match names.iter().filter(differ).count() {
-            0 if names.len() == 1 => format!("{} returns", names[0]),
-            0 => format!("All {all} return"),
+            0 if names.len() == 1 => format!("{} returns the sets of the reference scan", names[0]),
+            0 => format!("All {all} return the sets of the reference scan"),
+            1 =>
+                format!("1 of {all} differs from the reference scan or misses what the cameras see"),
             wrong => format!(
-                "{wrong} of {all} {} not return",
-                if wrong == 1 { "does" } else { "do" }
+                "{wrong} of {all} differ from the reference scan or miss what the cameras see"
             ),
         },
         text::counted(outcome.verdicts as usize, "verdict"),

@@ -258,7 +258,6 @@ fn time(
     notice: Notice,
     stop: &dyn Fn() -> bool,
 ) -> Option<()> {
-    let lap_ns = Stopwatch::empty_lap(false).cpu_ns;
     let mut orders = Orders::new(entries.len(), plan.protocol.seed);
     for round in 0..planned.schedule.rounds {
         for n in orders.next() {
@@ -277,7 +276,7 @@ fn time(
             }
             let is_first = entry.rounds.is_empty();
             let spec = &entry.subject.spec;
-            let laps = guarded(|| replay(spec, frames, lap_ns, is_first, stop));
+            let laps = guarded(|| replay(spec, frames, is_first, stop));
             match laps.unwrap_or_else(Err) {
                 Ok(Some(laps)) => entry.rounds.push(laps),
                 Ok(None) => return None,

@@ -20,7 +20,7 @@ pub struct MetricInfo {
 pub(super) enum Of {
     /// The count pass, under the name of the metric.
     Count,
-    /// Errors of the checked queries; of fat bounds, the count pass.
+    /// Errors of the checked queries.
     Judged(fn(&Judged) -> Option<Estimate>),
     /// Mean over the processes of positive values.
     Process(fn(&SubjectPart) -> Option<f64>),

@@ -61,7 +61,9 @@ impl<'w> Frames<'w> {
             let mut due = spread(items.len(), MOST_JUDGED, motion.frames()).peekable();
             for frame in 0..motion.frames() {
                 advance(&mut replay, workload, &mut items);
-                shown.advance(&mut boxes);
+                if due.peek().is_some() {
+                    shown.advance(&mut boxes);
+                }
                 if due.next_if_eq(&frame).is_some() {
                     let camera = frame * workload.views_per_frame % cameras.len();
                     let origin = workload.scene.origin;
@@ -282,13 +284,14 @@ pub(super) fn times_of(laps: &Laps, kind: TaskKind, workload: &Workload) -> [f64
 pub(super) fn replay(
     spec: &StructureSpec,
     frames: &Frames,
-    lap_ns: f64,
     compares_sets: bool,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<Laps>>, Verdict> {
     let mut moving = Moving::build(frames, spec)?;
     let mut outs = vec![Vec::new(); frames.workload.views_per_frame];
     let mut all = Vec::with_capacity(frames.motion.frames());
+    let all_threads = spec.query_threads() > 1;
+    let clock = Stopwatch::empty_lap(all_threads);
     for frame in 0.. {
         if !moving.take_moves() {
             break;
@@ -297,23 +300,21 @@ pub(super) fn replay(
             return Ok(None);
         }
         outs.iter_mut().for_each(Vec::clear);
-        let watch = Stopwatch::start_for(moving.spec.query_threads() > 1);
+        let watch = Stopwatch::start_for(all_threads);
         moving.update()?;
-        let updated = watch.lap();
+        let updated = watch.lap().less(clock);
         let mut views = frames.views(frame).zip(&mut outs);
+        let watch = Stopwatch::start_for(all_threads);
         if let Some(((_, view), out)) = views.next() {
             moving.index.query(view.as_any(), out);
         }
-        let first = watch.lap();
+        let first = watch.lap().less(clock);
+        let watch = Stopwatch::start_for(all_threads);
         for ((_, view), out) in views {
             moving.index.query(view.as_any(), out);
         }
-        let end = if outs.len() > 1 { watch.lap() } else { first };
-        let laps = [(Lap::default(), updated), (updated, first), (first, end)];
-        all.push(laps.map(|(from, to)| Lap {
-            cpu_ns: (to.cpu_ns - from.cpu_ns - lap_ns).max(0.0),
-            wall_ns: (to.wall_ns - from.wall_ns - lap_ns).max(0.0),
-        }));
+        let further = (outs.len() > 1).then(|| watch.lap().less(clock));
+        all.push([updated, first, further.unwrap_or_default()]);
         for ((query, _), out) in frames.views(frame).zip(&outs) {
             let right = frames.right.get(query);
             let is_right = right.is_some_and(|r| r.count == out.len() as u64);

@@ -189,7 +189,9 @@ impl<'p> MergedParts<'p> {
         let verdict = self.verdict(label);
         let is_right = verdict.status == Status::Ok;
         let is_answered = is_right || verdict.status == Status::Unsafe;
-        let judged = subject.and(first.judged).filter(|_| is_answered);
+        // Errors are of the scan's answers, which fat bounds do not give.
+        let is_fat = subject.is_some_and(|s| s.counts.contains_key("fat_excess"));
+        let judged = subject.and(first.judged).filter(|_| is_answered && !is_fat);
         ReportCell {
             scene: self.loaded.scene.clone(),
             path: self.loaded.path.clone(),
@@ -297,7 +299,7 @@ impl<'p> MergedParts<'p> {
         };
         let logs = |own: Vec<f64>| one_run(&own, &own);
         let value = |info: &MetricInfo| match info.of {
-            Of::Judged(of) => counted(info.name).or_else(|| of(judged?)),
+            Of::Judged(of) => of(judged?),
             Of::Process(of) => self.over_processes(label, of),
             Of::Log(of) => logs(self.subjects(label).filter_map(of).collect()),
             Of::Bytes(of) => {

@@ -28,9 +28,9 @@ pub struct Sample {
     pub frame: u32,
     /// Number of consecutive timed cameras in this reading.
     pub queries: u32,
-    /// CPU time per query.
+    /// CPU time per query, less the cost of the clock.
     pub cpu_ns: f64,
-    /// Wall time per query.
+    /// Wall time per query, less the cost of the clock.
     pub wall_ns: f64,
     /// Ids returned by all queries of the sample: each sample is a test too.
     pub returned: u64,
@@ -339,7 +339,7 @@ mod tests {
             let ns = timed[0].as_ref().unwrap().ns().unwrap();
             let clock = Stopwatch::empty_lap(false).cpu_ns;
             assert!(
-                0.0 < ns && ns < 0.7 * clock,
+                0.0 < ns && (cold || ns < 0.7 * clock),
                 "{ns}, the clock alone {clock}"
             );
         }

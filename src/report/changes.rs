@@ -264,13 +264,14 @@ fn conclude(row: &mut JudgedRow, judgement: Option<Judgement>) {
     row.outcome = change.unwrap_or(Outcome::Unmeasured);
 }
 
-/// The rows of one counter, which is exact.
+/// The rows of one counter, which is exact, where a side has it.
 ///
 /// Any growth by more than `threshold` is more work.
 fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedRow> {
     let most = 1.0 + threshold;
-    let rows = pairs.iter().map(|&pair| {
-        let mut row = valued(pair, counter);
+    let rows = pairs.iter().map(|&pair| valued(pair, counter));
+    let rows = rows.filter(|row| row.old.or(row.new).is_some());
+    let rows = rows.map(|mut row| {
         (row.outcome, row.reason) = match (row.old, row.new) {
             (Some(old), Some(new)) if new > old * most => (Outcome::MoreWork, None),
             (Some(old), Some(new)) if old > new * most => (Outcome::LessWork, None),

@@ -118,7 +118,9 @@ impl Judgement {
 /// wants to tolerate it compares `lower` with a tolerance.
 pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>> {
     let estimates = differences.iter().map(|d| trimmed_mean(d));
-    judge_estimates(estimates.collect(), [threshold, FLOOR], |_| ())
+    judge_estimates(estimates.collect(), [threshold, FLOOR], |cells| {
+        vec![0.0; cells.len()]
+    })
 }
 
 /// Returns true if every judged cell is known finely enough: the rule by which a
@@ -131,15 +133,16 @@ pub fn resolved(judged: &[Option<Judgement>], threshold: f64) -> bool {
 
 /// Judges estimates of ln(new / old), once their variances are moderated and then
 /// widened; a cell without an estimate stays without verdict. What is slower or
-/// faster is proven to have changed by more than the floor.
+/// faster is proven to have changed by more than the floor. `widen` returns the
+/// standard error of each cell that more pairs leave.
 pub(super) fn judge_estimates(
     estimates: Vec<Option<Trimmed>>,
     [threshold, floor]: [f64; 2],
-    widen: impl FnOnce(&mut [Trimmed]),
+    widen: impl FnOnce(&mut [Trimmed]) -> Vec<f64>,
 ) -> Vec<Option<Judgement>> {
     let mut cells: Vec<Trimmed> = estimates.iter().flatten().copied().collect();
     moderate(&mut cells);
-    widen(&mut cells);
+    let fixed = widen(&mut cells);
     let floor = floor.ln_1p();
     let above: Vec<f64> = cells.iter().map(|cell| cell.p_above(floor)).collect();
     let below: Vec<f64> = cells.iter().map(|cell| cell.p_below(-floor)).collect();
@@ -152,7 +155,7 @@ pub(super) fn judge_estimates(
             _ if is_same(cell, threshold) => Change::Same,
             _ => Change::Inconclusive,
         };
-        judgement(cell, change, tests, [threshold, floor])
+        judgement(cell, fixed[i], change, tests, [threshold, floor])
     });
     let judged = |estimate: &Option<Trimmed>| estimate.and_then(|_| judged.next());
     estimates.iter().map(judged).collect()
@@ -160,6 +163,7 @@ pub(super) fn judge_estimates(
 
 fn judgement(
     cell: &Trimmed,
+    fixed: f64,
     change: Change,
     tests: usize,
     [threshold, floor]: [f64; 2],
@@ -172,7 +176,7 @@ fn judgement(
         lower: Some((cell.mean - margin).exp()),
         upper: Some((cell.mean + margin).exp()),
         resolution: Some(resolution(cell, tests, floor)),
-        more_pairs: undecided.and_then(|cell| more_pairs(cell, tests, [threshold, floor])),
+        more_pairs: undecided.and_then(|cell| more_pairs(cell, fixed, tests, [threshold, floor])),
         pairs: cell.count,
     }
 }
@@ -190,12 +194,19 @@ fn resolution(cell: &Trimmed, tests: usize, floor: f64) -> f64 {
 }
 
 /// How many more pairs would prove the change that was found, or would prove it
-/// small enough: whichever comes first, if mean and spread stay as they are.
-fn more_pairs(cell: &Trimmed, tests: usize, [threshold, floor]: [f64; 2]) -> Option<usize> {
+/// small enough: whichever comes first, if mean and spread stay as they are. Of the
+/// standard error `fixed` stays as well.
+fn more_pairs(
+    cell: &Trimmed,
+    fixed: f64,
+    tests: usize,
+    [threshold, floor]: [f64; 2],
+) -> Option<usize> {
+    let shrinks = (cell.standard_error.powi(2) - fixed.powi(2)).max(0.0);
     let decides = |count: usize| {
-        let shrunk = cell.standard_error * (cell.count as f64 / count as f64).sqrt();
+        let shrunk = (shrinks * cell.count as f64 / count as f64).sqrt();
         let future = Trimmed {
-            standard_error: shrunk,
+            standard_error: shrunk.hypot(fixed),
             df: cell.df + kept(count) - kept(cell.count),
             count,
             ..*cell
@@ -312,7 +323,7 @@ mod tests {
                 mean: centre,
                 ..trimmed_mean(&cell(centre, spread)).unwrap()
             };
-            let more = more_pairs(&before, 1, [0.05, FLOOR.ln_1p()]).unwrap();
+            let more = more_pairs(&before, 0.0, 1, [0.05, FLOOR.ln_1p()]).unwrap();
             // The same pairs again and again: mean and spread stay.
             let repeated = |count: usize| {
                 let values: Vec<f64> = cell(centre, spread).repeat(1 + count / 10);

@@ -48,19 +48,10 @@ pub fn judge_unpaired(
     let names: Vec<&str> = names
         .filter_map(|(found, name)| found.map(|_| *name))
         .collect();
-    let mut widened = Vec::new();
-    let mut judged = judge_estimates(estimates, [threshold, FLOOR_OF_RUNS], |cells| {
-        widened = add_scatter_of_runs(cells, &names);
-    });
     // More processes leave the scatter of the runs as it is.
-    for (found, _) in judged
-        .iter_mut()
-        .flatten()
-        .zip(widened)
-        .filter(|(_, by)| *by > 0.0)
-    {
-        found.more_pairs = None;
-    }
+    let judged = judge_estimates(estimates, [threshold, FLOOR_OF_RUNS], |cells| {
+        add_scatter_of_runs(cells, &names)
+    });
     sides()
         .zip(judged)
         .map(|((old, new), judged)| judged.or_else(|| without_interval(old, new)))
