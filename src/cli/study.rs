@@ -82,7 +82,7 @@ impl Setting {
             && scene.surfaces.is_none()
             && scene.own_tree.is_none()
         {
-            tell("note: items count as solid boxes; the meshes in them may hide less");
+            tell("warning: items count as solid boxes; the meshes in them may hide less");
         }
     }
 }
