@@ -246,3 +246,16 @@ fn motions_that_cannot_be_measured_are_refused() {
         assert!(!folder.path().join("r").exists());
     }
 }
+
+/// Bounds that are enlarged return more than the scan, which is not said to agree.
+#[test]
+fn fat_bounds_are_not_said_to_return_the_sets_of_the_scan() {
+    let folder = folder(&[]);
+    let line = "run --scene city:n=300 --path orbit:frames=4 --structure linear,wide --no-bounds \
+                --motion drift:share=0.5,frames=6 --processes 1 --update";
+    for (update, says) in [("fat=1", false), ("refit,fat=1", true)] {
+        let told = unwrapped(&works(folder.path(), &format!("{line} {update}")));
+        assert_eq!(told.contains("All structures returned"), says, "{told}");
+        assert!(told.contains("fat bounds return more"), "{told}");
+    }
+}

@@ -116,13 +116,8 @@ fn one_process_has_the_cells_of_the_plan_in_its_order() {
     assert!(!stopped.unwrap());
 }
 
-#[test]
-fn what_has_ended_a_process_is_not_built_again() {
-    let mut plan = plan();
-    plan.scenes.truncate(1);
-    let verdict = Verdict::new(super::super::Status::OutOfMemory, "while building");
-    let mut share = Share::first(plan.groups_of(&plan.scenes[0]).len());
-    share.failed.insert("bvh".to_owned(), verdict.clone());
+/// Structures of a share in the order of their builds, and its parts.
+fn measured(plan: &Plan, share: &Share) -> (Vec<String>, Vec<Part>) {
     let building = std::cell::RefCell::new(Vec::new());
     let notice = |structure: Option<&str>, step: &str| {
         if let (Some(structure), "building") = (structure, step) {
@@ -131,11 +126,20 @@ fn what_has_ended_a_process_is_not_built_again() {
     };
     let mut parts = Vec::new();
     let mut keep = |part: Part, _| parts.push(part);
-    let done = measure_scene(&plan, &plan.scenes[0], &share, &mut keep, &notice, &|| {
-        false
-    });
+    let done = measure_scene(plan, &plan.scenes[0], share, &mut keep, &notice, &|| false);
     assert!(done.unwrap());
-    assert!(!building.borrow().contains(&"bvh".to_owned()));
+    (building.into_inner(), parts)
+}
+
+#[test]
+fn what_has_ended_a_process_is_not_built_again() {
+    let mut plan = plan();
+    plan.scenes.truncate(1);
+    let verdict = Verdict::new(super::super::Status::OutOfMemory, "while building");
+    let mut share = Share::first(plan.groups_of(&plan.scenes[0]).len());
+    share.failed.insert("bvh".to_owned(), verdict.clone());
+    let (building, parts) = measured(&plan, &share);
+    assert!(!building.contains(&"bvh".to_owned()));
     for part in &parts {
         let own = part.subjects.iter().find(|s| s.label == "bvh");
         assert_eq!(own.map(|s| &s.verdict), Some(&verdict));
@@ -151,19 +155,8 @@ fn another_process_builds_in_another_order_and_keeps_that_of_the_plan() {
         process: 1,
         ..Share::first(plan.groups_of(&plan.scenes[0]).len())
     };
-    let building = std::cell::RefCell::new(Vec::new());
-    let notice = |structure: Option<&str>, step: &str| {
-        if let (Some(structure), "building") = (structure, step) {
-            building.borrow_mut().push(structure.to_owned());
-        }
-    };
-    let mut parts = Vec::new();
-    let mut keep = |part: Part, _| parts.push(part);
-    let done = measure_scene(&plan, &plan.scenes[0], &share, &mut keep, &notice, &|| {
-        false
-    });
-    assert!(done.unwrap());
-    assert_eq!(building.borrow()[..4], ["bvh", "octree", "bvh", "linear"]);
+    let (building, parts) = measured(&plan, &share);
+    assert_eq!(building[..4], ["bvh", "octree", "bvh", "linear"]);
     for part in &parts {
         let labels = part.subjects.iter().map(|s| s.label.as_str());
         assert!(labels.eq(["linear", "bvh", "octree", "bvh#twin"]));
