@@ -6,10 +6,10 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::args::MergeArgs;
-use super::report::{page, show, show_written};
+use super::report::{show, show_written, write_page};
 use super::run_resume::same_recorded;
 use super::{Ending, expect_folder, interrupt, tell, text, unread_is_fine};
-use crate::report::{Report, Stream, merge as join, read_stream, save_page};
+use crate::report::{Report, Stream, merge as join, read_stream};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     expect_folder("--out", Some(&args.out))?;
@@ -30,7 +30,7 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
         tell(&format!("note: no shard has {}", merged.missing_named()));
     }
     let report = merged.stream.report();
-    save_page(&args.out, &page(&report, &args.out))?;
+    write_page(&report, &args.out)?;
     unread_is_fine(show(&report, false))?;
     unread_is_fine(close(args, &report))?;
     let failed = report.has_failed();

@@ -50,6 +50,7 @@ mod shared_args;
 mod sheet;
 mod stress;
 mod study;
+mod suite_file;
 mod surface_tables;
 mod table;
 #[cfg(test)]

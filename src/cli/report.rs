@@ -18,7 +18,9 @@ use super::{
 };
 use crate::index::Registry;
 use crate::measure::{BOUNDS, METRICS};
-use crate::report::{Comparison, Overall, Report, Views, comparisons, grouped, read_report, views};
+use crate::report::{
+    Comparison, Overall, Report, Views, comparisons, grouped, read_report, save_page, views,
+};
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
     let outputs = [
@@ -74,10 +76,17 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
 }
 
 /// The page of a run; `folder` has its stream and samples.
-pub fn page(report: &Report, folder: &Path) -> String {
+fn page(report: &Report, folder: &Path) -> String {
     let mut blocks = blocks(report, &views(folder, report));
     blocks.extend(glossary(&blocks));
     to_html(&title(report), &blocks)
+}
+
+/// Writes the page and the pictures of a run into its folder.
+pub fn write_page(report: &Report, folder: &Path) -> anyhow::Result<()> {
+    let pictures = surface_tables::pictures(report);
+    let named = pictures.iter().map(|p| (p.name.as_str(), p.svg.as_str()));
+    Ok(save_page(folder, &page(report, folder), named)?)
 }
 
 /// Meaning of the columns and labels that occur in tables.
@@ -308,7 +317,7 @@ pub fn show_written(out: &mut impl Write, folder: &Path) -> io::Result<()> {
     writeln!(out, "report  {}", folder.join("report.html").display())?;
     writeln!(
         out,
-        "        report.json, summary.csv, samples.csv, stream.jsonl"
+        "        report.json, summary.csv, samples.csv, stream.jsonl, *.svg"
     )
 }
 

@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 use super::args::RunArgs;
 use super::interrupt::Interrupted;
 use super::processes::{Ended, Job, Message, Workers};
-use super::report::{page, show, show_written};
+use super::report::{show, show_written, write_page};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{RunOptions, create, go_on, resume};
 use super::study::progress;
@@ -21,7 +21,7 @@ use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
 };
-use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_page, save_report, utc};
+use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_report, utc};
 use crate::suite::DEFAULT_PATH;
 
 pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
@@ -144,7 +144,7 @@ impl<'a> Run<'a> {
             return Err(error);
         }
         saved?;
-        save_page(self.folder.path(), &page(&report, self.folder.path()))?;
+        write_page(&report, self.folder.path())?;
         let save = save.filter(|_| !stopped);
         if let Some(name) = &save {
             compare::save_baseline(name, &report)?;

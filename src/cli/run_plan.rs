@@ -7,6 +7,7 @@ use anyhow::{bail, ensure};
 
 use super::args::RunArgs;
 use super::shared_args::WhatArgs;
+use super::suite_file::{self, ChosenSuite, planned};
 use crate::culling::Culling;
 use crate::index::Registry;
 use crate::input::{InputError, note, tell_warnings};
@@ -16,14 +17,15 @@ use crate::path::{self, LensDefaults};
 use crate::report::{KeptPart, Stream};
 use crate::scene::{self, FETCHED, Scene, every_part};
 use crate::spec::SpecError;
-use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES, Suite};
+use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES};
 
 /// A plan with where it comes from.
 pub struct RunPlan {
     pub plan: Plan,
-    pub suite: &'static Suite,
-    /// True if scenes and paths are the suite's own.
-    pub from_suite: bool,
+    /// Name of the suite or of its file; `None` for scenes and paths chosen by hand.
+    pub suite: Option<String>,
+    /// True if nothing in it is the user's own.
+    is_built_in: bool,
     /// Groups of the whole plan, if this is a shard.
     pub whole: Vec<GroupKey>,
 }
@@ -50,11 +52,9 @@ pub fn plan_of(
     default_suite: &str,
     default_structures: Option<&str>,
 ) -> anyhow::Result<RunPlan> {
-    let name = args.suite.as_deref().unwrap_or(default_suite);
-    let suite = Suite::named(name)
-        .ok_or_else(|| SpecError::unknown("suite", name, SUITES.iter().map(|s| s.name)))?;
+    let suite = suite_file::suite(args.suite.as_deref().unwrap_or(default_suite))?;
     let structures = match args.structure.is_empty() {
-        true => default_structures.unwrap_or(suite.structures).to_owned(),
+        true => default_structures.map_or(suite.structures.clone(), str::to_owned),
         false => args.structure.join(","),
     };
     let tests = || args.test.iter().flat_map(|tests| tests.split(','));
@@ -64,7 +64,7 @@ pub fn plan_of(
     each_once("test", tests())?;
     let structures = args.kernel.structures(registry, &structures)?;
     let mut plan = Plan {
-        scenes: scenes(args, suite)?,
+        scenes: scenes(args, &suite)?,
         cullings,
         lens: args.lens.defaults()?,
         motions: Vec::new(),
@@ -80,14 +80,14 @@ pub fn plan_of(
     for scene in &plan.scenes {
         each_once("path", &scene.paths)?;
     }
-    let planned = RunPlan {
+    check_motions(&plan, &suite.name)?;
+    let is_suite = args.scene.is_empty() && args.path.is_empty();
+    Ok(RunPlan {
         plan,
-        suite,
-        from_suite: args.scene.is_empty() && args.path.is_empty(),
+        is_built_in: is_suite && suite.is_built_in && suite.name != REAL,
+        suite: is_suite.then_some(suite.name),
         whole: Vec::new(),
-    };
-    planned.check_motions()?;
-    Ok(planned)
+    })
 }
 
 /// "2/4": the second of four shares.
@@ -118,21 +118,19 @@ pub fn each_once(
     Ok(())
 }
 
-impl RunPlan {
-    /// Motions are named once and measured with warm caches.
-    fn check_motions(&self) -> anyhow::Result<()> {
-        let motions = &self.plan.motions;
-        each_once("motion", motions)?;
-        let mut scenes = self.plan.scenes.iter();
-        if !motions.is_empty() && scenes.any(|scene| scene.caches.contains(&true)) {
-            bail!(
-                "suite '{}' has cold caches, --motion has none; expected another suite, or --scene",
-                self.suite.name
-            );
-        }
-        Ok(())
+/// Motions are named once and measured with warm caches.
+fn check_motions(plan: &Plan, suite: &str) -> anyhow::Result<()> {
+    each_once("motion", &plan.motions)?;
+    let mut scenes = plan.scenes.iter();
+    if !plan.motions.is_empty() && scenes.any(|scene| scene.caches.contains(&true)) {
+        bail!(
+            "suite '{suite}' has cold caches, --motion has none; expected another suite, or --scene"
+        );
     }
+    Ok(())
+}
 
+impl RunPlan {
     /// Reads every input: a mistake in the last file should not show after an
     /// hour. A suite as it comes is known to be sound.
     pub fn check_inputs(&self) -> anyhow::Result<()> {
@@ -180,8 +178,7 @@ impl RunPlan {
         };
         let as_it_comes =
             self.plan.lens == LensDefaults::default() && self.plan.cullings.iter().all(is_plain);
-        let is_built_in = self.from_suite && self.suite.name != REAL;
-        if is_built_in && as_it_comes && self.plan.motions.is_empty() {
+        if self.is_built_in && as_it_comes && self.plan.motions.is_empty() {
             return Ok(());
         }
         for PlannedScene { source, paths, .. } in &self.plan.scenes {
@@ -230,17 +227,14 @@ fn same_digest(
     Ok(())
 }
 
-fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputError> {
-    let scene = |source: &str, paths: &[&str], cold: bool| PlannedScene {
-        source: source.to_owned(),
-        paths: match args.path.is_empty() {
+fn scenes(args: &WhatArgs, suite: &ChosenSuite) -> Result<Vec<PlannedScene>, InputError> {
+    let scene = |source: &str, paths: &[&str], cold: bool| {
+        let paths = match args.path.is_empty() {
             true => paths.iter().map(|&p| p.to_owned()).collect(),
             false => args.path.clone(),
-        },
-        caches: if cold { vec![false, true] } else { vec![false] },
+        };
+        planned(source.to_owned(), paths, cold)
     };
-    let rows = suite.plan.iter();
-    let rows = rows.map(|row| scene(row.scene, row.paths, row.cold || args.cold));
     if !args.scene.is_empty() {
         let named = args.scene.iter().map(|source| every_part(source));
         let named: Vec<_> = named.collect::<Result<_, _>>()?;
@@ -249,7 +243,15 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputErro
             .map(|source| scene(source, &[DEFAULT_PATH], args.cold))
             .collect());
     }
-    let mut scenes: Vec<PlannedScene> = rows.collect();
+    let mut scenes = suite.scenes.clone();
+    for row in &mut scenes {
+        if !args.path.is_empty() {
+            row.paths.clone_from(&args.path);
+        }
+        if args.cold {
+            row.caches = vec![false, true];
+        }
+    }
     if suite.name == REAL {
         let (there, missing): (Vec<_>, Vec<_>) = FETCHED.iter().partition(|row| row.is_there());
         let fetched = there.iter().flat_map(|row| row.scenes());

@@ -46,7 +46,7 @@ pub fn create(
     let mut header = Header::of(&plan.plan, machine, format!("{stamp}-{id}"), now);
     let words = [&[program::name().to_owned()], &typed[..]].concat();
     header.run.command = words.join(" ");
-    header.run.suite = plan.from_suite.then(|| plan.suite.name.to_owned());
+    header.run.suite = plan.suite.clone();
     header.run.shard.clone_from(&args.shard);
     header.args = typed;
     header.whole.clone_from(&plan.whole);

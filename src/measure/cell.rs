@@ -106,6 +106,16 @@ pub struct Metric {
 }
 
 impl Metric {
+    /// A metric with its unit.
+    pub fn of(found: Estimate, unit: &str) -> Metric {
+        Metric {
+            value: found.value,
+            lower: found.lower,
+            upper: found.upper,
+            unit: unit.to_owned(),
+        }
+    }
+
     /// Value and interval.
     pub fn estimate(&self) -> Estimate {
         Estimate {

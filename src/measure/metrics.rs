@@ -44,6 +44,8 @@ pub(super) enum Of {
     Over(&'static str),
     /// Queries after which the build is repaid.
     BreakEven,
+    /// Cells of other scenes: the report as a whole has it.
+    Report,
 }
 
 /// Mean of a number of errors over the checked queries.
@@ -94,6 +96,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "refitted_over_rebuilt", "1", Of::Log(|s| s.refitted_ln), "time per query after 32 refits, each after 1 % of the items have moved / time per query on a fresh build of the same boxes (query after 32 in tables); only structures that refit";
     "memory_bytes_per_item", "bytes", Of::Bytes(|s| s.memory_bytes), "nodes, item bounds and ids / items";
     "break_even_queries", "queries", Of::BreakEven, "queries after which the build is repaid against linear; 0: at once; empty: never";
+    "growth_exponent", "1", Of::Report, "slope of ln query_ns over ln items: 0 does not grow, 1 as a scan does; least squares over three or more sizes of a world with about as many visible items on the same kind of path; absent below three";
     "locate_ns", "ns", Of::Time(TaskKind::Locate), "thread CPU time of a region search at the eye, mean over the timed cameras; as query_ns";
     "locate_batched_ns", "ns", Of::Time(TaskKind::LocateBatched), "thread CPU time of a region search of all points of the path in one batch, per point; as query_ns";
     "locate_speedup", "1", Of::Speedup(Some(TaskKind::Locate)), "as speedup, for region search";

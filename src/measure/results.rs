@@ -332,16 +332,11 @@ impl<'p> MergedParts<'p> {
             }
             Of::Over(bound) => subject.and_then(|_| self.ratio(label, bound)),
             Of::BreakEven => self.break_even(label).map(Estimate::exact),
+            Of::Report => None,
         };
         let found = METRICS.iter().filter_map(|info| {
             let found = value(info).filter(|found| found.value.is_finite())?;
-            let metric = Metric {
-                value: found.value,
-                lower: found.lower,
-                upper: found.upper,
-                unit: info.unit.to_owned(),
-            };
-            Some((info.name.to_owned(), metric))
+            Some((info.name.to_owned(), Metric::of(found, info.unit)))
         });
         found.collect()
     }

@@ -283,12 +283,23 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
     }
 }
 
-/// Writes the page of a run into its folder; replaces links.
+/// Writes the page of a run and its pictures (names without `.svg`, and contents) into its
+/// folder; replaces links.
 ///
 /// # Errors
 /// Errors of the file system.
-pub fn save_page(folder: &Path, page: &str) -> Result<(), InputError> {
-    replace_atomically(&folder.join(PAGE), |out| out.write_all(page.as_bytes()))
+pub fn save_page<'p>(
+    folder: &Path,
+    page: &str,
+    pictures: impl IntoIterator<Item = (&'p str, &'p str)>,
+) -> Result<(), InputError> {
+    let save = |name: &str, text: &str| {
+        replace_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()))
+    };
+    for (name, svg) in pictures {
+        save(&format!("{name}.svg"), svg)?;
+    }
+    save(PAGE, page)
 }
 
 /// Writes report.json and summary.csv into a folder; replaces links.

@@ -9,6 +9,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use super::changes::{Fact, Setting, differences, facts, known};
+use super::surface::enter_growths;
 use super::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
@@ -259,6 +260,7 @@ impl Stream {
             }
         }
         report.noise.warnings = warnings(&report, speeds);
+        enter_growths(&mut report);
         report
     }
 }

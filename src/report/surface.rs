@@ -4,7 +4,7 @@
 
 use super::ranking::{grouped, unique};
 use super::{Comparison, Report, ReportCell};
-use crate::measure::{Status, YARDSTICK};
+use crate::measure::{Metric, Status, YARDSTICK};
 use crate::statistics::{Estimate, slope};
 
 /// One world of several sizes, with one cache state and culling test.
@@ -228,6 +228,8 @@ pub struct Growth<'r> {
     pub sizes: Vec<usize>,
     /// Least-squares slope of log query_ns over log N, with its 95 % interval.
     pub exponent: Estimate,
+    /// Their places in the report's list.
+    cells: Vec<usize>,
 }
 
 /// Visible counts this far apart are the same count.
@@ -238,11 +240,11 @@ const LEAST_SIZES: usize = 3;
 /// All structures that were measured on at least three sizes of a world with
 /// (about) the same number of visible items by the same kind of path.
 pub fn growths(report: &Report) -> Vec<Growth<'_>> {
-    let ok = report.cells.iter().filter(|c| c.status == Status::Ok);
-    let ok = ok.filter(|cell| cell.path.motion.is_empty());
-    let points = ok.filter_map(|cell| {
+    let ok = report.cells.iter().enumerate();
+    let ok = ok.filter(|(_, c)| c.status == Status::Ok && c.path.motion.is_empty());
+    let points = ok.filter_map(|(at, cell)| {
         let (visible, ns) = (cell.value("visible_count")?, cell.value("query_ns")?);
-        let point = (cell.scene.total_count, visible, ns);
+        let point = (cell.scene.total_count, visible, ns, at);
         // A NaN stays, and has no slope.
         let nothing = visible <= 0.0 || ns <= 0.0;
         (!nothing).then(|| (key(cell), point))
@@ -250,9 +252,21 @@ pub fn growths(report: &Report) -> Vec<Growth<'_>> {
     grouped(points).into_iter().flat_map(of_series).collect()
 }
 
+/// Gives every cell of a series its `growth_exponent`.
+pub(super) fn enter_growths(report: &mut Report) {
+    let of_cells = |growth: Growth| (growth.cells, growth.exponent);
+    let found: Vec<(Vec<usize>, Estimate)> = growths(report).into_iter().map(of_cells).collect();
+    for (cells, exponent) in found {
+        for cell in cells {
+            let metrics = &mut report.cells[cell].metrics;
+            metrics.insert("growth_exponent".to_owned(), Metric::of(exponent, "1"));
+        }
+    }
+}
+
 type Key<'r> = (String, &'r str, &'r str, &'r str, &'r str);
-/// Items, visible ones, ns.
-type Point = (usize, f64, f64);
+/// Items, visible ones, ns, place of the cell.
+type Point = (usize, f64, f64, usize);
 
 fn key(cell: &ReportCell) -> Key<'_> {
     let path = cell.path.name.split(':').next().unwrap_or_default();
@@ -263,12 +277,12 @@ fn key(cell: &ReportCell) -> Key<'_> {
 fn of_series<'r>((key, mut points): (Key<'r>, Vec<Point>)) -> Vec<Growth<'r>> {
     points.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut found = Vec::new();
-    while let Some(&(_, least, _)) = points.first() {
+    while let Some(&(_, least, ..)) = points.first() {
         let end = points.partition_point(|p| p.1 <= least * SAME_COUNT);
         let mut same: Vec<Point> = points.drain(..end).collect();
         same.sort_by_key(|p| p.0);
         same.dedup_by_key(|p| p.0);
-        let log = |&(items, _, ns): &Point| ((items as f64).ln(), ns.ln());
+        let log = |&(items, _, ns, _): &Point| ((items as f64).ln(), ns.ln());
         let logs: Vec<(f64, f64)> = same.iter().map(log).collect();
         let Some(exponent) = slope(&logs).filter(|_| same.len() >= LEAST_SIZES) else {
             continue;
@@ -282,6 +296,7 @@ fn of_series<'r>((key, mut points): (Key<'r>, Vec<Point>)) -> Vec<Growth<'r>> {
             visible: same.iter().map(|p| p.1).sum::<f64>() / same.len() as f64,
             sizes: same.iter().map(|p| p.0).collect(),
             exponent,
+            cells: same.iter().map(|p| p.3).collect(),
         });
     }
     found
@@ -422,11 +437,11 @@ mod tests {
         let grown = |points: &[Point]| of_series((key(), points.to_vec()));
         // 500 visible: N^0.5 exactly; 2 % visible grows along and says nothing.
         let points = [
-            (10_000, 500.0, 100.0),
-            (1_000_000, 510.0, 1000.0),
-            (100_000, 490.0, 316.227_766),
-            (1_000_000, 20_000.0, 9e4),
-            (100_000, 2_000.0, 9e3),
+            (10_000, 500.0, 100.0, 7),
+            (1_000_000, 510.0, 1000.0, 3),
+            (100_000, 490.0, 316.227_766, 5),
+            (1_000_000, 20_000.0, 9e4, 1),
+            (100_000, 2_000.0, 9e3, 2),
         ];
         let found = grown(&points);
         assert_eq!(found.len(), 1);
@@ -434,6 +449,7 @@ mod tests {
         let exponent = found[0].exponent;
         assert!(exponent.upper.unwrap() - exponent.lower.unwrap() < 1e-5);
         assert_eq!(found[0].sizes, [10_000, 100_000, 1_000_000]);
+        assert_eq!(found[0].cells, [7, 5, 3]);
         assert!((found[0].visible - 500.0).abs() < 1e-9);
         assert!(grown(&points[..2]).is_empty());
         // Two paths of one size are not two sizes.

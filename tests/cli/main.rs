@@ -50,6 +50,7 @@ mod shards;
 mod signals;
 mod stress;
 #[cfg(unix)]
+mod suites;
 mod terminal;
 mod view;
 

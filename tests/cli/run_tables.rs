@@ -91,7 +91,7 @@ fn a_run_ends_with_its_conclusion_in_eighty_columns() {
         "All structures returned the sets of the reference scan in all 16 views, of which",
         "A/A check:",
         "next cullbench advise --scene uniform:n=200 --path orbit:frames=16",
-        "report out/run/report.html report.json, summary.csv, samples.csv, stream.jsonl",
+        "report out/run/report.html report.json, summary.csv, samples.csv, stream.jsonl, *.svg",
     ] {
         assert!(told.contains(wanted), "no '{wanted}': {told}");
     }

@@ -1,0 +1,127 @@
+//! Suites by their names, or written by a user: a TOML file in place of a name.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::input::{InputError, read_file};
+use crate::measure::{Effort, PlannedScene};
+use crate::scene::every_part;
+use crate::spec::SpecError;
+use crate::suite::{DEFAULT_PATH, SUITES, Suite};
+
+/// A suite as it is to be run.
+pub struct ChosenSuite {
+    /// Its name, or that of its file.
+    pub name: String,
+    /// True of one that comes with the program.
+    pub is_built_in: bool,
+    pub scenes: Vec<PlannedScene>,
+    pub effort: Effort,
+    pub structures: String,
+}
+
+/// A suite as it is written; a field that is not known is refused.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    /// The suite whose rounds and structures it takes where it states none.
+    like: Option<String>,
+    structures: Option<String>,
+    processes: Option<u32>,
+    scenes: Vec<WrittenScene>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenScene {
+    scene: String,
+    #[serde(default)]
+    paths: Vec<String>,
+    #[serde(default)]
+    cold: bool,
+}
+
+/// The suite of a name or a TOML file.
+///
+/// # Errors
+/// An unknown name; a file that cannot be read or is no suite, with its line.
+pub fn suite(text: &str) -> Result<ChosenSuite, InputError> {
+    if text.ends_with(".toml") {
+        return written(text);
+    }
+    let suite = named(text, Some("FILE.toml"))?;
+    let paths = |paths: &[&str]| paths.iter().map(|&path| path.to_owned()).collect();
+    let rows = suite.plan.iter();
+    let rows = rows.map(|row| planned(row.scene.to_owned(), paths(row.paths), row.cold));
+    Ok(ChosenSuite {
+        name: suite.name.to_owned(),
+        is_built_in: true,
+        scenes: rows.collect(),
+        effort: suite.effort,
+        structures: suite.structures.to_owned(),
+    })
+}
+
+/// A scene with its ways, warm or both warm and cold.
+pub fn planned(source: String, paths: Vec<String>, cold: bool) -> PlannedScene {
+    PlannedScene {
+        source,
+        paths,
+        caches: if cold { vec![false, true] } else { vec![false] },
+    }
+}
+
+fn named(name: &str, or: Option<&'static str>) -> Result<&'static Suite, SpecError> {
+    let known = SUITES.iter().map(|suite| suite.name).chain(or);
+    Suite::named(name).ok_or_else(|| SpecError::unknown("suite", name, known))
+}
+
+fn written(file: &str) -> Result<ChosenSuite, InputError> {
+    let bytes = read_file(Path::new(file))?;
+    let text = str::from_utf8(&bytes).map_err(|error| {
+        InputError::byte(file, error.valid_up_to(), "not UTF-8", "a suite in TOML")
+    })?;
+    let suite: Written = toml::from_str(text).map_err(|error| {
+        let begin = error.span().map_or(0, |span| span.start);
+        let line = 1 + text
+            .bytes()
+            .take(begin)
+            .filter(|byte| *byte == b'\n')
+            .count();
+        let found = error.message().replace('\n', ", ").replace('`', "'");
+        InputError::new(format_args!("{file}, line {line}: {found}"))
+    })?;
+    let at_file = |error: SpecError| InputError::new(format_args!("{file}: {error}"));
+    let like = named(suite.like.as_deref().unwrap_or(SUITES[0].name), None).map_err(at_file)?;
+    let mut effort = like.effort;
+    effort.processes = suite.processes.unwrap_or(effort.processes);
+    if !(1..=1000).contains(&effort.processes) {
+        let found = format_args!("processes is {}", effort.processes);
+        return Err(InputError::new(format_args!(
+            "{file}: {found}; expected a whole number from 1 to 1000"
+        )));
+    }
+    let mut scenes = Vec::new();
+    for row in suite.scenes {
+        let paths = match row.paths.is_empty() {
+            true => vec![DEFAULT_PATH.to_owned()],
+            false => row.paths,
+        };
+        let parts = every_part(&row.scene)?.into_iter();
+        scenes.extend(parts.map(|source| planned(source, paths.clone(), row.cold)));
+    }
+    if scenes.is_empty() {
+        let found = "no scenes; expected [[scenes]] with a scene and its paths";
+        return Err(InputError::new(format_args!("{file}: {found}")));
+    }
+    Ok(ChosenSuite {
+        name: file.to_owned(),
+        is_built_in: false,
+        scenes,
+        effort,
+        structures: suite
+            .structures
+            .unwrap_or_else(|| like.structures.to_owned()),
+    })
+}

@@ -1,0 +1,91 @@
+//! `run --suite FILE.toml`: a suite that a user wrote, and files that are none.
+
+use std::fs;
+
+use super::process::*;
+
+const SUITE: &str = r#"
+like = "compare"
+structures = "linear,bvh"
+processes = 2
+[[scenes]]
+scene = "uniform:n=300"
+paths = ["flythrough:frames=8,visible=20"]
+[[scenes]]
+scene = "uniform:n=900"
+paths = ["flythrough:frames=8,visible=20"]
+[[scenes]]
+scene = "uniform:n=2700"
+paths = ["flythrough:frames=8,visible=20", "orbit:frames=8"]
+"#;
+
+#[test]
+fn a_suite_of_a_file_is_run_as_written_and_grows_over_its_sizes() {
+    let folder = folder(&[("mine.toml", SUITE.as_bytes())]);
+    works(folder.path(), "run --suite mine.toml --out r");
+    let text = |name: &str| fs::read_to_string(folder.path().join("r").join(name)).expect(name);
+    let report = json(&text("report.json"));
+    assert_eq!(report["run"]["suite"], "mine.toml");
+    assert_eq!(report["run"]["processes"], 2);
+    let rows = rows(&text("summary.csv"));
+    assert_eq!(rows.len(), 4 * 2);
+    for row in &rows {
+        // A slope needs three sizes: the orbit has one.
+        let has_slope = row["path"].starts_with("flythrough");
+        assert_eq!(
+            row["growth_exponent"].parse::<f64>().is_ok(),
+            has_slope,
+            "{row:?}"
+        );
+        // The effort of the suite it is like: no region search.
+        assert_eq!(row["locate_ns"], "", "{row:?}");
+    }
+    let pictures = fs::read_dir(folder.path().join("r")).expect("a folder");
+    let pictures = pictures.map(|entry| entry.expect("an entry").file_name());
+    let pictures = pictures.filter(|name| name.to_string_lossy().ends_with(".svg"));
+    assert_eq!(pictures.count(), 4);
+    // Options stand in for what the file has.
+    let plan = works(
+        folder.path(),
+        "run --suite mine.toml --path spin:frames=4 --structure linear --plan",
+    );
+    let plan: Vec<_> = plan.lines().map(json).collect();
+    assert_eq!(plan.len(), 3);
+    assert!(plan.iter().all(|cell| cell["structure"] == "linear"));
+    assert!(plan.iter().all(|cell| cell["path"] == "spin:frames=4"));
+}
+
+#[test]
+fn a_file_that_is_no_suite_is_refused_with_its_line() {
+    for (text, wanted) in [
+        ("x = 3", "bad.toml, line 1: | 'x' | expected one of"),
+        ("scenes = []", "bad.toml: no scenes; expected"),
+        (
+            "[[scenes]]\npath = [3]",
+            "bad.toml, line 2: | 'path' | 'paths'",
+        ),
+        ("[[scenes]]\nscene = 3", "bad.toml, line 2: | 3 | a string"),
+        (
+            "processes = 0\n[[scenes]]\nscene = 'city'",
+            "processes is 0; expected",
+        ),
+        (
+            "like = 'quik'\n[[scenes]]\nscene = 'city'",
+            "did you mean 'quick'",
+        ),
+        (
+            "[[scenes]]\nscene = 'no.glb'",
+            "no.glb: | expected an existing file",
+        ),
+        ("[[scenes", "bad.toml, line 1: | expected"),
+    ] {
+        let folder = with_good_files(&[("bad.toml", text.as_bytes())]);
+        all_refused(&folder, &["run --suite bad.toml --out new"], wanted);
+    }
+    let folder = with_good_files(&[]);
+    all_refused(
+        &folder,
+        &["run --suite no.toml --out new"],
+        "no.toml: | expected",
+    );
+}
