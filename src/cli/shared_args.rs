@@ -49,9 +49,9 @@ impl SceneArgs {
 /// Options of a measurement, shared by `run` and `compare --against`.
 #[derive(Args, Debug)]
 pub struct WhatArgs {
-    /// Scenes, paths and rounds: quick, standard, full, real, compare, growth, or a file
-    /// FILE.toml of your own (`cullbench help run`) [default: quick; compare --against:
-    /// compare]
+    /// Scenes, paths and rounds: quick, standard, full, real, compare, growth, or
+    /// your own in FILE.toml (see the end of `run --help`) [default: quick; compare
+    /// --against: compare]
     #[arg(long, value_name = "SUITE")]
     pub suite: Option<String>,
     /// A scene (file or spec) instead of the suite's; may be repeated; maps.wad#* and

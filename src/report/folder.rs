@@ -283,8 +283,9 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
     }
 }
 
-/// Writes the page of a run and its pictures (names without `.svg`, and contents) into its
-/// folder; replaces links.
+/// Writes the page of a run and its pictures into its folder; replaces links.
+///
+/// A picture is its name without `.svg`, and its contents.
 ///
 /// # Errors
 /// Errors of the file system.
