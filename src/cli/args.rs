@@ -46,7 +46,7 @@ const EXAMPLES: &str = include_str!("assets/help/examples.txt");
 
 #[derive(Subcommand, Debug)]
 pub enum Command {
-    /// List the available structures, scenes, paths, tests and metrics
+    /// List the available structures, scenes, paths, motions, tests and metrics
     List(ListArgs),
     /// Measure structures on scenes along camera paths (the main job)
     Run(RunArgs),
