@@ -104,7 +104,10 @@ fn glossary(blocks: &[Block]) -> [Block; 2] {
         text.split(", ").next() == Some(name) || name.contains('[') && text.contains(" [")
     };
     let occurs = |name: &str| texts.iter().any(|text| is_of(text, name));
-    let figures = run_table::FIGURES.iter().map(|figure| (figure.0, figure.1));
+    let figures = run_table::OF_QUERIES
+        .iter()
+        .chain(&run_table::OF_FRAMES)
+        .map(|figure| (figure.0, figure.1));
     let figures = [("vs linear", "speedup")].into_iter().chain(figures);
     let figures = figures.map(|(column, metric)| {
         let info = METRICS.iter().find(|info| info.name == metric);

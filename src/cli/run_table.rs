@@ -98,13 +98,13 @@ fn share(share: f64) -> String {
 /// A column of single figures: head, metric and form.
 pub type Figure = (&'static str, &'static str, fn(f64) -> String);
 
-/// Figures of queries by priority, then those of frames.
-///
-/// A summary has the first two, or the first five of a motion.
-pub const FIGURES: [Figure; 19] = [
+/// Figures of queries by priority; a summary has the first two.
+pub const OF_QUERIES: [Figure; 12] = [
     ("build", "build_ms", |ms| text::time(ms * 1e6)),
     ("bytes/item", "memory_bytes_per_item", |b| format!("{b:.1}")),
     ("p95", "query_ns_p95", text::time),
+    ("nodes tested", "nodes_tested", text::significant),
+    ("items tested", "items_tested", text::significant),
     ("/ read", "times_read", text::significant),
     ("/ copy", "times_memcpy", text::significant),
     ("/ replay", "times_replay", text::significant),
@@ -114,6 +114,12 @@ pub const FIGURES: [Figure; 19] = [
     ("repaid after", "break_even_queries", |n| {
         text::count(n as usize)
     }),
+];
+
+/// Figures of frames by priority, before the first two of queries.
+///
+/// A summary of a motion has the first five.
+pub const OF_FRAMES: [Figure; 9] = [
     ("returned in excess", "fat_excess", text::percent),
     ("worst", "worst_frame_ns", text::time),
     ("update", "update_ns", text::time),
@@ -129,10 +135,9 @@ pub const FIGURES: [Figure; 19] = [
 ///
 /// In full with intervals, lower bounds and every figure.
 pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) -> Table {
-    let (queries, frames) = FIGURES.split_at(10);
     let (time, figures, brief) = match comparison.about().path.motion.is_empty() {
-        true => ("time per query", queries.to_vec(), 2),
-        false => ("time per frame", [frames, &queries[..2]].concat(), 5),
+        true => ("time per query", OF_QUERIES.to_vec(), 2),
+        false => ("time per frame", [&OF_FRAMES, &OF_QUERIES[..2]].concat(), 5),
     };
     let figures = if is_full { &figures } else { &figures[..brief] };
     let peer = comparison.fastest_peer().filter(|_| is_full);
