@@ -24,8 +24,11 @@ const CHILD: &str = "CULLBENCH_TEST_STATUSES_CHILD";
 /// Fault of a structure at its build or its queries.
 trait Mishap: Send + Sync + 'static {
     const NAME: &'static str;
+    /// True for a refit that does nothing.
+    const KEEPS_BOXES: bool = false;
     fn at_build() {}
     fn at_query() {}
+    fn at_chose() {}
 }
 
 /// A scan with a mishap.
@@ -40,7 +43,8 @@ impl<M: Mishap> RegionIndex for Broken<M> {
         "a scan with a mishap",
         Kind::Grid,
         Origin::Crate("test"),
-    );
+    )
+    .refits();
     type Params = ();
 
     fn build(input: &Input<'_>, (): &()) -> Result<Self, BuildError> {
@@ -53,6 +57,16 @@ impl<M: Mishap> RegionIndex for Broken<M> {
             boxes: items.to_vec(),
             mishap: std::marker::PhantomData,
         })
+    }
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        for &id in moved.iter().filter(|_| !M::KEEPS_BOXES) {
+            self.boxes[id as usize] = items[id as usize];
+        }
+        true
+    }
+    fn chose(&self) -> Option<String> {
+        M::at_chose();
+        None
     }
     fn memory(&self) -> MemoryUsage {
         MemoryUsage {
@@ -118,7 +132,14 @@ mishaps! {
         for_ever();
     };
     Aborts "aborts" at_query std::process::abort();
-    Panics "panics" at_query panic!("no such luck");
+    Panics "panics" at_query panic!("no such luck\nin two lines");
+    PanicsChose "panics-chose" at_chose panic!("no choice");
+}
+
+struct Stale;
+impl Mishap for Stale {
+    const NAME: &'static str = "stale";
+    const KEEPS_BOXES: bool = true;
 }
 
 const RUN: &str = "run --scene city:n=300 --path orbit:frames=4 --path spin:frames=4 \
@@ -148,6 +169,7 @@ fn assert_alone(cells: &[Value], structure: &str, status: &str, reason: &str) {
             true => {
                 assert_eq!(cell["status"], status, "{cell}");
                 assert!(told.contains(reason), "{structure}: {told}");
+                assert!(!told.starts_with("panicked"), "{structure}: {told}");
             }
             false => {
                 assert_eq!(cell["status"], "ok", "{structure}: {cell}");
@@ -174,7 +196,9 @@ fn each_mishap_fails_its_own_rows() {
         ("hangs-asked", "timed_out", "took longer than 2 s", 0),
         ("hangs-timed", "timed_out", "timing took longer than 2 s", 0),
         ("aborts", "panicked", "ended by signal 6 while", 1),
-        ("panics", "panicked", "no such luck", 1),
+        ("panics", "panicked", "no such luck in two lines", 1),
+        ("panics-chose", "panicked", "no choice", 1),
+        ("stale", "unsafe", "a search after updates: ", 1),
     ] {
         let folder = tempfile::tempdir().expect("a folder");
         let mut line = format!("{RUN}{structure} --out r");
@@ -375,7 +399,11 @@ fn a_scene_without_items_is_left_out() {
 
 fn main() -> ExitCode {
     if env::var_os(CHILD).is_some() {
-        return cullbench::cli::main_with(registry().with::<Broken<HangsLate>>());
+        return cullbench::cli::main_with(
+            registry()
+                .with::<Broken<HangsLate>>()
+                .with::<Broken<Stale>>(),
+        );
     }
     a_scene_without_items_is_left_out();
     a_run_without_any_answer_is_no_success();

@@ -236,6 +236,11 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
         };
     }
     let last = words.lines().rev().find(|line| !line.trim().is_empty());
+    // Hints on backtraces follow the message of a panic.
+    let mut panic = words
+        .lines()
+        .skip_while(|line| !line.contains(" panicked at "));
+    let last = panic.nth(1).or(last);
     let last = last.map(|last| format!(": {last}")).unwrap_or_default();
     Verdict::new(
         Status::Panicked,

@@ -68,9 +68,7 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
             _ => anyhow::bail!(OTHER),
         };
         // Threads that are started later stay where this one does.
-        let on_threads =
-            |spec: &StructureSpec| spec.query_threads() > 1 || spec.execution.threads > 1;
-        if !plan.structures.iter().any(on_threads) {
+        if !plan.structures.iter().any(StructureSpec::is_threaded) {
             stay_on(request.cpu);
         }
         here.scene(&plan, *scene, share, *samples)?;

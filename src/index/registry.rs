@@ -295,6 +295,11 @@ impl StructureSpec {
         self.params["threads"].as_u64().unwrap_or(1) as usize
     }
 
+    /// Returns true if builds or queries share threads.
+    pub fn is_threaded(&self) -> bool {
+        self.query_threads() > 1 || self.execution.threads > 1
+    }
+
     /// The structure's declaration.
     pub fn info(&self) -> &Info {
         &self.row.info

@@ -15,7 +15,7 @@ use super::process_result::{Known, Part, TaskSamples};
 use super::schedule::cameras_within;
 use super::{
     Group, Machine, Notice, PathInfo, Protocol, SceneInfo, Status, Subject, Verdict, Workload,
-    WorkloadError,
+    WorkloadError, guarded,
 };
 use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
@@ -218,10 +218,11 @@ impl Plan {
                 }
                 notice(Some(&spec.label), "building");
                 let built = Subject::build(spec.clone(), is_twin, scene, test);
-                match self.has_updates(share) && !is_twin {
-                    true => (place, built.with_updates(scene, test)),
-                    false => (place, built),
+                if !self.has_updates(share) || is_twin {
+                    return (place, built);
                 }
+                notice(Some(&spec.label), "updating");
+                (place, built.with_updates(scene, test))
             })
             .collect();
         built.sort_unstable_by_key(|(place, _)| *place);
@@ -349,7 +350,11 @@ pub fn measure_scene(
                 let spec = plan.structures.iter().find(|s| s.label == subject.label);
                 if let Some(spec) = spec.filter(|_| subject.verdict.status == Status::Ok) {
                     notice(Some(&spec.label), "refitting");
-                    subject.refitted_ln = refitted_ln(spec, &workload, &protocol);
+                    let found = guarded(|| refitted_ln(spec, &workload, &protocol));
+                    match found.unwrap_or_else(Err) {
+                        Ok(found) => subject.refitted_ln = found,
+                        Err(verdict) => subject.verdict = verdict,
+                    }
                 }
             }
         }

@@ -64,7 +64,10 @@ fn measure_frames(
     stop: &dyn Fn() -> bool,
 ) -> Option<(Part, Vec<TaskSamples>)> {
     let answered = plan.known.filter(|known| !known.visible.is_empty());
-    let frames = &Frames::new(workload, motion, answered);
+    if answered.is_none() {
+        notice(None, "scanning the frames");
+    }
+    let frames = &Frames::new(workload, motion, answered, stop)?;
     let mut entries = Vec::new();
     for subject in subjects {
         let verdict = subject.built.as_ref().err().cloned().unwrap_or_default();
@@ -112,7 +115,10 @@ fn measure_frames(
             if entry.runs() && !is_twin && ages(spec) {
                 notice(Some(&entry.part.label), "ageing");
                 let found = guarded(|| ageing(spec, frames, &plan.protocol, stop));
-                entry.part.ageing_ln = found.unwrap_or_default();
+                match found.unwrap_or_else(Err) {
+                    Ok(ageing_ln) => entry.part.ageing_ln = ageing_ln,
+                    Err(verdict) => entry.part.verdict = verdict,
+                }
             }
         }
         if stop() {
@@ -151,11 +157,12 @@ impl Entry<'_> {
         let (mut out, mut cost) = (Vec::new(), QueryCost::default());
         let mut false_positives = 0;
         self.replay_ns = 0.0;
+        let all_threads = self.subject.spec.is_threaded();
         for frame in 0.. {
             if !moving.take_moves() || stop() {
                 break;
             }
-            let watch = Stopwatch::start();
+            let watch = Stopwatch::start_for(all_threads);
             moving.update()?;
             self.replay_ns += watch.lap().cpu_ns;
             for (query, view) in frames.views(frame) {
@@ -165,7 +172,7 @@ impl Entry<'_> {
                     .query_counted(view.as_any(), &mut out, &mut cost);
                 frames.check(&moving, query, &out)?;
                 out.clear();
-                let watch = Stopwatch::start();
+                let watch = Stopwatch::start_for(all_threads);
                 moving.index.query(view.as_any(), &mut out);
                 self.replay_ns += watch.lap().cpu_ns;
                 frames.check(&moving, query, &out)?;
@@ -189,7 +196,12 @@ impl Entry<'_> {
         }
         self.part.counts = counts;
         self.part.memory_after_bytes = Some(moving.index.memory().total() as u64);
-        self.part.chose = moving.index.chose();
+        let chose = moving.index.chose();
+        self.part.chose = match self.subject.spec.policy {
+            // A new build counts its own updates.
+            UpdatePolicy::Every(_) => chose.map(|chose| format!("since the last rebuild: {chose}")),
+            _ => chose,
+        };
         Ok(())
     }
 

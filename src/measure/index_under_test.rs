@@ -92,14 +92,13 @@ impl Subject {
     pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Subject {
         let updates = |spec: &StructureSpec| {
             let items = test.items(&scene.items);
-            let spare = spec.build(input_of(scene, &items))?;
+            let spare = spec.build(input_of(scene, &items)).map_err(not_built)?;
             measure_updates(spec, scene, &items, spare)
         };
         if let Ok(built) = &mut self.built {
-            match guarded(|| updates(&self.spec)) {
-                Ok(Ok(update_ms)) => built.update_ms = update_ms,
-                Ok(Err(error)) => self.built = Err(not_built(error)),
-                Err(panicked) => self.built = Err(panicked),
+            match guarded(|| updates(&self.spec)).unwrap_or_else(Err) {
+                Ok(update_ms) => built.update_ms = update_ms,
+                Err(verdict) => self.built = Err(verdict),
             }
         }
         self

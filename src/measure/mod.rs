@@ -54,8 +54,10 @@ mod workload;
 
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::Aabb;
 use crate::index::caught;
-use crate::verify::Fault;
+use crate::query::{AnyVolume, ItemId};
+use crate::verify::{Fault, Trial, explain_visibility};
 
 pub use bounds::{BOUNDS, Bound, Material};
 pub use cell::{CellTimes, Metric, PathInfo, ReportCell, SamplesRef, SceneInfo};
@@ -143,9 +145,12 @@ impl Verdict {
 
     /// A status other than [`Status::Ok`], with its reason.
     pub fn new(status: Status, reason: impl Into<String>) -> Self {
+        let reason: String = reason.into();
+        // Messages of panics have several lines.
+        let lines: Vec<&str> = reason.lines().map(str::trim).collect();
         Verdict {
             status,
-            reason: Some(reason.into()),
+            reason: Some(lines.join(" ")),
         }
     }
 }
@@ -153,6 +158,22 @@ impl Verdict {
 /// Runs code of a structure; a panic becomes [`Status::Panicked`] with its message.
 pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Verdict> {
     caught(work).map_err(|text| Verdict::new(Status::Panicked, format!("panicked: {text}")))
+}
+
+/// Compares one answer with the reference scan; `place` names the query.
+fn compare_with_scan(
+    items: &[Aabb],
+    volume: AnyVolume,
+    place: &str,
+    answer: impl FnOnce(&mut Vec<ItemId>),
+) -> Result<(), Verdict> {
+    let mut trial = Trial::new(items.len());
+    trial.see(items, volume);
+    trial.ask(answer).map(drop).map_err(|fault| {
+        let why = |id: usize| Some(explain_visibility(&items[id], volume));
+        let reason = format!("{place}: {}", fault.explained(why));
+        Verdict::new(Status::of(&fault), reason)
+    })
 }
 
 /// Step that is reported at every turn of a timed pass.

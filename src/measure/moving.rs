@@ -11,15 +11,15 @@ use super::index_under_test::not_built;
 use super::process_result::Known;
 use super::update::{MOST_UPDATED, USUAL_SHARE, move_share};
 use super::{
-    Answer, Judged, Protocol, Status, TaskKind, TimedTask, Verdict, Workload, guarded, input_of,
-    timed_rounds,
+    Answer, Judged, Protocol, Status, TaskKind, TimedTask, Verdict, Workload, compare_with_scan,
+    guarded, input_of, timed_rounds,
 };
 use crate::culling::CameraView;
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec, UpdatePolicy};
 use crate::motion::{Motion, Replay};
 use crate::query::ItemId;
-use crate::verify::{Trial, Truth, explain_visibility, scan};
+use crate::verify::{Truth, scan};
 
 /// Number of updates before queries are timed.
 const REFITS: usize = 32;
@@ -41,12 +41,13 @@ pub(super) struct Frames<'w> {
 }
 
 impl<'w> Frames<'w> {
-    /// The right answers by the scan, unless they are known.
+    /// The right answers by the scan, unless they are known; `None` if stopped.
     pub(super) fn new(
         workload: &'w Workload<'w>,
         motion: &'w Motion,
         known: Option<&Known>,
-    ) -> Frames<'w> {
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Frames<'w>> {
         let mut frames = Frames {
             workload,
             motion,
@@ -58,14 +59,19 @@ impl<'w> Frames<'w> {
             let (mut boxes, mut shown) = (workload.scene.items.to_vec(), motion.replay());
             let (mut answers, mut ids) = (Vec::new(), Vec::new());
             let (mut judging, cameras) = (Judging::default(), &workload.cameras);
-            let mut due = spread(items.len(), MOST_JUDGED, motion.frames()).peekable();
+            let due = spread(items.len(), MOST_JUDGED, motion.frames());
+            let (mut due, views) = (due.enumerate().peekable(), workload.views_per_frame);
             for frame in 0..motion.frames() {
+                if stop() {
+                    return None;
+                }
                 advance(&mut replay, workload, &mut items);
                 if due.peek().is_some() {
                     shown.advance(&mut boxes);
                 }
-                if due.next_if_eq(&frame).is_some() {
-                    let camera = frame * workload.views_per_frame % cameras.len();
+                if let Some((n, _)) = due.next_if(|(_, due)| *due == frame) {
+                    // Each view of a frame in turn.
+                    let camera = (frame * views + n % views) % cameras.len();
                     let origin = workload.scene.origin;
                     let truth = Truth::of_camera(&cameras[camera], origin, &boxes);
                     judging.add(workload, camera, truth, &boxes, &items);
@@ -79,7 +85,7 @@ impl<'w> Frames<'w> {
             frames.right = answers;
             frames.judged = Some(judging.judged());
         }
-        frames
+        Some(frames)
     }
 
     /// Queries of a frame with their numbers; frames repeat the path.
@@ -105,21 +111,13 @@ impl<'w> Frames<'w> {
         let (views, per_frame) = (&self.workload.views, self.workload.views_per_frame);
         let camera = query % views.len();
         let view = views[camera].as_any();
-        let mut trial = Trial::new(moving.items.len());
-        trial.see(moving.held(), view);
         let place = format!("frame {}, camera {camera}", query / per_frame + 1);
-        Err(match trial.ask(|ids| ids.extend(out)) {
-            Ok(_) if moving.fat.is_some() => return Ok(()),
-            Ok(_) => {
-                let reason = format!("{place}: another set than in the first process of the run");
-                Verdict::new(Status::Wrong, reason)
-            }
-            Err(fault) => {
-                let status = Status::of(&fault);
-                let why = |id: usize| Some(explain_visibility(&moving.held()[id], view));
-                Verdict::new(status, format!("{place}: {}", fault.explained(why)))
-            }
-        })
+        compare_with_scan(moving.held(), view, &place, |ids| ids.extend(out))?;
+        if moving.fat.is_some() {
+            return Ok(());
+        }
+        let reason = format!("{place}: another set than in the first process of the run");
+        Err(Verdict::new(Status::Wrong, reason))
     }
 }
 
@@ -290,7 +288,7 @@ pub(super) fn replay(
     let mut moving = Moving::build(frames, spec)?;
     let mut outs = vec![Vec::new(); frames.workload.views_per_frame];
     let mut all = Vec::with_capacity(frames.motion.frames());
-    let all_threads = spec.query_threads() > 1;
+    let all_threads = spec.is_threaded();
     let clock = Stopwatch::empty_lap(all_threads);
     for frame in 0.. {
         if !moving.take_moves() {
@@ -327,77 +325,85 @@ pub(super) fn replay(
 }
 
 /// ln of (query time / query time on a fresh build of the same boxes), by frame.
+///
+/// # Errors
+/// An answer that differs from the reference scan's.
 pub(super) fn ageing(
     spec: &StructureSpec,
     frames: &Frames,
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
-) -> BTreeMap<usize, f64> {
+) -> Result<BTreeMap<usize, f64>, Verdict> {
     let mut ages = BTreeMap::new();
-    let Ok(mut moving) = Moving::build(frames, spec) else {
-        return ages;
-    };
+    let mut moving = Moving::build(frames, spec)?;
     let last = AGES.into_iter().rfind(|age| *age <= frames.motion.frames());
     for frame in 1..=last.unwrap_or(0) {
-        if !moving.take_moves() || moving.update().is_err() || stop() {
+        if !moving.take_moves() || stop() {
             break;
         }
+        moving.update()?;
         if AGES.contains(&frame) {
             let aged = moving.index.as_ref();
-            let found = over_fresh(aged, spec, frames.workload, moving.held(), protocol);
+            let found = over_fresh(aged, spec, frames.workload, moving.held(), protocol)?;
             ages.extend(found.map(|ln| (frame, ln)));
         }
     }
-    ages
+    Ok(ages)
 }
 
 /// ln of (query time after many refits / query time on a fresh build).
 ///
 /// Frustum queries over the same boxes, timed side by side in one process. `None` for a
-/// structure that does not refit, a scene too large, or answers that differ.
+/// structure that does not refit, or a scene too large.
+///
+/// # Errors
+/// An answer that differs from the reference scan's.
 pub(super) fn refitted_ln(
     spec: &StructureSpec,
     workload: &Workload,
     protocol: &Protocol,
-) -> Option<f64> {
+) -> Result<Option<f64>, Verdict> {
     let scene = workload.scene;
     let refits = spec.row.info.capabilities.refits;
     if !refits || protocol.cold || workload.items.is_empty() || scene.items.len() > MOST_UPDATED {
-        return None;
+        return Ok(None);
     }
     let mut items = workload.items.to_vec();
-    let mut refitted = spec.build(input_of(scene, &items)).ok()?;
+    let mut refitted = spec.build(input_of(scene, &items)).map_err(not_built)?;
     for _ in 0..REFITS {
         let moved = move_share(&mut items, USUAL_SHARE);
         spec.update(&mut refitted, input_of(scene, &items), &moved)
-            .ok()?;
+            .map_err(not_built)?;
     }
     over_fresh(refitted.as_ref(), spec, workload, &items, protocol)
 }
 
 /// ln of (query time / query time on a fresh build of the same boxes).
 ///
-/// All views of the path, timed side by side; `None` if answers differ.
+/// All views of the path, timed side by side.
 fn over_fresh(
     aged: &dyn DynIndex,
     spec: &StructureSpec,
     workload: &Workload,
     items: &[Aabb],
     protocol: &Protocol,
-) -> Option<f64> {
-    let rebuilt = spec.build(input_of(workload.scene, items)).ok()?;
-    let answers = |index: &dyn DynIndex| -> Option<Vec<Answer>> {
-        let mut out = Vec::new();
-        let of_view = |view: &crate::culling::CameraView| {
-            out.clear();
-            guarded(|| index.query(view.as_any(), &mut out)).ok()?;
-            Some(Answer::of(&out))
-        };
-        workload.views.iter().map(of_view).collect()
+) -> Result<Option<f64>, Verdict> {
+    let Ok(rebuilt) = spec.build(input_of(workload.scene, items)) else {
+        return Ok(None);
     };
-    let expected = answers(rebuilt.as_ref())?;
-    if answers(aged)? != expected {
-        return None;
+    let mut expected = Vec::with_capacity(workload.views.len());
+    for (n, view) in workload.views.iter().enumerate() {
+        let mut outs = [Vec::new(), Vec::new()];
+        for (index, out) in [aged, rebuilt.as_ref()].into_iter().zip(&mut outs) {
+            guarded(|| index.query(view.as_any(), out))?;
+        }
+        if Answer::of(&outs[0]) != Answer::of(&outs[1]) {
+            let place = format!("camera {n}, a refit differs from a fresh build");
+            for out in &outs {
+                compare_with_scan(items, view.as_any(), &place, |ids| ids.extend(out))?;
+            }
+        }
+        expected.push(Answer::of(&outs[1]));
     }
     let tasks = [aged, rebuilt.as_ref()].map(|index| {
         let counts = expected.iter().map(|answer| answer.count).collect();
@@ -411,10 +417,10 @@ fn over_fresh(
         ..*protocol
     };
     let timed = timed_rounds(workload.views.len(), &tasks, &few);
-    match &timed[..] {
+    Ok(match &timed[..] {
         [Ok(refitted), Ok(rebuilt)] => refitted.over(rebuilt).map(f64::ln),
         _ => None,
-    }
+    })
 }
 
 #[cfg(test)]
@@ -440,21 +446,45 @@ mod tests {
     }
 
     #[test]
-    fn a_structure_that_refits_is_timed_again_and_no_other() {
-        let scene = scene::load("uniform:n=2000", &Default::default()).unwrap();
+    fn a_refit_that_differs_from_a_fresh_build_is_no_right_answer() {
+        let scene = scene::load("uniform:n=500", &Default::default()).unwrap();
         let way = path::load("orbit:frames=8", &scene, &LensDefaults::default()).unwrap();
         let workload = Workload::new(&scene, &way, &Culling::default()).unwrap();
-        let protocol = Protocol {
+        let spec = StructureSpec::parse("linear").unwrap();
+        let aged = spec.build(input_of(&scene, &scene.items)).unwrap();
+        let mut items = scene.items.clone();
+        let far = glam::Vec3::splat(1e4);
+        items[7] = Aabb::new(items[7].min + far, items[7].max + far);
+        let found = over_fresh(aged.as_ref(), &spec, &workload, &items, &protocol());
+        let verdict = found.unwrap_err();
+        assert_eq!(verdict.status, Status::Wrong);
+        let reason = verdict.reason.unwrap_or_default();
+        assert!(
+            reason.contains("a refit differs from a fresh build: "),
+            "{reason}"
+        );
+    }
+
+    fn protocol() -> Protocol {
+        Protocol {
             rounds: [3, 3],
             task_ns: 1e5,
             cameras: 8,
             cold: false,
             seed: 1,
             cache_bytes: 0,
-        };
+        }
+    }
+
+    #[test]
+    fn a_structure_that_refits_is_timed_again_and_no_other() {
+        let scene = scene::load("uniform:n=2000", &Default::default()).unwrap();
+        let way = path::load("orbit:frames=8", &scene, &LensDefaults::default()).unwrap();
+        let workload = Workload::new(&scene, &way, &Culling::default()).unwrap();
+        let protocol = protocol();
         for name in ["bvh", "wide", "linear-scalar", "bsp"] {
             let spec = StructureSpec::parse(name).unwrap();
-            let found = refitted_ln(&spec, &workload, &protocol);
+            let found = refitted_ln(&spec, &workload, &protocol).unwrap();
             assert_eq!(
                 found.is_some_and(f64::is_finite),
                 spec.row.info.capabilities.refits,

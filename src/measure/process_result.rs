@@ -13,7 +13,7 @@ use crate::index::{Kind, Origin, StructureSpec};
 use super::key::{Pass, TaskKey};
 use super::{
     Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, Subject,
-    TaskKind, Verdict,
+    TaskKind, Verdict, guarded,
 };
 
 /// Results of one process for one group of cells.
@@ -140,13 +140,17 @@ impl SubjectPart {
         };
         match &subject.built {
             Err(_) => part,
-            Ok(built) => SubjectPart {
-                build_ms: Some(built.build_ms),
-                memory_bytes: Some(built.memory.total() as u64),
-                update_ms: built.update_ms.clone(),
-                chose: built.items.chose(),
-                ..part
-            },
+            Ok(built) => {
+                let chose = guarded(|| built.items.chose());
+                SubjectPart {
+                    build_ms: Some(built.build_ms),
+                    memory_bytes: Some(built.memory.total() as u64),
+                    update_ms: built.update_ms.clone(),
+                    chose: chose.clone().unwrap_or_default(),
+                    verdict: chose.err().unwrap_or(part.verdict),
+                    ..part
+                }
+            }
         }
     }
 

@@ -21,6 +21,9 @@ use crate::statistics::{
 /// Label of the structure that speed-ups refer to.
 pub const YARDSTICK: &str = "linear";
 
+/// Fewest readings of a frame: below them an interruption is the median.
+const LEAST_READINGS: usize = 3;
+
 /// All cells of a group, and the results of lower bounds and the twin.
 #[non_exhaustive]
 pub struct Group {
@@ -174,13 +177,16 @@ impl<'p> MergedParts<'p> {
         all.filter(move |t| t.label == label && t.task == task)
     }
 
-    /// Mean number of visible items of the timed cameras.
+    /// Mean number of items returned to the timed queries: in frames the first of each.
     fn visible_when_timed(&self) -> Option<f64> {
         let known = self.known?;
         let cameras = &known.query.as_ref()?.schedule.cameras;
+        let views = self.loaded.path.views_per_frame.max(1);
+        let cameras = cameras.iter().step_by(views);
+        let timed = cameras.len();
         let of_camera = |camera: &u32| Some(known.visible.get(*camera as usize)?.count as f64);
-        let visible = cameras.iter().map(of_camera).sum::<Option<f64>>()?;
-        Some(visible / cameras.len() as f64)
+        let visible = cameras.map(of_camera).sum::<Option<f64>>()?;
+        Some(visible / timed as f64)
     }
 
     /// The cell of a structure, its rank excluded, or of a lower bound.
@@ -201,7 +207,10 @@ impl<'p> MergedParts<'p> {
             params: subject.map_or(Value::Null, |subject| subject.params.clone()),
             test: first.key.test.clone(),
             status: verdict.status,
-            reason: verdict.reason,
+            // The status says that it panicked.
+            reason: verdict
+                .reason
+                .map(|why| why.trim_start_matches("panicked: ").to_owned()),
             rank: None,
             times: self.times(label),
             metrics: self.metrics(label, subject, judged.as_ref(), is_right),
@@ -218,8 +227,10 @@ impl<'p> MergedParts<'p> {
     /// Metrics that this cell lacks though its structure is right, with the reason.
     fn left_out(&self, label: &str) -> Vec<String> {
         if self.ranked() == TaskKind::Frame {
-            let left_out = "query_ns_p95, locate_ns: not measured of items that move";
-            return vec![left_out.to_owned()];
+            let left_out = "query_ns_p95, locate_ns: not measured of items that move".to_owned();
+            let few = format!("worst_frame_ns: fewer than {LEAST_READINGS} readings per frame");
+            let few = (self.readings(label) < LEAST_READINGS).then_some(few);
+            return [left_out].into_iter().chain(few).collect();
         }
         let is_large = self.loaded.scene.total_count > MOST_UPDATED;
         let has_few_groups = |task: &TaskPart| task.tail_ns.len() < LEAST_TAIL;
@@ -323,8 +334,11 @@ impl<'p> MergedParts<'p> {
                 quantile(&all, q).map(Estimate::exact)
             }
             Of::WorstFrame => {
-                let frames = self.tail(label, TaskKind::Frame);
-                frames.last().copied().map(Estimate::exact)
+                let worst = *self.tail(label, TaskKind::Frame).last()?;
+                let mean = self.ns(label, TaskKind::Frame)?.value;
+                let is_known = self.readings(label) >= LEAST_READINGS;
+                // The mean has another estimator.
+                is_known.then(|| Estimate::exact(worst.max(mean)))
             }
             Of::Speedup(task) => {
                 let [yardstick, own] = self.paired(label, task.unwrap_or(self.ranked()))?;
@@ -339,6 +353,12 @@ impl<'p> MergedParts<'p> {
             Some((info.name.to_owned(), Metric::of(found, info.unit)))
         });
         found.collect()
+    }
+
+    /// Number of readings of each frame.
+    fn readings(&self, label: &str) -> usize {
+        let tasks = self.tasks(label, TaskKind::Frame);
+        tasks.map(|task| task.rounds_ns.len()).sum()
     }
 
     /// Median times of each group of cameras or each frame, ns, ascending.

@@ -1,10 +1,11 @@
 //! Cost of updating an index after items have moved.
 
 use super::clock::Stopwatch;
-use super::input_of;
+use super::index_under_test::not_built;
+use super::{Verdict, compare_with_scan, input_of};
 use crate::geometry::Aabb;
-use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::query::ItemId;
+use crate::index::{DynIndex, StructureSpec};
+use crate::query::{AnyVolume, ItemId};
 use crate::scene::Scene;
 
 /// Shares of the items that move in the updates that are measured.
@@ -17,25 +18,34 @@ pub(super) const MOST_UPDATED: usize = 2_000_000;
 /// Times an update for each of [`UPDATE_SHARES`], CPU ms; consumes the index.
 ///
 /// Each update moves a share of the items by their own size. The first one, which touches
-/// memory for the first time, is not timed.
+/// memory for the first time, is not timed. A search after the last one is checked.
 pub(super) fn measure_updates(
     spec: &StructureSpec,
     scene: &Scene,
     items: &[Aabb],
     mut index: Box<dyn DynIndex>,
-) -> Result<Vec<f64>, BuildError> {
+) -> Result<Vec<f64>, Verdict> {
     if items.is_empty() || items.len() > MOST_UPDATED {
         return Ok(Vec::new());
     }
     let mut items = items.to_vec();
     let mut times = Vec::with_capacity(UPDATE_SHARES.len());
     let first = move_share(&mut items, USUAL_SHARE);
-    spec.update(&mut index, input_of(scene, &items), &first)?;
+    let update = |index: &mut Box<dyn DynIndex>, items: &[Aabb], moved: &[ItemId]| {
+        let updated = spec.update(index, input_of(scene, items), moved);
+        updated.map(drop).map_err(not_built)
+    };
+    update(&mut index, &items, &first)?;
     for share in UPDATE_SHARES {
         let moved = move_share(&mut items, share);
-        let watch = Stopwatch::start();
-        spec.update(&mut index, input_of(scene, &items), &moved)?;
+        let watch = Stopwatch::start_for(spec.is_threaded());
+        update(&mut index, &items, &moved)?;
         times.push(watch.lap().cpu_ns / 1e6);
+    }
+    if let Some(moved) = items.iter().find(|b| !b.is_empty()) {
+        let point = AnyVolume::Point(moved.min);
+        let answer = |out: &mut Vec<ItemId>| index.query(point, out);
+        compare_with_scan(&items, point, "a search after updates", answer)?;
     }
     Ok(times)
 }

@@ -81,7 +81,10 @@ fn frames_are_measured_as_one_thing_and_in_parts() {
         };
         let sum = of("update_ns") + of("query_ns") + of("further_query_ns");
         assert!((of("frame_ns") / sum - 1.0).abs() < 0.5, "{cell:?}");
-        assert!(of("worst_frame_ns") >= 0.9 * of("frame_ns"));
+        assert!(of("worst_frame_ns") >= of("frame_ns"));
+        let firsts = known.visible.iter().step_by(2).map(|answer| answer.count);
+        let returned = firsts.sum::<u64>() as f64 / 12.0;
+        assert!((of("ns_per_visible") * returned / of("query_ns") - 1.0).abs() < 1e-9);
         assert_eq!(
             cell.value("ageing_10").is_some(),
             specs[rank].info().capabilities.refits

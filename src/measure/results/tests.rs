@@ -322,6 +322,28 @@ fn a_tail_is_read_off_twenty_groups_and_not_fewer() {
 }
 
 #[test]
+fn the_worst_frame_is_of_three_readings_and_no_better_than_the_mean() {
+    let tasks = [TaskKind::Query, TaskKind::Frame].map(|task| ("linear", task, &[9.0][..]));
+    let mut all = parts(&tasks);
+    all[0].known = None;
+    all[0].key.motion = "drift".to_owned();
+    let worst = |all: &[Part]| Group::of(all).cells[0].value("worst_frame_ns");
+    for (slowest, wanted) in [(30.0, 30.0), (8.0, 9.0)] {
+        all[0].tasks[1].tail_ns = vec![7.0, slowest];
+        let worst = worst(&all).unwrap();
+        assert!((worst - wanted).abs() < 1e-9, "{worst}");
+    }
+    all[0].tasks[1].rounds_ns.pop();
+    assert_eq!(worst(&all), None);
+    let left_out = &Group::of(&all).cells[0].left_out;
+    assert!(
+        left_out
+            .iter()
+            .any(|text| text.contains("fewer than 3 readings"))
+    );
+}
+
+#[test]
 fn without_the_yardstick_there_are_times_and_ranks_but_no_speed_ups() {
     let (bvh, octree) = (times(1.0, 1), times(2.0, 2));
     let group = Group::of(&parts(&[
