@@ -125,7 +125,8 @@ pub fn prepare(
     let moved = workload.motion.as_ref().map(Motion::share);
     let here = [Some(items), visible.map(|count| count / items), moved];
     let contenders = structure.contenders(moved.is_some());
-    let (motion, policies) = MotionChoice::begun(input, &structure, moved).unzip();
+    let (motion, policies) =
+        MotionChoice::begun(input, &structure, workload.motion.as_ref()).unzip();
     let labels = [contenders, policies.unwrap_or_default()];
     let (beside, counted) = Beside::plan(input, labels, here, progress);
     let case = Case::new(input, &workload, &structures)?;

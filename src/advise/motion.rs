@@ -6,6 +6,7 @@ use super::choice::{StructureChoice, StructureRow};
 use super::options::AdviseInput;
 use crate::index::UpdatePolicy;
 use crate::measure::ReportCell;
+use crate::motion::Motion;
 
 /// Policies measured beside the refit, unless their builds alone take longer.
 const POLICIES: [UpdatePolicy; 3] = [
@@ -41,12 +42,14 @@ pub struct MotionChoice {
 impl MotionChoice {
     /// The choice before it is made, and labels of the policies to be measured.
     ///
-    /// `None` for a still scene. Policies of `--update` are rows of the run instead.
+    /// `None` for a still scene. Policies of `--update` are rows of the run instead. Those
+    /// without a second rebuild in the frames are left out.
     pub(super) fn begun(
         input: &AdviseInput,
         structure: &StructureChoice,
-        share_moved: Option<f64>,
+        motion: Option<&Motion>,
     ) -> Option<(MotionChoice, Vec<String>)> {
+        let motion = motion?;
         let (mut ruled_out, mut measured) = (Vec::new(), Vec::new());
         let are_rows = input
             .structures
@@ -60,6 +63,7 @@ impl MotionChoice {
         let spec = spec.filter(|_| refits && !structure.is_scan);
         for policy in POLICIES.into_iter().filter(|_| !are_rows) {
             let frames = match policy {
+                UpdatePolicy::Every(frames) if 2 * frames as usize > motion.frames() => continue,
                 UpdatePolicy::Every(frames) => f64::from(frames),
                 _ => 1.0,
             };
@@ -74,7 +78,7 @@ impl MotionChoice {
         }
         let begun = MotionChoice {
             name: input.motion?.to_owned(),
-            share_moved: share_moved?,
+            share_moved: motion.share(),
             views: input.views,
             policy: None,
             policy_ties: Vec::new(),

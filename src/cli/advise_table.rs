@@ -134,13 +134,13 @@ fn in_motion(advice: &Advice) -> Option<String> {
     let others = bracketed(longer.chain(ruled_out), "; ");
     Some(format!(
         "In motion, {} of the items and {} per frame: {policy}{}{others}. A frame takes {}, of which \
-         the update {}; the worst one {}.",
+         the update {}; the worst one {}. The rules below are weighed on the still scene.",
         share(motion.share_moved),
         text::counted(motion.views, "query"),
         ties(&motion.policy_ties),
         text::time(frame),
         some(row.update_ns, text::time),
-        some(row.worst_frame_ns, text::time),
+        row.worst_frame_ns.map_or("unknown".to_owned(), text::time),
     ))
 }
 
@@ -169,6 +169,7 @@ fn changes(advice: &Advice) -> String {
         let turns: Vec<String> = turns.collect();
         let [low, high] = change.measured.map(show);
         told += &match turns.is_empty() {
+            true if low == high => format!("\n  {what}: only {low} was measured"),
             true => format!("\n  {what}: not within {low} to {high}, which were measured"),
             false => format!(
                 "\n  {what}: {}; measured from {low} to {high}",

@@ -18,6 +18,7 @@ use super::run_resume::{RunOptions, create, go_on, resume};
 use super::study::progress;
 use super::{Ending, compare, expect_folder, interrupt, run_why, tell, text, unread_is_fine};
 use crate::index::Registry;
+use crate::input;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
 };
@@ -347,6 +348,10 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
         // The shell joins the lines.
         let gap = if is_within { " " } else { " \\\n        " };
         line += &format!("{gap}{option}");
+    }
+    // A pipe cannot be read again.
+    if input::pipes().iter().any(|(pipe, _)| line.contains(pipe)) {
+        return None;
     }
     let gives = "  which shortcuts pay here";
     let is_within = line.chars().count() + gives.len() <= width;

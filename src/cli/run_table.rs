@@ -46,7 +46,7 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         text::some(bad, |bad| format!("{bad} left out")),
     ]);
     let of_scene = match scene.total_count {
-        0 if scene.digest.is_empty() => "not loaded".to_owned(),
+        0 if scene.digest.is_empty() => "no process finished".to_owned(),
         0 => of_scene + "; nothing is ranked",
         _ => of_scene,
     };
@@ -60,7 +60,16 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         format!("{}: {frames}, {queries} each", path.motion)
     });
     let visible = comparison.of_any("cull_rate").map(|culled| 1.0 - culled);
-    let visible = visible.map(|visible| format!("{} of the items are visible", share(visible)));
+    // Sets of a coarse test are larger than what is visible.
+    let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);
+    let visible = visible.map(|returned| match excess {
+        None => format!("{} of the items are visible", share(returned)),
+        Some(excess) => format!(
+            "{} of the items are returned, about {} visible",
+            share(returned),
+            share(returned / (1.0 + excess))
+        ),
+    });
     let sources = text::by_source(comparison);
     let sources = sources.map(|items| format!("{items} {}", text::BY_SOURCE));
     let excess = match (text::false_positives(comparison), sources) {

@@ -3,7 +3,7 @@
 //! The winner, its lead over the next best and over the base, the queries that repay its
 //! build, and how its answers were checked.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::text;
 use crate::measure::{SharedWork, Status, YARDSTICK};
@@ -39,9 +39,31 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     told.extend(gains(&SharedWork::of(comparison.sound())));
     told.extend(checked(&[comparison]));
     told.extend(failed(&[comparison]));
-    let fat = comparison.cells.iter().any(is_fat);
-    told.extend(fat.then(|| "Rank -: none, as fat bounds return more than exact ones.".to_owned()));
+    told.extend(caveats(&[comparison]));
     told.join(" ")
+}
+
+/// Remarks on fat bounds, rebuilds that do not come, and dropped contacts.
+fn caveats(all: &[&Comparison]) -> Vec<String> {
+    let cells = || all.iter().flat_map(|c| &c.cells);
+    let fat = cells().any(|cell| is_fat(&cell));
+    let mut told = Vec::new();
+    told.extend(fat.then(|| "Rank -: none, as fat bounds return more than exact ones.".to_owned()));
+    let late = cells().filter_map(|cell| {
+        let (_, every) = cell.structure.split_once("@every=")?;
+        let frames = cell.times.cameras_checked / cell.path.views_per_frame.max(1);
+        let is_late = frames > 0 && every.parse::<usize>().ok()? > frames;
+        let frames = text::counted(frames, "frame");
+        is_late.then(|| format!("{}: no rebuild in {frames}.", cell.structure))
+    });
+    told.extend(late.collect::<BTreeSet<_>>());
+    let dropped = all.iter().filter_map(|c| c.of_any("touch_dropped_count"));
+    let dropped = dropped.fold(0.0, f64::max);
+    told.extend((dropped > 0.0).then(|| {
+        let dropped = text::significant(dropped);
+        format!("{dropped} boxes per checked query only touch the view and are not returned.")
+    }));
+    told
 }
 
 /// Returns true for enlarged bounds that have returned more than exact ones.
@@ -77,9 +99,12 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
         let scene = &comparison.about().scene;
         return match scene.total_count {
             0 if scene.digest.is_empty() => {
-                "Nothing is ranked: the scene was not loaded.".to_owned()
+                "Nothing is ranked: no process finished a measurement.".to_owned()
             }
             0 => "Nothing is ranked: the scene has no items.".to_owned(),
+            _ if comparison.cells.iter().any(is_fat) => {
+                "Nothing is ranked: no structure with exact bounds has times.".to_owned()
+            }
             _ => "Nothing is ranked: no structure has times of right answers.".to_owned(),
         };
     };
@@ -204,6 +229,7 @@ pub fn of_many(all: &[&Comparison], overall: &Overall) -> String {
     told.extend(overall.base.and_then(fallback));
     told.extend(checked(all));
     told.extend(failed(all));
+    told.extend(caveats(all));
     told.join(" ")
 }
 

@@ -56,7 +56,7 @@ fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, St
     let Some(own) = comparison.cells.iter().copied().find(|cell| is_own(cell)) else {
         return Err(format!("{structure} was not measured."));
     };
-    if own.value("query_ns").is_none() {
+    if query_ns(own).is_none() {
         let status = own.status.name();
         let reason = some(own.reason.as_ref(), |reason| format!(": {reason}"));
         return Err(format!("{structure} has no times: {status}{reason}."));
@@ -90,8 +90,8 @@ impl Pair<'_> {
             );
         };
         format!(
-            "A frame by {own} takes {} the time of one by {other}: {} in updates and {} in the \
-             first query, where {parts}.",
+            "A frame by {own} takes {} the time of one by {other}: {} in updates and {} in \
+             queries, where {parts}.",
             times(frame),
             some(self.ratio(update_ns), times),
             times(time)
@@ -107,8 +107,12 @@ fn update_ns(cell: &ReportCell) -> Option<f64> {
     cell.value("frame_ns").and_then(|_| cell.value("update_ns"))
 }
 
+/// Time per query; of frames with several views the mean of all, as counters are.
 fn query_ns(cell: &ReportCell) -> Option<f64> {
-    cell.value("query_ns")
+    let first = cell.value("query_ns")?;
+    let further = cell.path.views_per_frame.saturating_sub(1) as f64;
+    let rest = further * cell.value("further_query_ns").unwrap_or(first);
+    Some((first + rest) / (1.0 + further))
 }
 
 /// Nodes and items tested per query.
@@ -189,7 +193,7 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
             "{structure} takes {} the time of the best other structure in the geometric mean{}: {}.",
             times(geometric_mean(&frames).unwrap_or(time)),
             some(geometric_mean(&frames), |_| {
-                format!(" of the frames, and {} in the first query", times(time))
+                format!(" of the frames, and {} in queries", times(time))
             }),
             parts(tests, per_test)
         ),

@@ -30,7 +30,7 @@ pub(super) enum Of {
     Bytes(fn(&SubjectPart) -> Option<u64>),
     /// CPU time of a task.
     Time(TaskKind),
-    /// CPU time of a query per visible item.
+    /// CPU time of a query per returned item.
     TimePerVisible,
     /// Wall time of a task.
     Wall(TaskKind),
@@ -63,15 +63,15 @@ fn excess(judged: &Judged) -> Option<Estimate> {
 
 /// All metrics of a cell, in the order of the columns.
 pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary }
-    "visible_count", "items", Of::Count, "visible items per query, mean over the path";
-    "cull_rate", "1", Of::Count, "1 - visible/total, mean over the path";
+    "visible_count", "items", Of::Count, "items returned per query, mean over the path: the visible ones and the false positives of the test (excess)";
+    "cull_rate", "1", Of::Count, "1 - returned/total, mean over the path";
     "query_ns", "ns", Of::Time(TaskKind::Query), "thread CPU time per frustum query, mean over the timed cameras: trimmed mean over the processes, each the interquartile mean over its rounds; interval over the processes";
     "query_ns_p5", "ns", Of::Tail(0.05), "5th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
     "query_ns_p95", "ns", Of::Tail(0.95), "95th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
     "query_ns_p99", "ns", Of::Tail(0.99), "99th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
     "query_ns_max", "ns", Of::Tail(1.0), "slowest group of cameras";
     "query_wall_ns", "ns", Of::Wall(TaskKind::Query), "as query_ns, wall time";
-    "ns_per_visible", "ns", Of::TimePerVisible, "query_ns / visible items of a timed camera, mean; interval scaled likewise";
+    "ns_per_visible", "ns", Of::TimePerVisible, "query_ns / items returned to a timed query, mean; interval scaled likewise";
     "speedup", "1", Of::Speedup(None), "time of linear / time of this structure: above 1 is faster; the ratio of the two query_ns, of motions that of the two frame_ns";
     "times_read", "1", Of::Over("bound-read"), "time of this structure / time of reading all item bounds once \
                         (bound-read); a tree can be below 1";
@@ -103,11 +103,11 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "comparisons", "bounds", Of::Count, "bounds tested per region search, of nodes and items, mean";
     "regions_found", "regions", Of::Count, "regions that hold the eye, mean over the path";
     "views_wall_ns", "ns", Of::Wall(TaskKind::Views), "wall time per view where threads share the views of all timed cameras (--threads above 1)";
-    "frame_ns", "ns", Of::Time(TaskKind::Frame), "thread CPU time per frame of a motion, update and all queries, mean over the frames; as query_ns, which is then the first query after each update";
+    "frame_ns", "ns", Of::Time(TaskKind::Frame), "CPU time per frame of a motion (of all threads with --threads above 1), update and all queries, mean over the frames; as query_ns, which is then the first query after each update";
     "fat_excess", "1", Of::Count, "items that enlarged bounds (--update fat=M) return in excess / items that exact bounds return";
-    "update_ns", "ns", Of::Time(TaskKind::Update), "thread CPU time of the update of a frame, mean over the frames; as query_ns";
+    "update_ns", "ns", Of::Time(TaskKind::Update), "CPU time of the update of a frame, mean over the frames; as query_ns";
     "further_query_ns", "ns", Of::Time(TaskKind::Further), "thread CPU time of a query after the first one of a frame; as query_ns";
-    "worst_frame_ns", "ns", Of::WorstFrame, "slowest frame: median of each frame over rounds and processes, then the maximum over the frames, so that an interruption is no worst frame";
+    "worst_frame_ns", "ns", Of::WorstFrame, "slowest frame: median of each frame over rounds and processes, then the maximum over the frames, at least frame_ns; absent below three readings per frame, where an interruption would be the worst frame";
     "ageing_1", "1", Of::Log(|s| s.ageing_ln.get(&1).copied()), "time per query after 1 frame / time per query on a fresh build of the same boxes";
     "ageing_10", "1", Of::Log(|s| s.ageing_ln.get(&10).copied()), "as ageing_1, after 10 frames";
     "ageing_100", "1", Of::Log(|s| s.ageing_ln.get(&100).copied()), "as ageing_1, after 100 frames";

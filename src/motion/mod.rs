@@ -171,6 +171,14 @@ impl Motion {
         // Without the last frame if it lacks cameras.
         let complete = (path.times.len() / views).max(1);
         let (paced, late) = recorded.at(path.times.iter().step_by(views).take(complete));
+        let spare = path.times.len().saturating_sub(complete * views);
+        if spare > 0 {
+            let all = counted(path.times.len(), "camera");
+            note(&format!(
+                "{name}: the last {spare} of {all} of '{path_name}' fill no frame of {views} views and \
+                 are not used"
+            ));
+        }
         if late > 0 {
             let of = format!("{late} of {} moves", recorded.moves());
             note(&format!(

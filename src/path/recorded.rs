@@ -7,7 +7,7 @@ use crate::camera::{
     Camera, CameraError, FARTHEST, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
     MatrixConvention, look_at,
 };
-use crate::input::{InputError, Row, TableReader};
+use crate::input::{InputError, Row, TableReader, note};
 use crate::scene::{Scene, WorldBox, memory};
 
 /// Values for columns that a file does not have, and lenses of generated paths.
@@ -124,6 +124,12 @@ pub fn read_cameras_csv(
     match is_matrix {
         true => table.note_unread(&MATRIX_ENTRIES, &[]),
         false => table.note_unread(&OF_EYES, &SYNONYMS),
+    }
+    if ![0, cameras.len()].contains(&times.len()) {
+        let (empty, all) = (cameras.len() - times.len(), cameras.len());
+        note(&format!(
+            "{file}: time_s is empty in {empty} of {all} rows; no time is used"
+        ));
     }
     Ok(CameraPath {
         lens_scale: None,

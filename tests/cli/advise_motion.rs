@@ -97,7 +97,7 @@ fn other_numbers_of_items_and_shares_are_measured() {
 
 #[test]
 fn policies_are_weighed_without_being_named() {
-    let line = "advise --scene uniform:n=300 --path orbit:frames=4 --structure wide --motion swarm:frames=10";
+    let line = "advise --scene uniform:n=300 --path orbit:frames=4 --structure wide --motion swarm:frames=20";
     let told = works(Path::new("."), &format!("{line} --processes 1"));
     for part in [
         "In motion, 100 % of the items and 1 query per frame: ",
@@ -106,5 +106,9 @@ fn policies_are_weighed_without_being_named() {
     ] {
         assert!(told.contains(part), "{part}: {told}");
     }
+    assert!(
+        !told.contains("every=50"),
+        "no second rebuild in 20 frames: {told}"
+    );
     assert!(!told.contains("Another structure"), "{told}");
 }

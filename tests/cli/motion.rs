@@ -93,6 +93,39 @@ fn items_that_a_file_moves_far_away_are_still_found() {
     assert!(refused.err.contains(wanted), "{}", refused.err);
 }
 
+#[test]
+fn times_and_cameras_that_are_not_used_are_said() {
+    let cameras = |times: [&str; 3]| {
+        let rows = times.map(|time| format!("-9,0.5,0.5,0,0.5,0.5,{time}\n"));
+        format!("{EYE_LOOK},time_s\n{}", rows.concat())
+    };
+    let folder = folder(&[
+        ("scene.csv", format!("{BOXES}\n0,0,0,1,1,1\n").as_bytes()),
+        ("all.csv", cameras(["0", "1", "2"]).as_bytes()),
+        ("some.csv", cameras(["0", "", "2"]).as_bytes()),
+        (
+            "motion.csv",
+            format!("time_s,id,{BOUNDS}\n0,0,0,0,0,1,1,2\n").as_bytes(),
+        ),
+    ]);
+    let run =
+        "run --scene scene.csv --structure linear --processes 1 --motion motion.csv --views 2";
+    for (path, wanted) in [
+        (
+            "all",
+            "the last 1 of 3 cameras of 'all.csv' fill no frame of 2",
+        ),
+        ("some", "some.csv: time_s is empty in 1 of 3 rows"),
+    ] {
+        let done = cullbench(
+            folder.path(),
+            &format!("{run} --path {path}.csv --out {path}"),
+        );
+        assert_eq!(done.code, Some(0), "{done:?}");
+        assert!(unwrapped(&done.err).contains(wanted), "{}", done.err);
+    }
+}
+
 const PLAN: &str = "run --scene city:n=300 --path orbit:frames=4 --structure linear,wide,octree,bvh \
     --motion spawn:share=0.1,frames=12 --motion swarm:frames=10 --views 2 --processes 3";
 
@@ -257,5 +290,20 @@ fn fat_bounds_are_not_said_to_return_the_sets_of_the_scan() {
         let told = unwrapped(&works(folder.path(), &format!("{line} {update}")));
         assert_eq!(told.contains("All structures returned"), says, "{told}");
         assert!(told.contains("fat bounds return more"), "{told}");
+        assert_eq!(
+            told.contains("no structure with exact bounds"),
+            !says,
+            "{told}"
+        );
+    }
+    let told = unwrapped(&works(
+        folder.path(),
+        &format!("{line} every=50,fat=1 --path spin:frames=4"),
+    ));
+    for part in [
+        "fat bounds return more",
+        "wide@every=50: no rebuild in 6 frames",
+    ] {
+        assert!(told.contains(part), "{told}");
     }
 }
