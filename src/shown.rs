@@ -64,7 +64,7 @@ pub fn expected_by(error: &io::Error, what: &str) -> String {
     if error.to_string().contains("expected") {
         return String::new();
     }
-    let expected = match error.kind() {
+    let expected = match kind_of(error) {
         NotFound => format!("an existing {what}"),
         IsADirectory => "a file".to_owned(),
         NotADirectory => "folders before the last name".to_owned(),
@@ -74,6 +74,15 @@ pub fn expected_by(error: &io::Error, what: &str) -> String {
         _ => format!("another {what}"),
     };
     format!("; expected {expected}")
+}
+
+/// The kind of an error that `csv` may have wrapped.
+fn kind_of(error: &io::Error) -> io::ErrorKind {
+    let inner = error.get_ref().and_then(|inner| inner.downcast_ref());
+    match inner.map(csv::Error::kind) {
+        Some(csv::ErrorKind::Io(inner)) => kind_of(inner),
+        _ => error.kind(),
+    }
 }
 
 /// Nanoseconds with three significant digits and a fitting unit.
@@ -155,8 +164,9 @@ pub fn from_field(field: &str) -> &str {
 }
 
 fn is_formula(text: &str) -> bool {
-    // A spreadsheet drops white space before it looks.
-    let begins = text.trim_start().starts_with(['=', '+', '-', '@']);
+    // What reads as marked is marked once more. A spreadsheet drops white space.
+    let unmarked = text.trim_start_matches('\'');
+    let begins = unmarked.trim_start().starts_with(['=', '+', '-', '@']);
     begins && !text.parse::<f64>().is_ok_and(f64::is_finite)
 }
 
@@ -275,13 +285,13 @@ mod tests {
             "\t=1",
             "-",
             "-inf",
+            "'=1",
+            "''=1",
         ] {
             assert_eq!(field(text), format!("'{text}"));
             assert_eq!(from_field(&field(text)), text);
         }
-        for text in [
-            "", "city:n=3", "-3.5", "+7", "-1e9", "'", "'a'", "a=b", "''=1",
-        ] {
+        for text in ["", "city:n=3", "-3.5", "+7", "-1e9", "'", "'a'", "a=b"] {
             assert_eq!(field(text), text);
             assert_eq!(from_field(text), text);
         }
@@ -291,6 +301,16 @@ mod tests {
     fn a_shown_field_steers_no_terminal_and_no_spreadsheet() {
         assert_eq!(shown_field("\u{1b}[2J\na"), "\\u{1b}[2J\na");
         assert_eq!(shown_field("\t=1"), "' =1");
+    }
+
+    #[test]
+    fn a_full_disk_is_told_the_same_through_any_writer() {
+        let full = || io::Error::from(io::ErrorKind::StorageFull);
+        let csv = |error: io::Error| io::Error::from(csv::Error::from(error));
+        let json = |error: io::Error| io::Error::from(serde_json::Error::io(error));
+        for error in [full(), csv(full()), csv(csv(full())), json(full())] {
+            assert_eq!(expected_by(&error, "file"), "; expected room on the disk");
+        }
     }
 
     #[test]

@@ -188,7 +188,7 @@ pub fn write(
         }
         RowFormat::Json => {
             let mut json = serde_json::Serializer::pretty(&mut out);
-            let mut array = json.serialize_seq(None)?;
+            let mut array = json.serialize_seq(None).map_err(io::Error::from)?;
             let object = |row: &Row| -> Map<String, Value> {
                 let fields = columns.iter();
                 fields
@@ -199,7 +199,7 @@ pub fn write(
                 let mut rows = rows.iter().map(object);
                 Ok(rows.try_for_each(|object| array.serialize_element(&object))?)
             });
-            array.end()?;
+            array.end().map_err(io::Error::from)?;
             writeln!(out)?;
             agree
         }

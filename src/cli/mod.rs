@@ -72,7 +72,7 @@ use std::process::ExitCode;
 use crate::index::Registry;
 use crate::input::{InputError, hold_files, tell_notes, tell_warnings};
 use crate::report::{folder_of, try_folder, try_place, write_atomically};
-use crate::scene::{LoadOptions, NOTICE, Scene};
+use crate::scene::{LoadOptions, NOTICE, Scene, split_part};
 use crate::shown::expected_by;
 use clap::{CommandFactory, Parser};
 use interrupt::Interrupted;
@@ -261,7 +261,7 @@ fn load_scene_by(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
     let scene = crate::scene::load(source, options)?;
     if scene.skipped_items > 0 {
         tell(&format!(
-            "note: {} left out of {}",
+            "note: {} left out of {}; ids count the other rows",
             text::counted(scene.skipped_items, "bad item"),
             scene.name
         ));
@@ -270,14 +270,18 @@ fn load_scene_by(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
 }
 
 /// Checks before the work that outputs can be written, and that none is an input or
-/// another output. Inputs may be specs and names.
+/// another output. Inputs may be specs and names, or parts of files.
 fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow::Result<()> {
     // The file system's own name, also of a file that does not exist yet.
     let known = |file: &Path| -> Option<PathBuf> {
         let place = folder_of(file).canonicalize().ok()?.join(file.file_name()?);
         Some(place.canonicalize().unwrap_or(place))
     };
-    let files = inputs.iter().filter(|file| file.is_file());
+    let files = inputs.iter().map(|input| match input.to_str() {
+        Some(source) => Path::new(split_part(source).0),
+        None => input,
+    });
+    let files = files.filter(|file| file.is_file());
     let mut taken: Vec<PathBuf> = files.filter_map(|file| known(file)).collect();
     for &(option, file) in outputs {
         expect_place_for(option, file)?;
@@ -299,6 +303,10 @@ fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
     let Some(file) = file else {
         return Ok(());
     };
+    anyhow::ensure!(
+        file != Path::new("-"),
+        "{option} is '-'; expected a file, such as './-'"
+    );
     anyhow::ensure!(
         !file.is_dir(),
         "{}: a folder; expected a file for {option}",

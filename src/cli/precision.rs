@@ -64,6 +64,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     let wrong = points.any(|p| matches!(p.status, Status::Wrong | Status::Panicked));
     let outcome = precision_tables::Outcome {
         precision,
+        skipped_items: setting.scene.skipped_items,
         seed: spread.seed,
         warnings: setting.path.warnings(&setting.scene),
         size_sweep: sizes,

@@ -22,6 +22,8 @@ pub type CullingPoint = Point<CullingErrors>;
 pub struct Outcome {
     #[serde(flatten)]
     pub precision: Precision,
+    /// Items left out on request (`--skip-bad-items`).
+    pub skipped_items: usize,
     pub seed: u64,
     pub size_sweep: Vec<SizeRow>,
     pub sweeps: Vec<SweepRow>,

@@ -72,6 +72,12 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
     if let Some(line) = value(error) {
         return Some(line);
     }
+    if error.kind() == ErrorKind::InvalidUtf8
+        && let Some(arg) = env::args_os().find(|arg| arg.to_str().is_none())
+    {
+        let arg = arg.to_string_lossy();
+        return Some(format!("'{arg}' is not UTF-8; expected UTF-8 names"));
+    }
     let text = error.render().to_string();
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     let first = lines.next().unwrap_or_default();

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::command_args::{SceneConvertArgs, SceneGenerateArgs, SceneInfoArgs};
 use super::scene_facts::{SceneFacts, people};
 use super::shared_args::TableFormat;
-use super::{Ending, expect_place_for, interrupt, load_scene, print_json, scene_facts, tell, text};
+use super::{Ending, expect_places, interrupt, load_scene, print_json, scene_facts, tell, text};
 use crate::measure::SceneInfo;
 use crate::path::{self, CameraFacts};
 use crate::report::write_atomically;
@@ -56,7 +56,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         print_json(&value)?;
         return Ok(Ending::Ok);
     }
-    let [low, high, origin] = [info.bounds_min, info.bounds_max, info.origin]
+    let [low, high, origin] = [figures.bounds_min, figures.bounds_max, info.origin]
         .map(|v| format!("({})", v.map(text::short).join(", ")));
     let mut rows = vec![
         ("scene", text::plain(&info.name)),
@@ -119,9 +119,9 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
 }
 
 pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
-    expect_place_for("--out", args.out.as_deref())?;
+    let out = expect_other(args.out.as_deref(), &args.scene)?;
     let scene = load_scene(&args.scene, &args.scene_args, 0)?;
-    write(scene.settled()?, args.out.as_deref())
+    write(scene.settled()?, out)
 }
 
 pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
@@ -129,7 +129,7 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     if args.to.is_none() {
         expect_csv(out)?;
     }
-    expect_place_for("--out", out)?;
+    let out = expect_other(out, &args.scene)?;
     let scene = load_scene(&args.scene, &args.scene_args, 0)?;
     let (origin, lost) = (scene.origin, left_behind(&scene));
     let kept = scene.settled()?;
@@ -152,6 +152,13 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
         ));
     }
     write(kept, out)
+}
+
+/// The file to write, which is not the input; none for standard output.
+fn expect_other<'f>(out: Option<&'f Path>, scene: &str) -> anyhow::Result<Option<&'f Path>> {
+    let out = out.filter(|out| *out != Path::new("-"));
+    expect_places(&[("--out", out)], &[Path::new(scene)])?;
+    Ok(out)
 }
 
 /// Refuses another extension; a file without one gets boxes too.

@@ -134,6 +134,11 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
         let tested = verdicts.iter().flatten().count();
         told += &format!(", of which the query tests {}", text::count(tested));
     }
+    let deeper = cells.iter().filter(|cell| cell.level > args.depth).count();
+    if deeper > 0 {
+        let deeper = text::counted(deeper, "cell");
+        told += &format!("; not drawn: {deeper} below level {}", args.depth);
+    }
     tell(&format!("{}: {told}", args.out.display()));
     Ok(Ending::Ok)
 }

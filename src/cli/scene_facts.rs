@@ -6,11 +6,11 @@ use super::text;
 use crate::index::{Bvh, FrustumQuery, Input, RegionIndex};
 use crate::measure::{PathInfo, SceneInfo};
 use crate::path::{CameraFacts, LensDefaults, MatrixFacts};
-use crate::scene::Scene;
+use crate::scene::{Scene, WorldBox};
 use crate::statistics::{quantile, sorted};
 
 /// Edge of a flat item along its thinnest axis, as a share of its longest edge.
-const FLAT: f32 = 0.01;
+const FLAT: f64 = 0.01;
 /// Most items whose neighbours are counted.
 const SAMPLE: usize = 1000;
 /// Neighbours after which no other item is sampled.
@@ -19,9 +19,13 @@ const MOST_NEIGHBOURS: usize = 10_000_000;
 const STEPS: usize = 12;
 const BARS: [char; 9] = ['·', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// Figures of the items; sizes are longest edges in units of the scene.
+/// Figures of the items as they were written; sizes are longest edges in units of the
+/// scene.
 #[derive(Serialize)]
 pub struct SceneFacts {
+    /// Corners of the box about all items.
+    pub bounds_min: [f64; 3],
+    pub bounds_max: [f64; 3],
     /// Edges of the box about all items.
     extent: [f64; 3],
     size_min: Option<f64>,
@@ -56,20 +60,21 @@ struct SizeStep {
 
 impl SceneFacts {
     pub fn of(scene: &Scene) -> anyhow::Result<SceneFacts> {
-        let edges = scene.items.iter().map(|b| b.extent().max_element().into());
-        let edges = sorted(edges.collect());
+        let extents = || scene.written().map(|b| b.max - b.min);
+        let edges = sorted(extents().map(|extent| extent.max_element()).collect());
         let [size_min, size_median, size_p99, size_max] =
             [0.0, 0.5, 0.99, 1.0].map(|q| quantile(&edges, q));
         let mut flat_counts = [0; 3];
-        for extent in scene.items.iter().map(|b| b.extent()) {
+        for extent in extents() {
             for (axis, count) in flat_counts.iter_mut().enumerate() {
                 let longest = extent.max_element();
                 *count += usize::from(longest > 0.0 && extent[axis] < FLAT * longest);
             }
         }
-        let mut bits: Vec<_> = scene.items.iter().map(|b| b.bits()).collect();
-        bits.sort_unstable();
-        bits.dedup();
+        let corners = |b: WorldBox| [b.min, b.max].map(|v| v.to_array().map(f64::to_bits));
+        let mut distinct: Vec<_> = scene.written().map(corners).collect();
+        distinct.sort_unstable();
+        distinct.dedup();
         let mut f32_loss = [0.0f64; 3];
         for (b, written) in scene.items.iter().zip(scene.written()) {
             for (axis, loss) in f32_loss.iter_mut().enumerate() {
@@ -78,7 +83,10 @@ impl SceneFacts {
                 *loss = loss.max(low).max(high);
             }
         }
-        let bounds = scene.world_bounds();
+        let bounds = match scene.items.is_empty() {
+            true => scene.world_bounds(),
+            false => WorldBox::union_of(scene.written()),
+        };
         let step = |axis: usize| {
             let farthest = bounds.min[axis].abs().max(bounds.max[axis].abs()) as f32;
             f64::from(farthest.next_up() - farthest)
@@ -87,12 +95,11 @@ impl SceneFacts {
         if !scene.items.is_empty() {
             let tree = Bvh::build(&Input::new(&scene.items), &Default::default())?;
             let stride = scene.items.len().div_ceil(SAMPLE);
-            for b in scene.items.iter().step_by(stride) {
+            for (stored, b) in scene.items.iter().zip(scene.written()).step_by(stride) {
                 let mut met = 0;
-                tree.each_visible(b, |_| met += 1);
-                let own = usize::from(met > 0);
-                (sampled, others) = (sampled + 1, others + met - own);
-                meeting += usize::from(met > own);
+                tree.each_visible(stored, |id| met += usize::from(scene.overlaps(id, &b)));
+                (sampled, others) = (sampled + 1, others + met - 1);
+                meeting += usize::from(met > 1);
                 if others > MOST_NEIGHBOURS {
                     break;
                 }
@@ -100,6 +107,8 @@ impl SceneFacts {
         }
         let of_sample = |count: usize| (sampled > 0).then(|| count as f64 / sampled as f64);
         Ok(SceneFacts {
+            bounds_min: bounds.min.to_array(),
+            bounds_max: bounds.max.to_array(),
             extent: (bounds.max - bounds.min).to_array(),
             size_min,
             size_median,
@@ -108,7 +117,7 @@ impl SceneFacts {
             point_count: edges.partition_point(|edge| *edge <= 0.0),
             size_histogram: histogram(&edges),
             flat_counts,
-            coincident_count: scene.items.len() - bits.len(),
+            coincident_count: scene.items.len() - distinct.len(),
             overlap_mean: of_sample(others),
             overlap_share: of_sample(meeting),
             overlap_sample_count: sampled,
@@ -156,7 +165,7 @@ impl SceneFacts {
             });
         let copies = match self.coincident_count {
             0 => "no two items have the same bounds".to_owned(),
-            copies => format!("{} with the bounds of another item", people(copies)),
+            copies => format!("{} with the bounds of an item before them", people(copies)),
         };
         let loss = format!(
             "bounds grow by at most {} (x, y, z); f32 steps in world coordinates are {}",
@@ -357,6 +366,23 @@ mod tests {
         assert!(facts.f32_loss[0] > 0.0 && facts.f32_loss[0] <= step);
         assert_eq!(facts.f32_loss[1..], [0.0, 0.0]);
         assert_eq!(facts.f32_step_unmoved[0], step);
+    }
+
+    /// f32 has steps of 2 there.
+    #[test]
+    fn figures_are_those_of_the_boxes_as_written() {
+        let point = |x: f64| WorldBox::at(DVec3::new(16_777_217.0 + x, 0.0, 0.0));
+        let unit = WorldBox::new(DVec3::ZERO, DVec3::ONE);
+        let boxes = [point(0.0), point(0.25), point(0.5), unit, point(0.5)];
+        let scene = Scene::from_boxes("far", &boxes).expect("boxes");
+        let facts = SceneFacts::of(&scene).unwrap();
+        assert_eq!((facts.size_min, facts.size_max), (Some(0.0), Some(1.0)));
+        assert_eq!((facts.point_count, facts.flat_counts), (4, [0; 3]));
+        assert_eq!(
+            (facts.coincident_count, facts.overlap_share),
+            (1, Some(0.4))
+        );
+        assert_eq!(facts.bounds_max, [16_777_217.5, 1.0, 1.0]);
     }
 
     #[test]

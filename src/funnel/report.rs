@@ -27,6 +27,8 @@ pub struct FunnelReport {
     pub path: String,
     /// Number of items of the scene.
     pub items: usize,
+    /// Items left out on request (`--skip-bad-items`).
+    pub skipped_items: usize,
     /// Number of views.
     pub views: usize,
     /// Number of cameras of the path, of which the views are an even choice.

@@ -222,6 +222,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
         scene: input.scene.name.clone(),
         path: input.path.name.clone(),
         items: input.scene.items.len(),
+        skipped_items: input.scene.skipped_items,
         views: world.views.len(),
         cameras: input.path.cameras.len(),
         samples: [input.samples.width, input.samples.height],

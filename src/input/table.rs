@@ -49,7 +49,7 @@ impl<'b> TableReader<'b> {
         let mut csv = csv::ReaderBuilder::new()
             .flexible(true)
             .delimiter(delimiter)
-            .trim(csv::Trim::All)
+            .trim(csv::Trim::Headers)
             .from_reader(bytes);
         // From memory nothing fails to be read.
         let fields = csv.byte_headers().cloned().unwrap_or_default();
@@ -88,7 +88,10 @@ impl<'b> TableReader<'b> {
         let mut seen = HashSet::with_capacity(header.len());
         for name in header.iter().filter(|name| !name.is_empty()) {
             if seen.contains(name.as_str()) && is_data(&header) {
-                let found = format!("data '{}' in place of the header", joined(&header));
+                let found = format!(
+                    "data '{}' in place of the header",
+                    joined(&header, delimiter)
+                );
                 return Err(complain(found, "a line with the names of the columns"));
             }
             if !seen.insert(name.as_str()) {
@@ -129,7 +132,7 @@ impl<'b> TableReader<'b> {
         let mut places = [0; N];
         for (place, name) in places.iter_mut().zip(names) {
             *place = self.column(name).ok_or_else(|| {
-                let all = joined(&self.header);
+                let all = joined(&self.header, self.delimiter);
                 let found = match is_data(&self.header) {
                     true => format!("data '{all}' in place of the header"),
                     false => format!("no column '{name}' in '{all}'"),
@@ -203,8 +206,13 @@ impl<'b> TableReader<'b> {
 }
 
 impl Row<'_> {
-    /// The field as text; bytes that are no UTF-8 are replaced.
+    /// The field as text without blanks around it; bytes that are no UTF-8 are replaced.
     pub fn text(&self, column: usize) -> Cow<'_, str> {
+        String::from_utf8_lossy(self.record[column].trim_ascii())
+    }
+
+    /// The same with its blanks.
+    pub fn label(&self, column: usize) -> Cow<'_, str> {
         String::from_utf8_lossy(&self.record[column])
     }
 
@@ -251,9 +259,9 @@ fn delimiter(head: &[u8], names: &[&str]) -> u8 {
     all.into_iter().max_by_key(rank).unwrap_or(b',')
 }
 
-/// Names of columns, cut down to what fits an error line.
-fn joined(header: &[String]) -> String {
-    shortened(&header.join(","), 60)
+/// Names of columns as in the file, cut down to what fits an error line.
+fn joined(header: &[String], delimiter: u8) -> String {
+    shortened(&header.join(&char::from(delimiter).to_string()), 60)
 }
 
 /// Numbers in place of the names of columns: all tables have three or more.

@@ -154,8 +154,11 @@ fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
     let id = text.parse::<ItemId>().ok();
     id.filter(|id| (*id as usize) < items).ok_or_else(|| {
         let found = format!("id '{}'", crate::shown::shortened(&text, 60));
-        let most = items.saturating_sub(1);
-        row.error(found, format!("an item of '{}', 0 to {most}", scene.name))
+        let expected = match items.checked_sub(1) {
+            Some(most) => format!("an item of '{}', 0 to {most}", scene.name),
+            None => format!("a scene with items, and '{}' has none", scene.name),
+        };
+        row.error(found, expected)
     })
 }
 

@@ -107,7 +107,7 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
                 }
             }
             for (column, label) in &mut labels {
-                label.push(from_field(&row.text(*column)));
+                label.push(from_field(&row.label(*column)));
             }
             Ok(b)
         });

@@ -1,5 +1,6 @@
 //! Wavefront OBJ: every object or group with faces is an item.
 //!
+//! A group that is opened again is another item of the same name.
 //! Faces become fans of opaque triangles, counter-clockwise as seen from the outside. Boxes
 //! hold the vertices as written. Weights and colours of vertices, normals and texture
 //! coordinates change nothing. Source: Wavefront Technologies, Advanced Visualizer Manual,
@@ -24,14 +25,17 @@ const BYTES_PER_BYTE: u64 = 12;
 /// Most unread words that are counted.
 const MOST_UNREAD: usize = 100;
 
-/// Tells OBJ by the first word that is no comment.
+/// Tells OBJ by the first word that is no comment, and not in the header of boxes CSV.
 pub fn is_obj(bytes: &[u8]) -> bool {
     let lines = text(bytes).split(|byte| *byte == b'\n');
     let mut lines = lines.map(|line| line.trim_ascii());
     let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"));
     first.is_some_and(|line| {
         let word = words(line).next().unwrap_or_default();
-        word.len() < line.len() && KNOWN.iter().chain(&UNREAD).any(|known| *known == word)
+        let is_header = line.windows(5).any(|part| part == b"min_x");
+        !is_header
+            && word.len() < line.len()
+            && KNOWN.iter().chain(&UNREAD).any(|known| *known == word)
     })
 }
 
@@ -171,7 +175,12 @@ impl Obj<'_> {
             }
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;
-                let name = String::from_utf8_lossy(line[start..].trim_ascii()).into_owned();
+                let name = &line[start..];
+                let comment = name
+                    .windows(2)
+                    .position(|pair| matches!(pair, b" #" | b"\t#"));
+                let name = name[..comment.unwrap_or(name.len())].trim_ascii();
+                let name = String::from_utf8_lossy(name).into_owned();
                 self.items.pop_if(|(_, first)| *first == self.corners.len());
                 self.items.push((name, self.corners.len()));
             }
@@ -262,7 +271,7 @@ s off
 f 1/1/1 3/-1/-9 2//7
 f 1 2 4
 g empty
-g other  part
+g other  part\t# of #2
 usemtl steel
 f -3 -2 -1
 f 1 4 \\
@@ -278,6 +287,7 @@ f 1 2 3 4";
     #[test]
     fn objects_and_groups_with_faces_are_items_with_boxes_of_their_vertices() {
         assert!(is_obj(TEXT.as_bytes()));
+        assert!(!is_obj(b"s\tmin_x\tmin_y\n") && !is_obj(b"# from Excel\ng ; min_x;min_y\n"));
         let scene = read(TEXT.as_bytes()).unwrap();
         let names = [0, 1, 2].map(|item| scene.labels[0].get(item).to_owned());
         assert_eq!(names, ["solid", "other  part", "last"]);

@@ -38,6 +38,15 @@ pub fn split_part(source: &str) -> (&str, Option<&str>) {
     }
 }
 
+/// What to type for one part of a file, for the end of a message.
+pub(super) fn part_hint(file: &str, name: &str) -> String {
+    let typed = match file {
+        "-" => ", typed '--scene=-#..', or '-- -#..' without an option",
+        _ => "",
+    };
+    format!("one of them by name, as in '{file}#{name}'{typed}")
+}
+
 /// The scenes of `maps.wad#*` or `pak.pk3#*`, one by one; of others the source.
 ///
 /// # Errors
@@ -161,7 +170,7 @@ fn check_generated(
 
 /// Reads a file by its beginning or extension; anything else as boxes CSV.
 ///
-/// `name` will be the scene's. A map that is named makes it a WAD.
+/// `name` will be the scene's.
 ///
 /// # Errors
 /// The errors of [`load`].
@@ -206,17 +215,21 @@ fn read_beside(
     }
     let extension = Path::new(file).extension();
     let is_named = |name: &str| extension.is_some_and(|e| e.eq_ignore_ascii_case(name));
-    if map.is_none() && (is_ibsp(bytes) || is_named("bsp")) {
-        return read_ibsp(bytes, file, name, options);
-    }
-    if is_wad(bytes) || map.is_some() || is_named("wad") {
+    if is_wad(bytes) || is_named("wad") && !is_ibsp(bytes) {
         return Ok(Scene {
             unit: Some("map units"),
             ..WadMap::read(bytes, file, map)?.into_scene(name)?
         });
     }
+    if let Some(map) = map {
+        let found = format!("no parts, and so no '{}'", shortened(map, 80));
+        return Err(InputError::byte(file, 0, found, "a WAD or a zip archive"));
+    }
+    if is_ibsp(bytes) || is_named("bsp") {
+        return read_ibsp(bytes, file, name, options);
+    }
     let is_gltf = is_gltf(bytes) || is_named("gltf") || is_named("glb");
-    if is_gltf || is_obj(bytes) || is_named("obj") {
+    if is_gltf || is_obj(bytes) && !is_named("csv") || is_named("obj") {
         if options.skip_bad_items {
             note(&format!("{name}: --skip-bad-items is for boxes CSV"));
         }
@@ -381,6 +394,9 @@ mod tests {
         assert!(error("no/such/file.csv").contains("no/such/file.csv: No such file"));
         assert!(error("datasets/").contains("a directory; expected a file"));
         assert!(error("datasets/freedm_map12.wad#MAP99").contains("no map 'MAP99'"));
+        let part = error("Cargo.lock#MAP01");
+        let wanted = "no parts, and so no 'MAP01'; expected a WAD or a zip archive";
+        assert!(part.ends_with(wanted), "{part}");
         assert!(error("helsinki:n=3").contains("unknown parameter"));
     }
 

@@ -149,7 +149,8 @@ impl Scene {
         self.meets(boxes, self.region_originals(), id, &WorldBox::at(p))
     }
 
-    fn overlaps(&self, id: ItemId, by: &WorldBox) -> bool {
+    /// Tests whether an item, as it was written, has a point in common with a box.
+    pub fn overlaps(&self, id: ItemId, by: &WorldBox) -> bool {
         self.meets(&self.items, &self.originals, id, by)
     }
 

@@ -3,12 +3,14 @@
 //! No size is believed before the bytes are there. Buffers of a glTF are entries in its
 //! folder or below: `..` leads nowhere. Source: PKWARE, APPNOTE.TXT 6.3.
 
+use std::collections::HashSet;
 use std::fmt::Display;
 
 use miniz_oxide::inflate::decompress_to_vec_with_limit;
 use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive, crc32};
 
 use super::memory;
+use super::source::part_hint;
 use crate::input::InputError;
 use crate::shown::{counted, first_of, plain, shortened};
 
@@ -105,6 +107,8 @@ fn damaged(file: &str, error: rawzip::Error) -> InputError {
 }
 
 /// Names and records in the order of the directory, without folders.
+///
+/// Of entries of one name the last counts.
 fn entries<'a>(
     archive: &'a Archive,
     file: &str,
@@ -117,24 +121,34 @@ fn entries<'a>(
             all.push((name, record));
         }
     }
+    let mut seen = HashSet::new();
+    all.reverse();
+    all.retain(|(name, _)| seen.insert(name.clone()));
+    all.reverse();
     Ok(all)
 }
 
+/// Archives made by macOS have a `._` file beside each other one, for its attributes.
 fn is_scene(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
-    SCENES.iter().any(|ending| name.ends_with(ending))
+    let is_aside = name
+        .rsplit('/')
+        .next()
+        .unwrap_or_default()
+        .starts_with("._");
+    !is_aside && SCENES.iter().any(|ending| name.ends_with(ending))
 }
 
-/// The entry of a name in either case, or the only scene, and the map within it. Of
-/// entries of one name the last counts.
+/// The entry of a name, or the only scene, and the map within it. Without an entry of
+/// that very name, the last one that differs by case.
 fn chosen<'e, 'r, 'w>(
     entries: &'e [(String, ZipFileHeaderRecord<'r>)],
     file: &str,
     wanted: Option<&'w str>,
 ) -> Result<(&'e str, &'e ZipFileHeaderRecord<'r>, Option<&'w str>), InputError> {
     let named = |wanted: &str| {
-        let mut last_first = entries.iter().rev();
-        last_first.find(|(name, _)| name.eq_ignore_ascii_case(wanted))
+        let last = |is_it: &dyn Fn(&str) -> bool| entries.iter().rfind(|(name, _)| is_it(name));
+        last(&|name| name == wanted).or_else(|| last(&|name| name.eq_ignore_ascii_case(wanted)))
     };
     let scenes = entries.iter().filter(|(name, _)| is_scene(name));
     let scenes: Vec<_> = scenes.collect();
@@ -149,7 +163,7 @@ fn chosen<'e, 'r, 'w>(
         ),
         (None, _) => (
             format!("{} scenes, {listed}", scenes.len()),
-            format!("one of them by name, as in '{file}#{}'", names[0]),
+            part_hint(file, &names[0]),
         ),
         (Some(wanted), _) => {
             let in_entry = wanted.rsplit_once('#');
@@ -260,6 +274,19 @@ pub mod tests {
             "no scene among 1 entry",
         );
         refused(&packed(&[]), None, "no scene among no entries");
+        // The very name first, and the last of several entries of one name.
+        let two = [BOX, b"1,1,1,2,2,2\n"].concat();
+        let cases = packed(&[("A.csv", BOX, 0), ("a.csv", &two, 0), ("b.csv", &two, 0)]);
+        let counts = ["A.csv", "a.csv", "B.csv"].map(|part| read(&cases, Some(part)));
+        assert_eq!(counts, [Ok(1), Ok(2), Ok(2)]);
+        let again = packed(&[("a.csv", BOX, 0), ("A.csv", BOX, 0), ("a.csv", &two, 0)]);
+        assert_eq!(part_names(&again, "a.zip").unwrap(), ["A.csv", "a.csv"]);
+        let mac = packed(&[
+            ("a.csv", &two, 0),
+            ("__MACOSX/._a.csv", b"\0", 0),
+            ("a.csv", BOX, 8),
+        ]);
+        assert_eq!(read(&mac, None), Ok(1));
         // The archive in an archive.
         let outer = packed(&[("inner.pk3", &one, 8)]);
         assert_eq!(read(&outer, Some("inner.pk3")), Ok(1));

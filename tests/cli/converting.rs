@@ -123,13 +123,41 @@ fn boxes_that_f32_cannot_hold_are_written_as_they_were() {
 }
 
 #[test]
-fn a_scene_can_be_converted_onto_itself() {
-    let text = format!("{BOXES},kind\n0.5,1,2,3,4,5,a\n7,7,7,8,8,8.25,b\n");
-    let folder = folder(&[("s.csv", text.as_bytes())]);
-    let (again, _) = convert(folder.path(), "s.csv s.csv", "s.csv");
-    assert_eq!(again, text);
+fn outputs_have_any_name_but_that_of_the_input() {
+    // Blanks and marks of labels stay, so that none become equal.
+    let text = format!(
+        "{BOXES},kind\n0.5,1,2,3,4,5, a\n7,7,7,8,8,8.25,a\n7,7,7,8,8,9,'=1\n7,7,7,8,8,9,''=1\n"
+    );
+    let map = map12();
+    let folder = folder(&[("s.csv", text.as_bytes()), ("map.wad", &map)]);
     let (other, _) = convert(folder.path(), "s.csv -o S.CSV", "S.CSV");
     assert_eq!(other, text);
+    for out in ["-", "--out -", "-o -"] {
+        let done = cullbench(folder.path(), &format!("scene convert s.csv {out}"));
+        assert_eq!(
+            (done.code, done.out, done.err),
+            (Some(0), text.clone(), String::new())
+        );
+    }
+    let onto_input = [
+        "convert s.csv s.csv",
+        "convert s.csv -o ./s.csv",
+        "generate s.csv -o s.csv",
+    ];
+    let lines = onto_input.map(|line| format!("scene {line}"));
+    all_refused(
+        &folder,
+        &lines,
+        "s.csv: an input or another output; expected a file of its own",
+    );
+    let part = "scene convert map.wad#MAP12 map.wad --to csv";
+    all_refused(&folder, &[part], "map.wad: an input or another output");
+    let drawn = "scene draw s.csv --out -";
+    all_refused(
+        &folder,
+        &[drawn],
+        "--out is '-'; expected a file, such as './-'",
+    );
     // No extension, and one that the format is named for.
     convert(folder.path(), "s.csv boxes", "boxes");
     convert(folder.path(), "s.csv boxes.txt --to csv", "boxes.txt");

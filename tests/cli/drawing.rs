@@ -33,6 +33,19 @@ fn a_drawing_counts_what_a_query_counts() {
         let tested = format!("of which the query tests {}", row["nodes_tested"]);
         assert!(done.err.contains(&tested), "{structure}: {}", done.err);
         let svg = fs::read_to_string(folder.path().join("x.svg")).expect("a picture");
+        let not_drawn = done
+            .err
+            .split_once("; not drawn: ")
+            .map_or("", |said| said.1);
+        assert_eq!(
+            svg.contains("not drawn: "),
+            !not_drawn.is_empty(),
+            "{structure}"
+        );
+        assert!(
+            svg.contains(not_drawn.trim_end()),
+            "{structure}: {not_drawn}"
+        );
         let of = |words: &[&str]| {
             words
                 .iter()

@@ -104,6 +104,7 @@ fn a_full_disk_is_one_error_line() {
         "completions bash",
         "query --scene scene.csv --cameras cameras.csv",
         "locate --scene scene.csv --points points.csv --format json",
+        "query --scene scene.csv --cameras cameras.csv --format json",
         "verify --cases 5",
         "drift --steps 1000 --processes 1 --seconds 1 --arm linear --rate 60 --stiffness 1e2",
         "scene generate uniform:n=20000",
@@ -119,7 +120,7 @@ fn a_full_disk_is_one_error_line() {
             out: String::new(),
             err: besides_work(&err).to_owned(),
         };
-        assert_refused(&done, "No space left", line);
+        assert_refused(&done, "No space left | expected room on the disk", line);
     }
     // The table is lost, the cells are not.
     check_run(&folder.path().join("run"));

@@ -47,7 +47,7 @@ fn culling(point: &Value) -> String {
 #[test]
 fn json_has_the_documented_fields() {
     let outcome = small();
-    let top = "scene path items cameras processes rounds twin points front region_points stability seed \
+    let top = "scene path items skipped_items cameras processes rounds twin points front region_points stability seed \
                size_sweep sweeps warnings";
     assert_eq!(keys(outcome), set(top));
     assert_eq!(

@@ -7,6 +7,7 @@ use std::fmt::Display;
 use std::ops::Range;
 
 use super::records::{Table, int_at, range_within};
+use super::source::part_hint;
 use crate::input::InputError;
 use crate::shown::first_of;
 
@@ -120,7 +121,7 @@ impl<'a> Wad<'a> {
             (Some(one), None, _) => return Ok(*one),
             (Some(first), _, _) => (
                 format!("{} maps, {}", maps.len(), listed()),
-                format!("one of them by name, as in '{}#{}'", self.file, first.0),
+                part_hint(&self.file, first.0),
             ),
             (None, _, None) => (
                 "no map".to_owned(),
