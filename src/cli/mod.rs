@@ -277,12 +277,12 @@ fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow:
         let place = folder_of(file).canonicalize().ok()?.join(file.file_name()?);
         Some(place.canonicalize().unwrap_or(place))
     };
-    let files = inputs.iter().map(|input| match input.to_str() {
-        Some(source) => Path::new(split_part(source).0),
-        None => input,
+    let files = inputs.iter().map(|&input| {
+        let source = input.to_str().map(|source| split_part(source).0);
+        source.map_or(input, Path::new)
     });
     let files = files.filter(|file| file.is_file());
-    let mut taken: Vec<PathBuf> = files.filter_map(|file| known(file)).collect();
+    let mut taken: Vec<PathBuf> = files.filter_map(known).collect();
     for &(option, file) in outputs {
         expect_place_for(option, file)?;
         let Some(place) = file.and_then(known) else {

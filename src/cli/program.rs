@@ -72,11 +72,10 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
     if let Some(line) = value(error) {
         return Some(line);
     }
-    if error.kind() == ErrorKind::InvalidUtf8
-        && let Some(arg) = env::args_os().find(|arg| arg.to_str().is_none())
-    {
-        let arg = arg.to_string_lossy();
-        return Some(format!("'{arg}' is not UTF-8; expected UTF-8 names"));
+    if error.kind() == ErrorKind::InvalidUtf8 {
+        let mut found = env::args_os().filter(|arg| arg.to_str().is_none());
+        let found = found.next().unwrap_or_default();
+        return Some(format!("{found:?} is not UTF-8; expected UTF-8 names"));
     }
     let text = error.render().to_string();
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());

@@ -19,8 +19,9 @@ const MOST_NEIGHBOURS: usize = 10_000_000;
 const STEPS: usize = 12;
 const BARS: [char; 9] = ['·', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// Figures of the items as they were written; sizes are longest edges in units of the
-/// scene.
+/// Figures of the items as they were written.
+///
+/// Sizes are longest edges in units of the scene.
 #[derive(Serialize)]
 pub struct SceneFacts {
     /// Corners of the box about all items.

@@ -206,7 +206,9 @@ impl<'b> TableReader<'b> {
 }
 
 impl Row<'_> {
-    /// The field as text without blanks around it; bytes that are no UTF-8 are replaced.
+    /// The field as text without blanks around it.
+    ///
+    /// Bytes that are no UTF-8 are replaced.
     pub fn text(&self, column: usize) -> Cow<'_, str> {
         String::from_utf8_lossy(self.record[column].trim_ascii())
     }

@@ -154,11 +154,9 @@ fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
     let id = text.parse::<ItemId>().ok();
     id.filter(|id| (*id as usize) < items).ok_or_else(|| {
         let found = format!("id '{}'", crate::shown::shortened(&text, 60));
-        let expected = match items.checked_sub(1) {
-            Some(most) => format!("an item of '{}', 0 to {most}", scene.name),
-            None => format!("a scene with items, and '{}' has none", scene.name),
-        };
-        row.error(found, expected)
+        let most = items.checked_sub(1).map(|most| format!("0 to {most}"));
+        let ids = most.as_deref().unwrap_or("which has none");
+        row.error(found, format!("an item of '{}', {ids}", scene.name))
     })
 }
 

@@ -25,7 +25,7 @@ const BYTES_PER_BYTE: u64 = 12;
 /// Most unread words that are counted.
 const MOST_UNREAD: usize = 100;
 
-/// Tells OBJ by the first word that is no comment, and not in the header of boxes CSV.
+/// Tells OBJ by the first word that is no comment and no header of boxes CSV.
 pub fn is_obj(bytes: &[u8]) -> bool {
     let lines = text(bytes).split(|byte| *byte == b'\n');
     let mut lines = lines.map(|line| line.trim_ascii());
@@ -175,12 +175,13 @@ impl Obj<'_> {
             }
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;
-                let name = &line[start..];
-                let comment = name
-                    .windows(2)
-                    .position(|pair| matches!(pair, b" #" | b"\t#"));
-                let name = name[..comment.unwrap_or(name.len())].trim_ascii();
-                let name = String::from_utf8_lossy(name).into_owned();
+                let name = String::from_utf8_lossy(&line[start..]);
+                let name = name
+                    .split(" #")
+                    .next()
+                    .unwrap_or_default()
+                    .trim_ascii()
+                    .to_owned();
                 self.items.pop_if(|(_, first)| *first == self.corners.len());
                 self.items.push((name, self.corners.len()));
             }
@@ -271,7 +272,7 @@ s off
 f 1/1/1 3/-1/-9 2//7
 f 1 2 4
 g empty
-g other  part\t# of #2
+g other  part # of #2
 usemtl steel
 f -3 -2 -1
 f 1 4 \\

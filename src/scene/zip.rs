@@ -108,7 +108,7 @@ fn damaged(file: &str, error: rawzip::Error) -> InputError {
 
 /// Names and records in the order of the directory, without folders.
 ///
-/// Of entries of one name the last counts.
+/// The last of several entries of one name counts.
 fn entries<'a>(
     archive: &'a Archive,
     file: &str,
@@ -128,7 +128,9 @@ fn entries<'a>(
     Ok(all)
 }
 
-/// Archives made by macOS have a `._` file beside each other one, for its attributes.
+/// Tells by the name.
+///
+/// macOS adds to each file of an archive a `._` file with its attributes.
 fn is_scene(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     let is_aside = name
@@ -139,8 +141,9 @@ fn is_scene(name: &str) -> bool {
     !is_aside && SCENES.iter().any(|ending| name.ends_with(ending))
 }
 
-/// The entry of a name, or the only scene, and the map within it. Without an entry of
-/// that very name, the last one that differs by case.
+/// The entry of a name, or the only scene, and the map within it.
+///
+/// Without an entry of that very name, the last one that differs by case.
 fn chosen<'e, 'r, 'w>(
     entries: &'e [(String, ZipFileHeaderRecord<'r>)],
     file: &str,
