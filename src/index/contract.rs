@@ -159,7 +159,8 @@ pub struct NoParams {}
 pub trait RegionIndex: Sized + Send + Sync {
     /// Name and declaration; the conformance suite checks it as far as possible.
     const INFO: Info;
-    /// Build parameters, `name:key=value` on the command line.
+    /// Build parameters, `name:key=value` on the command line; keys that are not given have the
+    /// values of `Default`. A field `threads` is the number of threads that share one query.
     type Params: Default + Serialize + DeserializeOwned;
 
     /// Builds the structure. Deterministic: the same items and parameters give
@@ -209,10 +210,12 @@ pub trait RegionIndex: Sized + Send + Sync {
 
     /// Takes over the new bounds of `moved` items without a new build.
     ///
-    /// `items` holds the bounds of all items, the new ones included; they are
-    /// finite. `moved` may be empty, as before the first frame of a motion. Returns false,
-    /// with the structure unchanged, if a rebuild is needed: where an item becomes or
-    /// ceases to be empty, and always from a structure that does not declare
+    /// `items` holds the bounds of all items, the new ones included: finite, and as many as
+    /// were built. Ids are below their number; others may panic, and
+    /// [`StructureSpec::update`](super::StructureSpec::update) refuses them. `moved` may be
+    /// empty, as before the first frame of a motion. Returns false, with the structure
+    /// unchanged, if a rebuild is needed: where an item becomes or ceases to be empty, and
+    /// always from a structure that does not declare
     /// [`Capabilities::refits`](super::Capabilities).
     fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
         false

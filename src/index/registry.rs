@@ -43,21 +43,35 @@ impl Row {
     /// The row of a structure, from its declaration.
     pub const fn of<T: RegionIndex + 'static>() -> Row {
         fn typed<T: RegionIndex>(params: &Value) -> Result<T::Params, BuildError> {
-            // Nothing given is no object for parameters that are `()`.
-            let nothing = params.as_object().is_some_and(Map::is_empty);
-            if nothing && let Ok(none) = serde_json::from_value(Value::Null) {
-                return Ok(none);
-            }
-            serde_path_to_error::deserialize(params).map_err(|error| {
+            let structure = T::INFO.name;
+            let defaults = serde_json::to_value(T::Params::default()).unwrap_or_default();
+            let filled = match (defaults, params) {
+                // Not the nulls: JSON has no other form of NaN and infinity.
+                (Value::Object(mut all), Value::Object(given)) => {
+                    all.retain(|_, value| !value.is_null());
+                    all.extend(given.clone());
+                    Value::Object(all)
+                }
+                // Parameters without names, such as `()` or a number.
+                (unnamed, Value::Object(given)) => match given.keys().next() {
+                    None => unnamed,
+                    Some(key) => {
+                        let reason = format!("a field '{key}'; expected none");
+                        return Err(BuildError::Params { structure, reason });
+                    }
+                },
+                _ => params.clone(),
+            };
+            serde_path_to_error::deserialize(&filled).map_err(|error| {
                 // serde's message about a value lacks its name.
                 let key = error.path().to_string();
                 let (found, expected) = told(error.inner());
-                let found = match params.get(&key) {
+                let found = match filled.get(&key) {
                     Some(value) if !found.starts_with("a field") => format!("{key}={value}"),
                     _ => found,
                 };
                 BuildError::Params {
-                    structure: T::INFO.name,
+                    structure,
                     reason: match expected {
                         Some(expected) => format!("{found}; expected {expected}"),
                         None => found,
@@ -208,17 +222,22 @@ impl Registry {
             })
             .collect();
         let params = (row.params)(&Value::Object(given)).map_err(SpecError::new)?;
-        // The build checks ranges: a build over no items.
-        let (execution, no_planes) = (Execution::default(), PlaneTree::default());
-        let nothing = Input::new(&[]).own_tree(Some(&no_planes));
-        (row.build)(execution, &nothing, &params).map_err(SpecError::new)?;
-        Ok(StructureSpec {
+        let has_given = spec.given().next().is_some();
+        let spec = StructureSpec {
             label: text.to_owned(),
             row,
             params,
-            execution,
+            execution: Execution::default(),
             policy: UpdatePolicy::default(),
-        })
+        };
+        // The build checks ranges: a build over no items, which a structure may fail in any
+        // other way and still be sound.
+        let no_planes = PlaneTree::default();
+        let nothing = Input::new(&[]).own_tree(Some(&no_planes));
+        match has_given.then(|| spec.build(nothing)) {
+            Some(Err(error @ BuildError::Params { .. })) => Err(SpecError::new(error)),
+            _ => Ok(spec),
+        }
     }
 
     /// The structures with certain declarations, with their default parameters.
@@ -290,7 +309,8 @@ impl StructureSpec {
         StructureSpec { execution, ..self }
     }
 
-    /// Threads that share one query: the parameter `threads`, 1 without it.
+    /// Threads that share one query: the parameter `threads` (the name is reserved for it, see
+    /// [`RegionIndex::Params`]), 1 without it.
     pub fn query_threads(&self) -> usize {
         self.params["threads"].as_u64().unwrap_or(1) as usize
     }
@@ -333,7 +353,9 @@ impl StructureSpec {
     /// by a new build. True for a refit.
     ///
     /// # Errors
-    /// A moved item with a NaN or infinite bound; the index is unchanged.
+    /// A moved item with a NaN or infinite bound, or one that is not among `items`: the index
+    /// is unchanged. The errors of [`StructureSpec::build`], and a refit that panics: the index
+    /// answers nothing reliable until it is built again.
     pub fn update(
         &self,
         index: &mut Box<dyn DynIndex>,
@@ -341,14 +363,19 @@ impl StructureSpec {
         moved: &[ItemId],
     ) -> Result<bool, BuildError> {
         let items = input.items;
-        if let Some(&id) = moved.iter().find(|&&id| !items[id as usize].is_finite()) {
-            let item = id as usize;
-            return Err(BuildError::NonFiniteItem {
-                item,
-                bounds: items[item],
-            });
+        for item in moved.iter().map(|&id| id as usize) {
+            match items.get(item) {
+                Some(b) if b.is_finite() => {}
+                Some(&bounds) => return Err(BuildError::NonFiniteItem { item, bounds }),
+                None => {
+                    let reason = format!("moved item {item} of {}; expected less", items.len());
+                    let structure = self.info().name;
+                    return Err(BuildError::Refused { structure, reason });
+                }
+            }
         }
-        if index.refit(items, moved) {
+        let refitted = caught(|| index.refit(items, moved));
+        if refitted.map_err(|message| BuildError::Panicked { message })? {
             return Ok(true);
         }
         *index = self.build(input)?;
@@ -357,105 +384,4 @@ impl StructureSpec {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Aabb;
-    use glam::Vec3;
-
-    #[test]
-    fn structures_are_found_with_their_parameters() {
-        let registry = Registry::builtin();
-        let all = registry.structures("all").unwrap();
-        assert_eq!(all.len(), registry.rows().len());
-        let named = registry.structures("default,octree-textbook").unwrap();
-        assert_eq!(named.iter().filter(|s| s.info().on_request).count(), 1);
-        assert_eq!(named.len(), all.len() - 4);
-        let two = registry
-            .structures("bvh:leaf=4,preset=medium,linear")
-            .unwrap();
-        assert_eq!(two[0].params["leaf"], 4);
-        assert_eq!(two[0].params["preset"], "medium");
-        assert_eq!(two[1].label, "linear");
-    }
-
-    #[test]
-    fn mistakes_are_named() {
-        for (text, wanted) in [
-            ("bhv", "did you mean 'bvh'"),
-            ("bvh:leav=4", "a field 'leav'; expected 'preset' or 'leaf'"),
-            (
-                "bvh:leaf=many",
-                "leaf=\"many\"; expected a whole number from 0 to 4294967295",
-            ),
-            ("bvh:leaf=0", "leaf=0; expected 1 to 255"),
-            ("bvh:preset=best", "preset=\"best\"; expected one of 'fast"),
-            ("bvh,bvh", "named twice"),
-            ("", "no structure"),
-            ("linear-scalar:leaf=3", "a field 'leaf'; expected none"),
-        ] {
-            let error = Registry::builtin()
-                .structures(text)
-                .err()
-                .map(|e| e.to_string())
-                .unwrap_or_default();
-            assert!(error.contains(wanted), "{text}: {error}");
-        }
-    }
-
-    #[test]
-    fn items_that_cannot_be_indexed_are_named() {
-        let sound = Aabb::around(Vec3::ZERO, Vec3::ONE);
-        let nan = Aabb::new(Vec3::splat(f32::NAN), Vec3::ONE);
-        for spec in Registry::builtin().structures("all").unwrap() {
-            let error = spec.build(&[sound, nan]).err();
-            assert!(matches!(
-                error,
-                Some(BuildError::NonFiniteItem { item: 1, .. })
-            ));
-        }
-    }
-
-    #[test]
-    fn a_registry_has_what_was_added_and_nothing_else() {
-        let registry = Registry::empty().with::<Wide>();
-        assert_eq!(registry.structures("all").unwrap().len(), 1);
-        let error = registry.structure("bvh").unwrap_err().to_string();
-        assert!(error.contains("(known: wide)"), "{error}");
-    }
-
-    #[test]
-    #[should_panic(expected = "structure 'wide' is in the registry already")]
-    fn a_name_comes_once() {
-        let _ = Registry::builtin().with::<Wide>();
-    }
-
-    #[test]
-    fn names_that_cannot_be_typed_are_refused() {
-        for name in ["", "all", "default", "a:b", "a,b", "a b", "a=b", "-a"] {
-            let row = Row {
-                info: Wide::INFO.named(name),
-                ..Row::of::<Wide>()
-            };
-            let refused = caught(|| Registry::empty().with_row(row)).unwrap_err();
-            assert!(refused.contains("cannot be typed"), "{name}: {refused}");
-        }
-    }
-
-    /// The hint names exactly what the feature brings.
-    #[test]
-    fn the_names_of_the_peers_are_those_of_their_rows() {
-        let own = 14;
-        let peers: Vec<_> = Registry::builtin().rows()[own..]
-            .iter()
-            .map(|row| row.info.name)
-            .collect();
-        assert_eq!(
-            peers,
-            if cfg!(feature = "peers") {
-                &PEERS[..]
-            } else {
-                &[]
-            }
-        );
-    }
-}
+mod tests;
