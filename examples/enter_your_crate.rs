@@ -52,6 +52,8 @@ impl RegionIndex for Tiles {
         }
     }
     /// One query for every question: a frustum of any kind, a point, a box.
+    /// Inlined, so that each instruction set gets its own.
+    #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, q: &Q, cx: &mut C) -> ControlFlow<()> {
         let tiles = self.ids.chunks(TILE).zip(self.boxes.chunks(TILE));
         for ((ids, boxes), bounds) in tiles.zip(&self.bounds) {

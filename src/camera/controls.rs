@@ -5,8 +5,8 @@
 
 use glam::{DQuat, DVec3};
 
-use super::frame::unit;
-use super::{Camera, CameraError, Frame, Lens, LensKind, require};
+use super::frame::{check_finite, unit};
+use super::{Camera, CameraError, Frame, Lens, LensKind, finite, require};
 
 /// Rotations between two corrections: a rotation drifts by about 2e-16, so
 /// the frame stays orthonormal to 1e-13 at no visible cost.
@@ -58,7 +58,7 @@ impl Frame {
     /// and bearing to the centre stay.
     ///
     /// # Errors
-    /// An axis of length zero or with a value that is not finite.
+    /// An axis of length zero, or a value that is not finite; the frame is unchanged.
     pub fn orbit(
         &mut self,
         centre: DVec3,
@@ -71,6 +71,9 @@ impl Frame {
             || "the axis of the orbit is zero or not finite".to_owned(),
             "a direction",
         )?;
+        check_finite("centre", centre)?;
+        finite("the angle around", around)?;
+        finite("the angle over", over)?;
         self.swing(centre, unit(axis), around);
         // Read only now: the first swing has turned u.
         self.swing(centre, self.u, over);
@@ -127,7 +130,7 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::look_at;
+    use crate::camera::{PlaneOptions, Surroundings, look_at};
     use proptest::prelude::*;
 
     fn level() -> Frame {
@@ -185,6 +188,22 @@ mod tests {
             DVec3::new(swung.cos(), swung.sin(), 0.0) * 10.0
         ));
         assert!(frame.orbit(centre, DVec3::ZERO, 1.0, 0.0).is_err());
+        let before = frame;
+        for bad in [f64::NAN, f64::INFINITY] {
+            assert!(frame.orbit(DVec3::splat(bad), DVec3::Z, 1.0, 0.0).is_err());
+            assert!(frame.orbit(centre, DVec3::Z, bad, 0.0).is_err());
+            assert!(frame.orbit(centre, DVec3::Z, 1.0, bad).is_err());
+            assert_eq!(frame, before);
+            let mut turned = frame;
+            turned.yaw(bad);
+            let lens = Lens::perspective(90.0, 1.0, 1.0, None).unwrap();
+            let camera = Camera {
+                frame: turned,
+                lens,
+            };
+            let volume = camera.volume(&PlaneOptions::default(), &Surroundings::default());
+            assert!(volume.is_err(), "a turn by {bad}");
+        }
     }
 
     #[test]

@@ -100,7 +100,7 @@ pub(super) fn unit(v: DVec3) -> DVec3 {
     scaled / scaled.length()
 }
 
-fn check_finite(name: &str, v: DVec3) -> Result<(), CameraError> {
+pub(super) fn check_finite(name: &str, v: DVec3) -> Result<(), CameraError> {
     for (axis, value) in ["x", "y", "z"].into_iter().zip(v.to_array()) {
         let found = || format!("{name} {axis} is {value}");
         require(value.is_finite(), found, "a finite number")?;
@@ -112,7 +112,8 @@ fn check_finite(name: &str, v: DVec3) -> Result<(), CameraError> {
 /// camera looks along -n). Right-handed: `u x v = n`.
 ///
 /// From "3D Viewing and Camera Control" (E. Agu, CS 543), with the lecture's
-/// names.
+/// names. Turned or moved by a number that is not finite, the frame has no view:
+/// [`Camera::volume`] refuses it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Frame {
     /// Position of the camera in world coordinates.

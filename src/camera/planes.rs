@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::margin::{LARGEST_SUM, Margin, TINY, check_sums, largest_sum};
 use super::projection::{double, single};
-use super::{Camera, CameraError, ClipSpace, Frame, Lens, LensKind};
+use super::{Camera, CameraError, ClipSpace, Frame, Lens, LensKind, require};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume, VolumeError,
 };
@@ -91,7 +91,8 @@ impl Camera {
     /// # Errors
     /// [`CameraError::Volume`] if a plane does not fit f32 (or the chosen
     /// method loses it); [`CameraError::Sums`] if a sum of the plane test could
-    /// overflow within the surroundings' reach.
+    /// overflow within the surroundings' reach; [`CameraError::Invalid`] for an epsilon or a
+    /// reach that is negative or not finite.
     pub fn volume(
         &self,
         options: &PlaneOptions,
@@ -116,7 +117,7 @@ impl Camera {
         let of_scene = around.reach.as_dvec3();
         let zero = [around.origin];
         let named = self.derive(&zero, options.method)?;
-        let margin = self.margin(&zero, of_scene, options);
+        let margin = self.margin(&zero, of_scene, options)?;
         let moved = |name, plane: &Plane| margin.moved(name, plane, 0.0);
         let volume = gathered(&named, more, options.epsilon, of_scene, moved)?;
         check_sums(&volume, of_scene)?;
@@ -177,7 +178,7 @@ impl Camera {
             epsilon,
             ..PlaneOptions::default()
         };
-        let margin = self.margin(&about, of_scene, &options);
+        let margin = self.margin(&about, of_scene, &options)?;
         let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
         let slack = of_eye + margin.reach.element_sum() * TINY;
         let moved = |name, plane: &Plane| margin.moved(name, plane, slack);
@@ -203,10 +204,20 @@ impl Camera {
         }
     }
 
-    fn margin(&self, zero: &[DVec3], of_scene: DVec3, options: &PlaneOptions) -> Margin {
+    fn margin(
+        &self,
+        zero: &[DVec3],
+        of_scene: DVec3,
+        options: &PlaneOptions,
+    ) -> Result<Margin, CameraError> {
         let frame = self.frame_about(zero);
         let c = options.epsilon;
-        match self.lens.kind() {
+        for (name, value) in [("epsilon", c), ("reach", of_scene.min_element())] {
+            let is_sound = value >= 0.0 && value.is_finite() && of_scene.is_finite();
+            let found = || format!("the {name} is {value}");
+            require(is_sound, found, "a finite number of at least 0")?;
+        }
+        Ok(match self.lens.kind() {
             LensKind::Matrix(matrix) => {
                 Margin::of_matrix(matrix.corners_about(zero), frame.eye, of_scene, c)
             }
@@ -214,7 +225,7 @@ impl Camera {
                 let of_frame = options.method == PlaneMethod::Frame;
                 Margin::new(&frame, &self.lens, of_scene, c, of_frame)
             }
-        }
+        })
     }
 
     fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes, CameraError> {

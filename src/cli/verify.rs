@@ -17,7 +17,7 @@ use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
 use crate::measure::{Status, Subject, Verdict, Workload, count_pass, guarded, judge};
 use crate::path::{self, CameraPath};
-use crate::query::Located;
+use crate::query::{ItemId, Located};
 use crate::scene::{FAMILIES, ItemKind, Regions, SAMPLES, Scene, every_part};
 use crate::verify::{
     ErrorCount, Fault, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment,
@@ -406,10 +406,19 @@ fn differ(
         .map_err(|fault| verdict("region search: ", &fault, &holds))?;
     let nowhere = Vec3::new(case.point.x, f32::NAN, case.point.z);
     let mut many = Located::default();
-    index.query_many(&[case.point, nowhere, case.point], &mut many);
-    if !many.iter().eq([out, &[], out]) {
+    let points = [case.point, nowhere, case.point];
+    index.query_many(&points, &mut many);
+    let (answers, rights): (Vec<_>, _) = (many.iter().collect(), [out, &[], out]);
+    if answers != rights {
+        let differs = |n: &usize| answers.get(*n) != Some(&rights[*n]);
+        let n = (0..rights.len()).find(differs).unwrap_or_default();
+        let (found, right) = (answers.get(n).copied().unwrap_or_default(), rights[n]);
+        let one_sided = |id: &&ItemId| !found.contains(id) || !right.contains(id);
+        let first = right.iter().chain(found).find(one_sided);
+        let first = first.map_or(String::new(), |id| format!("; first: item {id}"));
+        let (count, of, alone, point) = (answers.len(), found.len(), right.len(), points[n]);
         let why = format!(
-            "region search: a batch of points has other answers than single points: {many:?}"
+            "region search: {count} of 3 points answered in a batch; point {point} by {of} items,              alone by {alone}{first}"
         );
         return Err(Verdict::new(Status::Wrong, why));
     }

@@ -8,7 +8,8 @@ use crate::arithmetic::rounding::{difference_down, difference_up, sum_down, sum_
 /// A closed axis-aligned box `[min, max]` in scene-local f32 coordinates.
 ///
 /// Zero thickness is allowed. A box with `min > max` on any axis is the empty
-/// set: nothing sees it, and no union grows by it.
+/// set: nothing sees it, and it meets nothing. [`Aabb::union_of`] leaves it out;
+/// [`Aabb::union`] does so only with [`Aabb::EMPTY`].
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Aabb {
@@ -19,7 +20,8 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The empty box: the neutral element of [`Aabb::union`].
+    /// The empty box: the neutral element of [`Aabb::union`]. Its centre is NaN, its extent
+    /// and area are infinite.
     pub const EMPTY: Aabb = Aabb {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
@@ -79,7 +81,8 @@ impl Aabb {
         self.min.is_finite() && self.max.is_finite()
     }
 
-    /// The smallest box that holds both. Exact: min and max never round.
+    /// The smallest box that holds both, neither of them empty ([`Aabb::EMPTY`] excepted).
+    /// Exact: min and max never round.
     pub fn union(&self, other: &Aabb) -> Aabb {
         Aabb::new(self.min.min(other.min), self.max.max(other.max))
     }
@@ -110,13 +113,16 @@ impl Aabb {
         other.min.cmpge(self.min).all() && other.max.cmple(self.max).all()
     }
 
-    /// Returns whether the two closed boxes share a point (touching counts).
+    /// Returns whether the two closed boxes share a point (touching counts; an empty box
+    /// has none).
     #[inline(always)]
     pub fn intersects(&self, other: &Aabb) -> bool {
-        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+        let overlap = self.min.cmple(other.max).all() && other.min.cmple(self.max).all();
+        overlap && !self.is_empty() && !other.is_empty()
     }
 
-    /// Mid point. Halves before adding, so that huge bounds do not overflow.
+    /// Mid point, NaN of [`Aabb::EMPTY`]. Halves before adding, so that huge bounds do not
+    /// overflow.
     #[inline(always)]
     pub fn centre(&self) -> Vec3 {
         self.min * 0.5 + self.max * 0.5
@@ -140,7 +146,7 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// Half the surface.
+    /// Half the surface; of an empty box without meaning.
     pub fn half_area(&self) -> f32 {
         let e = self.extent();
         e.x * e.y + e.y * e.z + e.z * e.x
@@ -186,6 +192,8 @@ mod tests {
         assert!(unit.intersects(&next) && unit.contains_point(Vec3::ONE));
         let inverted = Aabb::new(Vec3::ONE, Vec3::ZERO);
         assert!(inverted.is_empty() && !unit.is_empty());
+        let within = Aabb::new(Vec3::splat(0.75), Vec3::splat(0.25));
+        assert!(!within.intersects(&unit) && !unit.intersects(&within));
         assert_eq!(Aabb::union_of(&[unit, inverted]), unit);
         let nothing = Aabb::union_of(&[inverted]);
         assert!(nothing.is_empty() && Aabb::union_of(&[]).is_empty());

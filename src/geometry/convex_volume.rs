@@ -117,14 +117,17 @@ impl ConvexVolume {
     /// A box as six planes: the items that no plane excludes are exactly those that
     /// overlap it (closed bounds), because a plane along an axis evaluates to a
     /// difference of two numbers, whose sign no rounding changes. Infinite bounds
-    /// count as the largest number.
+    /// count as the largest number. An empty box is a plane that nothing is inside of.
     pub fn of_box(b: &Aabb) -> Self {
         let planes = (0..3).flat_map(|axis| {
             let normal = Vec3::AXES[axis];
             let (low, high) = (held(b.min[axis]), held(b.max[axis]));
             [Plane::new(normal, -low), Plane::new(-normal, high)]
         });
-        let planes: Vec<Plane> = planes.collect();
+        let planes: Vec<Plane> = match b.is_empty() {
+            true => vec![Plane::new(Vec3::ZERO, -1.0)],
+            false => planes.collect(),
+        };
         match Self::from_planes(&planes) {
             Ok(volume) => volume,
             Err(error) => unreachable!("six finite planes: {error}"),
@@ -223,6 +226,13 @@ impl ConvexVolume {
     /// `CullPointAgainstFrustum`, with inward normals). O(planes).
     pub fn contains_point(&self, p: Vec3) -> bool {
         self.planes().iter().all(|plane| plane.contains_point(p))
+    }
+}
+
+/// The same planes under the same names; all else follows from them.
+impl PartialEq for ConvexVolume {
+    fn eq(&self, other: &ConvexVolume) -> bool {
+        self.planes() == other.planes() && self.names == other.names
     }
 }
 

@@ -4,6 +4,7 @@
 //! compiled for that structure, volume, recorder and instruction set.
 
 use std::fmt;
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::str::FromStr;
 
@@ -134,7 +135,17 @@ pub trait DynIndex: Send + Sync {
     }
 }
 
+impl fmt::Debug for dyn DynIndex {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let memory = &self.memory();
+        f.debug_struct("DynIndex")
+            .field("memory", memory)
+            .finish_non_exhaustive()
+    }
+}
+
 /// A structure with the kernel of its queries.
+#[derive(Clone, Debug)]
 pub struct WithKernel<T> {
     /// The structure.
     pub index: T,
@@ -164,24 +175,9 @@ impl<T: RegionIndex> DynIndex for WithKernel<T> {
     }
 
     fn query_many(&self, points: &[Vec3], out: &mut Located) {
-        struct QueryMany<'a, T> {
-            index: &'a T,
-            points: &'a [Vec3],
-            out: &'a mut Located,
-        }
-
-        impl<T: RegionIndex> Work for QueryMany<'_, T> {
-            type Output = ();
-
-            #[inline(always)]
-            fn run<I: Isa>(self, isa: I) {
-                let _ = self.index.query_many(isa, self.points, self.out);
-            }
-        }
-
         out.clear();
         let index = &self.index;
-        self.kernel.run(QueryMany { index, points, out });
+        let _ = self.kernel.run(QueryMany { index, points, out });
     }
 
     fn cells(&self) -> Vec<TreeCell<'_>> {
@@ -194,6 +190,22 @@ impl<T: RegionIndex> DynIndex for WithKernel<T> {
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         self.index.refit(items, moved)
+    }
+}
+
+/// Region search for many points, for a [`Kernel`] to run.
+pub(crate) struct QueryMany<'a, T> {
+    pub index: &'a T,
+    pub points: &'a [Vec3],
+    pub out: &'a mut Located,
+}
+
+impl<T: RegionIndex> Work for QueryMany<'_, T> {
+    type Output = ControlFlow<()>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> ControlFlow<()> {
+        self.index.query_many(isa, self.points, self.out)
     }
 }
 

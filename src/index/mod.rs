@@ -21,6 +21,19 @@
 //! in a crate of your own call [`Registry::with`]; list, run, query, verify, benches and
 //! conformance tests read the registry.
 
+/// `Debug` of structures, with their generics and bounds.
+macro_rules! debug_by_memory {
+    ($([$($generics:tt)*] $structure:ty),*) => {$(
+        impl<$($generics)*> std::fmt::Debug for $structure {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                contract::debug(self, f)
+            }
+        }
+    )*};
+}
+debug_by_memory!([] LinearScalar, [] Linear, [] UniformGrid, [] Wide, [] Moving, [] Auto,
+    [B: TreeBuilder] Tree<B>, [D: textbook::Division] textbook::Textbook<D>);
+
 mod box_test;
 mod build;
 mod cells;
@@ -51,6 +64,7 @@ pub use cells::TreeCell;
 pub(crate) use cells::verdicts;
 pub(crate) use contract::check_range;
 pub use contract::{BuildError, FrustumQuery, Input, MemoryUsage, NoParams, Query, RegionIndex};
+pub(crate) use erased::QueryMany;
 pub use erased::{DynIndex, Execution, UpdatePolicy, WithKernel, caught};
 pub use grid::UniformGrid;
 pub use info::{Capabilities, Info, Kind, Origin};

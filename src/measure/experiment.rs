@@ -67,7 +67,7 @@ pub struct PlannedScene {
 }
 
 /// Plan of a run: data, complete before anything runs.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Plan {
     /// Scenes, measured one after the other.
     pub scenes: Vec<PlannedScene>,
@@ -173,6 +173,9 @@ impl Plan {
     /// Shard `i` of `n` (from 1), a smaller plan: every n-th pair of scene and path.
     ///
     /// Structures, cache states and tests of a pair stay together.
+    ///
+    /// # Panics
+    /// Zero shards.
     pub fn shard(mut self, i: usize, n: usize) -> Plan {
         let mut pair = 0;
         for scene in &mut self.scenes {
@@ -240,6 +243,14 @@ pub enum ExperimentError {
     /// A camera of the path cannot be culled with.
     #[error(transparent)]
     Workload(#[from] WorkloadError),
+    /// A plan that measures nothing, or not what it says.
+    #[error("{found}; expected {expected}")]
+    Plan {
+        /// Setting and value.
+        found: String,
+        /// Values that it can have.
+        expected: &'static str,
+    },
     /// The name of a structure or a parameter of it is wrong.
     #[error(transparent)]
     Spec(#[from] crate::spec::SpecError),

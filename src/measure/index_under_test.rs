@@ -13,6 +13,7 @@ use crate::scene::Scene;
 
 /// A structure with its two indexes: over the items (what does the camera
 /// see) and over the regions (where is the camera).
+#[derive(Debug)]
 pub struct Subject {
     /// Structure, parameters, kernel and threads.
     pub spec: StructureSpec,
@@ -23,6 +24,7 @@ pub struct Subject {
 }
 
 /// The indexes of a structure over one scene.
+#[derive(Debug)]
 pub struct Built {
     /// Over the items, as the culling test has them.
     pub items: Box<dyn DynIndex>,

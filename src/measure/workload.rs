@@ -22,6 +22,7 @@ pub fn input_of<'a>(scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
 }
 
 /// A scene with the queries along one path.
+#[derive(Debug)]
 pub struct Workload<'a> {
     /// Items, regions and origin.
     pub scene: &'a Scene,

@@ -21,6 +21,7 @@ pub const REMOVED: Aabb = Aabb::new(Vec3::ONE, Vec3::NEG_ONE);
 pub(super) type Law = fn(&World, ItemId, u32) -> Option<Aabb>;
 
 /// The facts of a scene that laws read. Coordinates are the scene's own.
+#[derive(Debug)]
 pub(super) struct World {
     start: Vec<Aabb>,
     low: DVec3,

@@ -60,6 +60,7 @@ pub const MOTION_PARAMS: &str = "frames=100, share (of the items that move in a 
 const MOST_FRAMES: u64 = 100_000;
 
 /// Frames of new bounds for the items of one scene.
+#[derive(Debug)]
 pub struct Motion {
     /// The file or the spec, such as `drift:share=0.01`.
     pub name: String,
@@ -68,6 +69,7 @@ pub struct Motion {
     source: Source,
 }
 
+#[derive(Debug)]
 enum Source {
     Generated {
         law: Law,

@@ -147,12 +147,14 @@ impl Number {
 }
 
 /// A certificate in f64, each coefficient rounded once.
+#[derive(Clone, Debug)]
 pub(super) struct Filter {
     pub normal: [f64; 3],
     d: f64,
 }
 
 /// A certificate in full.
+#[derive(Clone, Debug)]
 pub(super) struct Exact {
     /// Axis and term of its coefficient, smallest first.
     terms: Vec<(usize, f64)>,

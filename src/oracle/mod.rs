@@ -61,6 +61,7 @@ pub struct Judgement {
 /// assert_eq!(oracle.verdict(&behind), Verdict::Out);
 /// # Ok::<(), cullbench::geometry::VolumeError>(())
 /// ```
+#[derive(Clone, Debug)]
 pub struct Oracle {
     extent: Extent,
     faces: usize,

@@ -34,6 +34,10 @@ pub(super) fn for_visible_share(
     cameras: &[Camera],
     share: f64,
 ) -> Result<f64, InputError> {
+    if !(0.0..=1.0).contains(&share) {
+        let reason = format!("visible={share}; expected a share from 0 to 1");
+        return Err(unfit(path, reason));
+    }
     let needed = (LEAST_SEEN / share).ceil() as usize;
     let items = every_nth(&scene.items, MOST_ITEMS.max(needed));
     let sample = every_nth(cameras, most_cameras(items.len()));

@@ -203,6 +203,7 @@ const FEW: usize = 48;
 
 /// Positions of the answers in the structure's own order; adjoining ranges are one.
 /// Only for structures that pass positions.
+#[derive(Debug)]
 pub struct Ranges<'a> {
     out: &'a mut Vec<Range<u32>>,
     /// Number of ranges in the list before the query.

@@ -319,12 +319,14 @@ impl QueryVolume for Aabb {
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         match mask {
             0 => LaneMask::MAX,
+            _ if self.is_empty() => 0,
             _ => block.meeting(self),
         }
     }
 }
 
-/// Any volume for an erased structure. Dispatched once per query, never per node.
+/// Any volume for an erased structure. Dispatched once per query, never per node. A box is
+/// asked for as [`ConvexVolume::of_box`].
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum AnyVolume<'a> {
@@ -461,6 +463,7 @@ mod tests {
             check(&RelativeVolume::new(eye, volume.clone()).unwrap(), &items)?;
             check(&eye, &items)?;
             check(&items[0], &items)?;
+            check(&Aabb::new(items[0].max, items[0].min), &items)?;
             let spheres = Spheres::new(&volume);
             // Whatever the boxes are, and as they are meant.
             check(&spheres, &items)?;

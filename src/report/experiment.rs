@@ -1,6 +1,6 @@
 //! An experiment in the process of its caller: from names to a report.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::SystemTime;
 
 use super::Report;
@@ -24,6 +24,7 @@ use crate::measure::{
 /// assert!(report.cells[1].value("query_ns") > Some(0.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[derive(Clone, Debug)]
 pub struct Experiment {
     /// The plan, for settings that have no method here.
     pub plan: Plan,
@@ -81,8 +82,10 @@ impl Experiment {
     /// Loads, builds, checks every answer, and times.
     ///
     /// # Errors
-    /// The errors of [`measure_scene`].
+    /// The errors of [`measure_scene`]; a plan that measures nothing, or that one process
+    /// cannot measure.
     pub fn run(&self) -> Result<Report, ExperimentError> {
+        self.check()?;
         let started_at = utc(SystemTime::now());
         let (machine, id) = (Machine::capture(), started_at.clone());
         let mut header = Header::of(&self.plan, machine, id, started_at);
@@ -102,5 +105,98 @@ impl Experiment {
         }
         stream.finished_at = Some(utc(SystemTime::now()));
         Ok(stream.report())
+    }
+
+    /// Checks that the plan has something of everything, and numbers that can be followed.
+    fn check(&self) -> Result<(), ExperimentError> {
+        let plan = &self.plan;
+        let (scenes, effort) = (&plan.scenes, &plan.effort);
+        let ([least, most], task, pass) = (effort.rounds, effort.task_ns, effort.pass_ns);
+        let labels: BTreeSet<&str> = plan.structures.iter().map(|s| &*s.label).collect();
+        let rule = |holds: bool, found: &str, expected| match holds {
+            true => Ok(()),
+            false => Err(ExperimentError::Plan {
+                found: found.to_owned(),
+                expected,
+            }),
+        };
+        let (has_paths, has_caches) = (
+            scenes.iter().all(|scene| !scene.paths.is_empty()),
+            scenes.iter().all(|scene| !scene.caches.is_empty()),
+        );
+        let is_once = labels.len() == plan.structures.len();
+        let are_times = [task, pass]
+            .iter()
+            .all(|ns| (0.0..f64::INFINITY).contains(ns));
+        let rounds = format!("rounds of {least} to {most}");
+        let times = format!("task_ns {task} and pass_ns {pass}");
+        let one = "at least one";
+        rule(!scenes.is_empty(), "no scene", one)?;
+        rule(has_paths, "a scene without a camera path", one)?;
+        rule(has_caches, "a scene without a cache state", one)?;
+        rule(!labels.is_empty(), "no structure", one)?;
+        rule(is_once, "a structure named twice", "each once")?;
+        rule(!plan.cullings.is_empty(), "no culling test", one)?;
+        rule(plan.views_per_frame > 0, "no view in a frame", one)?;
+        rule(effort.processes == 1, "several processes", "1")?;
+        rule((1..=most).contains(&least), &rounds, "1 or more, ascending")?;
+        rule(are_times, &times, "finite times of at least 0")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::culling::Culling;
+
+    #[test]
+    fn a_plan_that_measures_nothing_or_not_what_it_says_is_an_error() {
+        let sound = || {
+            let spec = |name| StructureSpec::parse(name).unwrap();
+            Experiment::new("city:n=50")
+                .path("orbit:frames=1")
+                .structures(vec![spec("linear"), spec("bvh")])
+        };
+        assert_eq!(sound().check().map_err(|e| e.to_string()), Ok(()));
+        type Break = fn(&mut Plan);
+        let breaks: [(Break, &str); 13] = [
+            (|p| p.scenes.clear(), "no scene; expected at least one"),
+            (
+                |p| p.scenes[0].paths.clear(),
+                "a scene without a camera path;",
+            ),
+            (
+                |p| p.scenes[0].caches.clear(),
+                "a scene without a cache state;",
+            ),
+            (|p| p.structures.clear(), "no structure;"),
+            (
+                |p| p.structures[1] = p.structures[0].clone(),
+                "a structure named twice;",
+            ),
+            (
+                |p: &mut Plan| p.cullings = Vec::<Culling>::new(),
+                "no culling test;",
+            ),
+            (|p| p.effort.processes = 10, "several processes;"),
+            (|p| p.effort.rounds = [0, 0], "rounds of 0 to 0;"),
+            (|p| p.effort.rounds = [5, 2], "rounds of 5 to 2;"),
+            (|p| p.effort.task_ns = f64::NAN, "task_ns NaN"),
+            (
+                |p| p.effort.pass_ns = f64::INFINITY,
+                "task_ns 100000000 and pass_ns inf;",
+            ),
+            (|p| p.effort.pass_ns = -1.0, "and pass_ns -1;"),
+            (|p| p.views_per_frame = 0, "no view in a frame;"),
+        ];
+        for (make, wanted) in breaks {
+            let mut experiment = sound();
+            make(&mut experiment.plan);
+            let error = experiment.run().map(|_| ()).unwrap_err().to_string();
+            assert!(
+                error.starts_with(wanted) && error.contains("; expected "),
+                "{error}"
+            );
+        }
     }
 }

@@ -64,6 +64,7 @@ const ITEMS_PER_BLOCK: f64 = 40.0;
 const BUILDINGS: f64 = 0.25;
 
 /// The blocks of a city along one axis, and the streets between them.
+#[derive(Debug)]
 pub struct CityGrid {
     /// Width of a block.
     pub block: f64,

@@ -7,6 +7,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 /// Seeded randomness with the few distributions that the families need.
+#[derive(Clone, Debug)]
 pub struct SeededRng(Pcg64);
 
 impl SeededRng {

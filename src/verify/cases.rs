@@ -25,6 +25,7 @@ pub const VOLUME_KINDS: [&str; 9] = [
 ];
 
 /// One scene with one volume and one point.
+#[derive(Clone, Debug)]
 pub struct RandomCase {
     /// Boxes, some of them inverted.
     pub items: Vec<Aabb>,

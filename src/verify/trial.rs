@@ -21,6 +21,7 @@ pub enum Fault {
 /// One question at a time; the memory serves all of them. The reference is each box
 /// against each plane with [`AnyVolume::sees`]: no structure, no mask, no early way
 /// out.
+#[derive(Clone, Debug)]
 pub struct Trial {
     /// Per item: the number of the question that marked it last, twice: +0 if
     /// the reference wants it, +1 once a structure has returned it.
@@ -49,6 +50,9 @@ impl Trial {
     }
 
     /// A question whose right answer is known.
+    ///
+    /// # Panics
+    /// An id that is not below the number of items.
     pub fn expect(&mut self, right: impl IntoIterator<Item = ItemId>) {
         self.stamp += 2;
         self.expected = 0;

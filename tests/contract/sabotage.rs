@@ -2,6 +2,7 @@
 //! sound to begin with, and broken in one way at a time: each break must fail
 //! the properties named beside it, and each property must catch some break.
 
+use std::any::{type_name, type_name_of_val};
 use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::ops::{ControlFlow, Range};
@@ -9,10 +10,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use cullbench::geometry::{Aabb, PlaneMask};
 use cullbench::index::{
-    BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable,
+    BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell, indexable,
 };
-use cullbench::query::{Containment, Context, ItemId, NoRecorder, QueryVolume, Recorder, Sink};
+use cullbench::kernel::{BASELINE, Isa, Kernel};
+use cullbench::query::{
+    Containment, Context, ItemId, ManySink, NoRecorder, QueryContext, QueryVolume, Recorder, Sink,
+};
 use cullbench::verify::conformance::properties;
+use glam::Vec3;
 
 /// How the tree is broken.
 type Fault = u8;
@@ -38,6 +43,16 @@ const COUNTS_NO_ITEMS: Fault = 17;
 const EVERY_OTHER_BUILD_DIFFERS: Fault = 18;
 const COUNTED_QUERY_DIFFERS: Fault = 19;
 const ITEMS_ARE_TESTED_LIKE_NODES: Fault = 20;
+
+const WRONG_BY_THE_BEST_KERNEL: Fault = 27;
+const MANY_ARE_WRONG_BY_THE_BEST_KERNEL: Fault = 28;
+const MANY_ARE_STALE_AFTER_REFIT: Fault = 29;
+const SPHERES_ARE_STALE_AFTER_REFIT: Fault = 30;
+const F64_IS_STALE_AFTER_REFIT: Fault = 31;
+const FAR_ITEMS_ARE_NOT_REFITTED: Fault = 32;
+const MEMORY_PANICS: Fault = 33;
+const CHOICE_PANICS: Fault = 34;
+const CELLS_PANICS: Fault = 35;
 
 const CLAIMS_TO_REFIT: Fault = 21;
 const REFITS_UNDECLARED: Fault = 22;
@@ -80,6 +95,8 @@ struct Toy<const CLAIMS: Claims> {
     fault: Fault,
     ids: Vec<ItemId>,
     boxes: Vec<Aabb>,
+    /// The boxes as built.
+    first: Vec<Aabb>,
     root: Option<Node>,
 }
 
@@ -136,6 +153,11 @@ impl<S: Sink> Sink for Deaf<'_, S> {
         self.broke |= self.sink.accept(ids).is_break();
         ControlFlow::Continue(())
     }
+}
+
+/// Other instructions than the portable ones, where the machine has them.
+fn is_best<I: Isa>() -> bool {
+    type_name::<I>() != type_name_of_val(&BASELINE)
 }
 
 impl<const CLAIMS: Claims> Toy<CLAIMS> {
@@ -240,19 +262,65 @@ impl<const CLAIMS: Claims> RegionIndex for Toy<CLAIMS> {
         Ok(Toy {
             fault,
             ids,
+            first: boxes.clone(),
             boxes,
             root,
         })
     }
 
     fn memory(&self) -> MemoryUsage {
+        assert_ne!(self.fault, MEMORY_PANICS, "no figure");
         MemoryUsage::default()
+    }
+
+    fn chose(&self) -> Option<String> {
+        assert_ne!(self.fault, CHOICE_PANICS, "no choice");
+        None
+    }
+
+    fn cells(&self) -> Vec<TreeCell<'_>> {
+        assert_ne!(self.fault, CELLS_PANICS, "no cells");
+        Vec::new()
+    }
+
+    fn query_many<I: Isa, S: ManySink>(
+        &self,
+        isa: I,
+        points: &[Vec3],
+        sink: &mut S,
+    ) -> ControlFlow<()> {
+        let skips = self.fault == MANY_ARE_WRONG_BY_THE_BEST_KERNEL && is_best::<I>();
+        let is_stale = self.fault == MANY_ARE_STALE_AFTER_REFIT && self.boxes != self.first;
+        for (p, n) in points.iter().zip(0..) {
+            let mut ids = Vec::new();
+            let _ = self.query(p, &mut QueryContext::new(isa, &mut ids, &mut NoRecorder));
+            if skips {
+                ids.pop();
+            }
+            if is_stale {
+                let held = self.ids.iter().zip(&self.first);
+                let held = held.filter(|(_, b)| b.contains_point(*p));
+                ids = held.map(|(&id, _)| id).collect();
+            }
+            sink.accept(n, &ids)?;
+        }
+        ControlFlow::Continue(())
     }
 
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         let Some(root) = &self.root else {
             return ControlFlow::Continue(());
         };
+        let is_stale = match self.fault {
+            SPHERES_ARE_STALE_AFTER_REFIT => Q::SPHERES,
+            F64_IS_STALE_AFTER_REFIT => type_name::<Q>().ends_with("ConvexVolumeF64"),
+            _ => false,
+        };
+        if self.fault == WRONG_BY_THE_BEST_KERNEL && is_best::<C::Isa>()
+            || is_stale && self.boxes != self.first
+        {
+            return cx.accept(&self.ids);
+        }
         let (sink, recorder) = cx.parts();
         if self.fault == ONLY_SIX_PLANES && Q::planes_open(volume.mask()) > 6 {
             return sink.accept(&self.ids);
@@ -287,6 +355,10 @@ impl<const CLAIMS: Claims> RegionIndex for Toy<CLAIMS> {
             return false;
         }
         for (b, &id) in self.boxes.iter_mut().zip(&self.ids) {
+            let is_far = items[id as usize].min.x > 1e5;
+            if is_far && self.fault == FAR_ITEMS_ARE_NOT_REFITTED {
+                continue;
+            }
             if !items[id as usize].is_empty() {
                 *b = items[id as usize];
             }
@@ -358,10 +430,23 @@ fn every_fault_is_caught_and_every_property_catches_one() {
         SLICES_FOR_RANGES: "declared_capabilities_are_true";
         CLAIMS_THREADS: "declared_capabilities_are_true";
         THREADS_CHANGE_IT: "declared_capabilities_are_true";
+        WRONG_BY_THE_BEST_KERNEL: "reference_set_on_edge_scenes",
+            "region_search_is_the_closed_box_scan", "every_view_sees_what_the_scan_sees";
+        MANY_ARE_WRONG_BY_THE_BEST_KERNEL: "many_points_are_answered_as_one_by_one";
+        MANY_ARE_STALE_AFTER_REFIT: "refit_equals_a_fresh_build";
+        SPHERES_ARE_STALE_AFTER_REFIT: "refit_equals_a_fresh_build";
+        F64_IS_STALE_AFTER_REFIT: "refit_equals_a_fresh_build";
+        FAR_ITEMS_ARE_NOT_REFITTED: "refit_equals_a_fresh_build";
+        MEMORY_PANICS: "declared_capabilities_are_true";
+        CHOICE_PANICS: "declared_capabilities_are_true";
+        CELLS_PANICS: "declared_capabilities_are_true";
         ITEMS_ARE_TESTED_LIKE_NODES: "every_view_sees_what_the_scan_sees";
     };
     let mut useful = BTreeSet::new();
     for (fault, failed, expected) in faults {
+        if fault.ends_with("BY_THE_BEST_KERNEL") && Kernel::best() == Kernel::Portable {
+            continue;
+        }
         // Seen with `cargo test --test contract sabotage:: -- --nocapture`.
         println!("{fault}:");
         for (property, error) in &failed {
@@ -380,6 +465,11 @@ fn every_fault_is_caught_and_every_property_catches_one() {
                 failed.len() == 1 && text.contains("spheres"),
                 "one view is wrong: {failed:?}"
             );
+        }
+        if fault.ends_with("PANICS") {
+            let says =
+                |text: &String| text.starts_with("toy on '") && text.contains("': panicked: no ");
+            assert!(failed.iter().all(|(_, text)| says(text)), "{failed:?}");
         }
         useful.extend(failed.into_iter().map(|(name, _)| name));
     }

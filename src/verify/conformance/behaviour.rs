@@ -7,9 +7,11 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
+use super::super::edge_volumes;
 use super::*;
 use crate::geometry::{ConvexVolumeF64, PlaneF64, RelativeVolume, Spheres, sphere_cube};
-use crate::kernel::BASELINE;
+use crate::index::QueryMany;
+use crate::kernel::{BASELINE, Kernel};
 use crate::query::{Located, ManySink, QueryVolume, Ranges};
 use crate::threads::Pool;
 
@@ -30,18 +32,37 @@ pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
 
 /// Queries with every kind of view of some of the volumes.
 fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize) -> Outcome {
-    let items = &asked.items;
-    let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
-    let index_of_cubes: T = build(&cubes)?;
-    let input = Input::new(&cubes).spheres(true);
-    let of_spheres = T::build(&input, &T::Params::default()).map_err(|e| e.to_string())?;
-    for volume in asked.volumes.iter().step_by(step).take(most) {
+    let cubes: Vec<Aabb> = asked.items.iter().map(sphere_cube).collect();
+    let [of_cubes, of_spheres]: [T; 2] = [build(&cubes)?, build_of_spheres(&cubes)?];
+    let some = || asked.volumes.iter().step_by(step).take(most);
+    views_are_right(&asked.items, index, some())?;
+    spheres_are_right(&cubes, &of_cubes, some())?;
+    spheres_are_right(&cubes, &of_spheres, some())
+}
+
+fn build_of_spheres<T: RegionIndex>(cubes: &[Aabb]) -> Result<T, String> {
+    let input = Input::new(cubes).spheres(true);
+    T::build(&input, &T::Params::default()).map_err(|error| error.to_string())
+}
+
+fn spheres_are_right<'v, T: RegionIndex>(
+    cubes: &[Aabb],
+    index: &T,
+    mut volumes: impl Iterator<Item = &'v ConvexVolume>,
+) -> Outcome {
+    volumes.try_for_each(|volume| right("spheres", index, cubes, &Spheres::new(volume)))
+}
+
+/// Queries with every kind of view but spheres, which see cubes.
+fn views_are_right<'v, T: RegionIndex>(
+    items: &[Aabb],
+    index: &T,
+    volumes: impl Iterator<Item = &'v ConvexVolume>,
+) -> Outcome {
+    for volume in volumes {
         let wide =
             ConvexVolumeF64::from_planes(&finer(volume)).map_err(|error| error.to_string())?;
         right("planes", index, items, volume)?;
-        let spheres = Spheres::new(volume);
-        right("spheres", &index_of_cubes, &cubes, &spheres)?;
-        right("spheres in blocks", &of_spheres, &cubes, &spheres)?;
         right("f64 planes", index, items, &wide)?;
         let eye = items.first().map_or(Vec3::ONE, |b| b.max);
         // A plane may leave f32 on its way to the eye.
@@ -51,9 +72,12 @@ fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize)
     }
     // A box at either end, and all of them.
     let ends = [items.first(), items.last()].into_iter().flatten().copied();
-    let sought = ends.chain([Aabb::union_of(items)]);
-    let mut sound = sought.filter(|b| !b.is_empty());
-    sound.try_for_each(|sought| right("a box", index, items, &sought))
+    let mut sought = ends.chain([Aabb::union_of(items)]);
+    sought.try_for_each(|sought| {
+        right("a box", index, items, &sought)?;
+        let inverted = Aabb::new(sought.max, sought.min);
+        right("a box, inverted", index, items, &inverted)
+    })
 }
 
 /// Planes that are none of f32.
@@ -94,23 +118,8 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
         }
         // Neighbours in a batch, and far apart.
         points.extend_from_within(points.len() / 2..);
-        let mut trial = Trial::new(asked.items.len());
         for count in [0, 1, 3, points.len()] {
-            let points = &points[..count.min(points.len())];
-            let (mut many, count) = (Located::default(), points.len());
-            let flow = index.query_many(BASELINE, points, &mut many);
-            ensure(many.len() == count && flow.is_continue(), || {
-                format!("{} of {count} points answered, {flow:?}", many.len())
-            })?;
-            for (&p, found) in points.iter().zip(many.iter()) {
-                trial.expect(scan(&asked.items, |b| b.contains_point(p)));
-                let alone = seen(index, &p);
-                let answer = trial.ask(|ids| ids.extend_from_slice(found));
-                let fault = answer.err().map(|fault| fault.explained(|_| None));
-                ensure(fault.is_none() && found == alone, || {
-                    format!("{p} among {count} points: {fault:?}; {found:?}, alone {alone:?}")
-                })?;
-            }
+            many_are_right(&asked.items, index, &points[..count.min(points.len())])?;
         }
         if points.len() > 1 {
             let most = points.len() as u32 / 2;
@@ -122,6 +131,40 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
         }
         Ok(())
     })
+}
+
+/// Searches for a batch of points, by the portable and by the best kernel.
+fn many_are_right<T: RegionIndex>(items: &[Aabb], index: &T, points: &[Vec3]) -> Outcome {
+    let (mut trial, count) = (Trial::new(items.len()), points.len());
+    let run = |kernel: Kernel| {
+        let mut out = Located::default();
+        let (flow, got) = (
+            kernel.run(QueryMany {
+                index,
+                points,
+                out: &mut out,
+            }),
+            out.len(),
+        );
+        ensure(got == count && flow.is_continue(), || {
+            format!("{got} of {count} points answered, {flow:?}")
+        })?;
+        Ok::<_, String>(out)
+    };
+    let (many, best) = (run(Kernel::Portable)?, run(Kernel::best())?);
+    for ((&p, found), best) in points.iter().zip(many.iter()).zip(best.iter()) {
+        trial.expect(scan(items, |b| b.contains_point(p)));
+        let alone = seen(index, &p);
+        let answer = trial.ask(|ids| ids.extend_from_slice(found));
+        let fault = answer.err().map(|fault| fault.explained(|_| None));
+        ensure(fault.is_none() && found == alone && found == best, || {
+            let kernel = Kernel::best().name();
+            format!(
+                "{p} among {count} points: {fault:?}; {found:?}, alone {alone:?}, by {kernel} {best:?}"
+            )
+        })?;
+    }
+    Ok(())
 }
 
 /// Breaks when it has its points.
@@ -175,7 +218,8 @@ fn update<T: RegionIndex>(index: &mut T, asked: &Questions, moved: &[ItemId]) ->
 }
 
 /// After 0.1 %, 1 %, 10 % and 100 % of the items have moved, one after the
-/// other, a structure that refits answers as a newly built one.
+/// other, and all of them far away, a structure that refits answers as a newly built one:
+/// every view, and points one by one and many.
 pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     let degenerate = ["all the same", "needles", "inverted among sound"];
     let degenerate = edges().filter(|asked| degenerate.contains(&asked.scene.as_str()));
@@ -183,22 +227,35 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     each(scenes, |asked, index: &mut T| {
         let mut rng = SeededRng::new(11);
         let width = f64::from(Aabb::union_of(&asked.items).extent().max_element());
+        let cubes = |items: &[Aabb]| items.iter().map(sphere_cube).collect::<Vec<_>>();
+        let mut of_spheres: T = build_of_spheres(&cubes(&asked.items))?;
         update(index, asked, &[])?;
-        for step in [1000, 100, 10, 1] {
+        for (step, away) in [(1000, 0.0), (100, 0.0), (10, 0.0), (1, 0.0), (1, 1e6)] {
             let all = 0..asked.items.len() as ItemId;
             let moved: Vec<ItemId> = all.skip(step / 3).step_by(step).collect();
             for (at, &id) in moved.iter().enumerate() {
                 // Most move a little, some far.
                 let far = if at % 5 == 0 { 0.5 } else { 0.01 };
-                let by = (rng.normal3() * width * far).as_vec3();
+                let by = (rng.normal3() * width * far + away).as_vec3();
                 let b = &mut asked.items[id as usize];
                 *b = Aabb::new(b.min + by, b.max + by);
             }
             update(index, asked, &moved)?;
+            let cubes = cubes(&asked.items);
+            if !of_spheres.refit(&cubes, &moved) {
+                of_spheres = build_of_spheres(&cubes)?;
+            }
             asked.points = points(&asked.items);
             let corners = moved.iter().map(|&id| asked.items[id as usize].max);
             asked.points.extend(corners.take(20));
+            if away > 0.0 {
+                asked.volumes = edge_volumes(&asked.items);
+            }
+            let some = || asked.volumes.iter().step_by(3).take(6);
             let right = asked.both_are_right(index);
+            let right = right.and_then(|()| views_are_right(&asked.items, index, some()));
+            let right = right.and_then(|()| spheres_are_right(&cubes, &of_spheres, some()));
+            let right = right.and_then(|()| many_are_right(&asked.items, index, &asked.points));
             right.map_err(|error| format!("after {} moves: {error}", moved.len()))?;
         }
         Ok(())
@@ -235,6 +292,8 @@ pub fn items_that_come_and_go_are_followed<T: RegionIndex>() -> Outcome {
 pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
     let says = T::INFO.capabilities;
     each(generated_scenes(500)?, |asked, index: &mut T| {
+        // Called by every run: they must not panic.
+        let _ = (index.memory(), index.chose(), index.cells().len());
         let ordered = index.tree_order().is_some();
         ensure(ordered == says.ranges, || {
             let (says, has) = (says.ranges, if ordered { "has" } else { "lacks" });

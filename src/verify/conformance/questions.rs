@@ -9,8 +9,8 @@ use super::super::{RandomCase, Trial, edge_scenes, edge_volumes, scan};
 use super::super::{explain_containment, explain_visibility};
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
-use crate::index::{Input, RegionIndex};
-use crate::kernel::BASELINE;
+use crate::index::{FrustumQuery, Input, RegionIndex, caught};
+use crate::kernel::{BASELINE, Kernel};
 use crate::query::{ItemId, NoRecorder, QueryContext, QueryCost, QueryVolume, Recorder, Sink};
 use crate::scene;
 
@@ -72,8 +72,11 @@ fn each_of<T: RegionIndex>(
     holds: &mut dyn FnMut(&mut Questions, &mut T) -> Outcome,
 ) -> Outcome {
     for mut questions in scenes {
-        let built = build(&questions.items);
-        let outcome = built.and_then(|mut index| holds(&mut questions, &mut index));
+        let outcome = caught(|| {
+            let mut index = build(&questions.items)?;
+            holds(&mut questions, &mut index)
+        });
+        let outcome = outcome.unwrap_or_else(|message| Err(format!("panicked: {message}")));
         outcome.map_err(|why| format!("{} on '{}': {why}", T::INFO.name, questions.scene))?;
     }
     Ok(())
@@ -152,8 +155,8 @@ impl Questions {
 /// Tests that a structure returns exactly the items that the scan does; `explain`
 /// says why an item is in the answer or not.
 ///
-/// A counted query returns the same ids, tests or accepts with a subtree every item that
-/// it returns, and evaluates no plane twice.
+/// The best kernel and a counted query return the same ids; the latter tests or accepts
+/// with a subtree every item that it returns, and evaluates no plane twice.
 pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     kind: &str,
     index: &T,
@@ -166,6 +169,14 @@ pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     let answer = trial.ask(|ids| *ids = seen(index, volume));
     let why = |id: usize| Some(explain(items.get(id)?));
     let plain = answer.map_err(|fault| format!("{kind}: {}", fault.explained(why)))?;
+    let best = index.visible(volume);
+    ensure(best == plain, || {
+        let (kernel, best, plain) = (Kernel::best().name(), best.len(), plain.len());
+        format!(
+            "{kind}: {best} ids by {kernel}, other {plain} by {}",
+            Kernel::Portable.name()
+        )
+    })?;
     let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
     let _ = ask(index, volume, &mut ids, &mut cost);
     let planes = Q::planes_open(volume.mask());
