@@ -169,3 +169,37 @@ pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<(), Came
 pub(super) fn largest_sum(plane: &Plane, reach: DVec3) -> f64 {
     plane.normal.as_dvec3().abs().dot(reach) + f64::from(plane.d).abs()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, PlaneOptions, Surroundings, look_at};
+    use glam::Vec3;
+
+    #[test]
+    fn an_epsilon_or_a_reach_without_a_guarantee_is_an_error() {
+        let frame = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap();
+        let lens = Lens::perspective(60.0, 1.5, 0.1, Some(100.0)).unwrap();
+        let camera = Camera { frame, lens };
+        let refused = |epsilon: f64, reach: Vec3| {
+            let origin = DVec3::ZERO;
+            let around = Surroundings { origin, reach };
+            let options = PlaneOptions {
+                epsilon,
+                ..PlaneOptions::default()
+            };
+            let relative = camera.relative_volume(&[], epsilon, &around).is_err();
+            let volume = camera.volume(&options, &around);
+            assert_eq!(volume.is_err(), relative, "{epsilon} {reach}");
+            volume.is_err_and(|e| {
+                e.to_string()
+                    .contains("; expected finite numbers of at least 0")
+            })
+        };
+        for bad in [f32::NAN, -1.0, f32::INFINITY] {
+            assert!(refused(bad.into(), Vec3::ONE), "epsilon {bad}");
+            assert!(refused(8.0, Vec3::new(1.0, bad, 1.0)), "reach {bad}");
+        }
+        assert!(!refused(0.0, Vec3::ZERO) && !refused(8.0, Vec3::ONE));
+    }
+}

@@ -212,11 +212,10 @@ impl Camera {
     ) -> Result<Margin, CameraError> {
         let frame = self.frame_about(zero);
         let c = options.epsilon;
-        for (name, value) in [("epsilon", c), ("reach", of_scene.min_element())] {
-            let is_sound = value >= 0.0 && value.is_finite() && of_scene.is_finite();
-            let found = || format!("the {name} is {value}");
-            require(is_sound, found, "a finite number of at least 0")?;
-        }
+        let is_sound = |x: f64| x.is_finite() && x >= 0.0;
+        let are_sound = is_sound(c) && of_scene.to_array().into_iter().all(is_sound);
+        let found = || format!("epsilon is {c} and reach {of_scene}");
+        require(are_sound, found, "finite numbers of at least 0")?;
         Ok(match self.lens.kind() {
             LensKind::Matrix(matrix) => {
                 Margin::of_matrix(matrix.corners_about(zero), frame.eye, of_scene, c)

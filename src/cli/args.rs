@@ -86,8 +86,11 @@ pub enum Command {
     Worker,
     /// Print shell completions
     Completions { shell: clap_complete::Shell },
-    /// Print the manual page (roff)
-    Man,
+    /// Print the manual (roff), or write it as a page per command
+    Man {
+        /// Folder of the pages, such as share/man/man1
+        folder: Option<PathBuf>,
+    },
     /// Print the licences of the program and of the real scenes inside it
     Licences,
 }

@@ -65,6 +65,7 @@ mod worker;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::ffi::OsString;
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -229,17 +230,36 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Env(args) => list::env(&args),
         Command::Worker => worker::worker(registry),
         Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), program::name(), &mut script);
+            let (mut script, all) = (Vec::new(), Cli::command());
+            // The script generators offer hidden commands too.
+            let shown = all.get_subcommands().filter(|c| !c.is_hide_set());
+            let program = clap::Command::new(program::name()).version(program::version());
+            let mut shown = program.subcommands(shown.cloned());
+            clap_complete::generate(shell, &mut shown, program::name(), &mut script);
             print_all(&script)
         }
-        Command::Man => {
-            let mut page = Vec::new();
-            clap_mangen::Man::new(Cli::command()).render(&mut page)?;
-            print_all(&page)
+        Command::Man { folder: None } => {
+            let mut command = Cli::command().disable_help_subcommand(true);
+            command.build();
+            let mut pages = Vec::new();
+            manual(&command, &mut pages)?;
+            print_all(&pages)
+        }
+        Command::Man { folder: Some(to) } => {
+            expect_folder("man", Some(&to))?;
+            fs::create_dir_all(&to)?;
+            clap_mangen::generate_to(Cli::command(), &to)?;
+            Ok(Ending::Ok)
         }
         Command::Licences => print_all(NOTICE.as_bytes()),
     }
+}
+
+/// Writes the pages of a command and of those below it, one after the other.
+fn manual(command: &clap::Command, pages: &mut Vec<u8>) -> io::Result<()> {
+    clap_mangen::Man::new(command.clone()).render(pages)?;
+    let mut shown = command.get_subcommands().filter(|c| !c.is_hide_set());
+    shown.try_for_each(|below| manual(below, pages))
 }
 
 /// Prints a text as one line on stderr, which a terminal gets wrapped.

@@ -408,19 +408,17 @@ fn differ(
     let mut many = Located::default();
     let points = [case.point, nowhere, case.point];
     index.query_many(&points, &mut many);
-    let (answers, rights): (Vec<_>, _) = (many.iter().collect(), [out, &[], out]);
-    if answers != rights {
-        let differs = |n: &usize| answers.get(*n) != Some(&rights[*n]);
-        let n = (0..rights.len()).find(differs).unwrap_or_default();
-        let (found, right) = (answers.get(n).copied().unwrap_or_default(), rights[n]);
-        let one_sided = |id: &&ItemId| !found.contains(id) || !right.contains(id);
-        let first = right.iter().chain(found).find(one_sided);
-        let first = first.map_or(String::new(), |id| format!("; first: item {id}"));
-        let (count, of, alone, point) = (answers.len(), found.len(), right.len(), points[n]);
-        let why = format!(
-            "region search: {count} of 3 points answered in a batch; point {point} by {of} items,              alone by {alone}{first}"
-        );
-        return Err(Verdict::new(Status::Wrong, why));
+    for (n, right) in [out, &[], out].into_iter().enumerate() {
+        let found = many.iter().nth(n).unwrap_or_default();
+        if found != right || many.len() != points.len() {
+            let one_sided = |id: &&ItemId| !found.contains(id) || !right.contains(id);
+            let first = right.iter().chain(found).find(one_sided);
+            let (point, found, alone) = (points[n], found.len(), right.len());
+            let why = format!(
+                "region search: {point} has {found} items in a batch, {alone} alone; first: {first:?}"
+            );
+            return Err(Verdict::new(Status::Wrong, why));
+        }
     }
     let volume = ConvexVolume::of_box(&case.region);
     let overlaps = |id| Some(format!("{:?} by {:?}", item(id)?, case.region));

@@ -93,7 +93,7 @@ impl VolumeError {
 /// assert!(slab.sees(&touching), "bounds are closed: touching is visible");
 /// # Ok::<(), cullbench::geometry::VolumeError>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct ConvexVolume {
     planes: [Plane; MAX_PLANES],
     names: [Option<FrustumPlane>; MAX_PLANES],
@@ -229,13 +229,6 @@ impl ConvexVolume {
     }
 }
 
-/// The same planes under the same names; all else follows from them.
-impl PartialEq for ConvexVolume {
-    fn eq(&self, other: &ConvexVolume) -> bool {
-        self.planes() == other.planes() && self.names == other.names
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -249,6 +242,10 @@ mod tests {
         assert!(!empty.sees(&b));
         assert_eq!(empty.mask(), 1, "an impossible plane must stay in the mask");
         assert!(ConvexVolume::from_planes(&[]).unwrap().sees(&b));
+        for inverted in [Aabb::new(Vec3::splat(0.75), Vec3::splat(0.25)), Aabb::EMPTY] {
+            assert!(!ConvexVolume::of_box(&inverted).sees(&b));
+        }
+        assert_eq!(ConvexVolume::of_box(&b), ConvexVolume::of_box(&b));
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! The contract of a structure, [`RegionIndex`]: build, memory, one generic query.
 //! [`FrustumQuery`] provides the forms of the query that callers use.
 
-use std::fmt;
 use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
@@ -321,13 +320,6 @@ pub trait FrustumQuery: RegionIndex {
 }
 
 impl<T: RegionIndex> FrustumQuery for T {}
-
-/// Shows a structure by its memory: its arrays would fill pages.
-pub(crate) fn debug<T: RegionIndex>(index: &T, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let memory = &index.memory();
-    let mut shown = f.debug_struct(T::INFO.name);
-    shown.field("memory", memory).finish_non_exhaustive()
-}
 
 /// One query with its arguments, for a [`Kernel`] to run.
 ///

@@ -135,15 +135,6 @@ pub trait DynIndex: Send + Sync {
     }
 }
 
-impl fmt::Debug for dyn DynIndex {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let memory = &self.memory();
-        f.debug_struct("DynIndex")
-            .field("memory", memory)
-            .finish_non_exhaustive()
-    }
-}
-
 /// A structure with the kernel of its queries.
 #[derive(Clone, Debug)]
 pub struct WithKernel<T> {
@@ -222,6 +213,36 @@ mod tests {
         let kernel = Kernel::best();
         WithKernel { index, kernel }.query_counted(volume, &mut counted.0, &mut counted.1);
         [own, counted]
+    }
+
+    #[test]
+    fn what_engines_store_can_be_shown_in_a_line() {
+        #[derive(Debug)]
+        struct Engine {
+            _tree: crate::index::Bvh,
+            _textbook: OctreeTextbook,
+            _any: Box<dyn DynIndex>,
+            _volume: ConvexVolume,
+        }
+        let items = vec![Aabb::new(Vec3::ZERO, Vec3::ONE); 1000];
+        let input = Input::new(&items);
+        let (kernel, index) = (
+            Kernel::best(),
+            Wide::build(&input, &Default::default()).unwrap(),
+        );
+        let engine = Engine {
+            _tree: RegionIndex::build(&input, &Default::default()).unwrap(),
+            _textbook: RegionIndex::build(&input, &Default::default()).unwrap(),
+            _any: Box::new(WithKernel { index, kernel }),
+            _volume: ConvexVolume::of_box(&items[0]),
+        };
+        let shown = format!("{engine:?}");
+        assert!(
+            shown.contains("Tree") && shown.contains("node_bytes"),
+            "{shown}"
+        );
+        let index = Box::new(engine._any);
+        assert!(format!("{index:?}").len() < 200);
     }
 
     #[test]

@@ -44,24 +44,17 @@ impl Row {
     pub const fn of<T: RegionIndex + 'static>() -> Row {
         fn typed<T: RegionIndex>(params: &Value) -> Result<T::Params, BuildError> {
             let structure = T::INFO.name;
-            let defaults = serde_json::to_value(T::Params::default()).unwrap_or_default();
-            let filled = match (defaults, params) {
-                // Not the nulls: JSON has no other form of NaN and infinity.
-                (Value::Object(mut all), Value::Object(given)) => {
+            let mut filled = serde_json::to_value(T::Params::default()).unwrap_or_default();
+            match (filled.as_object_mut(), params.as_object()) {
+                (Some(all), Some(given)) => {
+                    // Not the nulls: JSON has no other form of NaN and infinity.
                     all.retain(|_, value| !value.is_null());
                     all.extend(given.clone());
-                    Value::Object(all)
                 }
                 // Parameters without names, such as `()` or a number.
-                (unnamed, Value::Object(given)) => match given.keys().next() {
-                    None => unnamed,
-                    Some(key) => {
-                        let reason = format!("a field '{key}'; expected none");
-                        return Err(BuildError::Params { structure, reason });
-                    }
-                },
-                _ => params.clone(),
-            };
+                (None, Some(given)) if given.is_empty() => {}
+                _ => filled = params.clone(),
+            }
             serde_path_to_error::deserialize(&filled).map_err(|error| {
                 // serde's message about a value lacks its name.
                 let key = error.path().to_string();

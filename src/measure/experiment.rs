@@ -244,13 +244,8 @@ pub enum ExperimentError {
     #[error(transparent)]
     Workload(#[from] WorkloadError),
     /// A plan that measures nothing, or not what it says.
-    #[error("{found}; expected {expected}")]
-    Plan {
-        /// Setting and value.
-        found: String,
-        /// Values that it can have.
-        expected: &'static str,
-    },
+    #[error("the plan has {0}; expected one or more of everything, finite times, one process")]
+    Plan(&'static str),
     /// The name of a structure or a parameter of it is wrong.
     #[error(transparent)]
     Spec(#[from] crate::spec::SpecError),

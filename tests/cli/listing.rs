@@ -79,6 +79,35 @@ fn scenes_are_described_with_three_digits() {
 }
 
 #[test]
+fn the_manual_has_every_command_and_completions_no_hidden_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let manual = works(folder.path(), "man");
+    works(folder.path(), "man pages/man1");
+    for (command, option) in [
+        ("run", "no\\-bounds"),
+        ("compare", "against"),
+        ("scene-draw", "depth"),
+    ] {
+        let page = folder
+            .path()
+            .join(format!("pages/man1/cullbench-{command}.1"));
+        let page = std::fs::read_to_string(page).unwrap();
+        assert!(
+            page.contains(option) && manual.contains(option),
+            "{command}"
+        );
+    }
+    assert!(!folder.path().join("pages/man1/cullbench-worker.1").exists());
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = works(folder.path(), &format!("completions {shell}"));
+        assert!(
+            script.contains("advise") && !script.contains("worker"),
+            "{shell}"
+        );
+    }
+}
+
+#[test]
 fn help_lists_and_scenes_fit_eighty_columns_of_a_pipe() {
     let fits = |line: &str| {
         let told = works(Path::new("."), line);

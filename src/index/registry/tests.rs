@@ -149,8 +149,8 @@ fn parameters_need_no_serde_default_and_may_have_no_names() {
     for (text, wanted) in [
         ("Plain:level=10", "level out of range"),
         ("Plain:level=-1", "level=-1; expected a whole number"),
-        ("Number:level=1", "a field 'level'; expected none"),
-        ("Unit:level=1", "a field 'level'; expected none"),
+        ("Number:level=1", "an object; expected a whole number"),
+        ("Unit:level=1", "an object; expected "),
     ] {
         let error = registry.structure(text).unwrap_err().to_string();
         assert!(error.contains(wanted), "{text}: {error}");

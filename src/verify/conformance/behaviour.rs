@@ -32,12 +32,13 @@ pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
 
 /// Queries with every kind of view of some of the volumes.
 fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize) -> Outcome {
-    let cubes: Vec<Aabb> = asked.items.iter().map(sphere_cube).collect();
-    let [of_cubes, of_spheres]: [T; 2] = [build(&cubes)?, build_of_spheres(&cubes)?];
-    let some = || asked.volumes.iter().step_by(step).take(most);
-    views_are_right(&asked.items, index, some())?;
-    spheres_are_right(&cubes, &of_cubes, some())?;
-    spheres_are_right(&cubes, &of_spheres, some())
+    let cubes = cubes(asked);
+    let of_cubes: [T; 2] = [build(&cubes)?, build_of_spheres(&cubes)?];
+    views_are_right(asked, index, &of_cubes, step, most)
+}
+
+fn cubes(asked: &Questions) -> Vec<Aabb> {
+    asked.items.iter().map(sphere_cube).collect()
 }
 
 fn build_of_spheres<T: RegionIndex>(cubes: &[Aabb]) -> Result<T, String> {
@@ -45,24 +46,22 @@ fn build_of_spheres<T: RegionIndex>(cubes: &[Aabb]) -> Result<T, String> {
     T::build(&input, &T::Params::default()).map_err(|error| error.to_string())
 }
 
-fn spheres_are_right<'v, T: RegionIndex>(
-    cubes: &[Aabb],
+fn views_are_right<T: RegionIndex>(
+    asked: &Questions,
     index: &T,
-    mut volumes: impl Iterator<Item = &'v ConvexVolume>,
+    of_cubes: &[T],
+    step: usize,
+    most: usize,
 ) -> Outcome {
-    volumes.try_for_each(|volume| right("spheres", index, cubes, &Spheres::new(volume)))
-}
-
-/// Queries with every kind of view but spheres, which see cubes.
-fn views_are_right<'v, T: RegionIndex>(
-    items: &[Aabb],
-    index: &T,
-    volumes: impl Iterator<Item = &'v ConvexVolume>,
-) -> Outcome {
-    for volume in volumes {
+    let (items, cubes) = (&asked.items, cubes(asked));
+    for volume in asked.volumes.iter().step_by(step).take(most) {
         let wide =
             ConvexVolumeF64::from_planes(&finer(volume)).map_err(|error| error.to_string())?;
         right("planes", index, items, volume)?;
+        let spheres = Spheres::new(volume);
+        for index in of_cubes {
+            right("spheres", index, &cubes, &spheres)?;
+        }
         right("f64 planes", index, items, &wide)?;
         let eye = items.first().map_or(Vec3::ONE, |b| b.max);
         // A plane may leave f32 on its way to the eye.
@@ -136,33 +135,22 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
 /// Searches for a batch of points, by the portable and by the best kernel.
 fn many_are_right<T: RegionIndex>(items: &[Aabb], index: &T, points: &[Vec3]) -> Outcome {
     let (mut trial, count) = (Trial::new(items.len()), points.len());
-    let run = |kernel: Kernel| {
-        let mut out = Located::default();
-        let (flow, got) = (
-            kernel.run(QueryMany {
-                index,
-                points,
-                out: &mut out,
-            }),
-            out.len(),
-        );
-        ensure(got == count && flow.is_continue(), || {
-            format!("{got} of {count} points answered, {flow:?}")
+    for kernel in [Kernel::Portable, Kernel::best()] {
+        let mut many = Located::default();
+        let out = &mut many;
+        let flow = kernel.run(QueryMany { index, points, out });
+        ensure(many.len() == count && flow.is_continue(), || {
+            format!("{} of {count} points answered, {flow:?}", many.len())
         })?;
-        Ok::<_, String>(out)
-    };
-    let (many, best) = (run(Kernel::Portable)?, run(Kernel::best())?);
-    for ((&p, found), best) in points.iter().zip(many.iter()).zip(best.iter()) {
-        trial.expect(scan(items, |b| b.contains_point(p)));
-        let alone = seen(index, &p);
-        let answer = trial.ask(|ids| ids.extend_from_slice(found));
-        let fault = answer.err().map(|fault| fault.explained(|_| None));
-        ensure(fault.is_none() && found == alone && found == best, || {
-            let kernel = Kernel::best().name();
-            format!(
-                "{p} among {count} points: {fault:?}; {found:?}, alone {alone:?}, by {kernel} {best:?}"
-            )
-        })?;
+        for (&p, found) in points.iter().zip(many.iter()) {
+            trial.expect(scan(items, |b| b.contains_point(p)));
+            let alone = seen(index, &p);
+            let answer = trial.ask(|ids| ids.extend_from_slice(found));
+            let fault = answer.err().map(|fault| fault.explained(|_| None));
+            ensure(fault.is_none() && found == alone, || {
+                format!("{p} among {count} points: {fault:?}; {found:?}, alone {alone:?}")
+            })?;
+        }
     }
     Ok(())
 }
@@ -227,8 +215,7 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     each(scenes, |asked, index: &mut T| {
         let mut rng = SeededRng::new(11);
         let width = f64::from(Aabb::union_of(&asked.items).extent().max_element());
-        let cubes = |items: &[Aabb]| items.iter().map(sphere_cube).collect::<Vec<_>>();
-        let mut of_spheres: T = build_of_spheres(&cubes(&asked.items))?;
+        let mut of_spheres: [T; 1] = [build_of_spheres(&cubes(asked))?];
         update(index, asked, &[])?;
         for (step, away) in [(1000, 0.0), (100, 0.0), (10, 0.0), (1, 0.0), (1, 1e6)] {
             let all = 0..asked.items.len() as ItemId;
@@ -241,9 +228,8 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
                 *b = Aabb::new(b.min + by, b.max + by);
             }
             update(index, asked, &moved)?;
-            let cubes = cubes(&asked.items);
-            if !of_spheres.refit(&cubes, &moved) {
-                of_spheres = build_of_spheres(&cubes)?;
+            if !of_spheres[0].refit(&cubes(asked), &moved) {
+                of_spheres = [build_of_spheres(&cubes(asked))?];
             }
             asked.points = points(&asked.items);
             let corners = moved.iter().map(|&id| asked.items[id as usize].max);
@@ -251,10 +237,8 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
             if away > 0.0 {
                 asked.volumes = edge_volumes(&asked.items);
             }
-            let some = || asked.volumes.iter().step_by(3).take(6);
             let right = asked.both_are_right(index);
-            let right = right.and_then(|()| views_are_right(&asked.items, index, some()));
-            let right = right.and_then(|()| spheres_are_right(&cubes, &of_spheres, some()));
+            let right = right.and_then(|()| views_are_right(asked, index, &of_spheres, 3, 6));
             let right = right.and_then(|()| many_are_right(&asked.items, index, &asked.points));
             right.map_err(|error| format!("after {} moves: {error}", moved.len()))?;
         }

@@ -171,10 +171,10 @@ pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     let plain = answer.map_err(|fault| format!("{kind}: {}", fault.explained(why)))?;
     let best = index.visible(volume);
     ensure(best == plain, || {
-        let (kernel, best, plain) = (Kernel::best().name(), best.len(), plain.len());
+        let (best, kernel) = (best.len(), Kernel::best().name());
         format!(
-            "{kind}: {best} ids by {kernel}, other {plain} by {}",
-            Kernel::Portable.name()
+            "{kind}: {best} ids by {kernel}, other {} by portable",
+            plain.len()
         )
     })?;
     let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
