@@ -113,8 +113,10 @@ pub mod verify;
 #[cfg(feature = "cli")]
 pub mod visibility;
 
-/// Names for queries and experiments. A structure of one's own takes more, of [`index`]
-/// and [`query`]: see `examples/enter_your_crate.rs`.
+/// Names for queries and experiments.
+///
+/// A structure of one's own takes more, of [`index`] and [`query`]: see
+/// `examples/enter_your_crate.rs`.
 pub mod prelude {
     pub use crate::camera::{Camera, Lens, PlaneOptions, look_at};
     pub use crate::culling::{Culling, CullingTest};

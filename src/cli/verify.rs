@@ -413,9 +413,10 @@ fn differ(
         if found != right || many.len() != points.len() {
             let one_sided = |id: &&ItemId| !found.contains(id) || !right.contains(id);
             let first = right.iter().chain(found).find(one_sided);
+            let first = first.map_or(String::new(), |id| format!("; first: item {id}"));
             let (point, found, alone) = (points[n], found.len(), right.len());
             let why = format!(
-                "region search: {point} has {found} items in a batch, {alone} alone; first: {first:?}"
+                "region search: {point} has {found} items in a batch, {alone} alone{first}"
             );
             return Err(Verdict::new(Status::Wrong, why));
         }
@@ -428,34 +429,4 @@ fn differ(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::index::{LinearScalar, RegionIndex, Row};
-    use serde_json::Value;
-
-    const PANICS: Row = Row {
-        info: LinearScalar::INFO.named("panics"),
-        build: |_, _, _| panic!("deep in a peer's code"),
-        params: |_| Ok(Value::Null),
-    };
-
-    #[test]
-    fn a_panic_in_a_random_case_is_its_status_and_says_how_to_see_it_again() {
-        let spec = StructureSpec {
-            label: "panics".to_owned(),
-            row: PANICS,
-            params: Value::Null,
-            execution: Default::default(),
-            policy: Default::default(),
-        };
-        let linear = StructureSpec::parse("linear").expect("linear");
-        let checks = random_cases(&[spec, linear], 5, 3);
-        assert_eq!([checks[0].status, checks[1].status], ["panicked", "ok"]);
-        let told = checks[0].difference.as_deref().unwrap_or_default();
-        assert!(
-            told.contains("deep in a peer's code")
-                && told.contains("--seed 5 --structure 'panics'"),
-            "{told}"
-        );
-    }
-}
+mod tests;

@@ -20,8 +20,9 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The empty box: the neutral element of [`Aabb::union`]. Its centre is NaN, its extent
-    /// and area are infinite.
+    /// The empty box: the neutral element of [`Aabb::union`].
+    ///
+    /// Its centre is NaN, its extent minus infinity, and its area means nothing.
     pub const EMPTY: Aabb = Aabb {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
@@ -81,8 +82,9 @@ impl Aabb {
         self.min.is_finite() && self.max.is_finite()
     }
 
-    /// The smallest box that holds both, neither of them empty ([`Aabb::EMPTY`] excepted).
-    /// Exact: min and max never round.
+    /// The smallest box that holds both. Exact: min and max never round.
+    ///
+    /// Neither may be empty, but for [`Aabb::EMPTY`]; [`Aabb::union_of`] takes any.
     pub fn union(&self, other: &Aabb) -> Aabb {
         Aabb::new(self.min.min(other.min), self.max.max(other.max))
     }
@@ -113,16 +115,17 @@ impl Aabb {
         other.min.cmpge(self.min).all() && other.max.cmple(self.max).all()
     }
 
-    /// Returns whether the two closed boxes share a point (touching counts; an empty box
-    /// has none).
+    /// Returns whether the two closed boxes share a point (touching counts).
+    /// An empty box shares none.
     #[inline(always)]
     pub fn intersects(&self, other: &Aabb) -> bool {
         let overlap = self.min.cmple(other.max).all() && other.min.cmple(self.max).all();
         overlap && !self.is_empty() && !other.is_empty()
     }
 
-    /// Mid point, NaN of [`Aabb::EMPTY`]. Halves before adding, so that huge bounds do not
-    /// overflow.
+    /// Mid point; NaN of [`Aabb::EMPTY`].
+    ///
+    /// Halves before adding, so that huge bounds do not overflow.
     #[inline(always)]
     pub fn centre(&self) -> Vec3 {
         self.min * 0.5 + self.max * 0.5

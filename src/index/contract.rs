@@ -159,8 +159,9 @@ pub struct NoParams {}
 pub trait RegionIndex: Sized + Send + Sync {
     /// Name and declaration; the conformance suite checks it as far as possible.
     const INFO: Info;
-    /// Build parameters, `name:key=value` on the command line; keys that are not given have the
-    /// values of `Default`. A field `threads` is the number of threads that share one query.
+    /// Build parameters, `name:key=value` on the command line.
+    ///
+    /// Keys that are not given have the values of `Default`. A field `threads` is the number of threads that share one query.
     type Params: Default + Serialize + DeserializeOwned;
 
     /// Builds the structure. Deterministic: the same items and parameters give

@@ -302,8 +302,9 @@ impl StructureSpec {
         StructureSpec { execution, ..self }
     }
 
-    /// Threads that share one query: the parameter `threads` (the name is reserved for it, see
-    /// [`RegionIndex::Params`]), 1 without it.
+    /// Threads that share one query: the parameter `threads`, 1 without it.
+    ///
+    /// The name is reserved for it: see [`RegionIndex::Params`].
     pub fn query_threads(&self) -> usize {
         self.params["threads"].as_u64().unwrap_or(1) as usize
     }

@@ -122,8 +122,8 @@ impl Predicate for Vec3 {
     }
 }
 
-/// Box search: the boxes that share a point with this one (closed bounds); none with an
-/// empty one.
+/// Box search: the boxes that share a point with this one (closed bounds).
+/// None with an empty one.
 impl Predicate for Aabb {
     #[inline(always)]
     fn mask(&self) -> PlaneMask {

@@ -325,8 +325,8 @@ impl QueryVolume for Aabb {
     }
 }
 
-/// Any volume for an erased structure. Dispatched once per query, never per node. A box is
-/// asked for as [`ConvexVolume::of_box`].
+/// Any volume for an erased structure. Dispatched once per query, never per node.
+/// A box becomes one by [`ConvexVolume::of_box`].
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum AnyVolume<'a> {

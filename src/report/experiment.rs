@@ -107,7 +107,7 @@ impl Experiment {
         Ok(stream.report())
     }
 
-    /// Checks that the plan has something of everything, and numbers that can be followed.
+    /// Checks that the plan has one or more of everything, and usable numbers.
     fn check(&self) -> Result<(), ExperimentError> {
         let (plan, effort) = (&self.plan, &self.plan.effort);
         let (scenes, [least, most]) = (&plan.scenes, effort.rounds);

@@ -1,4 +1,4 @@
-//! Tests of the registry, with structures of other crates as their authors write them.
+//! Tests of the registry, with structures as authors of other crates write them.
 
 use super::*;
 use crate::geometry::Aabb;
