@@ -8,6 +8,7 @@ use super::args::PrecisionArgs;
 use super::document::{Block, show, to_page};
 use super::figure::picture;
 use super::funnel::plain_input;
+use super::precision_conclusions::is_wrong;
 use super::processes::{Job, Timing};
 use super::study::{Setting, Study};
 use super::table::{Column, Table};
@@ -17,7 +18,7 @@ use super::{
 };
 use crate::funnel::{self, Chain, FunnelPlan, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
-use crate::measure::{ProcessTimes, Status};
+use crate::measure::ProcessTimes;
 use crate::precision::{self, PointPlan, PrecisionInput, SWEEPS, size_sweep, sweep};
 use crate::scene::LoadOptions;
 use crate::visibility::{Guarantee, SampleGrid};
@@ -60,8 +61,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     let points = |timing| Job::Points(prepared.plan.clone(), timing);
     let times = study.times("every point, timed", setting.path.lens_scale, points)?;
     let precision = prepared.conclude(&times);
-    let mut points = precision.points.iter();
-    let wrong = points.any(|p| matches!(p.status, Status::Wrong | Status::Panicked));
+    let wrong =
+        precision.points.iter().any(is_wrong) || precision.region_points.iter().any(is_wrong);
     let outcome = precision_tables::Outcome {
         precision,
         skipped_items: setting.scene.skipped_items,

@@ -6,6 +6,7 @@ use super::error_figure::{Against, Measured};
 use super::figure::{Figure, ends};
 use super::precision_tables::{CullingPoint, Outcome, elsewhere, named, numbers, percent, swept};
 use super::text;
+use crate::measure::Status;
 use crate::precision::{Point, Precision, RegionErrors, SWEEPS, SizeRow, SweepRow};
 use crate::statistics::Rate;
 
@@ -67,9 +68,17 @@ fn of_points(p: &Precision) -> Vec<String> {
             text::significant(depth(worst)),
             named(worst)
         ),
+        None if p.points.iter().any(is_wrong) => {
+            "Points of right answers missed no visible item on these cameras.".to_owned()
+        }
         None => "No point missed a visible item on these cameras.".to_owned(),
     });
     all
+}
+
+/// The structure itself is at fault, so that its errors are not known.
+pub fn is_wrong<E>(point: &Point<E>) -> bool {
+    matches!(point.status, Status::Wrong | Status::Panicked)
 }
 
 fn of_storage(p: &Precision) -> Option<String> {

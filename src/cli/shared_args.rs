@@ -293,10 +293,11 @@ pub struct CullingArgs {
     /// gh-d3d-f64, gh-revz-f32, gh-revz-f64
     #[arg(long, value_name = "METHOD", default_value = "frame", value_parser = values::choice("plane method", &PLANE_METHODS))]
     pub planes: PlaneMethod,
-    /// Factor c of the conservative epsilon; 0 leaves the planes as derived
+    /// Factor c of the conservative epsilon; 0 leaves the planes as derived [default: 8;
+    /// 0 with f64, which has none]
     // With the largest one everything is visible.
-    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::within(0.0..=1e9))]
-    pub epsilon: f64,
+    #[arg(long, value_name = "C", value_parser = values::within(0.0..=1e9))]
+    pub epsilon: Option<f64>,
     /// Number format of the culling test: f32, f64, f32-relative
     #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::choice("arithmetic", &ARITHMETICS))]
     pub arithmetic: Arithmetic,
@@ -305,12 +306,17 @@ pub struct CullingArgs {
 impl CullingArgs {
     /// The culling test of that name, with the other settings from the options.
     pub fn culling(&self, test: &str) -> Result<Culling, SpecError> {
+        if let (Some(c), Arithmetic::F64) = (self.epsilon.filter(|&c| c > 0.0), self.arithmetic) {
+            return Err(SpecError::new(format_args!(
+                "--epsilon is {c} with --arithmetic f64, which has none; expected 0, or f32"
+            )));
+        }
         Ok(Culling {
             test: values::choice("test", &TESTS)(test)?,
             arithmetic: self.arithmetic,
             planes: PlaneOptions {
                 method: self.planes,
-                epsilon: self.epsilon,
+                epsilon: self.epsilon.unwrap_or(DEFAULT_EPSILON),
             },
         })
     }

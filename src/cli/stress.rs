@@ -2,6 +2,7 @@
 //! structure. Prints what passed in a line per category and everything that
 //! failed in full, or all rows as JSON.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::time::Instant;
 
@@ -15,13 +16,21 @@ use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::stress::extremes::{Extremes, Tally};
-use crate::stress::{Section, Status, Vector, built_in, read_vectors_file, replay};
+use crate::stress::{Name, Section, Status, Vector, built_in, read_vectors_file, replay};
 
 pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
-    let mut vectors = Vec::new();
+    let mut vectors: Vec<Vector> = Vec::new();
+    let mut ids = BTreeSet::new();
     for file in &args.vectors {
-        vectors.extend(read_vectors_file(file)?);
+        let mut more = read_vectors_file(file)?;
+        for Name(id) in more.iter_mut().map(|vector| &mut vector.id) {
+            // Another file has this id as well.
+            if !ids.insert(id.clone()) {
+                *id = format!("{}: {id}", file.display());
+            }
+        }
+        vectors.extend(more);
     }
     if args.vectors.is_empty() {
         vectors = built_in()?;
@@ -94,6 +103,9 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     }
     let interrupted = interrupt::asked();
     bar.finish_and_clear();
+    if !interrupted && by_others == 0 && sections.iter().all(|section| section.rows.is_empty()) {
+        bail!("nothing was checked; expected planes, a camera or points in a vector");
+    }
     unread_is_fine(match args.format {
         TableFormat::Json => json(&sections),
         TableFormat::Table => {
@@ -123,7 +135,7 @@ fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
     for section in &mut sections {
         section.rows.retain(|row| row.status == Status::Fail);
         for row in &mut section.rows {
-            row.test = format!("{} by {kernel}", row.test);
+            row.got = format!("{} by {kernel}", row.got).into();
         }
         section.name = format!("{} by {kernel}", section.name);
         section.tally = Tally::default();

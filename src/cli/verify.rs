@@ -148,11 +148,10 @@ fn paths(args: &VerifyArgs, scene: &Scene) -> Vec<String> {
 fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
     let (lens, culling, read) = (&args.lens, &args.culling, &args.scene_args);
     let mut command = format!(
-        "{} verify --scene '{scene}' --path '{path}' --planes {} --epsilon {} \
-         --arithmetic {} --fovy {} --aspect {}",
+        "{} verify --scene '{scene}' --path '{path}' --planes {} --arithmetic {} --fovy {} \
+         --aspect {}",
         program::name(),
         culling.planes.name(),
-        culling.epsilon,
         culling.arithmetic.name(),
         lens.fovy,
         lens.aspect
@@ -162,6 +161,7 @@ fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
     let mut add = |option: &str, value: Option<String>| {
         command += &text::some(value, |value| format!(" --{option} {value}"));
     };
+    add("epsilon", culling.epsilon.map(|c| c.to_string()));
     add("near", lens.near.map(|near| near.to_string()));
     add("far", lens.far.map(|far| far.to_string()));
     add("matrix-convention", lens.matrix_convention.clone());

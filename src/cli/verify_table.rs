@@ -30,6 +30,7 @@ pub(super) struct Check {
 pub(super) struct Outcome {
     pub(super) ok: bool,
     pub(super) verdicts: u64,
+    /// Checks with a difference, however many verdicts are wrong in each.
     pub(super) mismatches: usize,
     /// True if answers were compared with the cameras as written too.
     pub(super) against_cameras: bool,
@@ -94,7 +95,13 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
         text::counted(outcome.verdicts as usize, "verdict"),
         outcome.seconds,
         outcome.verdicts as f64 / outcome.seconds / 1e6,
-        text::counted(outcome.mismatches, "mismatch")
+        match outcome.mismatches {
+            0 => "no mismatches".to_owned(),
+            failed => format!(
+                "{failed} of {} checks failed (structure x path)",
+                outcome.checks.len()
+            ),
+        }
     );
     writeln!(out, "{}", text::wrapped(&checked, width))?;
     if !outcome.against_cameras {

@@ -161,19 +161,27 @@ impl Culling {
         Ok(())
     }
 
-    /// The reason why a requested margin may still lose visible items; `None` if it is
-    /// proven to keep them, or there is none.
+    /// Factor c of the planes' margin: f64 has none.
+    pub fn epsilon(&self) -> f64 {
+        match self.arithmetic {
+            Arithmetic::F64 => 0.0,
+            _ => self.planes.epsilon,
+        }
+    }
+
+    /// The reason why the planes may lose visible items; `None` if their margin is proven
+    /// to keep them.
     pub fn unproven(&self) -> Option<String> {
-        let PlaneOptions { method, epsilon } = self.planes;
-        let found = match method {
-            _ if self.arithmetic == Arithmetic::F64 || epsilon == 0.0 => return None,
+        let epsilon = self.epsilon();
+        let found = match self.planes.method {
             PlaneMethod::Frame if epsilon >= DEFAULT_EPSILON => return None,
+            PlaneMethod::Frame if self.arithmetic == Arithmetic::F64 => "f64".to_owned(),
             PlaneMethod::Frame => format!("c = {epsilon}"),
             method => format!("planes by {}", method.name()),
         };
         Some(format!(
-            "the margin is proven for planes of the frame with c = {DEFAULT_EPSILON} or more, not \
-             for {found}: visible items may be lost"
+            "the margin is proven for f32 planes of the frame with c = {DEFAULT_EPSILON} or more, \
+             not for {found}: visible items may be lost"
         ))
     }
 
@@ -318,7 +326,9 @@ mod tests {
             culling.planes.epsilon = epsilon;
             culling.unproven().is_some()
         };
-        assert_eq!([0.0, 7.9, 8.0].map(with), [false, true, false]);
+        assert_eq!([0.0, 7.9, 8.0].map(with), [true, true, false]);
+        let f64 = of(CullingTest::SixPlane, Arithmetic::F64);
+        assert!(f64.unproven().is_some() && f64.epsilon() == 0.0);
     }
 
     /// A window of 40 by 40 seen from far away: its planes are 20 from zero.

@@ -328,7 +328,7 @@ impl GroupKey {
             test: culling.test.name().to_owned(),
             arithmetic: culling.arithmetic.name().to_owned(),
             planes: culling.planes.method.name().to_owned(),
-            epsilon: culling.planes.epsilon,
+            epsilon: culling.epsilon(),
             motion: motion.to_owned(),
         }
     }

@@ -28,8 +28,11 @@ impl GroupKey {
     /// Text that is equal for equal keys, as a key of maps.
     pub fn id(&self) -> String {
         let key = GroupKey {
-            // Zero has two signs and one meaning.
-            epsilon: self.epsilon + 0.0,
+            // Zero has two signs and one meaning. Old reports have an epsilon with f64.
+            epsilon: match self.arithmetic.as_str() {
+                "f64" => 0.0,
+                _ => self.epsilon + 0.0,
+            },
             ..self.clone()
         };
         serde_json::to_string(&key).unwrap_or_default()
@@ -118,3 +121,27 @@ impl Pass {
 
 /// Key of a task: label of a structure or a lower bound, and kind of query.
 pub type TaskKey = (String, TaskKind);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_epsilon_beside_f64_is_no_part_of_the_key() {
+        let id = |arithmetic: &str, epsilon| {
+            let key = GroupKey {
+                scene: String::new(),
+                path: String::new(),
+                cache: String::new(),
+                test: String::new(),
+                arithmetic: arithmetic.to_owned(),
+                planes: String::new(),
+                epsilon,
+                motion: String::new(),
+            };
+            key.id()
+        };
+        assert_eq!(id("f64", 8.0), id("f64", -0.0));
+        assert_ne!(id("f32", 8.0), id("f32", 0.0));
+    }
+}

@@ -35,7 +35,7 @@ impl Names {
             test: culling.test.name(),
             arithmetic: culling.arithmetic.name(),
             planes: culling.planes.method.name(),
-            epsilon: culling.planes.epsilon,
+            epsilon: culling.epsilon(),
         }
     }
 }

@@ -230,7 +230,13 @@ impl<'a> Built<'a> {
         for (n, answer) in judged.answers.iter().enumerate() {
             trial.expect(answer.iter().copied());
             if let Err(fault) = trial.ask(|out| self.answer(way, n, out)) {
-                return Err(Verdict::new(Status::of(&fault), fault.explained(|_| None)));
+                // Not a point that misses items by its numbers: the structure is at fault.
+                let status = Some(Status::of(&fault)).filter(|status| *status != Status::Unsafe);
+                let reason = format!(
+                    "not the scan of its own planes: {}",
+                    fault.explained(|_| None)
+                );
+                return Err(Verdict::new(status.unwrap_or(Status::Wrong), reason));
             }
         }
         Ok(())
@@ -376,5 +382,50 @@ impl Prepared {
         point::conclude(&mut precision.region_points, &times);
         precision.processes = processes.len();
         precision
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::index::Row;
+
+    #[test]
+    fn a_structure_that_loses_items_is_wrong_and_no_point_that_misses() {
+        let linear = || StructureSpec::parse("linear").expect("linear");
+        let blind = StructureSpec {
+            label: "blind".to_owned(),
+            row: Row {
+                build: |_, _, _| {
+                    StructureSpec::parse("linear")
+                        .expect("linear")
+                        .build(&[][..])
+                },
+                ..linear().row
+            },
+            ..linear()
+        };
+        let scene = crate::scene::load("city:n=200", &Default::default()).expect("a city");
+        let path = crate::path::load("orbit:frames=3", &scene, &Default::default());
+        let input = PrecisionInput {
+            scene: &scene,
+            path: &path.expect("a path"),
+            structures: &[linear(), blind],
+            most_cameras: 3,
+            protocol: &Protocol {
+                rounds: [1, 1],
+                task_ns: 0.0,
+                cameras: 3,
+                cold: false,
+                seed: 1,
+                cache_bytes: 0,
+            },
+        };
+        let points = prepare(&input).expect("no refusal").precision.points;
+        for point in points {
+            let reason = point.reason.unwrap_or_default();
+            let is_wrong = point.status == Status::Wrong && reason.contains("own planes");
+            assert_eq!(is_wrong, point.structure == "blind", "{:?}", point.status);
+        }
     }
 }

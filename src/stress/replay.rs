@@ -1,9 +1,11 @@
 //! Test vectors on structures: the given planes bit for bit, the camera through
 //! the default pipeline, points, and boxes that must be refused.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
-use super::sheet::{Built, Sheet, slack};
+use super::sheet::{Built, ORACLE, Sheet, slack};
 use super::{Level, Name, Row, Said, Status, Vector, VectorBox, VectorCamera};
 use crate::camera::{PlaneOptions, Surroundings};
 use crate::culling::{Culling, CullingTest, TESTS};
@@ -38,11 +40,13 @@ impl Replay<'_> {
     pub fn vector(&self, vector: &Vector) -> Vec<Row> {
         let sound = vector.sound_boxes().map(|b| (b.id.clone(), b.bounds()));
         let (names, items): (Vec<Name>, Vec<Aabb>) = sound.unzip();
+        let places = names.iter().zip(0..).collect();
         let sheet = |level| Sheet {
             vector,
             level,
             names: &names,
             items: &items,
+            places: &places,
             rows: Vec::new(),
         };
         let (mut planes, mut camera) = (sheet(Level::Planes), sheet(Level::Camera));
@@ -61,6 +65,7 @@ impl Replay<'_> {
             None => &mut camera,
         };
         self.rejected(at_load);
+        empty(at_load);
         [planes.rows, camera.rows].concat()
     }
 
@@ -70,21 +75,21 @@ impl Replay<'_> {
         specs.map(|s| (s.label.as_str(), build(s))).collect()
     }
 
-    /// Builds that must fail: each rejected box among the sound ones, and the
+    /// Builds that must fail: each rejected box among some sound ones, and the
     /// first of them among all boxes.
     fn rejected(&self, sheet: &mut Sheet) {
         let vector = sheet.vector;
         let all: Vec<Aabb> = vector.boxes().map(VectorBox::bounds).collect();
+        let places: BTreeMap<&Name, usize> = vector.boxes().map(|b| &b.id).zip(0..).collect();
+        let is_bad = |b: &Aabb| !b.is_finite();
         for name in vector.expect_rejected_at_load.iter().flatten() {
             let mut scenes = Vec::new();
-            if let Some(index) = vector.boxes().position(|b| b.id == *name) {
-                let before: Vec<&Name> = vector.boxes().take(index).map(|b| &b.id).collect();
-                let is_before = |name: &&Name| before.contains(name);
-                let item = sheet.names.iter().filter(is_before).count();
-                let mut scene = sheet.items.to_vec();
+            if let Some(&index) = places.get(name) {
+                let mut scene = sheet.items[..sheet.items.len().min(BESIDE)].to_vec();
+                let item = index.min(scene.len());
                 scene.insert(item, all[index]);
                 scenes.push((scene, item));
-                if item == index {
+                if all.iter().position(is_bad) == Some(index) {
                     scenes.push((all.clone(), index));
                 }
             }
@@ -174,6 +179,24 @@ impl Replay<'_> {
                 &vector.touch_camera,
             );
         }
+    }
+}
+
+/// Sound boxes beside one that must be rejected.
+const BESIDE: usize = 64;
+
+/// Adds a row for each box that the file calls empty.
+fn empty(sheet: &mut Sheet) {
+    let boxes = sheet.vector.boxes().map(|b| (&b.id, b.bounds()));
+    let boxes: BTreeMap<&Name, Aabb> = boxes.collect();
+    for name in sheet.vector.expect_empty_boxes.iter().flatten() {
+        let (status, got) = match boxes.get(name).map(Aabb::is_empty) {
+            Some(true) => (Status::Pass, "inverted"),
+            Some(false) => (Status::Fail, "not inverted"),
+            None => (Status::Fail, "no such box"),
+        };
+        let subject = [ORACLE, CullingTest::Exact.name()];
+        sheet.row(Some(name), subject, status, "inverted", got);
     }
 }
 
@@ -272,7 +295,7 @@ mod tests {
     use super::*;
     use crate::index::Registry;
     use crate::stress::Names;
-    use crate::stress::built_in;
+    use crate::stress::{built_in, read_vectors};
 
     #[test]
     fn the_built_in_vectors_pass_on_every_structure() {
@@ -355,6 +378,49 @@ mod tests {
             }
         }
         assert!(declared > 20, "{declared}");
+    }
+
+    fn failed(text: &str) -> Vec<String> {
+        let structures = Registry::builtin().structures("linear").unwrap();
+        let vectors = read_vectors(text.as_bytes(), "f.json").unwrap();
+        let rows = vectors.iter().flat_map(|v| replay(v, &structures));
+        let failed = rows.filter(|row| row.status == Status::Fail);
+        failed.map(|row| row.id).collect()
+    }
+
+    #[test]
+    fn a_touch_that_is_declared_and_not_visible_fails() {
+        let wedge = |visible: &str| {
+            failed(&format!(
+                r#"[{{"id":"v","planes":[[1,0,0,0]],"boxes":[{{"id":"b","lo":[-1,0,0],
+                "hi":[0,1,1]}}],"expected_visible_planes":{visible},"touch_planes":["b"]}}]"#
+            ))
+        };
+        assert!(wedge(r#"["b"]"#).is_empty());
+        assert_eq!(wedge("[]"), ["v", "v/b"]);
+    }
+
+    #[test]
+    fn boxes_that_are_declared_empty_are_inverted() {
+        let text = r#"[{"id":"v","boxes":[{"id":"b","lo":[0,0,0],"hi":[1,1,1]},
+            {"id":"inv","lo":[0,0,0],"hi":[1,-1,1]}],"expect_empty_boxes":["b","inv","none"]}]"#;
+        assert_eq!(failed(text), ["v/b", "v/none"]);
+    }
+
+    #[test]
+    fn a_lens_that_is_narrower_than_the_oracle_carries_fails_nothing() {
+        let seen = |fovy: &str, aspect: &str, visible: &str| {
+            failed(&format!(
+                r#"[{{"id":"v","camera":{{"eye":[0,0,0],"look":[0,0,-1],"up":[0,1,0],
+                "fovy_deg":{fovy},"aspect":{aspect},"near":1,"far":8}},"boxes":[{{"id":"b",
+                "lo":[-1,-1,-4],"hi":[1,1,-2]}}],"expected_visible_camera":{visible},
+                "touch_camera":[]}}]"#
+            ))
+        };
+        for (fovy, aspect) in [("1e-9", "1"), ("1e-46", "1"), ("90", "1e-50"), ("90", "1")] {
+            assert!(seen(fovy, aspect, r#"["b"]"#).is_empty(), "{fovy} {aspect}");
+            assert!(seen(fovy, aspect, "[]").contains(&"v/b".to_owned()));
+        }
     }
 
     #[test]

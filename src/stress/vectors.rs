@@ -1,17 +1,18 @@
 //! Test vectors: boxes, cameras or planes with the answers of exact arithmetic.
 //! Fields have the names of the JSON files; numbers and names have readers.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
-use serde::de::{Error, Unexpected, Visitor};
+use serde::de::{DeserializeOwned, Error, IgnoredAny, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer};
+use strsim::damerau_levenshtein;
 
 use crate::camera::{Camera, CameraError, Lens};
 use crate::geometry::{Aabb, Plane};
-use crate::input::{InputError, read_file};
+use crate::input::{InputError, note, read_file};
 use crate::json::{JsonError, from_json};
 use crate::oracle::Pose;
 use crate::shown::plain;
@@ -20,6 +21,17 @@ use crate::shown::plain;
 pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
 /// Name of the built-in vectors in messages.
 pub const BUILT_IN_NAME: &str = "datasets/vectors.json";
+
+/// Fields of a vector that are read.
+#[rustfmt::skip]
+const FIELDS: [&str; 17] = [
+    "id", "category", "camera", "planes", "planes_f32_hex", "boxes", "points",
+    "expected_visible_planes", "touch_planes", "expected_visible_camera", "touch_camera",
+    "observed_f32_pvertex_mul_add", "p_vertex_exact_visible", "expect_camera_error",
+    "expect_planes_error", "expect_rejected_at_load", "expect_empty_boxes",
+];
+/// The narrowest angle of view that [`crate::oracle::Oracle::of_camera`] promises to carry.
+const CARRIED_DEG: f64 = 1e-12;
 
 /// Names of boxes; sorted, so that they print alike every time.
 pub type Names = BTreeSet<Name>;
@@ -97,6 +109,11 @@ impl VectorCamera {
         }
     }
 
+    /// Returns whether the oracle carries the angles of the lens without loss.
+    pub fn is_carried(&self) -> bool {
+        self.fovy_deg.0 * self.aspect.0.min(1.0) >= CARRIED_DEG
+    }
+
     /// # Errors
     /// No such camera.
     pub fn camera(&self) -> Result<Camera, CameraError> {
@@ -159,6 +176,43 @@ impl Vector {
             .or(decimals.map(Iterator::collect))
     }
 
+    /// The first claim that no answer can meet: the place, what was found and expected.
+    ///
+    /// A list without names is no claim. Planes that must be refused may have names: the
+    /// format's generator lists what the finite ones among them leave visible.
+    fn contradiction(&self) -> Option<(String, &str, &str)> {
+        let named =
+            |lists: &[&Option<Names>]| lists.iter().copied().flatten().flatten().count() > 0;
+        let seen = named(&[&self.expected_visible_camera, &self.touch_camera]);
+        let of_planes = named(&[
+            &self.expected_visible_planes,
+            &self.touch_planes,
+            &self.p_vertex_exact_visible,
+            &self.observed_f32_pvertex_mul_add,
+        ]);
+        let is_refused = self.camera_error().is_some();
+        let at = |field: &str, found, expected| Some((field.to_owned(), found, expected));
+        if self.camera.is_none() && (seen || is_refused) {
+            return at("camera", "claims about a camera but none", "a camera");
+        }
+        if seen && is_refused {
+            let found = "an error, and boxes that the camera sees";
+            return at("expect_camera_error", found, "one or the other");
+        }
+        if self.planes().is_none() && (of_planes || self.planes_error().is_some()) {
+            return at("planes", "claims about planes but none", "planes");
+        }
+        let (bits, decimals) = self.planes_f32_hex.as_ref().zip(self.planes.as_ref())?;
+        let equal = |(a, b): (&Bits, &Narrow)| a.0 == b.0 || a.0.is_nan() && b.0.is_nan();
+        let differ = |&n: &usize| {
+            let both = bits.get(n).zip(decimals.get(n));
+            !both.is_some_and(|(a, b)| a.0.iter().zip(&b.0).all(equal))
+        };
+        let n = (0..bits.len().max(decimals.len())).find(differ)?;
+        let field = format!("planes_f32_hex[{n}]");
+        at(&field, "another plane than in 'planes'", "the same numbers")
+    }
+
     /// Answer of the f32 six-plane test; by default that of the exact one.
     pub fn six_plane(&self) -> Option<&Names> {
         let observed = self.observed_f32_pvertex_mul_add.as_ref();
@@ -199,7 +253,7 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
 
 /// Reads a file of vectors: an object with the array `vectors`, or the array
 /// alone. Numbers may be given as the words NaN, Infinity (inf) and
-/// -Infinity (-inf); unknown fields are ignored.
+/// -Infinity (-inf); unknown fields are ignored, with a note where one is like a known.
 ///
 /// # Errors
 /// One line: the file, the path of the field, what was found and expected.
@@ -207,12 +261,7 @@ pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError>
     let wrong = |place: String, found: String, expected: String| {
         InputError::at(file, place, found, expected)
     };
-    let is_array = bytes.iter().find(|byte| b"[{".contains(byte)) == Some(&b'[');
-    let read = match is_array {
-        true => from_json(bytes),
-        false => from_json(bytes).map(|file: File| file.vectors),
-    };
-    let vectors: Vec<Vector> = read.map_err(|error: JsonError| {
+    let vectors: Vec<Vector> = list(bytes).map_err(|error: JsonError| {
         let form = || format!("JSON in the form of {BUILT_IN_NAME}");
         wrong(
             error.place(),
@@ -231,8 +280,40 @@ pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError>
         if let Some((i, id)) = repeated(vector.boxes().map(|b| &b.id)) {
             return Err(again(format!("vectors[{n}].boxes[{i}]"), id));
         }
+        if let Some((field, found, expected)) = vector.contradiction() {
+            let place = format!("vectors[{n}].{field}");
+            return Err(wrong(place, found.to_owned(), expected.to_owned()));
+        }
     }
+    note_unread(bytes, file);
     Ok(vectors)
+}
+
+fn list<V: DeserializeOwned>(bytes: &[u8]) -> Result<Vec<V>, JsonError> {
+    let is_array = bytes.iter().find(|byte| b"[{".contains(byte)) == Some(&b'[');
+    match is_array {
+        true => from_json(bytes),
+        false => from_json(bytes).map(|file: File<V>| file.vectors),
+    }
+}
+
+/// Tells of fields that nothing is read from and that are nearly one that is read.
+fn note_unread(bytes: &[u8], file: &str) {
+    let vectors: Vec<BTreeMap<String, IgnoredAny>> = list(bytes).unwrap_or_default();
+    let names: BTreeSet<&String> = vectors.iter().flat_map(BTreeMap::keys).collect();
+    for name in names
+        .into_iter()
+        .filter(|name| !FIELDS.contains(&name.as_str()))
+    {
+        let most = (name.len() / 3).min(3);
+        let edits = |field: &&&str| damerau_levenshtein(&name.to_lowercase(), field);
+        if let Some(guess) = FIELDS.iter().find(|field| edits(field) <= most) {
+            let name = plain(name);
+            note(&format!(
+                "{file}: field '{name}' is not read (did you mean '{guess}'?)"
+            ));
+        }
+    }
 }
 
 /// The first id that occurred before, and its index.
@@ -243,11 +324,11 @@ fn repeated<'v>(ids: impl Iterator<Item = &'v Name>) -> Option<(usize, &'v Name)
 
 #[derive(Deserialize)]
 #[serde(expecting = "an object with the array 'vectors'")]
-struct File {
+struct File<V> {
     #[serde(default, deserialize_with = "format")]
     #[expect(dead_code, reason = "there is but one")]
     format: (),
-    vectors: Vec<Vector>,
+    vectors: Vec<V>,
 }
 
 /// Name of a box or a vector: text, or a whole number taken as text.

@@ -89,6 +89,10 @@ fn choices_that_do_not_go_together_are_refused() {
             "unknown arithmetic 'f63' | did you mean 'f64'",
         ),
         ("--epsilon -1", "--epsilon is '-1'"),
+        (
+            "--arithmetic f64 --epsilon 4",
+            "--epsilon is 4 with --arithmetic f64 | expected 0",
+        ),
         ("--planes gh-gl-f16", "gh-gl-f16 | did you mean 'gh-gl-f"),
     ] {
         let commands = ["query", "verify", "run --out r"].map(|c| format!("{c} {scene} {choice}"));

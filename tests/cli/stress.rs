@@ -144,6 +144,13 @@ fn other_vectors_run_alone() {
         "stress --vectors a.json --vectors b.json --format json",
     );
     assert!(text.contains("B12-fov-180") && text.contains("A02-touch"));
+    // The second file with an id is named beside it.
+    let twice = super::process::folder(&[("a.json", bare.as_bytes()), ("b.json", bare.as_bytes())]);
+    let text = works(
+        twice.path(),
+        "stress --vectors a.json --vectors b.json --format json",
+    );
+    assert!(text.contains("\"B12-fov-180\"") && text.contains("\"b.json: B12-fov-180\""));
 }
 
 /// A file whose expectations are wrong fails, and the vector and box are named.
@@ -267,6 +274,10 @@ fn a_wrong_answer_fails_and_names_the_box() {
             row["id"].as_str().expect("an id").starts_with(named) && row["level"] == level
         };
         assert!(failed.iter().any(|row| right(&row)), "{named}: {failed:?}");
+        let by_kernel = failed
+            .iter()
+            .find(|row| row["test"].to_string().contains(" by "));
+        assert!(by_kernel.is_none(), "{by_kernel:?} is no name of a test");
         let table = cullbench(folder.path(), "stress --vectors v.json");
         assert_eq!(table.code, Some(1), "{named}");
         assert!(table.out.contains(named), "{named}: {}", table.out);
@@ -279,7 +290,7 @@ fn a_wrong_answer_fails_and_names_the_box() {
 
 #[test]
 fn a_file_that_is_wrong_is_refused_in_one_line() {
-    let cases: [(&str, &[u8], &str); 12] = [
+    let cases: [(&str, &[u8], &str); 14] = [
         ("empty.json", b"", "empty.json, line 1 | expected JSON"),
         ("cut.json", b"{\"vectors\": [{\"id\": \"a\",\n \"boxes\": [", "cut.json, line 2"),
         ("bytes.json", b"\xff\xfe\x00", "bytes.json, line 1"),
@@ -308,6 +319,12 @@ fn a_file_that_is_wrong_is_refused_in_one_line() {
             b"[{\"id\": \"q\", \"expected_visible_camera\": [[]]}]",
             "expected_visible_camera[0]: a list; expected a name",
         ),
+        (
+            "orphan.json",
+            b"[{\"id\": \"q\", \"expected_visible_camera\": [\"b\"]}]",
+            "orphan.json, vectors[0].camera: claims about a camera | expected a camera",
+        ),
+        ("nothing.json", b"[{\"id\": \"q\", \"boxes\": []}]", "nothing was checked | expected"),
     ];
     for (name, bytes, wanted) in cases {
         let folder = folder(&[(name, bytes)]);

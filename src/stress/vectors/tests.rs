@@ -1,6 +1,9 @@
 //! Vectors as they are read and answered.
 
+use std::sync::Mutex;
+
 use super::*;
+use crate::input::tell_notes;
 
 #[test]
 fn the_built_in_vectors_can_be_read() {
@@ -92,6 +95,38 @@ fn every_mistake_is_one_line_that_says_where() {
             with(r#""points":[{"id":"p","p":[0,0,0]}]"#),
             "points[0]: no field 'expected_containing'",
         ),
+        (
+            with(r#""touch_camera":["b"]"#),
+            "vectors[0].camera: claims about a camera",
+        ),
+        (
+            with(r#""expect_camera_error":"fov""#),
+            "vectors[0].camera: claims about a camera",
+        ),
+        (
+            with(r#""p_vertex_exact_visible":["b"]"#),
+            "vectors[0].planes: claims about planes",
+        ),
+        (
+            with(r#""expect_planes_error":true"#),
+            "vectors[0].planes: claims about planes",
+        ),
+        (
+            with(&format!(
+                r#"{CAMERA},"expect_camera_error":true,"expected_visible_camera":["b"]"#
+            )),
+            "vectors[0].expect_camera_error: an error, and boxes",
+        ),
+        (
+            with(
+                &format!(
+                    r#""planes":[[0,0,1,-0.0],["NaN",0,0,0],[1,0,0,2]],"planes_f32_hex":[{HEX},
+                ["0x7fc00001","0x0","0x0","0x0"],["0x3f800000","0x0","0x0","0x0"]]"#
+                )
+                .replace("0x0\"", "0x00000000\""),
+            ),
+            "vectors[0].planes_f32_hex[2]: another plane",
+        ),
     ];
     for (text, wanted) in cases {
         let error = read_vectors(text.as_bytes(), "f.json")
@@ -106,6 +141,38 @@ fn every_mistake_is_one_line_that_says_where() {
             "{error}"
         );
     }
+}
+
+const CAMERA: &str = r#""camera":{"eye":[0,0,0],"look":[0,0,1],"up":[0,1,0],"fovy_deg":180,
+    "aspect":1,"near":1}"#;
+const HEX: &str = r#"["0x0","0x80000000","0x3f800000","0x0"]"#;
+
+#[test]
+fn lists_without_names_claim_nothing() {
+    let text = format!(
+        r#"[{{"id":"v","expected_visible_camera":[],"touch_camera":null,"touch_planes":[],
+        "expect_camera_error":false}},{{"id":"w",{CAMERA},"expected_visible_camera":[],
+        "expect_camera_error":"fov","x":1}}]"#
+    );
+    assert_eq!(read_vectors(text.as_bytes(), "f.json").unwrap().len(), 2);
+}
+
+#[test]
+fn fields_like_those_that_are_read_are_told() {
+    static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+    tell_notes(|note| HEARD.lock().unwrap().push(note.to_owned()));
+    let text = r#"[{"id":"v","Camera":{},"boxs":[],"x":1,"margin_camera":{}},{"id":"w","boxs":0}]"#;
+    read_vectors(text.as_bytes(), "note-v.json").unwrap();
+    read_vectors(BUILT_IN.as_bytes(), "note-b.json").unwrap();
+    let heard = HEARD.lock().unwrap();
+    let heard: Vec<&String> = heard.iter().filter(|n| n.contains("note-")).collect();
+    assert_eq!(
+        heard,
+        [
+            "note: note-v.json: field 'Camera' is not read (did you mean 'camera'?)",
+            "note: note-v.json: field 'boxs' is not read (did you mean 'boxes'?)",
+        ]
+    );
 }
 
 #[test]
