@@ -3,6 +3,7 @@
 //! wrong at camera level though all structures agree about them.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use serde_json::Value;
 
