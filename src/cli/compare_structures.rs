@@ -157,14 +157,8 @@ fn all_agree(rows: &[Row], what: &str, right: impl Fn(usize) -> Option<Answer>) 
         let base = first.entry(row.question).or_insert(row);
         if let Some(id) = row.stray {
             agree = false;
-            let Row {
-                question: n,
-                structure,
-                ..
-            } = row;
-            super::tell(&format!(
-                "error: {what} {n}: {structure} finds id {id}, which is no item's"
-            ));
+            let about = format!("{what} {}: {}", row.question, row.structure);
+            super::tell(&format!("error: {about} finds id {id}, which is no item's"));
         }
         if base.answer != row.answer {
             agree = false;

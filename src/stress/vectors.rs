@@ -22,14 +22,6 @@ pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
 /// Name of the built-in vectors in messages.
 pub const BUILT_IN_NAME: &str = "datasets/vectors.json";
 
-/// Fields of a vector that are read.
-#[rustfmt::skip]
-const FIELDS: [&str; 17] = [
-    "id", "category", "camera", "planes", "planes_f32_hex", "boxes", "points",
-    "expected_visible_planes", "touch_planes", "expected_visible_camera", "touch_camera",
-    "observed_f32_pvertex_mul_add", "p_vertex_exact_visible", "expect_camera_error",
-    "expect_planes_error", "expect_rejected_at_load", "expect_empty_boxes",
-];
 /// The narrowest angle of view that [`crate::oracle::Oracle::of_camera`] promises to carry.
 const CARRIED_DEG: f64 = 1e-12;
 
@@ -285,7 +277,7 @@ pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError>
             return Err(wrong(place, found.to_owned(), expected.to_owned()));
         }
     }
-    note_unread(bytes, file);
+    note_unknown(bytes, file);
     Ok(vectors)
 }
 
@@ -297,17 +289,18 @@ fn list<V: DeserializeOwned>(bytes: &[u8]) -> Result<Vec<V>, JsonError> {
     }
 }
 
-/// Tells of fields that nothing is read from and that are nearly one that is read.
-fn note_unread(bytes: &[u8], file: &str) {
-    let vectors: Vec<BTreeMap<String, IgnoredAny>> = list(bytes).unwrap_or_default();
-    let names: BTreeSet<&String> = vectors.iter().flat_map(BTreeMap::keys).collect();
-    for name in names
-        .into_iter()
-        .filter(|name| !FIELDS.contains(&name.as_str()))
-    {
+/// Tells of fields that the format does not have and that are nearly one of it.
+fn note_unknown(bytes: &[u8], file: &str) {
+    let fields = |bytes| -> BTreeSet<String> {
+        let vectors: Vec<BTreeMap<String, IgnoredAny>> = list(bytes).unwrap_or_default();
+        vectors.into_iter().flat_map(BTreeMap::into_keys).collect()
+    };
+    // The built-in vectors have every field.
+    let known = fields(BUILT_IN.as_bytes());
+    for name in fields(bytes).difference(&known) {
         let most = (name.len() / 3).min(3);
-        let edits = |field: &&&str| damerau_levenshtein(&name.to_lowercase(), field);
-        if let Some(guess) = FIELDS.iter().find(|field| edits(field) <= most) {
+        let edits = |field: &&String| damerau_levenshtein(&name.to_lowercase(), field);
+        if let Some(guess) = known.iter().find(|field| edits(field) <= most) {
             let name = plain(name);
             note(&format!(
                 "{file}: field '{name}' is not read (did you mean '{guess}'?)"
