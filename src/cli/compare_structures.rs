@@ -44,11 +44,11 @@ impl Row {
 /// Bytes of answers in memory: enough that a structure is rarely built again.
 const HELD: usize = 64 << 20;
 
-/// Answers every question by every structure; false if two structures disagree, or an id
-/// is no item's.
+/// Answers every question by every structure.
 ///
+/// False if two structures disagree, or an id is no item's.
 /// One structure is not compared with the reference scan, which takes far longer; where two
-/// disagree the scan's answer is told.
+/// disagree, the one that agrees with the scan is named.
 ///
 /// `each` receives the answers in the order of questions, then of structures, in blocks of
 /// [`HELD`] bytes, or an eighth of the free memory. Ids (ascending) are kept only with `keep_ids`. Every disagreement is a
@@ -148,8 +148,9 @@ pub fn ask_all(
     Ok(agree)
 }
 
-/// Reports ids that are no item's and questions with different answers, and which structure
-/// has the answer that is `right`; true if there are none.
+/// Reports ids that are no item's, and questions with different answers.
+///
+/// `right` is the reference scan's answer to a question. True if there is nothing to report.
 fn all_agree(rows: &[Row], what: &str, right: impl Fn(usize) -> Option<Answer>) -> bool {
     let mut first: BTreeMap<usize, &Row> = BTreeMap::new();
     let mut agree = true;

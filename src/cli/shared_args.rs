@@ -293,8 +293,8 @@ pub struct CullingArgs {
     /// gh-d3d-f64, gh-revz-f32, gh-revz-f64
     #[arg(long, value_name = "METHOD", default_value = "frame", value_parser = values::choice("plane method", &PLANE_METHODS))]
     pub planes: PlaneMethod,
-    /// Factor c of the conservative epsilon; 0 leaves the planes as derived [default: 8;
-    /// 0 with f64, which has none]
+    /// Factor c of the conservative epsilon; 0 leaves the planes as derived
+    /// [default: 8; 0 with f64, which has no margin]
     // With the largest one everything is visible.
     #[arg(long, value_name = "C", value_parser = values::within(0.0..=1e9))]
     pub epsilon: Option<f64>,

@@ -169,8 +169,9 @@ impl Culling {
         }
     }
 
-    /// The reason why the planes may lose visible items; `None` if their margin is proven
-    /// to keep them.
+    /// The reason why the planes may lose visible items.
+    ///
+    /// `None` if their margin is proven to keep them.
     pub fn unproven(&self) -> Option<String> {
         let epsilon = self.epsilon();
         let found = match self.planes.method {

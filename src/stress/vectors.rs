@@ -22,7 +22,7 @@ pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
 /// Name of the built-in vectors in messages.
 pub const BUILT_IN_NAME: &str = "datasets/vectors.json";
 
-/// The narrowest angle of view that [`crate::oracle::Oracle::of_camera`] promises to carry.
+/// The narrowest angle of view that the oracle of a camera carries, degrees.
 const CARRIED_DEG: f64 = 1e-12;
 
 /// Names of boxes; sorted, so that they print alike every time.

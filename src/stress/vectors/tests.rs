@@ -161,7 +161,8 @@ fn lists_without_names_claim_nothing() {
 fn fields_like_those_that_are_read_are_told() {
     static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
     tell_notes(|note| HEARD.lock().unwrap().push(note.to_owned()));
-    let text = r#"[{"id":"v","Camera":{},"boxs":[],"x":1,"margin_camera":{}},{"id":"w","boxs":0}]"#;
+    let text =
+        r#"[{"id":"v","Camera":{},"Boxes":[],"x":1,"margin_camera":{}},{"id":"w","Boxes":0}]"#;
     read_vectors(text.as_bytes(), "note-v.json").unwrap();
     read_vectors(BUILT_IN.as_bytes(), "note-b.json").unwrap();
     let heard = HEARD.lock().unwrap();
@@ -169,8 +170,8 @@ fn fields_like_those_that_are_read_are_told() {
     assert_eq!(
         heard,
         [
+            "note: note-v.json: field 'Boxes' is not read (did you mean 'boxes'?)",
             "note: note-v.json: field 'Camera' is not read (did you mean 'camera'?)",
-            "note: note-v.json: field 'boxs' is not read (did you mean 'boxes'?)",
         ]
     );
 }
