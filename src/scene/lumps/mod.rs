@@ -121,7 +121,7 @@ impl<'a> Wad<'a> {
             (Some(one), None, _) => return Ok(*one),
             (Some(first), _, _) => (
                 format!("{} maps, {}", maps.len(), listed()),
-                part_hint(&self.file, first.0),
+                part_hint(self.file, first.0),
             ),
             (None, _, None) => (
                 "no map".to_owned(),
