@@ -82,7 +82,11 @@ pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
             inside => (inside, error.into_inner()),
         },
     };
-    let (found, expected) = told(&error);
+    let count = error.is_syntax().then(|| too_long(text, &path)).flatten();
+    let (found, expected) = match count {
+        Some(count) => (format!("{count} values"), Some("fewer".to_owned())),
+        None => told(&error),
+    };
     Err(JsonError {
         line: error.line(),
         column: error.column(),
@@ -90,6 +94,15 @@ pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
         found,
         expected,
     })
+}
+
+/// Number of values of the list at a path, if the text is JSON.
+///
+/// The reader takes a list of too many values for bad syntax.
+fn too_long(text: &str, path: &str) -> Option<usize> {
+    let json: serde_json::Value = serde_json::from_str(text).ok()?;
+    let pointer = path.replace(['.', '['], "/").replace(']', "");
+    Some(json.pointer(&format!("/{pointer}"))?.as_array()?.len())
 }
 
 /// Text found and text expected, from the reader's message.
@@ -253,6 +266,10 @@ mod tests {
             (
                 "{\"count\": 1} 2",
                 "line 1, column 14: no JSON (trailing characters)",
+            ),
+            (
+                "{\"count\": 1, \"pair\": [1, 2, 3]}",
+                "pair: 3 values; expected JSON, here fewer",
             ),
             ("{\"count\" 1}", "no JSON (expected ':')"),
             (

@@ -42,6 +42,9 @@ pub struct Omission {
     /// Assumption or error that decides, in a few words.
     #[serde(skip)]
     pub note: String,
+    /// `true` if the choice of the structure or test decides, not the clock.
+    #[serde(skip)]
+    pub is_chosen: bool,
     /// Name and unit of the statistic.
     pub statistic_name: &'static str,
     /// Null where the rule does not apply to this scene.

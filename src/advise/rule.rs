@@ -208,6 +208,7 @@ impl Rule {
             is_saving: self.is_saving,
             cost_ns,
             note: finding.note,
+            is_chosen: finding.decision.is_some(),
             statistic_name: self.statistic_name,
             statistic: statistic.filter(|x| x.is_finite()),
             threshold: threshold.filter(|x| x.is_finite()),

@@ -140,6 +140,14 @@ impl ViewProjection {
 }
 
 impl Camera {
+    /// Returns `true` if its orthographic matrix has reversed depth, or a mirrored image.
+    pub fn may_be_reversed(&self) -> bool {
+        let LensKind::Matrix(matrix) = self.lens.kind() else {
+            return false;
+        };
+        matrix.is_parallel && matrix.unprojected().is_ok_and(|found| found.is_mirrored)
+    }
+
     /// This camera with a frame and a lens of its own, whose rays are known.
     ///
     /// # Errors
@@ -160,7 +168,7 @@ impl Camera {
                 "at most 1e-4 where rays are needed, or another --matrix-convention",
             )?;
         }
-        let is_unclear = matrix.is_parallel && matrix.is_from_zero() && found.is_mirrored;
+        let is_unclear = matrix.is_from_zero() && self.may_be_reversed();
         require(
             !is_unclear,
             || {
@@ -301,6 +309,14 @@ mod tests {
             error.contains("either end") && error.contains("ortho_height"),
             "{error}"
         );
+        // From -1 on there are rays, and a doubt.
+        let turned = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0));
+        for (change, is_doubtful) in [(DMat4::IDENTITY, false), (turned, true)] {
+            let matrix = change * parallel.projection(OpenGl) * frame.world_to_eye();
+            let camera = read(matrix, OpenGl, false);
+            assert_eq!(camera.may_be_reversed(), is_doubtful);
+            assert!(camera.unprojected().is_ok());
+        }
     }
 
     #[test]

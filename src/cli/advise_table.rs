@@ -30,6 +30,7 @@ pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
     }
     for row in &advice.structure.rows {
         if let Some(reason) = &row.reason {
+            let reason = text::plain(reason);
             say(&format!("{}: {}: {reason}", row.structure, row.status))?;
         }
     }
@@ -39,14 +40,16 @@ pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
     for paragraph in [in_motion(advice), threads, changes].into_iter().flatten() {
         say(&(paragraph + "\n"))?;
     }
-    let rules = rule_table(advice).within(width, &["gain", "cost", ""]);
+    let rules = rule_table(advice);
+    let wrapped = rules.wrapped_last(width);
+    let rules = wrapped.unwrap_or_else(|| rules.within(width, &["gain", "cost", ""]));
     say(rules.bare().trim_end())?;
     let no = |rule: &Omission| not_for(advice, rule);
     type Holds<'h> = &'h dyn Fn(&Omission) -> bool;
     let lines: [(&str, Holds); 4] = [
         ("Does not apply: ", &|rule| no(rule).is_some()),
         (
-            "Pays from: a mean over all views, where funnel takes 8 (or --frames): ",
+            "Pays from: each feature alone on the tree, where funnel measures it within its chain: ",
             &|rule| rule.note.contains("pays from"),
         ),
         ("WRONG: answers with and without differ: ", &|rule| {
@@ -54,7 +57,7 @@ pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
         }),
         (
             "\nEstimated otherwise; the measured times decide: ",
-            &|rule| rule.confirmed == Some(false) && no(rule).is_none(),
+            &|rule| rule.confirmed == Some(false) && !rule.is_chosen && no(rule).is_none(),
         ),
     ];
     for (what, is_in) in lines {
@@ -217,18 +220,16 @@ fn rule_table(advice: &Advice) -> Table {
             };
             let finite = |x: f64| Some(x).filter(|x| x.is_finite());
             let shown = |ns| some(finite(ns), text::time);
+            let note = match rule.is_chosen && ratio < 1.0 {
+                true => "the choice above decides",
+                false => &rule.note,
+            };
             let ratio = match rule.is_tie {
                 true => "tie".to_owned(),
                 false => some(finite(ratio), |x| format!("{} x", significant(x))),
             };
             let feature = format!("  {}", rule.feature);
-            table.add_row([
-                feature,
-                shown(with),
-                shown(without),
-                ratio,
-                rule.note.clone(),
-            ]);
+            table.add_row([feature, shown(with), shown(without), ratio, note.to_owned()]);
         }
     }
     if !table.rows.is_empty() {

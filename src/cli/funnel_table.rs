@@ -45,6 +45,14 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         )));
     }
     blocks.push(Block::Table(stages(report, false)));
+    let may_lose = |row: &StageRow| {
+        let is_unproven = row.back_end.guarantee == Guarantee::Unproven;
+        is_unproven && row.back_end.stage == StageKind::Occlusion && (all || row.is_chosen)
+    };
+    let loss = report.stages.iter().any(may_lose).then(|| {
+        let line = "?: FN at these samples only; between them: precision --stage occlusion";
+        [Block::line(""), Block::line(line)]
+    });
     let both = |row: &&StageRow| row.is_chosen && row.back_end.does_object_stage;
     if let Some(row) = report.stages.iter().find(both) {
         let name = row.back_end.name;
@@ -56,6 +64,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         blocks.push(Block::heading("Every back end of every stage"));
         blocks.push(Block::Table(stages(report, true)));
     }
+    blocks.extend(loss.into_iter().flatten());
     // Not every scene has all of them.
     for (heading, table) in [
         ("Occluders: boxes that hide others", occluders(report)),
@@ -165,7 +174,7 @@ fn worth(gain: &Gain) -> String {
 fn saved_load(level: &Level) -> Option<String> {
     let time = level.saved_load?;
     let [lower, upper] = [time.lower?, time.upper?];
-    let others = text::counted(level.map_count - 1, "other map");
+    let others = text::counted(level.map_count - 1, "other level");
     Some(match lower > 0.0 {
         true => format!(
             "Decoding the {others} of the file takes {} of wall time, which the level stage saves.",

@@ -216,10 +216,16 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Locate(args) => query::locate(registry, &args),
         Command::Verify(args) => verify::verify(registry, &args),
         Command::Precision(args) => {
-            study::or_left_out(args.format, precision::precision(registry, &args))
+            let files = [&args.svg, &args.html];
+            study::or_left_out(args.format, &files, precision::precision(registry, &args))
         }
-        Command::Advise(args) => study::or_left_out(args.format, advise::advise(registry, &args)),
-        Command::Funnel(args) => study::or_left_out(args.format, funnel::funnel(registry, &args)),
+        Command::Advise(args) => {
+            study::or_left_out(args.format, &[], advise::advise(registry, &args))
+        }
+        Command::Funnel(args) => {
+            let files = [&args.csv, &args.svg, &args.html];
+            study::or_left_out(args.format, &files, funnel::funnel(registry, &args))
+        }
         Command::Drift(args) => drift::drift(&args),
         Command::Stress(args) => stress::stress(registry, &args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
@@ -346,6 +352,10 @@ fn expect_folder(option: &str, folder: Option<&Path>) -> anyhow::Result<()> {
     let Some(folder) = folder else {
         return Ok(());
     };
+    anyhow::ensure!(
+        folder != Path::new("-"),
+        "{option} is '-'; expected a folder, such as './-'"
+    );
     anyhow::ensure!(
         folder.is_dir() || !folder.exists(),
         "{}: not a folder; expected a folder for {option}",

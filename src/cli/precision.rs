@@ -236,12 +236,14 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
     let is_lossy = |point: &&SweepPoint| point.errors.false_negative_count > 0.0;
     let lossy = sweep.points.iter().filter(is_lossy);
     let told = format!(
-        "{} of {} points dropped visible items; {} of these have a guarantee. * On the Pareto \
-         front: no other point has fewer errors in these views, or is shown to be faster, and is \
-         as good in the rest.",
+        "{} of {} points dropped visible items{}. * On the Pareto front: no other point has fewer \
+         errors in these views, or is shown to be faster, and is as good in the rest.",
         lossy.clone().count(),
         sweep.points.len(),
-        lossy.filter(|point| is_guaranteed(point)).count()
+        match lossy.filter(|point| is_guaranteed(point)).count() {
+            0 => String::new(),
+            wrong => format!("; {wrong} of these with a guarantee"),
+        }
     );
     vec![
         Block::Line(title),

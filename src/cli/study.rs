@@ -3,7 +3,7 @@
 //! processes come together.
 
 use std::io::{self, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
@@ -92,8 +92,12 @@ impl Setting {
 #[error("{0}: left out: {NO_ITEMS}")]
 pub struct LeftOut(String);
 
-/// The ending of a study; prints why nothing was measured.
-pub fn or_left_out(format: TableFormat, ended: anyhow::Result<Ending>) -> anyhow::Result<Ending> {
+/// The ending of a study; prints why nothing was measured or written.
+pub fn or_left_out(
+    format: TableFormat,
+    files: &[&Option<PathBuf>],
+    ended: anyhow::Result<Ending>,
+) -> anyhow::Result<Ending> {
     let error = match ended {
         Err(error) => error,
         ended => return ended,
@@ -103,6 +107,9 @@ pub fn or_left_out(format: TableFormat, ended: anyhow::Result<Ending>) -> anyhow
     let document = json!({ "scene": scene, "status": Status::LeftOut, "reason": NO_ITEMS });
     let line = text::plain(&left_out.to_string());
     print(format, &document, || writeln!(io::stdout(), "{line}"))?;
+    for file in files.iter().filter_map(|file| file.as_ref()) {
+        tell(&format!("note: {}: not written", file.display()));
+    }
     Ok(Ending::Ok)
 }
 
@@ -141,7 +148,7 @@ impl Study {
         })
     }
 
-    /// Prints the amount of work, on a terminal or not, and how long the defaults take.
+    /// Prints the amount of work and how long the defaults take, on a terminal only.
     pub fn announce(&self, work: &str, by_default: &str) {
         let times = text::counted(self.processes as usize, "process");
         let line = format!(
@@ -150,7 +157,9 @@ impl Study {
         );
         self.bar.suspend(|| {
             tell_warnings();
-            tell(&line);
+            if !self.bar.is_hidden() {
+                tell(&line);
+            }
         });
     }
 

@@ -190,7 +190,7 @@ impl Table {
     /// The table with text in its last column wrapped.
     ///
     /// `None` if that is not needed or does not help.
-    fn wrapped_last(&self, width: usize) -> Option<Table> {
+    pub fn wrapped_last(&self, width: usize) -> Option<Table> {
         let widths = self.widths();
         let last = widths.len().checked_sub(1)?;
         let others: usize = widths[..last].iter().map(|own| own + GAP).sum();

@@ -284,17 +284,27 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
 fn of_gain(gain: &Gain) -> Option<String> {
     let what = format!("{} ({})", gain.stage.name(), gain.back_end);
     let unit = gain.unit.trim_end_matches('s');
-    let ns = gain.break_even;
-    match (ns.map(|ns| ns.value), ns.and_then(|ns| ns.lower)) {
+    let Some(Estimate {
+        value,
+        lower,
+        upper,
+    }) = gain.break_even
+    else {
+        let is_idle = gain.removed() <= 0.0 && gain.stage != StageKind::Fragment;
+        return is_idle.then(|| {
+            format!("{what} is not needed: it removes nothing that the other stages leave.")
+        });
+    };
+    // Within noise of saving time as well.
+    let within = match (lower, upper) {
+        (Some(0.0), Some(upper)) => format!(" (0 to {})", time(upper)),
+        _ => String::new(),
+    };
+    match value {
         _ if gain.stage == StageKind::Fragment => None,
-        (None, _) if gain.removed() <= 0.0 => Some(format!(
-            "{what} is not needed: it removes nothing that the other stages leave."
-        )),
-        (None, _) => None,
-        (Some(0.0), _) => Some(format!("Use {what}: it saves time as well.")),
-        (_, Some(0.0)) => Some(format!("Use {what}: it takes no more time than it saves.")),
-        (Some(ns), _) => Some(format!(
-            "Use {what} if drawing one {unit} takes more than {}.",
+        0.0 => Some(format!("Use {what}: it saves time as well.")),
+        ns => Some(format!(
+            "Use {what} if drawing one {unit} takes more than {}{within}.",
             time(ns)
         )),
     }
@@ -347,4 +357,34 @@ fn of_order(row: &OrderRow) -> impl Iterator<Item = String> {
         let views = counted(*views, "view");
         format!("Order {} may be wrong in {views}: {reason}.", row.name)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_makes_no_advice_unconditional() {
+        let advice = |value, lower, upper| {
+            let mut gain = Gain::new(
+                StageKind::Region,
+                ("portals", "items"),
+                [1.0, 2.0],
+                [vec![], vec![]],
+            );
+            gain.break_even = Some(Estimate {
+                value,
+                lower: Some(lower),
+                upper: Some(upper),
+            });
+            of_gain(&gain).expect("a sentence")
+        };
+        let wanted = "Use region (portals) if drawing one item takes more than 350 ns";
+        assert_eq!(
+            advice(350.0, 0.0, 734.0),
+            format!("{wanted} (0 to 734 ns).")
+        );
+        assert_eq!(advice(350.0, 300.0, 734.0), format!("{wanted}."));
+        assert!(advice(0.0, 0.0, 9.0).ends_with("saves time as well."));
+    }
 }

@@ -224,7 +224,7 @@ impl Errors {
         let clusters = |of: fn(&ViewCounts) -> [u64; 2]| -> Vec<[f64; 2]> {
             views.iter().map(|v| of(v).map(|n| n as f64)).collect()
         };
-        let share = |of| rate(&clusters(of));
+        let share = |of| rate(&clusters(of)).map(Rate::of_share);
         let streaks = views.split(|view| view.false_negatives == 0);
         let worst = views.iter().map(|v| v.worst_missing_samples).max();
         Errors {

@@ -158,6 +158,7 @@ pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
     let found = [
         rolled(scene, cameras),
         unstraight(cameras),
+        mirrored(cameras),
         far_outside(scene, cameras),
         blind(scene, cameras),
     ];
@@ -175,6 +176,17 @@ impl CameraPath {
 /// "2 of 8 cameras".
 fn share(part: usize, cameras: &[Camera]) -> String {
     format!("{part} of {}", counted(cameras.len(), "camera"))
+}
+
+/// Orthographic matrices of which the near end is not certain.
+fn mirrored(cameras: &[Camera]) -> Option<String> {
+    // Depths from 0 are refused where it matters.
+    let is_doubtful = |camera: &&Camera| camera.may_be_reversed() && camera.unprojected().is_ok();
+    let count = cameras.iter().filter(is_doubtful).count();
+    (count > 0).then(|| {
+        let what = share(count, cameras);
+        format!("{what} orthographic and mirrored; if depth is reversed, near and far are swapped")
+    })
 }
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.

@@ -41,9 +41,9 @@ pub struct Surfaces {
     pub triangles: Vec<[u32; 3]>,
     /// The triangles of each item: one range follows the other, without gaps.
     pub of_item: Vec<Range<u32>>,
-    /// Kind of each item.
+    /// Kind of each triangle.
     pub kinds: Vec<SurfaceKind>,
-    /// `true` for each item whose triangles are seen from both sides.
+    /// `true` for each triangle that is seen from both sides.
     pub two_sided: Vec<bool>,
     /// The points as a file states them, in the world; empty where `points` are exact.
     written: Vec<DVec3>,
@@ -123,9 +123,23 @@ impl Surfaces {
                 .iter()
                 .map(|corners| corners.map(|p| p - first))
                 .collect();
-            some.push(self.kinds[item], self.two_sided[item], points, &triangles);
+            some.push(SurfaceKind::Opaque, false, points, &triangles);
+            let own = self.range(item);
+            some.set_last(&self.kinds[own.clone()], &self.two_sided[own]);
         }
         some
+    }
+
+    /// The opaque, one-sided triangles of an item, as the only item.
+    pub(crate) fn solid_part(&self, item: usize) -> Surfaces {
+        let whole = self.some(&[item as ItemId]);
+        let facts = whole.kinds.iter().zip(&whole.two_sided);
+        let solid = whole.triangles.iter().zip(facts);
+        let solid = solid.filter(|(_, fact)| *fact == (&SurfaceKind::Opaque, &false));
+        let triangles: Vec<[u32; 3]> = solid.map(|(corners, _)| *corners).collect();
+        let mut part = Surfaces::about(self.origin);
+        part.push(SurfaceKind::Opaque, false, &whole.points, &triangles);
+        part
     }
 
     /// Appends the twelve triangles of a scene-local box as an item.
@@ -134,7 +148,7 @@ impl Surfaces {
         self.push(kind, two_sided, &corners, &BOX);
     }
 
-    /// Appends an item; `triangles` are indices into its own `points`.
+    /// Appends an item of one kind; `triangles` are indices into its own `points`.
     ///
     /// # Panics
     /// If an index is beyond `points`, or the sums do not fit u32.
@@ -157,8 +171,15 @@ impl Surfaces {
         }));
         let end = u32::try_from(self.triangles.len()).expect("triangles are counted in u32");
         self.of_item.push(start..end);
-        self.kinds.push(kind);
-        self.two_sided.push(two_sided);
+        self.kinds.resize(end as usize, kind);
+        self.two_sided.resize(end as usize, two_sided);
+    }
+
+    /// Sets the kind and sides of each of the last triangles.
+    pub(super) fn set_last(&mut self, kinds: &[SurfaceKind], two_sided: &[bool]) {
+        let first = self.kinds.len() - kinds.len();
+        self.kinds[first..].copy_from_slice(kinds);
+        self.two_sided[first..].copy_from_slice(two_sided);
     }
 
     /// Appends an item by its points in the world: all items of a surface or none.
@@ -191,6 +212,18 @@ impl Surfaces {
     /// The triangles of an item, as corners.
     pub fn of(&self, item: usize) -> impl Iterator<Item = [Vec3; 3]> {
         self.of_item[item].clone().map(|t| self.corners(t))
+    }
+
+    /// The triangles of an item, cut where kind or sides change.
+    pub(crate) fn runs(&self, item: usize) -> impl Iterator<Item = Range<u32>> {
+        let mut rest = self.of_item[item].clone();
+        let fact = |t: u32| (self.kinds[t as usize], self.two_sided[t as usize]);
+        std::iter::from_fn(move || {
+            let first = rest.start;
+            let end = rest.clone().find(|&t| fact(t) != fact(first));
+            rest.start = end.unwrap_or(rest.end);
+            (first < rest.start).then_some(first..rest.start)
+        })
     }
 
     /// The item that a triangle belongs to. O(log items).
@@ -280,7 +313,8 @@ impl Scene {
         let mut boxes = Vec::with_capacity(surfaces.triangles.len());
         for item in 0..surfaces.items() {
             for triangle in surfaces.of_item[item].clone() {
-                let (kind, two_sided) = (surfaces.kinds[item], surfaces.two_sided[item]);
+                let at = triangle as usize;
+                let (kind, two_sided) = (surfaces.kinds[at], surfaces.two_sided[at]);
                 single.push(kind, two_sided, &surfaces.corners(triangle), &[[0, 1, 2]]);
                 boxes.push(surfaces.world_box(&(triangle..triangle + 1)));
                 for (own, all) in labels.iter_mut().zip(&self.labels) {

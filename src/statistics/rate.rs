@@ -31,6 +31,15 @@ pub struct Rate {
 }
 
 impl Rate {
+    /// The same for units of which each has one event at most.
+    pub fn of_share(self) -> Rate {
+        Rate {
+            upper: self.upper.map(|x| x.min(1.0)),
+            elsewhere: self.elsewhere.map(|x| x.min(1.0)),
+            ..self
+        }
+    }
+
     /// The same for another number of units, such as a million.
     pub fn per(self, units: f64) -> Rate {
         let times = |x: Option<f64>| x.map(|x| x * units);
@@ -162,6 +171,8 @@ mod tests {
         assert_eq!((one.value, one.lower, one.upper), (0.25, None, None));
         assert_eq!(rate(&[[1.0, 0.0], [0.0, 0.0]]), None);
         assert_eq!(rate(&[]), None);
+        let share = rate(&[[0.0, 4.0], [3.0, 4.0]]).unwrap().of_share();
+        assert_eq!((share.upper, share.elsewhere), (Some(1.0), Some(1.0)));
         // Nothing seen, and clusters that are all alike: never nearer than 3/n.
         for events in [0.0, 1.0] {
             let alike = rate(&[[events, 10.0]; 30]).unwrap();

@@ -439,6 +439,11 @@ fn the_advice_fits_eighty_columns_and_the_evidence_is_asked_for() {
     ] {
         assert!(told.contains(part), "{part}: {told}");
     }
+    // Notes are wrapped before a column goes.
+    for (title, ratio) in [("Needed ", "gain"), ("Not needed ", "cost")] {
+        let head = told.lines().find(|line| line.starts_with(title));
+        assert!(head.is_some_and(|line| line.ends_with(ratio)), "{told}");
+    }
     // What is assumed stands in its line.
     let culling = told.lines().find(|line| line.contains("occlusion culling"));
     assert!(

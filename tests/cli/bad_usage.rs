@@ -211,6 +211,12 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
             "kept.csv: not a folder; expected a folder for --out",
         ),
         (run, "kept.csv/run", "kept.csv/run: Not a directory"),
+        (run, "-", "--out is '-' | expected a folder"),
+        (
+            "funnel --scene uniform:n=5 --path orbit:frames=2 --svg",
+            "-",
+            "--svg is '-' | expected a file",
+        ),
     ];
     for (command, out, wanted) in cases {
         all_refused(&folder, &[format!("{command} {out}")], wanted);

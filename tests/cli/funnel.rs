@@ -306,7 +306,13 @@ fn the_chain_is_shown_and_the_rest_is_asked_for() {
         chain.contains("200 items; 8 of 32 views of 32 x 18 samples"),
         "{chain}"
     );
-    let rest = ["masked?", "Draw orders", "Picking", "Lower bounds"];
+    let rest = [
+        "masked?",
+        "?: FN at these samples only",
+        "Draw orders",
+        "Picking",
+        "Lower bounds",
+    ];
     for name in rest {
         assert!(!chain.contains(&format!("{name} ")) && !chain.contains(&format!("{name}:")));
     }

@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use serde_json::json;
+
 use super::FULL_CAMERA;
 use super::process::*;
 
@@ -101,6 +103,124 @@ fn its_triangles_and_cameras_reach_the_later_stages() {
             turned()
         ),
     );
+}
+
+type Triangles = Vec<[[f32; 3]; 3]>;
+
+/// A rectangle across x that faces the eye at the origin.
+fn pane(x: f32, [low, high]: [[f32; 2]; 2]) -> Triangles {
+    let [a, c] = [low, high].map(|[y, z]| [x, y, z]);
+    let [b, d] = [[high[0], low[1]], [low[0], high[1]]].map(|[y, z]| [x, y, z]);
+    vec![[a, c, b], [a, d, c]]
+}
+
+/// A closed box.
+fn boxed(low: [f32; 3], high: [f32; 3]) -> Triangles {
+    let corner = |bits: usize| std::array::from_fn(|k| [low, high][bits >> k & 1][k]);
+    let mut all = Vec::new();
+    for axis in 0..3 {
+        let (k, u, v) = (1 << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+        all.extend([
+            [k, k | u, k | u | v],
+            [k, k | u | v, k | v],
+            [0, u | v, u],
+            [0, v, u | v],
+        ]);
+    }
+    all.into_iter().map(|corners| corners.map(corner)).collect()
+}
+
+/// A file of meshes, each of primitives with a material; the second text is its bytes.
+fn of_primitives(meshes: &[&[(Triangles, usize)]]) -> (String, Vec<u8>) {
+    let (mut bytes, mut views, mut accessors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut add = |own: Vec<u8>, kind: &str, component: u32, count: usize| {
+        views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": own.len()}));
+        bytes.extend(own);
+        accessors.push(
+            json!({"bufferView": views.len() - 1, "componentType": component,
+            "count": count, "type": kind}),
+        );
+        accessors.len() - 1
+    };
+    let meshes = meshes.iter().map(|primitives| {
+        let primitives = primitives.iter().map(|(triangles, material)| {
+            let mut points: Vec<[f32; 3]> = Vec::new();
+            let mut indices = Vec::new();
+            for p in triangles.as_flattened() {
+                let known = points.iter().position(|own| own == p);
+                indices.push(known.unwrap_or(points.len()) as u32);
+                points.extend(known.is_none().then_some(*p));
+            }
+            let written = points.as_flattened().iter().flat_map(|x| x.to_le_bytes());
+            let written = add(written.collect(), "VEC3", 5126, points.len());
+            let order = indices.iter().flat_map(|x| x.to_le_bytes()).collect();
+            let order = add(order, "SCALAR", 5125, indices.len());
+            json!({"attributes": {"POSITION": written}, "indices": order, "material": material})
+        });
+        json!({"primitives": primitives.collect::<Vec<_>>()})
+    });
+    let meshes: Vec<_> = meshes.collect();
+    let nodes: Vec<_> = (0..meshes.len())
+        .map(|mesh| json!({"mesh": mesh}))
+        .collect();
+    let file = json!({
+        "asset": {"version": "2.0"}, "nodes": nodes, "meshes": meshes,
+        "materials": [{}, {"alphaMode": "BLEND"}, {"doubleSided": true}],
+        "accessors": accessors, "bufferViews": views,
+        "buffers": [{"uri": "b.bin", "byteLength": bytes.len()}],
+    });
+    (file.to_string(), bytes)
+}
+
+/// Panes beside a wall or on a house decide nothing about the wall or the house.
+#[test]
+fn a_material_is_that_of_its_primitive_at_every_stage() {
+    let thing = || (boxed([8.0, -1.0, -1.0], [9.0, 1.0, 1.0]), 0);
+    let wall = || pane(5.0, [[-4.0, -6.0], [4.0, 6.0]]);
+    let aside = || pane(4.0, [[3.0, 3.0], [3.5, 3.5]]);
+    let back = wall().into_iter().map(|[a, b, c]| [a, c, b]).collect();
+    let house = boxed([5.0, -4.0, -6.0], [6.0, 4.0, 6.0]);
+    let on_it = pane(4.99, [[-0.5, -0.5], [0.5, 0.5]]);
+    let camera = format!("{FULL_CAMERA}\n0,0.1,0.2,10,0.1,0.2,0,1,0,60,1.5,0.1,100\n");
+    for (what, first, covered, boxed_count) in [
+        ("back and two-sided pane", [(back, 0), (aside(), 2)], 49, 1),
+        (
+            "wall and BLEND pane",
+            [(wall(), 0), (aside(), 1)],
+            48 * 32,
+            1,
+        ),
+        ("house with a pane", [(house, 0), (on_it, 1)], 48 * 32, 2),
+    ] {
+        let (file, bytes) = of_primitives(&[&first, &[thing()]]);
+        let files: [(&str, &[u8]); 3] = [
+            ("m.gltf", file.as_bytes()),
+            ("b.bin", &bytes),
+            ("c.csv", camera.as_bytes()),
+        ];
+        let folder = folder(&files);
+        for items in ["objects", "triangles"] {
+            let line = format!(
+                "funnel --scene m.gltf --path c.csv --samples 48x32 --processes 1 --format json \
+                 --items {items}"
+            );
+            let report = json(&works(folder.path(), &line));
+            for row in array(&report, "stages") {
+                let counts = ["truth_count", "false_negative_count"].map(|name| &row[name]);
+                if items == "objects" && row["unit"] == "items" {
+                    assert_eq!(counts, [1.0, 0.0], "{what}: {row}");
+                }
+                let found = &row["fragments"]["covered_count"];
+                assert!(
+                    found.is_null() || *found == f64::from(covered),
+                    "{what}: {row}"
+                );
+            }
+            if items == "objects" {
+                assert_eq!(report["inner_boxes"]["boxed_count"], boxed_count, "{what}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -287,6 +287,10 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
         let document = json(&works(folder.path(), &format!("{line} --format json")));
         assert_eq!(document["status"], "left_out", "{study}");
     }
+    let line = "funnel --scene none.csv --path outside:frames=1 --csv t --svg t.svg";
+    let done = cullbench(folder.path(), line);
+    let notes = "note: t: not written\nnote: t.svg: not written\n";
+    assert_eq!((done.code, done.err.as_str()), (Some(0), notes));
     let table = works(
         folder.path(),
         &format!("run --scene one.csv --structure linear {run} one"),

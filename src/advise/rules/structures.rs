@@ -7,7 +7,7 @@ use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::drift::rotations;
 use crate::measure::{Stopwatch, input_of, move_share};
-use crate::shown::significant;
+use crate::shown::{counted, significant};
 use crate::statistics::Estimate;
 
 /// The index itself: below some number of items a scan is as fast.
@@ -121,19 +121,19 @@ pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
         let slower = queries * (check.left_out_ns - check.kept_ns);
         let kept = rebuild_ns + queries * check.kept_ns;
         let left_out = refit_ns + queries * check.left_out_ns;
+        let many = match queries {
+            1.0 => "1 query".to_owned(),
+            more => format!("{more} queries"),
+        };
         let reason = format!(
-            "{count} items moved by their own size ({} %), {queries} queries an update: refit {:.0} us, \
-             rebuild {:.0} us",
+            "{} moved by their own size ({} %), {many} an update: refit {:.0} us, rebuild {:.0} us",
+            counted(count, "item"),
             share * 100.0,
             refit_ns / 1e3,
             rebuild_ns / 1e3
         );
         Finding::new(slower, rebuild_ns - refit_ns, reason)
-            .noted(format!(
-                "{} % moved, {queries} {} each",
-                share * 100.0,
-                if queries == 1.0 { "query" } else { "queries" }
-            ))
+            .noted(format!("{} % moved, {many} each", share * 100.0))
             .costing([kept, left_out])
     });
     draft.once = Some(trials.once_ns.len());
@@ -177,14 +177,15 @@ pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
         let ([left_out_ns, kept_ns], Some(ratio)) = (facts.once_ns, &facts.once_ratio) else {
             return finding;
         };
+        let many = counted(steps as usize, "step");
         finding.reason = format!(
-            "{steps} steps of {DRIFT:.0e}; walked: {left_out_error} uncorrected at {left_out_ns:.0} ns a step, \
+            "{many} of {DRIFT:.0e}; walked: {left_out_error} uncorrected at {left_out_ns:.0} ns a step, \
              {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns ({}); a tenth of \
              {tolerance:.0e} is used up after some {:.0} steps",
             dearer(ratio),
             tolerance * MUCH_LESS / DRIFT
         );
-        finding.note = format!("{steps} steps drift {left_out_error} rad");
+        finding.note = format!("{many}: drift of {left_out_error} rad");
         finding.cost_ns = Some([kept_ns, left_out_ns]);
         let ends = ratio.lower.zip(ratio.upper);
         finding.is_tie = ends.map(|(lower, upper)| lower <= 1.0 && 1.0 <= upper);

@@ -13,16 +13,15 @@ use crate::scene::SurfaceKind;
 use crate::shown::shortened;
 
 /// The triangles of a mesh, or why it has none that can be read.
-pub struct Mesh {
-    pub plain: Result<Triangles, String>,
-    pub kind: SurfaceKind,
-    pub two_sided: bool,
-}
+pub type Mesh = Result<Triangles, String>;
 
 #[derive(Default)]
 pub struct Triangles {
     pub points: Vec<DVec3>,
     pub corners: Vec<[u32; 3]>,
+    /// Of each triangle, by the material of its primitive; so are its sides.
+    pub kinds: Vec<SurfaceKind>,
+    pub two_sided: Vec<bool>,
 }
 
 impl File<'_> {
@@ -44,26 +43,24 @@ impl File<'_> {
     pub fn mesh(&self, index: usize) -> Result<Mesh, InputError> {
         let mesh = &self.root.meshes[index];
         let mut all = Ok(Triangles::default());
-        let (mut kind, mut two_sided) = (SurfaceKind::Opaque, false);
         for (place, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("meshes[{index}].primitives[{place}]");
             let Some(positions) = positions(primitive) else {
                 continue;
             };
+            let (mut kind, mut two_sided) = (SurfaceKind::Opaque, false);
             if let Some(material) = primitive.material {
                 let material = self.get(&self.root.materials, material, &place)?;
-                two_sided |= material.double_sided;
+                two_sided = material.double_sided;
                 let extensions = material.extensions.as_ref();
                 let is_glass =
                     extensions.is_some_and(|e| e.others.contains_key("KHR_materials_transmission"));
-                match material.alpha_mode {
-                    _ if is_glass => kind = SurfaceKind::Clear,
-                    Checked::Valid(AlphaMode::Blend) => kind = SurfaceKind::Clear,
-                    Checked::Valid(AlphaMode::Mask) if kind == SurfaceKind::Opaque => {
-                        kind = SurfaceKind::CutOut;
-                    }
-                    _ => {}
-                }
+                kind = match material.alpha_mode {
+                    _ if is_glass => SurfaceKind::Clear,
+                    Checked::Valid(AlphaMode::Blend) => SurfaceKind::Clear,
+                    Checked::Valid(AlphaMode::Mask) => SurfaceKind::CutOut,
+                    _ => SurfaceKind::Opaque,
+                };
             }
             let own = self.primitive(primitive, positions, &place)?;
             match (&mut all, own) {
@@ -73,20 +70,17 @@ impl File<'_> {
                     let corners = own.corners.into_iter();
                     all.corners
                         .extend(corners.map(|c| c.map(|corner| first.saturating_add(corner))));
+                    all.kinds.resize(all.corners.len(), kind);
+                    all.two_sided.resize(all.corners.len(), two_sided);
                 }
                 (Ok(_), Err(reason)) => all = Err(reason),
                 _ => {}
             }
         }
-        let plain = all.and_then(|all| match all.corners.is_empty() {
+        Ok(all.and_then(|all| match all.corners.is_empty() {
             true => Err("has no triangles".to_owned()),
             false => Ok(all),
-        });
-        Ok(Mesh {
-            plain,
-            kind,
-            two_sided,
-        })
+        }))
     }
 
     fn primitive(
@@ -94,7 +88,7 @@ impl File<'_> {
         primitive: &Primitive,
         positions: Index<Accessor>,
         place: &str,
-    ) -> Result<Result<Triangles, String>, InputError> {
+    ) -> Result<Mesh, InputError> {
         let extensions = primitive.extensions.as_ref();
         if let Some(name) =
             extensions.and_then(|e| e.others.keys().find(|n| n.contains("compression")))
@@ -140,7 +134,11 @@ impl File<'_> {
             }
             _ => return Ok(Err("has points or lines".to_owned())),
         };
-        Ok(Ok(Triangles { points, corners }))
+        Ok(Ok(Triangles {
+            points,
+            corners,
+            ..Triangles::default()
+        }))
     }
 }
 

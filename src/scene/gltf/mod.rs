@@ -24,7 +24,8 @@ pub use self::file::{Beside, beside};
 use self::file::{File, component, normalised};
 use self::mesh::{Mesh, Triangles, positions};
 use super::{
-    CameraPlace, Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory,
+    CameraPlace, Labels, LoadOptions, Scene, SurfaceKind, Surfaces, UpAxis, WorldBox,
+    choose_origin, memory,
 };
 use crate::input::{InputError, note};
 use crate::shown::counted;
@@ -90,7 +91,7 @@ pub(super) fn read_beside(
         let node = file.root.nodes[item.node].name.as_deref();
         labels.push(node.unwrap_or_default());
     }
-    let reason = |mesh: usize| Some((mesh, meshes[mesh].plain.as_ref().err()?));
+    let reason = |mesh: usize| Some((mesh, meshes[mesh].as_ref().err()?));
     let unplain = placed.iter().find_map(|item| reason(item.mesh));
     let scene = match unplain {
         None if placed.is_empty() => Scene::from_boxes(name, &[])?,
@@ -245,7 +246,7 @@ impl File<'_> {
         name: &str,
         options: &LoadOptions,
     ) -> Result<Scene, InputError> {
-        let plain = |item: &Placed| meshes[item.mesh].plain.as_ref().expect("plain meshes");
+        let plain = |item: &Placed| meshes[item.mesh].as_ref().expect("plain meshes");
         let count = |of: fn(&Triangles) -> usize| placed.iter().map(|i| of(plain(i)) as u64).sum();
         let (triangles, points): (u64, u64) =
             (count(|t| t.corners.len()), count(|t| t.points.len()));
@@ -264,12 +265,13 @@ impl File<'_> {
         });
         let mut surfaces = Surfaces::about(choose_origin(corners));
         for item in placed {
-            let mesh = &meshes[item.mesh];
-            let mut corners = plain(item).corners.clone();
+            let mesh = plain(item);
+            let mut corners = mesh.corners.clone();
             if item.world.matrix3.determinant() < 0.0 {
                 corners.iter_mut().for_each(|corners| corners.swap(1, 2));
             }
-            surfaces.push_written(mesh.kind, mesh.two_sided, &world(item), &corners);
+            surfaces.push_written(SurfaceKind::Opaque, false, &world(item), &corners);
+            surfaces.set_last(&mesh.kinds, &mesh.two_sided);
         }
         surfaces.into_scene(name)
     }

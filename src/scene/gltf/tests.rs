@@ -328,7 +328,41 @@ fn glass_is_clear() {
     let transmission = json!({"KHR_materials_transmission": {"transmissionFactor": 1}});
     glass["materials"][0] = json!({"extensions": transmission});
     let surfaces = read(&glass).unwrap().surfaces.expect("triangles");
-    assert_eq!(surfaces.kinds, [SurfaceKind::Clear; 2]);
+    assert_eq!(surfaces.kinds, [SurfaceKind::Clear; 8]);
+}
+
+#[test]
+fn each_triangle_has_the_material_of_its_primitive() {
+    let mut file = file();
+    file["materials"] =
+        json!([{"alphaMode": "MASK"}, {"doubleSided": true}, {"alphaMode": "BLEND"}]);
+    let primitive = &file["meshes"][0]["primitives"][0];
+    let all = [Some(1), Some(0), None, Some(2)].map(|material| {
+        let mut own = primitive.clone();
+        own["material"] = json!(material);
+        own
+    });
+    file["meshes"][0]["primitives"] = json!(all);
+    let scene = read(&file).unwrap();
+    let single = scene.clone().by_triangle(&LoadOptions::default()).unwrap();
+    let alone = scene.surfaces.as_ref().expect("triangles").some(&[1]);
+    for surfaces in [scene.surfaces, single.surfaces, Some(alone.into())] {
+        let surfaces = surfaces.expect("triangles");
+        let (kinds, two_sided) = (surfaces.kinds.chunks(4), surfaces.two_sided.chunks(4));
+        let facts = kinds.zip(two_sided).zip((0..4).cycle());
+        for ((kinds, two_sided), primitive) in facts {
+            let kind = [
+                SurfaceKind::Opaque,
+                SurfaceKind::CutOut,
+                SurfaceKind::Opaque,
+                SurfaceKind::Clear,
+            ][primitive];
+            assert_eq!(
+                (kinds, two_sided),
+                (&[kind; 4][..], &[primitive == 0; 4][..])
+            );
+        }
+    }
 }
 
 #[test]

@@ -113,7 +113,7 @@ mod tests {
             for item in 0..surfaces.items() {
                 // Ground is open, and so are the cards of bushes.
                 let is_tile = surfaces.of_item[item].len() == ground::TILE;
-                let is_bush = surfaces.kinds[item] == SurfaceKind::CutOut;
+                let is_bush = surfaces.kinds[surfaces.range(item).start] == SurfaceKind::CutOut;
                 if !is_tile && !is_bush {
                     assert_eq!(surfaces.open_edges(item), 0, "{} {item}", mesh.name);
                     assert!(surfaces.volume(item) > 0.0, "{} {item}", mesh.name);

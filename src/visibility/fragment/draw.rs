@@ -280,10 +280,9 @@ impl Drawn<Facet> {
     ) {
         self.clear();
         for opaque in [true, false] {
-            let facets = triangles.iter().map(|&triangle| {
-                let item = surfaces.item_of(triangle);
-                Facet::of(surfaces, item, surfaces.corners(triangle))
-            });
+            let facets = triangles
+                .iter()
+                .map(|&triangle| Facet::of(surfaces, surfaces.item_of(triangle), triangle));
             let facets = facets.filter(|facet| facet.hides == opaque);
             self.draw(canvas, facets, &Tests::default());
         }

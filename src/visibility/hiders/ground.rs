@@ -66,7 +66,8 @@ impl Ground {
         let up = scene.up;
         let of_item = |item| surfaces.of(item).map(|t| t.map(|p| up.to_z_up(p) + 0.0));
         let items = (0..surfaces.items()).filter(|&item| {
-            surfaces.kinds[item] == SurfaceKind::Opaque
+            let mut kinds = surfaces.kinds[surfaces.range(item)].iter();
+            kinds.all(|&kind| kind == SurfaceKind::Opaque)
                 && !surfaces.of_item[item].is_empty()
                 && of_item(item).all(faces_up)
         });

@@ -17,7 +17,7 @@ use super::inscribed::cells::Grid;
 use crate::arithmetic::Expansion;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
-use crate::scene::{SurfaceKind, Surfaces, WorldBox, volume_within};
+use crate::scene::{Surfaces, WorldBox, volume_within};
 use crate::threads;
 use crate::visibility::region::without;
 use crate::visibility::triangle::{Eye, faces, normal};
@@ -31,9 +31,11 @@ pub struct Inscribed {
     /// Scene-local, those that add most first; they overlap. The open inside of none
     /// holds a point of the piece of the surface that it is inside of.
     pub boxes: Vec<Aabb>,
-    /// Volume of the boxes over that of the mesh, 1 less the loss; where pieces
-    /// overlap, both count.
+    /// Volume of the boxes over `volume`, 1 less the loss; where pieces overlap, both
+    /// count.
     pub share: f64,
+    /// Volume of the opaque, one-sided triangles.
+    pub volume: f64,
 }
 
 /// Cells of the grid along each axis, by default.
@@ -53,33 +55,37 @@ const TRIES: usize = 4;
 
 /// Large axis-parallel boxes inside an item: of whole cells, by a grid of `cells`
 /// (4 to 64) along each axis of each of its pieces; of all these the `most` (up to
-/// [`MOST_BOXES`]) that add most. `None` for an item that is not opaque, one-sided and
-/// closed, or where no box was found. O(t + cells⁴), both for each box.
+/// [`MOST_BOXES`]) that add most. Counts opaque, one-sided triangles only; `None` where
+/// these are not closed, or no box was found. O(t + cells⁴), both for each box.
 pub fn inscribed_boxes(
     surfaces: &Surfaces,
     item: usize,
     cells: usize,
     most: usize,
 ) -> Option<Inscribed> {
-    let is_solid = surfaces.kinds[item] == SurfaceKind::Opaque && !surfaces.two_sided[item];
-    if !is_solid || surfaces.of_item[item].is_empty() || surfaces.open_edges(item) != 0 {
+    let solid = surfaces.solid_part(item);
+    if solid.triangles.is_empty() || solid.open_edges(0) != 0 {
         return None;
     }
     let most = most.min(MOST_BOXES);
-    let whole = surfaces.volume(item);
-    let least = whole * LEAST_GAIN;
+    let volume = solid.volume(0);
+    let least = volume * LEAST_GAIN;
     // A box adds no more than its piece has.
     let large = |part: &&Vec<[Vec3; 3]>| volume_within(part.iter().copied()) >= least;
-    let mut found: Vec<(f64, Aabb)> = parts(surfaces, item)
+    let mut found: Vec<(f64, Aabb)> = parts(&solid)
         .iter()
         .filter(large)
         .flat_map(|part| boxes_in(part, cells.clamp(4, 64), most, least))
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.truncate(most);
-    let share = found.iter().map(|(gain, _)| gain).sum::<f64>() / whole;
+    let share = found.iter().map(|(gain, _)| gain).sum::<f64>() / volume;
     let boxes: Vec<Aabb> = found.into_iter().map(|(_, b)| b).collect();
-    (!boxes.is_empty()).then_some(Inscribed { boxes, share })
+    (!boxes.is_empty()).then_some(Inscribed {
+        boxes,
+        share,
+        volume,
+    })
 }
 
 /// Boxes in a closed surface in one piece, each with the volume it adds.
@@ -126,14 +132,12 @@ fn volume(b: &WorldBox) -> f64 {
     size.x * size.y * size.z
 }
 
-/// The triangles of an item, apart where they have no point in common: pieces of a
+/// The triangles of an only item, apart where they have no point in common: pieces of a
 /// closed surface are closed, and may overlap.
-fn parts(surfaces: &Surfaces, item: usize) -> Vec<Vec<[Vec3; 3]>> {
-    let triangles = &surfaces.triangles[surfaces.range(item)];
-    let points = triangles.iter().flatten().copied();
-    let (low, high) = points.fold((u32::MAX, 0), |(low, high), p| (low.min(p), high.max(p)));
+fn parts(surfaces: &Surfaces) -> Vec<Vec<[Vec3; 3]>> {
+    let triangles = &surfaces.triangles;
     // Union and find by halving paths; the lowest point stands for its piece.
-    let mut parent: Vec<u32> = (0..=high - low).collect();
+    let mut parent: Vec<u32> = (0..surfaces.points.len() as u32).collect();
     fn root(parent: &mut [u32], mut at: u32) -> u32 {
         while parent[at as usize] != at {
             parent[at as usize] = parent[parent[at as usize] as usize];
@@ -143,13 +147,13 @@ fn parts(surfaces: &Surfaces, item: usize) -> Vec<Vec<[Vec3; 3]>> {
     }
     for [a, b, c] in triangles {
         for other in [b, c] {
-            let [a, b] = [a, other].map(|p| root(&mut parent, p - low));
+            let [a, b] = [a, other].map(|p| root(&mut parent, *p));
             parent[a.max(b) as usize] = a.min(b);
         }
     }
     let mut parts: BTreeMap<u32, Vec<[Vec3; 3]>> = BTreeMap::new();
     for corners in triangles {
-        let piece = root(&mut parent, corners[0] - low);
+        let piece = root(&mut parent, corners[0]);
         let corners = corners.map(|p| surfaces.points[p as usize]);
         parts.entry(piece).or_default().push(corners);
     }
@@ -204,9 +208,8 @@ impl InnerBoxes {
         let [mut inner, mut whole] = [0.0, 0.0];
         for (item, found) in (0..).zip(&found) {
             let Some(found) = found else { continue };
-            let own = surfaces.volume(item as usize);
-            inner += found.share * own;
-            whole += own;
+            inner += found.share * found.volume;
+            whole += found.volume;
             boxed_count += 1;
             boxes.extend(found.boxes.iter().map(|b| (item, *b)));
         }
@@ -328,11 +331,12 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Family, SeededRng, load};
+    use crate::scene::{Family, SeededRng, SurfaceKind, load};
 
     /// Returns `true` if the open box is inside one piece of a closed item, exactly.
     fn is_inside(surfaces: &Surfaces, item: usize, inner: &Aabb) -> bool {
-        parts(surfaces, item).iter().any(|part| is_in(part, inner))
+        let parts = parts(&surfaces.solid_part(item));
+        parts.iter().any(|part| is_in(part, inner))
     }
 
     fn mesh(name: &str, triangles: usize) -> Surfaces {
@@ -423,6 +427,28 @@ mod tests {
         assert!(share > 0.2 && share < 1.0, "{share}");
         let ground = InnerBoxes::of(&mesh("terrain", 2000), CELLS, BOXES, 1).row;
         assert_eq!((ground.boxed_count, ground.volume_share), (0, None));
+    }
+
+    #[test]
+    fn a_pane_on_a_house_takes_none_of_its_boxes() {
+        let mut house = Surfaces::about(DVec3::ZERO);
+        let walls = Aabb::new(Vec3::ZERO, Vec3::splat(4.0));
+        house.push_box(SurfaceKind::Opaque, false, &walls);
+        let whole = inscribed_boxes(&house, 0, 8, 1);
+        assert_eq!(whole.as_ref().unwrap().volume, 64.0);
+        // The first two triangles once more, of glass.
+        house.triangles.extend_from_within(..2);
+        house.of_item[0].end += 2;
+        house.kinds.extend([SurfaceKind::Clear; 2]);
+        house.two_sided.extend([true; 2]);
+        assert_eq!(inscribed_boxes(&house, 0, 8, 1), whole);
+        assert_eq!(
+            InnerBoxes::of(&house, 8, 1, 1).row.volume_share,
+            Some(whole.unwrap().share)
+        );
+        // A wall of glass leaves the house open.
+        house.kinds[0] = SurfaceKind::Clear;
+        assert_eq!(inscribed_boxes(&house, 0, 8, 1), None);
     }
 
     #[test]

@@ -1,4 +1,5 @@
 //! Clusters: at most 64 neighbouring triangles of an item, a bit of a word each.
+//! All of a cluster are of one kind and alike in sides.
 //!
 //! Grown greedily over common edges, along the Morton curve (as Kapoulkine's meshoptimizer
 //! grows meshlets). Deterministic.
@@ -40,7 +41,9 @@ impl Clusters {
         let mut clusters = Clusters::none_of(&surfaces, most);
         for item in 0..surfaces.items() {
             let first = clusters.len() as u32;
-            grow(&surfaces, item, most, &mut clusters);
+            for run in surfaces.runs(item) {
+                grow(&surfaces, run, most, &mut clusters);
+            }
             clusters.of_item.push(first..clusters.len() as u32);
         }
         clusters
@@ -59,11 +62,11 @@ impl Clusters {
             .extend(0..surfaces.triangles.len() as u32);
         for item in 0..surfaces.items() {
             let first = clusters.len() as u32;
-            let own = surfaces.of_item[item].clone();
-            // Each ends where the next one starts; of nothing there is none.
-            let ends = own.clone().step_by(most).skip(1);
-            let last = (!own.is_empty()).then_some(own.end);
-            clusters.starts.extend(ends.chain(last));
+            for run in surfaces.runs(item) {
+                // Each ends where the next one starts.
+                let ends = run.clone().step_by(most).skip(1);
+                clusters.starts.extend(ends.chain([run.end]));
+            }
             clusters.of_item.push(first..clusters.len() as u32);
         }
         clusters
@@ -112,8 +115,7 @@ impl Clusters {
 
     /// Returns `true` if the triangles of a cluster are seen from both sides.
     pub fn is_two_sided(&self, cluster: usize) -> bool {
-        let triangle = self.triangles_of(cluster)[0];
-        self.surfaces.two_sided[self.surfaces.item_of(triangle)]
+        self.surfaces.two_sided[self.triangles_of(cluster)[0] as usize]
     }
 
     /// Exact: returns `true` if a triangle has two sides or the eye sees its front.
@@ -135,10 +137,11 @@ struct Node {
     is_used: bool,
 }
 
-fn grow(surfaces: &Surfaces, item: usize, most: usize, out: &mut Clusters) {
-    let first = surfaces.of_item[item].start;
-    let mut nodes = nodes(surfaces, item);
-    let order = along_the_curve(&nodes, &surfaces.bounds(item));
+fn grow(surfaces: &Surfaces, run: Range<u32>, most: usize, out: &mut Clusters) {
+    let first = run.start;
+    let bounds = Aabb::of_points(run.clone().flat_map(|t| surfaces.corners(t)));
+    let mut nodes = nodes(surfaces, run);
+    let order = along_the_curve(&nodes, &bounds);
     let mut seeds = order.into_iter();
     let mut frontier: Vec<u32> = Vec::new();
     while let Some(seed) = seeds.find(|&seed| !nodes[seed as usize].is_used) {
@@ -177,9 +180,10 @@ fn grow(surfaces: &Surfaces, item: usize, most: usize, out: &mut Clusters) {
     }
 }
 
-fn nodes(surfaces: &Surfaces, item: usize) -> Vec<Node> {
-    let mut nodes: Vec<Node> = surfaces
-        .of(item)
+fn nodes(surfaces: &Surfaces, run: Range<u32>) -> Vec<Node> {
+    let mut nodes: Vec<Node> = run
+        .clone()
+        .map(|t| surfaces.corners(t))
         .map(|corners| Node {
             centre: each(corners, |p: Vec3| p.as_dvec3()).iter().sum::<DVec3>() / 3.0,
             normal: normal(corners).normalize_or_zero(),
@@ -188,7 +192,8 @@ fn nodes(surfaces: &Surfaces, item: usize) -> Vec<Node> {
         })
         .collect();
     let mut edges: Vec<(u64, u32)> = Vec::with_capacity(3 * nodes.len());
-    for (index, t) in surfaces.triangles[surfaces.range(item)].iter().enumerate() {
+    let triangles = &surfaces.triangles[run.start as usize..run.end as usize];
+    for (index, t) in triangles.iter().enumerate() {
         for k in 0..3 {
             let (a, b) = (t[k], t[(k + 1) % 3]);
             let key = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
@@ -288,14 +293,26 @@ mod tests {
         let mut surfaces = Surfaces::from_boxes(&scene);
         let whole = surfaces.of_item[1].clone();
         surfaces.of_item.insert(1, whole.start..whole.start);
-        surfaces.kinds.push(SurfaceKind::Opaque);
-        surfaces.two_sided.push(false);
         for clusters in
             [Clusters::as_listed, Clusters::of].map(|make| make(surfaces.clone().into(), 2))
         {
             assert!(clusters.of_item[1].is_empty());
             assert!((0..clusters.len()).all(|cluster| !clusters.triangles_of(cluster).is_empty()));
             assert_eq!(clusters.one_sided().count(), clusters.len());
+        }
+    }
+
+    #[test]
+    fn a_cluster_is_of_one_kind_and_alike_in_sides() {
+        let scene = crate::scene::load("city:n=2", &Default::default()).unwrap();
+        let mut surfaces = Surfaces::from_boxes(&scene);
+        surfaces.two_sided[4] = true;
+        surfaces.kinds[20..].fill(SurfaceKind::Clear);
+        for make in [Clusters::as_listed, Clusters::of] {
+            let clusters = make(surfaces.clone().into(), 64);
+            assert_eq!(clusters.starts, [0, 4, 5, 12, 20, 24]);
+            assert_eq!(clusters.of_item, [0..3, 3..5]);
+            assert_eq!(clusters.one_sided().count(), 4);
         }
     }
 

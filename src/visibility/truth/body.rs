@@ -86,12 +86,12 @@ pub struct Facet {
 
 impl Facet {
     /// A triangle of an item of surfaces; an opaque one hides what is behind it.
-    pub fn of(surfaces: &Surfaces, item: usize, corners: [Vec3; 3]) -> Facet {
+    pub fn of(surfaces: &Surfaces, item: usize, triangle: u32) -> Facet {
         Facet {
-            corners,
+            corners: surfaces.corners(triangle),
             item: item as ItemId,
-            two_sided: surfaces.two_sided[item],
-            hides: surfaces.kinds[item] == SurfaceKind::Opaque,
+            two_sided: surfaces.two_sided[triangle as usize],
+            hides: surfaces.kinds[triangle as usize] == SurfaceKind::Opaque,
         }
     }
 }
@@ -161,8 +161,8 @@ impl Facets {
     /// All triangles of surfaces; opaque ones hide what is behind them.
     pub fn of(surfaces: &Surfaces) -> Facets {
         let of_item = |item: usize| {
-            let corners = surfaces.of(item);
-            corners.map(move |corners| Facet::of(surfaces, item, corners))
+            let own = surfaces.of_item[item].clone();
+            own.map(move |triangle| Facet::of(surfaces, item, triangle))
         };
         let all: Vec<Facet> = (0..surfaces.items()).flat_map(of_item).collect();
         Bodies {

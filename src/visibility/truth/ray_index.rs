@@ -42,7 +42,8 @@ pub struct Front<At> {
     ///
     /// Several are a tie. Empty if the ray meets none from near to far.
     pub front: Vec<ItemId>,
-    /// Items that hide nothing and are met before these or with them, ascending.
+    /// Others of which a triangle that hides nothing is met before these or with them,
+    /// ascending.
     pub before: Vec<ItemId>,
     /// Point where the ray meets the front items.
     pub meeting: Option<At>,
@@ -277,6 +278,7 @@ impl<At: Copy> Search<At> {
             items.sort_unstable();
             items.dedup();
         }
+        self.before.retain(|item| !self.front.contains(item));
         best
     }
 }

@@ -151,15 +151,15 @@ impl PartitionOrder {
         let mut fallen: Vec<Vec<Fallen>> = Vec::new();
         fallen.resize_with(2 * planes.nodes.len().max(1), Vec::new);
         for item in 0..surfaces.items() {
-            for corners in surfaces.of(item) {
-                let [a, b, c] = corners.map(|p| p.as_dvec3());
+            for triangle in surfaces.range(item) {
+                let [a, b, c] = surfaces.corners(triangle as u32).map(|p| p.as_dvec3());
                 let normal = (b - a).cross(c - a).normalize_or_zero();
                 order.drop_in([a, b, c], normal, |leaf, polygon| {
                     fallen[leaf].push(Fallen {
                         item: item as ItemId,
                         polygon,
                         normal,
-                        two_sided: surfaces.two_sided[item],
+                        two_sided: surfaces.two_sided[triangle],
                     });
                 });
             }

@@ -69,7 +69,10 @@ fn items_have_the_numbers_of_the_scene_and_lie_in_their_boxes() {
         for (item, b) in scene.items.iter().enumerate() {
             if kinds.get(item) != "linedef" {
                 assert_eq!(surfaces.bounds(item), *b);
-                assert_eq!(surfaces.kinds[item], SurfaceKind::CutOut);
+                assert_eq!(
+                    surfaces.kinds[surfaces.range(item).start],
+                    SurfaceKind::CutOut
+                );
             } else if !surfaces.of_item[item].is_empty() {
                 let bounds = surfaces.bounds(item);
                 assert!(bounds.min.cmpge(b.min).all() && bounds.max.cmple(b.max).all());

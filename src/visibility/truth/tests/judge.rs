@@ -162,16 +162,24 @@ pub fn triangles(rng: &mut SeededRng) -> Surfaces {
             Vec3::new(one(), one(), one())
         })
         .collect();
-    for _ in 0..1 + rng.below(8) {
-        let kind = [
+    let one_of = |rng: &mut SeededRng| {
+        let kinds = [
             SurfaceKind::Opaque,
             SurfaceKind::Opaque,
             SurfaceKind::Clear,
             SurfaceKind::CutOut,
-        ][rng.below(4)];
+        ];
+        kinds[rng.below(4)]
+    };
+    for _ in 0..1 + rng.below(8) {
+        let kind = one_of(rng);
         let mut triangle = || [0; 3].map(|_| rng.below(6) as u32);
         let triangles = [triangle(), triangle()];
         surfaces.push(kind, rng.below(2) == 0, &corners, &triangles);
+        // Items of two materials.
+        let mixed = surfaces.kinds.len() - 1;
+        surfaces.kinds[mixed] = one_of(rng);
+        surfaces.two_sided[mixed] = rng.below(2) == 0;
     }
     for b in ties(rng, 6) {
         let (low, high) = (b.min.as_vec3(), b.max.as_vec3());
