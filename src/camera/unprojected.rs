@@ -140,7 +140,7 @@ impl ViewProjection {
 }
 
 impl Camera {
-    /// Returns `true` if its orthographic matrix has reversed depth, or a mirrored image.
+    /// Returns `true` for an orthographic matrix, mirrored or with reversed depth.
     pub fn may_be_reversed(&self) -> bool {
         let LensKind::Matrix(matrix) = self.lens.kind() else {
             return false;

@@ -130,7 +130,7 @@ fn boxed(low: [f32; 3], high: [f32; 3]) -> Triangles {
     all.into_iter().map(|corners| corners.map(corner)).collect()
 }
 
-/// A file of meshes, each of primitives with a material; the second text is its bytes.
+/// A file of meshes, each of primitives with a material, and its bytes.
 fn of_primitives(meshes: &[&[(Triangles, usize)]]) -> (String, Vec<u8>) {
     let (mut bytes, mut views, mut accessors) = (Vec::new(), Vec::new(), Vec::new());
     let mut add = |own: Vec<u8>, kind: &str, component: u32, count: usize| {

@@ -19,8 +19,9 @@ pub type Mesh = Result<Triangles, String>;
 pub struct Triangles {
     pub points: Vec<DVec3>,
     pub corners: Vec<[u32; 3]>,
-    /// Of each triangle, by the material of its primitive; so are its sides.
+    /// Kind of each triangle, by the material of its primitive.
     pub kinds: Vec<SurfaceKind>,
+    /// Sides of each triangle, alike.
     pub two_sided: Vec<bool>,
 }
 

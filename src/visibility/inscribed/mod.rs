@@ -132,8 +132,9 @@ fn volume(b: &WorldBox) -> f64 {
     size.x * size.y * size.z
 }
 
-/// The triangles of an only item, apart where they have no point in common: pieces of a
-/// closed surface are closed, and may overlap.
+/// The triangles of an only item, apart where they have no point in common.
+///
+/// Pieces of a closed surface are closed, and may overlap.
 fn parts(surfaces: &Surfaces) -> Vec<Vec<[Vec3; 3]>> {
     let triangles = &surfaces.triangles;
     // Union and find by halving paths; the lowest point stands for its piece.

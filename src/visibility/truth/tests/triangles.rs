@@ -97,7 +97,7 @@ fn seen(ray: &Ray, surfaces: &Surfaces) -> [Vec<ItemId>; 2] {
 fn triangles_full_of_ties_are_seen_as_whole_numbers_see_them() {
     let mut rng = SeededRng::new(31);
     let (mut met, mut tied, mut before, mut edges) = (0, 0, 0, 0);
-    for world in 0..160 {
+    for world in 0..240 {
         let surfaces = judge::triangles(&mut rng);
         let index = SurfaceIndex::build(&surfaces);
         let mut camera = judge::camera(&mut rng);
