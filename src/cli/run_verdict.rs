@@ -46,7 +46,7 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
 /// Remarks on fat bounds, rebuilds that do not come, and dropped contacts.
 fn caveats(all: &[&Comparison]) -> Vec<String> {
     let cells = || all.iter().flat_map(|c| &c.cells);
-    let fat = cells().any(|cell| is_fat(&cell));
+    let fat = cells().any(is_fat);
     let mut told = Vec::new();
     told.extend(fat.then(|| "Rank -: none, as fat bounds return more than exact ones.".to_owned()));
     let late = cells().filter_map(|cell| {

@@ -199,7 +199,7 @@ impl Entry<'_> {
         let chose = moving.index.chose();
         self.part.chose = match self.subject.spec.policy {
             // A new build counts its own updates.
-            UpdatePolicy::Every(_) => chose.map(|chose| format!("since the last rebuild: {chose}")),
+            UpdatePolicy::Every(_) => chose.map(|chose| format!("since the last build: {chose}")),
             _ => chose,
         };
         Ok(())
