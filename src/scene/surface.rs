@@ -131,7 +131,7 @@ impl Surfaces {
     }
 
     /// The opaque, one-sided triangles of an item, as the only item.
-    pub(crate) fn solid_part(&self, item: usize) -> Surfaces {
+    pub fn solid_part(&self, item: usize) -> Surfaces {
         let whole = self.some(&[item as ItemId]);
         let facts = whole.kinds.iter().zip(&whole.two_sided);
         let solid = whole.triangles.iter().zip(facts);
@@ -215,7 +215,7 @@ impl Surfaces {
     }
 
     /// The triangles of an item, cut where kind or sides change.
-    pub(crate) fn runs(&self, item: usize) -> impl Iterator<Item = Range<u32>> {
+    pub fn runs(&self, item: usize) -> impl Iterator<Item = Range<u32>> {
         let mut rest = self.of_item[item].clone();
         let fact = |t: u32| (self.kinds[t as usize], self.two_sided[t as usize]);
         std::iter::from_fn(move || {
