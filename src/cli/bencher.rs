@@ -3,7 +3,8 @@
 
 use serde_json::{Map, Value, json};
 
-use super::compare_table::name;
+use super::cell_names::name;
+use super::text;
 use crate::measure::{Metric, Status};
 use crate::report::Report;
 
@@ -20,7 +21,7 @@ const MEASURES: [(&str, &str); 9] = [
     ("worst-frame-ns", "worst_frame_ns"),
 ];
 
-/// One benchmark per right cell, named for structure, scene, path and test.
+/// One benchmark per right cell, named for structure and question.
 pub fn format(report: &Report) -> serde_json::Result<String> {
     let cells = report.cells.iter().filter(|cell| cell.status == Status::Ok);
     let benchmarks = cells.map(|cell| {
@@ -28,9 +29,9 @@ pub fn format(report: &Report) -> serde_json::Result<String> {
             let value = of_metric(cell.metrics.get(*metric)?);
             Some(((*measure).to_owned(), value))
         });
-        let key = cell.key();
-        let (arithmetic, planes) = (&key.group.arithmetic, &key.group.planes);
-        let name = format!("{}, {arithmetic}, {planes}", name(&key));
+        let views = Some(cell.path.views_per_frame).filter(|views| *views > 1);
+        let views = text::some(views, |views| format!(", {views} views"));
+        let name = name(&cell.key()) + &views;
         (name, Value::Object(measures.collect()))
     });
     serde_json::to_string_pretty(&benchmarks.collect::<Map<_, _>>()).map(|text| text + "\n")

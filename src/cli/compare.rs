@@ -9,11 +9,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
+use super::cell_names::name;
 use super::command_args::{CompareArgs, Gate};
-use super::compare_table::{CompareTable, Side, change_of, counted, name, reason};
+use super::compare_table::{CompareTable, Side, change_of, counted, reason};
 use super::diagram::{Row, rows};
 use super::document::{Block, to_page};
 use super::figure::{Axis, Figure, is_drawn};
+use super::run_resume::newest_run;
 use super::{Ending, expect_places, run_plan, text, unread_is_fine, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
@@ -23,11 +25,14 @@ use crate::report::{
 };
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
-    let inputs = [&args.old, &args.new].into_iter().flatten();
-    let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
-    expect_places(&[("--html", args.html.as_deref())], &inputs)?;
+    let page = [("--html", args.html.as_deref())];
     let threshold = args.threshold;
+    ensure!(
+        args.gate == Gate::Time || !args.fail_inconclusive,
+        "--fail-inconclusive is of times; expected none with --gate work"
+    );
     if let Some(binary) = &args.against {
+        expect_places(&page, &[binary])?;
         let table = super::against::compare_against(registry, args, binary)?;
         return show(&table);
     }
@@ -46,12 +51,21 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
             WORK.to_vec()
         }
     };
-    let [old, new] = match (&args.baseline, &args.old, &args.new) {
+    let files = match (&args.baseline, &args.old, &args.new) {
         // The only run that is named is NEW.
-        (Some(name), new, _) => baseline_and(name, new.as_deref())?,
-        (None, Some(old), Some(new)) => [read_report(old)?, read_report(new)?],
+        (Some(name), new, _) => baseline_and(name, new.clone())?,
+        (None, Some(old), Some(new)) => [old.clone(), new.clone()],
         _ => bail!("two reports, or --against BINARY: expected one of them"),
     };
+    expect_places(&page, &files.each_ref().map(PathBuf::as_path))?;
+    let [old, new] = [read_report(&files[0])?, read_report(&files[1])?];
+    if let Some(name) = &args.baseline {
+        ensure!(
+            old.run.id != new.run.id,
+            "{} is the baseline '{name}' itself; expected another run to compare with it",
+            text::plain(&new.run.id)
+        );
+    }
     if args.gate == Gate::Time && args.metric.is_empty() {
         let moving = new.cells.iter().filter(|cell| !cell.path.motion.is_empty());
         metrics.extend(moving.map(ReportCell::ranked_by).take(1));
@@ -121,6 +135,7 @@ fn side(report: &Report) -> Side {
         json: json!({
             "id": run.id,
             "started_at": run.started_at,
+            "finished_at": run.finished_at,
             "command": run.command,
             "version": source.version,
             "commit": source.commit,
@@ -222,44 +237,37 @@ pub fn save_baseline(name: &str, report: &Report) -> anyhow::Result<()> {
     Ok(write_atomically(&baseline_file(name), write)?)
 }
 
-/// Reads a baseline and the run to compare with it, by default the newest run under
-/// results/.
-fn baseline_and(name: &str, new: Option<&Path>) -> anyhow::Result<[Report; 2]> {
+/// Files of a baseline and of the run to compare with it, by default the newest of the
+/// others under results/.
+fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]> {
+    let file = baseline_file(name);
     ensure!(
-        baseline_file(name).is_file(),
+        file.is_file(),
         "no baseline '{name}' in {BASELINES}; {}",
-        match names(BASELINES, |_| true).as_slice() {
+        match names(BASELINES).as_slice() {
             [] => "expected one that `run --save NAME` kept".to_owned(),
-            known => format!("available: {}", known.join(", ").replace(".json", "")),
+            known => format!("available: {}", known.join(", ")),
         }
     );
-    let old = read_report(&baseline_file(name))?;
-    let new = match new {
-        Some(new) => read_report(new)?,
-        None => {
-            // Names of runs begin with their time.
-            let runs = names("results", |name| {
-                name.starts_with(|c: char| c.is_ascii_digit())
-            });
-            let newest = runs.last().context(
-                "no run in results; expected one to compare with the baseline, or its folder",
-            )?;
-            read_report(&Path::new("results").join(newest))?
-        }
-    };
-    ensure!(
-        old.run.id != new.run.id,
-        "{} is the baseline '{name}' itself; expected another run to compare with it",
-        text::plain(&new.run.id)
-    );
-    Ok([old, new])
+    if let Some(new) = new {
+        return Ok([file, new]);
+    }
+    let old = read_report(&file)?.run.id;
+    let newest = newest_run(Path::new("results"), |path| {
+        let run = read_report(&path.join("report.json")).ok()?.run;
+        Some(run).filter(|run| run.id != old)
+    });
+    let newest = newest
+        .context("no run in results; expected one to compare with the baseline, or its folder")?;
+    Ok([file, newest])
 }
 
-/// Names in a folder, sorted; none where there is no folder.
-fn names(folder: &str, is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
+/// Names of the baselines in a folder, sorted; none where there is no folder.
+fn names(folder: &str) -> Vec<String> {
     let listing = fs::read_dir(folder).into_iter().flatten().flatten();
     let names = listing.filter_map(|entry| entry.file_name().into_string().ok());
-    let mut names: Vec<String> = names.filter(|name| is_wanted(name)).collect();
+    let names = names.filter_map(|name| Some(name.strip_suffix(".json")?.to_owned()));
+    let mut names: Vec<String> = names.collect();
     names.sort();
     names
 }

@@ -6,19 +6,19 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::cell_names::{name, place, question, short_structure};
 use super::command_args::{CompareArgs, Gate};
 use super::document::{Block, folded, to_markdown, to_terminal};
-use super::run_table::short;
+use super::run_table::{distinct, short};
 use super::shared_args::TableFormat;
 use super::table::Table;
 use super::{Ending, print_json, program, text};
-use crate::culling::CullingTest;
-use crate::measure::{CellKey, METRICS};
+use crate::measure::{GroupKey, METRICS};
 use crate::report::{
     Basis, Changes, CommonShift, FEW_OTHERS, JudgedRow, Lone, Outcome, Setting, WORK, WorkChange,
-    grouped,
+    grouped, unique,
 };
-use crate::shown::{number, plain, shortened, without_middle};
+use crate::shown::{number, plain};
 use crate::statistics::{Change, Judgement};
 
 /// Counters in the list; `--all` shows every one.
@@ -217,18 +217,28 @@ impl CompareTable<'_> {
         ));
         // Beside the widest other column, "vs the others [95 %]", and three gaps.
         let widest = |of: &dyn Fn(&JudgedRow) -> usize| rows.iter().map(|row| of(row)).max();
-        let structure = widest(&|row| short_name(row).chars().count());
+        let structure = widest(&|row| short_structure(&row.cell.structure).chars().count());
         let metric = widest(&|row| row.metric.map_or(0, str::len));
-        let left = 54_usize.saturating_sub(structure.unwrap_or(0) + metric.unwrap_or(0));
+        let left = match room {
+            Some(usize::MAX) => usize::MAX,
+            _ => 54_usize.saturating_sub(structure.unwrap_or(0) + metric.unwrap_or(0)),
+        };
+        let groups = unique(self.changes.rows.iter().map(|row| &row.cell.group));
+        let short = |group: &&GroupKey| place(group, left, short);
+        let full = |group: &&GroupKey| place(group, usize::MAX, plain);
+        let places = distinct(&groups, short, full);
+        let places: Vec<(&GroupKey, String)> = groups.into_iter().zip(places).collect();
         for row in rows {
+            let place = places.iter().find(|(group, _)| **group == row.cell.group);
+            let place = text::some(place, |(_, place)| place.clone());
             let metric = row.metric.unwrap_or_default();
             let judged = row.judgement.as_ref();
             let resolution = judged.and_then(|found| found.resolution);
             let (scene, structure) = (&row.cell.group.scene, &row.cell.structure);
             let places = match room {
-                None => vec![scene.clone(), question(&row.cell), structure.clone()],
-                Some(usize::MAX) => vec![structure.clone(), place(&row.cell, usize::MAX)],
-                Some(_) => vec![short_name(row), place(&row.cell, left)],
+                None => vec![scene.clone(), question(&row.cell.group), structure.clone()],
+                Some(usize::MAX) => vec![structure.clone(), place],
+                Some(_) => vec![short_structure(structure), place],
             };
             let figures = [
                 metric.to_owned(),
@@ -289,7 +299,12 @@ impl CompareTable<'_> {
                 text::counted(cells, "cell")
             ),
         };
-        format!("{} of {rows}", counts.join(", "))
+        let alone = changes.only_in_new.iter();
+        let alone = match alone.filter(|cell| cell.status.is_failure()).count() {
+            0 => String::new(),
+            wrong => format!("; {} only in NEW", text::counted(wrong, "wrong answer")),
+        };
+        format!("{} of {rows}{alone}", counts.join(", "))
     }
 
     /// Advice on inconclusive cells, if there are any.
@@ -305,7 +320,11 @@ impl CompareTable<'_> {
         let judged = self.changes.rows.iter().filter_map(|row| row.judgement);
         let mut undecided = judged.filter(|found| found.change == Change::Inconclusive);
         let is_hopeless = |found: Judgement| found.lower.is_some() && found.more_pairs.is_none();
+        let is_stopped = |side: &Side| side.json.get("finished_at") == Some(&Value::Null);
         let told = match (self.basis, more) {
+            _ if is_stopped(&self.old) || is_stopped(&self.new) => {
+                "finish the run that was stopped (run --resume)".to_owned()
+            }
             (Basis::Pairs, Some(more)) => {
                 format!("about {} would decide", text::counted(more, "more pair"))
             }
@@ -335,56 +354,6 @@ impl CompareTable<'_> {
     }
 }
 
-/// A cell by its name in a sentence.
-pub fn name(cell: &CellKey) -> String {
-    format!(
-        "{} on {}, {}",
-        cell.structure,
-        cell.group.scene,
-        question(cell)
-    )
-}
-
-/// Structure in at most twenty characters; its last parameter stays.
-fn short_name(row: &JudgedRow) -> String {
-    without_middle(&plain(&row.cell.structure), [8, 9])
-}
-
-/// Scene and path in short, with the test and the cache state that are no defaults.
-///
-/// At most `room` characters; the scene is cut first.
-fn place(cell: &CellKey, room: usize) -> String {
-    let group = &cell.group;
-    let mut rest = format!(" {}", short(&group.path));
-    if group.test != CullingTest::SixPlane.name() {
-        rest += &format!(" {}", group.test);
-    }
-    if group.cache != "warm" {
-        rest += &format!(" {}", group.cache);
-    }
-    if !group.motion.is_empty() {
-        rest += &format!(" {}", short(&group.motion));
-    }
-    let scene = short(&group.scene);
-    if scene.chars().count() + rest.chars().count() <= room {
-        return scene + &rest;
-    }
-    let most = room.saturating_sub(3);
-    let left = most.saturating_sub(rest.chars().count() + 3).max(8);
-    shortened(&(shortened(&scene, left) + &rest), most)
-}
-
-/// All of a cell's key that is no default, but for scene and structure.
-fn question(cell: &CellKey) -> String {
-    let group = &cell.group;
-    let cold = match group.cache.as_str() {
-        "warm" => String::new(),
-        cache => format!(" ({cache})"),
-    };
-    let test = format!("{}{cold}", group.test);
-    text::joined([&group.path, &test, &group.motion])
-}
-
 /// "+6.8 % [+5.2, +8.4]" of a ratio new / old.
 pub fn change_of(ratio: f64, interval: Option<(f64, f64)>) -> String {
     let change = |ratio: f64| match (ratio - 1.0) * 100.0 {
@@ -407,8 +376,9 @@ fn shift_line(shift: CommonShift) -> String {
         None => String::new(),
     };
     format!(
-        "the machine or the program as a whole: NEW takes {} %{interval} of OLD ({}); this \
+        "the machine or the program as a whole: {} of NEW is {} %{interval} of OLD ({}); this \
          comparison cannot tell which",
+        shift.metric,
         percent(shift.ratio),
         text::counted(shift.cells, "cell")
     )

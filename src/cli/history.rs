@@ -1,5 +1,6 @@
-//! The page of several runs: time per query of each structure, oldest run first.
+//! The page of several runs: time per query or frame of each structure, oldest run first.
 
+use super::cell_names::question;
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, to_html};
 use super::figure::{Axis, ends, is_drawn};
@@ -32,7 +33,8 @@ pub fn page(mut reports: Vec<Report>) -> String {
     let mut changed = [Vec::new(), Vec::new()];
     let mut compared = 0;
     for (group, cells) in grouped(cells) {
-        let heading = text::joined([&group.scene, &group.path, &group.cache, &group.test]);
+        let heading = format!("{}, {}", group.scene, question(&group));
+        let per = ["query", "frame"][usize::from(!group.motion.is_empty())];
         let names = reports.iter().map(name).chain(["last / first".to_owned()]);
         let mut table = Table::of_numbers(["structure".to_owned()].into_iter().chain(names));
         let mut series = Vec::new();
@@ -52,7 +54,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
             if let [(_, first), .., (_, last)] = times[..] {
                 change = format!("{} x", text::significant(last.value / first.value));
                 compared += 1;
-                let line = || format!("{structure} on {}, {} ({change})", group.scene, group.path);
+                let line = || format!("{structure} on {heading} ({change})");
                 match (ends(first.estimate()), ends(last.estimate())) {
                     (Some(a), Some(b)) if b[0] > a[1] => changed[0].push(line()),
                     (Some(a), Some(b)) if b[1] < a[0] => changed[1].push(line()),
@@ -107,7 +109,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
             let points = series.iter().flat_map(|s| s.points.iter());
             let values = points.flat_map(|p| p.ends.unwrap_or([p.at[1]; 2]));
             let y = Axis::log("", values.collect::<Vec<_>>().into_iter(), 1.1, &text::time);
-            let caption = format!("{heading}: time per query in each run, 95 % interval");
+            let caption = format!("{heading}: time per {per} in each run, 95 % interval");
             let diagram = Diagram::of(caption, [x, y], Joined::Marked, series);
             blocks.push(Block::Figure(diagram.draw()));
         }

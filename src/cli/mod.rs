@@ -12,6 +12,7 @@ mod advise_table;
 mod against;
 mod args;
 mod bencher;
+mod cell_names;
 mod command_args;
 mod compare;
 mod compare_structures;
@@ -303,12 +304,18 @@ fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow:
         let place = folder_of(file).canonicalize().ok()?.join(file.file_name()?);
         Some(place.canonicalize().unwrap_or(place))
     };
-    let files = inputs.iter().map(|&input| {
+    // A run is all that was measured, and what was made of it but for its page.
+    let names = ["report.json", "summary.csv", "samples.csv", "stream.jsonl"];
+    let files = inputs.iter().flat_map(|&input| {
         let source = input.to_str().map(|source| split_part(source).0);
-        source.map_or(input, Path::new)
+        let input = source.map_or(input, Path::new);
+        let is_report = input.ends_with(names[0]);
+        let run = if is_report { folder_of(input) } else { input };
+        let files = names.map(|name| run.join(name)).into_iter();
+        files.chain([input.to_path_buf()])
     });
     let files = files.filter(|file| file.is_file());
-    let mut taken: Vec<PathBuf> = files.filter_map(known).collect();
+    let mut taken: Vec<PathBuf> = files.filter_map(|file| known(&file)).collect();
     for &(option, file) in outputs {
         expect_place_for(option, file)?;
         let Some(place) = file.and_then(known) else {

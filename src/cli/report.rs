@@ -29,10 +29,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         ("--bencher", args.bencher.as_deref()),
         ("--history", args.history.as_deref()),
     ];
-    // A run's folder stands for its report.
-    let files = args.reports.iter().map(|path| path.join("report.json"));
-    let files: Vec<PathBuf> = args.reports.iter().cloned().chain(files).collect();
-    let inputs: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = args.reports.iter().map(PathBuf::as_path).collect();
     expect_places(&outputs, &inputs)?;
     expect_folder("--svg", args.svg.as_deref())?;
     if let Some(path) = &args.history {
@@ -223,7 +220,8 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
     blocks.push(Block::Heading(2, "Statuses".to_owned()));
     let cells = text::counted(report.cells.len(), "cell");
     let reasons = run_table::reasons(&all.iter().collect::<Vec<_>>());
-    let all_ok = reasons.is_empty().then(|| format!("{cells}, all ok."));
+    let all_ok = format!("{cells}, all ok{}.", text::missing(report));
+    let all_ok = reasons.is_empty().then_some(all_ok);
     blocks.extend(reasons.into_iter().chain(all_ok).map(Block::Line));
     blocks.push(Block::Heading(2, "Machine and command".to_owned()));
     blocks.extend(about(report).into_iter().map(Block::Line));

@@ -20,7 +20,7 @@ use super::{Ending, compare, expect_folder, interrupt, run_why, tell, text, unre
 use crate::index::Registry;
 use crate::input;
 use crate::measure::{
-    GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
+    GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, Status, SubjectPart, Verdict,
 };
 use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_report, utc};
 use crate::suite::DEFAULT_PATH;
@@ -37,11 +37,10 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
         let plan = plan(registry, &begun)?;
         plan.check_goes_on(&stream)
             .with_context(|| stopped.path.display().to_string())?;
-        check_why(args, &plan)?;
+        check_why(&begun, &plan)?;
         interrupt::from_now_on_finish();
         let folder = go_on(stopped, &stream)?;
-        let save = args.save.clone().or(begun.save);
-        return Run::new(args, plan, folder, stream)?.all(save);
+        return Run::new(&begun, plan, folder, stream)?.all();
     }
     let plan = plan(registry, args)?;
     check_why(args, &plan)?;
@@ -52,7 +51,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     interrupt::from_now_on_finish();
     let machine = Machine::capture().by(args.what.kernel.execution()?.kernel);
     let (folder, stream) = create(args, &plan, machine)?;
-    Run::new(args, plan, folder, stream)?.all(args.save.clone())
+    Run::new(args, plan, folder, stream)?.all()
 }
 
 /// Refuses the explanation of a structure that is not measured.
@@ -116,8 +115,8 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Measures all scenes; keeps a finished run as the baseline `save`.
-    fn all(mut self, save: Option<String>) -> anyhow::Result<Ending> {
+    /// Measures all scenes; keeps a finished run as the baseline that the options name.
+    fn all(mut self) -> anyhow::Result<Ending> {
         let mut scenes = 0..self.plan.plan.scenes.len();
         let measured = scenes.try_for_each(|scene| self.scene(scene));
         self.bar.finish_and_clear();
@@ -127,6 +126,9 @@ impl<'a> Run<'a> {
         if self.stream.parts.is_empty() {
             drop(self.workers);
             self.folder.discard();
+            if failed.is_none() {
+                tell("interrupted: no cell was finished, and nothing was saved");
+            }
             return failed.map_or(Ok(Ending::Interrupted), Err);
         }
         if !stopped && self.stream.finished_at.is_none() {
@@ -146,12 +148,12 @@ impl<'a> Run<'a> {
         }
         saved?;
         write_page(&report, self.folder.path())?;
-        let save = save.filter(|_| !stopped);
-        if let Some(name) = &save {
+        let save = self.args.save.as_deref().filter(|_| !stopped);
+        if let Some(name) = save {
             compare::save_baseline(name, &report)?;
         }
         shown?;
-        unread_is_fine(self.close(&report, save.as_deref()))?;
+        unread_is_fine(self.close(&report, save))?;
         if stopped {
             tell("interrupted: finished cells were saved; continue with --resume");
         }
@@ -280,14 +282,16 @@ impl<'a> Run<'a> {
     }
 
     fn close(&self, report: &Report, save: Option<&str>) -> io::Result<()> {
-        let cells = report.cells.iter();
-        let failed = cells.filter(|cell| cell.status.is_failure()).count();
+        let failed = report.cells.iter().filter(|cell| cell.status.is_failure());
+        let is_wrong = failed.clone().all(|cell| cell.status == Status::Wrong);
         let width = text::width();
         let mut out = text::terminal();
         let basis = format!(
-            "{} in {:.1} s, {failed} wrong; {}",
+            "{} in {:.1} s, {} {}; {}",
             text::counted(report.cells.len(), "cell"),
             self.started.elapsed().as_secs_f64(),
+            failed.count(),
+            if is_wrong { "wrong" } else { "failed" },
             text::conclusion(report)
         );
         writeln!(out, "\n{}", text::wrapped(&basis, width))?;

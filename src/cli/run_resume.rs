@@ -15,7 +15,7 @@ use super::run_plan::RunPlan;
 use super::{program, tell, text};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
-    Header, RunFolder, SCHEMA_VERSION, Setting, StoppedRun, Stream, dated, read_report,
+    Header, RunFolder, RunInfo, SCHEMA_VERSION, Setting, StoppedRun, Stream, dated, read_report,
     read_stream, utc,
 };
 use crate::scene;
@@ -51,6 +51,11 @@ pub fn create(
     header.args = typed;
     header.whole.clone_from(&plan.whole);
     header.binary = binary_digest();
+    let groups = header.whole().iter();
+    let names = groups.flat_map(|key| [&key.path, &key.motion]);
+    let files = names.filter(|name| Path::new(name).is_file());
+    let digests = files.filter_map(|name| Some((name.clone(), digest(Path::new(name))?)));
+    header.files = digests.collect();
     let folder = RunFolder::create(&path, &header)?;
     Ok((folder, Stream::of(header)))
 }
@@ -65,11 +70,17 @@ pub fn typed_args() -> anyhow::Result<Vec<String>> {
 
 /// SHA-256 of the program that runs; `None` if it cannot be read.
 fn binary_digest() -> Option<String> {
-    let bytes = fs::read(std::env::current_exe().ok()?).ok()?;
+    digest(&std::env::current_exe().ok()?)
+}
+
+/// SHA-256 of a file; `None` if it cannot be read.
+fn digest(file: &Path) -> Option<String> {
+    let bytes = fs::read(file).ok()?;
     Some(scene::hex(&hmac_sha256::Hash::hash(&bytes)))
 }
 
-/// Opens the run to continue; the options it was begun with. Nothing is written.
+/// Opens the run to continue; its options, as recorded or else typed now. Nothing is
+/// written.
 pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
     let path = match &args.out {
         Some(path) => path.clone(),
@@ -112,8 +123,13 @@ fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
             before.told(&id)
         );
     }
-    let recorded = Cli::try_parse_from(first().chain(recorded.to_vec()));
-    match recorded.map_err(one_line)?.command {
+    // What was typed now and is no part of the plan takes the place of what is recorded.
+    let is_new = |name: &str| !now.words(|typed| typed == name).is_empty();
+    let mut line = vec!["run".to_owned()];
+    line.extend(before.words(|name| !is_new(name)));
+    line.extend(now.words(|_| true));
+    let all = Cli::try_parse_from(first().chain(line));
+    match all.map_err(one_line)?.command {
         Command::Run(args) => Ok(args),
         _ => bail!(NO_RUN),
     }
@@ -231,18 +247,26 @@ fn same_place(header: &Header, begun: &RunArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
+/// The folder in `results` that holds the newest of the runs that `of` reads.
+pub fn newest_run(results: &Path, of: impl Fn(&Path) -> Option<RunInfo>) -> Option<PathBuf> {
     // No folder of results holds no run.
     let listing = fs::read_dir(results).into_iter().flatten().flatten();
-    let mut folders: Vec<PathBuf> = listing.map(|entry| entry.path()).collect();
-    folders.sort();
-    // Killed at the very end, a run lacks nothing but its report.
-    let unfinished = |path: &PathBuf| {
-        let is_run = read_stream(&path.join("stream.jsonl")).is_ok();
+    let runs = listing.filter_map(|entry| {
+        let run = of(&entry.path())?;
+        let changed = entry.metadata().and_then(|found| found.modified()).ok();
+        Some((run.started_at, run.finished_at, changed, entry.path()))
+    });
+    runs.max().map(|(.., path)| path)
+}
+
+fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
+    let found = newest_run(results, |path| {
+        // Killed at the very end, a run lacks nothing but its report.
         let report = read_report(&path.join("report.json"));
-        is_run && report.map_or(true, |report| report.run.finished_at.is_none())
-    };
-    let found = folders.into_iter().rev().find(unfinished);
+        let is_finished = report.is_ok_and(|report| report.run.finished_at.is_some());
+        let stream = (!is_finished).then(|| read_stream(&path.join("stream.jsonl")));
+        Some(stream?.ok()?.0.header.run)
+    });
     found.with_context(|| {
         format!(
             "no unfinished run in {}; expected one to resume there, or its folder as --out DIR",

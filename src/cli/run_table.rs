@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 use super::document::Block;
 use super::table::Table;
 use super::{run_verdict, scene_facts, text};
-use crate::measure::Status;
+use crate::measure::{GroupKey, Status};
 use crate::report::{Comparison, Overall, ReportCell, Speedup, grouped, times_as_fast};
-use crate::shown::shortened;
+use crate::shown::{shortened, without_middle};
 use crate::spec::parse_number;
 
 /// Comparisons of one cache state and culling test each.
@@ -238,7 +238,7 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
     let cache = if cache == "warm" { "" } else { ", cold" };
     let lens = lens.map(|lens| format!("{test}{cache}; {} up; {lens}", up.join(" or ")));
     let names = labels(all).into_iter();
-    let names = names.map(|label| shortened(&label, width / 2));
+    let names = names.map(|label| without_middle(&text::plain(&label), [width / 4; 2]));
     let mut parts = matrix(names.collect(), all, overall).parts(width);
     let hidden = parts.split_off(1);
     let hidden: usize = hidden.iter().map(|part| part.header.len() - 1).sum();
@@ -266,17 +266,28 @@ pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
 ///
 /// The full ones where two would be the same.
 pub fn labels(all: &[&Comparison]) -> Vec<String> {
-    let of = |comparison: &Comparison, show: fn(&str) -> String| {
-        let about = comparison.about();
-        let names = [&about.scene.name, &about.path.name, &about.path.motion];
+    let of = |key: &GroupKey, show: fn(&str) -> String| {
+        let names = [&key.scene, &key.path, &key.motion];
         names.map(|name| show(name)).join(" ").trim_end().to_owned()
     };
-    let short: Vec<String> = all.iter().map(|c| of(c, short)).collect();
-    let is_unique = |label: &String| short.iter().filter(|other| *other == label).count() == 1;
-    match short.iter().all(is_unique) {
-        true => short,
-        false => all.iter().map(|c| of(c, str::to_owned)).collect(),
-    }
+    let keys: Vec<GroupKey> = all.iter().map(|c| c.about().key().group).collect();
+    distinct(&keys, |key| of(key, short), |key| of(key, str::to_owned))
+}
+
+/// Short names; the full ones where two that differ have the same.
+pub fn distinct<T: PartialEq>(
+    all: &[T],
+    short: impl Fn(&T) -> String,
+    full: impl Fn(&T) -> String,
+) -> Vec<String> {
+    let names: Vec<String> = all.iter().map(short).collect();
+    let named = || all.iter().zip(&names);
+    let name =
+        |(one, name): (&T, &String)| match named().any(|(other, of)| of == name && other != one) {
+            true => full(one),
+            false => name.clone(),
+        };
+    named().map(name).collect()
 }
 
 /// A file without its folder, a spec without keys and frames: "city 100k".

@@ -5,7 +5,7 @@ use std::iter::repeat;
 
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
-pub use crate::shown::{count, counted, lines, message, plain, significant, time, unit};
+pub use crate::shown::{count, counted, first_of, lines, message, plain, significant, time, unit};
 use crate::statistics::{Estimate, Rate};
 
 /// A figure as text; nothing if there is none.
@@ -28,8 +28,21 @@ pub fn range((least, most): (usize, usize), shown: impl Fn(usize) -> String) -> 
     }
 }
 
-/// Basis of the times of a report, in one sentence.
+/// Basis of the times of a report, and what of its plan is not in it.
 pub fn conclusion(report: &Report) -> String {
+    basis_of_times(report) + &missing(report)
+}
+
+/// "; shard 1/2; not measured: city along orbit"; empty for a whole run.
+pub fn missing(report: &Report) -> String {
+    let (shard, missing) = (&report.run.shard, &report.run.missing);
+    let shard = some(shard.as_ref(), |shard| format!("; shard {shard}"));
+    let first = || format!("; not measured: {}", first_of(missing, 4));
+    shard + &some(missing.first(), |_| first())
+}
+
+/// Processes and intervals of a report, in one sentence.
+fn basis_of_times(report: &Report) -> String {
     let processes = report.cells.iter().map(|c| c.times.processes);
     let least = processes.filter(|p| *p > 0).min().unwrap_or(0);
     let planned = report.run.processes as usize;

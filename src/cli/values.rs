@@ -92,8 +92,9 @@ pub fn threshold(typed: &str) -> Result<f64, SpecError> {
         Some(percents) => parse_number(&format!("{}%", percents.trim_end())),
         None => parse_number(typed).filter(|share| *share < 1.0),
     };
-    let what = "a percentage such as 5% or a share from 0 to 1 such as 0.05";
-    expected(share.filter(|share| *share >= 0.0), what)
+    let what = "a percentage such as 5% or a share from 0 to below 1 such as 0.05";
+    // Zero has two signs and one meaning.
+    expected(share.filter(|share| *share >= 0.0), what).map(f64::abs)
 }
 
 /// A metric that runs are compared by.
@@ -105,6 +106,7 @@ pub fn metric(name: &str) -> Result<&'static str, SpecError> {
 
 /// Name of a baseline, which becomes the name of a file.
 pub fn baseline(name: &str) -> Result<String, SpecError> {
+    let name = name.trim_end_matches(".json");
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
     let sound = name.chars().all(is_plain) && (1..=100).contains(&name.len());
     let name = Some(name).filter(|name| sound && !name.starts_with(['.', '-']));
@@ -172,6 +174,7 @@ mod tests {
         ] {
             assert_eq!(threshold(typed), Ok(share), "{typed}");
         }
+        assert!(threshold("-0").is_ok_and(f64::is_sign_positive));
         let bad = "nan NaN% -5% -0.1 inf inf% 1e999 5 1.5 5k five % 5%% - --all";
         for typed in bad.split(' ').chain(["", "5 5%"]) {
             let error = threshold(typed).expect_err(typed).to_string();

@@ -67,8 +67,13 @@ pub fn changes(
             false => by_metric(basis, &comparable, metric, threshold),
         });
     }
-    if basis == Basis::Reports && metrics.iter().any(|metric| !WORK.contains(metric)) {
-        found.common_shift = common_shift(&comparable);
+    if basis == Basis::Reports {
+        // Structures that move are ranked by their frames.
+        let frames = metrics.iter().find(|metric| **metric == "frame_ns");
+        let metric = frames
+            .or(metrics.first())
+            .filter(|metric| !WORK.contains(metric));
+        found.common_shift = metric.and_then(|metric| common_shift(&comparable, metric));
     }
     found.rows.sort_by(JudgedRow::order);
     found
@@ -325,12 +330,12 @@ fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
     (!has_others).then(|| FEW_OTHERS.to_owned())
 }
 
-/// Per process, the mean over the groups of the median over the structures, by
-/// the first metric; `None` without a cell that both have timed.
-fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
+/// Per process, the mean over the groups of the median over the structures;
+/// `None` without a cell that both have timed.
+fn common_shift(pairs: &[Pair], metric: &'static str) -> Option<CommonShift> {
     let timed = pairs.iter().filter_map(|&pair| {
         let is_ok = pair.0.status == Status::Ok && timed_otherwise(pair).is_none();
-        let logs = logs(pair, super::JUDGED_METRICS[0]).filter(|_| is_ok)?;
+        let logs = logs(pair, metric).filter(|_| is_ok)?;
         Some((pair.1.key().group, centred(&logs)))
     });
     let groups: Vec<(GroupKey, Vec<Logs>)> = grouped(timed);
@@ -355,6 +360,7 @@ fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
     };
     let found = judge_unpaired(&[of(0)], &[of(1)], &["all"], 0.0)[0]?;
     Some(CommonShift {
+        metric,
         ratio: found.ratio,
         lower: found.lower,
         upper: found.upper,

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -116,7 +116,7 @@ impl RunFolder {
                     [&key.scene, &path, &key.cache, label, &key.test].map(|name| shown_field(name));
                 for s in samples {
                     let at = (part.process, s.round, s.frame, s.queries);
-                    let [cpu_ns, wall_ns] = [s.cpu_ns, s.wall_ns].map(|ns| format!("{ns:.1}"));
+                    let [cpu_ns, wall_ns] = [s.cpu_ns, s.wall_ns].map(|ns| format!("{ns:.3}"));
                     csv.serialize((&names, task.name(), at, cpu_ns, wall_ns, s.returned))?;
                     *rows.entry(label.clone()).or_insert(0) += 1;
                 }
@@ -262,15 +262,19 @@ fn open(file: &Path) -> Result<File, InputError> {
     opened.map_err(writing::io(file))
 }
 
-/// Bytes of samples.csv up to the first NUL. A power cut leaves NULs where data
-/// never reached the disk.
+/// Bytes of samples.csv up to the first NUL, none without its first line. A power cut
+/// leaves NULs where data never reached the disk.
 pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
     // A pipe would wait for its writer.
     if !fs::metadata(file)?.is_file() {
         return Ok(0);
     }
     let mut reader = BufReader::new(File::open(file)?);
-    let mut length = 0;
+    let mut head = [0; SAMPLE_COLUMNS.len()];
+    if reader.read_exact(&mut head).is_err() || head != *SAMPLE_COLUMNS.as_bytes() {
+        return Ok(0);
+    }
+    let mut length = head.len() as u64;
     loop {
         let bytes = reader.fill_buf()?;
         let whole = bytes.iter().position(|b| *b == 0);
@@ -389,6 +393,7 @@ const WITH_INTERVALS: &[&str] = &[
     "times_memcpy",
     "locate_ns",
     "build_ms",
+    "frame_ns",
 ];
 
 /// Text of a value; empty without one.

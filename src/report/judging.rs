@@ -200,6 +200,8 @@ pub struct Lone {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[non_exhaustive]
 pub struct CommonShift {
+    /// Metric whose times are compared.
+    pub metric: &'static str,
     /// new / old: above 1 is slower.
     pub ratio: f64,
     /// 95 % interval; `None` below three processes a side.

@@ -63,7 +63,7 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
     if !missing.is_empty() && !partial {
         return Err(InputError::new(format!(
             "no shard has {}; expected all of the plan (--partial joins what is there)",
-            pairs(&missing)
+            first_of(&pairs(&missing), NAMED)
         )));
     }
     let mut parts = Vec::new();
@@ -114,7 +114,7 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
 impl Merged {
     /// The scenes and paths that no shard has, a few of them by name.
     pub fn missing_named(&self) -> String {
-        pairs(&self.missing)
+        first_of(&pairs(&self.missing), NAMED)
     }
 
     /// Writes the four files of a run into a folder that is new or empty: beside its
@@ -197,7 +197,7 @@ fn overlap(own: &Stream, other: &Stream, first: &Path) -> Option<String> {
     let first = first.display();
     let mut groups = own.header.groups.iter();
     if let Some(key) = groups.find(|key| other.header.groups.contains(key)) {
-        let pair = pairs(std::slice::from_ref(key));
+        let pair = pairs([key]).concat();
         return Some(format!(
             "{pair} is in {first} as well; expected every cell in one shard"
         ));
@@ -221,12 +221,13 @@ fn overlap(own: &Stream, other: &Stream, first: &Path) -> Option<String> {
     ))
 }
 
-/// Scenes with paths, a few of them by name.
-fn pairs(groups: &[GroupKey]) -> String {
-    const NAMED: usize = 4;
-    let pairs = groups.iter();
-    let pairs = pairs.map(|key| format!("{} along {}", key.scene, key.path));
-    first_of(&unique(pairs), NAMED)
+/// Missing scenes and paths that a message names.
+const NAMED: usize = 4;
+
+/// Scenes with paths, each once.
+pub(super) fn pairs<'k>(groups: impl IntoIterator<Item = &'k GroupKey>) -> Vec<String> {
+    let pairs = groups.into_iter();
+    unique(pairs.map(|key| format!("{} along {}", key.scene, key.path)))
 }
 
 /// The header of the run that the shards are together.

@@ -78,6 +78,9 @@ pub struct RunInfo {
     /// `i/n` where only a share of the plan was run.
     #[serde(default)]
     pub shard: Option<String>,
+    /// Scenes and paths of the plan that nothing was measured of.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<String>,
 }
 
 fn one() -> u32 {
@@ -108,6 +111,9 @@ pub struct TwinEntry {
     pub scene: String,
     /// Name of the path.
     pub path: String,
+    /// File name or spec of the motion; absent for a still scene.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub motion: String,
     /// "warm" or "cold".
     pub cache: String,
     /// Label of the structure.
@@ -138,6 +144,7 @@ impl Noise {
         self.twins.push(TwinEntry {
             scene: scene.to_owned(),
             path: path.name.clone(),
+            motion: path.motion.clone(),
             cache: path.cache.clone(),
             structure: structure.clone(),
             test: test.to_owned(),

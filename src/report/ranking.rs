@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Report, ReportCell};
 use crate::measure::{Judged, Metric, Status, YARDSTICK};
-use crate::statistics::{ALPHA, geometric_mean, is_less};
+use crate::statistics::{ALPHA, geometric_mean, is_less, speedup};
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
@@ -91,17 +91,25 @@ impl<'r> Comparison<'r> {
         self.sound().find(|cell| cell.structure == structure)
     }
 
-    /// The speed-up of a cell over the structure `base` of the same comparison.
+    /// The speed-up of a cell over the structure `base` of the same comparison, process
+    /// by process; the base itself has no interval.
     pub fn speedup(&self, base: &str, cell: &ReportCell) -> Option<Speedup> {
         if base == YARDSTICK {
             let found = cell.metrics.get("speedup")?;
             return Some((found.value, found.lower.zip(found.upper).map(Into::into)));
         }
-        let base = self.sound_cell(base)?.time()?.value;
-        let own = cell.time()?;
-        let ends = own.upper.zip(own.lower);
-        let ends = ends.map(|(most, least)| [base / most, base / least]);
-        Some((base / own.value, ends))
+        let base = self.sound_cell(base)?;
+        let value = times_as_fast(base, cell)?;
+        let logs = |cell: &ReportCell| -> Option<Vec<f64>> {
+            let times = cell.times.by_process.get(cell.ranked_by())?;
+            Some(times.iter().map(|time| time.ln()).collect())
+        };
+        let logs = logs(base).zip(logs(cell));
+        let found = logs.and_then(|(base, own)| speedup(&base, &own));
+        // About the ratio of the two shown values.
+        let ends = found.map(|found| found.per(found.value / value));
+        let ends = ends.and_then(|ends| ends.lower.zip(ends.upper));
+        Some((value, ends.map(Into::into)))
     }
 
     /// The fastest structure that is not this crate's own and whose answers are
@@ -203,7 +211,12 @@ pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Match
 }
 
 /// Why the two cells are not the same question, if they are not.
+///
+/// A process that ended before its scene was loaded knows neither items nor cameras.
 pub fn asked_otherwise((old, new): Pair) -> Option<String> {
+    if old.scene.digest.is_empty() || new.scene.digest.is_empty() {
+        return None;
+    }
     let digests = |what: &str, old: &str, new: &str| {
         let short = |digest: &str| digest.chars().take(8).collect::<String>();
         (old != new).then(|| format!("{what}: digest {} and {}", short(old), short(new)))

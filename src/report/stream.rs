@@ -9,6 +9,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use super::changes::{Fact, Setting, differences, facts, known};
+use super::merge::pairs;
 use super::surface::enter_growths;
 use super::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
@@ -56,6 +57,9 @@ pub struct Header {
     pub structures: Vec<String>,
     /// SHA-256 of the program.
     pub binary: Option<String>,
+    /// SHA-256 of the files of cameras and motions, by their names in the plan.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub files: BTreeMap<String, String>,
 }
 
 impl Line<'_> {
@@ -85,6 +89,7 @@ impl Header {
                 generator: GENERATOR_NAME.to_owned(),
                 processes: plan.effort.processes,
                 shard: None,
+                missing: Vec::new(),
             },
             args: Vec::new(),
             machine,
@@ -94,6 +99,7 @@ impl Header {
             whole: Vec::new(),
             structures: plan.structures.iter().map(|s| s.label.clone()).collect(),
             binary: None,
+            files: BTreeMap::new(),
         }
     }
 
@@ -130,12 +136,15 @@ impl Header {
 
     fn plan(&self) -> Vec<Fact> {
         let run = &self.run;
+        let files = self.files.iter();
+        let files = files.map(|(name, digest)| format!("{name} {digest:.8}"));
         vec![
             ("plan", "seed", false, run.seed.to_string()),
             ("plan", "suite", false, known(run.suite.as_deref())),
             ("plan", "generator", false, run.generator.clone()),
             ("plan", "processes", false, run.processes.to_string()),
             ("plan", "structures", false, self.structures.join(",")),
+            ("plan", "files", false, files.collect::<Vec<_>>().join(",")),
         ]
     }
 
@@ -219,6 +228,8 @@ impl Stream {
         let header = &self.header;
         let mut run = header.run.clone();
         run.finished_at.clone_from(&self.finished_at);
+        let whole = header.whole().iter();
+        run.missing = pairs(whole.filter(|key| !self.has(key, 0)));
         let mut report = Report {
             schema_version: SCHEMA_VERSION,
             run,

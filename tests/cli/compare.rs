@@ -125,7 +125,7 @@ fn a_report_and_itself_are_the_same() {
     assert_eq!(last_line(&text), verdict, "{text}");
     for wanted in [
         "10 processes vs 10 processes, threshold 5.00 %",
-        "the machine or the program as a whole: NEW takes 100.0 % [",
+        "the machine or the program as a whole: query_ns of NEW is 100.0 % [",
         "of OLD (10 cells); this comparison cannot tell which",
     ] {
         assert!(
@@ -184,7 +184,10 @@ fn what_moves_everything_is_one_line_and_no_verdict() {
         scale(bvh(new), "query_ns", 1.2);
     });
     let text = compare(folder.path(), "", 3);
-    assert!(text.contains("NEW takes 150."), "{text}");
+    assert!(
+        unwrapped(&text).contains("query_ns of NEW is 150."),
+        "{text}"
+    );
     assert!(
         last_line(&text).starts_with("1 slower, 0 inconclusive"),
         "{text}"
@@ -311,6 +314,10 @@ fn statuses_go_before_times() {
             text.contains(&format!(
                 "only in NEW: newest on uniform:n=300, orbit:frames=8, six-plane: {name}: for"
             )),
+            "{text}"
+        );
+        assert!(
+            unwrapped(&text).contains("of 9 cells; 1 wrong answer only in NEW"),
             "{text}"
         );
     }
@@ -453,4 +460,72 @@ fn cells_of_one_side_and_other_settings_are_said() {
         cells(new).push(copy);
     });
     assert!(compare(twice.path(), "", 0).contains("only in NEW: 1 cell (bvh on"));
+}
+
+#[test]
+fn cells_of_the_same_short_name_are_told_apart() {
+    let folder = with_change(|new| scale(bvh(new), "query_ns", 2.0));
+    for file in ["old.json", "new.json"] {
+        let path = folder.path().join(file);
+        let text = fs::read_to_string(&path).expect("a report");
+        // Two paths whose short names are the same.
+        fs::write(&path, text.replace("outside:frames=8", "orbit:frames=9")).expect("writable");
+    }
+    let text = compare(folder.path(), "", 3);
+    let row = row_with(&text, "slower");
+    assert!(row.contains(" uniform:n=300 orbit:frames=8 "), "{text}");
+    let text = compare(folder.path(), "--all", 3);
+    for frames in [8, 9] {
+        let name = format!("  uniform:n=300 orbit:frames={frames}  ");
+        assert!(text.matches(&name).count() >= 5, "{text}");
+    }
+}
+
+#[test]
+fn a_run_that_was_stopped_is_to_be_finished() {
+    let folder = with_change(|new| {
+        new["run"]["finished_at"] = Value::Null;
+        cells(new).retain(|cell| cell["structure"] == "bvh");
+    });
+    let text = unwrapped(&compare(folder.path(), "", 0));
+    assert!(
+        text.contains("2 inconclusive cells: finish the run that was stopped"),
+        "{text}"
+    );
+}
+
+/// The files of a run are inputs, whichever of them is named.
+#[test]
+fn no_page_takes_the_place_of_an_input() {
+    let folder = with_change(|_| ());
+    let at = |name: &str| folder.path().join(name);
+    for name in ["run", "results/baselines"] {
+        fs::create_dir_all(at(name)).expect("made");
+    }
+    fs::copy(at("old.json"), at("run/report.json")).expect("writable");
+    fs::copy(at("old.json"), at("results/baselines/main.json")).expect("writable");
+    for name in ["summary.csv", "samples.csv", "stream.jsonl"] {
+        fs::write(at("run").join(name), name).expect("writable");
+    }
+    let mut lines = vec![
+        "compare --baseline main new.json --html results/baselines/main.json".to_owned(),
+        "compare --baseline main run --html run/report.json".to_owned(),
+        format!("compare --against {0} --html {0}", super::PROGRAM),
+    ];
+    for name in ["report.json", "summary.csv", "samples.csv", "stream.jsonl"] {
+        lines.extend([
+            format!("compare run new.json --html run/{name}"),
+            format!("compare new.json run/report.json --html run/{name}"),
+            format!("report run --html run/{name}"),
+            format!("report run/report.json --markdown run/{name}"),
+            format!("report run new.json --history run/{name}"),
+        ]);
+    }
+    all_refused(
+        &folder,
+        &lines,
+        "an input or another output; expected a file",
+    );
+    works(folder.path(), "report run --html run/report.html");
+    works(folder.path(), "report run --html run/report.html");
 }

@@ -20,7 +20,7 @@ fn json_says_the_same_with_types() {
         work_changed only_in_old only_in_new common_shift";
     assert_eq!(keys(&done), set(fields));
     assert_eq!(done["verdict"], "regression");
-    let head = "id started_at command version commit dirty cells";
+    let head = "id started_at finished_at command version commit dirty cells";
     assert_eq!(keys(&done["old"]), set(head));
     assert_eq!(
         (&done["old"]["cells"], &done["new"]["cells"]),
@@ -68,7 +68,7 @@ fn json_says_the_same_with_types() {
     );
     assert_eq!(done["only_in_new"], json!([]));
     let shift = &done["common_shift"];
-    assert_eq!(keys(shift), set("ratio lower upper cells"));
+    assert_eq!(keys(shift), set("metric ratio lower upper cells"));
     assert_eq!(shift["cells"], json!(9));
     let same = json(&works(
         folder.path(),

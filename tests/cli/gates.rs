@@ -85,6 +85,10 @@ fn the_gate_of_the_work_sees_lost_and_wrong_answers() {
             "--gate work --metric build_ms",
             "--metric names times | expected none with --gate work",
         ),
+        (
+            "--gate work --fail-inconclusive",
+            "--fail-inconclusive is of times | expected none with --gate work",
+        ),
         ("--gate memory", "--gate | memory | expected | time, work"),
     ] {
         all_refused(&uncounted, &[format!("{COMPARE} {options}")], wanted);
@@ -164,8 +168,13 @@ fn a_saved_run_is_the_baseline_of_the_newest() {
         read("second/report.json")["run"]["id"]
     );
     assert_eq!(id("compare --baseline main"), newest);
+    // Whatever the folder of a newer one is named; a file is none.
+    fs::write(path.join("results/9zzz"), "a file").expect("writable");
+    works(path, &format!("{RUN} --out results/try-2"));
+    let newer = read("results/try-2/report.json")["run"]["id"].clone();
+    assert_eq!(id("compare --baseline main.json"), newer);
     // Again: the newer one stays.
-    works(path, &format!("{RUN} --save main --out third"));
+    works(path, &format!("{RUN} --save main.json --out third"));
     assert_eq!(
         read("results/baselines/main.json"),
         read("third/report.json")
@@ -253,7 +262,7 @@ fn bencher_gets_every_right_cell_once() {
     let benchmarks = json(&written);
     let benchmarks = benchmarks.as_object().expect("an object");
     assert_eq!(benchmarks.len(), 9);
-    let found = &benchmarks["bvh on uniform:n=300, orbit:frames=8, six-plane, f32, frame"];
+    let found = &benchmarks["bvh on uniform:n=300, orbit:frames=8, six-plane"];
     let measures = "latency locate-ns build-ms nodes-tested items-tested planes-tested \
         memory-bytes-per-item";
     assert_eq!(keys(found), set(measures));
@@ -265,6 +274,18 @@ fn bencher_gets_every_right_cell_once() {
         found["planes-tested"],
         json!({ "value": own("planes_tested", cell) })
     );
+    // What is no default is in the name.
+    for (from, to) in [
+        ("\"epsilon\":8.0", "\"epsilon\":64.0"),
+        ("\"f32\"", "\"f64\""),
+    ] {
+        let text = fs::read_to_string(folder.path().join("new.json")).expect("there");
+        fs::write(folder.path().join("new.json"), text.replace(from, to)).expect("writable");
+    }
+    works(folder.path(), "report new.json --bencher b.json");
+    let written = fs::read_to_string(folder.path().join("b.json")).expect("written");
+    let name = "bvh on uniform:n=300, orbit:frames=8, six-plane, f64, epsilon 64";
+    assert_ne!(json(&written)[name], Value::Null, "{written}");
     let wanted = "b.json: an input or another output | --bencher";
     all_refused(&folder, &["report b.json --bencher b.json"], wanted);
 }

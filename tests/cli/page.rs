@@ -177,6 +177,23 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     let page = fs::read_to_string(folder.path().join("other.html")).expect("a page");
     assert!(page.contains("0 of no times took longer and 0 took less time"));
     assert_eq!(page.matches("8 cameras and 80</td>").count(), 2);
+    // What tells two sections apart is in their headings.
+    for cell in new["cells"].as_array_mut().expect("an array") {
+        let own = &mut cell["path"];
+        (own["motion"], own["arithmetic"]) = (json!("drift"), json!("f64"));
+        own["epsilon"] = json!(64);
+        cell["metrics"]["frame_ns"] = cell["metrics"]["query_ns"].clone();
+    }
+    fs::write(folder.path().join("new.json"), new.to_string()).expect("writable");
+    works(folder.path(), "report new.json old --history other.html");
+    let page = fs::read_to_string(folder.path().join("other.html")).expect("a page");
+    let heading = "city:n=300, orbit:frames=8, six-plane";
+    assert!(
+        page.contains(&format!("{heading}: time per query in each run")),
+        "{page}"
+    );
+    let moving = format!("{heading}, drift, f64, epsilon 64: time per frame in each run");
+    assert!(page.contains(&moving), "{page}");
     let wanted = "2 reports; expected one, or --history FILE";
     all_refused(&folder, &["report old new.json".to_owned()], wanted);
 }

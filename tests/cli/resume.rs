@@ -53,7 +53,8 @@ fn assert_complete(run: &Path) {
         .expect("readable")
         .map(|entry| entry.expect("readable").file_name().display().to_string())
         .collect();
-    let names: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+    let names = names.iter().map(String::as_str);
+    let names: BTreeSet<&str> = names.filter(|name| !name.ends_with(".svg")).collect();
     assert_eq!(
         names,
         set("report.html report.json samples.csv stream.jsonl summary.csv")
@@ -276,6 +277,12 @@ fn half_a_line_and_lost_samples_are_measured_again() {
     assert!(!fs::read(&samples).expect("samples").contains(&0));
     // What has its samples has not been touched.
     assert_eq!(lines(&run)[..2], kept[..2]);
+    // Of the right length, and not what was written.
+    let mut other = fs::read(&samples).expect("samples");
+    other[..5].copy_from_slice(b"SCENE");
+    fs::write(&samples, &other).expect("writable");
+    told(&cullbench(folder.path(), "run --resume --out r"));
+    assert_complete(&run);
     fs::remove_file(&samples).expect("removed");
     assert!(
         cullbench(folder.path(), "run --resume --out r")
@@ -283,6 +290,49 @@ fn half_a_line_and_lost_samples_are_measured_again() {
             .contains("6 parts")
     );
     assert_complete(&run);
+}
+
+#[test]
+fn recorded_options_hold_unless_others_are_typed() {
+    let folder = folder(&[]);
+    let plan = PLAN.replace(" --no-bounds", "");
+    works(folder.path(), &format!("{plan} --all-columns --why bvh"));
+    let resumed = |typed: &str| {
+        cut(&folder.path().join("r"), 2);
+        works(folder.path(), &format!("run --resume --out r {typed}"))
+    };
+    let all = resumed("");
+    assert!(
+        all.contains("bound-read") && all.contains("bvh takes "),
+        "{all}"
+    );
+    let linear = resumed("--why linear --timeout 500");
+    assert!(
+        linear.contains("bound-read") && linear.contains("linear takes "),
+        "{linear}"
+    );
+}
+
+/// Folders by hand, a file, and a run that is no run: the newest unfinished one goes on.
+#[test]
+fn the_newest_unfinished_run_goes_on_whatever_its_folder_is_named() {
+    let folder = folder(&[]);
+    fs::create_dir(folder.path().join("results")).expect("made");
+    fs::write(folder.path().join("results/9zzz"), "a file").expect("writable");
+    let plan = PLAN.replace("--out r", "--out");
+    for (name, started) in [
+        ("9-older", "2020-01-01T00:00:00Z"),
+        ("b", "2021-01-01T00:00:00Z"),
+    ] {
+        let run = folder.path().join("results").join(name);
+        works(folder.path(), &format!("{plan} results/{name}"));
+        edit_header(&run, |header| header["run"]["started_at"] = started.into());
+        cut(&run, 2);
+        fs::remove_file(run.join("report.json")).expect("removed");
+    }
+    works(folder.path(), "run --resume");
+    assert_complete(&folder.path().join("results/b"));
+    assert!(!folder.path().join("results/9-older/report.json").exists());
 }
 
 #[cfg(unix)]

@@ -140,6 +140,10 @@ fn a_part_of_the_shards_is_joined_on_request_only() {
         done.err,
         "note: no shard has city:n=300 along spin:frames=4\n"
     );
+    let lacks = "; shard 1/4+3/4+4/4; not measured: city:n=300 along spin:frames=4";
+    assert!(unwrapped(&done.out).contains(lacks), "{}", done.out);
+    let page = fs::read_to_string(folder.path().join("some/report.html")).expect("a page");
+    assert!(page.contains(&format!("6 cells, all ok{lacks}.")), "{page}");
     let some = report(&folder.path().join("some"));
     assert_eq!(cells(&some).len(), 6);
     assert_eq!(some["run"]["shard"], "1/4+3/4+4/4");
@@ -284,4 +288,20 @@ fn what_must_not_be_mixed_is_refused_by_name() {
     works(folder.path(), "merge part1 part2 --out merged");
     assert!(!left.exists());
     assert_eq!(cells(&report(&folder.path().join("merged"))).len(), 8);
+}
+
+#[test]
+fn files_of_cameras_and_motions_are_the_same_in_all_shards() {
+    let cameras = format!("{}\n-9,0.5,0.5,0,0.5,0.5\n", super::EYE_LOOK);
+    let folder = folder(&[("cameras.csv", cameras.as_bytes())]);
+    let plan = "run --scene city:n=300 --scene uniform:n=200 --path cameras.csv \
+        --structure linear,bvh --processes 1 --no-bounds --shard";
+    works(folder.path(), &format!("{plan} 1/2 --out part1"));
+    works(folder.path(), &format!("{plan} 2/2 --out part2"));
+    works(folder.path(), "merge part1 part2 --out whole");
+    let other = cameras.replace("-9", "-8");
+    fs::write(folder.path().join("cameras.csv"), other).expect("writable");
+    works(folder.path(), &format!("{plan} 2/2 --out other"));
+    let wanted = "other: plan differs: files 'cameras.csv | and 'cameras.csv | in part1";
+    all_refused(&folder, &["merge part1 other --out merged"], wanted);
 }

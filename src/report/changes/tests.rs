@@ -183,6 +183,56 @@ fn statuses_and_questions_go_before_times() {
     }
 }
 
+/// A process that ends before its scene is loaded knows no items and no cameras.
+#[test]
+fn an_answer_that_is_not_given_for_want_of_a_scene_is_lost() {
+    for status in [Status::TimedOut, Status::OutOfMemory] {
+        let (whole, mut other) = (all(10, 1.0), all(10, 1.0));
+        for cell in &mut other.cells {
+            let key = cell.key().group;
+            cell.status = status;
+            cell.scene = crate::measure::SceneInfo::unknown(&key.scene);
+            cell.path = crate::measure::PathInfo::unknown(&key);
+        }
+        for (basis, metrics) in [
+            (Basis::Reports, QUERY),
+            (Basis::Reports, WORK),
+            (Basis::Pairs, QUERY),
+        ] {
+            let lost = changes(basis, [&whole.cells, &other.cells], 0.05, metrics);
+            assert_eq!(lost.count(Outcome::Lost), 5, "{:?}", outcomes(&lost));
+            assert!(lost.is_regression() && !lost.judges_nothing());
+            let gained = changes(basis, [&other.cells, &whole.cells], 0.05, metrics);
+            assert_eq!(gained.count(Outcome::Gained), 5, "{:?}", outcomes(&gained));
+            assert!(!gained.is_regression() && !gained.judges_nothing());
+        }
+    }
+}
+
+#[test]
+fn the_common_shift_is_of_the_metric_that_is_judged() {
+    let (mut old, mut new) = (all(10, 1.0), all(10, 2.0));
+    for (report, factor) in [(&mut old, 1.0), (&mut new, 0.5)] {
+        for cell in &mut report.cells {
+            cell.path.motion = "drift".to_owned();
+            let times = cell.times.by_process["query_ns"].clone();
+            let frames = times.iter().map(|ns| ns * factor * factor).collect();
+            cell.times.by_process.insert("frame_ns".to_owned(), frames);
+        }
+    }
+    for (metrics, wanted, ratio) in [
+        (QUERY, "query_ns", 2.0),
+        (&["query_ns", "frame_ns"], "frame_ns", 0.5),
+    ] {
+        let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, metrics);
+        let shift = found.common_shift.unwrap();
+        assert_eq!(shift.metric, wanted);
+        assert!((shift.ratio / ratio - 1.0).abs() < 0.01, "{shift:?}");
+    }
+    let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, WORK);
+    assert_eq!(found.common_shift, None);
+}
+
 #[test]
 fn counters_are_compared_exactly_and_judge_nothing() {
     let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));

@@ -10,7 +10,7 @@ pub fn cell(scene: &str, items: usize, path: &str, structure: &str, ns: f64) -> 
     let cell = json!({
         "scene": { "name": scene, "total_count": items, "region_count": 0,
             "origin": [0.0, 0.0, 0.0], "bounds_min": [0.0, 0.0, 0.0],
-            "bounds_max": [1.0, 1.0, 1.0], "skipped_items": 0, "digest": "" },
+            "bounds_max": [1.0, 1.0, 1.0], "skipped_items": 0, "digest": "d" },
         "path": { "name": path, "camera_count": 8, "cache": "warm", "planes": "frame",
             "epsilon": 8.0, "arithmetic": "f32" },
         "structure": structure, "kind": "tree", "origin": "ours", "params": {}, "test": "six-plane", "status": "ok",
@@ -178,4 +178,31 @@ fn means_tie_unless_the_processes_tell_them_apart() {
         }
         ties(&cells, wanted);
     }
+}
+
+#[test]
+fn a_speedup_without_linear_has_the_interval_of_its_own_ratio() {
+    // Twice as slow and twice as fast as before in turns, and always a ratio of two.
+    let times = |factor: f64| -> Vec<f64> {
+        let speeds = [1.0, 2.0, 1.0, 2.0, 1.01, 2.01];
+        speeds.iter().map(|speed| speed * factor).collect()
+    };
+    let cells = [("bvh", 100.0), ("octree", 200.0)].map(|(name, ns)| {
+        let mut cell = cell("s", 10, "p", name, ns);
+        cell.rank = Some(1);
+        let metric = cell.metrics.get_mut("query_ns").unwrap();
+        (metric.lower, metric.upper) = (Some(ns / 2.0), Some(ns * 2.0));
+        cell.times
+            .by_process
+            .insert("query_ns".to_owned(), times(ns));
+        cell
+    });
+    let comparison = Comparison {
+        cells: cells.iter().collect(),
+        bounds: Vec::new(),
+    };
+    let (ratio, ends) = comparison.speedup("octree", &cells[0]).unwrap();
+    let [lower, upper] = ends.expect("an interval");
+    assert!(ratio == 2.0 && 1.999 < lower && upper < 2.001, "{ends:?}");
+    assert_eq!(comparison.speedup("octree", &cells[1]), Some((1.0, None)));
 }
