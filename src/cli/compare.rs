@@ -237,8 +237,9 @@ pub fn save_baseline(name: &str, report: &Report) -> anyhow::Result<()> {
     Ok(write_atomically(&baseline_file(name), write)?)
 }
 
-/// Files of a baseline and of the run to compare with it, by default the newest of the
-/// others under results/.
+/// Files of a baseline and of the run to compare with it.
+///
+/// By default the newest of the others under results/.
 fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]> {
     let file = baseline_file(name);
     ensure!(

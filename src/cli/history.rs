@@ -1,4 +1,4 @@
-//! The page of several runs: time per query or frame of each structure, oldest run first.
+//! The page of several runs: times of each structure, oldest run first.
 
 use super::cell_names::question;
 use super::diagram::{Diagram, Joined, Point, Series};

@@ -79,8 +79,7 @@ fn digest(file: &Path) -> Option<String> {
     Some(scene::hex(&hmac_sha256::Hash::hash(&bytes)))
 }
 
-/// Opens the run to continue; its options, as recorded or else typed now. Nothing is
-/// written.
+/// Opens the run to continue, with its options; writes nothing.
 pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
     let path = match &args.out {
         Some(path) => path.clone(),

@@ -262,8 +262,9 @@ fn open(file: &Path) -> Result<File, InputError> {
     opened.map_err(writing::io(file))
 }
 
-/// Bytes of samples.csv up to the first NUL, none without its first line. A power cut
-/// leaves NULs where data never reached the disk.
+/// Bytes of samples.csv up to the first NUL; none without its first line.
+///
+/// A power cut leaves NULs where data never reached the disk.
 pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
     // A pipe would wait for its writer.
     if !fs::metadata(file)?.is_file() {

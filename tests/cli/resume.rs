@@ -313,7 +313,7 @@ fn recorded_options_hold_unless_others_are_typed() {
     );
 }
 
-/// Folders by hand, a file, and a run that is no run: the newest unfinished one goes on.
+/// Among folders of any name, and a file.
 #[test]
 fn the_newest_unfinished_run_goes_on_whatever_its_folder_is_named() {
     let folder = folder(&[]);
