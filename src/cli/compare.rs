@@ -239,7 +239,7 @@ pub fn save_baseline(name: &str, report: &Report) -> anyhow::Result<()> {
 
 /// Files of a baseline and of the run to compare with it.
 ///
-/// By default the newest of the others under results/.
+/// The run is the newest of the others under results/ if none is named.
 fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]> {
     let file = baseline_file(name);
     ensure!(
