@@ -4,10 +4,11 @@
 
 use glam::DVec3;
 
-use super::{Pose, Stage, unfit};
+use super::{Pose, Stage, thin, unfit};
 use crate::camera::Frame;
 use crate::input::{InputError, note};
 use crate::scene::{CameraPlace, PlaceView};
+use crate::shown::counted;
 use crate::spec::Spec;
 
 /// A circle about the scene: everything turns past.
@@ -148,8 +149,8 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputErr
 
 /// The scene's own camera places: things of Doom maps, cameras of glTF.
 ///
-/// Roll and lens are the file's, where it states them.
-pub(super) fn places(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
+/// Roll and lens are the file's, where it states them. `frames` of them at most.
+pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
     if stage.scene.places.is_empty() {
         let reason = format!(
             "scene '{}' has no camera places of its own; expected one with places, such as a Doom map",
@@ -158,7 +159,11 @@ pub(super) fn places(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputErro
         return Err(unfit("places", reason));
     }
     let places = stage.scene.places.iter();
-    Ok(places.map(|place| pose(stage, place)).collect())
+    let mut poses: Vec<Pose> = places.map(|place| pose(stage, place)).collect();
+    if spec.text("frames").is_some() {
+        thin(&mut poses, stage.count);
+    }
+    Ok(poses)
 }
 
 pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
@@ -176,21 +181,30 @@ pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
 /// The camera that the animation of a scene's file moves, at even times.
 pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
     let unfit = |reason: String| unfit("animation", reason);
-    let Some(animation) = &stage.scene.animation else {
-        let name = &stage.scene.name;
-        return Err(unfit(format!(
-            "scene '{name}' has no animated camera; expected a glTF file with one"
-        )));
+    let animation = match stage.scene.animation.as_deref() {
+        Some(Ok(animation)) => animation,
+        Some(Err(error)) => return Err(unfit(error.to_string())),
+        None => {
+            let name = &stage.scene.name;
+            return Err(unfit(format!(
+                "scene '{name}' has no animated camera; expected a glTF file with one"
+            )));
+        }
     };
-    if animation.others > 0 {
-        let others = animation.others;
-        note(&format!(
-            "path 'animation' follows the first animated camera, not the {others} others"
-        ));
+    let (cameras, clips) = (animation.cameras, animation.clips);
+    for (count, one) in [(cameras, "animated camera"), (clips, "animation")] {
+        if count > 1 {
+            note(&format!(
+                "path 'animation' follows the first of {}",
+                counted(count, one)
+            ));
+        }
     }
     let [first, last] = animation.seconds;
-    let step = (last - first) / stage.count.saturating_sub(1).max(1) as f64;
-    let times = (0..stage.count).map(|frame| first + step * frame as f64);
+    let steps = stage.count.saturating_sub(1).max(1) as f64;
+    // Exact products of f32 times, so that the last time is the last key's.
+    let at = |frame| (first * (steps - frame) + last * frame) / steps;
+    let times = (0..stage.count).map(|frame| at(frame as f64));
     let pose = |time: f64| match animation.at(time) {
         Some(place) => Ok(pose(stage, &place)),
         None => Err(unfit(format!(

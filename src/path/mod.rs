@@ -142,12 +142,13 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
         "height=1.7 (above the ground), near=0.1", street::frames;
     "walk", "through the doors of rooms or a Doom map at constant height above the floors",
         "height=1.7 (eyes above the floor; 41 in a Doom map), doors=32 (passed)", walk::frames;
-    "places", "the scene's own camera places (things of a Doom map, cameras of glTF)", "", families::places;
+    "places", "the scene's own camera places (things of a Doom map, cameras of glTF)",
+        "frames=1000 (at most as many, evenly spread; all without it)", families::places;
     "animation", "the camera that the animation of a glTF file moves, at even times", "", families::animation;
 };
 
 /// Parameters that every generated path takes.
-pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000, \
+pub const PATH_PARAMS: &str = "frames=256, seed=1 (of random choices), fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000, \
      far=the scene's diagonal (or inf), visible (choose far so that this share of the items \
      is visible on average, e.g. visible=2%, or this many of them, e.g. visible=2000)";
 
@@ -169,6 +170,7 @@ pub(crate) struct Stage<'a> {
 
 /// One camera without its far plane decided. `magnification` divides the
 /// window (zoom by field of view).
+#[derive(Clone, Copy)]
 pub(crate) struct Pose {
     eye: DVec3,
     forward: DVec3,
@@ -261,6 +263,7 @@ pub fn load_scaled(
 ) -> Result<CameraPath, InputError> {
     let path = read(source, scene, defaults, scale)?;
     path.warnings(scene).iter().for_each(|text| warn(text));
+    defaults.note_unused(&path);
     Ok(path)
 }
 

@@ -209,8 +209,8 @@ pub struct Scene {
     pub labels: Vec<Labels>,
     /// Camera places that the scene offers, for the path `places`.
     pub places: Vec<CameraPlace>,
-    /// The camera that an animation of the file moves.
-    pub animation: Option<Arc<CameraAnimation>>,
+    /// The camera that an animation of the file moves, or why it cannot be read.
+    pub animation: Option<Arc<Result<CameraAnimation, InputError>>>,
     /// The partition that the scene's file brings, local coordinates.
     pub own_tree: Option<PlaneTree>,
     /// Items left out on request (`--skip-bad-items`).

@@ -78,6 +78,50 @@ fn a_note_tells_of_skins() {
 }
 
 #[test]
+fn notes_tell_of_what_is_not_read_as_drawn() {
+    let text = r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["EXT_odd", "KHR_materials_unlit"],
+        "scenes": [{"nodes": [0, 2]}, {"nodes": [3]}], "cameras": [{"type": "perspective",
+        "perspective": {"yfov": 1, "znear": 1}}],
+        "nodes": [{"extensions": {"KHR_node_visibility": {"visible": false}}, "children": [1]},
+            {"mesh": 0}, {"camera": 0, "scale": [0, 0, 0]}, {"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}], "weights": [0, 1]}],
+        "animations": [{"samplers": [{"input": 0, "output": 0}],
+            "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}]}],
+        "accessors": [{"componentType": 5126, "count": 1, "type": "VEC3", "min": [0, 0, 0],
+            "max": [1, 1, 1]}]}"#;
+    let folder = folder(&[("s.gltf", text.as_bytes())]);
+    let done = cullbench(folder.path(), "scene info s.gltf");
+    let notes = [
+        "1 item with morph weights, as stored and not morphed",
+        "1 item that an animation moves, where its node stands",
+        "1 item hidden by KHR_node_visibility, read all the same",
+        "1 camera without a direction of view, left out",
+        "1 further scene not read",
+        "1 node with a mesh outside of the scene, not read",
+        "extensions that it requires, not read: EXT_odd",
+    ];
+    assert_eq!(done.code, Some(0), "{}", done.err);
+    for note in notes {
+        let line = format!("note: s.gltf: {note}\n");
+        assert!(done.err.contains(&line), "{note}: {}", done.err);
+    }
+}
+
+#[test]
+fn a_camera_with_another_up_is_not_told_of_an_option_that_its_format_excludes() {
+    let text = format!("{FULL_CAMERA}\n0,20,0,10,20,0,0,0,1,50,1.5,0.1,100\n");
+    let folder = folder(&[("c.csv", text.as_bytes())]);
+    let line = format!(
+        "query --scene {} --cameras c.csv --structure linear",
+        turned()
+    );
+    let done = cullbench(folder.path(), &line);
+    let warning = format!("c.csv: z is up in 1 of 1 camera, y in {}\n", turned());
+    assert_eq!(done.code, Some(0), "{}", done.err);
+    assert!(done.err.contains(&warning), "{}", done.err);
+}
+
+#[test]
 fn its_triangles_and_cameras_reach_the_later_stages() {
     let folder = folder(&[]);
     let path = "--path outside:frames=4 --processes 1 --samples 48x32 --format json";
@@ -239,6 +283,7 @@ fn its_cameras_keep_their_lens_and_its_animation_is_a_path() {
         assert_eq!(cameras["lens"]["aspect"], serde_json::json!([1.5, 1.5]));
         assert_eq!(cameras["lens"]["far"], serde_json::json!([99.0, 99.0]));
     }
+    assert_eq!(lens("places:frames=9")["camera_count"], 1);
     let typed = lens("places:fovy=40,far=50");
     assert_eq!(typed["lens"]["fovy_deg"][0], 40.0);
     assert_eq!(typed["lens"]["far"][1], 50.0);

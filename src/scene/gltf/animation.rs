@@ -4,14 +4,15 @@
 //! arc; cubic splines by Hermite's polynomials.
 
 use std::array;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::iter::successors;
 
 use glam::{DAffine3, DQuat, DVec3, DVec4};
+use gltf::json::Value;
 use gltf::json::animation::{Channel, Interpolation, Property};
-use gltf::json::camera::Camera;
 use gltf::json::validation::Checked;
 
+use super::Order;
 use super::file::File;
 use crate::input::InputError;
 use crate::scene::{CameraPlace, PlaceView};
@@ -25,8 +26,10 @@ pub struct CameraAnimation {
     lens: Option<PlaceView>,
     /// Seconds of the first and of the last key.
     pub seconds: [f64; 2],
-    /// Number of further cameras that an animation moves.
-    pub others: usize,
+    /// Number of cameras that an animation moves.
+    pub cameras: usize,
+    /// Number of animations that move this one.
+    pub clips: usize,
 }
 
 impl CameraAnimation {
@@ -119,26 +122,21 @@ pub fn transform([moved, turned, scaled]: Parts) -> DAffine3 {
 }
 
 /// The lens of a camera; its up vector is of no meaning.
-fn lens(camera: &Camera) -> Option<PlaceView> {
-    let between = |near: f32, far: Option<f32>| PlaceView {
+fn lens(camera: &Value) -> Option<PlaceView> {
+    let (perspective, parallel) = (&camera["perspective"], &camera["orthographic"]);
+    let lens = [perspective, parallel]
+        .into_iter()
+        .find(|lens| lens.is_object())?;
+    let number = |name: &str| lens[name].as_f64();
+    let aspect = || Some(number("xmag")? / number("ymag")?);
+    Some(PlaceView {
         up: DVec3::Y,
-        fovy_deg: None,
-        ortho_height: None,
-        aspect: None,
-        near: near.into(),
-        far: far.map(f64::from).filter(|far| far.is_finite()),
-    };
-    let parallel = camera.orthographic.as_ref().map(|lens| PlaceView {
-        ortho_height: Some(2.0 * f64::from(lens.ymag)),
-        aspect: Some(f64::from(lens.xmag) / f64::from(lens.ymag)),
-        ..between(lens.znear, Some(lens.zfar))
-    });
-    let perspective = camera.perspective.as_ref().map(|lens| PlaceView {
-        fovy_deg: Some(f64::from(lens.yfov).to_degrees()),
-        aspect: lens.aspect_ratio.map(f64::from),
-        ..between(lens.znear, lens.zfar)
-    });
-    perspective.or(parallel)
+        fovy_deg: number("yfov").map(f64::to_degrees),
+        ortho_height: number("ymag").map(|half| 2.0 * half),
+        aspect: number("aspectRatio").or_else(aspect),
+        near: number("znear")?,
+        far: number("zfar"),
+    })
 }
 
 impl File<'_> {
@@ -148,16 +146,12 @@ impl File<'_> {
             return Ok(None);
         };
         let place = format!("nodes[{node}].camera");
-        Ok(lens(self.get(&self.root.cameras, camera, &place)?))
+        self.get(&self.root.cameras, camera, &place)?;
+        Ok(lens(&self.exact.cameras[camera.value()]))
     }
 
     /// The first camera that an animation moves, by its first animation.
-    ///
-    /// `order` has the nodes with their parents, parents first.
-    pub fn camera_animation(
-        &self,
-        order: &[(usize, Option<usize>)],
-    ) -> Result<Option<CameraAnimation>, InputError> {
+    pub fn camera_animation(&self, order: &Order) -> Result<Option<CameraAnimation>, InputError> {
         let mut channels: HashMap<usize, Vec<(usize, usize, usize, &Channel)>> = HashMap::new();
         for (clip, animation) in self.root.animations.iter().enumerate() {
             for (number, channel) in animation.channels.iter().enumerate() {
@@ -167,26 +161,22 @@ impl File<'_> {
                 }
             }
         }
-        let mut parents = vec![None; self.root.nodes.len()];
-        let mut moved = vec![false; parents.len()];
-        let mut animated = order.iter().filter(|&&(node, parent)| {
-            parents[node] = parent;
-            moved[node] = channels.contains_key(&node) || parent.is_some_and(|node| moved[node]);
-            moved[node] && self.root.nodes[node].camera.is_some()
-        });
-        let Some(&(camera, _)) = animated.next() else {
+        let moved = self.below(order, |node| channels.contains_key(&node));
+        let is_animated = |node: &usize| moved[*node] && self.root.nodes[*node].camera.is_some();
+        let animated = order.iter().map(|(node, _)| *node).filter(is_animated);
+        let Some(camera) = animated.clone().next() else {
             return Ok(None);
         };
-        let others = animated.count();
-        let mut nodes: Vec<usize> = successors(Some(camera), |node| parents[*node]).collect();
+        let parents: HashMap<usize, Option<usize>> = order.iter().copied().collect();
+        let mut nodes: Vec<usize> = successors(Some(camera), |node| parents[node]).collect();
         nodes.reverse();
         let own = nodes.iter().filter_map(|node| channels.get(node)).flatten();
-        let first = own.map(|(clip, ..)| *clip).min();
+        let clips: BTreeSet<usize> = own.map(|(clip, ..)| *clip).collect();
         let (mut chain, mut seconds) = (Vec::new(), [f64::INFINITY, f64::NEG_INFINITY]);
         for index in nodes {
             let mut tracks = [None, None, None];
             let own = channels.get(&index).into_iter().flatten();
-            for &(clip, number, part, channel) in own.filter(|own| Some(own.0) == first) {
+            for &(clip, number, part, channel) in own.filter(|own| clips.first() == Some(&own.0)) {
                 let place = format!("animations[{clip}].channels[{number}]");
                 let track = self.track(clip, channel, part, &place)?;
                 seconds[0] = seconds[0].min(track.times[0]);
@@ -203,7 +193,8 @@ impl File<'_> {
             chain,
             lens: self.lens_of(camera)?,
             seconds,
-            others,
+            cameras: animated.count(),
+            clips: clips.len(),
         }))
     }
 
@@ -229,7 +220,12 @@ impl File<'_> {
         };
         let ascend = times.is_sorted_by(|a, b| a < b) && times.iter().all(|t| t.is_finite());
         if !ascend || times.is_empty() || each * times.len() != values.len() {
-            let found = format!("{} times and {} values", times.len(), values.len());
+            let found = match ascend {
+                true => [(times.len(), "time"), (values.len(), "value")]
+                    .map(|(count, what)| counted(count, what))
+                    .join(" and "),
+                false => "times that do not ascend".to_owned(),
+            };
             let expected = format!("ascending times with {} each", counted(each, "value"));
             return Err(self.error(place.to_owned(), found, &expected));
         }

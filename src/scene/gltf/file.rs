@@ -5,11 +5,12 @@ use std::fmt;
 use std::path::Path;
 
 use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
+use base64::engine::general_purpose::STANDARD_NO_PAD;
 use glam::DVec4;
 use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root, Value};
+use serde::Deserialize;
 
 use crate::input::{InputError, read_file};
 use crate::shown::{message, plain, shortened};
@@ -50,6 +51,15 @@ fn lenient(mut json: Value) -> Option<Root> {
     serde_json::from_value(json).ok()
 }
 
+/// Nodes and cameras as the file states them: the typed form rounds numbers to f32.
+#[derive(Deserialize)]
+pub struct Exact {
+    #[serde(default)]
+    pub nodes: Vec<Value>,
+    #[serde(default)]
+    pub cameras: Vec<Value>,
+}
+
 /// Reads a file that a scene names relative to itself.
 pub type Beside<'b> = &'b dyn Fn(&str) -> Result<Vec<u8>, InputError>;
 
@@ -87,6 +97,7 @@ fn part(bytes: &[u8], first: u64, length: u64) -> Option<&[u8]> {
 pub struct File<'f> {
     pub name: &'f str,
     pub root: Root,
+    pub exact: Exact,
     pub buffers: Vec<Cow<'f, [u8]>>,
 }
 
@@ -115,9 +126,11 @@ impl<'f> File<'f> {
             let version = shortened(&root.asset.version, 20);
             return Err(error(format!("glTF of version '{version}'")));
         }
+        let exact = serde_json::from_slice(json).map_err(|e| error(message(&e.to_string())))?;
         let mut file = File {
             name,
             root,
+            exact,
             buffers: Vec::new(),
         };
         for index in 0..file.root.buffers.len() {
@@ -132,20 +145,20 @@ impl<'f> File<'f> {
     }
 
     fn linked(&self, buffer: usize, uri: &str, beside: Beside) -> Result<Vec<u8>, InputError> {
-        let error = |found: String, expected| {
-            Err(self.error(format!("buffers[{buffer}].uri"), found, expected))
-        };
-        match uri.strip_prefix("data:") {
-            Some(data) => match data.split_once(";base64,").map(|(_, d)| STANDARD.decode(d)) {
-                Some(Ok(bytes)) => Ok(bytes),
-                _ => error("bytes that are no base64".to_owned(), "base64 data"),
-            },
-            None if uri.contains("://") => error(
-                format!("'{}'", shortened(uri, 60)),
-                "a file beside this one",
-            ),
-            None => beside(&decoded(uri)),
+        let error =
+            |found: &str, expected| self.error(format!("buffers[{buffer}].uri"), found, expected);
+        let (head, data) = uri.split_once(',').unwrap_or((uri, ""));
+        let head = head.to_ascii_lowercase();
+        if head.starts_with("data:") {
+            let data = STANDARD_NO_PAD.decode(decoded(data).trim_end_matches('='));
+            let data = data.ok().filter(|_| head.ends_with(";base64"));
+            return data.ok_or_else(|| error("bytes that are no base64", "base64 data"));
         }
+        if uri.contains("://") {
+            let found = format!("'{}'", shortened(uri, 60));
+            return Err(error(&found, "a file beside this one"));
+        }
+        beside(&decoded(uri))
     }
 
     pub fn error(&self, place: String, found: impl fmt::Display, expected: &str) -> InputError {

@@ -25,6 +25,23 @@ pub struct Triangles {
     pub two_sided: Vec<bool>,
 }
 
+impl Triangles {
+    /// Drops points without a triangle, of which each item would have a copy.
+    fn compact(mut self) -> Triangles {
+        let mut places = vec![u32::MAX; self.points.len()];
+        let mut points = Vec::new();
+        for corner in self.corners.as_flattened_mut() {
+            let place = &mut places[*corner as usize];
+            if *place == u32::MAX {
+                *place = points.len() as u32;
+                points.push(self.points[*corner as usize]);
+            }
+            *corner = *place;
+        }
+        Triangles { points, ..self }
+    }
+}
+
 impl File<'_> {
     /// How many numbers the accessors of a mesh state.
     pub fn numbers(&self, mesh: usize) -> u64 {
@@ -80,7 +97,7 @@ impl File<'_> {
         }
         Ok(all.and_then(|all| match all.corners.is_empty() {
             true => Err("has no triangles".to_owned()),
-            false => Ok(all),
+            false => Ok(all.compact()),
         }))
     }
 

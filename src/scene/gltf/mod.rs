@@ -9,11 +9,12 @@
 mod animation;
 mod file;
 mod mesh;
+mod notes;
 
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use glam::{BVec3, DAffine3, DMat4, DVec3};
+use glam::{BVec3, DAffine3, DMat4, DVec3, DVec4};
 use gltf::json::{Index, Value};
 use serde::Deserialize;
 use serde_json::Map;
@@ -28,7 +29,6 @@ use super::{
     choose_origin, memory,
 };
 use crate::input::{InputError, note};
-use crate::shown::counted;
 
 /// Bytes of a number of a mesh while it is read: in f64, and as a point or corner.
 const BYTES_PER_NUMBER: u64 = 20;
@@ -70,14 +70,8 @@ pub(super) fn read_beside(
 ) -> Result<Scene, InputError> {
     let file = File::open(bytes, file, beside)?;
     let (placed, places, order) = file.placed()?;
-    let is_skinned = |item: &&Placed| file.root.nodes[item.node].skin.is_some();
-    let skinned = placed.iter().filter(is_skinned).count();
-    if skinned > 0 {
-        let skinned = counted(skinned, "item");
-        let what = "with a skin, placed by its node and not by joints";
-        note(&format!("{}: {skinned} {what}", file.name));
-    }
-    let animation = file.camera_animation(&order)?;
+    file.note_unread(&placed, &order, places.len());
+    let animation = file.camera_animation(&order).transpose();
     let meshes = 0..file.root.meshes.len();
     let numbers = meshes.clone().map(|mesh| file.numbers(mesh));
     let numbers = numbers.fold(0, u64::saturating_add);
@@ -177,10 +171,9 @@ impl File<'_> {
 
     /// Transform of a node relative to its parent.
     fn local(&self, index: usize) -> Result<DAffine3, InputError> {
-        let node = &self.root.nodes[index];
-        let found = match node.matrix {
-            Some(matrix) => DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from))),
-            None => transform(self.parts(index)),
+        let found = match <[f64; 16]>::deserialize(&self.exact.nodes[index]["matrix"]) {
+            Ok(matrix) => DAffine3::from_mat4(DMat4::from_cols_array(&matrix)),
+            Err(_) => transform(self.parts(index)),
         };
         match found.is_finite() {
             true => Ok(found),
@@ -194,10 +187,15 @@ impl File<'_> {
 
     /// The parts of the transform of a node that it states.
     fn parts(&self, index: usize) -> Parts {
-        let node = &self.root.nodes[index];
-        let three = |v: [f32; 3]| DVec3::from(v.map(f64::from)).extend(0.0);
-        let turned = node.rotation.as_ref().map(|r| r.0.map(f64::from).into());
-        [node.translation.map(three), turned, node.scale.map(three)]
+        let node = &self.exact.nodes[index];
+        let three =
+            |name| Some(DVec3::from(<[f64; 3]>::deserialize(&node[name]).ok()?).extend(0.0));
+        let turned = <[f64; 4]>::deserialize(&node["rotation"]).ok();
+        [
+            three("translation"),
+            turned.map(DVec4::from),
+            three("scale"),
+        ]
     }
 
     /// Instances of a node by EXT_mesh_gpu_instancing; the node itself without them.

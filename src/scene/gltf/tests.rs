@@ -57,12 +57,7 @@ fn read(file: &Value) -> Result<Scene, InputError> {
 
 /// The points of both items in the world, by hand.
 fn world() -> [Vec<DVec3>; 2] {
-    let turn = DQuat::from_xyzw(
-        0.1f32.into(),
-        (-0.7f32).into(),
-        0.2f32.into(),
-        0.6f32.into(),
-    );
+    let turn = DQuat::from_xyzw(0.1, -0.7, 0.2, 0.6);
     let place = |p: DVec3| {
         DVec3::new(10.0, 20.0, -30.0) + turn.normalize() * (p * DVec3::new(2.0, 3.0, -4.0))
     };
@@ -145,15 +140,86 @@ fn animated_by(path: &str, kind: &str, count: usize, values: &[f32]) -> Value {
     file
 }
 
+fn animation_of(scene: &Scene) -> &CameraAnimation {
+    let animation = scene.animation.as_deref().expect("an animation");
+    animation.as_ref().expect("a good one")
+}
+
+/// The error of the animation of a scene that is read without it.
+fn animation_error(file: &Value) -> String {
+    let animation = read(file).unwrap().animation.expect("an animation");
+    animation
+        .as_ref()
+        .as_ref()
+        .map(|_| ())
+        .unwrap_err()
+        .to_string()
+}
+
+/// Sets a value that may be new.
+fn set(file: &mut Value, place: &str, value: Value) {
+    let (parent, name) = place.rsplit_once('/').unwrap();
+    match file.pointer_mut(parent).unwrap() {
+        Value::Array(all) => all[name.parse::<usize>().unwrap()] = value,
+        object => object[name] = value,
+    }
+}
+
+#[test]
+fn transforms_are_those_of_the_file_in_f64() {
+    let at = [6378137.3, 0.1, 1e-9];
+    let column = [0.3, 0.0, 0.0, 0.0, 0.0, 0.7, 0.0, 0.0, 0.0, 0.0, 1.1, 0.0];
+    let matrix = [&column[..], &at, &[1.0]].concat();
+    let moved = json!({"mesh": 0, "translation": at, "scale": [0.3, 0.7, 1.1]});
+    for node in [moved, json!({"mesh": 0, "matrix": matrix})] {
+        let mut file = file();
+        file["nodes"] = json!([node]);
+        file["scenes"] = json!([{"nodes": [0]}]);
+        let scene = read(&file).unwrap();
+        let written = scene.written().next().unwrap();
+        let size = DVec3::new(0.3 * 1.5, 0.7 * 2.0, 1.1 * 3.0);
+        assert_eq!(
+            (written.min, written.max),
+            (DVec3::from(at), DVec3::from(at) + size)
+        );
+    }
+}
+
+#[test]
+fn points_without_a_triangle_are_not_copied() {
+    let mut file = file();
+    file["accessors"][1]["count"] = json!(3);
+    let surfaces = read(&file).unwrap().surfaces.expect("triangles");
+    assert_eq!((surfaces.points.len(), surfaces.triangles.len()), (6, 2));
+    assert_eq!(surfaces.triangles[0], [0, 2, 1]);
+}
+
+#[test]
+fn data_of_uris_may_lack_padding_and_have_any_case() {
+    let mut file = file();
+    // One byte beyond the 72, whose code ends in padding.
+    let uri = file["buffers"][0]["uri"].as_str().unwrap().to_owned() + "AA==";
+    let bare = uri.trim_end_matches('=').to_owned();
+    for uri in [
+        uri.replace('=', "%3D"),
+        bare,
+        uri.replace("data:", "DATA:"),
+        uri,
+    ] {
+        file["buffers"][0]["uri"] = json!(uri);
+        assert_eq!(read(&file).unwrap().items.len(), 2, "{uri}");
+    }
+}
+
 #[test]
 fn cameras_have_their_lens_and_move_as_animated() {
     let scene = read(&animated()).unwrap();
     let view = scene.places[0].view.expect("a lens");
     let wanted = [Some(1f64.to_degrees()), None, None];
     assert_eq!([view.fovy_deg, view.aspect, view.far], wanted);
-    assert!((view.near - 0.1).abs() < 1e-6 && view.up.distance(DVec3::Y) < 1e-6);
+    assert!(view.near == 0.1 && view.up.distance(DVec3::Y) < 1e-6);
     let forward = |scene: &Scene, time: f64| {
-        let animation = scene.animation.as_ref().expect("an animation");
+        let animation = animation_of(scene);
         assert_eq!(animation.seconds, [1.0, 3.0]);
         let place = animation.at(time).expect("a direction");
         assert_eq!((place.eye, place.view), (scene.places[0].eye, Some(view)));
@@ -172,7 +238,13 @@ fn cameras_have_their_lens_and_move_as_animated() {
     nodes[2]["children"] = json!([nodes.len()]);
     let second = json!({"camera": nodes[2]["camera"]});
     nodes.push(second);
-    assert_eq!(read(&two).unwrap().animation.expect("one").others, 1);
+    let clip = two["animations"][0].clone();
+    two["animations"].as_array_mut().unwrap().push(clip);
+    let two = read(&two).unwrap();
+    assert_eq!(
+        (animation_of(&two).cameras, animation_of(&two).clips),
+        (2, 2)
+    );
     let mut parallel = animated();
     let lens = json!({"xmag": 3, "ymag": 2, "znear": 0, "zfar": 9});
     parallel["cameras"] = json!([{"type": "orthographic", "orthographic": lens}]);
@@ -183,20 +255,44 @@ fn cameras_have_their_lens_and_move_as_animated() {
         (
             "/accessors/2/count",
             json!(1),
-            "animations[0].channels[0]: 1 times and 2 values",
+            "animations[0].channels[0]: 1 time and 2 values",
+        ),
+        (
+            "/accessors/2/bufferView",
+            json!(3),
+            "animations[0].channels[0]: times that do not ascend",
+        ),
+        (
+            "/bufferViews/3/extensions",
+            json!({"EXT_meshopt_compression": {}}),
+            "animations[0].channels[0]: is compressed",
         ),
         (
             "/animations/0/channels/0/sampler",
             json!(4),
             "animations[0].channels[0]: index 4",
         ),
-        ("/nodes/2/camera", json!(1), "nodes[2].camera: index 1"),
     ] {
         let mut file = animated();
-        *file.pointer_mut(place).unwrap() = value;
-        let error = read(&file).map(|_| ()).unwrap_err().to_string();
+        set(&mut file, place, value);
+        let error = animation_error(&file);
         assert!(error.contains(wanted), "{place}: {error}");
     }
+}
+
+#[test]
+fn the_last_frame_is_at_the_last_key() {
+    let mut file = animated_by("translation", "VEC3", 2, &[0.0, 0.0, 0.0, 8.0, 0.0, 0.0]);
+    file["animations"][0]["samplers"][0]["interpolation"] = json!("STEP");
+    let uri = file["buffers"][1]["uri"].as_str().unwrap();
+    let values = STANDARD.decode(uri.split_once(',').unwrap().1).unwrap();
+    let times = [0f32, 4.0].map(f32::to_le_bytes).concat();
+    let bytes = STANDARD.encode([&times, &values[8..]].concat());
+    file["buffers"][1]["uri"] = json!(format!("data:;base64,{bytes}"));
+    let scene = read(&file).unwrap();
+    let path = crate::path::load("animation:frames=50", &scene, &Default::default()).unwrap();
+    let ends = [path.cameras[48], path.cameras[49]].map(|camera| camera.frame.eye.x);
+    assert_eq!(ends, [0.0, 8.0]);
 }
 
 #[test]
@@ -206,7 +302,8 @@ fn cubic_splines_bend_by_their_tangents() {
     let keys = [9.0, 0.0, 0.0, 12.0, 8.0, 9.0].map(slope);
     let mut cubic = animated_by("translation", "VEC3", 6, keys.as_flattened());
     cubic["animations"][0]["samplers"][0]["interpolation"] = json!("CUBICSPLINE");
-    let animation = read(&cubic).unwrap().animation.expect("an animation");
+    let scene = read(&cubic).unwrap();
+    let animation = animation_of(&scene);
     for (time, x) in [
         (0.5, 0.0),
         (1.0, 0.0),
@@ -218,7 +315,7 @@ fn cubic_splines_bend_by_their_tangents() {
         assert_eq!(animation.at(time).expect("a direction").eye.x, x, "{time}");
     }
     cubic["accessors"][3]["count"] = json!(5);
-    let error = read(&cubic).map(|_| ()).unwrap_err().to_string();
+    let error = animation_error(&cubic);
     assert!(
         error.contains("2 times and 5 values; expected ascending times with 3 values each"),
         "{error}"
@@ -239,9 +336,12 @@ fn what_the_specification_allows_is_read() {
     file["nodes"][2]["mesh"] = json!(1);
     let scene = read(&file).unwrap();
     assert_eq!(scene.items, read(&animated()).unwrap().items);
-    assert_eq!(scene.surfaces.expect("triangles").triangles.len(), 8);
-    assert_eq!(scene.animation.expect("one").seconds, [1.0, 3.0]);
-    assert_eq!(scene.places[0].view.expect("a lens").far, None);
+    assert_eq!(
+        scene.surfaces.as_ref().expect("triangles").triangles.len(),
+        8
+    );
+    assert_eq!(animation_of(&scene).seconds, [1.0, 3.0]);
+    assert_eq!(scene.places[0].view.expect("a lens").far, Some(1e39));
     let whole = file.as_object_mut().unwrap();
     assert!(whole.remove("scene").is_some() && whole.remove("scenes").is_some());
     assert_eq!(read(&file).unwrap().items, scene.items);
@@ -373,7 +473,8 @@ fn what_is_wrong_is_named_with_its_place() {
     let bytes = STANDARD.decode(uri.split_once(',').unwrap().1).unwrap();
     let bytes = [&bytes[..12], &[0xff; 4], &bytes[16..]].concat();
     let nan = format!("data:;base64,{}", STANDARD.encode(bytes));
-    let cases: [(&str, Value, &str); 13] = [
+    let cases: [(&str, Value, &str); 14] = [
+        ("/nodes/2/camera", json!(1), "nodes[2].camera: index 1"),
         (
             "/buffers/0/uri",
             json!(nan),
@@ -430,13 +531,7 @@ fn what_is_wrong_is_named_with_its_place() {
     ];
     for (place, value, wanted) in cases {
         let mut file = file();
-        match file.pointer_mut(place) {
-            Some(old) => *old = value,
-            None => {
-                let (parent, name) = place.rsplit_once('/').unwrap();
-                file.pointer_mut(parent).unwrap()[name] = value;
-            }
-        }
+        set(&mut file, place, value);
         let error = read(&file).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(wanted), "{place}: {error}");
         assert!(

@@ -1,0 +1,63 @@
+//! Notes about what a glTF file has and this reader leaves out or draws otherwise.
+
+use std::collections::HashSet;
+
+use super::file::File;
+use super::{Order, Placed};
+use crate::input::note;
+use crate::shown::{counted, first_of, shortened};
+
+/// Parts of the names of extensions that are read, noted elsewhere, or change no geometry.
+#[rustfmt::skip]
+const HARMLESS: [&str; 7] =
+    ["compression", "instancing", "lights", "materials", "quantization", "texture", "visibility"];
+
+impl File<'_> {
+    /// Marks the nodes of a kind and all nodes below them.
+    pub fn below(&self, order: &Order, is_of_kind: impl Fn(usize) -> bool) -> Vec<bool> {
+        let mut marked = vec![false; self.root.nodes.len()];
+        for &(node, parent) in order {
+            marked[node] = is_of_kind(node) || parent.is_some_and(|parent| marked[parent]);
+        }
+        marked
+    }
+
+    /// Tells of what is not read, or not as it is drawn; `cameras` have a direction.
+    #[rustfmt::skip]
+    pub fn note_unread(&self, placed: &[Placed], order: &Order, cameras: usize) {
+        let (root, nodes) = (&self.root, &self.root.nodes);
+        let channels = root.animations.iter().flat_map(|clip| &clip.channels);
+        let targets: HashSet<usize> = channels.map(|c| c.target.node.value()).collect();
+        let moved = self.below(order, |node| targets.contains(&node));
+        let extensions = |node: usize| &self.exact.nodes[node]["extensions"];
+        let hidden = self.below(order, |n| extensions(n)["KHR_node_visibility"]["visible"] == false);
+        let is_morphed = |item: &Placed| {
+            let own = nodes[item.node].weights.as_ref();
+            let mut weights = own.or(root.meshes[item.mesh].weights.as_ref()).into_iter().flatten();
+            weights.any(|weight| *weight != 0.0)
+        };
+        let items = |is: &dyn Fn(&Placed) -> bool| placed.iter().filter(|item| is(item)).count();
+        let read = |is: &dyn Fn(usize) -> bool| order.iter().filter(|(node, _)| is(*node)).count();
+        let has_mesh = |node: usize| nodes[node].mesh.is_some();
+        let meshes = (0..nodes.len()).filter(|node| has_mesh(*node)).count();
+        for (count, one, what) in [
+            (items(&|i| nodes[i.node].skin.is_some()), "item", "with a skin, placed by its node and not by joints"),
+            (items(&is_morphed), "item", "with morph weights, as stored and not morphed"),
+            (items(&|i| moved[i.node]), "item", "that an animation moves, where its node stands"),
+            (items(&|i| hidden[i.node]), "item", "hidden by KHR_node_visibility, read all the same"),
+            (read(&|n| nodes[n].camera.is_some()) - cameras, "camera", "without a direction of view, left out"),
+            (root.scenes.len().saturating_sub(1), "further scene", "not read"),
+            (meshes - read(&has_mesh), "node", "with a mesh outside of the scene, not read"),
+        ] {
+            if count > 0 {
+                note(&format!("{}: {} {what}", self.name, counted(count, one)));
+            }
+        }
+        let is_unknown = |name: &&String| !HARMLESS.iter().any(|part| name.contains(part));
+        let required = root.extensions_required.iter().filter(is_unknown);
+        let names: Vec<String> = required.map(|name| shortened(name, 40)).collect();
+        if !names.is_empty() {
+            note(&format!("{}: extensions that it requires, not read: {}", self.name, first_of(&names, 8)));
+        }
+    }
+}
