@@ -5,6 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use glam::{DVec2, DVec3, Vec3};
 
+use crate::arithmetic::Expansion;
 use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
 use crate::query::ItemId;
 
@@ -62,12 +63,24 @@ pub fn plane_tree(
     }
 }
 
+/// The sign of `normal . p - distance`, exactly.
+pub fn side_of(normal: DVec3, distance: f64, p: DVec3) -> i32 {
+    let value = normal.dot(p) - distance;
+    // Twice the rounding of three products and three sums.
+    let doubt = (normal.abs().dot(p.abs()) + distance.abs()) * 8.0 * f64::EPSILON;
+    if value.abs() > doubt {
+        return if value < 0.0 { -1 } else { 1 };
+    }
+    let products = (0..3).map(|k| Expansion::product(normal[k], p[k]));
+    let start = Expansion::from(-distance);
+    products.fold(start, |sum, product| &sum + &product).sign()
+}
+
 impl BspNode {
     /// 0 for the front (right) side, 1 for the back.
     ///
     /// Ties follow the Doom engine's `R_PointOnSide` (linuxdoom 1.10, r_main.c), which
-    /// treats a point on an axis-parallel line unlike one on any other line. Exact for
-    /// map coordinates (integers), correctly signed up to f64 rounding for others; the
+    /// treats a point on an axis-parallel line unlike one on any other line. Exact; the
     /// engine's 16.16 truncation is not imitated.
     pub fn side(&self, p: DVec2) -> usize {
         let (DVec2 { x, y }, DVec2 { x: dx, y: dy }) = (self.start, self.direction);
@@ -86,7 +99,9 @@ impl BspNode {
         if parts.filter(|v| *v < 0.0).count() % 2 == 1 {
             return usize::from((dy < 0.0) != (to.x < 0.0));
         }
-        usize::from(to.y * dx >= dy * to.x)
+        // Coordinates of a map are 16-bit integers, so that this distance is exact.
+        let normal = DVec3::new(-dy, dx, 0.0);
+        usize::from(side_of(normal, dx * y - dy * x, p.extend(0.0)) >= 0)
     }
 }
 
@@ -285,6 +300,9 @@ mod tests {
             ],
             [1, 0, 1]
         );
+        // By rational arithmetic -5.7e-14, which the rounded products lose.
+        let near = line(-149.0, -505.0, 30.0, -19.0);
+        assert_eq!(near.side(at(-317.7181021391705, -398.14520197852534)), 0);
         let slope = line(0.0, 0.0, 2.0, 2.0);
         assert_eq!(
             [

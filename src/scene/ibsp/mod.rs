@@ -21,6 +21,7 @@ use super::{
 };
 use crate::geometry::Aabb;
 use crate::input::{InputError, note};
+use crate::shown::counted;
 
 /// Height of a player's eyes above a spawn point, in map units.
 const EYE_HEIGHT: f64 = 26.0;
@@ -273,15 +274,18 @@ fn faces_of(
 /// The places where players begin, looking as they do.
 fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
     let (mut places, mut bad) = (Vec::new(), 0);
-    for entity in entities.split('}') {
-        let words: Vec<&str> = entity.split('"').skip(1).step_by(2).collect();
+    let mut moved = 0;
+    for words in entities_of(entities) {
         let value = |key: &str| {
-            let pair = words.chunks_exact(2).find(|pair| pair[0] == key);
+            let mut pairs = words.chunks_exact(2);
+            let pair = pairs.find(|pair| pair[0].eq_ignore_ascii_case(key));
             pair.map(|pair| pair[1])
         };
         let class = value("classname").unwrap_or_default();
         let is_of_team = class.ends_with("spawn") || class.ends_with("player");
         if !(class.starts_with("info_player_") || class.starts_with("team_CTF_") && is_of_team) {
+            let is_part = value("model").is_some_and(|model| model.starts_with('*'));
+            moved += usize::from(is_part && value("origin").is_some_and(|at| at != "0 0 0"));
             continue;
         }
         let numbers = |key: &str| -> Option<Vec<f64>> {
@@ -311,12 +315,42 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
             view: None,
         });
     }
-    if bad > 0 {
-        note(&format!(
-            "{file}: {bad} spawn points without a place are left out"
-        ));
+    for (count, one, what) in [
+        (bad, "spawn point", "without a place, left out"),
+        (
+            moved,
+            "part",
+            "with an origin, where the file has it and not there",
+        ),
+    ] {
+        if count > 0 {
+            note(&format!("{file}: {} {what}", counted(count, one)));
+        }
     }
     places
+}
+
+/// Keys and values of each entity, in turns.
+fn entities_of(mut text: &str) -> Vec<Vec<&str>> {
+    let (mut all, mut words) = (Vec::new(), Vec::new());
+    while let Some(at) = text.find(['"', '}', '/']) {
+        let rest = &text[at + 1..];
+        text = match text.as_bytes()[at] {
+            b'"' => {
+                let (word, rest) = rest.split_once('"').unwrap_or((rest, ""));
+                words.push(word);
+                rest
+            }
+            b'/' if rest.starts_with('/') => rest.trim_start_matches(|c| c != '\n'),
+            b'}' => {
+                all.push(std::mem::take(&mut words));
+                rest
+            }
+            _ => rest,
+        };
+    }
+    all.push(words);
+    all
 }
 
 #[cfg(test)]

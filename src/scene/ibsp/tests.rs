@@ -88,6 +88,26 @@ fn surfaces_or_brushes_alone_are_items_on_request() {
 }
 
 #[test]
+fn entities_are_read_as_the_engine_reads_them() {
+    let spawn = r#""classname" "info_player_deathmatch" "origin" "1 2 3""#;
+    let of = |text: &str| places(text, "in.bsp").len();
+    for (text, count) in [
+        (format!("{{{spawn}}} {{{spawn}}}"), 2),
+        (format!(r#"{{"message" "}}" {spawn}}}"#), 1),
+        (format!(r#"{{"message" "//" {spawn}}}"#), 1),
+        (format!("// a \" and a {{\n{{{spawn}}}{{{spawn}}}"), 2),
+        (
+            format!("{{{}}}", spawn.replace("classname", "ClassName")),
+            1,
+        ),
+        (format!("{{{spawn}"), 1),
+        ("\"".to_owned(), 0),
+    ] {
+        assert_eq!(of(&text), count, "{text}");
+    }
+}
+
+#[test]
 fn each_spawn_point_lies_in_an_open_leaf_and_its_box() {
     let scene = read(MAP).unwrap();
     let found = |p: DVec3| scene.holding(&scene.sought(p));

@@ -2,11 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::arithmetic::Expansion;
 use crate::geometry::{Aabb, Plane, PlaneTree};
 use crate::input::InputError;
 use crate::query::ItemId;
-use crate::scene::bsp::{BspChild, descend, plane_tree};
+use crate::scene::bsp::{BspChild, descend, plane_tree, side_of};
 use crate::scene::records::Table;
 
 /// Most nodes on the way to a leaf; maps have less than a hundred.
@@ -41,16 +40,7 @@ pub struct LeafTree {
 impl LeafNode {
     /// 1, for the back, where `normal . p < distance`; else 0. Exact.
     pub fn side(&self, p: DVec3) -> usize {
-        let (n, d) = (self.normal.as_dvec3(), f64::from(self.distance));
-        let value = n.dot(p) - d;
-        // Twice the rounding of three products and three sums.
-        let doubt = (n.abs().dot(p.abs()) + d.abs()) * 8.0 * f64::EPSILON;
-        if value.abs() > doubt {
-            return usize::from(value < 0.0);
-        }
-        let products = (0..3).map(|k| Expansion::product(n[k], p[k]));
-        let sum = products.fold(Expansion::from(-d), |sum, product| &sum + &product);
-        usize::from(sum.sign() < 0)
+        usize::from(side_of(self.normal.as_dvec3(), self.distance.into(), p) < 0)
     }
 }
 
