@@ -202,11 +202,16 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
         along > 0.7 * ups.len() as f64
     };
     Some(match UpAxis::ALL.into_iter().find(is_along) {
-        Some(other) if other != scene.up => format!(
-            "{other} is up in {what}, {own} in {}; --up {other} if it is the scene's",
-            scene.name,
-            other = other.name(),
-        ),
+        Some(other) if other != scene.up => {
+            let (other, name) = (other.name(), &scene.name);
+            // Formats that state an axis state a unit as well.
+            let advice = scene
+                .unit
+                .is_none()
+                .then(|| format!("; --up {other} if it is the scene's"));
+            let advice = advice.unwrap_or_default();
+            format!("{other} is up in {what}, {own} in {name}{advice}")
+        }
         _ => format!(
             "{what} rolled by more than 45 degrees, first with ({:.3}, {:.3}, {:.3}) up; {own} is \
              up in {}",

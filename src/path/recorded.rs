@@ -64,6 +64,23 @@ impl LensDefaults {
         far.min(self.reach) / FAR_IN_NEARS
     }
 
+    /// Tells of what is given and has no effect on the cameras of a path.
+    pub(super) fn note_unused(&self, path: &CameraPath) {
+        let is_matrix = |camera: &Camera| matches!(camera.lens.kind(), LensKind::Matrix(_));
+        let lens = |of: &LensDefaults| (of.fovy_deg, of.aspect, of.near, of.far);
+        let is_given = lens(self) != lens(&LensDefaults::default());
+        let what = match path.cameras.first().is_some_and(is_matrix) {
+            true if is_given => {
+                "--fovy, --aspect, --near and --far are for cameras without matrices"
+            }
+            false if self.matrix.is_some() => {
+                "--matrix-convention is for cameras that are matrices"
+            }
+            _ => return,
+        };
+        note(&format!("{}: {what}", path.name));
+    }
+
     /// The same with up axis and size of a scene.
     pub fn of_scene(&self, scene: &Scene) -> LensDefaults {
         let WorldBox { min, max } = scene.world_bounds();
@@ -276,7 +293,7 @@ fn eyes<'a>(
         };
         let frame = frame.map_err(|error| match error {
             CameraError::Invalid { found, .. } if !has_up && found.starts_with("up is") => {
-                let expected = "columns up_x,up_y,up_z, or --up y where y is up";
+                let expected = "columns up_x,up_y,up_z";
                 CameraError::Invalid { found, expected }
             }
             other => other,

@@ -16,7 +16,7 @@ use super::{
     boxes_csv, map_names,
 };
 use crate::input::{InputError, is_readable, note, read_file};
-use crate::shown::shortened;
+use crate::shown::{counted, shortened};
 use crate::spec::{Spec, SpecError, nearest};
 
 /// First part of the name of every mesh.
@@ -86,8 +86,10 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     if let Regions::Leaves(map) = &scene.regions
         && map.bare > 0
     {
-        let what = "surfaces without triangles (flares) are no items";
-        note(&format!("{source}: {} {what}", map.bare));
+        let bare = counted(map.bare, "surface");
+        note(&format!(
+            "{source}: {bare} without triangles (flares), no items"
+        ));
     }
     let is_of_map = matches!(options.items, ItemKind::Surfaces | ItemKind::Brushes);
     if is_of_map && !matches!(scene.regions, Regions::Leaves(_)) {
@@ -190,12 +192,15 @@ fn read_beside(
 ) -> Result<Scene, InputError> {
     refuse(bytes, file)?;
     if is_zip(bytes) {
-        let entry = zip::unpack(bytes, file, map)?;
+        let archive = zip::open(bytes, file)?;
+        // Read once: a glTF may have a buffer in each of thousands of entries.
+        let entries = zip::entries(&archive, file)?;
+        let entry = zip::unpack(&archive, &entries, file, map)?;
         let names = [&format!("{file}#{}", entry.name), name];
         let folder = entry.name.rfind('/').map_or("", |end| &entry.name[..=end]);
         let beside = |uri: &str| {
             let wanted = format!("{folder}{}", uri.trim_start_matches("./"));
-            let entry = zip::unpack(bytes, file, Some(&wanted))?;
+            let entry = zip::unpack(&archive, &entries, file, Some(&wanted))?;
             match entry.map {
                 None => Ok(entry.bytes),
                 Some(_) => {

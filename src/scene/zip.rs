@@ -49,13 +49,12 @@ pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> 
 /// No such entry, or several; an entry that is encrypted, packed by another method,
 /// too large for the memory, or other bytes than the directory states.
 pub fn unpack<'w>(
-    bytes: &[u8],
+    archive: &Archive,
+    entries: &[(String, ZipFileHeaderRecord)],
     file: &str,
     wanted: Option<&'w str>,
 ) -> Result<Entry<'w>, InputError> {
-    let archive = open(bytes, file)?;
-    let entries = entries(&archive, file)?;
-    let (name, record, map) = chosen(&entries, file, wanted)?;
+    let (name, record, map) = chosen(entries, file, wanted)?;
     let refused = |found: &dyn Display, expected: &str| {
         let place = format!("entry {}", shortened(name, 80));
         InputError::at(file, &place, found.to_string(), expected)
@@ -96,9 +95,9 @@ pub fn unpack<'w>(
     })
 }
 
-type Archive<'a> = ZipSliceArchive<&'a [u8]>;
+pub type Archive<'a> = ZipSliceArchive<&'a [u8]>;
 
-fn open<'a>(bytes: &'a [u8], file: &str) -> Result<Archive<'a>, InputError> {
+pub fn open<'a>(bytes: &'a [u8], file: &str) -> Result<Archive<'a>, InputError> {
     ZipArchive::from_slice(bytes).map_err(|error| damaged(file, error))
 }
 
@@ -109,7 +108,7 @@ fn damaged(file: &str, error: rawzip::Error) -> InputError {
 /// Names and records in the order of the directory, without folders.
 ///
 /// The last of several entries of one name counts.
-fn entries<'a>(
+pub fn entries<'a>(
     archive: &'a Archive,
     file: &str,
 ) -> Result<Vec<(String, ZipFileHeaderRecord<'a>)>, InputError> {
@@ -153,6 +152,16 @@ fn chosen<'e, 'r, 'w>(
         let last = |is_it: &dyn Fn(&str) -> bool| entries.iter().rfind(|(name, _)| is_it(name));
         last(&|name| name == wanted).or_else(|| last(&|name| name.eq_ignore_ascii_case(wanted)))
     };
+    let found = wanted.and_then(|wanted| {
+        let part = || {
+            let (entry, map) = wanted.rsplit_once('#')?;
+            Some((named(entry)?, Some(map)))
+        };
+        named(wanted).map(|found| (found, None)).or_else(part)
+    });
+    if let Some(((name, record), map)) = found {
+        return Ok((name, record, map));
+    }
     let scenes = entries.iter().filter(|(name, _)| is_scene(name));
     let scenes: Vec<_> = scenes.collect();
     let names: Vec<String> = scenes.iter().map(|(name, _)| shortened(name, 80)).collect();
@@ -168,24 +177,13 @@ fn chosen<'e, 'r, 'w>(
             format!("{} scenes, {listed}", scenes.len()),
             part_hint(file, &names[0]),
         ),
-        (Some(wanted), _) => {
-            let in_entry = wanted.rsplit_once('#');
-            let found = named(wanted).map(|found| (found, None));
-            let found = found.or_else(|| {
-                let (entry, map) = in_entry?;
-                Some((named(entry)?, Some(map)))
-            });
-            if let Some(((name, record), map)) = found {
-                return Ok((name, record, map));
-            }
-            (
-                format!(
-                    "no '{}' among {all}; scenes: {listed}",
-                    shortened(wanted, 80)
-                ),
-                "the name of an entry".to_owned(),
-            )
-        }
+        (Some(wanted), _) => (
+            format!(
+                "no '{}' among {all}; scenes: {listed}",
+                shortened(wanted, 80)
+            ),
+            "the name of an entry".to_owned(),
+        ),
     };
     Err(InputError::at(file, "directory", found, &expected))
 }

@@ -109,7 +109,7 @@ fn recorded_cameras_see_the_same_whatever_is_up() {
     // Two of them look along z.
     let wrong = cullbench(folder.path(), "query --scene y.csv --cameras bare.csv");
     let wanted = "bare.csv, line 3: up is zero or parallel to the direction of view; expected columns \
-                  up_x,up_y,up_z, or --up y where y is up";
+                  up_x,up_y,up_z";
     assert_eq!(
         (wrong.code, wrong.err),
         (Some(2), format!("error: {wanted}\n"))

@@ -117,6 +117,34 @@ fn a_matrix_sees_what_its_camera_sees_under_every_name() {
 }
 
 #[test]
+fn options_of_other_cameras_are_told_once() {
+    let eye = format!("{EYE_LOOK},fovy_deg,aspect,near,far\n{EYE}\n");
+    let matrix = format!("{ENTRIES}\n{}\n", row(GL, false));
+    let folder = folder(&[
+        ("boxes.csv", boxes().as_bytes()),
+        ("eye.csv", eye.as_bytes()),
+        ("m.csv", matrix.as_bytes()),
+    ]);
+    let convention = "--matrix-convention column-gl";
+    let lens = "note: m.csv: --fovy, --aspect, --near and --far are for cameras without matrices\n";
+    let of = |cameras: &str| {
+        format!("note: {cameras}: --matrix-convention is for cameras that are matrices\n")
+    };
+    for (cameras, note) in [
+        (format!("m.csv {convention}"), String::new()),
+        (format!("m.csv {convention} --near 3"), lens.to_owned()),
+        (format!("m.csv {convention} --fovy 30"), lens.to_owned()),
+        ("eye.csv --near 3".to_owned(), String::new()),
+        (format!("eye.csv {convention}"), of("eye.csv")),
+        (format!("orbit:frames=2 {convention}"), of("orbit:frames=2")),
+    ] {
+        let line = format!("query --scene boxes.csv --structure linear --cameras {cameras}");
+        let done = cullbench(folder.path(), &line);
+        assert_eq!((done.code, done.err), (Some(0), note), "{line}");
+    }
+}
+
+#[test]
 fn every_command_takes_matrices() {
     // Without an end, and one more.
     let endless = row(with_depth([0.0, 0.0, 0.0, 1.0]), false);
@@ -238,8 +266,12 @@ fn counts(folder: &Path, scene: &str, cameras: &str, convention: &str) -> Vec<(S
             collect(&format!("{at}/{key}"), part, all);
         }
     }
+    let convention = match cameras {
+        "eye.csv" => String::new(),
+        _ => format!("--matrix-convention {convention}"),
+    };
     let line = format!(
-        "funnel --scene {scene} --path {cameras} --matrix-convention {convention} \
+        "funnel --scene {scene} --path {cameras} {convention} \
          --structure linear,bvh --samples 48x32 --processes 1 --format json"
     );
     let mut all = Vec::new();
