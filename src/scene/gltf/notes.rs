@@ -7,7 +7,9 @@ use super::{Order, Placed};
 use crate::input::note;
 use crate::shown::{counted, first_of, shortened};
 
-/// Parts of the names of extensions that are read, noted elsewhere, or change no geometry.
+/// Parts of names of extensions that need no note.
+///
+/// They are read, have a note of their own, or change no geometry.
 #[rustfmt::skip]
 const HARMLESS: [&str; 7] =
     ["compression", "instancing", "lights", "materials", "quantization", "texture", "visibility"];
