@@ -4,9 +4,10 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::CameraPath;
 use super::calibrate::{MOST_TESTS, every_nth};
+use super::{CameraPath, LensDefaults};
 use crate::camera::{Camera, Frame, Lens, LensKind, PlaneOptions, ViewProjection};
+use crate::input::note;
 use crate::scene::{Scene, UpAxis};
 use crate::shown::counted;
 
@@ -170,6 +171,25 @@ impl CameraPath {
     /// [`warnings`] about these cameras in a scene.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         warnings(scene, &self.name, &self.cameras)
+    }
+}
+
+impl LensDefaults {
+    /// Tells of what is given and has no effect on the cameras of a path.
+    pub(super) fn note_unused(&self, path: &CameraPath) {
+        let is_matrix = |camera: &Camera| matches!(camera.lens.kind(), LensKind::Matrix(_));
+        let lens = |of: &LensDefaults| (of.fovy_deg, of.aspect, of.near, of.far);
+        let is_given = lens(self) != lens(&LensDefaults::default());
+        let what = match path.cameras.first().is_some_and(is_matrix) {
+            true if is_given => {
+                "--fovy, --aspect, --near and --far are for cameras without matrices"
+            }
+            false if self.matrix.is_some() => {
+                "--matrix-convention is for cameras that are matrices"
+            }
+            _ => return,
+        };
+        note(&format!("{}: {what}", path.name));
     }
 }
 

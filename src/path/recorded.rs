@@ -7,7 +7,7 @@ use crate::camera::{
     Camera, CameraError, FARTHEST, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
     MatrixConvention, look_at,
 };
-use crate::input::{InputError, Row, TableReader, note};
+use crate::input::{InputError, Row, TableReader};
 use crate::scene::{Scene, WorldBox, memory};
 
 /// Values for columns that a file does not have, and lenses of generated paths.
@@ -62,23 +62,6 @@ impl LensDefaults {
     fn near_of(&self, far: Option<f64>) -> f64 {
         let far = far.filter(|far| *far > 0.0).unwrap_or(f64::INFINITY);
         far.min(self.reach) / FAR_IN_NEARS
-    }
-
-    /// Tells of what is given and has no effect on the cameras of a path.
-    pub(super) fn note_unused(&self, path: &CameraPath) {
-        let is_matrix = |camera: &Camera| matches!(camera.lens.kind(), LensKind::Matrix(_));
-        let lens = |of: &LensDefaults| (of.fovy_deg, of.aspect, of.near, of.far);
-        let is_given = lens(self) != lens(&LensDefaults::default());
-        let what = match path.cameras.first().is_some_and(is_matrix) {
-            true if is_given => {
-                "--fovy, --aspect, --near and --far are for cameras without matrices"
-            }
-            false if self.matrix.is_some() => {
-                "--matrix-convention is for cameras that are matrices"
-            }
-            _ => return,
-        };
-        note(&format!("{}: {what}", path.name));
     }
 
     /// The same with up axis and size of a scene.
