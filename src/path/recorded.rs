@@ -7,7 +7,7 @@ use crate::camera::{
     Camera, CameraError, FARTHEST, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
     MatrixConvention, look_at,
 };
-use crate::input::{InputError, Row, TableReader};
+use crate::input::{InputError, Row, TableReader, note};
 use crate::scene::{Scene, WorldBox, memory};
 
 /// Values for columns that a file does not have, and lenses of generated paths.
