@@ -116,16 +116,14 @@ impl StructureChoice {
         let mut first = first(None).map(|cell| cell.structure.clone());
         let [name, ties]: [Vec<String>; 2] = [first.by_ref().take(1).collect(), first.collect()];
         let is = |is_scan| move |row: &StructureRow| row.is_scan == is_scan;
-        let tied = rows
-            .iter()
-            .filter(|row| name.contains(&row.structure) || ties.contains(&row.structure));
+        let is_tied =
+            |row: &&StructureRow| [&name, &ties].iter().any(|n| n.contains(&row.structure));
+        let tied = rows.iter().filter(is_tied);
         let has_both = |rows: &[&StructureRow]| {
             [false, true].map(|kind| rows.iter().any(|row| is(kind)(row))) == [true; 2]
         };
         StructureChoice {
-            is_scan: rows
-                .first()
-                .is_some_and(|row| row.is_scan && row.ns().is_some()),
+            is_scan: matches!(rows.first(), Some(row) if row.is_scan && row.ns().is_some()),
             is_open: has_both(&alone(&rows).collect::<Vec<_>>()),
             is_mixed: has_both(&tied.collect::<Vec<_>>()),
             name: name.into_iter().next(),
@@ -151,10 +149,8 @@ impl StructureChoice {
     /// In another workload: the fastest tree and scan, of a motion the three fastest too.
     pub(super) fn contenders(&self, moves: bool) -> Vec<String> {
         let first = alone(&self.rows).take(if moves { 3 } else { 1 });
-        let of_kind = [false, true].map(|is_scan| {
-            let mut timed = alone(&self.rows);
-            timed.find(|row| row.is_scan == is_scan)
-        });
+        let of_kind =
+            [false, true].map(|is_scan| alone(&self.rows).find(|row| row.is_scan == is_scan));
         let mut labels: Vec<String> = Vec::new();
         for row in first.chain(of_kind.into_iter().flatten()) {
             if !labels.contains(&row.structure) {
@@ -283,6 +279,7 @@ impl TestChoice {
             let extra = errors.map(|e| e.false_positives as f64 / judged);
             let extra = extra.filter(|extra| extra.is_finite());
             let drawn = extra.map(|extra| extra * draw_ns);
+            let of_cameras = by_camera.iter().map(|e| e.false_positives as f64 * draw_ns);
             TestRow {
                 test: test.name(),
                 query_ns: query,
@@ -291,10 +288,7 @@ impl TestChoice {
                 false_positives_per_query: extra,
                 total_ns: query.zip(drawn).map(|(query, drawn)| query.value + drawn),
                 by_process: times.ln_ns(task).iter().map(|ln_ns| ln_ns.exp()).collect(),
-                by_camera: by_camera
-                    .iter()
-                    .map(|e| e.false_positives as f64 * draw_ns)
-                    .collect(),
+                by_camera: of_cameras.collect(),
             }
         });
         let rows: Vec<TestRow> = rows.collect();
@@ -320,14 +314,11 @@ fn near_the_least(rows: &[TestRow]) -> Vec<&'static str> {
         let times = [&time[..], &b.by_process];
         shows_less_in_sum(times, [&drawn, &b.by_camera], ALPHA)
     };
-    let sound = rows
-        .iter()
-        .filter(is_sound)
-        .filter(|row| row.total_ns.is_some());
-    let least = sound
-        .clone()
-        .min_by(|a, b| or_last(a.total_ns).total_cmp(&or_last(b.total_ns)));
-    let Some(least) = least else {
+    let timed = rows.iter().filter(|row| row.total_ns.is_some());
+    let (sound, total) = (timed.filter(is_sound), |row: &TestRow| {
+        or_last(row.total_ns)
+    });
+    let Some(least) = sound.clone().min_by(|a, b| total(a).total_cmp(&total(b))) else {
         return Vec::new();
     };
     let is_near = |row: &&TestRow| row.test == least.test || !is_less(least, row);

@@ -134,9 +134,9 @@ pub fn prepare(
     progress("answers, checked");
     let answered = entered.trials.answered();
     let drafts = entered.rules.iter_mut().flat_map(|(_, draft)| draft);
-    drafts
-        .flat_map(|draft| &mut draft.sides)
-        .for_each(|sides| entered.trials.compare(sides));
+    for sides in drafts.flat_map(|draft| &mut draft.sides) {
+        entered.trials.compare(sides);
+    }
     let tasks = entered.trials.tasks(&answered.counts);
     Ok(Prepared {
         plan: TrialPlan {

@@ -51,14 +51,9 @@ impl MotionChoice {
     ) -> Option<(MotionChoice, Vec<String>)> {
         let motion = motion?;
         let (mut ruled_out, mut measured) = (Vec::new(), Vec::new());
-        let are_rows = input
-            .structures
-            .iter()
-            .any(|s| s.policy != UpdatePolicy::Refit);
-        let spec = input
-            .structures
-            .iter()
-            .find(|s| structure.name.as_ref() == Some(&s.label));
+        let mut all = input.structures.iter();
+        let are_rows = all.clone().any(|s| s.policy != UpdatePolicy::Refit);
+        let spec = all.find(|s| structure.name.as_ref() == Some(&s.label));
         let refits = spec.is_none_or(|spec| spec.info().capabilities.refits);
         let spec = spec.filter(|_| refits && !structure.is_scan);
         for policy in POLICIES.into_iter().filter(|_| !are_rows) {

@@ -143,12 +143,11 @@ impl Draft {
     ) -> Facts<'f> {
         let sides = std::mem::take(&mut self.sides).into_iter();
         let once_ns = |n| self.once.map_or(f64::NAN, |first| times.once_ns(first + n));
+        let once_ratio = |first| times.once_ratio(first + 1, first);
         Facts {
             checks: sides.map(|sides| sides.check(answered, times)).collect(),
             once_ns: [0, 1].map(once_ns),
-            once_ratio: self
-                .once
-                .and_then(|first| times.once_ratio(first + 1, first)),
+            once_ratio: self.once.and_then(once_ratio),
             structure: choice.0,
             test: choice.1,
             changes: choice.2,
@@ -186,9 +185,8 @@ impl Rule {
         let predicted = finding.predicted.or(predicted);
         let [statistic, threshold] = [0, 1].map(|i| finding.compared.map(|both| both[i]));
         let first = checks.first();
-        let cost_ns = finding
-            .cost_ns
-            .or(first.map(|c| [c.kept_ns, c.left_out_ns]));
+        let timed = first.map(|check| [check.kept_ns, check.left_out_ns]);
+        let cost_ns = finding.cost_ns.or(timed);
         // Both costs are times of the first check and what follows from counts.
         let ratio = first.zip(cost_ns).and_then(|(check, [kept, left_out])| {
             let measured = check.ratio?;

@@ -100,16 +100,12 @@ fn taken(advice: &Advice) -> String {
     });
     let repaid = row.and_then(|row| row.break_even_queries);
     let repaid = some(repaid.filter(|n| *n > 0.0), |n| {
-        format!(
-            " Its build is repaid after {}.",
-            text::counted(n as usize, "query")
-        )
+        let queries = text::counted(n as usize, "query");
+        format!(" Its build is repaid after {queries}.")
     });
     let search = some(choice.region_search.as_ref(), |name| {
-        format!(
-            " For region search: {name}{}.",
-            ties(&choice.region_search_ties)
-        )
+        let ties = ties(&choice.region_search_ties);
+        format!(" For region search: {name}{ties}.")
     });
     format!(
         "Take structure {name}{figures}{}{test}.{repaid}{search}",
@@ -171,13 +167,11 @@ fn changes(advice: &Advice) -> String {
         });
         let turns: Vec<String> = turns.collect();
         let [low, high] = change.measured.map(show);
+        let turns = turns.join(", ");
         told += &match turns.is_empty() {
             true if low == high => format!("\n  {what}: only {low} was measured"),
             true => format!("\n  {what}: not within {low} to {high}, which were measured"),
-            false => format!(
-                "\n  {what}: {}; measured from {low} to {high}",
-                turns.join(", ")
-            ),
+            false => format!("\n  {what}: {turns}; measured from {low} to {high}"),
         };
     }
     told
@@ -191,14 +185,11 @@ fn share(share: f64) -> String {
 /// Reason for which a feature is neither needed nor not needed.
 fn not_for(advice: &Advice, omission: &Omission) -> Option<String> {
     let of_nodes = ["plane-masks", "third-dimension", "rebuild"].contains(&omission.rule);
+    let taken = &advice.structure;
+    let scan = taken.name.as_ref().filter(|_| of_nodes && taken.is_scan);
     match omission.is_needed() {
         None => Some(omission.reason.clone()),
-        Some(_) if of_nodes && advice.structure.is_scan => advice
-            .structure
-            .name
-            .as_ref()
-            .map(|name| format!("{name} has no nodes")),
-        Some(_) => None,
+        Some(_) => scan.map(|name| format!("{name} has no nodes")),
     }
 }
 
@@ -241,11 +232,9 @@ fn rule_table(advice: &Advice) -> Table {
 /// Every structure, test and feature with its times.
 fn evidence(advice: &Advice, width: usize) -> Vec<String> {
     let reasons = advice.omissions.iter().map(|feature| {
-        let contradicted = match feature.confirmed {
-            Some(false) => " (predicted otherwise)",
-            _ => "",
-        };
-        let reason = format!("{}{contradicted}", feature.reason);
+        let otherwise = feature.confirmed.filter(|confirmed| !confirmed);
+        let otherwise = some(otherwise, |_| " (predicted otherwise)".to_owned());
+        let reason = format!("{}{otherwise}", feature.reason);
         [feature.feature.to_owned(), reason]
     });
     vec![

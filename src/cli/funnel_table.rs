@@ -12,27 +12,22 @@ use crate::visibility::{Guarantee, Level};
 
 /// The chain and what it is worth; with `all` every other back end too.
 pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
-    let views = match report.views {
-        all if all == report.cameras => text::counted(all, "view"),
-        some => format!(
-            "{} of {}",
-            text::count(some),
-            text::counted(report.cameras, "view")
-        ),
+    let all_views = text::counted(report.cameras, "view");
+    let [views, more] = match report.views == report.cameras {
+        true => [all_views, String::new()],
+        false => [
+            format!("{} of {all_views}", text::count(report.views)),
+            format!("; --frames {} takes all, as advise does", report.cameras),
+        ],
     };
     let mut blocks = vec![
         Block::Heading(1, format!("Funnel of {}, {}", report.scene, report.path)),
         Block::Line(format!(
-            "{}; {} of {} x {} samples; {}; figures are means per view{}.",
+            "{}; {views} of {} x {} samples; {}; figures are means per view{more}.",
             text::counted(report.items, "item"),
-            views,
             report.samples[0],
             report.samples[1],
             spread(report.processes),
-            match report.views == report.cameras {
-                true => String::new(),
-                false => format!("; --frames {} takes all, as advise does", report.cameras),
-            },
         )),
     ];
     if let Some(made) = &report.cut_outs {

@@ -54,7 +54,7 @@ fn caveats(all: &[&Comparison]) -> Vec<String> {
         let frames = cell.times.cameras_checked / cell.path.views_per_frame.max(1);
         let is_late = frames > 0 && every.parse::<usize>().ok()? > frames;
         let frames = text::counted(frames, "frame");
-        is_late.then(|| format!("{}: no rebuild in {frames}.", cell.structure))
+        is_late.then(|| format!("@every={every}: no rebuild in {frames}."))
     });
     told.extend(late.collect::<BTreeSet<_>>());
     let dropped = all.iter().filter_map(|c| c.of_any("touch_dropped_count"));
@@ -97,16 +97,13 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     let winners: Vec<&ReportCell> = comparison.winners().collect();
     let Some(best) = winners.first() else {
         let scene = &comparison.about().scene;
-        return match scene.total_count {
-            0 if scene.digest.is_empty() => {
-                "Nothing is ranked: no process finished a measurement.".to_owned()
-            }
-            0 => "Nothing is ranked: the scene has no items.".to_owned(),
-            _ if comparison.cells.iter().any(is_fat) => {
-                "Nothing is ranked: no structure with exact bounds has times.".to_owned()
-            }
-            _ => "Nothing is ranked: no structure has times of right answers.".to_owned(),
+        let why = match scene.total_count {
+            0 if scene.digest.is_empty() => "no process finished a measurement",
+            0 => "the scene has no items",
+            _ if comparison.cells.iter().any(is_fat) => "no structure with exact bounds has times",
+            _ => "no structure has times of right answers",
         };
+        return format!("Nothing is ranked: {why}.");
     };
     let names: Vec<&str> = winners.iter().map(|cell| cell.structure.as_str()).collect();
     let time = text::some(best.time(), |time| text::time(time.value));

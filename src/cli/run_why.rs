@@ -179,12 +179,9 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
         let frame = [frame_ns, update_ns].map(|of| pair.ratio(of));
         frames.extend(frame[0]);
         let figures = frame.into_iter().chain(own).chain(counters);
+        let figures = figures.map(|ratio| some(ratio, times));
         let names = [shortened(label, 28), shortened(&pair.other.structure, 24)];
-        table.add_row(
-            names
-                .into_iter()
-                .chain(figures.map(|ratio| some(ratio, times))),
-        );
+        table.add_row(names.into_iter().chain(figures));
     }
     let means = ratios.each_ref().map(|all| geometric_mean(all));
     let failed = pairs.iter().find_map(|pair| pair.as_ref().err());

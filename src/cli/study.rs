@@ -155,13 +155,10 @@ impl Study {
             "at work: {}{work}, timed in {times}; the defaults take {by_default}",
             self.about
         );
-        let is_hidden = self.bar.is_hidden();
-        self.bar.suspend(|| {
-            tell_warnings();
-            if !is_hidden {
-                tell(&line);
-            }
-        });
+        self.bar.suspend(tell_warnings);
+        if !self.bar.is_hidden() {
+            self.bar.suspend(|| tell(&line));
+        }
     }
 
     /// Shows the step that begins.

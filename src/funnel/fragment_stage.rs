@@ -19,7 +19,7 @@ use crate::camera::Camera;
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
-use crate::visibility::fragment::{Canvas, Drawn, Holes, Screen, Stencil, Tally, Tests, draw};
+use crate::visibility::fragment::{Canvas, Drawn, Holes, Screen, Tally, Tests, draw};
 use crate::visibility::truth::{Facet, SolidBox};
 use crate::visibility::{Rays, Solids};
 
@@ -102,10 +102,8 @@ impl Left<'_> {
         match self {
             Left::Boxes(views, _) => {
                 let boxes = views[view].bodies.iter();
-                fits_drawing(
-                    world.samples,
-                    boxes.filter_map(|body| screen.rectangle(&body.b)),
-                )
+                let placed = boxes.filter_map(|body| screen.rectangle(&body.b));
+                fits_drawing(world.samples, placed)
             }
             Left::Triangles(surfaces, views, _) => {
                 let corners = views[view].iter().map(|&t| surfaces.corners(t));
@@ -266,7 +264,8 @@ impl Boxes {
             None => drawn.draw(canvas, self.bodies.iter().copied(), &tests),
             Some(room) => {
                 drawn.draw(canvas, room.near.iter().copied(), &tests);
-                let stencil = room.stencil(canvas, drawn);
+                // Samples that see a portal before everything that is drawn already.
+                let stencil = drawn.stencil(canvas, &room.portals);
                 drawn.tally.asked += stencil.tested;
                 let stencil = Some(&stencil);
                 let beyond = room.beyond.iter().copied();
@@ -299,11 +298,6 @@ impl Room {
             near,
             beyond,
         })
-    }
-
-    /// Samples that see a portal before everything that is drawn already.
-    fn stencil(&self, canvas: &Canvas, drawn: &Drawn) -> Stencil {
-        drawn.stencil(canvas, &self.portals)
     }
 }
 

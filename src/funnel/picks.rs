@@ -141,18 +141,14 @@ impl<'w> Picks<'w> {
             }
             let pick = build(row);
             let pick = pick.map(Rc::from).and_then(|pick| {
-                let is_foreign = row.guarantee == Guarantee::Unproven;
-                if is_foreign {
+                if row.guarantee == Guarantee::Unproven {
                     self.try_out(row.name, &pick)?;
                 }
                 Ok(pick)
             });
             match pick {
                 Ok(pick) => built.push(((row.name, row.summary, row.guarantee), pick)),
-                Err(reason) => {
-                    let row = LeftOutRow::new("picks", row.name, reason);
-                    self.left_out.push(row);
-                }
+                Err(reason) => (self.left_out).push(LeftOutRow::new("picks", row.name, reason)),
             }
         }
         for (declared, pick) in built.iter().cloned() {
@@ -254,11 +250,7 @@ impl<'w> Picks<'w> {
             ids.map(|(id, _)| id).collect()
         });
         Truth {
-            first: exact
-                .first(&cursor.ray)
-                .iter()
-                .map(|hit| hit.item)
-                .collect(),
+            first: Vec::from_iter(exact.first(&cursor.ray).map(|hit| hit.item)),
             nearest: nearest(exact, &cursor.ray, NEAREST),
             met: met_within(exact, rays, &cursor.rectangle),
             in_planes,

@@ -75,12 +75,13 @@ pub struct FunnelReport {
 impl FunnelReport {
     /// Returns `true` for a task of the chain or of the chain without a stage.
     pub(super) fn needs(&self, key: &FunnelKey) -> bool {
-        let chosen = self.stages.iter().filter(|row| row.is_chosen);
-        let of_gains = self.gains.iter().flat_map(|gain| gain.tasks.iter());
-        chosen
-            .filter_map(|row| row.key(&self.chain))
-            .any(|own| own == *key)
-            || of_gains.flatten().any(|own| own == key)
+        let mut chosen = self.stages.iter().filter(|row| row.is_chosen);
+        let mut of_gains = self
+            .gains
+            .iter()
+            .flat_map(|gain| gain.tasks.iter().flatten());
+        chosen.any(|row| row.key(&self.chain).as_ref() == Some(key))
+            || of_gains.any(|own| own == key)
     }
 }
 
@@ -284,30 +285,19 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
 fn of_gain(gain: &Gain) -> Option<String> {
     let what = format!("{} ({})", gain.stage.name(), gain.back_end);
     let unit = gain.unit.trim_end_matches('s');
-    let Some(Estimate {
-        value,
-        lower,
-        upper,
-    }) = gain.break_even
-    else {
-        let is_idle = gain.removed() <= 0.0 && gain.stage != StageKind::Fragment;
-        return is_idle.then(|| {
-            format!("{what} is not needed: it removes nothing that the other stages leave.")
-        });
-    };
-    // Within noise of saving time as well.
-    let within = match (lower, upper) {
-        (Some(0.0), Some(upper)) => format!(" (0 to {})", time(upper)),
-        _ => String::new(),
-    };
-    match value {
-        _ if gain.stage == StageKind::Fragment => None,
-        0.0 => Some(format!("Use {what}: it saves time as well.")),
-        ns => Some(format!(
-            "Use {what} if drawing one {unit} takes more than {}{within}.",
-            time(ns)
-        )),
-    }
+    Some(match gain.break_even {
+        _ if gain.stage == StageKind::Fragment => return None,
+        None if gain.removed() > 0.0 => return None,
+        None => format!("{what} is not needed: it removes nothing that the other stages leave."),
+        Some(Estimate { value: 0.0, .. }) => format!("Use {what}: it saves time as well."),
+        Some(ns) => {
+            // Within noise of saving time as well.
+            let most = ns.upper.filter(|_| ns.lower == Some(0.0));
+            let within = most.map_or_else(String::new, |most| format!(" (0 to {})", time(most)));
+            let least = time(ns.value);
+            format!("Use {what} if drawing one {unit} takes more than {least}{within}.")
+        }
+    })
 }
 
 /// Samples that the stencil-test saves against the default test.

@@ -98,12 +98,8 @@ impl<'w> Study<'w> {
                         self.items.counts(&before, &steps, truth)
                     }
                 };
-                rows.push(StageRow::new(
-                    back_end,
-                    &name,
-                    self.chain,
-                    Errors::of(&counts),
-                ));
+                let errors = Errors::of(&counts);
+                rows.push(StageRow::new(back_end, &name, self.chain, errors));
             }
         }
         rows
@@ -180,12 +176,8 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
     let mut left_out = Vec::from_iter(left_out_of(input.scene));
     let too_much = study.fragments.too_much.as_ref();
     left_out.extend(too_much.map(|reason| LeftOutRow::new("stages", "fragment", reason)));
-    left_out.extend(
-        study
-            .orders
-            .iter()
-            .flat_map(|orders| orders.left_out.clone()),
-    );
+    let orders = study.orders.iter();
+    left_out.extend(orders.flat_map(|orders| orders.left_out.clone()));
     let mirror = input.mirror.map_or(Ok(None), |item| {
         mirrored(item, &world, &study.items, &study.steps)
     });
@@ -218,6 +210,8 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
     if !input.all {
         bounds.clear();
     }
+    let cut_outs = input.cut_outs.zip(world.cut_outs.as_ref());
+    let ground = world.hiders.ground.as_ref();
     let report = FunnelReport {
         scene: input.scene.name.clone(),
         path: input.path.name.clone(),
@@ -228,22 +222,15 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
         samples: [input.samples.width, input.samples.height],
         processes: 0,
         level: Level::of(&input.scene.name, input.scene, &input.loading)?,
-        cut_outs: input
-            .cut_outs
-            .zip(world.cut_outs.as_ref())
-            .map(|(typed, made)| CutOutRow {
-                typed: *typed,
-                item_count: made.count(),
-            }),
+        cut_outs: cut_outs.map(|(typed, made)| CutOutRow {
+            typed: *typed,
+            item_count: made.count(),
+        }),
         chain: input.chain.clone(),
         gains: study.gains(&rows),
         stages: rows,
         inner_boxes: world.hiders.inner.clone(),
-        ground: world
-            .hiders
-            .ground
-            .as_ref()
-            .map(|ground| ground.row.clone()),
+        ground: ground.map(|ground| ground.row.clone()),
         solid_blocks: world.hiders.blocks.clone(),
         mirror,
         orders,
@@ -286,14 +273,12 @@ impl Prepared {
         let mut report = self.report;
         report.processes = processes.len();
         let chain = &report.chain;
-        report
-            .stages
-            .iter_mut()
-            .for_each(|row| row.set(chain, &times));
-        report
-            .bounds
-            .iter_mut()
-            .for_each(|row| row.set(chain, &times));
+        for row in &mut report.stages {
+            row.set(chain, &times);
+        }
+        for row in &mut report.bounds {
+            row.set(chain, &times);
+        }
         for row in &mut report.picks {
             row.set(times.ns(row.key()));
         }

@@ -210,12 +210,10 @@ impl Plan {
             .into_iter()
             .map(|(place, (spec, is_twin))| {
                 if let Some(verdict) = share.failed.get(&spec.label) {
-                    let built = Err(verdict.clone());
-                    let spec = spec.clone();
                     let subject = Subject {
-                        spec,
+                        spec: spec.clone(),
                         is_twin,
-                        built,
+                        built: Err(verdict.clone()),
                     };
                     return (place, subject);
                 }
@@ -318,10 +316,8 @@ pub fn measure_scene(
         let scale = known.and_then(|known| known.lens_scale);
         let path = path::load_scaled(&group.path, &scene, &plan.lens, scale)?;
         let motion = Some(&group.motion).filter(|motion| !motion.is_empty());
-        let motion = motion
-            .map(|motion| Motion::load(motion, &scene))
-            .transpose()?;
-        let views = plan.views_per_frame;
+        let motion = motion.map(|motion| Motion::load(motion, &scene));
+        let (motion, views) = (motion.transpose()?, plan.views_per_frame);
         let workload = Workload::moving(&scene, &path, &group.culling, motion, views)?;
         let settings = GroupPlan {
             scene: &info,

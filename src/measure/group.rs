@@ -362,23 +362,24 @@ pub(super) fn counts(counted: &Counted, items: usize) -> BTreeMap<String, f64> {
         counts.sum::<u64>() as f64
     });
     let [cost, locate_cost] = &counted.costs;
+    let mean = |count: u64| count as f64 / queries;
     let means = [
         ("visible_count", visible / queries),
         ("cull_rate", 1.0 - visible / (queries * items as f64)),
-        ("nodes_tested", cost.nodes_tested as f64 / queries),
-        ("planes_tested", cost.planes_tested as f64 / queries),
-        ("items_tested", cost.items_tested as f64 / queries),
+        ("nodes_tested", mean(cost.nodes_tested)),
+        ("planes_tested", mean(cost.planes_tested)),
+        ("items_tested", mean(cost.items_tested)),
         (
             "items_accepted_untested",
-            cost.items_accepted_untested as f64 / queries,
+            mean(cost.items_accepted_untested),
         ),
         ("comparisons", locate_cost.comparisons() as f64 / searches),
         ("regions_found", found / searches),
     ];
-    let measured = means.into_iter().filter(|(_, mean)| mean.is_finite());
-    measured
+    let measured = means
         .map(|(name, mean)| (name.to_owned(), mean))
-        .collect()
+        .into_iter();
+    measured.filter(|(_, mean)| mean.is_finite()).collect()
 }
 
 #[cfg(test)]

@@ -138,19 +138,17 @@ impl SubjectPart {
             label: subject.label(),
             ..SubjectPart::unknown(&subject.spec, verdict)
         };
-        match &subject.built {
-            Err(_) => part,
-            Ok(built) => {
-                let chose = guarded(|| built.items.chose());
-                SubjectPart {
-                    build_ms: Some(built.build_ms),
-                    memory_bytes: Some(built.memory.total() as u64),
-                    update_ms: built.update_ms.clone(),
-                    chose: chose.clone().unwrap_or_default(),
-                    verdict: chose.err().unwrap_or(part.verdict),
-                    ..part
-                }
-            }
+        let Ok(built) = &subject.built else {
+            return part;
+        };
+        let chose = guarded(|| built.items.chose());
+        SubjectPart {
+            build_ms: Some(built.build_ms),
+            memory_bytes: Some(built.memory.total() as u64),
+            update_ms: built.update_ms.clone(),
+            chose: chose.clone().unwrap_or_default(),
+            verdict: chose.err().unwrap_or(part.verdict),
+            ..part
         }
     }
 

@@ -162,11 +162,6 @@ impl<'p> MergedParts<'p> {
         all.filter(move |s| s.label == label)
     }
 
-    /// The frustum queries of a structure in each process.
-    fn queries<'l>(&self, label: &'l str) -> impl Iterator<Item = &'p TaskPart> + use<'p, 'l> {
-        self.tasks(label, TaskKind::Query)
-    }
-
     /// A task of a structure in each process.
     fn tasks<'l>(
         &self,
@@ -226,27 +221,47 @@ impl<'p> MergedParts<'p> {
 
     /// Metrics that this cell lacks though its structure is right, with the reason.
     fn left_out(&self, label: &str) -> Vec<String> {
-        if self.ranked() == TaskKind::Frame {
-            let left_out = "query_ns_p95, locate_ns: not measured of items that move".to_owned();
-            let few = format!("worst_frame_ns: fewer than {LEAST_READINGS} readings per frame");
-            let few = (self.readings(label) < LEAST_READINGS).then_some(few);
-            return [left_out].into_iter().chain(few).collect();
-        }
-        let is_large = self.loaded.scene.total_count > MOST_UPDATED;
+        let (moves, scene) = (self.ranked() == TaskKind::Frame, &self.loaded.scene);
         let has_few_groups = |task: &TaskPart| task.tail_ns.len() < LEAST_TAIL;
+        let mut queries = self.tasks(label, TaskKind::Query);
+        let is_untimed = |task| !moves && self.ln_ns(label, task).is_none();
+        let few = format!("fewer than {LEAST_READINGS} readings per frame");
+        let large = format!("scenes of more than {MOST_UPDATED} items are not moved");
+        let groups = format!("fewer than {LEAST_TAIL} comparable groups of cameras");
         let reasons = [
-            (self.ln_ns(label, TaskKind::Query).is_none())
-                .then(|| "query_ns: no time in some process".to_owned()),
-            is_large.then(|| {
-                format!("update_ms: scenes of more than {MOST_UPDATED} items are not moved")
-            }),
-            (self.ln_ns(label, TaskKind::Locate).is_none())
-                .then(|| "locate_ns: this suite times frustum queries only".to_owned()),
-            (self.queries(label).any(has_few_groups)).then(|| {
-                format!("query_ns_p95: fewer than {LEAST_TAIL} comparable groups of cameras")
-            }),
+            (
+                moves,
+                "query_ns_p95, locate_ns",
+                "not measured of items that move",
+            ),
+            (
+                moves && self.readings(label) < LEAST_READINGS,
+                "worst_frame_ns",
+                &few,
+            ),
+            (
+                is_untimed(TaskKind::Query),
+                "query_ns",
+                "no time in some process",
+            ),
+            (
+                !moves && scene.total_count > MOST_UPDATED,
+                "update_ms",
+                &large,
+            ),
+            (
+                is_untimed(TaskKind::Locate),
+                "locate_ns",
+                "this suite times frustum queries only",
+            ),
+            (
+                !moves && queries.any(has_few_groups),
+                "query_ns_p95",
+                &groups,
+            ),
         ];
-        reasons.into_iter().flatten().collect()
+        let holds = reasons.into_iter().filter(|(holds, ..)| *holds);
+        holds.map(|(_, of, why)| format!("{of}: {why}")).collect()
     }
 
     fn times(&self, label: &str) -> CellTimes {
@@ -267,13 +282,15 @@ impl<'p> MergedParts<'p> {
                 by_process.insert(metric.name.to_owned(), ns);
             }
         }
+        let queries = self.tasks(label, TaskKind::Query);
+        let rounds = queries.map(|task| task.rounds_ns.len());
         let builds: Vec<f64> = self.subjects(label).filter_map(|s| s.build_ms).collect();
         if !builds.is_empty() {
             by_process.insert("build_ms".to_owned(), builds);
         }
         CellTimes {
             processes: self.ln_ns(label, TaskKind::Query).map_or(0, <[f64]>::len),
-            rounds: (self.queries(label).map(|t| t.rounds_ns.len()).min()).unwrap_or(0),
+            rounds: rounds.min().unwrap_or(0),
             cameras_timed,
             cameras_checked: self.known.map_or(0, |known| known.visible.len()),
             batch,

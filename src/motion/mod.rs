@@ -138,16 +138,14 @@ impl Motion {
             order.swap(i, rng.below(i + 1));
         }
         let movers = ((order.len() as f64 * share).round() as usize).clamp(1, order.len());
-        Ok(motion(
-            frames,
-            Source::Generated {
-                law,
-                world,
-                order,
-                movers,
-                same,
-            },
-        ))
+        let source = Source::Generated {
+            law,
+            world,
+            order,
+            movers,
+            same,
+        };
+        Ok(motion(frames, source))
     }
 
     /// The frames that the cameras of a path see, `views` of them each.

@@ -302,7 +302,7 @@ fn fat_bounds_are_not_said_to_return_the_sets_of_the_scan() {
     ));
     for part in [
         "fat bounds return more",
-        "wide@every=50: no rebuild in 6 frames",
+        "@every=50: no rebuild in 6 frames",
     ] {
         assert!(told.contains(part), "{told}");
     }

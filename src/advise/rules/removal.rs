@@ -41,28 +41,23 @@ impl Removal {
         let testing = check.kept_ns - check.left_out_ns;
         let pays = (testing / (cost_ns * without)).max(0.0);
         let share = removed / without;
+        let from = (testing > 0.0 && removed > 0.0).then_some(testing / removed);
+        let told = |show: &dyn Fn(f64) -> String| from.map_or_else(String::new, show);
         let reason = format!(
             "{removed:.1} of {without:.1} {many} a view are removed ({:.1} %; predicted {:.1} %), \
              which saves {} ns each{}",
             share * 100.0,
             self.predicted * 100.0,
             (cost_ns * 1e3).round() / 1e3,
-            match testing > 0.0 && removed > 0.0 {
-                true => format!("; pays above {:.1} ns per {one}", testing / removed),
-                false => String::new(),
-            }
+            told(&|ns| format!("; pays above {ns:.1} ns per {one}"))
         );
         let kept = check.kept_ns + with * cost_ns;
         let left_out = check.left_out_ns + without * cost_ns;
-        let short = |ns: f64| format!("{ns:.*}", if ns < 10.0 { 2 } else { 0 });
         let note = format!(
             "{} ns/{}{}",
             (cost_ns * 1e1).round() / 1e1,
             one.trim_start_matches("shaded "),
-            match testing > 0.0 && removed > 0.0 {
-                true => format!(", pays from {}", short(testing / removed)),
-                false => String::new(),
-            }
+            told(&|ns| format!(", pays from {ns:.*}", if ns < 10.0 { 2 } else { 0 }))
         );
         let is_known = self.predicted.is_finite() && pays.is_finite();
         Finding {

@@ -101,13 +101,13 @@ pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
     let mut refitted = case.spec.build(input_of(scene, &scene.items))?;
     // Some structures allocate room for refits at the first one.
     let can = refitted.refit(&scene.items, &moved);
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start_for(case.spec.is_threaded());
     if !can || !refitted.refit(&items, &moved) {
         let why = format!("'{}' cannot be refitted", case.spec.label);
         return Err(not_applicable(why));
     }
     let refit_ns = watch.lap().cpu_ns;
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start_for(case.spec.is_threaded());
     let rebuilt = case.spec.build(input_of(scene, &items))?;
     let rebuild_ns = watch.lap().cpu_ns;
     // Moved items are not the scene's: there is no truth about them.
