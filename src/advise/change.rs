@@ -161,10 +161,13 @@ impl Beside {
     /// The group of each workload, from the count pass and all processes.
     pub(super) fn groups(&self, counted: Vec<Part>, processes: &[ProcessTimes]) -> Vec<Group> {
         let groups = counted.into_iter().enumerate().map(|(n, counted)| {
-            let timed = processes
-                .iter()
-                .filter_map(|times| times.parts.get(n).cloned());
-            Group::of(&[counted].into_iter().chain(timed).collect::<Vec<_>>())
+            let mut parts = vec![counted];
+            parts.extend(
+                processes
+                    .iter()
+                    .filter_map(|times| times.parts.get(n).cloned()),
+            );
+            Group::of(&parts)
         });
         groups.collect()
     }
@@ -178,22 +181,17 @@ impl Beside {
             let (taken, value) = (self.contenders.first()?, value?);
             let own = self.changed.iter().zip(groups);
             let own = own.filter(|(changed, _)| changed.axis == Some(axis));
-            let mut points: Vec<(f64, &[ReportCell])> = own
-                .map(|(c, group)| (c.reached, &group.cells[..]))
-                .collect();
-            points.push((value, here));
+            let own = own.map(|(changed, group)| (changed.reached, &group.cells[..]));
+            let mut points: Vec<(f64, &[ReportCell])> = own.chain([(value, here)]).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let middle = points.iter().position(|point| point.0 == value)?;
-            let [down, up] = [
-                points[..=middle].iter().rev().collect(),
-                points[middle..].iter().collect(),
-            ];
+            let (down, up) = (points[..=middle].iter().rev(), points[middle..].iter());
             (points.len() > 1).then(|| Change {
                 axis,
                 here: value,
                 measured: [points[0].0, points[points.len() - 1].0],
-                below: turn(taken, down),
-                above: turn(taken, up),
+                below: turn(taken, down.collect()),
+                above: turn(taken, up.collect()),
             })
         });
         changes.collect()
@@ -257,9 +255,8 @@ impl Changed {
         let workload = Workload::moving(scene, &path, &culling, motion, input.views).ok()?;
         let labels = beside.contenders.iter();
         let further = beside.policies.iter().filter(|_| self.axis.is_none());
-        let specs = labels
-            .chain(further)
-            .map(|label| planned(input.structures, label));
+        let labels = labels.chain(further);
+        let specs = labels.map(|label| planned(input.structures, label));
         let specs: Vec<StructureSpec> = specs.collect::<Result<_, _>>().ok()?;
         let build = |spec| Subject::build(spec, false, scene, CullingTest::SixPlane);
         let subjects: Vec<Subject> = specs.into_iter().map(build).collect();

@@ -227,12 +227,10 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
         const SIGKILL: i32 = 9;
         let by_system = format!("killed while {step}: the system was out of memory, most likely");
+        let by_itself = format!("ended by signal {signal} while {step}");
         return match signal {
             SIGKILL => Verdict::new(Status::OutOfMemory, by_system),
-            _ => Verdict::new(
-                Status::Panicked,
-                format!("ended by signal {signal} while {step}"),
-            ),
+            _ => Verdict::new(Status::Panicked, by_itself),
         };
     }
     let last = words.lines().rev().find(|line| !line.trim().is_empty());
@@ -242,10 +240,8 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
         .skip_while(|line| !line.contains(" panicked at "));
     let last = panic.nth(1).or(last);
     let last = last.map(|last| format!(": {last}")).unwrap_or_default();
-    Verdict::new(
-        Status::Panicked,
-        format!("ended while {step} ({status}){last}"),
-    )
+    let reason = format!("ended while {step} ({status}){last}");
+    Verdict::new(Status::Panicked, reason)
 }
 
 /// Starts a worker and sees it through.
@@ -362,9 +358,8 @@ impl Workers {
             Ok(())
         };
         let ended = self.see_through(process, job, &mut keep, step)?;
-        ended
-            .done()
-            .with_context(|| format!("process {}", process + 1))?;
+        let place = || format!("process {}", process + 1);
+        ended.done().with_context(place)?;
         Ok(found)
     }
 }

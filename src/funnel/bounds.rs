@@ -98,10 +98,8 @@ pub fn bounds<'w>(
 fn of_table<'w>(world: &'w World, row: &'w RegionRow) -> Bound<'w> {
     let homes = world.views().map(|view| {
         let mut homes = Vec::new();
-        match row.graph.homes(world.rays(view), &mut homes) {
-            true => homes,
-            false => Vec::new(),
-        }
+        let is_inside = row.graph.homes(world.rays(view), &mut homes);
+        Some(homes).filter(|_| is_inside).unwrap_or_default()
     });
     let homes: Vec<Vec<RegionId>> = homes.collect();
     let name = "read the rows of the eye's regions";
@@ -165,22 +163,17 @@ fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
     bounds.map(|(name, work)| {
         let traces = traces.clone();
         let buffer = RefCell::new(MaskedInner::new(world.samples));
-        bound(
-            StageKind::Occlusion,
-            [MASKED_INNER, name],
-            move |view, _| {
-                let (occluders, trace) = &traces[view];
-                work(occluders, trace, &mut buffer.borrow_mut());
-            },
-        )
+        let names = [MASKED_INNER, name];
+        bound(StageKind::Occlusion, names, move |view, _| {
+            let (occluders, trace) = &traces[view];
+            work(occluders, trace, &mut buffer.borrow_mut());
+        })
     })
 }
 
 fn of_cones<'w>(world: &World, triangles: &TriangleStage) -> Bound<'w> {
-    let views = world.views();
-    let cones: Vec<SafeCones> = views
-        .map(|view| SafeCones::of(triangles.clusters(view)))
-        .collect();
+    let cones = (world.views()).map(|view| SafeCones::of(triangles.clusters(view)));
+    let cones: Vec<SafeCones> = cones.collect();
     let kernel = world.kernel;
     let names = ["cone-f32-safe", "read the cones"];
     bound(StageKind::Triangle, names, move |view, _| {

@@ -144,11 +144,8 @@ impl<'w> ItemStages<'w> {
 
     /// Mean number of items behind some steps, over the views.
     pub fn mean_count(&self, steps: &[Step]) -> f64 {
-        let count = |view| {
-            self.items(steps, view)
-                .map_or(self.world.items(), <[ItemId]>::len)
-        };
-        let counts = self.world.views().map(|view| count(view) as f64);
+        let left = self.world.views().map(|view| self.items(steps, view));
+        let counts = left.map(|left| left.map_or(self.world.items(), <[ItemId]>::len) as f64);
         counts.sum::<f64>() / self.world.views.len().max(1) as f64
     }
 
@@ -220,11 +217,10 @@ impl PlanView {
         });
         let is_visible = |item| visible.binary_search_by_key(&item, |(id, _)| *id).is_ok();
         let items = (0..).take(world.scene.items.len());
+        let fates = items.map(|item| fate(item, &left, is_visible(item)));
         PlanView {
             camera: Some(*view.rays.camera()),
-            fates: items
-                .map(|item| fate(item, &left, is_visible(item)))
-                .collect(),
+            fates: fates.collect(),
         }
     }
 }

@@ -89,18 +89,14 @@ impl TriangleStage {
         let views = world.views().map(|view| {
             let items = world.listed(stages.items(steps, view));
             let camera = world.rays(view).camera();
-            let (built, given) = match &whole {
-                Err(solids) => {
-                    let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
-                    let origin = origin_of(world.scene, camera);
-                    let built = Built::of(Arc::new(Surfaces::of_boxes_about(origin, boxes)));
-                    let given = Selection::all(&built.clusters);
-                    (built, given)
-                }
-                Ok(built) => {
-                    let given = Selection::of_items(&built.clusters, items.iter().copied());
-                    (built.clone(), given)
-                }
+            let built = whole.clone().unwrap_or_else(|solids| {
+                let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
+                let origin = origin_of(world.scene, camera);
+                Built::of(Arc::new(Surfaces::of_boxes_about(origin, boxes)))
+            });
+            let given = match whole.is_ok() {
+                true => Selection::of_items(&built.clusters, items.iter().copied()),
+                false => Selection::all(&built.clusters),
             };
             let eye = eye(world.scene, camera);
             Faces {

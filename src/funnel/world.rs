@@ -151,10 +151,9 @@ impl<'a> World<'a> {
         if let (Some(typed), Shape::Boxes(solids)) = (input.cut_outs, &mut shape) {
             let graph = regions.as_ref().map(|regions| &*regions.graph);
             let holes = holes_of(typed, scene, graph);
-            let items = 0..scene.items.len() as ItemId;
-            items
-                .filter(|&item| holes.of(item).is_some())
-                .for_each(|item| solids.hides_nothing(item));
+            for item in (0..scene.items.len() as ItemId).filter(|&item| holes.of(item).is_some()) {
+                solids.hides_nothing(item);
+            }
             cut_outs = Some(holes);
         }
         begin("occluders");
@@ -248,9 +247,8 @@ fn views(input: &FunnelInput) -> Result<Vec<View>, StudyError> {
     let count = all.len().min(input.most_views.max(1));
     let chosen = (0..count).map(|k| k * all.len() / count);
     let views = chosen.map(|index| {
-        let place = || input.path.place(index);
         let refused = |error: CameraError| WorkloadError {
-            place: place(),
+            place: input.path.place(index),
             error: error.into(),
         };
         let rays = Rays::of(&all[index]).map_err(refused)?;
@@ -286,16 +284,12 @@ fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), Stu
 
 /// Refuses options that the items of the scene cannot have.
 fn check_options(input: &FunnelInput) -> Result<(), StudyError> {
-    let FunnelInput { scene, mirror, .. } = input;
+    let (scene, mirror, inner_boxes) = (input.scene, &input.mirror, input.inner_boxes);
     let (name, shape) = (&scene.name, scene.item_shape());
     for (option, is_given, expected) in [
         ("--cut-out", input.cut_outs.is_some(), ItemShape::Box),
         ("--mirror", mirror.is_some(), ItemShape::Box),
-        (
-            "--inner-boxes",
-            input.inner_boxes.is_some(),
-            ItemShape::Mesh,
-        ),
+        ("--inner-boxes", inner_boxes.is_some(), ItemShape::Mesh),
     ] {
         if is_given && shape != expected {
             return Err(StudyError::Refused(format!(

@@ -111,12 +111,11 @@ fn replay<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     let params = serde_json::from_value(wide.spec.params.clone()).ok()?;
     let tree = Wide::build(&Input::new(&material.workload.items), &params).ok()?;
     let views = material.workload.views.iter();
-    let traces: Vec<Trace> = views
-        .map(|view| match Dispatched::of(view.as_any()) {
-            Ok(planes) => Trace::of(&tree, &planes),
-            Err(p) => Trace::of(&tree, &p),
-        })
-        .collect();
+    let traces = views.map(|view| match Dispatched::of(view.as_any()) {
+        Ok(planes) => Trace::of(&tree, &planes),
+        Err(p) => Trace::of(&tree, &p),
+    });
+    let traces: Vec<Trace> = traces.collect();
     let replay = move |place: usize, out: &mut Vec<_>| traces[place].replay(&tree, out);
     Some(TimedTask::new(material.visible.clone(), replay))
 }

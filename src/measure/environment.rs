@@ -87,9 +87,8 @@ impl Machine {
             .with_cpu(CpuRefreshKind::nothing())
             .with_memory(MemoryRefreshKind::nothing().with_ram());
         let system = System::new_with_specifics(wanted).ok();
-        let brand = system
-            .as_ref()
-            .and_then(|s| Some(s.cpus().first()?.brand().trim().to_owned()));
+        let cpu = system.as_ref().and_then(|system| system.cpus().first());
+        let brand = cpu.map(|cpu| cpu.brand().trim().to_owned());
         Machine {
             cpu: brand.filter(|brand| !brand.is_empty()),
             features: simd_features(),
@@ -115,9 +114,7 @@ impl Machine {
     /// last level, at least 64 MiB.
     pub fn cache_sweep_bytes(&self) -> usize {
         let last = self.caches.iter().map(|c| c.bytes).max().unwrap_or(0);
-        usize::try_from(2 * last)
-            .unwrap_or(usize::MAX)
-            .max(64 << 20)
+        usize::try_from((2 * last).max(64 << 20)).unwrap_or(usize::MAX)
     }
 
     /// A short name for folders: `amd-epyc-2c`.
@@ -139,18 +136,8 @@ fn simd_features() -> Vec<String> {
                 $(if std::arch::is_x86_feature_detected!($name) { found.push($name.to_owned()); })*
             };
         }
-        detect!(
-            "sse2",
-            "sse4.2",
-            "avx",
-            "avx2",
-            "fma",
-            "bmi2",
-            "avx512f",
-            "avx512bw",
-            "avx512vl",
-            "avx512vbmi2"
-        );
+        detect!("sse2", "sse4.2", "avx", "avx2", "fma", "bmi2");
+        detect!("avx512f", "avx512bw", "avx512vl", "avx512vbmi2");
     }
     #[cfg(target_arch = "aarch64")]
     if std::arch::is_aarch64_feature_detected!("neon") {
@@ -192,17 +179,16 @@ impl Toolchain {
     /// The facts that the build script left in this program.
     pub fn capture() -> Toolchain {
         let lock = include_bytes!("../../Cargo.lock");
+        let features = env!("CULLBENCH_FEATURES")
+            .split(',')
+            .filter(|f| !f.is_empty());
         Toolchain {
             rustc: built_with(env!("CULLBENCH_RUSTC")),
             target: built_with(env!("CULLBENCH_TARGET")),
             flags: env!("CULLBENCH_RUSTFLAGS").to_owned(),
             profile: built_with(env!("CULLBENCH_PROFILE")),
             opt_level: built_with(env!("CULLBENCH_OPT_LEVEL")),
-            features: env!("CULLBENCH_FEATURES")
-                .split(',')
-                .filter(|f| !f.is_empty())
-                .map(str::to_owned)
-                .collect(),
+            features: features.map(str::to_owned).collect(),
             lock_digest: hex(&hmac_sha256::Hash::hash(lock)),
         }
     }

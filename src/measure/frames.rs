@@ -167,9 +167,8 @@ impl Entry<'_> {
             self.replay_ns += watch.lap().cpu_ns;
             for (query, view) in frames.views(frame) {
                 out.clear();
-                moving
-                    .index
-                    .query_counted(view.as_any(), &mut out, &mut cost);
+                let index = &moving.index;
+                index.query_counted(view.as_any(), &mut out, &mut cost);
                 frames.check(&moving, query, &out)?;
                 out.clear();
                 let watch = Stopwatch::start_for(all_threads);

@@ -144,9 +144,8 @@ impl<'w> Moving<'w> {
             _ => None,
         };
         let held = fat.as_ref().map_or(&items, |fat| &fat.boxes);
-        let mut index = spec
-            .build(input_of(workload.scene, held))
-            .map_err(not_built)?;
+        let built = spec.build(input_of(workload.scene, held));
+        let mut index = built.map_err(not_built)?;
         if spec.info().capabilities.refits && spec.policy != UpdatePolicy::Rebuild {
             // Tables of positions are no part of the first frame.
             index.refit(held, &[]);
@@ -194,10 +193,9 @@ impl<'w> Moving<'w> {
         if moved.is_empty() {
             return Ok(());
         }
-        let updated = self
-            .spec
-            .update(&mut self.index, input_of(scene, items), moved);
-        updated.map(|_| ()).map_err(not_built)
+        let (spec, input) = (self.spec, input_of(scene, items));
+        let updated = spec.update(&mut self.index, input, moved);
+        updated.map(drop).map_err(not_built)
     }
 
     /// The boxes that the index holds.

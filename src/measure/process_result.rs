@@ -204,10 +204,8 @@ impl Part {
                     Some(rounds) if !is_bound && ids(rounds) != Some(task.returned) => {
                         let wanted = ids(rounds);
                         let wanted = wanted.map_or("other cameras".to_owned(), |n| n.to_string());
-                        format!(
-                            "{} ids in all its samples; the plan asks for {wanted}",
-                            task.returned
-                        )
+                        let returned = task.returned;
+                        format!("{returned} ids in all its samples; the plan asks for {wanted}")
                     }
                     Some(_) => continue,
                 };

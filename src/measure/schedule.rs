@@ -103,36 +103,32 @@ impl Schedule {
         let timed = cameras.len().max(1);
         let mut out = Vec::new();
         let [least, most] = protocol.rounds;
-        let plans: Vec<(u32, usize)> = tasks
-            .iter()
-            .map(|task| {
-                // A panic is the task's own result when its pass comes.
-                let pilot = guarded(|| pilot(task, &cameras, &mut out)).unwrap_or(1.0);
-                let batch = match (&task.ask_many, protocol.cold) {
-                    (Some(_), _) => timed,
-                    (None, true) => 1,
-                    (None, false) => batch(task.least_ns.unwrap_or(pilot), timed),
-                };
-                let pass = 2.0 * (pilot * timed as f64).max(1.0);
-                let rounds = match protocol.cold {
-                    true => least,
-                    false => ((protocol.task_ns / pass) as usize).clamp(least, most.max(least)),
-                };
-                (batch as u32, rounds.max(1))
-            })
-            .collect();
+        let plans = tasks.iter().map(|task| {
+            // A panic is the task's own result when its pass comes.
+            let pilot = guarded(|| pilot(task, &cameras, &mut out)).unwrap_or(1.0);
+            let batch = match (&task.ask_many, protocol.cold) {
+                (Some(_), _) => timed,
+                (None, true) => 1,
+                (None, false) => batch(task.least_ns.unwrap_or(pilot), timed),
+            };
+            let pass = 2.0 * (pilot * timed as f64).max(1.0);
+            let rounds = match protocol.cold {
+                true => least,
+                false => ((protocol.task_ns / pass) as usize).clamp(least, most.max(least)),
+            };
+            (batch as u32, rounds.max(1))
+        });
+        let plans: Vec<(u32, usize)> = plans.collect();
         let rounds = plans.iter().map(|p| p.1).max().unwrap_or(0);
+        let tasks = plans.into_iter().map(|(batch, own)| TaskPlan {
+            batch,
+            every: (rounds / own).max(1) as u32,
+        });
         Schedule {
             cameras,
             rounds: rounds as u32,
             cold: protocol.cold,
-            tasks: plans
-                .into_iter()
-                .map(|(batch, own)| TaskPlan {
-                    batch,
-                    every: (rounds / own).max(1) as u32,
-                })
-                .collect(),
+            tasks: tasks.collect(),
         }
     }
 

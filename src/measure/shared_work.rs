@@ -32,15 +32,13 @@ impl SharedWork {
                 None => (cell, ["views_wall_ns", "views_ns"]),
             };
             let wall_ns = cell.value(wall)?;
+            let cpu_ns = cell.value(cpu).zip(alone.value("query_ns"));
             Some(SharedWork {
                 structure: label.clone(),
                 shares_views: own.is_none(),
                 wall_ns,
                 wall_gain: alone.value("query_wall_ns")? / wall_ns,
-                cpu_ratio: cell
-                    .value(cpu)
-                    .zip(alone.value("query_ns"))
-                    .map(|(all, one)| all / one),
+                cpu_ratio: cpu_ns.map(|(all, one)| all / one),
             })
         });
         shared.collect()

@@ -67,15 +67,14 @@ impl Recorded {
     }
 
     pub(super) fn digest(&self, hash: &mut hmac_sha256::Hash) {
-        self.ends
-            .iter()
-            .for_each(|end| hash.update((*end as u64).to_le_bytes()));
+        for end in &self.ends {
+            hash.update((*end as u64).to_le_bytes());
+        }
         for (id, b) in self.ids.iter().zip(&self.boxes) {
             hash.update(id.to_le_bytes());
-            let bits = b.bits();
-            bits.as_flattened()
-                .iter()
-                .for_each(|v| hash.update(v.to_le_bytes()));
+            for v in b.bits().as_flattened() {
+                hash.update(v.to_le_bytes());
+            }
         }
     }
 

@@ -45,10 +45,8 @@ pub(super) fn needless_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
     let fewer: Rc<[CameraView]> = fewer.into();
     let scan: Rc<dyn DynIndex> = case.scan.build(&case.scene().items)?.into();
     let on_tree = trials.index(&*case.index, fewer.clone());
-    let [kept, left_out] = [
-        trials.index(scan.clone(), case.views()),
-        trials.index(scan, fewer),
-    ];
+    let kept = trials.index(scan.clone(), case.views());
+    let left_out = trials.index(scan, fewer);
     let sides = vec![
         Sides::same(&case.spec.label, BASE, on_tree),
         Sides::same(&case.scan.label, kept, left_out),
@@ -248,9 +246,7 @@ fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
         let rows = rows.filter(|row| with != kept || row.test == taken);
         rows.filter_map(|row| row.total_ns).min_by(f64::total_cmp)
     };
-    finding.cost_ns = total(true)
-        .zip(total(false))
-        .map(|(with, without)| [with, without]);
+    finding.cost_ns = total(true).zip(total(false)).map(<[f64; 2]>::from);
     let is_tie = choice.ties.iter().any(|name| with_axes(name) != kept);
     finding.decision = Some(Decision::of(!kept));
     finding.is_tie = Some(is_tie);
@@ -329,18 +325,11 @@ pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
         true => (&other, scene, [BASE, there]),
         false => (scene, &other, [there, BASE]),
     };
-    let (margin, better) = (
-        case.margin(&at_zero.surroundings()),
-        case.margin(&moved.surroundings()),
-    );
+    let [margin, better] = [at_zero, moved].map(|scene| case.margin(&scene.surroundings()));
     let [x, y, z] = moved.origin.to_array().map(significant);
     let reason = format!(
         "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({x}, {y}, {z}); this scene {}",
-        if is_moved {
-            "is moved"
-        } else {
-            "stays where it is"
-        }
+        ["stays where it is", "is moved"][usize::from(is_moved)]
     );
     let sides = Sides::new(&case.spec.label, sides[0], sides[1]);
     let finding = Finding::new(margin, case.options.tolerance, reason)

@@ -72,11 +72,10 @@ pub fn inscribed_boxes(
     let least = volume * LEAST_GAIN;
     // A box adds no more than its piece has.
     let large = |part: &&Vec<[Vec3; 3]>| volume_within(part.iter().copied()) >= least;
-    let mut found: Vec<(f64, Aabb)> = parts(&solid)
-        .iter()
-        .filter(large)
-        .flat_map(|part| boxes_in(part, cells.clamp(4, 64), most, least))
-        .collect();
+    let (parts, cells) = (parts(&solid), cells.clamp(4, 64));
+    let large = parts.iter().filter(large);
+    let found = large.flat_map(|part| boxes_in(part, cells, most, least));
+    let mut found: Vec<(f64, Aabb)> = found.collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.truncate(most);
     let share = found.iter().map(|(gain, _)| gain).sum::<f64>() / volume;

@@ -38,15 +38,7 @@ impl Clusters {
     /// # Panics
     /// If `most` is outside 1..=64.
     pub fn of(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
-        let mut clusters = Clusters::none_of(&surfaces, most);
-        for item in 0..surfaces.items() {
-            let first = clusters.len() as u32;
-            for run in surfaces.runs(item) {
-                grow(&surfaces, run, most, &mut clusters);
-            }
-            clusters.of_item.push(first..clusters.len() as u32);
-        }
-        clusters
+        Clusters::by_run(&surfaces, most, grow)
     }
 
     /// Clusters of `most` triangles, 1 to 64, in the order of the list. O(t).
@@ -56,30 +48,35 @@ impl Clusters {
     /// # Panics
     /// If `most` is outside 1..=64.
     pub fn as_listed(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
-        let mut clusters = Clusters::none_of(&surfaces, most);
-        clusters
-            .triangles
-            .extend(0..surfaces.triangles.len() as u32);
-        for item in 0..surfaces.items() {
-            let first = clusters.len() as u32;
-            for run in surfaces.runs(item) {
-                // Each ends where the next one starts.
-                let ends = run.clone().step_by(most).skip(1);
-                clusters.starts.extend(ends.chain([run.end]));
-            }
-            clusters.of_item.push(first..clusters.len() as u32);
-        }
-        clusters
+        Clusters::by_run(&surfaces, most, |_, run, most, clusters| {
+            clusters.triangles.extend(run.clone());
+            // Each ends where the next one starts.
+            let ends = run.clone().step_by(most).skip(1);
+            clusters.starts.extend(ends.chain([run.end]));
+        })
     }
 
-    fn none_of(surfaces: &Arc<Surfaces>, most: usize) -> Clusters {
+    /// Clusters of each run of triangles of one kind and alike in sides.
+    fn by_run(
+        surfaces: &Arc<Surfaces>,
+        most: usize,
+        add: impl Fn(&Surfaces, Range<u32>, usize, &mut Clusters),
+    ) -> Clusters {
         assert!((1..=MOST_TRIANGLES).contains(&most), "1 to 64 triangles");
-        Clusters {
+        let mut clusters = Clusters {
             surfaces: surfaces.clone(),
             triangles: Vec::with_capacity(surfaces.triangles.len()),
             starts: vec![0],
             of_item: Vec::with_capacity(surfaces.items()),
+        };
+        for item in 0..surfaces.items() {
+            let first = clusters.len() as u32;
+            for run in surfaces.runs(item) {
+                add(surfaces, run, most, &mut clusters);
+            }
+            clusters.of_item.push(first..clusters.len() as u32);
         }
+        clusters
     }
 
     /// How many clusters there are.
@@ -181,16 +178,14 @@ fn grow(surfaces: &Surfaces, run: Range<u32>, most: usize, out: &mut Clusters) {
 }
 
 fn nodes(surfaces: &Surfaces, run: Range<u32>) -> Vec<Node> {
-    let mut nodes: Vec<Node> = run
-        .clone()
-        .map(|t| surfaces.corners(t))
-        .map(|corners| Node {
-            centre: each(corners, |p: Vec3| p.as_dvec3()).iter().sum::<DVec3>() / 3.0,
-            normal: normal(corners).normalize_or_zero(),
-            neighbours: [NONE; 3],
-            is_used: false,
-        })
-        .collect();
+    let corners = run.clone().map(|t| surfaces.corners(t));
+    let nodes = corners.map(|corners| Node {
+        centre: each(corners, |p: Vec3| p.as_dvec3()).iter().sum::<DVec3>() / 3.0,
+        normal: normal(corners).normalize_or_zero(),
+        neighbours: [NONE; 3],
+        is_used: false,
+    });
+    let mut nodes: Vec<Node> = nodes.collect();
     let mut edges: Vec<(u64, u32)> = Vec::with_capacity(3 * nodes.len());
     let triangles = &surfaces.triangles[run.start as usize..run.end as usize];
     for (index, t) in triangles.iter().enumerate() {
@@ -217,14 +212,11 @@ fn along_the_curve(nodes: &[Node], bounds: &Aabb) -> Vec<u32> {
     let low = bounds.min.as_dvec3();
     let edge = (bounds.max.as_dvec3() - low).max_element();
     let scale = if edge > 0.0 { 2_097_151.0 / edge } else { 0.0 };
-    let mut keyed: Vec<(u64, u32)> = nodes
-        .iter()
-        .enumerate()
-        .map(|(index, node)| {
-            let [x, y, z] = ((node.centre - low) * scale).to_array().map(|x| x as u32);
-            (morton_encode_u64(x, y, z), index as u32)
-        })
-        .collect();
+    let keyed = nodes.iter().zip(0..).map(|(node, index)| {
+        let [x, y, z] = ((node.centre - low) * scale).to_array().map(|x| x as u32);
+        (morton_encode_u64(x, y, z), index)
+    });
+    let mut keyed: Vec<(u64, u32)> = keyed.collect();
     keyed.sort_unstable();
     keyed.into_iter().map(|(_, index)| index).collect()
 }

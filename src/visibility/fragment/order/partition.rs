@@ -87,10 +87,8 @@ impl Partition {
                 continue;
             }
             sorted.clear();
-            let keyed = self.leaves[leaf]
-                .iter()
-                .map(|held| (nearest(camera, &held.bounds), held));
-            sorted.extend(keyed);
+            let held = self.leaves[leaf].iter();
+            sorted.extend(held.map(|held| (nearest(camera, &held.bounds), held)));
             sorted.sort_by(|(near_a, a): &(f64, &Held), (near_b, b)| {
                 let by_depth = near_a.total_cmp(near_b).then(a.item.cmp(&b.item));
                 a.is_behind_all.cmp(&b.is_behind_all).then(by_depth)
