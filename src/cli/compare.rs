@@ -258,8 +258,9 @@ fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]
         let run = read_report(&path.join("report.json")).ok()?.run;
         Some(run).filter(|run| run.id != old)
     });
-    let newest = newest
-        .context("no run in results; expected one to compare with the baseline, or its folder")?;
+    let newest = newest.context(
+        "no other run in results; expected one to compare with the baseline, or its folder",
+    )?;
     Ok([file, newest])
 }
 

@@ -1,6 +1,7 @@
 //! Answers of one structure after another (a large scene does not fit in memory
 //! several times), as `query` and `locate` compare and write them.
 
+use std::cell::LazyCell;
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
 
@@ -67,6 +68,15 @@ pub fn ask_all(
     let room = available_bytes().map_or(HELD, |free| HELD.min(free as usize / 8));
     // A single structure is built once; of several there may be memory for one.
     let mut only: Option<Box<dyn DynIndex>> = None;
+    let scan = LazyCell::new(|| {
+        let scan = StructureSpec::parse("linear-scalar").ok()?;
+        scan.build(input_of(scene, boxes)).ok()
+    });
+    let right = |question: usize| {
+        let (mut out, mut cost) = (Vec::new(), QueryCost::default());
+        ask(scan.as_ref()?.as_ref(), question, &mut out, &mut cost);
+        Some(Answer::of(&out))
+    };
     while from < questions {
         let mut answers: Vec<Vec<Row>> = Vec::new();
         for spec in structures {
@@ -135,14 +145,7 @@ pub fn ask_all(
         }
         from += answers.len();
         let rows: Vec<Row> = answers.into_iter().flatten().collect();
-        let right = |question: usize| {
-            let scan = StructureSpec::parse("linear-scalar").ok()?;
-            let index = scan.build(input_of(scene, boxes)).ok()?;
-            let (mut out, mut cost) = (Vec::new(), QueryCost::default());
-            ask(index.as_ref(), question, &mut out, &mut cost);
-            Some(Answer::of(&out))
-        };
-        agree &= all_agree(&rows, what, right);
+        agree &= all_agree(&rows, what, &right);
         each(rows)?;
     }
     Ok(agree)

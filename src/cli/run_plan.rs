@@ -206,7 +206,8 @@ impl RunPlan {
 /// Told of a scene, and then of each of its workloads with the name of the path.
 type Look<'l> = &'l dyn Fn(&Scene, Option<(&str, &Workload)>) -> anyhow::Result<()>;
 
-fn same_digest(
+/// Refuses what a run was begun with if it is another now.
+pub fn same_digest(
     what: &str,
     name: &str,
     before: Option<String>,

@@ -1,6 +1,7 @@
 //! The folder of a run: a new one, or an unfinished one to continue with the
 //! options and the plan it was begun with, on the same machine by the same program.
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, Parser};
 
 use super::args::{Cli, Command, RunArgs};
-use super::run_plan::RunPlan;
+use super::run_plan::{RunPlan, same_digest};
 use super::{program, tell, text};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
@@ -53,9 +54,13 @@ pub fn create(
     header.binary = binary_digest();
     let groups = header.whole().iter();
     let names = groups.flat_map(|key| [&key.path, &key.motion]);
-    let files = names.filter(|name| Path::new(name).is_file());
-    let digests = files.filter_map(|name| Some((name.clone(), digest(Path::new(name))?)));
-    header.files = digests.collect();
+    let names: BTreeSet<&String> = names.chain(&args.what.suite).collect();
+    let digests = names
+        .into_iter()
+        .map(|name| (name.clone(), digest(Path::new(name))));
+    header.files = digests
+        .filter_map(|(name, digest)| Some((name, digest?)))
+        .collect();
     let folder = RunFolder::create(&path, &header)?;
     Ok((folder, Stream::of(header)))
 }
@@ -73,9 +78,9 @@ fn binary_digest() -> Option<String> {
     digest(&std::env::current_exe().ok()?)
 }
 
-/// SHA-256 of a file; `None` if it cannot be read.
+/// SHA-256 of a file; `None` if it cannot be read, or is a pipe.
 fn digest(file: &Path) -> Option<String> {
-    let bytes = fs::read(file).ok()?;
+    let bytes = file.is_file().then(|| fs::read(file).ok())??;
     Some(scene::hex(&hmac_sha256::Hash::hash(&bytes)))
 }
 
@@ -88,6 +93,12 @@ pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
     let (folder, stream) = StoppedRun::open(&path)?;
     let begun = same_options(&stream.header.args).with_context(|| path.display().to_string())?;
     same_place(&stream.header, &begun).with_context(|| path.display().to_string())?;
+    let suite = begun.what.suite.as_deref().unwrap_or_default();
+    let before = stream.header.files.get(suite).cloned();
+    same_digest("suite", suite, before, || {
+        digest(Path::new(suite)).unwrap_or_default()
+    })
+    .with_context(|| path.display().to_string())?;
     Ok((folder, stream, begun))
 }
 

@@ -57,7 +57,7 @@ pub struct Header {
     pub structures: Vec<String>,
     /// SHA-256 of the program.
     pub binary: Option<String>,
-    /// SHA-256 of the files of cameras and motions, by their names in the plan.
+    /// SHA-256 of the files of suite, cameras and motions, by their names in the plan.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub files: BTreeMap<String, String>,
 }

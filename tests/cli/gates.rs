@@ -142,7 +142,7 @@ fn a_saved_run_is_the_baseline_of_the_newest() {
     all_refused(
         &folder,
         &["compare --baseline main"],
-        "no run in results | expected",
+        "no other run in results | expected",
     );
     all_refused(
         &folder,

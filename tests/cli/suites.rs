@@ -53,6 +53,17 @@ fn a_suite_of_a_file_is_run_as_written_and_grows_over_its_sizes() {
     assert_eq!(plan.len(), 3);
     assert!(plan.iter().all(|cell| cell["structure"] == "linear"));
     assert!(plan.iter().all(|cell| cell["path"] == "spin:frames=4"));
+    // A stopped run goes on with the suite it was begun with.
+    let stream = text("stream.jsonl");
+    let begun: String = stream.split_inclusive('\n').take(3).collect();
+    fs::write(folder.path().join("r/stream.jsonl"), begun).expect("writable");
+    let other = SUITE.replace("processes = 2", "processes = 3");
+    fs::write(folder.path().join("mine.toml"), other).expect("writable");
+    let wanted = "suite 'mine.toml' has changed since the run was begun | expected the same";
+    all_refused(&folder, &["run --resume --out r"], wanted);
+    fs::write(folder.path().join("mine.toml"), SUITE).expect("writable");
+    works(folder.path(), "run --resume --out r");
+    assert_eq!(json(&text("report.json"))["run"]["processes"], 2);
 }
 
 #[test]
