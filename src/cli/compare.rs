@@ -2,6 +2,7 @@
 //! report.json and measures nothing; the verdicts come from `report`, the table
 //! from `compare_table`.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -26,7 +27,6 @@ use crate::report::{
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
     let page = [("--html", args.html.as_deref())];
-    let threshold = args.threshold;
     ensure!(
         args.gate == Gate::Time || !args.fail_inconclusive,
         "--fail-inconclusive is of times; expected none with --gate work"
@@ -39,18 +39,11 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
     super::against::expect_none_of_a_run()?;
     let mut metrics = match (args.gate, args.metric.is_empty()) {
         (Gate::Time, true) => vec![JUDGED_METRICS[0]],
-        (Gate::Time, false) => {
-            run_plan::each_once("metric", &args.metric)?;
-            args.metric.clone()
-        }
-        (Gate::Work, is_free) => {
-            ensure!(
-                is_free,
-                "--metric names times; expected none with --gate work"
-            );
-            WORK.to_vec()
-        }
+        (Gate::Time, false) => args.metric.clone(),
+        (Gate::Work, true) => WORK.to_vec(),
+        (Gate::Work, false) => bail!("--metric names times; expected none with --gate work"),
     };
+    run_plan::each_once("metric", &metrics)?;
     let files = match (&args.baseline, &args.old, &args.new) {
         // The only run that is named is NEW.
         (Some(name), new, _) => baseline_and(name, new.clone())?,
@@ -70,12 +63,8 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         let moving = new.cells.iter().filter(|cell| !cell.path.motion.is_empty());
         metrics.extend(moving.map(ReportCell::ranked_by).take(1));
     }
-    let changes = changes(
-        Basis::Reports,
-        [&old.cells, &new.cells],
-        threshold,
-        &metrics,
-    );
+    let cells = [&old.cells[..], &new.cells];
+    let changes = changes(Basis::Reports, cells, args.threshold, &metrics);
     let settings = settings(&old, &new);
     let table = CompareTable {
         args,
@@ -269,7 +258,6 @@ fn names(folder: &str) -> Vec<String> {
     let listing = fs::read_dir(folder).into_iter().flatten().flatten();
     let names = listing.filter_map(|entry| entry.file_name().into_string().ok());
     let names = names.filter_map(|name| Some(name.strip_suffix(".json")?.to_owned()));
-    let mut names: Vec<String> = names.collect();
-    names.sort();
-    names
+    let names: BTreeSet<String> = names.collect();
+    names.into_iter().collect()
 }

@@ -72,19 +72,20 @@ impl CompareTable<'_> {
             "ok" => "no regression".to_owned(),
             other => other.replace('_', " "),
         };
-        let is_bad =
-            |row: &&JudgedRow| row.outcome < Outcome::Different && self.ending() != Ending::Ok;
-        let worst = self.changes.rows.first().filter(is_bad);
-        let worst = worst.map(|row| {
-            let change = row
-                .metric
-                .zip(row.ratio().filter(|ratio| ratio.is_finite()));
-            let change =
-                change.map(|(metric, ratio)| format!(": {metric} {}", change_of(ratio, None)));
-            format!("; worst: {}{}", name(&row.cell), change.unwrap_or_default())
+        let worst = self
+            .changes
+            .rows
+            .first()
+            .filter(|_| self.ending() != Ending::Ok);
+        let worst = worst.filter(|row| row.outcome < Outcome::Different);
+        let worst = text::some(worst, |row| {
+            let ratio = row.ratio().filter(|ratio| ratio.is_finite());
+            let change = text::some(row.metric.zip(ratio), |(metric, ratio)| {
+                format!(": {metric} {}", change_of(ratio, None))
+            });
+            format!("; worst: {}{change}", name(&row.cell))
         });
-        let counts = self.counts_line();
-        format!("{verdict}: {counts}{}", worst.unwrap_or_default())
+        format!("{verdict}: {}{worst}", self.counts_line())
     }
 
     /// Prints the comparison in the chosen format.
@@ -227,10 +228,9 @@ impl CompareTable<'_> {
         let short = |group: &&GroupKey| place(group, left, short);
         let full = |group: &&GroupKey| place(group, usize::MAX, plain);
         let places = distinct(&groups, short, full);
-        let places: Vec<(&GroupKey, String)> = groups.into_iter().zip(places).collect();
         for row in rows {
-            let place = places.iter().find(|(group, _)| **group == row.cell.group);
-            let place = text::some(place, |(_, place)| place.clone());
+            let at = groups.iter().position(|group| **group == row.cell.group);
+            let place = text::some(at, |at| places[at].clone());
             let metric = row.metric.unwrap_or_default();
             let judged = row.judgement.as_ref();
             let resolution = judged.and_then(|found| found.resolution);
@@ -277,12 +277,10 @@ impl CompareTable<'_> {
     fn counts_line(&self) -> String {
         let changes = &self.changes;
         // The verdicts of the gate are shown in any case.
+        let of_work = [Outcome::MoreWork, Outcome::LessWork, Outcome::Same];
         let is_of_gate = |outcome: Outcome| match self.args.gate {
             Gate::Time => outcome.is_judged(),
-            Gate::Work => matches!(
-                outcome,
-                Outcome::MoreWork | Outcome::LessWork | Outcome::Same
-            ),
+            Gate::Work => of_work.contains(&outcome),
         };
         let outcomes = Outcome::ALL.into_iter();
         let shown = outcomes.filter(|outcome| is_of_gate(*outcome) || changes.count(*outcome) > 0);
@@ -291,13 +289,10 @@ impl CompareTable<'_> {
             format!("{count} {}", outcome.name().replace('_', " "))
         });
         let counts: Vec<String> = counts.collect();
-        let rows = match (changes.rows.len(), changes.cells_in_common) {
-            (rows, cells) if rows == cells => text::counted(cells, "cell"),
-            (rows, cells) => format!(
-                "{} of {}",
-                text::counted(rows, "figure"),
-                text::counted(cells, "cell")
-            ),
+        let cells = text::counted(changes.cells_in_common, "cell");
+        let rows = match changes.rows.len() {
+            rows if rows == changes.cells_in_common => cells,
+            rows => format!("{} of {cells}", text::counted(rows, "figure")),
         };
         let alone = changes.only_in_new.iter();
         let alone = match alone.filter(|cell| cell.status.is_failure()).count() {
@@ -371,10 +366,9 @@ pub fn change_of(ratio: f64, interval: Option<(f64, f64)>) -> String {
 /// Line on the change that all cells share.
 fn shift_line(shift: CommonShift) -> String {
     let percent = |ratio: f64| format!("{:.1}", ratio * 100.0);
-    let interval = match shift.lower.zip(shift.upper) {
-        Some((lower, upper)) => format!(" [{}, {}]", percent(lower), percent(upper)),
-        None => String::new(),
-    };
+    let interval = text::some(shift.lower.zip(shift.upper), |(lower, upper)| {
+        format!(" [{}, {}]", percent(lower), percent(upper))
+    });
     format!(
         "the machine or the program as a whole: {} of NEW is {} %{interval} of OLD ({}); this \
          comparison cannot tell which",
@@ -422,12 +416,11 @@ fn reasons(rows: &[&JudgedRow]) -> Vec<String> {
         let why = format!("{}: {}", row.outcome.name().replace('_', " "), reason(row));
         (why, &row.cell)
     });
-    let lines = grouped(told)
-        .into_iter()
-        .map(|(why, cells)| match cells[..] {
-            [one] => format!("{why} ({})", name(one)),
-            _ => format!("{why} ({})", text::counted(cells.len(), "cell")),
-        });
+    let lines = grouped(told).into_iter();
+    let lines = lines.map(|(why, cells)| match cells[..] {
+        [one] => format!("{why} ({})", name(one)),
+        _ => format!("{why} ({})", text::counted(cells.len(), "cell")),
+    });
     lines.collect()
 }
 

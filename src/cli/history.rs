@@ -71,12 +71,8 @@ pub fn page(mut reports: Vec<Report>) -> String {
                     }),
                 }
             });
-            table.add_row(
-                [structure.to_owned()]
-                    .into_iter()
-                    .chain(shown)
-                    .chain([change]),
-            );
+            let figures = shown.chain([change]);
+            table.add_row([structure.to_owned()].into_iter().chain(figures));
             let point = |&(run, time): &(usize, &Metric)| Point {
                 at: [run as f64, time.value],
                 ends: ends(time.estimate()),
@@ -88,11 +84,8 @@ pub fn page(mut reports: Vec<Report>) -> String {
                 ..Point::default()
             };
             let is_scan = cells.iter().any(|(_, cell)| cell.is_scan());
-            series.push(Series::of(
-                structure,
-                is_scan,
-                times.iter().map(point).collect(),
-            ));
+            let points = times.iter().map(point).collect();
+            series.push(Series::of(structure, is_scan, points));
         }
         series.retain(|series| !series.points.is_empty());
         // The fastest of the last run keeps its colour.
@@ -139,16 +132,12 @@ fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<Strin
     let [first, .., last] = reports else {
         return "One run; a history has several.".to_owned();
     };
-    let differ: Vec<String> = (settings(first, last).iter())
-        .map(|setting| setting.what.to_owned())
-        .collect();
-    let note = match differ.is_empty() {
-        true => String::new(),
-        false => format!(
-            " They differ in the {}: not all of a change is the program's own.",
-            differ.join(", ")
-        ),
-    };
+    let settings = settings(first, last);
+    let differ: Vec<&str> = settings.iter().map(|setting| setting.what).collect();
+    let note = text::some(differ.first(), |_| {
+        let differ = differ.join(", ");
+        format!(" They differ in the {differ}: not all of a change is the program's own.")
+    });
     format!(
         "From the first to the last of {}, {} of {} took longer and {} took less time (intervals \
          apart){}{}. compare judges two runs.{note}",

@@ -19,7 +19,8 @@ use super::{
 use crate::index::Registry;
 use crate::measure::{BOUNDS, METRICS};
 use crate::report::{
-    Comparison, Overall, Report, Views, comparisons, grouped, read_report, save_page, views,
+    Comparison, Overall, Report, Views, comparisons, folder_of, grouped, read_report, save_page,
+    views,
 };
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
@@ -61,11 +62,8 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         }
     }
     if let Some(file) = &args.html {
-        let folder = match path.is_dir() {
-            true => Some(path.as_path()),
-            false => path.parent(),
-        };
-        write_text(file, &page(&report, folder.unwrap_or(Path::new(""))))?;
+        let folder = if path.is_dir() { path } else { folder_of(path) };
+        write_text(file, &page(&report, folder))?;
     } else if args.markdown.is_none() && args.svg.is_none() && args.bencher.is_none() {
         io::stdout().write_all(to_markdown(&blocks(&report, &BTreeMap::new())).as_bytes())?;
     }
@@ -101,10 +99,8 @@ fn glossary(blocks: &[Block]) -> [Block; 2] {
         text.split(", ").next() == Some(name) || name.contains('[') && text.contains(" [")
     };
     let occurs = |name: &str| texts.iter().any(|text| is_of(text, name));
-    let figures = run_table::OF_QUERIES
-        .iter()
-        .chain(&run_table::OF_FRAMES)
-        .map(|figure| (figure.0, figure.1));
+    let figures = run_table::OF_QUERIES.iter().chain(&run_table::OF_FRAMES);
+    let figures = figures.map(|figure| (figure.0, figure.1));
     let figures = [("vs linear", "speedup")].into_iter().chain(figures);
     let figures = figures.map(|(column, metric)| {
         let info = METRICS.iter().find(|info| info.name == metric);
@@ -231,9 +227,8 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
 /// Every scene and path with all its figures.
 fn details(all: &[Comparison], views: &BTreeMap<String, Views>) -> Vec<Block> {
     let path = |comparison: &Comparison| {
-        let cell = comparison.about();
-        let path = &cell.path;
-        [&cell.scene.name, &path.name, &path.cache, &path.motion].map(String::clone)
+        let (scene, path) = (&comparison.about().scene, &comparison.about().path);
+        [&scene.name, &path.name, &path.cache, &path.motion].map(String::clone)
     };
     let paths = grouped(all.iter().map(|comparison| (path(comparison), comparison)));
     let (mut blocks, mut scene) = (Vec::new(), "");
@@ -277,14 +272,9 @@ fn known(text: &Option<String>) -> &str {
 fn about(report: &Report) -> Vec<String> {
     let (run, machine) = (&report.run, &report.machine);
     let suite = run.suite.as_deref().unwrap_or("chosen by hand");
-    let unfinished = match run.finished_at {
-        Some(_) => "",
-        None => "; not finished",
-    };
-    let dirty = match report.source.dirty {
-        Some(true) => " with a dirty working tree",
-        _ => "",
-    };
+    let unfinished = ["", "; not finished"][usize::from(run.finished_at.is_none())];
+    let is_dirty = report.source.dirty == Some(true);
+    let dirty = ["", " with a dirty working tree"][usize::from(is_dirty)];
     let mut lines = vec![
         format!(
             "{}, suite: {suite}, seed {}{unfinished}.",
@@ -316,10 +306,8 @@ fn about(report: &Report) -> Vec<String> {
 /// Shows the files of a run.
 pub fn show_written(out: &mut impl Write, folder: &Path) -> io::Result<()> {
     writeln!(out, "report  {}", folder.join("report.html").display())?;
-    writeln!(
-        out,
-        "        report.json, summary.csv, samples.csv, stream.jsonl, *.svg"
-    )
+    let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg";
+    writeln!(out, "        {others}")
 }
 
 #[cfg(test)]

@@ -59,13 +59,11 @@ fn check_why(args: &RunArgs, plan: &RunPlan) -> anyhow::Result<()> {
     let labels = plan.plan.structures.iter().map(|spec| spec.label.as_str());
     let labels: Vec<&str> = labels.collect();
     let is_there = |why: &String| labels.iter().any(|label| run_why::is_named(label, why));
-    match args.why.as_ref().filter(|why| !is_there(why)) {
-        Some(why) => bail!(
-            "--why is '{why}'; expected a structure that is measured: {}",
-            labels.join(", ")
-        ),
-        None => Ok(()),
+    if let Some(why) = args.why.as_ref().filter(|why| !is_there(why)) {
+        let labels = labels.join(", ");
+        bail!("--why is '{why}'; expected a structure that is measured: {labels}");
     }
+    Ok(())
 }
 
 /// The cells as JSON lines, nothing measured.
@@ -312,18 +310,7 @@ impl<'a> Run<'a> {
 }
 
 /// Options that decide how files are read, and what a frame of moving items is.
-const READS: [&str; 10] = [
-    "up",
-    "items",
-    "views",
-    "update",
-    "skip-bad-items",
-    "matrix-convention",
-    "fovy",
-    "aspect",
-    "near",
-    "far",
-];
+const READS: &str = "up items views update skip-bad-items matrix-convention fovy aspect near far";
 
 /// The command that a reader will want next, with what it gives if that fits into
 /// `width` characters; `None` where nothing is ranked.
@@ -335,17 +322,15 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
         let gives = "the same for a scene of your own";
         return Some(format!("next    {program} run --scene FILE  {gives}"));
     }
-    let mut line = format!(
-        "next    {program} advise --scene {}",
-        quoted(&first.scene.name)
-    );
+    let scene = quoted(&first.scene.name);
+    let mut line = format!("next    {program} advise --scene {scene}");
     let path = Some(&first.path.name).filter(|path| *path != DEFAULT_PATH);
     let path = path.map(|path| format!("--path {}", quoted(path)));
     let motion = Some(&first.path.motion).filter(|motion| !motion.is_empty());
     let motion = motion.map(|motion| format!("--motion {}", quoted(motion)));
     let path = path.into_iter().chain(motion);
     let recorded = RunOptions::recorded(args).ok()?;
-    let read = recorded.words(|name| READS.contains(&name));
+    let read = recorded.words(|name| READS.split(' ').any(|read| read == name));
     for option in path.chain(read) {
         let last = line.rsplit('\n').next().unwrap_or_default();
         let is_within = last.chars().count() + option.chars().count() < width;

@@ -282,12 +282,12 @@ pub fn distinct<T: PartialEq>(
 ) -> Vec<String> {
     let names: Vec<String> = all.iter().map(short).collect();
     let named = || all.iter().zip(&names);
-    let name =
-        |(one, name): (&T, &String)| match named().any(|(other, of)| of == name && other != one) {
-            true => full(one),
-            false => name.clone(),
-        };
-    named().map(name).collect()
+    let is_taken = |one, name| named().any(|(other, of)| of == name && other != one);
+    let of_two = named().map(|(one, name)| is_taken(one, name).then(|| full(one)));
+    of_two
+        .zip(&names)
+        .map(|(full, name)| full.unwrap_or(name.clone()))
+        .collect()
 }
 
 /// A file without its folder, a spec without keys and frames: "city 100k".

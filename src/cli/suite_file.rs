@@ -1,5 +1,6 @@
 //! Suites by their names, or written by a user: a TOML file in place of a name.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -36,10 +37,14 @@ struct Written {
 #[serde(deny_unknown_fields)]
 struct WrittenScene {
     scene: String,
-    #[serde(default)]
+    #[serde(default = "default_paths")]
     paths: Vec<String>,
     #[serde(default)]
     cold: bool,
+}
+
+fn default_paths() -> Vec<String> {
+    vec![DEFAULT_PATH.to_owned()]
 }
 
 /// The suite of a name or a TOML file.
@@ -84,44 +89,38 @@ fn written(file: &str) -> Result<ChosenSuite, InputError> {
     })?;
     let suite: Written = toml::from_str(text).map_err(|error| {
         let begin = error.span().map_or(0, |span| span.start);
-        let line = 1 + text
-            .bytes()
-            .take(begin)
-            .filter(|byte| *byte == b'\n')
-            .count();
+        let line = 1 + text.bytes().take(begin).filter(|b| *b == b'\n').count();
         let found = error.message().replace('\n', ", ").replace('`', "'");
         InputError::new(format_args!("{file}, line {line}: {found}"))
     })?;
-    let at_file = |error: SpecError| InputError::new(format_args!("{file}: {error}"));
-    let like = named(suite.like.as_deref().unwrap_or(SUITES[0].name), None).map_err(at_file)?;
+    let bad = |found: &dyn Display| InputError::new(format_args!("{file}: {found}"));
+    let like = suite.like.as_deref().unwrap_or(SUITES[0].name);
+    let like = named(like, None).map_err(|error| bad(&error))?;
     let mut effort = like.effort;
     effort.processes = suite.processes.unwrap_or(effort.processes);
     if !(1..=1000).contains(&effort.processes) {
-        let found = format_args!("processes is {}", effort.processes);
-        return Err(InputError::new(format_args!(
-            "{file}: {found}; expected a whole number from 1 to 1000"
+        let expected = "expected a whole number from 1 to 1000";
+        return Err(bad(&format_args!(
+            "processes is {}; {expected}",
+            effort.processes
         )));
     }
     let mut scenes = Vec::new();
     for row in suite.scenes {
-        let paths = match row.paths.is_empty() {
-            true => vec![DEFAULT_PATH.to_owned()],
-            false => row.paths,
-        };
         let parts = every_part(&row.scene)?.into_iter();
-        scenes.extend(parts.map(|source| planned(source, paths.clone(), row.cold)));
+        scenes.extend(parts.map(|source| planned(source, row.paths.clone(), row.cold)));
     }
     if scenes.is_empty() {
-        let found = "no scenes; expected [[scenes]] with a scene and its paths";
-        return Err(InputError::new(format_args!("{file}: {found}")));
+        return Err(bad(
+            &"no scenes; expected [[scenes]] with a scene and its paths",
+        ));
     }
+    let structures = suite.structures;
     Ok(ChosenSuite {
         name: file.to_owned(),
         is_built_in: false,
         scenes,
         effort,
-        structures: suite
-            .structures
-            .unwrap_or_else(|| like.structures.to_owned()),
+        structures: structures.unwrap_or_else(|| like.structures.to_owned()),
     })
 }

@@ -166,17 +166,13 @@ fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
     add("far", lens.far.map(|far| far.to_string()));
     add("matrix-convention", lens.matrix_convention.clone());
     add("up", read.up.map(|up| up.name().to_owned()));
-    add(
-        "items",
-        differs(read.items.name(), ItemKind::default().name()),
-    );
+    let items = differs(read.items.name(), ItemKind::default().name());
+    add("items", items);
     let named = differs(&args.structure, "all");
     add("structure", named.map(|names| format!("'{names}'")));
     add("threads", differs(&threads.join(","), "1"));
-    add(
-        "kernel",
-        args.kernel.name.map(|kernel| kernel.name().to_owned()),
-    );
+    let kernel = args.kernel.name.map(|kernel| kernel.name().to_owned());
+    add("kernel", kernel);
     if read.skip_bad_items {
         command += " --skip-bad-items";
     }
@@ -392,10 +388,8 @@ fn differ(
 ) -> Result<(), Verdict> {
     let item = |id: usize| case.items.get(id);
     let verdict = |what: &str, fault: &Fault, explain: &dyn Fn(usize) -> Option<String>| {
-        Verdict::new(
-            Status::of(fault),
-            format!("{what}{}", fault.explained(explain)),
-        )
+        let why = format!("{what}{}", fault.explained(explain));
+        Verdict::new(Status::of(fault), why)
     };
     let visible = |id| Some(explain_visibility(item(id)?, &case.volume));
     seen.ask(|out| index.visible(&case.volume, out))
@@ -413,11 +407,9 @@ fn differ(
         if found != right || many.len() != points.len() {
             let one_sided = |id: &&ItemId| !found.contains(id) || !right.contains(id);
             let first = right.iter().chain(found).find(one_sided);
-            let first = first.map_or(String::new(), |id| format!("; first: item {id}"));
-            let (point, found, alone) = (points[n], found.len(), right.len());
-            let why = format!(
-                "region search: {point} has {found} items in a batch, {alone} alone{first}"
-            );
+            let first = text::some(first, |id| format!("; first: item {id}"));
+            let found = format!("{} has {} items in a batch", points[n], found.len());
+            let why = format!("region search: {found}, {} alone{first}", right.len());
             return Err(Verdict::new(Status::Wrong, why));
         }
     }
