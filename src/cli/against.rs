@@ -58,7 +58,7 @@ pub fn compare_against<'a>(
     let bar = progress(0, " pairs");
     let duel = Duel {
         args,
-        of_run: arguments()?,
+        of_run: arguments(&plan.structures)?,
         plan: &plan.plan,
         programs: [binary.to_owned(), new],
         progress: &|done, most, step| {
@@ -72,17 +72,15 @@ pub fn compare_against<'a>(
     let found = duel.run();
     bar.finish_and_clear();
     let (changes, head) = found?;
-    let busy = load
-        .load
-        .filter(|busy| is_timed && *busy > 0.5 * load.cores as f64);
+    let (busy, cores) = (load.load, load.cores);
+    let busy = busy.filter(|busy| is_timed && *busy > 0.5 * cores as f64);
     let note = |busy| {
         format!(
-            "the machine was busy (load average {busy:.1} on {} cores): both sides suffered \
-             alike, and it may take more pairs",
-            load.cores
+            "the machine was busy (load average {busy:.1} on {cores} cores): both sides suffered \
+             alike, and it may take more pairs"
         )
     };
-    let left_out = match args.what.structure.is_empty() {
+    let left_out = match plan.structures == STRUCTURES {
         true => left_out(registry, &plan.plan)?,
         false => None,
     };
@@ -149,10 +147,10 @@ fn typed() -> anyhow::Result<Vec<String>> {
 }
 
 /// The arguments of `run` for the same measurement.
-fn arguments() -> anyhow::Result<Vec<String>> {
+fn arguments(structures: &str) -> anyhow::Result<Vec<String>> {
     let mut arguments = vec!["run".to_owned()];
     arguments.extend(typed()?);
-    for (option, value) in [("--suite=", SUITE), ("--structure=", STRUCTURES)] {
+    for (option, value) in [("--suite=", SUITE), ("--structure=", structures)] {
         if !arguments.iter().any(|typed| typed.starts_with(option)) {
             arguments.push(format!("{option}{value}"));
         }
@@ -278,11 +276,8 @@ impl Duel<'_> {
             for side in [NEW, OLD] {
                 (self.progress)(0, most, "counting and checking answers");
                 let program = &self.programs[side];
-                let share = self.share(scene, 0, [&seen[NEW], &[]]);
-                let share = Share {
-                    plan_only: true,
-                    ..share
-                };
+                let mut share = self.share(scene, 0, [&seen[NEW], &[]]);
+                share.plan_only = true;
                 let request = self.request(scene, share, 0);
                 let own = &mut seen[side];
                 let patience = Duration::from_secs(self.args.what.timeout);
@@ -293,9 +288,8 @@ impl Duel<'_> {
                     Ok(())
                 };
                 let ended = see_through(program, &request, patience, &mut keep, &|_| ())?;
-                ended
-                    .done()
-                    .with_context(|| program.display().to_string())?;
+                let named = || program.display().to_string();
+                ended.done().with_context(named)?;
             }
         }
         Ok(seen)

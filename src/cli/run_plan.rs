@@ -24,6 +24,8 @@ pub struct RunPlan {
     pub plan: Plan,
     /// Name of the suite or of its file; `None` for scenes and paths chosen by hand.
     pub suite: Option<String>,
+    /// Structures as they were named.
+    pub structures: String,
     /// True if nothing in it is the user's own.
     is_built_in: bool,
     /// Groups of the whole plan, if this is a shard.
@@ -54,7 +56,11 @@ pub fn plan_of(
 ) -> anyhow::Result<RunPlan> {
     let suite = suite_file::suite(args.suite.as_deref().unwrap_or(default_suite))?;
     let structures = match args.structure.is_empty() {
-        true => default_structures.map_or(suite.structures.clone(), str::to_owned),
+        // A file that states them means them.
+        true => match default_structures.filter(|_| !suite.states_structures) {
+            Some(default) => default.to_owned(),
+            None => suite.structures.clone(),
+        },
         false => args.structure.join(","),
     };
     let tests = || args.test.iter().flat_map(|tests| tests.split(','));
@@ -62,7 +68,8 @@ pub fn plan_of(
     let cullings: Vec<Culling> = cullings.collect::<Result<_, _>>()?;
     cullings.iter().try_for_each(Culling::check)?;
     each_once("test", tests())?;
-    let structures = args.kernel.structures(registry, &structures)?;
+    let names = structures;
+    let structures = args.kernel.structures(registry, &names)?;
     let mut plan = Plan {
         scenes: scenes(args, &suite)?,
         cullings,
@@ -86,6 +93,7 @@ pub fn plan_of(
         plan,
         is_built_in: is_suite && suite.is_built_in && suite.name != REAL,
         suite: is_suite.then_some(suite.name),
+        structures: names,
         whole: Vec::new(),
     })
 }

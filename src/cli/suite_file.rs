@@ -20,6 +20,8 @@ pub struct ChosenSuite {
     pub scenes: Vec<PlannedScene>,
     pub effort: Effort,
     pub structures: String,
+    /// True if a file states them itself.
+    pub states_structures: bool,
 }
 
 /// A suite as it is written; a field that is not known is refused.
@@ -65,6 +67,7 @@ pub fn suite(text: &str) -> Result<ChosenSuite, InputError> {
         scenes: rows.collect(),
         effort: suite.effort,
         structures: suite.structures.to_owned(),
+        states_structures: false,
     })
 }
 
@@ -116,11 +119,13 @@ fn written(file: &str) -> Result<ChosenSuite, InputError> {
         ));
     }
     let structures = suite.structures;
+    let states_structures = structures.is_some();
     Ok(ChosenSuite {
         name: file.to_owned(),
         is_built_in: false,
         scenes,
         effort,
         structures: structures.unwrap_or_else(|| like.structures.to_owned()),
+        states_structures,
     })
 }

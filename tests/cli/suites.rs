@@ -53,6 +53,13 @@ fn a_suite_of_a_file_is_run_as_written_and_grows_over_its_sizes() {
     assert_eq!(plan.len(), 3);
     assert!(plan.iter().all(|cell| cell["structure"] == "linear"));
     assert!(plan.iter().all(|cell| cell["path"] == "spin:frames=4"));
+    // Two programs are compared by the structures that it states.
+    let line = format!(
+        "compare --suite mine.toml --gate work --against {}",
+        super::PROGRAM
+    );
+    let compared = works(folder.path(), &line);
+    assert!(compared.trim_end().ends_with("of 8 cells"), "{compared}");
     // A stopped run goes on with the suite it was begun with.
     let stream = text("stream.jsonl");
     let begun: String = stream.split_inclusive('\n').take(3).collect();
