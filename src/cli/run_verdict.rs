@@ -46,9 +46,8 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
 /// Remarks on fat bounds, rebuilds that do not come, and dropped contacts.
 fn caveats(all: &[&Comparison]) -> Vec<String> {
     let cells = || all.iter().flat_map(|c| &c.cells);
-    let fat = cells().any(is_fat);
-    let mut told = Vec::new();
-    told.extend(fat.then(|| "Rank -: none, as fat bounds return more than exact ones.".to_owned()));
+    let fat = "Rank -: none, as fat bounds return more than exact ones.".to_owned();
+    let mut told: Vec<String> = cells().any(is_fat).then_some(fat).into_iter().collect();
     let late = cells().filter_map(|cell| {
         let (_, every) = cell.structure.split_once("@every=")?;
         let frames = cell.times.cameras_checked / cell.path.views_per_frame.max(1);
@@ -59,10 +58,11 @@ fn caveats(all: &[&Comparison]) -> Vec<String> {
     told.extend(late.collect::<BTreeSet<_>>());
     let dropped = all.iter().filter_map(|c| c.of_any("touch_dropped_count"));
     let dropped = dropped.fold(0.0, f64::max);
-    told.extend((dropped > 0.0).then(|| {
+    if dropped > 0.0 {
         let dropped = text::significant(dropped);
-        format!("{dropped} boxes per checked query only touch the view and are not returned.")
-    }));
+        let what = "boxes per checked query only touch the view and are not returned";
+        told.push(format!("{dropped} {what}."));
+    }
     told
 }
 
@@ -74,19 +74,10 @@ fn is_fat(cell: &&ReportCell) -> bool {
 /// Wall time, gain and CPU time of work that threads share.
 pub fn gains(shared: &[SharedWork]) -> Option<String> {
     let told = shared.iter().map(|work| {
-        let what = match work.shares_views {
-            true => " with shared views",
-            false => "",
-        };
-        let cpu = text::some(work.cpu_ratio, |ratio| {
-            format!(", {} the CPU time", times(ratio))
-        });
-        let wall = text::time(work.wall_ns);
-        format!(
-            "{}{what} {wall} ({}{cpu})",
-            work.structure,
-            times(work.wall_gain)
-        )
+        let what = ["", " with shared views"][usize::from(work.shares_views)];
+        let cpu = text::some(work.cpu_ratio, |r| format!(", {} the CPU time", times(r)));
+        let (wall, gain) = (text::time(work.wall_ns), times(work.wall_gain));
+        format!("{}{what} {wall} ({gain}{cpu})", work.structure)
     });
     let told: Vec<String> = told.collect();
     let ranked = "CPU time of all threads ranks; wall time per view, and one thread's / it:";
@@ -107,10 +98,7 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     };
     let names: Vec<&str> = winners.iter().map(|cell| cell.structure.as_str()).collect();
     let time = text::some(best.time(), |time| text::time(time.value));
-    let per = match best.path.motion.is_empty() {
-        true => "query",
-        false => "frame",
-    };
+    let per = ["query", "frame"][usize::from(!best.path.motion.is_empty())];
     let next = comparison.sound().nth(winners.len());
     let lead = |cell: &ReportCell| text::some(times_as_fast(cell, best), times);
     let Some(next) = next else {
@@ -137,14 +125,11 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
         [one] => format!("{}{leads}", described(one)),
         _ => format!("{} (a tie){leads}", listed(&names, "or")),
     };
-    format!(
-        "Take {said}{}.",
-        text::some(of_base, |cell| format!(
-            ", and {} as fast as {}",
-            lead(cell),
-            described(&cell.structure)
-        ))
-    )
+    let of_base = text::some(of_base, |cell| {
+        let (lead, base) = (lead(cell), described(&cell.structure));
+        format!(", and {lead} as fast as {base}")
+    });
+    format!("Take {said}{of_base}.")
 }
 
 /// The base of speed-ups, where it is not the usual one.
@@ -184,18 +169,17 @@ fn checked(all: &[&Comparison]) -> Option<String> {
         _ if all.len() == 1 => format!("{right} of {tried} structures"),
         _ => format!("{} of {} cells", text::count(right), text::count(tried)),
     };
+    let of_frames = all.iter().any(|c| !c.about().path.motion.is_empty());
+    let asked = match views {
+        1 => "the only view".to_owned(),
+        _ if of_frames => format!("all {} queries of the frames", text::count(views)),
+        _ => format!("all {} views", text::count(views)),
+    };
+    let (timed, judged) = (were(timed), were(judged.sum::<f64>() as usize));
     (right > 0 && views > 0).then(|| {
         format!(
-            "{who} returned the sets of the reference scan in {}, of which {} timed and {} \
-             checked in exact arithmetic.",
-            match views {
-                1 => "the only view".to_owned(),
-                _ if all.iter().any(|c| !c.about().path.motion.is_empty()) =>
-                    format!("all {} queries of the frames", text::count(views)),
-                _ => format!("all {} views", text::count(views)),
-            },
-            were(timed),
-            were(judged.sum::<f64>() as usize)
+            "{who} returned the sets of the reference scan in {asked}, of which {timed} timed \
+             and {judged} checked in exact arithmetic."
         )
     })
 }

@@ -13,7 +13,7 @@ use super::args::StressArgs;
 use super::shared_args::TableFormat;
 use super::table::{Column, Table};
 use super::{Ending, interrupt, tell, text, unread_is_fine};
-use crate::index::{Execution, Registry, StructureSpec};
+use crate::index::{Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::stress::extremes::{Extremes, Tally};
 use crate::stress::{Name, Section, Status, Vector, built_in, read_vectors_file, replay};
@@ -61,16 +61,13 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let passes = others().map(|kernel| (kernel, cases.min(OF_OTHERS)));
     let passes: Vec<(Kernel, u64)> = passes.chain([(chosen, cases)]).collect();
     let vector_passes = (vectors.len() * passes.len()) as u64;
-    let case_passes = passes
-        .iter()
-        .map(|&(_, cases)| Extremes { cases, ..extremes }.total());
+    let case_passes = passes.iter();
+    let case_passes = case_passes.map(|&(_, cases)| Extremes { cases, ..extremes }.total());
     let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>());
     for (kernel, cases) in passes {
         let by_kernel = |spec: &StructureSpec| {
-            let execution = Execution {
-                kernel,
-                ..spec.execution
-            };
+            let mut execution = spec.execution;
+            execution.kernel = kernel;
             spec.clone().by(execution)
         };
         let structures: Vec<StructureSpec> = structures.iter().map(by_kernel).collect();

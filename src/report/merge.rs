@@ -76,10 +76,8 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
         }
         let found = folder::length_of_samples(&file).map_err(writing::io(&file))?;
         if found < from {
-            return Err(writing::at(
-                &file,
-                format!("{found} sound bytes; expected {from} that stream.jsonl refers to"),
-            ));
+            let why = format!("{found} sound bytes; expected {from} that stream.jsonl refers to");
+            return Err(writing::at(&file, why));
         }
     }
     // The order of one run: scene by scene, process by process.
@@ -89,13 +87,14 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
         let part = &kept.part;
         (scene(&part.key), part.process, place(&part.key))
     });
-    let mut end = SAMPLE_COLUMNS.len() as u64;
+    let mut samples_end = SAMPLE_COLUMNS.len() as u64;
     let (mut kept, mut samples) = (Vec::new(), Vec::new());
     for (part, (file, range)) in parts {
-        end += range[1] - range[0];
+        samples_end += range[1] - range[0];
+        let part = part.clone();
         kept.push(KeptPart {
-            samples_end: end,
-            ..part.clone()
+            samples_end,
+            ..part
         });
         samples.push((file, range));
     }
@@ -182,9 +181,8 @@ fn another_plan(begin: &Header, own: &Header, first: &Path) -> Option<String> {
         of, what, old, new, ..
     }) = difference
     {
-        return Some(format!(
-            "{of} differs: {what} '{new}', and '{old}' in {first}; expected the same in all shards"
-        ));
+        let differs = format!("{of} differs: {what} '{new}', and '{old}' in {first}");
+        return Some(differs + "; expected the same in all shards");
     }
     (begin.whole() != own.whole()).then(|| {
         format!("a shard of another plan than {first}; expected the same scenes, paths and tests")
