@@ -60,7 +60,7 @@ fn a_suite_of_a_file_is_run_as_written_and_grows_over_its_sizes() {
     );
     let compared = works(folder.path(), &line);
     assert!(compared.trim_end().ends_with("of 8 cells"), "{compared}");
-    // A stopped run goes on with the suite it was begun with.
+    // A stopped run continues with the suite it was begun with.
     let stream = text("stream.jsonl");
     let begun: String = stream.split_inclusive('\n').take(3).collect();
     fs::write(folder.path().join("r/stream.jsonl"), begun).expect("writable");
