@@ -92,7 +92,7 @@ impl Camera {
     /// [`CameraError::Volume`] if a plane does not fit f32 (or the chosen
     /// method loses it); [`CameraError::Sums`] if a sum of the plane test could
     /// overflow within the surroundings' reach; [`CameraError::Invalid`] for an epsilon or a
-    /// reach that is negative or not finite.
+    /// reach that is negative or NaN, or an infinite epsilon.
     pub fn volume(
         &self,
         options: &PlaneOptions,
@@ -212,10 +212,16 @@ impl Camera {
     ) -> Result<Margin, CameraError> {
         let frame = self.frame_about(zero);
         let c = options.epsilon;
-        let is_sound = |x: f64| x.is_finite() && x >= 0.0;
-        let are_sound = is_sound(c) && of_scene.to_array().into_iter().all(is_sound);
+        let are_sound = (0.0..f64::INFINITY).contains(&c) && of_scene.cmpge(DVec3::ZERO).all();
         let found = || format!("epsilon is {c} and reach {of_scene}");
-        require(are_sound, found, "finite numbers of at least 0")?;
+        require(
+            are_sound,
+            found,
+            "numbers of at least 0, and a finite epsilon",
+        )?;
+        if let largest @ f64::INFINITY = of_scene.element_sum() {
+            return Err(CameraError::Sums { largest });
+        }
         Ok(match self.lens.kind() {
             LensKind::Matrix(matrix) => {
                 Margin::of_matrix(matrix.corners_about(zero), frame.eye, of_scene, c)

@@ -168,11 +168,11 @@ impl Vector {
             .or(decimals.map(Iterator::collect))
     }
 
-    /// The first claim that no answer can meet: the place, what was found and expected.
+    /// What the vector claims and no check can judge, in words.
     ///
     /// A list without names is no claim. Planes that must be refused may have names: the
     /// format's generator lists what the finite ones among them leave visible.
-    fn contradiction(&self) -> Option<(String, &str, &str)> {
+    fn unjudged(&self) -> impl Iterator<Item = &'static str> {
         let named =
             |lists: &[&Option<Names>]| lists.iter().copied().flatten().flatten().count() > 0;
         let seen = named(&[&self.expected_visible_camera, &self.touch_camera]);
@@ -182,27 +182,23 @@ impl Vector {
             &self.p_vertex_exact_visible,
             &self.observed_f32_pvertex_mul_add,
         ]);
+        let (no_camera, no_planes) = (self.camera.is_none(), self.planes().is_none());
         let is_refused = self.camera_error().is_some();
-        let at = |field: &str, found, expected| Some((field.to_owned(), found, expected));
-        if self.camera.is_none() && (seen || is_refused) {
-            return at("camera", "claims about a camera but none", "a camera");
-        }
-        if seen && is_refused {
-            let found = "an error, and boxes that the camera sees";
-            return at("expect_camera_error", found, "one or the other");
-        }
-        if self.planes().is_none() && (of_planes || self.planes_error().is_some()) {
-            return at("planes", "claims about planes but none", "planes");
-        }
-        let (bits, decimals) = self.planes_f32_hex.as_ref().zip(self.planes.as_ref())?;
         let equal = |(a, b): (&Bits, &Narrow)| a.0 == b.0 || a.0.is_nan() && b.0.is_nan();
-        let differ = |&n: &usize| {
-            let both = bits.get(n).zip(decimals.get(n));
-            !both.is_some_and(|(a, b)| a.0.iter().zip(&b.0).all(equal))
+        let agree = |(bits, decimals): (&Vec<Array<Bits, 4>>, &Vec<Array<Narrow, 4>>)| {
+            let mut rows = bits.iter().zip(decimals);
+            bits.len() == decimals.len() && rows.all(|(a, b)| a.0.iter().zip(&b.0).all(equal))
         };
-        let n = (0..bits.len().max(decimals.len())).find(differ)?;
-        let field = format!("planes_f32_hex[{n}]");
-        at(&field, "another plane than in 'planes'", "the same numbers")
+        let both = self.planes_f32_hex.as_ref().zip(self.planes.as_ref());
+        let found = [
+            (no_camera && (seen || is_refused)).then_some("claims about a camera but no camera"),
+            (seen && is_refused).then_some("boxes seen by a camera that must be refused"),
+            (no_planes && (of_planes || self.planes_error().is_some()))
+                .then_some("claims about planes but no planes"),
+            (!both.is_none_or(agree))
+                .then_some("'planes' other than 'planes_f32_hex', which count"),
+        ];
+        found.into_iter().flatten()
     }
 
     /// Answer of the f32 six-plane test; by default that of the exact one.
@@ -245,7 +241,8 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
 
 /// Reads a file of vectors: an object with the array `vectors`, or the array
 /// alone. Numbers may be given as the words NaN, Infinity (inf) and
-/// -Infinity (-inf); unknown fields are ignored, with a note where one is like a known.
+/// -Infinity (-inf); unknown fields are ignored, with a note where one is like a
+/// known, and so are claims that nothing can judge.
 ///
 /// # Errors
 /// One line: the file, the path of the field, what was found and expected.
@@ -272,11 +269,8 @@ pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError>
         if let Some((i, id)) = repeated(vector.boxes().map(|b| &b.id)) {
             return Err(again(format!("vectors[{n}].boxes[{i}]"), id));
         }
-        if let Some((field, found, expected)) = vector.contradiction() {
-            let place = format!("vectors[{n}].{field}");
-            return Err(wrong(place, found.to_owned(), expected.to_owned()));
-        }
     }
+    note_unjudged(&vectors, file);
     note_unknown(bytes, file);
     Ok(vectors)
 }
@@ -286,6 +280,16 @@ fn list<V: DeserializeOwned>(bytes: &[u8]) -> Result<Vec<V>, JsonError> {
     match is_array {
         true => from_json(bytes),
         false => from_json(bytes).map(|file: File<V>| file.vectors),
+    }
+}
+
+/// Tells of each kind of claim that is not judged, once.
+fn note_unjudged(vectors: &[Vector], file: &str) {
+    let mut told = BTreeSet::new();
+    for (n, vector) in vectors.iter().enumerate() {
+        for found in vector.unjudged().filter(|&found| told.insert(found)) {
+            note(&format!("{file}, vectors[{n}]: {found}; not judged"));
+        }
     }
 }
 

@@ -72,6 +72,13 @@ mod foreign {
         scale: f32,
     }
 
+    #[derive(Serialize, Deserialize, Default)]
+    #[serde(default)]
+    pub struct Aliased {
+        #[serde(alias = "size")]
+        leaf: u32,
+    }
+
     impl Default for Derived {
         fn default() -> Derived {
             let (level, scale) = (3, 0.1);
@@ -110,6 +117,7 @@ mod foreign {
             reason: "level out of range".to_owned()
         }),
     });
+    structure!(Alias, Aliased, |_, _| Ok(Alias));
     structure!(Number, u32, |_, _| Ok(Number));
     structure!(Unit, (), |_, _| Ok(Unit));
     structure!(NeedsItems, Derived, |input, _| {
@@ -124,7 +132,9 @@ mod foreign {
 
 #[test]
 fn parameters_need_no_serde_default_and_may_have_no_names() {
-    use foreign::{Number, Plain, Unit};
+    use foreign::{Alias, Number, Plain, Unit};
+    let aliased = Registry::empty().with::<Alias>().structure("Alias:size=7");
+    assert_eq!(aliased.unwrap().params["leaf"], 7);
     let registry = Registry::empty()
         .with::<Plain>()
         .with::<Number>()

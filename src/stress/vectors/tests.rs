@@ -95,38 +95,6 @@ fn every_mistake_is_one_line_that_says_where() {
             with(r#""points":[{"id":"p","p":[0,0,0]}]"#),
             "points[0]: no field 'expected_containing'",
         ),
-        (
-            with(r#""touch_camera":["b"]"#),
-            "vectors[0].camera: claims about a camera",
-        ),
-        (
-            with(r#""expect_camera_error":"fov""#),
-            "vectors[0].camera: claims about a camera",
-        ),
-        (
-            with(r#""p_vertex_exact_visible":["b"]"#),
-            "vectors[0].planes: claims about planes",
-        ),
-        (
-            with(r#""expect_planes_error":true"#),
-            "vectors[0].planes: claims about planes",
-        ),
-        (
-            with(&format!(
-                r#"{CAMERA},"expect_camera_error":true,"expected_visible_camera":["b"]"#
-            )),
-            "vectors[0].expect_camera_error: an error, and boxes",
-        ),
-        (
-            with(
-                &format!(
-                    r#""planes":[[0,0,1,-0.0],["NaN",0,0,0],[1,0,0,2]],"planes_f32_hex":[{HEX},
-                ["0x7fc00001","0x0","0x0","0x0"],["0x3f800000","0x0","0x0","0x0"]]"#
-                )
-                .replace("0x0\"", "0x00000000\""),
-            ),
-            "vectors[0].planes_f32_hex[2]: another plane",
-        ),
     ];
     for (text, wanted) in cases {
         let error = read_vectors(text.as_bytes(), "f.json")
@@ -143,37 +111,69 @@ fn every_mistake_is_one_line_that_says_where() {
     }
 }
 
-const CAMERA: &str = r#""camera":{"eye":[0,0,0],"look":[0,0,1],"up":[0,1,0],"fovy_deg":180,
-    "aspect":1,"near":1}"#;
-const HEX: &str = r#"["0x0","0x80000000","0x3f800000","0x0"]"#;
+static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-#[test]
-fn lists_without_names_claim_nothing() {
-    let text = format!(
-        r#"[{{"id":"v","expected_visible_camera":[],"touch_camera":null,"touch_planes":[],
-        "expect_camera_error":false}},{{"id":"w",{CAMERA},"expected_visible_camera":[],
-        "expect_camera_error":"fov","x":1}}]"#
-    );
-    assert_eq!(read_vectors(text.as_bytes(), "f.json").unwrap().len(), 2);
+/// Notes about a file with one vector or more, which is read.
+fn notes(file: &str, vectors: &str) -> Vec<String> {
+    tell_notes(|note| HEARD.lock().unwrap().push(note.to_owned()));
+    read_vectors(vectors.as_bytes(), file).unwrap();
+    let heard = HEARD.lock().unwrap();
+    let about = |note: &String| Some(note.strip_prefix("note: ")?.strip_prefix(file)?.to_owned());
+    heard.iter().filter_map(about).collect()
 }
 
 #[test]
-fn fields_like_those_that_are_read_are_told() {
-    static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
-    tell_notes(|note| HEARD.lock().unwrap().push(note.to_owned()));
-    let text =
-        r#"[{"id":"v","Camera":{},"Boxes":[],"x":1,"margin_camera":{}},{"id":"w","Boxes":0}]"#;
-    read_vectors(text.as_bytes(), "note-v.json").unwrap();
-    read_vectors(BUILT_IN.as_bytes(), "note-b.json").unwrap();
-    let heard = HEARD.lock().unwrap();
-    let heard: Vec<&String> = heard.iter().filter(|n| n.contains("note-")).collect();
-    assert_eq!(
-        heard,
-        [
-            "note: note-v.json: field 'Boxes' is not read (did you mean 'boxes'?)",
-            "note: note-v.json: field 'Camera' is not read (did you mean 'camera'?)",
-        ]
-    );
+fn claims_and_fields_that_are_not_judged_are_told() {
+    let camera = r#""camera":{"eye":[0,0,0],"look":[0,0,1],"up":[0,1,0],"fovy_deg":180,
+        "aspect":1,"near":1}"#;
+    let seen = format!(r#"{camera},"expect_camera_error":true,"expected_visible_camera":["b"]"#);
+    let differ = |last: &str| {
+        let zero = "0x00000000";
+        format!(
+            r#""planes":[[0,0,1,-0.0],["NaN",0,0,0],[1,0,0,{last}]],"planes_f32_hex":[["{zero}",
+            "0x80000000","0x3f800000","{zero}"],["0x7fc00001","{zero}","{zero}","{zero}"],
+            ["0x3f800000","{zero}","{zero}","{zero}"]]"#
+        )
+    };
+    let (of_camera, of_planes) = ("claims about a camera but no", "claims about planes but no");
+    let cases = [
+        (r#""touch_camera":["b"]"#, of_camera),
+        (r#""expect_camera_error":"fov""#, of_camera),
+        (r#""p_vertex_exact_visible":["b"]"#, of_planes),
+        (r#""expect_planes_error":true"#, of_planes),
+        (&seen, "boxes seen by a camera that must be refused"),
+        (&differ("2"), "'planes' other than 'planes_f32_hex'"),
+        (
+            r#""Camera":{},"x":1"#,
+            "field 'Camera' is not read (did you mean 'camera'?)",
+        ),
+        // A list without names claims nothing.
+        (
+            r#""expected_visible_camera":[],"touch_camera":null,"touch_planes":[]"#,
+            "",
+        ),
+        (
+            r#""expect_camera_error":false,"margin_camera":{},"points":null"#,
+            "",
+        ),
+        (
+            &format!(r#"{camera},"touch_camera":[],"expect_camera_error":"fov""#),
+            "",
+        ),
+        (&differ("0"), ""),
+    ];
+    for (n, (fields, wanted)) in cases.into_iter().enumerate() {
+        let text = format!(r#"[{{"id":"v",{fields}}},{{"id":"w",{fields}}}]"#);
+        let heard = notes(&format!("note-{n}.json"), &text);
+        let is_right = heard
+            .iter()
+            .all(|note| !wanted.is_empty() && note.contains(wanted));
+        assert!(
+            is_right && heard.len() == usize::from(!wanted.is_empty()),
+            "{fields}: {heard:?}"
+        );
+    }
+    assert_eq!(notes("note-b.json", BUILT_IN), [""; 0]);
 }
 
 #[test]
