@@ -168,7 +168,7 @@ impl Vector {
             .or(decimals.map(Iterator::collect))
     }
 
-    /// What the vector claims and no check can judge, in words.
+    /// Claims of the vector that no check can judge, in words.
     ///
     /// A list without names is no claim. Planes that must be refused may have names: the
     /// format's generator lists what the finite ones among them leave visible.
