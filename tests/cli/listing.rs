@@ -75,7 +75,7 @@ fn scenes_are_described_with_three_digits() {
         assert!(told.contains(part), "{told}");
     }
     let info = json(&works(here, "scene info city:n=200 --format json"));
-    assert_eq!(number(&info, "size_max"), f64::from(39.881_317_f32));
+    assert_eq!(number(&info, "size_max"), 39.881_315_048_394_27);
 }
 
 #[test]
