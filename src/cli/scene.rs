@@ -98,14 +98,11 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     }
     for labels in &scene.labels {
         let counts = labels.histogram();
-        let shown = counts
-            .iter()
-            .map(|(label, count)| format!("{label} {}", text::count(*count)));
-        let shown: Vec<String> = shown.collect();
-        let (first, more) = shown.split_at(shown.len().min(8));
-        let mut shown = first.join(", ");
-        if !more.is_empty() {
-            shown += &format!(", and {} more", text::count(more.len()));
+        let one = |(label, count): &(_, usize)| format!("{label} {}", text::count(*count));
+        let shown: Vec<String> = counts.iter().take(8).map(one).collect();
+        let mut shown = shown.join(", ");
+        if counts.len() > 8 {
+            shown += &format!(", and {} more", text::count(counts.len() - 8));
         }
         rows.push(("label", text::plain(&format!("{}: {shown}", labels.column))));
     }
@@ -134,10 +131,8 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     let (origin, lost) = (scene.origin, left_behind(&scene));
     let kept = scene.settled()?;
     if !lost.is_empty() {
-        tell(&format!(
-            "note: {} not written; boxes CSV has boxes and labels only",
-            lost.join(", ")
-        ));
+        let what = "not written; boxes CSV has boxes and labels only";
+        tell(&format!("note: {} {what}", lost.join(", ")));
     }
     if kept.up != UpAxis::default() {
         let up = kept.up.name();
@@ -163,16 +158,14 @@ fn expect_other<'f>(out: Option<&'f Path>, scene: &str) -> anyhow::Result<Option
 
 /// Refuses another extension; a file without one gets boxes too.
 fn expect_csv(out: Option<&Path>) -> Result<(), SpecError> {
-    match out.and_then(Path::extension) {
-        Some(extension) if !extension.eq_ignore_ascii_case("csv") => {
-            Err(SpecError::new(format_args!(
-                "{}: a scene cannot be written as '.{}'; expected .csv, or --to csv",
-                out.unwrap_or(Path::new("")).display(),
-                extension.display()
-            )))
-        }
-        _ => Ok(()),
-    }
+    let named = out.and_then(|out| Some((out.display(), out.extension()?)));
+    let Some((out, extension)) = named.filter(|(_, e)| !e.eq_ignore_ascii_case("csv")) else {
+        return Ok(());
+    };
+    let extension = extension.display();
+    Err(SpecError::new(format_args!(
+        "{out}: a scene cannot be written as '.{extension}'; expected .csv, or --to csv"
+    )))
 }
 
 /// Parts of a scene that a boxes file cannot hold.
@@ -181,23 +174,17 @@ fn left_behind(scene: &Scene) -> Vec<String> {
         Regions::Items => 0,
         _ => scene.regions.boxes(&scene.items).len(),
     };
-    let triangles = scene
-        .surfaces
-        .as_ref()
-        .map_or(0, |surfaces| surfaces.triangles.len());
+    let triangles = scene.surfaces.as_ref().map_or(0, |s| s.triangles.len());
     let counts = [
         (regions, "region"),
         (scene.places.len(), "camera place"),
         (triangles, "triangle"),
     ];
     let counts = counts.into_iter().filter(|(count, _)| *count > 0);
-    let own_tree = scene
-        .own_tree
-        .is_some()
-        .then(|| "the map's own tree".to_owned());
+    let counts = counts.map(|(count, what)| text::counted(count, what));
+    let own_tree = || "the map's own tree".to_owned();
     counts
-        .map(|(count, what)| text::counted(count, what))
-        .chain(own_tree)
+        .chain(scene.own_tree.is_some().then(own_tree))
         .collect()
 }
 
@@ -211,11 +198,8 @@ fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
                 return Ok(Ending::Interrupted);
             }
             written?;
-            tell(&format!(
-                "{}: {}",
-                path.display(),
-                text::counted(scene.items.len(), "item")
-            ));
+            let items = text::counted(scene.items.len(), "item");
+            tell(&format!("{}: {items}", path.display()));
         }
         None => {
             let mut out = BufWriter::new(io::stdout().lock());

@@ -65,13 +65,11 @@ impl SceneFacts {
         let edges = sorted(extents().map(|extent| extent.max_element()).collect());
         let [size_min, size_median, size_p99, size_max] =
             [0.0, 0.5, 0.99, 1.0].map(|q| quantile(&edges, q));
-        let mut flat_counts = [0; 3];
-        for extent in extents() {
-            for (axis, count) in flat_counts.iter_mut().enumerate() {
-                let longest = extent.max_element();
-                *count += usize::from(longest > 0.0 && extent[axis] < FLAT * longest);
-            }
-        }
+        // A point is not thinner than it is long.
+        let flat_counts = [0, 1, 2].map(|axis| {
+            let is_flat = |extent: &glam::DVec3| extent[axis] < FLAT * extent.max_element();
+            extents().filter(is_flat).count()
+        });
         let corners = |b: WorldBox| [b.min, b.max].map(|v| v.to_array().map(f64::to_bits));
         let mut distinct: Vec<_> = scene.written().map(corners).collect();
         distinct.sort_unstable();
@@ -133,14 +131,13 @@ impl SceneFacts {
         let count = scene.items.len();
         let three = |values: [f64; 3]| values.map(length).join(", ");
         let extent = ("extent", self.extent.map(length).join(" x "));
-        let sizes = [
+        let ends = [
             self.size_min,
             self.size_median,
             self.size_p99,
             self.size_max,
         ];
-        let [Some(least), Some(median), Some(p99), Some(most)] = sizes.map(|s| s.map(length))
-        else {
+        let [Some(least), Some(median), Some(p99), Some(most)] = ends.map(|s| s.map(length)) else {
             return vec![extent, ("sizes", "no items".to_owned())];
         };
         let sizes = format!("longest edge min {least}, median {median}, p99 {p99}, max {most}");

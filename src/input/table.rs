@@ -53,14 +53,9 @@ impl<'b> TableReader<'b> {
             .from_reader(bytes);
         // From memory nothing fails to be read.
         let fields = csv.byte_headers().cloned().unwrap_or_default();
-        let header: Vec<String> = fields
-            .iter()
-            .map(|f| {
-                String::from_utf8_lossy(f)
-                    .trim_start_matches('\u{feff}')
-                    .to_owned()
-            })
-            .collect();
+        let header = fields.iter().map(String::from_utf8_lossy);
+        let header = header.map(|name| name.trim_start_matches('\u{feff}').to_owned());
+        let header: Vec<String> = header.collect();
         let mut table = TableReader {
             file: file.to_owned(),
             bytes,
@@ -88,10 +83,8 @@ impl<'b> TableReader<'b> {
         let mut seen = HashSet::with_capacity(header.len());
         for name in header.iter().filter(|name| !name.is_empty()) {
             if seen.contains(name.as_str()) && is_data(&header) {
-                let found = format!(
-                    "data '{}' in place of the header",
-                    joined(&header, delimiter)
-                );
+                let all = joined(&header, delimiter);
+                let found = format!("data '{all}' in place of the header");
                 return Err(complain(found, "a line with the names of the columns"));
             }
             if !seen.insert(name.as_str()) {

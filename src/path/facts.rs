@@ -180,16 +180,19 @@ impl LensDefaults {
         let is_matrix = |camera: &Camera| matches!(camera.lens.kind(), LensKind::Matrix(_));
         let lens = |of: &LensDefaults| (of.fovy_deg, of.aspect, of.near, of.far);
         let is_given = lens(self) != lens(&LensDefaults::default());
-        let what = match path.cameras.first().is_some_and(is_matrix) {
-            true if is_given => {
-                "--fovy, --aspect, --near and --far are for cameras without matrices"
-            }
-            false if self.matrix.is_some() => {
-                "--matrix-convention is for cameras that are matrices"
-            }
-            _ => return,
+        let (is_unused, what) = match path.cameras.first().is_some_and(is_matrix) {
+            true => (
+                is_given,
+                "--fovy, --aspect, --near and --far are for cameras without matrices",
+            ),
+            false => (
+                self.matrix.is_some(),
+                "--matrix-convention is for cameras that are matrices",
+            ),
         };
-        note(&format!("{}: {what}", path.name));
+        if is_unused {
+            note(&format!("{}: {what}", path.name));
+        }
     }
 }
 
@@ -225,11 +228,10 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
         Some(other) if other != scene.up => {
             let (other, name) = (other.name(), &scene.name);
             // Formats that state an axis state a unit as well.
-            let advice = scene
-                .unit
-                .is_none()
-                .then(|| format!("; --up {other} if it is the scene's"));
-            let advice = advice.unwrap_or_default();
+            let advice = match scene.unit {
+                None => format!("; --up {other} if it is the scene's"),
+                Some(_) => String::new(),
+            };
             format!("{other} is up in {what}, {own} in {name}{advice}")
         }
         _ => format!(

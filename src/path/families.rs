@@ -185,19 +185,15 @@ pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputE
         Some(Ok(animation)) => animation,
         Some(Err(error)) => return Err(unfit(error.to_string())),
         None => {
-            let name = &stage.scene.name;
-            return Err(unfit(format!(
-                "scene '{name}' has no animated camera; expected a glTF file with one"
-            )));
+            let reason = "has no animated camera; expected a glTF file with one";
+            return Err(unfit(format!("scene '{}' {reason}", stage.scene.name)));
         }
     };
     let (cameras, clips) = (animation.cameras, animation.clips);
     for (count, one) in [(cameras, "animated camera"), (clips, "animation")] {
         if count > 1 {
-            note(&format!(
-                "path 'animation' follows the first of {}",
-                counted(count, one)
-            ));
+            let all = counted(count, one);
+            note(&format!("path 'animation' follows the first of {all}"));
         }
     }
     let [first, last] = animation.seconds;

@@ -125,18 +125,18 @@ pub fn read_cameras_csv(
         true => table.note_unread(&MATRIX_ENTRIES, &[]),
         false => table.note_unread(&OF_EYES, &SYNONYMS),
     }
-    if ![0, cameras.len()].contains(&times.len()) {
-        let (empty, all) = (cameras.len() - times.len(), cameras.len());
+    let (all, empty) = (cameras.len(), cameras.len() - times.len());
+    if ![0, all].contains(&empty) {
+        times.clear();
+        let what = "rows; no time is used";
         note(&format!(
-            "{file}: time_s is empty in {empty} of {all} rows; no time is used"
+            "{file}: time_s is empty in {empty} of {all} {what}"
         ));
     }
     Ok(CameraPath {
         lens_scale: None,
         name: file.to_owned(),
-        times: Some(times)
-            .filter(|times| times.len() == cameras.len())
-            .unwrap_or_default(),
+        times,
         cameras,
         lines,
     })
@@ -269,12 +269,12 @@ fn eyes<'a>(
         let fovy_deg = number(fovy.filter(|_| height.is_none()), defaults.fovy_deg)?;
         let aspect = number(aspect, defaults.aspect)?;
         let near = number(near, defaults.near.unwrap_or_else(|| defaults.near_of(far)))?;
-        let frame = if by_forward {
-            Frame::looking_along(eye, target, up)
+        let looking = if by_forward {
+            Frame::looking_along
         } else {
-            look_at(eye, target, up)
+            look_at
         };
-        let frame = frame.map_err(|error| match error {
+        let frame = looking(eye, target, up).map_err(|error| match error {
             CameraError::Invalid { found, .. } if !has_up && found.starts_with("up is") => {
                 let expected = "columns up_x,up_y,up_z";
                 CameraError::Invalid { found, expected }

@@ -10,9 +10,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use super::{
-    Labels, LoadOptions, Scene, SurfaceKind, Surfaces, UpAxis, WorldBox, choose_origin, memory,
-};
+use super::{Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory};
 use crate::input::{InputError, finite, note};
 use crate::shown::{counted, first_of, shortened};
 
@@ -33,9 +31,8 @@ pub fn is_obj(bytes: &[u8]) -> bool {
     first.is_some_and(|line| {
         let word = words(line).next().unwrap_or_default();
         let is_header = line.windows(5).any(|part| part == b"min_x");
-        !is_header
-            && word.len() < line.len()
-            && KNOWN.iter().chain(&UNREAD).any(|known| *known == word)
+        let is_known = KNOWN.iter().chain(&UNREAD).any(|known| *known == word);
+        is_known && word.len() < line.len() && !is_header
     })
 }
 
@@ -176,14 +173,10 @@ impl Obj<'_> {
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;
                 let name = String::from_utf8_lossy(&line[start..]);
-                let name = name
-                    .split(" #")
-                    .next()
-                    .unwrap_or_default()
-                    .trim_ascii()
-                    .to_owned();
+                let name = name.split_once(" #").map_or(&*name, |parts| parts.0);
                 self.items.pop_if(|(_, first)| *first == self.corners.len());
-                self.items.push((name, self.corners.len()));
+                self.items
+                    .push((name.trim_ascii().to_owned(), self.corners.len()));
             }
             _ if word.contains(&0) => {
                 let found = "zero bytes, as in UTF-16 text".to_owned();
@@ -243,7 +236,7 @@ impl Obj<'_> {
                 })
             });
             let own: Vec<[u32; 3]> = own.collect();
-            surfaces.push_written(SurfaceKind::Opaque, false, &points, &own);
+            surfaces.push_written(&points, &own);
             labels.push(&pair[0].0);
         }
         Ok(Scene {

@@ -86,9 +86,10 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     if let Regions::Leaves(map) = &scene.regions
         && map.bare > 0
     {
-        let bare = counted(map.bare, "surface");
+        let what = "without triangles (flares), no items";
         note(&format!(
-            "{source}: {bare} without triangles (flares), no items"
+            "{source}: {} {what}",
+            counted(map.bare, "surface")
         ));
     }
     let is_of_map = matches!(options.items, ItemKind::Surfaces | ItemKind::Brushes);
@@ -145,10 +146,9 @@ pub fn check_fits(source: &str, options: &LoadOptions) -> Result<(), InputError>
         return Ok(());
     };
     match Family::named(spec.name()) {
-        Some(family) if !is_readable(Path::new(source)) => {
-            check_generated(source, family, &spec, options)
-        }
-        _ => Ok(()),
+        Some(_) if is_readable(Path::new(source)) => Ok(()),
+        Some(family) => check_generated(source, family, &spec, options),
+        None => Ok(()),
     }
 }
 
@@ -201,18 +201,9 @@ fn read_beside(
         let beside = |uri: &str| {
             let wanted = format!("{folder}{}", uri.trim_start_matches("./"));
             let entry = zip::unpack(&archive, &entries, file, Some(&wanted))?;
-            match entry.map {
-                None => Ok(entry.bytes),
-                Some(_) => {
-                    let found = format!("no '{}'", shortened(&wanted, 80));
-                    Err(InputError::at(
-                        file,
-                        "directory",
-                        found,
-                        "the name of an entry",
-                    ))
-                }
-            }
+            let found = format!("no '{}'", shortened(&wanted, 80));
+            let other = InputError::at(file, "directory", found, "the name of an entry");
+            entry.map.map_or(Ok(entry.bytes), |_| Err(other))
         };
         return read_beside(&entry.bytes, names, entry.map, options, &beside);
     }
@@ -232,7 +223,7 @@ fn read_beside(
         return read_ibsp(bytes, file, name, options);
     }
     let is_gltf = is_gltf(bytes) || is_named("gltf") || is_named("glb");
-    if is_gltf || is_obj(bytes) && !is_named("csv") || is_named("obj") {
+    if is_gltf || is_obj(bytes) || is_named("obj") {
         if options.skip_bad_items {
             note(&format!("{name}: --skip-bad-items is for boxes CSV"));
         }
@@ -258,10 +249,8 @@ fn unknown_scene(word: &str) -> SpecError {
     let families = FAMILIES.iter().map(|f| f.name);
     let generated = families.chain(MESHES.iter().map(|m| m.name));
     let known = generated.chain(SAMPLES.iter().map(|s| s.name));
-    let hint = match nearest(word, known.clone()) {
-        Some(guess) => format!("; did you mean '{guess}'?"),
-        None => String::new(),
-    };
+    let guess = nearest(word, known.clone());
+    let hint = guess.map_or(String::new(), |guess| format!("; did you mean '{guess}'?"));
     SpecError::new(format_args!(
         "unknown scene '{word}': neither a file nor a built-in scene{hint} (built in: {})",
         known.collect::<Vec<_>>().join(", ")
@@ -375,6 +364,8 @@ mod tests {
             assert_eq!(scene.name, source);
             assert!(!scene.items.is_empty());
         }
+        let (obj, names) = (b"v 0 0 0\nf 1 1 1\n", ["a.csv", "a"]);
+        assert!(read_bytes(obj, names, None, &LoadOptions::default()).is_ok());
     }
 
     #[test]

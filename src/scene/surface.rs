@@ -113,19 +113,17 @@ impl Surfaces {
     pub fn some(&self, items: &[ItemId]) -> Surfaces {
         let mut some = Surfaces::about(self.origin);
         for item in items.iter().map(|&id| id as usize) {
-            let triangles = &self.triangles[self.range(item)];
+            let range = self.range(item);
+            let triangles = &self.triangles[range.clone()];
             let own = triangles.iter().flatten().copied();
             let (first, end) = own.fold((u32::MAX, 0), |(low, high), p| {
                 (low.min(p), high.max(p + 1))
             });
             let points = &self.points[first.min(end) as usize..end as usize];
-            let triangles: Vec<[u32; 3]> = triangles
-                .iter()
-                .map(|corners| corners.map(|p| p - first))
-                .collect();
+            let triangles = triangles.iter().map(|corners| corners.map(|p| p - first));
+            let triangles: Vec<[u32; 3]> = triangles.collect();
             some.push(SurfaceKind::Opaque, false, points, &triangles);
-            let own = self.range(item);
-            some.set_last(&self.kinds[own.clone()], &self.two_sided[own]);
+            some.set_last(&self.kinds[range.clone()], &self.two_sided[range]);
         }
         some
     }
@@ -182,17 +180,11 @@ impl Surfaces {
         self.two_sided[first..].copy_from_slice(two_sided);
     }
 
-    /// Appends an item by its points in the world: all items of a surface or none.
-    pub(super) fn push_written(
-        &mut self,
-        kind: SurfaceKind,
-        two_sided: bool,
-        points: &[DVec3],
-        triangles: &[[u32; 3]],
-    ) {
+    /// Appends an opaque item by its points in the world: all items of a surface or none.
+    pub(super) fn push_written(&mut self, points: &[DVec3], triangles: &[[u32; 3]]) {
         let local = points.iter().map(|p| (p - self.origin).as_vec3());
         let local: Vec<Vec3> = local.collect();
-        self.push(kind, two_sided, &local, triangles);
+        self.push(SurfaceKind::Opaque, false, &local, triangles);
         self.written.extend_from_slice(points);
     }
 

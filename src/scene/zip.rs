@@ -132,11 +132,7 @@ pub fn entries<'a>(
 /// macOS adds to each file of an archive a `._` file with its attributes.
 fn is_scene(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
-    let is_aside = name
-        .rsplit('/')
-        .next()
-        .unwrap_or_default()
-        .starts_with("._");
+    let is_aside = name.rsplit('/').next().unwrap_or("").starts_with("._");
     !is_aside && SCENES.iter().any(|ending| name.ends_with(ending))
 }
 
@@ -152,21 +148,19 @@ fn chosen<'e, 'r, 'w>(
         let last = |is_it: &dyn Fn(&str) -> bool| entries.iter().rfind(|(name, _)| is_it(name));
         last(&|name| name == wanted).or_else(|| last(&|name| name.eq_ignore_ascii_case(wanted)))
     };
-    let found = wanted.and_then(|wanted| {
-        let part = || {
-            let (entry, map) = wanted.rsplit_once('#')?;
-            Some((named(entry)?, Some(map)))
-        };
-        named(wanted).map(|found| (found, None)).or_else(part)
-    });
-    if let Some(((name, record), map)) = found {
-        return Ok((name, record, map));
+    let whole = wanted.map(|wanted| (wanted, None));
+    let part = wanted.and_then(|wanted| wanted.rsplit_once('#'));
+    let part = part.map(|(entry, map)| (entry, Some(map)));
+    for (entry, map) in whole.into_iter().chain(part) {
+        if let Some((name, record)) = named(entry) {
+            return Ok((name, record, map));
+        }
     }
-    let scenes = entries.iter().filter(|(name, _)| is_scene(name));
-    let scenes: Vec<_> = scenes.collect();
+    let scenes: Vec<_> = entries.iter().filter(|(name, _)| is_scene(name)).collect();
     let names: Vec<String> = scenes.iter().map(|(name, _)| shortened(name, 80)).collect();
     let listed = first_of(&names, MOST_NAMED);
     let all = counted(entries.len(), "entry");
+    let sought = shortened(wanted.unwrap_or_default(), 80);
     let (found, expected) = match (wanted, &scenes[..]) {
         (None, [(name, record)]) => return Ok((name, record, None)),
         (None, []) => (
@@ -177,11 +171,8 @@ fn chosen<'e, 'r, 'w>(
             format!("{} scenes, {listed}", scenes.len()),
             part_hint(file, &names[0]),
         ),
-        (Some(wanted), _) => (
-            format!(
-                "no '{}' among {all}; scenes: {listed}",
-                shortened(wanted, 80)
-            ),
+        (Some(_), _) => (
+            format!("no '{sought}' among {all}; scenes: {listed}"),
             "the name of an entry".to_owned(),
         ),
     };

@@ -105,6 +105,15 @@ fn notes_tell_of_what_is_not_read_as_drawn() {
         let line = format!("note: s.gltf: {note}\n");
         assert!(done.err.contains(&line), "{note}: {}", done.err);
     }
+    // Weights in motion move no node.
+    let morphed = text.replace(r#"0, "path": "rotation""#, r#"1, "path": "weights""#);
+    fs::write(
+        folder.path().join("s.gltf"),
+        morphed.replace("[0, 1]}]", "[0]}]"),
+    )
+    .unwrap();
+    let told = cullbench(folder.path(), "scene info s.gltf").err;
+    assert!(told.contains(notes[0]) && !told.contains("moves"), "{told}");
 }
 
 #[test]

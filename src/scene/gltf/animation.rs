@@ -124,9 +124,8 @@ pub fn transform([moved, turned, scaled]: Parts) -> DAffine3 {
 /// The lens of a camera; its up vector is of no meaning.
 fn lens(camera: &Value) -> Option<PlaceView> {
     let (perspective, parallel) = (&camera["perspective"], &camera["orthographic"]);
-    let lens = [perspective, parallel]
-        .into_iter()
-        .find(|lens| lens.is_object())?;
+    let mut both = [perspective, parallel].into_iter();
+    let lens = both.find(|lens| lens.is_object())?;
     let number = |name: &str| lens[name].as_f64();
     let aspect = || Some(number("xmag")? / number("ymag")?);
     Some(PlaceView {
@@ -211,19 +210,16 @@ impl File<'_> {
         let times = self.vectors(sampler.input, 1, place)?;
         let times: Vec<f64> = times.iter().map(|time| time.x).collect();
         let values = self.vectors(sampler.output, width, place)?;
-        let Checked::Valid(interpolation) = sampler.interpolation else {
-            return Err(self.error(place.to_owned(), "an unknown interpolation", "LINEAR"));
-        };
-        let each = match interpolation {
-            Interpolation::CubicSpline => 3,
-            _ => 1,
+        let (interpolation, each) = match sampler.interpolation {
+            Checked::Valid(Interpolation::CubicSpline) => (Interpolation::CubicSpline, 3),
+            Checked::Valid(other) => (other, 1),
+            _ => return Err(self.error(place.to_owned(), "an unknown interpolation", "LINEAR")),
         };
         let ascend = times.is_sorted_by(|a, b| a < b) && times.iter().all(|t| t.is_finite());
         if !ascend || times.is_empty() || each * times.len() != values.len() {
+            let counts = [counted(times.len(), "time"), counted(values.len(), "value")];
             let found = match ascend {
-                true => [(times.len(), "time"), (values.len(), "value")]
-                    .map(|(count, what)| counted(count, what))
-                    .join(" and "),
+                true => counts.join(" and "),
                 false => "times that do not ascend".to_owned(),
             };
             let expected = format!("ascending times with {} each", counted(each, "value"));
@@ -238,7 +234,7 @@ impl File<'_> {
 }
 
 /// Part of a transform that a channel moves; `None` for weights of morph targets.
-fn part(channel: &Channel) -> Option<usize> {
+pub fn part(channel: &Channel) -> Option<usize> {
     match channel.target.path {
         Checked::Valid(Property::Translation) => Some(0),
         Checked::Valid(Property::Rotation) => Some(1),

@@ -73,21 +73,20 @@ impl File<'_> {
                 let extensions = material.extensions.as_ref();
                 let is_glass =
                     extensions.is_some_and(|e| e.others.contains_key("KHR_materials_transmission"));
-                kind = match material.alpha_mode {
-                    _ if is_glass => SurfaceKind::Clear,
-                    Checked::Valid(AlphaMode::Blend) => SurfaceKind::Clear,
-                    Checked::Valid(AlphaMode::Mask) => SurfaceKind::CutOut,
-                    _ => SurfaceKind::Opaque,
-                };
+                match material.alpha_mode {
+                    _ if is_glass => kind = SurfaceKind::Clear,
+                    Checked::Valid(AlphaMode::Blend) => kind = SurfaceKind::Clear,
+                    Checked::Valid(AlphaMode::Mask) => kind = SurfaceKind::CutOut,
+                    _ => {}
+                }
             }
             let own = self.primitive(primitive, positions, &place)?;
             match (&mut all, own) {
                 (Ok(all), Ok(own)) => {
                     let first = all.points.len() as u32;
                     all.points.extend(own.points);
-                    let corners = own.corners.into_iter();
-                    all.corners
-                        .extend(corners.map(|c| c.map(|corner| first.saturating_add(corner))));
+                    let shift = |c: [u32; 3]| c.map(|corner| first.saturating_add(corner));
+                    all.corners.extend(own.corners.into_iter().map(shift));
                     all.kinds.resize(all.corners.len(), kind);
                     all.two_sided.resize(all.corners.len(), two_sided);
                 }

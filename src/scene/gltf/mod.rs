@@ -25,8 +25,7 @@ pub use self::file::{Beside, beside};
 use self::file::{File, component, normalised};
 use self::mesh::{Mesh, Triangles, positions};
 use super::{
-    CameraPlace, Labels, LoadOptions, Scene, SurfaceKind, Surfaces, UpAxis, WorldBox,
-    choose_origin, memory,
+    CameraPlace, Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory,
 };
 use crate::input::{InputError, note};
 
@@ -91,10 +90,8 @@ pub(super) fn read_beside(
         None if placed.is_empty() => Scene::from_boxes(name, &[])?,
         None => file.triangles(&placed, &meshes, name, options)?,
         Some((mesh, reason)) => {
-            note(&format!(
-                "{}: items are boxes without triangles: meshes[{mesh}] {reason}",
-                file.name
-            ));
+            let what = format!("items are boxes without triangles: meshes[{mesh}] {reason}");
+            note(&format!("{}: {what}", file.name));
             let boxes: Result<Vec<_>, _> = placed.iter().map(|i| file.bounds(i)).collect();
             Scene::from_boxes(name, &boxes?)?
         }
@@ -188,14 +185,11 @@ impl File<'_> {
     /// The parts of the transform of a node that it states.
     fn parts(&self, index: usize) -> Parts {
         let node = &self.exact.nodes[index];
-        let three =
-            |name| Some(DVec3::from(<[f64; 3]>::deserialize(&node[name]).ok()?).extend(0.0));
-        let turned = <[f64; 4]>::deserialize(&node["rotation"]).ok();
-        [
-            three("translation"),
-            turned.map(DVec4::from),
-            three("scale"),
-        ]
+        ["translation", "rotation", "scale"].map(|name| {
+            let mut numbers = Vec::<f64>::deserialize(&node[name]).ok()?;
+            numbers.resize(4, 0.0);
+            Some(DVec4::from_slice(&numbers))
+        })
     }
 
     /// Instances of a node by EXT_mesh_gpu_instancing; the node itself without them.
@@ -268,7 +262,7 @@ impl File<'_> {
             if item.world.matrix3.determinant() < 0.0 {
                 corners.iter_mut().for_each(|corners| corners.swap(1, 2));
             }
-            surfaces.push_written(SurfaceKind::Opaque, false, &world(item), &corners);
+            surfaces.push_written(&world(item), &corners);
             surfaces.set_last(&mesh.kinds, &mesh.two_sided);
         }
         surfaces.into_scene(name)

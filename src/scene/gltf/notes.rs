@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::animation::part;
 use super::file::File;
 use super::{Order, Placed};
 use crate::input::note;
@@ -29,14 +30,17 @@ impl File<'_> {
     pub fn note_unread(&self, placed: &[Placed], order: &Order, cameras: usize) {
         let (root, nodes) = (&self.root, &self.root.nodes);
         let channels = root.animations.iter().flat_map(|clip| &clip.channels);
-        let targets: HashSet<usize> = channels.map(|c| c.target.node.value()).collect();
-        let moved = self.below(order, |node| targets.contains(&node));
+        let (moving, morphing): (Vec<_>, Vec<_>) = channels.partition(|c| part(c).is_some());
+        let [moving, morphing] = [moving, morphing].map(|channels| -> HashSet<usize> {
+            channels.into_iter().map(|c| c.target.node.value()).collect()
+        });
+        let moved = self.below(order, |node| moving.contains(&node));
         let extensions = |node: usize| &self.exact.nodes[node]["extensions"];
         let hidden = self.below(order, |n| extensions(n)["KHR_node_visibility"]["visible"] == false);
         let is_morphed = |item: &Placed| {
             let own = nodes[item.node].weights.as_ref();
             let mut weights = own.or(root.meshes[item.mesh].weights.as_ref()).into_iter().flatten();
-            weights.any(|weight| *weight != 0.0)
+            morphing.contains(&item.node) || weights.any(|weight| *weight != 0.0)
         };
         let items = |is: &dyn Fn(&Placed) -> bool| placed.iter().filter(|item| is(item)).count();
         let read = |is: &dyn Fn(usize) -> bool| order.iter().filter(|(node, _)| is(*node)).count();

@@ -273,8 +273,7 @@ fn faces_of(
 
 /// The places where players begin, looking as they do.
 fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
-    let (mut places, mut bad) = (Vec::new(), 0);
-    let mut moved = 0;
+    let (mut places, mut bad, mut moved) = (Vec::new(), 0, 0);
     for words in entities_of(entities) {
         let value = |key: &str| {
             let mut pairs = words.chunks_exact(2);
@@ -315,14 +314,9 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
             view: None,
         });
     }
-    for (count, one, what) in [
-        (bad, "spawn point", "without a place, left out"),
-        (
-            moved,
-            "part",
-            "with an origin, where the file has it and not there",
-        ),
-    ] {
+    let bad = (bad, "spawn point", "without a place, left out");
+    let what = "with an origin, where the file has it and not there";
+    for (count, one, what) in [bad, (moved, "part", what)] {
         if count > 0 {
             note(&format!("{file}: {} {what}", counted(count, one)));
         }
