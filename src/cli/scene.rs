@@ -107,11 +107,9 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         rows.push(("label", text::plain(&format!("{}: {shown}", labels.column))));
     }
     rows.push(("SHA-256", info.digest));
-    let rows = rows
-        .into_iter()
-        .map(|(name, value)| [name.to_owned(), value]);
-    let entries = text::entries(&rows.collect::<Vec<_>>(), text::width());
-    write!(io::stdout(), "{entries}")?;
+    let row = |(name, value): (&str, String)| [name.to_owned(), value];
+    let rows: Vec<_> = rows.into_iter().map(row).collect();
+    write!(io::stdout(), "{}", text::entries(&rows, text::width()))?;
     Ok(Ending::Ok)
 }
 

@@ -214,10 +214,8 @@ fn mirrored(cameras: &[Camera]) -> Option<String> {
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.
 fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
-    let ups: Vec<DVec3> = cameras
-        .iter()
-        .filter_map(|c| rolled_up(scene.up, c))
-        .collect();
+    let ups = cameras.iter().filter_map(|c| rolled_up(scene.up, c));
+    let ups: Vec<DVec3> = ups.collect();
     let (first, own) = (ups.first()?, scene.up.name());
     let what = share(ups.len(), cameras);
     let is_along = |axis: &UpAxis| {

@@ -61,10 +61,8 @@ struct Rows {
 impl Rows {
     /// Tells of labels that may have been meant as bounds.
     fn note_near_names(&self, file: &str) {
-        let letters = |name: &str| {
-            name.to_lowercase()
-                .replace(|c: char| !c.is_alphanumeric(), "")
-        };
+        let is_mark = |c: char| !c.is_alphanumeric();
+        let letters = |name: &str| name.to_lowercase().replace(is_mark, "");
         for name in self.labels.iter().map(|label| &label.column) {
             if let Some(bound) = BOUNDS.iter().find(|bound| letters(bound) == letters(name)) {
                 let name = shortened(name, 60);
@@ -97,9 +95,9 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
                 let (low, high) = (b.min[axis], b.max[axis]);
                 if low > high {
                     let name = ["x", "y", "z"][axis];
-                    let found =
-                        format!("an inverted box, min_{name} {low:?} > max_{name} {high:?}");
-                    return Err(row.error(found, format!("min_{name} <= max_{name}")));
+                    let [min, max] = ["min", "max"].map(|end| format!("{end}_{name}"));
+                    let found = format!("an inverted box, {min} {low:?} > {max} {high:?}");
+                    return Err(row.error(found, format!("{min} <= {max}")));
                 }
                 if low < -limit || high > limit {
                     let found = format!("a bound beyond the range of f32 ({low:?} to {high:?})");

@@ -210,10 +210,10 @@ fn check_counts(
         let counts = (0..table.len()).map(|i| Ok(table.range(i, at, of)?.len() as u64));
         counts.sum()
     };
-    let [points, ends] = [
+    let (points, ends) = (
         total(surfaces, 12, vertices)?,
         total(surfaces, 20, corners)?,
-    ];
+    );
     let faces = total(brushes, 0, sides)?;
     let most = [1, MOST_CORNERS].map(|each| each * vertices.len() as u64);
     let most = [most[0], most[1], sides.len() as u64];
@@ -288,10 +288,8 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
             continue;
         }
         let numbers = |key: &str| -> Option<Vec<f64>> {
-            let words = value(key)?.split_whitespace();
-            words
-                .map(|word| word.parse::<f32>().ok().map(f64::from))
-                .collect()
+            let number = |word: &str| word.parse::<f32>().ok().map(f64::from);
+            value(key)?.split_whitespace().map(number).collect()
         };
         let of_three = |key| <[f64; 3]>::try_from(numbers(key)?).ok().map(DVec3::from);
         let yaw = || numbers("angle")?.first().copied();
