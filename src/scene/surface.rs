@@ -180,7 +180,9 @@ impl Surfaces {
         self.two_sided[first..].copy_from_slice(two_sided);
     }
 
-    /// Appends an opaque item by its points in the world: all items of a surface or none.
+    /// Appends an opaque item by its points in the world.
+    ///
+    /// All items of a surface or none.
     pub(super) fn push_written(&mut self, points: &[DVec3], triangles: &[[u32; 3]]) {
         let local = points.iter().map(|p| (p - self.origin).as_vec3());
         let local: Vec<Vec3> = local.collect();
