@@ -85,6 +85,13 @@ fn kind_of(error: &io::Error) -> io::ErrorKind {
     }
 }
 
+/// The expectation of a message about a file with several parts.
+pub(crate) fn part_hint(file: &str, name: &str) -> String {
+    // A value that begins with a minus needs the sign.
+    let option = if file == "-" { "--scene=" } else { "" };
+    format!("one of them by name, as in '{option}{file}#{name}'")
+}
+
 /// Nanoseconds with three significant digits and a fitting unit.
 pub fn time(ns: f64) -> String {
     let (size, name) = unit(ns);

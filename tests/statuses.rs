@@ -278,7 +278,8 @@ fn ctrl_c_is_answered_at_once_in_the_middle_of_a_build() {
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(
         told,
-        "stopping at the next safe place; again ends at once\n"
+        "stopping at the next safe place; again ends at once\n\
+         interrupted: no cell was finished, and nothing was saved\n"
     );
     assert!(took < Duration::from_secs(1), "{took:?}");
     // Nothing was finished: nothing is left.

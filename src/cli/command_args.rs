@@ -18,7 +18,7 @@ use crate::visibility::inscribed::MOST_BOXES;
 const VIEW_HELP: &str = include_str!("assets/help/view.txt");
 
 #[derive(Args, Debug)]
-#[command(after_help = VIEW_HELP)]
+#[command(after_help = program::named(VIEW_HELP))]
 pub struct ViewArgs {
     /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(long)]

@@ -5,9 +5,9 @@
 use super::clock::Stopwatch;
 use super::key::Pass;
 use super::update::measure_updates;
-use super::{Status, Verdict, Workload, guarded, input_of};
+use super::{Verdict, Workload, guarded, input_of};
 use crate::culling::CullingTest;
-use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec};
+use crate::index::{DynIndex, MemoryUsage, StructureSpec};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::Scene;
 
@@ -94,7 +94,7 @@ impl Subject {
     pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Subject {
         let updates = |spec: &StructureSpec| {
             let items = test.items(&scene.items);
-            let spare = spec.build(input_of(scene, &items)).map_err(not_built)?;
+            let spare = spec.build(input_of(scene, &items)).map_err(Verdict::from)?;
             measure_updates(spec, scene, &items, spare)
         };
         if let Ok(built) = &mut self.built {
@@ -125,7 +125,7 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
         let lap = watch.lap();
         let alone = spec.execution.threads <= 1;
         let ms = if alone { lap.cpu_ns } else { lap.wall_ns } / 1e6;
-        built.map(|index| (index, ms)).map_err(not_built)
+        built.map(|index| (index, ms)).map_err(Verdict::from)
     };
     let (mut index, mut build_ms) = build()?;
     if build_ms < AGAIN_BELOW_MS {
@@ -138,7 +138,7 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     let regions = if std::ptr::eq(boxes, &items[..]) {
         None
     } else {
-        Some(spec.build(input_of(scene, boxes)).map_err(not_built)?)
+        Some(spec.build(input_of(scene, boxes)).map_err(Verdict::from)?)
     };
     Ok(Built {
         memory: index.memory(),
@@ -147,14 +147,4 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
         items: index,
         regions,
     })
-}
-
-/// Verdict of a structure that could not be built.
-pub(super) fn not_built(error: BuildError) -> Verdict {
-    let status = match error {
-        BuildError::Panicked { .. } => Status::Panicked,
-        BuildError::OutOfMemory { .. } => Status::OutOfMemory,
-        _ => Status::Refused,
-    };
-    Verdict::new(status, error.to_string())
 }

@@ -55,7 +55,7 @@ mod workload;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Aabb;
-use crate::index::caught;
+use crate::index::{BuildError, caught};
 use crate::query::{AnyVolume, ItemId};
 use crate::verify::{Fault, Trial, explain_visibility};
 
@@ -152,6 +152,18 @@ impl Verdict {
             status,
             reason: Some(lines.join(" ")),
         }
+    }
+}
+
+/// Of a structure that could not be built.
+impl From<BuildError> for Verdict {
+    fn from(error: BuildError) -> Verdict {
+        let status = match error {
+            BuildError::Panicked { .. } => Status::Panicked,
+            BuildError::OutOfMemory { .. } => Status::OutOfMemory,
+            _ => Status::Refused,
+        };
+        Verdict::new(status, error.to_string())
     }
 }
 

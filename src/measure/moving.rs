@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 
 use super::clock::{Lap, Stopwatch};
 use super::count::{Judging, MOST_JUDGED, spread};
-use super::index_under_test::not_built;
 use super::process_result::Known;
 use super::update::{MOST_UPDATED, USUAL_SHARE, move_share};
 use super::{
@@ -145,7 +144,7 @@ impl<'w> Moving<'w> {
         };
         let held = fat.as_ref().map_or(&items, |fat| &fat.boxes);
         let built = spec.build(input_of(workload.scene, held));
-        let mut index = built.map_err(not_built)?;
+        let mut index = built.map_err(Verdict::from)?;
         if spec.info().capabilities.refits && spec.policy != UpdatePolicy::Rebuild {
             // Tables of positions are no part of the first frame.
             index.refit(held, &[]);
@@ -180,7 +179,7 @@ impl<'w> Moving<'w> {
         };
         if is_rebuilt {
             let built = self.spec.build(input_of(scene, &self.items));
-            self.index = built.map_err(not_built)?;
+            self.index = built.map_err(Verdict::from)?;
             return Ok(());
         }
         let (items, moved) = match &mut self.fat {
@@ -195,7 +194,7 @@ impl<'w> Moving<'w> {
         }
         let (spec, input) = (self.spec, input_of(scene, items));
         let updated = spec.update(&mut self.index, input, moved);
-        updated.map(drop).map_err(not_built)
+        updated.map(drop).map_err(Verdict::from)
     }
 
     /// The boxes that the index holds.
@@ -367,11 +366,11 @@ pub(super) fn refitted_ln(
         return Ok(None);
     }
     let mut items = workload.items.to_vec();
-    let mut refitted = spec.build(input_of(scene, &items)).map_err(not_built)?;
+    let mut refitted = spec.build(input_of(scene, &items)).map_err(Verdict::from)?;
     for _ in 0..REFITS {
         let moved = move_share(&mut items, USUAL_SHARE);
         spec.update(&mut refitted, input_of(scene, &items), &moved)
-            .map_err(not_built)?;
+            .map_err(Verdict::from)?;
     }
     over_fresh(refitted.as_ref(), spec, workload, &items, protocol)
 }

@@ -1,7 +1,6 @@
 //! Cost of updating an index after items have moved.
 
 use super::clock::Stopwatch;
-use super::index_under_test::not_built;
 use super::{Verdict, compare_with_scan, input_of};
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec};
@@ -33,7 +32,7 @@ pub(super) fn measure_updates(
     let first = move_share(&mut items, USUAL_SHARE);
     let update = |index: &mut Box<dyn DynIndex>, items: &[Aabb], moved: &[ItemId]| {
         let updated = spec.update(index, input_of(scene, items), moved);
-        updated.map(drop).map_err(not_built)
+        updated.map(drop).map_err(Verdict::from)
     };
     update(&mut index, &items, &first)?;
     for share in UPDATE_SHARES {

@@ -196,11 +196,7 @@ pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputE
             note(&format!("path 'animation' follows the first of {all}"));
         }
     }
-    let [first, last] = animation.seconds;
-    let steps = stage.count.saturating_sub(1).max(1) as f64;
-    // Exact products of f32 times, so that the last time is the last key's.
-    let at = |frame| (first * (steps - frame) + last * frame) / steps;
-    let times = (0..stage.count).map(|frame| at(frame as f64));
+    let times = even_times(animation.seconds, stage.count);
     let pose = |time: f64| match animation.at(time) {
         Some(place) => Ok(pose(stage, &place)),
         None => Err(unfit(format!(
@@ -210,9 +206,24 @@ pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputE
     times.map(pose).collect()
 }
 
+/// Times from the first to the last key, both of them exact.
+fn even_times([first, last]: [f64; 2], count: usize) -> impl Iterator<Item = f64> {
+    let steps = count.saturating_sub(1).max(1) as f64;
+    // Exact products of f32 times, so that the last time is the last key's.
+    let at = move |frame: f64| (first * (steps - frame) + last * frame) / steps;
+    (0..count).map(move |frame| at(frame as f64))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_last_time_is_that_of_the_last_key() {
+        let times: Vec<f64> = even_times([0.0, 4.0], 50).collect();
+        assert_eq!((times[0], times[49]), (0.0, 4.0));
+        assert!(times.is_sorted());
+    }
 
     #[test]
     fn the_spline_passes_through_its_points_without_jumps() {

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use super::changes::Setting;
 use super::folder::{self, save_report};
-use super::ranking::unique;
+
 use super::reading::read_stream;
-use super::stream::{Header, KeptPart, Stream};
+use super::stream::{Header, KeptPart, Stream, pairs};
 use super::writing::{self, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::writing::{folder_of, temporary_folder_in};
 use crate::input::InputError;
@@ -221,12 +221,6 @@ fn overlap(own: &Stream, other: &Stream, first: &Path) -> Option<String> {
 
 /// Missing scenes and paths that a message names.
 const NAMED: usize = 4;
-
-/// Scenes with paths, each once.
-pub(super) fn pairs<'k>(groups: impl IntoIterator<Item = &'k GroupKey>) -> Vec<String> {
-    let pairs = groups.into_iter();
-    unique(pairs.map(|key| format!("{} along {}", key.scene, key.path)))
-}
 
 /// The header of the run that the shards are together.
 fn joined(shards: &[&Stream], args: &[String], is_partial: bool) -> Header {

@@ -9,7 +9,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use super::changes::{Fact, Setting, differences, facts, known};
-use super::merge::pairs;
+use super::ranking::unique;
 use super::surface::enter_growths;
 use super::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
@@ -274,6 +274,12 @@ impl Stream {
         enter_growths(&mut report);
         report
     }
+}
+
+/// Scenes with paths, each once.
+pub(super) fn pairs<'k>(groups: impl IntoIterator<Item = &'k GroupKey>) -> Vec<String> {
+    let pairs = groups.into_iter();
+    unique(pairs.map(|key| format!("{} along {}", key.scene, key.path)))
 }
 
 /// RFC 3339 in UTC, to the second. A clock out of range gives the nearest time

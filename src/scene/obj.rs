@@ -173,7 +173,7 @@ impl Obj<'_> {
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;
                 let name = String::from_utf8_lossy(&line[start..]);
-                let name = name.split_once(" #").map_or(&*name, |parts| parts.0);
+
                 self.items.pop_if(|(_, first)| *first == self.corners.len());
                 self.items
                     .push((name.trim_ascii().to_owned(), self.corners.len()));
@@ -265,7 +265,7 @@ s off
 f 1/1/1 3/-1/-9 2//7
 f 1 2 4
 g empty
-g other  part # of #2
+g other  part
 usemtl steel
 f -3 -2 -1
 f 1 4 \\

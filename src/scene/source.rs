@@ -38,13 +38,6 @@ pub fn split_part(source: &str) -> (&str, Option<&str>) {
     }
 }
 
-/// The expectation of a message about a file with several parts.
-pub(super) fn part_hint(file: &str, name: &str) -> String {
-    // A value that begins with a minus needs the sign.
-    let option = if file == "-" { "--scene=" } else { "" };
-    format!("one of them by name, as in '{option}{file}#{name}'")
-}
-
 /// The scenes of `maps.wad#*` or `pak.pk3#*`, one by one; of others the source.
 ///
 /// # Errors

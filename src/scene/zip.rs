@@ -10,9 +10,8 @@ use miniz_oxide::inflate::decompress_to_vec_with_limit;
 use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive, crc32};
 
 use super::memory;
-use super::source::part_hint;
 use crate::input::InputError;
-use crate::shown::{counted, first_of, plain, shortened};
+use crate::shown::{counted, first_of, part_hint, plain, shortened};
 
 /// Endings of the names of scenes.
 const SCENES: [&str; 6] = [".bsp", ".wad", ".gltf", ".glb", ".obj", ".csv"];

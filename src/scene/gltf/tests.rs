@@ -281,21 +281,6 @@ fn cameras_have_their_lens_and_move_as_animated() {
 }
 
 #[test]
-fn the_last_frame_is_at_the_last_key() {
-    let mut file = animated_by("translation", "VEC3", 2, &[0.0, 0.0, 0.0, 8.0, 0.0, 0.0]);
-    file["animations"][0]["samplers"][0]["interpolation"] = json!("STEP");
-    let uri = file["buffers"][1]["uri"].as_str().unwrap();
-    let values = STANDARD.decode(uri.split_once(',').unwrap().1).unwrap();
-    let times = [0f32, 4.0].map(f32::to_le_bytes).concat();
-    let bytes = STANDARD.encode([&times, &values[8..]].concat());
-    file["buffers"][1]["uri"] = json!(format!("data:;base64,{bytes}"));
-    let scene = read(&file).unwrap();
-    let path = crate::path::load("animation:frames=50", &scene, &Default::default()).unwrap();
-    let ends = [path.cameras[48], path.cameras[49]].map(|camera| camera.frame.eye.x);
-    assert_eq!(ends, [0.0, 8.0]);
-}
-
-#[test]
 fn cubic_splines_bend_by_their_tangents() {
     // The x of (t - 1)^3, and its slope on both sides of each key.
     let slope = |x: f32| [x, 0.0, 0.0];

@@ -7,9 +7,8 @@ use std::fmt::Display;
 use std::ops::Range;
 
 use super::records::{Table, int_at, range_within};
-use super::source::part_hint;
 use crate::input::InputError;
-use crate::shown::first_of;
+use crate::shown::{first_of, part_hint};
 
 /// The lumps of a map in their fixed order, that of UDMF first.
 const LUMPS: [&str; 13] = [
