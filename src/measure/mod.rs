@@ -155,7 +155,7 @@ impl Verdict {
     }
 }
 
-/// Of a structure that could not be built.
+/// Verdict of a structure that could not be built.
 impl From<BuildError> for Verdict {
     fn from(error: BuildError) -> Verdict {
         let status = match error {
