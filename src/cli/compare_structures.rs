@@ -145,7 +145,7 @@ pub fn ask_all(
         }
         from += answers.len();
         let rows: Vec<Row> = answers.into_iter().flatten().collect();
-        agree &= all_agree(&rows, what, &right);
+        agree &= all_agree(&rows, what, right);
         each(rows)?;
     }
     Ok(agree)
