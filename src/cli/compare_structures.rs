@@ -22,8 +22,10 @@ use crate::threads::share;
 pub struct Row {
     pub question: usize,
     pub structure: String,
+    /// Items, ascending.
     pub ids: Option<Box<[ItemId]>>,
     pub answer: Answer,
+    /// Sum of the ids as files have them.
     pub id_sum: u64,
     pub cost: QueryCost,
     /// An id of the answer that no item has.
@@ -124,7 +126,7 @@ pub fn ask_all(
                             question,
                             structure: spec.label.clone(),
                             answer: Answer::of(&out),
-                            id_sum: crate::measure::id_sum(&out),
+                            id_sum: out.iter().map(|&id| u64::from(scene.row_of(id))).sum(),
                             ids: keep_ids.then(|| out.as_slice().into()),
                             cost,
                             stray: out.iter().copied().find(|&id| id as usize >= boxes.len()),
@@ -346,7 +348,7 @@ mod tests {
             structure: "any".to_owned(),
             ids: None,
             answer: Answer::of(ids),
-            id_sum: crate::measure::id_sum(ids),
+            id_sum: ids.iter().map(|&id| u64::from(id)).sum(),
             cost: QueryCost::default(),
             stray: None,
         };

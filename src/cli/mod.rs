@@ -288,7 +288,7 @@ fn load_scene_by(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
     let scene = crate::scene::load(source, options)?;
     if scene.skipped_items > 0 {
         tell(&format!(
-            "note: {} left out of {}; ids count the other rows",
+            "note: {} left out of {}; the other rows keep their ids",
             text::counted(scene.skipped_items, "bad item"),
             scene.name
         ));

@@ -47,7 +47,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         ("visible_id_sum", &|row| json!(row.id_sum)),
         ("nodes_tested", &|row| json!(row.cost.nodes_tested)),
         ("items_tested", &|row| json!(row.cost.items_tested)),
-        ("visible_ids", &|row| json!(row.ids)),
+        ("visible_ids", &|row| json!(shown(&scene, row))),
     ];
     let columns = if args.ids {
         &columns[..]
@@ -59,6 +59,12 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         ask_all(&structures, &scene, items, questions, args.ids, ask, each)
     })?;
     Ok(Ending::of(agree))
+}
+
+/// The ids of an answer as files have them.
+fn shown(scene: &Scene, row: &Row) -> Option<Vec<ItemId>> {
+    let ids = row.ids.as_deref()?;
+    Some(ids.iter().map(|&id| scene.row_of(id)).collect())
 }
 
 /// Moves items through `frame` frames of a motion, or through all of them.
@@ -100,7 +106,7 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
         ("structure", &|row| json!(row.structure)),
         ("region_count", &|row| json!(row.answer.count)),
         ("region_id_sum", &|row| json!(row.id_sum)),
-        ("region_ids", &|row| json!(row.ids)),
+        ("region_ids", &|row| json!(shown(&scene, row))),
         ("nodes_tested", &|row| json!(row.cost.nodes_tested)),
     ];
     let (points, boxes) = match (&args.sought.points, &args.sought.boxes) {

@@ -21,7 +21,7 @@ use clap::{Args, ValueEnum};
 #[derive(Args, Debug)]
 pub struct SceneArgs {
     /// Leave out rows of the scene's boxes CSV that are not finite boxes, and report
-    /// their number; ids then count the rows that are left
+    /// their number; the others keep their ids
     #[arg(long)]
     pub skip_bad_items: bool,
     /// Up axis of boxes CSV and OBJ, y or z; other scenes state theirs [default: z of

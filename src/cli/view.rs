@@ -354,7 +354,8 @@ impl ViewData {
         let (mut ids, mut boxes) = (Packed::default(), Packed::default());
         let (mut id, mut low_corner) = (0, I64Vec3::ZERO);
         for &(_, item) in &order {
-            ids.push_signed(item as i64 - id);
+            let row = i64::from(scene.row_of(item as ItemId));
+            ids.push_signed(row - id);
             let (min, max) = corners(item);
             for difference in (min - low_corner).to_array() {
                 boxes.push_signed(difference);
@@ -362,7 +363,7 @@ impl ViewData {
             for side in (max - min).to_array() {
                 boxes.push(side as u64);
             }
-            (id, low_corner) = (item as i64, min);
+            (id, low_corner) = (row, min);
         }
         let data = ViewData {
             scene: scene.name.clone(),

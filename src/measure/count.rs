@@ -45,11 +45,6 @@ impl Answer {
     }
 }
 
-/// Sum of the ids, the checksum that `query` and `locate` print.
-pub fn id_sum(ids: &[ItemId]) -> u64 {
-    ids.iter().map(|&id| u64::from(id)).sum()
-}
-
 /// Answers of one subject, and their cost.
 #[derive(Clone, Default, Debug)]
 #[non_exhaustive]

@@ -64,7 +64,7 @@ pub use cell::{CellTimes, Metric, PathInfo, ReportCell, SamplesRef, SceneInfo};
 pub use clock::{Lap, Stopwatch};
 #[cfg(feature = "cli")]
 pub(crate) use count::blamed;
-pub use count::{Answer, Counted, Judged, count_pass, id_sum, judge};
+pub use count::{Answer, Counted, Judged, count_pass, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
     Effort, ExperimentError, Extras, Plan, PlannedScene, SceneGroup, Share, measure_group,

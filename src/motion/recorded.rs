@@ -104,18 +104,12 @@ impl Recorded {
 ///
 /// # Errors
 /// The line of the first value that is no number, no box or no item of the scene; a time
-/// before the last one; an item twice at one time; a file without rows; a scene whose
-/// bad items are left out, as its ids are no longer the rows of its file.
+/// before the last one; an item twice at one time; a file without rows.
 pub(super) fn read_motion_csv(
     bytes: &[u8],
     file: &str,
     scene: &Scene,
 ) -> Result<Recorded, InputError> {
-    if scene.skipped_items > 0 {
-        let (name, bad) = (&scene.name, scene.skipped_items);
-        let found = format!("ids of '{name}', which is without {bad} of its rows");
-        return Err(InputError::line(file, 1, found, "a scene with all rows"));
-    }
     let mut table = TableReader::open(bytes, file, &COLUMNS)?;
     let columns = table.columns(&COLUMNS)?;
     table.note_unread(&COLUMNS, &[]);
@@ -151,9 +145,12 @@ pub(super) fn read_motion_csv(
 fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
     let (text, items) = (row.text(column), scene.items.len());
     let id = text.parse::<ItemId>().ok();
-    id.filter(|id| (*id as usize) < items).ok_or_else(|| {
+    id.and_then(|id| scene.item_of(id)).ok_or_else(|| {
         let found = format!("id '{}'", crate::shown::shortened(&text, 60));
-        let most = items.checked_sub(1).map(|most| format!("0 to {most}"));
+        let last = items
+            .checked_sub(1)
+            .map(|last| scene.row_of(last as ItemId));
+        let most = last.map(|last| format!("0 to {last}"));
         let ids = most.as_deref().unwrap_or("which has none");
         row.error(found, format!("an item of '{}', {ids}", scene.name))
     })

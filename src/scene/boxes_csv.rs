@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::{Labels, Scene, WorldBox};
 use crate::input::{InputError, TableReader, note};
+use crate::query::ItemId;
 use crate::shown::{field, from_field, shortened};
 
 const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
@@ -16,8 +17,8 @@ const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"]
 /// f32 about an origin chosen in f64. `file` only names the source in errors.
 ///
 /// With `skip_bad_items`, rows that are not a finite box with min <= max are
-/// left out and counted in [`Scene::skipped_items`]; ids then count the rows
-/// that are kept.
+/// left out and counted in [`Scene::skipped_items`]; the others keep the ids of
+/// their rows ([`Scene::row_of`]).
 ///
 /// # Errors
 /// A missing or wrong header; the first bad row with the number of all.
@@ -36,6 +37,9 @@ pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<
     let mut scene = Scene::from_boxes(file, &rows.boxes)?;
     scene.labels = rows.labels;
     scene.skipped_items = rows.bad;
+    if rows.bad > 0 {
+        scene.rows = rows.kept;
+    }
     Ok(scene)
 }
 
@@ -53,6 +57,8 @@ pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>, 
 /// Content of a file, with its errors.
 struct Rows {
     boxes: Vec<WorldBox>,
+    /// Data row of each box.
+    kept: Vec<ItemId>,
     labels: Vec<Labels>,
     first_bad: Option<InputError>,
     bad: usize,
@@ -82,7 +88,7 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
     let others = others.filter(|(i, _)| !columns.contains(i));
     let labels = others.map(|(i, name)| (i, Labels::new(from_field(name))));
     let mut labels: Vec<(usize, Labels)> = labels.collect();
-    let (mut boxes, mut first_bad, mut bad) = (Vec::new(), None, 0);
+    let (mut boxes, mut kept, mut first_bad, mut bad) = (Vec::new(), Vec::new(), None, 0);
     while let Some(row) = table.next_row() {
         let checked = row.and_then(|row| {
             let mut bounds = [0.0; 6];
@@ -110,7 +116,10 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
             Ok(b)
         });
         match checked {
-            Ok(b) => boxes.push(b),
+            Ok(b) => {
+                kept.push((boxes.len() + bad) as ItemId);
+                boxes.push(b);
+            }
             Err(error) => {
                 bad += 1;
                 first_bad.get_or_insert(error);
@@ -119,6 +128,7 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
     }
     Ok(Rows {
         boxes,
+        kept,
         labels: labels.into_iter().map(|(_, label)| label).collect(),
         first_bad,
         bad,
@@ -220,6 +230,11 @@ mod tests {
         let scene = read_boxes_csv(text.as_bytes(), "b.csv", true).unwrap();
         assert_eq!((scene.items.len(), scene.skipped_items), (2, 2));
         assert_eq!(scene.labels[0].get(1), "d");
+        assert_eq!([scene.row_of(0), scene.row_of(1)], [0, 3]);
+        assert_eq!(
+            [0, 1, 3, 4].map(|row| scene.item_of(row)),
+            [Some(0), None, Some(1), None]
+        );
     }
 
     #[test]

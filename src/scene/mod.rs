@@ -215,9 +215,25 @@ pub struct Scene {
     pub own_tree: Option<PlaneTree>,
     /// Items left out on request (`--skip-bad-items`).
     pub skipped_items: usize,
+    /// Data row of each item, ascending, where some were left out; else empty.
+    pub rows: Vec<ItemId>,
 }
 
 impl Scene {
+    /// The id of an item in files: its zero-based data row. O(1).
+    pub fn row_of(&self, item: ItemId) -> ItemId {
+        self.rows.get(item as usize).copied().unwrap_or(item)
+    }
+
+    /// The item of a data row, if it has one. O(log n).
+    pub fn item_of(&self, row: ItemId) -> Option<ItemId> {
+        if self.rows.is_empty() {
+            return Some(row).filter(|&row| (row as usize) < self.items.len());
+        }
+        let item = self.rows.binary_search(&row).ok();
+        item.map(|item| item as ItemId)
+    }
+
     /// Rounds the boxes outward about the origin that suits them.
     ///
     /// # Errors
@@ -258,6 +274,7 @@ impl Scene {
             animation: None,
             own_tree: None,
             skipped_items: 0,
+            rows: Vec::new(),
         })
     }
 

@@ -66,15 +66,11 @@ fn a_file_named_city_has_no_streets() {
 /// Planes that are rounded for the still scene drop it.
 #[test]
 fn items_that_a_file_moves_far_away_are_still_found() {
-    let scene = format!("{BOXES}\n-10,-10,-10,-9,-9,-9\n9,9,9,10,10,10\n9,9,9,0,0,0\n");
+    let scene = format!("{BOXES}\n-10,-10,-10,-9,-9,-9\n9,9,9,10,10,10\n");
     let cameras = format!("{EYE_LOOK},aspect,near,far\n0,0,0,-7,1,5,1.5,1,inf\n");
     let place = "-518428.0625,735361.1875,436435.8125";
     let folder = folder(&[
-        ("bad.csv", scene.as_bytes()),
-        (
-            "scene.csv",
-            scene.rsplit_once("9,9,9,0").expect("a row").0.as_bytes(),
-        ),
+        ("scene.csv", scene.as_bytes()),
         ("cameras.csv", cameras.as_bytes()),
         (
             "motion.csv",
@@ -85,12 +81,47 @@ fn items_that_a_file_moves_far_away_are_still_found() {
     for row in rows(&works(folder.path(), &format!("{query} --scene scene.csv"))) {
         assert_eq!(row["visible_ids"], "1", "{}", row["structure"]);
     }
-    // Ids of what is left of a file are not its rows.
-    let line = format!("{query} --scene bad.csv --skip-bad-items");
-    let refused = cullbench(folder.path(), &line);
-    let wanted = "error: motion.csv, line 1: ids of 'bad.csv', which is without 1 of its rows";
-    assert_eq!(refused.code, Some(2), "{line}");
-    assert!(refused.err.contains(wanted), "{}", refused.err);
+}
+
+#[test]
+fn rows_keep_their_ids_beside_bad_ones() {
+    let scene = format!("{BOXES}\n3,3,3,2,2,2\n-1,-1,-1,1,1,1\n9,9,9,0,0,0\n4,-1,-1,5,1,1\n");
+    let folder = folder(&[
+        ("bad.csv", scene.as_bytes()),
+        (
+            "cameras.csv",
+            format!("{EYE_LOOK}\n-9,0,0,0,0,0\n").as_bytes(),
+        ),
+        ("points.csv", b"x,y,z\n4.5,0,0\n"),
+        (
+            "motion.csv",
+            format!("time_s,id,{BOUNDS}\n0,1,,,,,,\n").as_bytes(),
+        ),
+        (
+            "gone.csv",
+            format!("time_s,id,{BOUNDS}\n0,2,,,,,,\n").as_bytes(),
+        ),
+    ]);
+    let query = "query --scene bad.csv --skip-bad-items --cameras cameras.csv --ids";
+    let motion = format!("{query} --motion motion.csv");
+    let locate = "locate --scene bad.csv --skip-bad-items --points points.csv";
+    for (line, ids, sum) in [
+        (query, "visible_ids=1 3", "visible_id_sum=4"),
+        (&motion, "visible_ids=3", "visible_id_sum=3"),
+        (locate, "region_ids=3", "region_id_sum=3"),
+    ] {
+        for row in rows(&cullbench(folder.path(), line).out) {
+            for wanted in [ids, sum].map(|pair| pair.split_once('=').expect("a pair")) {
+                assert_eq!(row[wanted.0], wanted.1, "{line}");
+            }
+        }
+    }
+    let refused = cullbench(folder.path(), &format!("{query} --motion gone.csv"));
+    let wanted = "gone.csv, line 2: id '2'; expected an item of 'bad.csv', 0 to 3";
+    assert!(
+        refused.code == Some(2) && refused.err.contains(wanted),
+        "{refused:?}"
+    );
 }
 
 #[test]
