@@ -11,7 +11,7 @@ use cullbench::camera::PlaneOptions;
 use cullbench::culling::Culling;
 use cullbench::geometry::BoxBlocks;
 use cullbench::index::{Input, Registry, StructureSpec};
-use cullbench::kernel::BASELINE;
+use cullbench::kernel::Plain;
 use cullbench::measure::{UPDATE_SHARES, Workload, move_share};
 use cullbench::path;
 use cullbench::scene::{self, Scene};
@@ -152,7 +152,7 @@ fn kernels(c: &mut Criterion) {
         b.iter(|| {
             let blocks = black_box(&blocks).range(0, scene.items.len());
             let seen = blocks.map(|(_, lanes, block)| {
-                (block.admitted_by(BASELINE, &volume, volume.mask()) & lanes).count_ones()
+                (block.admitted_by(Plain, &volume, volume.mask()) & lanes).count_ones()
             });
             seen.sum::<u32>()
         });

@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use cullbench::geometry::Aabb;
 use cullbench::index::{PackedTree, Part, Record, Splitter, build_top_down};
-use cullbench::kernel::BASELINE;
+use cullbench::kernel::Plain;
 use cullbench::query::{ItemId, NoRecorder, QueryContext, Sink};
 use cullbench::scene;
 use glam::Vec3;
@@ -39,7 +39,7 @@ impl Splitter for Halves {
 /// Region search of the library with a recorder that is off.
 #[inline(never)]
 fn with(tree: &PackedTree, p: Vec3, out: &mut Vec<ItemId>) {
-    let _ = tree.query(&p, &mut QueryContext::new(BASELINE, out, &mut NoRecorder));
+    let _ = tree.query(&p, &mut QueryContext::new(Plain, out, &mut NoRecorder));
 }
 
 /// The same search, written without a recorder.
@@ -59,7 +59,7 @@ fn without(tree: &PackedTree, p: Vec3, out: &mut Vec<ItemId>) {
                 let admitted = block.holding(p) & lanes;
                 if admitted != 0 {
                     // A Vec never stops the query.
-                    let _ = out.accept_lanes(BASELINE, tree.ids(), start, admitted);
+                    let _ = out.accept_lanes(Plain, tree.ids(), start, admitted);
                 }
             }
         }

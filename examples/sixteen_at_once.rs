@@ -57,7 +57,7 @@ impl RegionIndex for Tiles16 {
         }
     }
 
-    // Inlined into a copy per instruction set: AVX-512, AVX2, SSE2 or plain arrays.
+    // Inlined into a copy per instruction set: AVX-512, AVX2 or plain arrays.
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, q: &Q, cx: &mut C) -> ControlFlow<()> {
         let isa = cx.isa();

@@ -412,7 +412,7 @@ mod tests {
     use super::super::arbitrary::{any_box, number};
     use super::super::{BroadcastPlanes, ConvexVolume, Planes};
     use super::*;
-    use crate::kernel::BASELINE;
+    use crate::kernel::Plain;
     use proptest::prelude::*;
 
     #[test]
@@ -443,14 +443,14 @@ mod tests {
             let (first, end) = (boxes.len() / 3, boxes.len());
             let mut seen = 0;
             for (start, lanes, block) in blocks.range(first, end) {
-                let admitted = block.admitted_by(BASELINE, &volume, volume.mask());
+                let admitted = block.admitted_by(Plain, &volume, volume.mask());
                 let four = [*block; 4];
-                let four = BoxBlock::four_admitted_by(BASELINE, &four, &volume, volume.mask());
+                let four = BoxBlock::four_admitted_by(Plain, &four, &volume, volume.mask());
                 prop_assert_eq!(four, [admitted; 4]);
-                let ready = BroadcastPlanes::new(BASELINE, &volume, volume.mask());
+                let ready = BroadcastPlanes::new(Plain, &volume, volume.mask());
                 prop_assert_eq!(ready.is_some(), volume.mask().count_ones() <= 6);
                 if let Some(ready) = ready {
-                    prop_assert_eq!(ready.kept(BASELINE, block), admitted);
+                    prop_assert_eq!(ready.kept(Plain, block), admitted);
                 }
                 for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
                     let b = &boxes[start + lane];

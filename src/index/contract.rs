@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Info, TreeCell};
 use crate::geometry::{Aabb, PlaneTree};
-use crate::kernel::{BASELINE, Isa, Kernel, Work};
+use crate::kernel::{Isa, Kernel, Plain, Work};
 use crate::query::{
     Context, ItemId, ManySink, NoRecorder, QueryContext, QueryCost, QueryVolume, Ranges, Recorder,
     Sink,
@@ -282,10 +282,7 @@ pub trait FrustumQuery: RegionIndex {
     /// Ids and cost are the same by all kernels.
     fn counted<Q: QueryVolume>(&self, volume: &Q) -> (Vec<ItemId>, QueryCost) {
         let (mut ids, mut cost) = Default::default();
-        let _ = self.query(
-            volume,
-            &mut QueryContext::new(BASELINE, &mut ids, &mut cost),
-        );
+        let _ = self.query(volume, &mut QueryContext::new(Plain, &mut ids, &mut cost));
         (ids, cost)
     }
 

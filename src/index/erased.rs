@@ -12,7 +12,7 @@ use glam::Vec3;
 
 use super::{MemoryUsage, Query, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, ConvexVolume};
-use crate::kernel::{BASELINE, Isa, Kernel, Work};
+use crate::kernel::{Isa, Kernel, Plain, Work};
 use crate::query::{
     AnyVolume, Dispatched, ItemId, Located, NoRecorder, QueryContext, QueryCost, each_volume,
 };
@@ -158,7 +158,7 @@ impl<T: RegionIndex> DynIndex for WithKernel<T> {
     }
 
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
-        let mut context = QueryContext::new(BASELINE, out, cost);
+        let mut context = QueryContext::new(Plain, out, cost);
         let _ = match Dispatched::of(volume) {
             Ok(planes) => self.index.query(&planes, &mut context),
             Err(p) => self.index.query(&p, &mut context),

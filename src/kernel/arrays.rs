@@ -1,14 +1,9 @@
-//! The portable kernel alone, its vectors plain arrays, for any machine.
+//! The portable kernel alone, for any machine.
 
 use std::ops::Range;
 
 use super::plain::Plain;
 use super::{Kernel, Work};
-
-/// The instruction set that the program was compiled for.
-pub type Baseline = Plain;
-/// The value of [`Baseline`].
-pub const BASELINE: Baseline = Plain;
 
 /// Returns whether this processor runs the kernel.
 pub fn detect(kernel: Kernel) -> bool {
@@ -18,7 +13,7 @@ pub fn detect(kernel: Kernel) -> bool {
 /// Does the work with the portable kernel.
 #[inline]
 pub fn run<W: Work>(_: Kernel, work: W) -> W::Output {
-    work.run(BASELINE)
+    work.run(Plain)
 }
 
 /// `out.extend_from_slice(words)`.

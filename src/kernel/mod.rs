@@ -25,7 +25,7 @@ use std::sync::OnceLock;
 
 pub use inlined::{each, pairs};
 pub use isa::{Isa, LANES, LaneMask, Pack, Piece, first_lanes};
-pub use machine::{BASELINE, Baseline, extend, extend_from_range, prefetch};
+pub use machine::{extend, extend_from_range, prefetch};
 pub use plain::Plain;
 
 named! {
@@ -34,7 +34,7 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
     #[non_exhaustive]
     pub enum Kernel {
-        /// The compilation target: SSE2 on x86-64, NEON on AArch64.
+        /// Plain arrays: whatever vectors the compiler makes of them, SSE2 or NEON.
         Portable = "portable",
         /// 256-bit vectors and the bit instructions of the same generation.
         Avx2 = "avx2",

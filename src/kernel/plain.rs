@@ -1,6 +1,6 @@
 //! Sixteen lanes as plain arrays, which the compiler turns into whatever vectors
-//! there are: for processors without a folder of their own here, for
-//! interpreters, and for the tests of the others. No unsafe code.
+//! there are: for any processor, for interpreters, and for the tests of the other
+//! kernels. No unsafe code.
 
 use super::isa::{Isa, LANES, LaneMask, Pack};
 

@@ -10,7 +10,7 @@ use crate::culling::{
     Arithmetic, CameraView, Culling, CullingError, CullingTest, farthest_corner, silhouettes,
 };
 use crate::geometry::{Aabb, BoxBlocks, MAX_PLANES, sphere_cube};
-use crate::kernel::BASELINE;
+use crate::kernel::Plain;
 use crate::measure::Stopwatch;
 use crate::oracle::{Oracle, Pose, Verdict};
 use crate::query::{QueryVolume, each_volume};
@@ -239,7 +239,7 @@ impl TestTally {
         for _ in 0..repeats {
             let blocks = std::hint::black_box(blocks);
             for ((_, lanes, block), slot) in blocks.range(0, verdicts.len()).zip(&mut admitted) {
-                *slot = view.kept_lanes(BASELINE, block, mask) & lanes;
+                *slot = view.kept_lanes(Plain, block, mask) & lanes;
             }
         }
         if is_timed {

@@ -44,14 +44,14 @@ pub trait Context {
 /// ```
 /// use cullbench::geometry::Aabb;
 /// use cullbench::index::{Bvh, Input, RegionIndex};
-/// use cullbench::kernel::BASELINE;
+/// use cullbench::kernel::Plain;
 /// use cullbench::query::{Count, QueryContext, QueryCost};
 /// use glam::Vec3;
 ///
 /// let items = [Aabb::new(Vec3::ZERO, Vec3::ONE); 3];
 /// let bvh = Bvh::build(&Input::new(&items), &Default::default())?;
 /// let (mut count, mut cost) = (Count::default(), QueryCost::default());
-/// let mut context = QueryContext::new(BASELINE, &mut count, &mut cost);
+/// let mut context = QueryContext::new(Plain, &mut count, &mut cost);
 /// // The volume may be a point, a box or a frustum.
 /// let _ = bvh.query(&Vec3::ONE, &mut context);
 /// assert_eq!(count.0, 3);

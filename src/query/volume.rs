@@ -388,7 +388,7 @@ mod tests {
     use super::*;
     use crate::geometry::arbitrary::{any_box, number, vector};
     use crate::geometry::{BoxBlocks, Plane, sphere_cube};
-    use crate::kernel::{BASELINE, Plain};
+    use crate::kernel::Plain;
     use proptest::prelude::*;
 
     /// Checks the contract of a volume: monotone plane by plane, lanes like the scalar
@@ -408,8 +408,8 @@ mod tests {
         items.iter().for_each(|b| blocks.push(b));
         for (start, lanes, block) in blocks.range(0, items.len()) {
             let (all, open) = (
-                view.kept_lanes(BASELINE, block, mask),
-                view.kept_lanes(BASELINE, block, left),
+                view.kept_lanes(Plain, block, mask),
+                view.kept_lanes(Plain, block, left),
             );
             let (passed, words) = view.sorted_lanes(Plain, block, mask);
             for lane in (0..16).filter(|lane| lanes >> lane & 1 == 1) {

@@ -10,7 +10,7 @@ use cullbench::index::{
     BlockOrder, Bsp, Bvh, FrustumQuery, Input, Linear, Octree, Quadtree, RegionIndex, Trace, Wide,
     WideParams,
 };
-use cullbench::kernel::{BASELINE, Isa, LANES, LaneMask, Pack};
+use cullbench::kernel::{Isa, LANES, LaneMask, Pack, Plain};
 use cullbench::query::{ItemId, Located, Predicate, QueryVolume};
 use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
@@ -51,7 +51,7 @@ fn queries<T: RegionIndex>(items: &[Aabb], volumes: &[ConvexVolume], points: &[V
         sees(&index, &finer, i, &wanted);
     }
     let mut all = Located::default();
-    let _ = index.query_many(BASELINE, points, &mut all);
+    let _ = index.query_many(Plain, points, &mut all);
     let mut from = 0;
     for (&p, &end) in points.iter().zip(all.ends()) {
         let wanted = those(items, |b| b.contains_point(p));
@@ -187,9 +187,9 @@ fn rows_go_into_any_place() {
             let mut wanted: Vec<u32> = [&vec![7; before], &row[from..to], &row].concat();
             let mut out = vec![7; before];
             let rows = [(row, lanes), (row, LaneMask::MAX)];
-            packed(BASELINE, &mut out, LANES + to - from, &rows);
+            packed(Plain, &mut out, LANES + to - from, &rows);
             assert_eq!(out, wanted);
-            BASELINE.append(&mut out, &row, lanes);
+            Plain.append(&mut out, &row, lanes);
             wanted.extend_from_slice(&row[from..to]);
             assert_eq!(out, wanted);
         }

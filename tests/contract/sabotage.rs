@@ -12,7 +12,7 @@ use cullbench::geometry::{Aabb, PlaneMask};
 use cullbench::index::{
     BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell, indexable,
 };
-use cullbench::kernel::{BASELINE, Isa, Kernel};
+use cullbench::kernel::{Isa, Kernel, Plain};
 use cullbench::query::{
     Containment, Context, ItemId, ManySink, NoRecorder, QueryContext, QueryVolume, Recorder, Sink,
 };
@@ -157,7 +157,7 @@ impl<S: Sink> Sink for Deaf<'_, S> {
 
 /// Other instructions than the portable ones, where the machine has them.
 fn is_best<I: Isa>() -> bool {
-    type_name::<I>() != type_name_of_val(&BASELINE)
+    type_name::<I>() != type_name_of_val(&Plain)
 }
 
 impl<const CLAIMS: Claims> Toy<CLAIMS> {

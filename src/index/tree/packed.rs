@@ -236,7 +236,7 @@ impl PackedTree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::BASELINE;
+    use crate::kernel::Plain;
     use crate::query::{Count, NoRecorder, QueryContext};
     use glam::Vec3;
 
@@ -275,14 +275,14 @@ mod tests {
         let everything = Aabb::new(Vec3::splat(-1e9), Vec3::splat(1e9));
         let _ = tree.query(
             &everything,
-            &mut QueryContext::new(BASELINE, &mut all, &mut NoRecorder),
+            &mut QueryContext::new(Plain, &mut all, &mut NoRecorder),
         );
         assert_eq!(all.0, 100_000);
         for id in [0, 50_000, 99_999] {
             let mut found = Vec::new();
             let _ = tree.query(
                 &items[id].centre(),
-                &mut QueryContext::new(BASELINE, &mut found, &mut NoRecorder),
+                &mut QueryContext::new(Plain, &mut found, &mut NoRecorder),
             );
             assert_eq!(found, [id as ItemId]);
         }

@@ -14,7 +14,7 @@ use super::{BlockOrder, Moving, WideParams};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::linear::{Linear, LinearParams};
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::kernel::BASELINE;
+use crate::kernel::Plain;
 use crate::query::{Context, Count, ItemId, QueryContext, QueryCost, QueryVolume};
 
 /// Parameters: `auto:use=linear,update=rebuild`.
@@ -181,7 +181,7 @@ impl Auto {
         let views = self.views(items);
         let (mut sink, mut cost) = (Count::default(), QueryCost::default());
         for view in &views {
-            let cx = &mut QueryContext::new(BASELINE, &mut sink, &mut cost);
+            let cx = &mut QueryContext::new(Plain, &mut sink, &mut cost);
             let _ = self.trees.query(view, cx);
         }
         let [nodes, tested, passed] = TREE_NS;

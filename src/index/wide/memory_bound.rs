@@ -7,7 +7,7 @@ use super::Wide;
 use crate::geometry::{BoxBlock, LANES, LaneMask, ROWS, RowMask};
 use crate::index::RegionIndex;
 use crate::index::frontier::AHEAD;
-use crate::kernel::{BASELINE, Isa, Kernel, Work, prefetch};
+use crate::kernel::{Isa, Kernel, Plain, Work, prefetch};
 use crate::query::{ItemId, QueryContext, QueryVolume, Recorder, Sink, Tests};
 
 /// A block with the rows that were read; of fewer than six rows, some are repeated.
@@ -79,10 +79,7 @@ impl Trace {
         };
         let mut reads = Reads(&mut trace.reads);
         // This sink never breaks off.
-        let _ = tree.query(
-            volume,
-            &mut QueryContext::new(BASELINE, &mut sink, &mut reads),
-        );
+        let _ = tree.query(volume, &mut QueryContext::new(Plain, &mut sink, &mut reads));
         let leaves = tree.id_rows().len();
         let tested = trace.reads.iter().filter(|read| (read.0 as usize) < leaves);
         trace.whole = trace.leaves.len() - tested.count();

@@ -2,9 +2,8 @@
 
 use std::arch::x86_64::*;
 
-use super::each;
+use super::avx2::halves_of_pairs;
 use super::packer::{PackTo, Packer};
-use super::sse2::four_pairs;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
 /// A value is the proof that the processor has AVX-512 (F, VL, BW, DQ) and all
@@ -49,13 +48,11 @@ impl Isa for Avx512 {
     }
     #[inline(always)]
     fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [__m512; 2] {
-        let fours: &[[u32; 4]] = places.as_chunks().0;
-        let [a, b, c, d] = each!(4, |i| four_pairs(table, &fours[i]));
-        each!(2, |side| unsafe {
-            let low = _mm256_set_m128(b[side], a[side]);
-            let high = _mm256_set_m128(d[side], c[side]);
-            _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high)
-        })
+        let [low, high] = halves_of_pairs(table, places);
+        let joined = |side| unsafe {
+            _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low[side]), high[side])
+        };
+        [joined(0), joined(1)]
     }
     #[inline(always)]
     fn to_array(self, floats: __m512) -> [f32; LANES] {

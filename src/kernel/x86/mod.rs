@@ -1,4 +1,4 @@
-//! Kernels of x86-64: SSE2, and AVX2 and AVX-512 if the processor has them.
+//! Kernels of x86-64 for processors with AVX2 or AVX-512; the others use plain arrays.
 //!
 //! The only folder of the crate with unsafe code. Intrinsics are unsafe; they
 //! are sound because a value of each set's type only exists where its
@@ -8,16 +8,10 @@
 mod avx2;
 mod avx512;
 mod packer;
-mod sse2;
 
 pub use packer::{extend, extend_from_range};
 
-use super::{Kernel, Work};
-
-/// The instruction set that the program was compiled for.
-pub type Baseline = sse2::Sse2;
-/// The value of [`Baseline`].
-pub const BASELINE: Baseline = sse2::Sse2;
+use super::{Kernel, Plain, Work};
 
 /// Returns whether this processor (and operating system) runs the kernel.
 pub fn detect(kernel: Kernel) -> bool {
@@ -48,7 +42,7 @@ pub fn run<W: Work>(kernel: Kernel, work: W) -> W::Output {
             // SAFETY: as above, for the features of `avx2`.
             unsafe { avx2(work) }
         }
-        _ => work.run(BASELINE),
+        _ => work.run(Plain),
     }
 }
 
@@ -69,29 +63,3 @@ pub fn prefetch<T>(place: &T) {
     // SAFETY: SSE is part of every x86-64, and a prefetch never faults.
     unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(place).cast()) };
 }
-
-/// Elementwise operations on an array of vectors, written out: `array::from_fn` and
-/// `map` are functions of their own, which a build without link-time optimisation leaves
-/// outside the kernel, compiled without its instructions (seen: a scan 65 times slower).
-macro_rules! each {
-    (2, $op:expr) => {{
-        let of = $op;
-        [of(0_usize), of(1)]
-    }};
-    (4, $op:expr) => {{
-        let of = $op;
-        [of(0_usize), of(1), of(2), of(3)]
-    }};
-}
-use each;
-
-/// Methods of [`Isa`](super::Isa) that are one instruction per vector.
-macro_rules! lanewise {
-    ($vectors:tt; $($name:ident: $instruction:ident),+) => {$(
-        #[inline(always)]
-        fn $name(self, a: Floats, b: Floats) -> Floats {
-            each!($vectors, |i| unsafe { $instruction(a[i], b[i]) })
-        }
-    )+};
-}
-use lanewise;

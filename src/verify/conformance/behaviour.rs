@@ -11,7 +11,7 @@ use super::super::edge_volumes;
 use super::*;
 use crate::geometry::{ConvexVolumeF64, PlaneF64, RelativeVolume, Spheres, sphere_cube};
 use crate::index::QueryMany;
-use crate::kernel::{BASELINE, Kernel};
+use crate::kernel::{Kernel, Plain};
 use crate::query::{Located, ManySink, QueryVolume, Ranges};
 use crate::threads::Pool;
 
@@ -123,7 +123,7 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
         if points.len() > 1 {
             let most = points.len() as u32 / 2;
             let mut sink = StopsAfter { most, got: 0 };
-            let flow = index.query_many(BASELINE, &points, &mut sink);
+            let flow = index.query_many(Plain, &points, &mut sink);
             ensure(flow.is_break() && sink.got == most, || {
                 format!("stopped after {most} points, got {} and {flow:?}", sink.got)
             })?;

@@ -10,7 +10,7 @@ use super::super::{explain_containment, explain_visibility};
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{FrustumQuery, Input, RegionIndex, caught};
-use crate::kernel::{BASELINE, Kernel};
+use crate::kernel::{Kernel, Plain};
 use crate::query::{ItemId, NoRecorder, QueryContext, QueryCost, QueryVolume, Recorder, Sink};
 use crate::scene;
 
@@ -28,7 +28,7 @@ pub(super) fn ask<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder>(
     sink: &mut S,
     recorder: &mut R,
 ) -> ControlFlow<()> {
-    index.query(volume, &mut QueryContext::new(BASELINE, sink, recorder))
+    index.query(volume, &mut QueryContext::new(Plain, sink, recorder))
 }
 
 /// The answer in the structure's own order.
