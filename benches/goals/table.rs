@@ -35,8 +35,6 @@ const MANY: &str = "orbit:visible=20%";
 pub const ALL: &str = "outside";
 
 const COPY: Option<(&str, f64)> = Some(("times_memcpy", 1.2));
-const REPLAY: Option<(&str, f64)> = Some(("times_replay", 1.15));
-const REPLAY_TINY: Option<(&str, f64)> = Some(("times_replay", 2.0));
 
 const OF_TEN_THOUSAND: [Way; 4] = [
     way(TINY, 3.0, None),
@@ -45,9 +43,9 @@ const OF_TEN_THOUSAND: [Way; 4] = [
     way(ALL, 50.0, None),
 ];
 const OF_A_MILLION: [Way; 4] = [
-    way(TINY, 10.0, REPLAY_TINY),
-    way(FEW, 20.0, REPLAY),
-    way(MANY, 33.0, REPLAY),
+    way(TINY, 10.0, None),
+    way(FEW, 20.0, None),
+    way(MANY, 33.0, None),
     way(ALL, 65.0, COPY),
 ];
 
@@ -108,9 +106,9 @@ pub const WORLDS: [World; 9] = [
         scan: 1.8,
         ahead: &TREES,
         ways: &[
-            way(TINY, 10.0, REPLAY_TINY),
-            way(FEW, 20.0, REPLAY),
-            way(MANY, 55.0, REPLAY),
+            way(TINY, 10.0, None),
+            way(FEW, 20.0, None),
+            way(MANY, 55.0, None),
             way(ALL, 65.0, COPY),
         ],
     },

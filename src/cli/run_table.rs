@@ -108,7 +108,7 @@ fn share(share: f64) -> String {
 pub type Figure = (&'static str, &'static str, fn(f64) -> String);
 
 /// Figures of queries by priority; a summary has the first two.
-pub const OF_QUERIES: [Figure; 12] = [
+pub const OF_QUERIES: [Figure; 11] = [
     ("build", "build_ms", |ms| text::time(ms * 1e6)),
     ("bytes/item", "memory_bytes_per_item", |b| format!("{b:.1}")),
     ("p95", "query_ns_p95", text::time),
@@ -116,7 +116,6 @@ pub const OF_QUERIES: [Figure; 12] = [
     ("items tested", "items_tested", text::significant),
     ("/ read", "times_read", text::significant),
     ("/ copy", "times_memcpy", text::significant),
-    ("/ replay", "times_replay", text::significant),
     ("locate", "locate_ns", text::time),
     ("update of 1 %", "update_ms", |ms| text::time(ms * 1e6)),
     ("query after 32", "refitted_over_rebuilt", text::significant),

@@ -4,18 +4,16 @@
 
 use std::cell::RefCell;
 use std::hint::black_box;
-use std::rc::Rc;
 
 use serde::Serialize;
 
-use super::stage::{Chain, MASKED_INNER, PORTAL_CLIP, StageKind, Z};
+use super::stage::{Chain, PORTAL_CLIP, StageKind, Z};
 use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
-use super::world::{View, World};
+use super::world::World;
 use crate::measure::OverProcesses;
 use crate::query::ItemId;
 use crate::statistics::{Estimate, flat};
-use crate::visibility::occlusion::{self, FrameTrace, MaskedInner, OccluderScene, OcclusionBuffer};
 use crate::visibility::region::{Opening, RegionId, RegionRow, Scratch};
 use crate::visibility::triangle::SafeCones;
 
@@ -89,7 +87,6 @@ pub fn bounds<'w>(
     let row = |name| world.regions.as_ref().and_then(|regions| regions.row(name));
     bounds.extend(row(STORED_PVS).map(|row| of_table(world, row)));
     bounds.extend(row(PORTAL_CLIP).map(|row| of_portals(world, row)));
-    bounds.extend(of_occlusion(world));
     bounds.push(of_cones(world, triangles));
     bounds.push(of_fragments(world, covered));
     bounds
@@ -128,46 +125,6 @@ fn of_portals<'w>(world: &World, row: &RegionRow) -> Bound<'w> {
             all ^ p.x.to_bits() ^ p.y.to_bits() ^ p.z.to_bits()
         });
         black_box(bits);
-    })
-}
-
-/// Reads and writes of a traced frame.
-type Reads = fn(&OccluderScene, &FrameTrace, &mut MaskedInner);
-
-fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
-    let trace = |view: usize| -> (&OccluderScene, FrameTrace) {
-        let occluders = world.occluders(view);
-        let View { rays, volume, .. } = &world.views[view];
-        let view = occlusion::View::new(rays, volume, occluders, world.samples);
-        (occluders, FrameTrace::of(occluders, &view, world.kernel))
-    };
-    let traces: Rc<[_]> = world.views().map(trace).collect();
-    let bounds: [(&str, Reads); 3] = [
-        (
-            "read the occluders that are drawn",
-            |occluders, trace, _| {
-                black_box(trace.read_occluders(occluders));
-            },
-        ),
-        (
-            "clear the buffer and write its tiles again",
-            |_, trace, buffer| trace.replay(buffer),
-        ),
-        (
-            "read the tested boxes and the deciding tiles",
-            |occluders, trace, buffer| {
-                black_box(trace.read_tested(occluders, buffer));
-            },
-        ),
-    ];
-    bounds.map(|(name, work)| {
-        let traces = traces.clone();
-        let buffer = RefCell::new(MaskedInner::new(world.samples));
-        let names = [MASKED_INNER, name];
-        bound(StageKind::Occlusion, names, move |view, _| {
-            let (occluders, trace) = &traces[view];
-            work(occluders, trace, &mut buffer.borrow_mut());
-        })
     })
 }
 

@@ -143,7 +143,7 @@ impl Chain {
 }
 
 pub const PORTAL_CLIP: &str = "portal-clip";
-pub const MASKED_INNER: &str = "masked-inner";
+const MASKED_INNER: &str = "masked-inner";
 /// The test that takes every item for solid.
 pub const Z: &str = "z-test";
 const ALPHA: &str = "alpha-test";

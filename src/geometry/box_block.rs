@@ -11,9 +11,6 @@ use crate::kernel::{Isa, each, first_lanes, prefetch};
 /// Boxes of one block, and one bit for each of them.
 pub use crate::kernel::{LANES, LaneMask};
 
-/// Rows of a block.
-pub const ROWS: usize = 6;
-
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z. 384 bytes.
 ///
 /// Lanes that hold no box hold the empty box; callers mask them out.
@@ -98,25 +95,6 @@ impl BoxBlock {
         for row in corner.rows() {
             prefetch(&self.rows[row]);
         }
-    }
-
-    /// Prefetches one row, if there is such a row.
-    #[inline(always)]
-    pub fn prefetch_row(&self, row: usize) {
-        if let Some(row) = self.rows.get(row) {
-            prefetch(row);
-        }
-    }
-
-    /// Reads six rows, which may come twice, and does nothing with them but
-    /// what keeps the reads.
-    #[inline(always)]
-    pub fn touch<I: Isa>(&self, isa: I, rows: &[u8; ROWS]) -> LaneMask {
-        let mut sum = isa.splat(0.0);
-        for &row in rows {
-            sum = isa.min(sum, isa.load(&self.rows[usize::from(row)]));
-        }
-        isa.below_zero(sum)
     }
 
     /// The coordinates of one corner, the same one of every box.
@@ -269,25 +247,6 @@ fn joined(bits: &[u32; LANES]) -> LaneMask {
     bits.iter().fold(0, |all, bit| all | bit) as LaneMask
 }
 
-/// Exclusive or over the bits of all bounds of some blocks. O(n).
-///
-/// Reads every byte and decides nothing: a bound for any program that reads them all.
-#[inline(always)]
-pub fn xor_of_bits(blocks: &[BoxBlock]) -> u32 {
-    let mut lanes = [0; LANES];
-    for block in blocks {
-        // Kept from the loop vectorizer, which with 512-bit vectors takes
-        // sixteen blocks at a time and gathers: seven times slower.
-        let [a, b, c, d, e, f] = std::hint::black_box(&block.rows);
-        for lane in 0..LANES {
-            let bits = |row: &[f32; LANES]| row[lane].to_bits();
-            // Joined within the block first: one step of the chain a block.
-            lanes[lane] ^= ((bits(a) ^ bits(b)) ^ (bits(c) ^ bits(d))) ^ (bits(e) ^ bits(f));
-        }
-    }
-    lanes.iter().fold(0, |all, bits| all ^ bits)
-}
-
 /// Boxes in blocks, in the order in which they were pushed; the last block is
 /// filled up with empty boxes. 24 bytes a box.
 #[derive(Clone, Default, Debug)]
@@ -365,10 +324,23 @@ impl BoxBlocks {
         size_of_val(&self.blocks[..])
     }
 
-    /// [`xor_of_bits`] of all blocks.
+    /// Exclusive or over the bits of all bounds. O(n).
+    ///
+    /// Reads every byte and decides nothing: a bound for any program that reads them all.
     #[inline(always)]
     pub fn xor_of_bits(&self) -> u32 {
-        xor_of_bits(&self.blocks)
+        let mut lanes = [0; LANES];
+        for block in &self.blocks {
+            // Kept from the loop vectorizer, which with 512-bit vectors takes
+            // sixteen blocks at a time and gathers: seven times slower.
+            let [a, b, c, d, e, f] = std::hint::black_box(&block.rows);
+            for lane in 0..LANES {
+                let bits = |row: &[f32; LANES]| row[lane].to_bits();
+                // Joined within the block first: one step of the chain a block.
+                lanes[lane] ^= ((bits(a) ^ bits(b)) ^ (bits(c) ^ bits(d))) ^ (bits(e) ^ bits(f));
+            }
+        }
+        lanes.iter().fold(0, |all, bits| all ^ bits)
     }
 
     /// All blocks; the last one may have empty lanes.

@@ -18,11 +18,11 @@ mod spheres;
 
 pub use aabb::Aabb;
 pub use balls::{BallBlock, BallBlocks, Balls};
-pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, ROWS, blocks_of, xor_of_bits};
+pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, blocks_of};
 pub use broadcast::{BallFrustum, BallPlane, BroadcastPlane, BroadcastPlanes, Planes};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use convex_volume_f64::ConvexVolumeF64;
-pub use p_vertex::{ALL_ROWS, BoxCorner, RowMask};
+pub use p_vertex::BoxCorner;
 pub use plane::Plane;
 pub use plane_f64::PlaneF64;
 pub use plane_rows::{PlaneRows, ROW_LANES};

@@ -1,11 +1,5 @@
 //! Rows of a block that hold the corners of its boxes a plane test reads.
 
-/// Some of the six rows of a [`BoxBlock`](super::BoxBlock), one bit each.
-pub type RowMask = u8;
-
-/// All six rows.
-pub const ALL_ROWS: RowMask = 0b11_1111;
-
 /// BoxCorner of a box: on each axis the upper bound, or else the lower one.
 ///
 /// The p-vertex of a plane (the corner farthest along its normal) is the same corner of
@@ -31,11 +25,5 @@ impl BoxCorner {
             1 + 3 * usize::from(y),
             2 + 3 * usize::from(z),
         ]
-    }
-
-    /// The same rows as a set.
-    #[inline(always)]
-    pub fn row_mask(self) -> RowMask {
-        self.rows().iter().fold(0, |rows, &row| rows | 1 << row)
     }
 }

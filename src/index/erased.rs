@@ -204,7 +204,7 @@ impl<T: RegionIndex> Work for QueryMany<'_, T> {
 mod tests {
     use super::*;
     use crate::geometry::{ConvexVolumeF64, Plane, RelativeVolume, Spheres};
-    use crate::index::{FrustumQuery, Input, Linear, OctreeTextbook, Trace, Wide};
+    use crate::index::{FrustumQuery, Input, Linear, OctreeTextbook, Wide};
 
     /// Answer and cost of the structure compiled for the volume, and dispatched.
     fn both<T: RegionIndex>(index: T, volume: AnyVolume<'_>) -> [(Vec<ItemId>, QueryCost); 2] {
@@ -270,12 +270,7 @@ mod tests {
             assert!(!own.0.is_empty() && own.0.len() < input.items.len());
             assert_eq!(own, counted, "{} {volume:?}", T::INFO.name);
         }
-        let wide_tree = Wide::build(&input, &Default::default()).unwrap();
         for volume in volumes {
-            if let Ok(planes) = Dispatched::of(volume) {
-                let own = each_volume!(volume, v => Trace::of(&wide_tree, v));
-                assert_eq!(Trace::of(&wide_tree, &planes), own, "{volume:?}");
-            }
             check::<Wide>(&input, volume);
             check::<Linear>(&input, volume);
             check::<OctreeTextbook>(&input, volume);

@@ -75,4 +75,4 @@ pub use registry::{Registry, Row, StructureSpec};
 pub use shared_query::QueryThreads;
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
 pub use tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
-pub use wide::{Auto, AutoParams, BlockOrder, Moving, Trace, Wide, WideParams};
+pub use wide::{Auto, AutoParams, BlockOrder, Moving, Wide, WideParams};

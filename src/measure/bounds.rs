@@ -3,11 +3,10 @@
 //! A bound answers nothing and is never ranked. It takes part in the same rounds as the
 //! structures, so that a ratio to it is paired like any other.
 
-use super::{Subject, TimedTask, Workload};
+use super::{TimedTask, Workload};
 use crate::geometry::{Aabb, BoxBlocks};
-use crate::index::{Input, RegionIndex, Trace, Wide};
 use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{Dispatched, ItemId};
+use crate::query::ItemId;
 
 /// A row of the table of bounds.
 #[non_exhaustive]
@@ -20,27 +19,18 @@ pub struct Bound {
     pub ratio: &'static str,
     /// Makes the task of the bound, with its own copy of the data.
     ///
-    /// `None` if there is nothing to read or copy, or if it needs a structure that
-    /// is not among the subjects.
+    /// `None` if there is nothing to read or copy.
     pub make: for<'a> fn(&Material<'a>) -> Option<TimedTask<'a>>,
 }
 
-/// Queries, structures and answers that a bound is made from.
+/// Queries and answers that a bound is made from.
 pub struct Material<'a> {
     /// The queries that it bounds.
     pub workload: &'a Workload<'a>,
-    /// Structures built on the scene, under the names on the command line.
-    pub subjects: &'a [Subject],
+    /// The kernel that the structures are queried with.
+    pub kernel: Kernel,
     /// Number of items that each camera of the path sees.
     pub visible: Vec<u64>,
-}
-
-impl Material<'_> {
-    /// The kernel that the subjects are queried with.
-    fn kernel(&self) -> Kernel {
-        let first = self.subjects.first();
-        first.map_or_else(Kernel::best, |c| c.spec.execution.kernel)
-    }
 }
 
 /// All bounds, in the order in which they are shown.
@@ -49,8 +39,6 @@ pub static BOUNDS: &[Bound] = rows! { Bound { name, summary, ratio, make }
         "times_read", read;
     "bound-memcpy", "copies as many ids as are visible, 4 bytes each, in one piece",
         "times_memcpy", memcpy;
-    "bound-replay", "reads the blocks and copies the ids that 'wide' does, and tests nothing",
-        "times_replay", replay;
 };
 
 /// One pass over all blocks, as work for a kernel.
@@ -67,7 +55,7 @@ impl Work for Read<'_> {
 
 fn read<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     let blocks = blocks_of(&material.workload.items);
-    let kernel = material.kernel();
+    let kernel = material.kernel;
     let expected = vec![0; material.visible.len()];
     (!blocks.is_empty()).then(|| {
         TimedTask::new(expected, move |_, _| {
@@ -104,22 +92,6 @@ fn memcpy<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     })
 }
 
-/// Only beside `wide` itself. The tree is a copy of its own.
-fn replay<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
-    let is_wide = |c: &&Subject| c.spec.row.info.name == Wide::INFO.name && c.built.is_ok();
-    let wide = material.subjects.iter().find(is_wide)?;
-    let params = serde_json::from_value(wide.spec.params.clone()).ok()?;
-    let tree = Wide::build(&Input::new(&material.workload.items), &params).ok()?;
-    let views = material.workload.views.iter();
-    let traces = views.map(|view| match Dispatched::of(view.as_any()) {
-        Ok(planes) => Trace::of(&tree, &planes),
-        Err(p) => Trace::of(&tree, &p),
-    });
-    let traces: Vec<Trace> = traces.collect();
-    let replay = move |place: usize, out: &mut Vec<_>| traces[place].replay(&tree, out);
-    Some(TimedTask::new(material.visible.clone(), replay))
-}
-
 /// Spreads consecutive places: multiples of 2^32 / golden ratio (Knuth, TAOCP
 /// vol. 3, sec. 6.4).
 fn scattered(place: usize) -> usize {
@@ -129,8 +101,7 @@ fn scattered(place: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::culling::{CameraView, Culling, CullingTest};
-    use crate::index::StructureSpec;
+    use crate::culling::Culling;
     use crate::path::{self, LensDefaults};
     use crate::scene;
 
@@ -139,24 +110,12 @@ mod tests {
         let scene = scene::load("uniform:n=300", &Default::default()).unwrap();
         let path = path::load("orbit:frames=6", &scene, &LensDefaults::default()).unwrap();
         let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
-        let spec = StructureSpec::parse("wide").unwrap();
-        let wide = Subject::build(spec, false, &scene, CullingTest::SixPlane);
-        let index = &wide.built.as_ref().unwrap().items;
-        let seen = |view: &CameraView| {
-            let mut ids = Vec::new();
-            index.query(view.as_any(), &mut ids);
-            ids.len() as u64
-        };
-        let visible: Vec<u64> = workload.views.iter().map(seen).collect();
-        assert!(visible.iter().any(|&v| v > 0));
-        let mut material = Material {
+        let visible: Vec<u64> = (0..6).map(|camera| 40 * camera).collect();
+        let material = Material {
             workload: &workload,
-            subjects: &[],
+            kernel: Kernel::best(),
             visible: visible.clone(),
         };
-        assert!(replay(&material).is_none(), "nothing to replay");
-        let subjects = [wide];
-        material.subjects = &subjects;
         for bound in BOUNDS {
             assert!(
                 crate::measure::METRICS
@@ -208,7 +167,7 @@ mod tests {
         let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
         let material = Material {
             workload: &workload,
-            subjects: &[],
+            kernel: Kernel::best(),
             visible: vec![0, 0],
         };
         assert!(BOUNDS.iter().all(|b| (b.make)(&material).is_none()));

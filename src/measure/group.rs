@@ -15,6 +15,7 @@ use super::{
     Answer, Judged, KeyedSchedule, Notice, PathInfo, Protocol, SceneInfo, Schedule, Status,
     Subject, TIMING, TaskKind, Tasks, Timed, TimedTask, Verdict, Workload, guarded, timed,
 };
+use crate::kernel::Kernel;
 use crate::statistics::{interquartile_mean, median};
 
 /// Reason of what is left out of a scene without items.
@@ -209,9 +210,10 @@ fn add_bounds<'a>(
     visible: &[Answer],
     bounds: &[Bound],
 ) -> Vec<String> {
+    let kernel = subjects.first().map(|s| s.spec.execution.kernel);
     let material = Material {
         workload,
-        subjects,
+        kernel: kernel.unwrap_or_else(Kernel::best),
         visible: visible.iter().map(|a| a.count).collect(),
     };
     let mut names = Vec::new();

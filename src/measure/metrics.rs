@@ -76,7 +76,6 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "times_read", "1", Of::Over("bound-read"), "time of this structure / time of reading all item bounds once \
                         (bound-read); a tree can be below 1";
     "times_memcpy", "1", Of::Over("bound-memcpy"), "time of this structure / time of copying as many ids (bound-memcpy)";
-    "times_replay", "1", Of::Over("bound-replay"), "time of this structure / time of a replay of what 'wide' reads and copies; only beside wide";
     "nodes_tested", "nodes", Of::Count, "node bounds classified per query, mean";
     "planes_tested", "planes", Of::Count, "plane tests per query, of nodes and items, mean";
     "items_tested", "items", Of::Count, "item bounds tested per query, mean";

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::volume::each_volume;
 use super::{AnyVolume, Containment, Predicate, QueryVolume, Recorder};
-use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows, RowMask};
+use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows};
 use crate::kernel::Isa;
 
 /// Any volume of planes, with the verdicts and costs of the volume inside, bit for
@@ -60,10 +60,6 @@ impl QueryVolume for Dispatched<'_> {
     #[inline(never)]
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         each_volume!(self.0, volume => volume.kept_lanes(isa, block, mask))
-    }
-    #[inline(never)]
-    fn rows_read(&self, mask: PlaneMask) -> RowMask {
-        each_volume!(self.0, volume => volume.rows_read(mask))
     }
     /// Does nothing: an untimed query gains nothing by it.
     fn prefetch(&self, _: &BoxBlock, _: PlaneMask) {}

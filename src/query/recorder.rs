@@ -1,6 +1,5 @@
 //! Counters of a query, and the recorder that counts nothing.
 
-use crate::geometry::RowMask;
 use serde::{Deserialize, Serialize};
 
 /// Counts the steps of a query. The calls of [`NoRecorder`] compile to nothing,
@@ -15,10 +14,6 @@ pub trait Recorder {
     /// Bounds of items were tested.
     #[inline(always)]
     fn items_tested(&mut self, _count: u32) {}
-    /// Rows of a block of bounds were read; `block` is its index among all blocks of
-    /// the structure. Only structures that can be replayed report it.
-    #[inline(always)]
-    fn block_read(&mut self, _block: usize, _rows: impl FnOnce() -> RowMask) {}
     /// A subtree was accepted whole: `items` ids without a test of their own.
     #[inline(always)]
     fn subtree_accepted(&mut self, _items: usize) {}

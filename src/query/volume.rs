@@ -5,9 +5,8 @@
 use glam::Vec3;
 
 use crate::geometry::{
-    ALL_ROWS, Aabb, BallFrustum, BallPlane, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes,
-    ConvexVolume, ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, Planes, RelativeVolume,
-    RowMask, Spheres,
+    Aabb, BallFrustum, BallPlane, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes, ConvexVolume,
+    ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, Planes, RelativeVolume, Spheres,
 };
 
 use super::predicate::Bits;
@@ -92,12 +91,6 @@ pub trait QueryVolume: Predicate {
             self.kept_lanes(isa, c, mask),
             self.kept_lanes(isa, d, mask),
         ]
-    }
-
-    /// The rows of a block that [`QueryVolume::kept_lanes`] reads.
-    #[inline(always)]
-    fn rows_read(&self, _mask: PlaneMask) -> RowMask {
-        ALL_ROWS
     }
 
     /// Prefetches the rows of a block that [`QueryVolume::kept_lanes`] reads.
@@ -202,12 +195,6 @@ impl QueryVolume for ConvexVolume {
     #[inline(always)]
     fn all_planes<I: Isa>(&self, isa: I) -> Option<impl Planes<I>> {
         BroadcastPlanes::new(isa, self, self.mask())
-    }
-    #[inline(always)]
-    fn rows_read(&self, mask: PlaneMask) -> RowMask {
-        Bits(mask).fold(0, |rows, plane| {
-            rows | self.p_vertex_of_bit(plane).row_mask()
-        })
     }
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock, mask: PlaneMask) {

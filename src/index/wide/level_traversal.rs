@@ -5,7 +5,7 @@ use std::ops::{ControlFlow, Range};
 
 use super::levels::Layer;
 use super::single_plane_buckets::{BUCKETS, SinglePlaneBuckets};
-use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
+use crate::geometry::{BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::index::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, pass_run};
 use crate::index::items::PaddedIds;
 use crate::kernel::{Isa, pairs, prefetch};
@@ -147,8 +147,6 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
         self.recorder.nodes_tested(lanes.count_ones());
         self.recorder
             .planes_tested(lanes.count_ones() * V::planes_open(mask));
-        self.recorder
-            .block_read(layer.level.first + at, || ALL_ROWS);
         let (kept, open) = self.volume.sorted_lanes(self.isa, &layer.blocks[at], mask);
         let kept = kept & lanes;
         self.recorder
@@ -193,14 +191,8 @@ trait LeafTest<I: Isa> {
     /// The lanes of a leaf that are answers, if they hold an item.
     fn kept(&self, isa: I, leaves: &Layer, leaf: (usize, usize)) -> LaneMask;
 
-    /// Records the test of a leaf that holds `items` items.
-    fn record<R: Recorder>(
-        &self,
-        recorder: &mut R,
-        leaves: &Layer,
-        leaf: (usize, usize),
-        items: u32,
-    );
+    /// Records the test of the i-th leaf, which holds `items` items.
+    fn record<R: Recorder>(&self, recorder: &mut R, i: usize, items: u32);
 }
 
 /// Leaves of a list, tested when the sink requests them.
@@ -250,23 +242,16 @@ impl<I: Isa, T: LeafTest<I>, R: Recorder> Tests<I> for ListedLeaves<'_, '_, T, R
         let at = self.listed[i] as usize;
         let kept = self.test.kept(isa, self.leaves, (i, at));
         let items = self.occupied[at];
-        (self.test).record(self.recorder, self.leaves, (i, at), items.count_ones());
+        self.test.record(self.recorder, i, items.count_ones());
         (at, kept & items)
     }
 }
 
 /// Records the test of a leaf against the planes of a mask.
 #[inline(always)]
-fn record<V: QueryVolume, R: Recorder>(
-    recorder: &mut R,
-    volume: &V,
-    block: usize,
-    mask: PlaneMask,
-    items: u32,
-) {
+fn record<V: QueryVolume, R: Recorder>(recorder: &mut R, _: &V, mask: PlaneMask, items: u32) {
     recorder.items_tested(items);
     recorder.planes_tested(items * V::planes_open(mask));
-    recorder.block_read(block, || volume.rows_read(mask));
 }
 
 /// Nothing to test: the leaves are wholly inside.
@@ -282,7 +267,7 @@ impl<I: Isa> LeafTest<I> for WhollyInside {
     }
 
     #[inline(always)]
-    fn record<R: Recorder>(&self, recorder: &mut R, _: &Layer, _: (usize, usize), items: u32) {
+    fn record<R: Recorder>(&self, recorder: &mut R, _: usize, items: u32) {
         recorder.subtree_accepted(items as usize);
     }
 }
@@ -313,15 +298,8 @@ impl<I: Isa, V: QueryVolume, P: Planes<I>> LeafTest<I> for SinglePlane<'_, V, P>
     }
 
     #[inline(always)]
-    fn record<R: Recorder>(
-        &self,
-        recorder: &mut R,
-        leaves: &Layer,
-        (_, at): (usize, usize),
-        items: u32,
-    ) {
-        let block = leaves.level.first + at;
-        record(recorder, self.volume, block, self.mask, items);
+    fn record<R: Recorder>(&self, recorder: &mut R, _: usize, items: u32) {
+        record(recorder, self.volume, self.mask, items);
     }
 }
 
@@ -350,14 +328,7 @@ impl<I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'_, V> {
     }
 
     #[inline(always)]
-    fn record<R: Recorder>(
-        &self,
-        recorder: &mut R,
-        leaves: &Layer,
-        (i, at): (usize, usize),
-        items: u32,
-    ) {
-        let block = leaves.level.first + at;
-        record(recorder, self.volume, block, self.masks[i], items);
+    fn record<R: Recorder>(&self, recorder: &mut R, i: usize, items: u32) {
+        record(recorder, self.volume, self.masks[i], items);
     }
 }

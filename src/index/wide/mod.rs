@@ -5,7 +5,6 @@ mod auto;
 mod block_order;
 mod level_traversal;
 mod levels;
-mod memory_bound;
 mod moving;
 mod refit;
 mod single_plane_buckets;
@@ -31,7 +30,6 @@ use crate::threads::share;
 
 pub use self::auto::{Auto, AutoParams};
 pub use self::block_order::BlockOrder;
-pub use self::memory_bound::Trace;
 pub use self::moving::Moving;
 
 /// Parameters: `wide:order=median`.
@@ -172,18 +170,6 @@ impl Wide {
     /// Compares two trees bit for bit: ids and blocks.
     pub fn same_as(&self, other: &Wide) -> bool {
         self.ids == other.ids && self.blocks == other.blocks
-    }
-
-    /// The ids of each leaf.
-    #[inline(always)]
-    fn id_rows(&self) -> &[[ItemId; LANES]] {
-        self.ids.rows()
-    }
-
-    /// All blocks, leaves first.
-    #[inline(always)]
-    fn blocks(&self) -> &[BoxBlock] {
-        &self.blocks
     }
 
     /// A level for a traversal; level 0 are the leaves.

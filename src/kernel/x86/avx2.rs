@@ -31,9 +31,11 @@ type Words = [__m256i; 2];
 // instructions.
 // Loads and stores are unaligned ones within their arrays.
 
-/// Elementwise operations on two vectors, written out: `array::from_fn` and `map` are
-/// functions of their own, which a build without link-time optimisation leaves outside
-/// the kernel, compiled without its instructions (seen: a scan 65 times slower).
+/// Elementwise operations on two vectors, written out.
+///
+/// `array::from_fn` and `map` are functions of their own, which a build without link-time
+/// optimisation leaves outside the kernel, compiled without its instructions (seen: a scan
+/// 65 times slower).
 macro_rules! each {
     ($op:expr) => {{
         let of = $op;

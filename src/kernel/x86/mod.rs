@@ -1,4 +1,4 @@
-//! Kernels of x86-64 for processors with AVX2 or AVX-512; the others use plain arrays.
+//! Kernels for x86-64 with AVX2 or AVX-512; other processors use plain arrays.
 //!
 //! The only folder of the crate with unsafe code. Intrinsics are unsafe; they
 //! are sound because a value of each set's type only exists where its

@@ -156,56 +156,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     }
 }
 
-/// The two layers of a tile.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Tile {
-    pub reference: f32,
-    pub working: f32,
-    pub mask: Mask,
-}
-
 impl<const WHOLE: bool> Masked<WHOLE> {
-    /// How many tiles there are.
-    pub(super) fn tiles(&self) -> usize {
-        self.columns * self.rows
-    }
-
-    #[inline(always)]
-    pub(super) fn tile(&self, at: usize) -> Tile {
-        Tile {
-            reference: self.reference[at],
-            working: self.working[at],
-            mask: self.mask[at],
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn set_tile(&mut self, at: usize, tile: &Tile) {
-        self.reference[at] = tile.reference;
-        self.working[at] = tile.working;
-        self.mask[at] = tile.mask;
-    }
-
-    /// The tiles that a rectangle meets, each with the part of it that lies there.
-    pub(super) fn tiles_of(&self, rect: &Rect) -> Vec<(usize, Rect)> {
-        let tiles = |first: u16, last: u16, size: u16| first / size..last / size + 1;
-        let (width, height) = (TILE_WIDTH as u16, TILE_HEIGHT as u16);
-        let mut parts = Vec::new();
-        for row in tiles(rect.y0, rect.y1, height) {
-            for column in tiles(rect.x0, rect.x1, width) {
-                let part = Rect {
-                    x0: rect.x0.max(column * width),
-                    x1: rect.x1.min(column * width + width - 1),
-                    y0: rect.y0.max(row * height),
-                    y1: rect.y1.min(row * height + height - 1),
-                    ..*rect
-                };
-                parts.push((usize::from(row) * self.columns + usize::from(column), part));
-            }
-        }
-        parts
-    }
-
     /// Lanes that are hidden in the row of tiles that contains the pixels of rows `y`.
     ///
     /// Two tiles of the row are tested for `wide` lanes, else one.

@@ -19,7 +19,6 @@ mod rect;
 mod scene;
 #[cfg(test)]
 mod tests;
-mod trace;
 mod view;
 
 pub use buffer::{CullStats, OcclusionBuffer};
@@ -28,7 +27,6 @@ pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use outline::{Coverage, Outline};
 pub use rect::{Candidate, Rect, Rects};
 pub use scene::{Faces, Occluder, OccluderScene};
-pub use trace::FrameTrace;
 pub use view::{Linear, Projection, View};
 
 #[cfg(test)]

@@ -170,11 +170,6 @@ impl OccluderScene {
         let [first, end] = [position, position + 1].map(|at| self.first_occluders[at] as usize);
         &self.occluders[first..end]
     }
-
-    /// All that hides, in tree order.
-    pub fn all_occluders(&self) -> &[Occluder] {
-        &self.occluders
-    }
 }
 
 /// Orders the items so that each run of `capacity` of them (the last may be

@@ -9,7 +9,6 @@ mod pairs;
 mod rules;
 mod slits;
 mod streets;
-mod traces;
 mod two_pass;
 mod windows;
 mod worlds;
