@@ -44,7 +44,13 @@ pub fn descend(mut at: BspChild, below: impl Fn(u32) -> BspChild) -> Option<Item
     }
 }
 
-/// The planes of a map's nodes, for structures that can use them.
+/// Most planes of a map one below another that structures divide by.
+///
+/// Real maps have 13 to 61. A chain of planes would make building quadratic.
+const DEPTH: usize = 256;
+
+/// The planes of a map's nodes, for structures that can use them: a tree as the
+/// readers of maps have checked, down to [`DEPTH`].
 pub fn plane_tree(
     root: BspChild,
     nodes: impl Iterator<Item = (Plane, [BspChild; 2])>,
@@ -57,10 +63,17 @@ pub fn plane_tree(
         plane,
         children: children.map(below),
     });
-    PlaneTree {
-        nodes: nodes.collect(),
-        root: below(root),
+    let mut nodes: Vec<PlaneTreeNode> = nodes.collect();
+    let root = below(root);
+    let mut level = Vec::from_iter(root);
+    for _ in 1..DEPTH {
+        let children = |node: u32| nodes[node as usize].children.into_iter().flatten();
+        level = level.into_iter().flat_map(children).collect();
     }
+    for node in level {
+        nodes[node as usize].children = [None; 2];
+    }
+    PlaneTree { nodes, root }
 }
 
 /// The sign of `normal . p - distance`, exactly.
@@ -250,6 +263,7 @@ fn planar_bounds(polygon: &[DVec2]) -> Aabb {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     fn line(x: f64, y: f64, dx: f64, dy: f64) -> BspNode {
         BspNode {
@@ -257,6 +271,26 @@ mod tests {
             direction: DVec2::new(dx, dy),
             children: [BspChild::Leaf(0), BspChild::Leaf(1)],
         }
+    }
+
+    #[test]
+    fn structures_divide_by_no_long_chain_of_planes() {
+        let deep = |below: u32| BspChild::Node(below);
+        let nodes = (1..=1000).map(|next| {
+            let child = if next < 1000 {
+                deep(next)
+            } else {
+                BspChild::Solid
+            };
+            (Plane::new(Vec3::X, 0.0), [BspChild::Leaf(next), child])
+        });
+        let tree = plane_tree(deep(0), nodes);
+        let mut at = tree.root;
+        let depth = std::iter::from_fn(|| {
+            at = tree.nodes[at? as usize].children[1];
+            Some(())
+        });
+        assert_eq!(depth.count(), DEPTH);
     }
 
     #[test]
