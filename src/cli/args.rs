@@ -352,7 +352,7 @@ pub struct DriftArgs {
     /// Number of steps; errors are shown at 1e3, 1e4, ... and at the last one
     #[arg(long, value_name = "N", default_value = "1e6", value_parser = values::steps)]
     pub steps: u64,
-    /// Largest error after all steps of a method to recommend for turns or orbits
+    /// Largest error after all steps of a method to recommend for camera bases
     #[arg(long, value_name = "RAD", default_value_t = 1e-6, value_parser = values::above_zero)]
     pub tolerance: f64,
     /// Spring arms to study: linear, collision (stiffens when stretched, has a stop)
@@ -373,15 +373,9 @@ pub struct DriftArgs {
         value_parser = values::within(0.01..=1e8)
     )]
     pub stiffness: Vec<f64>,
-    /// Frames per second of the spring arms; tables of errors show the middle one
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        default_value = "30,60,144",
-        value_parser = values::within(1.0..=1e3)
-    )]
-    pub rate: Vec<f64>,
+    /// Frames per second of the spring arms
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = values::whole(1u32..=1000))]
+    pub rate: u32,
     /// Simulated time over which the largest error of a spring arm is taken
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = values::within(1.0..=1e3))]
     pub seconds: f64,

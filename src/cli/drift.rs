@@ -1,7 +1,5 @@
-//! `cullbench drift`: tables of the errors of camera updates (turn, orbit, chase),
-//! of the cost of a step of each, and recommendations.
-
-use std::collections::BTreeMap;
+//! `cullbench drift`: tables of the errors of camera bases and spring arms, of the
+//! cost of a step of each, and recommendations.
 
 use super::args::DriftArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
@@ -14,7 +12,7 @@ use super::text::{self, some, time_plus_minus};
 use super::{Ending, expect_places, print, write_text};
 use crate::drift::{
     self, ARMS, ArmChoice, ArmKind, ArmOptions, ArmPoint, ArmReport, DriftOptions, DriftReport,
-    ORBIT_RADIUS, OrbitDrift, Rated, Recommendation, RotationDrift, SWING_DEG, StabilityLimit,
+    ORBIT_RADIUS, Rated, RotationDrift, StabilityLimit,
 };
 use crate::measure::{ProcessTimes, Protocol, Schedule};
 
@@ -58,12 +56,9 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
 }
 
 fn options(args: &DriftArgs) -> DriftOptions {
-    let once = |typed: &[f64]| {
-        let mut list = typed.to_vec();
-        list.sort_by(f64::total_cmp);
-        list.dedup();
-        list
-    };
+    let mut stiffnesses = args.stiffness.clone();
+    stiffnesses.sort_by(f64::total_cmp);
+    stiffnesses.dedup();
     let mut arms = ArmKind::ALL.to_vec();
     arms.retain(|kind| args.arm.contains(kind));
     DriftOptions {
@@ -71,8 +66,8 @@ fn options(args: &DriftArgs) -> DriftOptions {
         tolerance_rad: args.tolerance,
         arm: ArmOptions {
             arms,
-            stiffnesses: once(&args.stiffness),
-            rates_hz: once(&args.rate),
+            stiffnesses,
+            rate_hz: args.rate,
             seconds: args.seconds,
             tolerance: args.arm_tolerance,
         },
@@ -105,44 +100,29 @@ fn scientific(value: f64) -> String {
 ///
 /// With `all` the errors after each number of steps too.
 fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
-    let (turn, steps) = (report.turn_per_step, steps(report.steps));
+    let [yaw, pitch, roll] = report.turn_per_step;
     let times = match report.processes {
         ..3 => "times without intervals (--processes 10 gives them)",
         _ => "times with 95 % intervals",
     };
-    let mut blocks = vec![Block::line(format!(
-        "Camera updates after {steps} steps: {}, {} in each; {times}.",
-        text::counted(report.processes, "process"),
-        text::counted(report.rounds, "round"),
-    ))];
-    let turns = format!(
-        "Camera bases turned by yaw {}, pitch {} and roll {} degrees per step",
-        turn.yaw_deg, turn.pitch_deg, turn.roll_deg
-    );
-    let swing = format!("Orbits: an eye carried around by {SWING_DEG:.3} degrees per step");
-    for (heading, methods, error, tables) in [
-        (
-            turns,
-            &report.rotation_methods,
-            "error",
-            rotations as Tables,
-        ),
-        (swing, &report.orbit_methods, "error / radius", orbits),
-    ] {
-        blocks.push(Block::Heading(2, heading));
-        if all {
-            blocks.extend(tables(report));
-        }
-        let rated = rated(methods, error, report.tolerance_rad, all);
-        blocks.push(Block::Table(rated));
+    let mut blocks = vec![
+        Block::line(format!(
+            "Camera updates after {} steps: {}, {} in each; {times}.",
+            steps(report.steps),
+            text::counted(report.processes, "process"),
+            text::counted(report.rounds, "round"),
+        )),
+        Block::heading(format!(
+            "Camera bases turned by yaw {yaw}, pitch {pitch} and roll {roll} degrees per step"
+        )),
+    ];
+    if all {
+        blocks.extend(rotations(report));
     }
+    blocks.push(Block::Table(rated(report, all)));
     blocks.extend(arm_blocks(&report.arm, all));
     blocks.push(Block::heading("Conclusions:"));
-    let bases = (&report.rotation_methods, &report.recommended_rotation);
-    let eyes = (&report.orbit_methods, &report.recommended_orbit);
-    for (what, (methods, choice)) in [("a camera base", bases), ("an orbit", eyes)] {
-        blocks.push(Block::Line(recommended(what, methods, choice)));
-    }
+    blocks.push(Block::Line(recommended(report)));
     blocks.extend(arm_conclusions(&report.arm).map(Block::Line));
     if !all {
         let more = "errors by number of steps, orders, stability: --all";
@@ -151,17 +131,17 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
     blocks
 }
 
-/// Tables of errors after each number of steps.
-type Tables = fn(&DriftReport) -> Vec<Block>;
+/// Title of a table of errors, and its cell.
+type Errors = (&'static str, fn(&RotationDrift) -> f64);
 
-/// Errors of bases after each number of steps.
+/// Errors of bases after each number of steps: a row per method, a column per number.
 fn rotations(report: &DriftReport) -> Vec<Block> {
     let note = format!(
         "Each figure is the largest of the {} steps that end there, a period between two \
          corrections. The orbit has radius {ORBIT_RADIUS}; the eye hangs on the base.",
         report.period_steps
     );
-    let figures: [Errors<RotationDrift>; 4] = [
+    let figures: [Errors; 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
         ("angular error in rad after", |d| d.angle_error_rad),
         ("position error on an orbit after", |d| {
@@ -169,88 +149,55 @@ fn rotations(report: &DriftReport) -> Vec<Block> {
         }),
         ("radius error of an orbit after", |d| d.orbit_radius_error),
     ];
+    let grid = |(title, error): Errors| {
+        let drifts = report.rotation.iter();
+        let cell = |d: &RotationDrift| [d.method.into(), steps(d.steps), scientific(error(d))];
+        Block::Table(Table::grid(title, drifts.map(cell)))
+    };
     let by_turns = report.one_degree_turns.iter().map(|d| {
         let turns = text::counted(d.turns as usize, "turn");
-        [
-            d.method.to_owned(),
-            turns,
-            format!("{:.3e}", d.angle_error_rad),
-        ]
+        [d.method.into(), turns, format!("{:.3e}", d.angle_error_rad)]
     });
     let by_turns = Table::grid("by 1 degree per step: error in rad after", by_turns);
     let mut blocks = vec![Block::Line(note)];
-    blocks.extend(errors(&figures, &report.rotation, |d| (d.method, d.steps)));
+    blocks.extend(figures.map(grid));
     blocks.push(Block::Table(by_turns));
     blocks
 }
 
-/// Errors of carried eyes after each number of steps.
-fn orbits(report: &DriftReport) -> Vec<Block> {
-    let figures: [Errors<OrbitDrift>; 2] = [
-        ("position error after", |d| d.position_error),
-        ("radius error after", |d| d.radius_error),
-    ];
-    errors(&figures, &report.orbit, |d| (d.method, d.steps)).collect()
-}
-
-/// Title of a table of errors, and its cell.
-type Errors<T> = (&'static str, fn(&T) -> f64);
-
-/// A table per error: a row per method, a column per number of steps.
-fn errors<T>(
-    figures: &[Errors<T>],
-    rows: &[T],
-    of: fn(&T) -> (&'static str, u64),
-) -> impl Iterator<Item = Block> {
-    figures.iter().map(move |(title, error)| {
-        let cells = rows.iter().map(|row| {
-            let (method, count) = of(row);
-            [method.to_owned(), steps(count), scientific(error(row))]
-        });
-        Block::Table(Table::grid(title, cells))
-    })
-}
-
 /// Methods with error and time; with `all` a line about each.
-fn rated(methods: &[Rated], error: &str, tolerance: f64, all: bool) -> Table {
+fn rated(report: &DriftReport, all: bool) -> Table {
     let columns: [Column<&Rated>; 5] = [
         ("method", |r| {
             let default = if r.is_default { " (default)" } else { "" };
             format!("{}{default}", r.name)
         }),
-        (">error", |r| {
-            r.error.map_or("unstable".to_owned(), scientific)
-        }),
+        (">error", |r| scientific(r.error)),
         (">time per step", |r| time_plus_minus(r.time_per_step)),
         ("", |r| if r.qualifies { "yes" } else { "no" }.to_owned()),
         ("", |r| r.summary.to_owned()),
     ];
     let shown = if all { columns.len() } else { 4 };
-    let mut table = Table::with(methods, &columns[..shown]);
-    error.clone_into(&mut table.header[1]);
-    table.header[3] = format!("within {tolerance:e}");
+    let mut table = Table::with(&report.rotation_methods, &columns[..shown]);
+    table.header[3] = format!("within {:e}", report.tolerance_rad);
     table
 }
 
-/// A recommendation with its figures.
-fn recommended(what: &str, methods: &[Rated], choice: &Recommendation) -> String {
-    let Some(name) = &choice.name else {
-        return format!("Recommended for {what}: nothing, {}.", choice.reason);
-    };
-    let row = methods.iter().find(|row| row.name == name);
-    let figures = some(row, |row| {
-        let error = some(row.error, scientific);
+/// The recommended way to turn, with its figures.
+fn recommended(report: &DriftReport) -> String {
+    let choice = &report.recommended_rotation;
+    let name = choice.name.as_deref().unwrap_or("nothing");
+    let mut methods = report.rotation_methods.iter();
+    let figures = some(methods.find(|row| row.name == name), |row| {
         let time = time_plus_minus(row.time_per_step);
-        format!(" ({time} per step, error {error})")
+        format!(" ({time} per step, error {})", scientific(row.error))
     });
-    format!(
-        "Recommended for {what}: {name}{figures}, {}.",
-        choice.reason
-    )
+    let reason = &choice.reason;
+    format!("Recommended for a camera base: {name}{figures}, {reason}.")
 }
 
 /// Method of each arm; with `all` errors, orders and limits of stability as well.
-pub fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
+fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
     let mut blocks = vec![
         Block::heading("Spring arms, critically damped, behind a moving target"),
         Block::line(format!(
@@ -262,7 +209,7 @@ pub fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
     for (arm, name, what) in ARMS {
         if all && report.points.iter().any(|p| p.setting.arm == arm) {
             blocks.push(Block::Heading(3, format!("{name} arm: {what}")));
-            let title = format!("{name}, {} Hz, within {:e}", rate(report), report.tolerance);
+            let title = format!("{name}, within {:e}", report.tolerance);
             let cell = |own: &[&ArmPoint]| within(own, report.tolerance);
             blocks.push(Block::Table(by_stiffness(report, arm, &title, cell)));
             let title = format!("{name}, observed order");
@@ -272,8 +219,8 @@ pub fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
     if all {
         blocks.push(Block::line(
             "Orders are the powers of the step by which a method's own error falls from each \
-             number of steps to the next; ! is half a power or more below the classical order: \
-             steps are not far below 1/omega, or the arm meets the stop.",
+             number of steps to the next. They are not the classical ones where steps are not far \
+             below 1/omega, and where the arm meets the stop.",
         ));
         blocks.push(Block::Table(stability(&report.stability)));
     }
@@ -281,43 +228,23 @@ pub fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
     blocks
 }
 
-/// Methods to take, each with the number of settings it is the choice of.
-pub fn arm_conclusions(report: &ArmReport) -> impl Iterator<Item = String> {
-    ARMS.iter().filter_map(|(arm, name, _)| {
-        let own = report.choices.iter().filter(|c| c.setting.arm == *arm);
-        let own: Vec<&ArmChoice> = own.collect();
-        let first = own.first()?;
-        let mut methods = BTreeMap::<&str, usize>::new();
-        for choice in &own {
-            *methods
-                .entry(choice.method.unwrap_or("nothing"))
-                .or_default() += 1;
-        }
-        let mut methods: Vec<_> = methods.into_iter().collect();
-        methods.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-        let told = match methods[..] {
-            [(method, _)] => format!("{method}, {}", first.choice.reason),
-            _ => {
-                let each = methods
-                    .iter()
-                    .map(|(name, count)| format!("{name} in {count}"));
-                format!(
-                    "{} of {} settings, the cheapest with an error within {:e}",
-                    each.collect::<Vec<_>>().join(", "),
-                    own.len(),
-                    report.tolerance
-                )
-            }
-        };
-        Some(format!("Recommended for a {name} arm: {told}."))
-    })
-}
-
-/// The frame rate in the middle, the one of errors and orders.
-fn rate(report: &ArmReport) -> f64 {
-    let mut rates: Vec<f64> = report.choices.iter().map(|c| c.setting.rate_hz).collect();
-    rates.sort_by(f64::total_cmp);
-    rates.get(rates.len() / 2).copied().unwrap_or(f64::NAN)
+/// The method to take for each stiffness of each arm.
+fn arm_conclusions(report: &ArmReport) -> impl Iterator<Item = String> {
+    report
+        .choices
+        .chunk_by(|a, b| a.setting.arm == b.setting.arm)
+        .map(|own| {
+            let each = own.iter().map(|c| {
+                let name = c.choice.name.as_deref().unwrap_or("nothing");
+                format!("{name} at k={:e}", c.setting.stiffness)
+            });
+            format!(
+                "Recommended for a {} arm: {}, the cheapest with an error within {:e}.",
+                own[0].setting.arm.name(),
+                each.collect::<Vec<_>>().join(", "),
+                report.tolerance
+            )
+        })
 }
 
 /// A table of an arm: a row per method, a column per stiffness.
@@ -327,9 +254,7 @@ fn by_stiffness(
     title: &str,
     cell: impl Fn(&[&ArmPoint]) -> String,
 ) -> Table {
-    let shown = (arm, rate(report));
-    let points = report.points.iter();
-    let points = points.filter(|p| (p.setting.arm, p.setting.rate_hz) == shown);
+    let points = report.points.iter().filter(|p| p.setting.arm == arm);
     let points: Vec<&ArmPoint> = points.collect();
     let is_same = |a: &&ArmPoint, b: &&ArmPoint| (a.setting, a.method) == (b.setting, b.method);
     let cells = points.chunk_by(is_same).map(|own| {
@@ -341,30 +266,25 @@ fn by_stiffness(
 
 /// "x4: 1.2e-4, 3.21 us" of the cheapest that is precise enough, or the nearest.
 fn within(points: &[&ArmPoint], tolerance: f64) -> String {
-    let stable = || points.iter().filter_map(|p| Some((p.position_error?, *p)));
+    let error = |point: &&&ArmPoint| point.position_error;
     let time = |point: &ArmPoint| point.us_per_second.map_or(f64::INFINITY, |us| us.value);
-    let good = stable().filter(|(error, _)| *error <= tolerance);
-    if let Some((error, point)) = good.min_by(|a, b| time(a.1).total_cmp(&time(b.1))) {
-        let time = point.us_per_second.map(|us| text::time(us.value * 1e3));
-        return format!(
-            "x{}: {error:.1e}, {}",
-            point.substeps,
-            time.unwrap_or_default()
-        );
-    }
-    match stable().min_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((error, point)) => format!("no: x{} {error:.1e}", point.substeps),
-        None => "unstable".to_owned(),
+    let good = points.iter().filter(|p| error(p) <= tolerance);
+    let best = good.min_by(|a, b| time(a).total_cmp(&time(b)));
+    let sound = points.iter().filter(|p| !error(p).is_nan());
+    match (best, sound.min_by(|a, b| error(a).total_cmp(&error(b)))) {
+        (Some(p), _) => {
+            let time = some(p.us_per_second, |us| text::time(us.value * 1e3));
+            format!("x{}: {:.1e}, {time}", p.substeps, p.position_error)
+        }
+        (None, Some(p)) => format!("no: x{} {:.1e}", p.substeps, p.position_error),
+        (None, None) => "unstable".to_owned(),
     }
 }
 
-/// "1.98 2.00", with "!" where the order is reduced.
+/// "1.98 2.00".
 fn orders(points: &[&ArmPoint]) -> String {
-    let order = |p: &&ArmPoint| {
-        let mark = if p.order_reduced { "!" } else { "" };
-        p.observed_order.map(|order| format!("{order:.1}{mark}"))
-    };
-    let orders: Vec<String> = points.iter().filter_map(order).collect();
+    let orders = points.iter().filter_map(|p| p.observed_order);
+    let orders: Vec<String> = orders.map(|order| format!("{order:.1}")).collect();
     orders.join(" ")
 }
 
@@ -372,24 +292,10 @@ fn stability(limits: &[StabilityLimit]) -> Table {
     let cells = limits.iter().map(|limit| {
         let shown = limit.limit_omega_h.map(|limit| format!("{limit:.4}"));
         let shown = shown.unwrap_or("always".to_owned());
-        [
-            limit.method.to_owned(),
-            format!("zeta={}", limit.damping_ratio),
-            shown,
-        ]
+        let damping = format!("zeta={}", limit.damping_ratio);
+        [limit.method.to_owned(), damping, shown]
     });
-    let critical = limits.iter().filter(|limit| limit.damping_ratio == 1.0);
-    let left = critical.map(|limit| {
-        let share = limit.stiffest_left_per_step;
-        let unstable = if share.abs() > 1.0 { ", unstable" } else { "" };
-        let head = "left per step at 16.7, zeta=1".to_owned();
-        [
-            limit.method.to_owned(),
-            head,
-            format!("{share:.1e}{unstable}"),
-        ]
-    });
-    Table::grid("stable while omega h <", cells.chain(left))
+    Table::grid("stable while omega h <", cells)
 }
 
 /// The method of each arm; with `all` the reasons too.
@@ -419,15 +325,11 @@ fn choices(report: &ArmReport, all: bool) -> Table {
 
 /// Time and error, if the point has both.
 fn at(point: &ArmPoint) -> Option<[f64; 2]> {
-    // A logarithmic axis has no zero.
-    let at = [
-        point.us_per_second?.value * 1e3,
-        point.position_error?.max(1e-16),
-    ];
+    let at = [point.us_per_second?.value * 1e3, point.position_error];
     at.iter().all(|value| is_drawn(*value)).then_some(at)
 }
 
-pub fn arm_figures(report: &ArmReport) -> Vec<Figure> {
+fn arm_figures(report: &ArmReport) -> Vec<Figure> {
     let places = || report.points.iter().filter_map(at);
     let settings = report.points.chunk_by(|a, b| a.setting == b.setting);
     let figure = |points: &[ArmPoint]| {
@@ -466,10 +368,11 @@ pub fn arm_figures(report: &ArmReport) -> Vec<Figure> {
     settings.map(figure).collect()
 }
 
-/// All as one picture: a row per arm and stiffness, a column per rate.
-pub fn draw(report: &ArmReport) -> String {
-    let mut rates: Vec<f64> = report.points.iter().map(|p| p.setting.rate_hz).collect();
-    rates.sort_by(f64::total_cmp);
-    rates.dedup();
-    picture(&arm_figures(report), rates.len().max(1))
+/// All as one picture: a row per arm, a column per stiffness.
+fn draw(report: &ArmReport) -> String {
+    let linear = report
+        .choices
+        .iter()
+        .filter(|c| c.setting.arm == report.choices[0].setting.arm);
+    picture(&arm_figures(report), linear.count().max(1))
 }

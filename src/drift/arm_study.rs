@@ -6,18 +6,18 @@ use std::hint::black_box;
 
 use serde::Serialize;
 
-use super::arm::{Arm, ArmKind, Chase, EXACT, Line, METHODS, Method, State, rk4, rk4_of_sine};
-use super::exact::linear_way;
+use super::arm::{Arm, ArmKind, Chase, Line, METHODS, Method, State, rk4, rk4_of_sine};
+use super::exact::larger;
 use super::frames::task;
-use super::rated::{Candidate, Recommendation, recommended, small_margin};
+use super::rated::{Recommendation, recommended};
 use crate::measure::{OverProcesses, TimedTask};
 use crate::statistics::{Estimate, flat};
 
+/// Steps per frame that each method is tried with.
+const SUBSTEPS: [u32; 5] = [1, 2, 4, 16, 64];
+
 /// Damping ratios that limits are found for.
 const DAMPING_RATIOS: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
-
-/// `omega h` of the stiffest arm of interest: k = 1e6 at 60 frames per second.
-const STIFFEST: f64 = 1e3 / 60.0;
 
 /// A method that is stable up to here is stable always.
 const ALWAYS: f64 = 1e4;
@@ -25,57 +25,26 @@ const ALWAYS: f64 = 1e4;
 /// Slack of the conditions of stability, for rounding.
 const SLACK: f64 = 1e-12;
 
-/// Relative distance of two eigenvalues below which they are one.
+/// Tests that an error does not grow behind a target at rest, where `omega` is one.
 ///
-/// The discriminant of a double one is the rounding of its terms.
-const DOUBLE: f64 = 1e-9;
-
-/// Trace and determinant of the matrix of one step, for a target at rest at zero.
-/// `omega` is one and `h` is `omega_h`.
-fn trace_and_determinant(method: &Method, zeta: f64, omega_h: f64) -> (f64, f64) {
+/// Both eigenvalues of the matrix of one step lie in the unit circle by Jury's conditions
+/// `|trace| <= 1 + det` and `det <= 1`, which need no square root.
+fn is_stable(method: &Method, zeta: f64, h: f64) -> bool {
     let arm = Arm {
         stiffness: 1.0,
         friction: 2.0 * zeta,
         stiffening: 0.0,
         stop: f64::INFINITY,
     };
-    let rest = Line {
-        start: 0.0,
-        base: 0.0,
-        speed: 0.0,
-    };
-    let column = |start| Chase {
-        arm,
-        start,
-        frames: vec![rest],
-        frame_s: omega_h,
-    };
-    let column = |start| column(start).states(method.follow, 1)[0];
+    let column = |start| (method.step)(&arm, &Line::default(), 0.0, start, h);
     let ([a, c], [b, d]) = (column([1.0, 0.0]), column([0.0, 1.0]));
-    (a + d, a * d - b * c)
-}
-
-/// Tests that both eigenvalues lie in the unit circle: Jury's conditions
-/// `|trace| <= 1 + det` and `det <= 1`, which need no square root.
-fn is_stable(method: &Method, zeta: f64, omega_h: f64) -> bool {
-    let (trace, determinant) = trace_and_determinant(method, zeta, omega_h);
+    let (trace, determinant) = (a + d, a * d - b * c);
     trace.abs() <= 1.0 + determinant + SLACK && determinant <= 1.0 + SLACK
-}
-
-/// The eigenvalue of largest size, or the size of a complex pair.
-fn left_per_step(method: &Method, zeta: f64, omega_h: f64) -> f64 {
-    let (trace, determinant) = trace_and_determinant(method, zeta, omega_h);
-    let middle = trace / 2.0;
-    match middle * middle - determinant {
-        apart if apart.abs() <= DOUBLE * middle * middle => middle,
-        apart if apart < 0.0 => determinant.sqrt(),
-        apart => middle + apart.sqrt().copysign(middle),
-    }
 }
 
 /// The least `omega h` where a method is no longer stable, by growing steps and
 /// bisection; `None` if it is stable up to [`ALWAYS`].
-pub fn limit(method: &Method, zeta: f64) -> Option<f64> {
+fn limit(method: &Method, zeta: f64) -> Option<f64> {
     let (mut good, mut bad) = (1e-3, 1e-3);
     while is_stable(method, zeta, bad) {
         (good, bad) = (bad, bad * 1.01);
@@ -102,10 +71,6 @@ pub struct StabilityLimit {
     pub damping_ratio: f64,
     /// `None` if it is stable always.
     pub limit_omega_h: Option<f64>,
-    /// The share of an error that one step leaves at the highest stiffness:
-    /// negative if its sign alternates (the camera rings), above one in size
-    /// if unstable.
-    pub stiffest_left_per_step: f64,
 }
 
 pub fn limits() -> Vec<StabilityLimit> {
@@ -116,7 +81,6 @@ pub fn limits() -> Vec<StabilityLimit> {
         method: method.name,
         damping_ratio: zeta,
         limit_omega_h: limit(method, zeta),
-        stiffest_left_per_step: left_per_step(method, zeta, STIFFEST),
     })
     .collect()
 }
@@ -124,12 +88,12 @@ pub fn limits() -> Vec<StabilityLimit> {
 /// Scope of the study.
 #[derive(Clone, Debug)]
 pub struct ArmOptions {
-    /// Kinds of arm, each with every stiffness and rate.
+    /// Kinds of arm, each with every stiffness.
     pub arms: Vec<ArmKind>,
     /// k in 1/s^2.
     pub stiffnesses: Vec<f64>,
     /// Frames per second.
-    pub rates_hz: Vec<f64>,
+    pub rate_hz: u32,
     /// Simulated time that errors are the maxima of.
     pub seconds: f64,
     /// Largest position error of a recommended method.
@@ -159,18 +123,14 @@ pub struct ArmPoint {
     pub method: &'static str,
     /// Equal steps per frame.
     pub substeps: u32,
-    /// Largest distance from the arm's true way at the ends of all frames; null if it
+    /// Largest distance from the arm's true way at the ends of all frames; NaN if it
     /// blew up.
-    pub position_error: Option<f64>,
-    /// The same of the velocity, per second.
-    pub velocity_error: Option<f64>,
-    /// The same of the position, from the way behind straight lines between frame ends:
-    /// the method's own share of `position_error`.
-    pub own_error: Option<f64>,
+    pub position_error: f64,
+    /// The same from the way behind straight lines between frame ends: the method's own
+    /// share of `position_error`.
+    pub own_error: f64,
     /// Power of the step by which `own_error` falls from the number of steps before.
     pub observed_order: Option<f64>,
-    /// Half a power or more below the classical order.
-    pub order_reduced: bool,
     /// Thread CPU time per simulated second, with its 95 % interval.
     #[serde(flatten, serialize_with = "flat::us_per_second")]
     pub us_per_second: Option<Estimate>,
@@ -193,113 +153,81 @@ pub struct ArmChoice {
     pub choice: Recommendation,
 }
 
-/// Every arm, stiffness and rate.
+/// Every arm with every stiffness.
 pub fn settings(options: &ArmOptions) -> Vec<Setting> {
-    let mut all = Vec::new();
-    for &arm in &options.arms {
-        for &stiffness in &options.stiffnesses {
-            let setting = |&rate_hz: &f64| Setting {
-                arm,
-                stiffness,
-                rate_hz,
-                omega_h: stiffness.sqrt() / rate_hz,
-            };
-            all.extend(options.rates_hz.iter().map(setting));
-        }
-    }
-    all
+    let rate_hz = f64::from(options.rate_hz);
+    let of = |&arm: &ArmKind| {
+        let stiffnesses = options.stiffnesses.iter();
+        stiffnesses.map(move |&stiffness| Setting {
+            arm,
+            stiffness,
+            rate_hz,
+            omega_h: stiffness.sqrt() / rate_hz,
+        })
+    };
+    options.arms.iter().flat_map(of).collect()
 }
 
-impl Setting {
-    fn chase(&self, seconds: f64) -> Chase {
-        Chase::new(self.arm, self.stiffness, self.rate_hz, seconds)
-    }
-
-    /// Methods with their numbers of steps, those that make a difference on this arm.
-    fn efforts(&self) -> impl Iterator<Item = (&'static Method, u32)> + use<> {
-        let is_linear = self.arm == ArmKind::Linear;
-        let of = |method: &'static Method| method.substeps.iter().map(move |n| (method, *n));
-        let all = METHODS.iter().flat_map(of);
-        all.filter(move |(method, n)| !is_linear || method.name != EXACT || *n == 1)
-    }
+/// Every method with every number of steps per frame.
+fn efforts() -> impl Iterator<Item = (&'static Method, u32)> {
+    METHODS
+        .iter()
+        .flat_map(|method| SUBSTEPS.map(|n| (method, n)))
 }
 
 /// `omega h` of the steps of the reference: RK4 is then off by less than 1e-12.
 const REFERENCE_STEP: f64 = 1e-3;
 
-/// The true way of an arm, and its way behind straight lines between frame ends.
-fn ways(setting: &Setting, chase: &Chase) -> [Vec<State>; 2] {
-    let count = (setting.omega_h / REFERENCE_STEP).ceil() as u32;
-    let truth = match setting.arm {
-        ArmKind::Linear => linear_way(setting.stiffness.sqrt(), chase.frame_s, chase.frames.len()),
-        ArmKind::Collision => chase.states(rk4_of_sine, count),
-    };
-    [truth, chase.states(rk4, count)]
-}
-
-/// Size of a state that has blown up, in units of the arm's own motion.
+/// An error of something that has blown up, in units of the arm's own motion.
 const BLOWN_UP: f64 = 1e3;
 /// Errors below this are rounding and have no order.
 const LEAST_ORDERED: f64 = 1e-11;
-/// Distance from the classical order that counts as a reduced order.
-const REDUCED_BY: f64 = 0.5;
 
 /// The errors of all points of a setting.
 pub fn errors(setting: Setting, seconds: f64) -> Vec<ArmPoint> {
-    let chase = setting.chase(seconds);
-    let [truth, own_way] = ways(&setting, &chase);
-    let fastest = BLOWN_UP * setting.stiffness.sqrt().max(1.0);
+    let chase = Chase::new(setting.arm, setting.stiffness, setting.rate_hz, seconds);
+    let count = (setting.omega_h / REFERENCE_STEP).ceil() as u32;
+    let truth = match setting.arm {
+        ArmKind::Linear => chase.linear_way(),
+        ArmKind::Collision => chase.states(rk4_of_sine, count),
+    };
+    let behind_lines = chase.states(rk4, count);
     let mut points: Vec<ArmPoint> = Vec::new();
-    for (method, substeps) in setting.efforts() {
-        let states = chase.states(method.follow, substeps);
-        // Asked this way round so that NaN is not sound.
-        let is_sound = |[x, v]: &State| x.abs() < BLOWN_UP && v.abs() < fastest;
-        let is_sound = states.iter().all(is_sound);
-        let off = |way: &[State], i: usize| {
-            let apart = states.iter().zip(way).map(|(a, b)| (a[i] - b[i]).abs());
-            is_sound.then(|| apart.fold(0.0, f64::max))
+    for (method, substeps) in efforts() {
+        let states = chase.states(method.step, substeps);
+        let off = |way: &[State]| {
+            let apart = states.iter().zip(way).map(|(a, b)| (a[0] - b[0]).abs());
+            let worst = apart.fold(0.0, larger);
+            if worst < BLOWN_UP { worst } else { f64::NAN }
         };
-        let own_error = off(&own_way, 0);
+        let own_error = off(&behind_lines);
         let fewer = points.last().filter(|last| last.method == method.name);
-        let fewer = fewer.and_then(|last| Some((last.own_error?, last.substeps)));
-        let order = own_error.filter(|now| *now >= LEAST_ORDERED).zip(fewer);
-        let order = order.map(|(now, (before, fewer))| {
-            libm::log(before / now) / libm::log(f64::from(substeps) / f64::from(fewer))
+        let order = fewer.map(|fewer| {
+            let shorter = f64::from(substeps) / f64::from(fewer.substeps);
+            libm::log(fewer.own_error / own_error) / libm::log(shorter)
         });
         points.push(ArmPoint {
             setting,
             method: method.name,
             substeps,
-            position_error: off(&truth, 0),
-            velocity_error: off(&truth, 1),
+            position_error: off(&truth),
             own_error,
-            observed_order: order,
-            order_reduced: order.is_some_and(|order| order < f64::from(method.order) - REDUCED_BY),
+            observed_order: order.filter(|o| o.is_finite() && own_error >= LEAST_ORDERED),
             us_per_second: None,
         });
     }
     points
 }
 
-/// Steps of one query, about: a round is some tens of microseconds.
-const STEPS: usize = 750;
-
-/// Tasks of all points of a setting, each with the simulated seconds of a query.
-///
-/// They time the arm on its way in.
-pub fn tasks(setting: Setting) -> impl Iterator<Item = (TimedTask<'static>, f64)> {
-    setting.efforts().map(move |(method, substeps)| {
-        let chase = setting.chase(1.0);
-        let repeats = STEPS.div_ceil(chase.frames.len() * substeps as usize);
-        let seconds = chase.frame_s * (chase.frames.len() * repeats) as f64;
-        let run = move || {
-            for _ in 0..repeats {
-                (method.follow)(black_box(&chase), substeps, &mut |y| {
-                    black_box(y);
-                });
-            }
-        };
-        (task(run), seconds)
+/// Tasks of all points of a setting: a query is the first second, the arm on its way in.
+pub fn tasks(setting: Setting) -> impl Iterator<Item = TimedTask<'static>> {
+    efforts().map(move |(method, substeps)| {
+        let chase = Chase::new(setting.arm, setting.stiffness, setting.rate_hz, 1.0);
+        task(move || {
+            black_box(&chase).follow(method.step, substeps, |y| {
+                black_box(y);
+            });
+        })
     })
 }
 
@@ -314,31 +242,20 @@ pub fn conclude(
 ) -> Option<ArmChoice> {
     let setting = points.first()?.setting;
     let mut candidates = Vec::new();
-    for ((task, point), (_, seconds)) in (first..).zip(&mut *points).zip(tasks(setting)) {
-        if let Some(error) = point.position_error {
-            let ln_ns = times.ln_ns(task).into_iter();
-            candidates.push(Candidate {
-                name: point.label(),
-                error,
-                ln_ns: ln_ns.map(|ns| ns - seconds.ln()).collect(),
-            });
-            point.us_per_second = times.ns(task).map(|ns| ns.per(1e3 * seconds));
+    for (task, point) in (first..).zip(&mut *points) {
+        candidates.push((point.label(), point.position_error, times.ln_ns(task)));
+        if !point.position_error.is_nan() {
+            point.us_per_second = times.ns(task).map(|ns| ns.per(1e3));
         }
     }
     let rule = format!("an error within {tolerance:e}");
-    let mut choice = recommended(&candidates, tolerance, &rule);
+    let choice = recommended(&candidates, tolerance, &rule);
     let is_taken = |point: &&ArmPoint| choice.name.as_ref() == Some(&point.label());
     let taken = points.iter().find(is_taken);
-    let free = taken.and_then(|point| {
-        let method = METHODS.iter().find(|method| method.name == point.method);
-        let step = setting.omega_h / f64::from(point.substeps);
-        Some(1.0 - step / limit(method?, 1.0)?)
-    });
-    choice.reason += &small_margin("its step", "the limit of stability", free);
     Some(ArmChoice {
         setting,
         method: taken.map(|point| point.method),
-        position_error: taken.and_then(|point| point.position_error),
+        position_error: taken.map(|point| point.position_error),
         us_per_second: taken.and_then(|point| Some(point.us_per_second?.value)),
         choice,
     })
@@ -404,37 +321,9 @@ mod tests {
                 let limit = found("rk4").expect("a limit");
                 assert!((rk4_left(zeta, limit) - 1.0).abs() < 1e-9, "{limit}");
             }
-            for name in ["implicit-euler", "tr-bdf2", "exact-linear"] {
+            for name in ["implicit-euler", "implicit-midpoint", "exact-linear"] {
                 assert_eq!(found(name), None, "{name} is stable always");
             }
         }
-    }
-
-    /// At critical damping R(-omega h) is a double eigenvalue.
-    ///
-    /// It is 1 + z for explicit Euler, 1/(1 - z) for implicit Euler, exp(z), and for TR-BDF2
-    /// `(1 + (sqrt(2) - 1) z) / (1 - (1 - 1/sqrt(2)) z)^2`, which is below zero from
-    /// `omega h = sqrt(2) + 1` on and tends to zero from below.
-    #[test]
-    fn the_share_that_is_left_has_its_sign() {
-        let root = std::f64::consts::SQRT_2;
-        for h in [1e-3, 0.5, 2.4, 2.42, 1e1, STIFFEST, 1e3, 1e4] {
-            let z: f64 = -h;
-            let tr_bdf2 = (1.0 + (root - 1.0) * z) / (1.0 - (1.0 - 1.0 / root) * z).powi(2);
-            assert_eq!(tr_bdf2 < 0.0, h > root + 1.0);
-            for (name, wanted) in [
-                ("explicit-euler", 1.0 + z),
-                ("implicit-euler", 1.0 / (1.0 - z)),
-                ("tr-bdf2", tr_bdf2),
-            ] {
-                let left = left_per_step(method(name), 1.0, h);
-                assert!(
-                    (left - wanted).abs() < 1e-5 * wanted.abs(),
-                    "{name} {h}: {left:e}"
-                );
-            }
-        }
-        let left = left_per_step(method("exact-linear"), 1.0, STIFFEST);
-        assert!((left / libm::exp(-STIFFEST) - 1.0).abs() < 1e-9, "{left:e}");
     }
 }

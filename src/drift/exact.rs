@@ -1,16 +1,12 @@
-//! References in arithmetic of about 200 bits: rotations with the errors of an
-//! approximate one, and the way of a linear spring arm.
+//! The exact turn in arithmetic of about 200 bits, and how far axes are from it.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 use crate::arithmetic::{Expansion, exact};
 
 /// Leading doubles kept of every number: about 2e-63 relative. Raised to the
 /// power 1e10, that still leaves more than 50 digits.
 const TERMS: usize = 4;
-
-/// Changes of a series that end it: below the last digit of one.
-const NEGLIGIBLE: f64 = 1e-70;
 
 /// Sine and cosine of an angle in degrees.
 ///
@@ -22,119 +18,43 @@ fn sin_cos_degrees(degrees: &Expansion) -> (Expansion, Expansion) {
     exact::sin_cos(&radians.leading(TERMS), TERMS)
 }
 
-/// Position and velocity of the linear arm at the ends of frames.
-///
-/// The arm is `x'' = omega^2 (sin t - x) - 2 omega x'`, from rest at one.
-/// Position, velocity, sine and cosine of the time are one linear system: each frame
-/// multiplies them by the exponential of its matrix.
-pub fn linear_way(omega: f64, frame_s: f64, frames: usize) -> Vec<[f64; 2]> {
-    let square = Expansion::product(omega, omega);
-    let mut rates = Matrix::from_entries(|_, _| Expansion::ZERO);
-    rates.0[0][1] = 1.0.into();
-    rates.0[1] = [-&square, (-2.0 * omega).into(), square, Expansion::ZERO];
-    rates.0[2][3] = 1.0.into();
-    rates.0[3][2] = (-1.0).into();
-    let step = rates.scaled(&frame_s.into()).exponential();
-    let mut state: [Expansion; 4] = [1.0, 0.0, 0.0, 1.0].map(Expansion::from);
-    let frame = |_| {
-        state = step.applied(&state);
-        [state[0].estimate(), state[1].estimate()]
-    };
-    (0..frames).map(frame).collect()
-}
-
-/// A square matrix of numbers of 200 bits. The columns of a camera basis are u, v
-/// and n.
+/// Columns of numbers of 200 bits: u, v and n of a camera basis.
 #[derive(Clone, Debug)]
-pub struct Matrix<const N: usize = 3>([[Expansion; N]; N]);
+pub struct Matrix([exact::ExactVector; 3]);
 
-impl<const N: usize> Matrix<N> {
+impl Matrix {
     fn from_entries(entry: impl Fn(usize, usize) -> Expansion) -> Self {
-        let row = |i| std::array::from_fn(|j| entry(i, j));
-        Matrix(std::array::from_fn(row))
+        let column = |j| std::array::from_fn(|i| entry(i, j));
+        Matrix(std::array::from_fn(column))
     }
 
     pub fn identity() -> Self {
-        Matrix::from_entries(|i, j| Expansion::from(f64::from(u8::from(i == j))))
-    }
-
-    fn scaled(&self, factor: &Expansion) -> Self {
-        Matrix::from_entries(|i, j| (&self.0[i][j] * factor).leading(TERMS))
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        Matrix::from_entries(|i, j| (&self.0[i][j] + &other.0[i][j]).leading(TERMS))
-    }
-
-    pub fn times(&self, other: &Self) -> Self {
-        let columns = other.transposed().0.map(|column| self.applied(&column));
-        Matrix(columns).transposed()
-    }
-
-    /// The product with a column.
-    fn applied(&self, column: &[Expansion; N]) -> [Expansion; N] {
-        let sum = |row: &[Expansion; N]| {
-            let products = row.iter().zip(column).map(|(a, b)| (a * b).leading(TERMS));
-            let sum = products.fold(Expansion::ZERO, |sum, product| &sum + &product);
-            sum.leading(TERMS)
-        };
-        self.0.each_ref().map(sum)
+        DMat3::IDENTITY.into()
     }
 
     fn transposed(&self) -> Self {
-        Matrix::from_entries(|i, j| self.0[j][i].clone())
+        Matrix::from_entries(|i, j| self.0[i][j].clone())
+    }
+
+    /// The product of the transpose with another matrix.
+    fn transposed_times(&self, other: &Self) -> Self {
+        let entry = |i: usize, j: usize| exact::dot(&self.0[i], &other.0[j]);
+        Matrix::from_entries(|i, j| entry(i, j).leading(TERMS))
+    }
+
+    pub fn times(&self, other: &Self) -> Self {
+        self.transposed().transposed_times(other)
     }
 
     /// The matrix `exponent` times over, by repeated squaring.
-    pub fn power(&self, mut exponent: u64) -> Self {
-        let (mut power, mut square) = (Matrix::identity(), self.clone());
-        while exponent > 0 {
-            if exponent & 1 == 1 {
-                power = power.times(&square);
-            }
-            square = square.times(&square);
-            exponent >>= 1;
-        }
-        power
-    }
-
-    /// The exponential: halved until its series converges, then squared as often.
-    fn exponential(&self) -> Self {
-        let size = self.largest_difference(&Matrix::from_entries(|_, _| Expansion::ZERO));
-        let halvings = (size.log2().ceil() as i32 + 4).max(0);
-        let small = Matrix::from_entries(|i, j| self.0[i][j].scaled(-halvings));
-        let (mut sum, mut term, mut n) = (Matrix::identity(), Matrix::identity(), 0.0);
-        loop {
-            n += 1.0;
-            let next = term.times(&small);
-            term = Matrix::from_entries(|i, j| next.0[i][j].over(n, TERMS));
-            let longer = sum.plus(&term);
-            if longer.largest_difference(&sum) <= NEGLIGIBLE {
-                return (0..halvings).fold(longer, |power, _| power.times(&power));
-            }
-            sum = longer;
+    pub fn power(&self, exponent: u64) -> Self {
+        match exponent {
+            0 => Matrix::identity(),
+            _ if exponent & 1 == 1 => self.power(exponent - 1).times(self),
+            _ => self.times(self).power(exponent / 2),
         }
     }
 
-    /// Largest entry of `X^T X - I`: zero for a rotation.
-    pub fn orthogonality_error(&self) -> f64 {
-        let gram = self.transposed().times(self);
-        gram.largest_difference(&Matrix::identity())
-    }
-
-    pub fn largest_difference(&self, other: &Self) -> f64 {
-        let entries = self.0.iter().flatten().zip(other.0.iter().flatten());
-        let differences = entries.map(|(a, b)| (a - b).estimate().abs());
-        differences.fold(0.0, larger)
-    }
-}
-
-/// The larger of two errors. NaN is the largest: `max` would lose it.
-pub fn larger(a: f64, b: f64) -> f64 {
-    if b > a || b.is_nan() { b } else { a }
-}
-
-impl Matrix {
     /// The turn by exact degrees about the axis 0, 1 or 2, counter-clockwise.
     pub fn about(axis: usize, degrees: &Expansion) -> Self {
         let (sin, cos) = sin_cos_degrees(degrees);
@@ -142,67 +62,16 @@ impl Matrix {
         let mut turn = Matrix::identity();
         turn.0[next][next] = cos.clone();
         turn.0[last][last] = cos;
-        turn.0[next][last] = -&sin;
-        turn.0[last][next] = sin;
+        turn.0[last][next] = -&sin;
+        turn.0[next][last] = sin;
         turn
     }
 
-    /// Length of the difference of two columns, and how much longer than one
-    /// the column of `self` is.
-    pub fn column_error(&self, exact: &Matrix, column: usize) -> (f64, f64) {
-        let (mut square, mut length) = (0.0, Expansion::from(-1.0));
-        for row in 0..3 {
-            let entry = &self.0[row][column];
-            square += (entry - &exact.0[row][column]).estimate().powi(2);
-            length = &length + &(entry * entry).leading(TERMS);
-        }
-        // |x| - 1 = (|x|^2 - 1)/(|x| + 1), without cancellation.
-        let longer = length.estimate();
-        (square.sqrt(), longer / ((longer + 1.0).sqrt() + 1.0))
-    }
-
-    /// The nearest rotation (polar factor) by Newton's iteration
-    /// X(3I - X^T X)/2 (Higham 1986, eq. 3.1 in its inverse-free form); `None`
-    /// if there is none to find.
-    fn nearest_rotation(&self) -> Option<Matrix> {
-        let sum: f64 = self.0.iter().flatten().map(|e| e.estimate().powi(2)).sum();
-        // Scaled so that the squares of the singular values add to 3: each is
-        // then below sqrt(3), where the iteration converges.
-        let scale = (3.0 / sum).sqrt();
-        if !scale.is_finite() {
-            return None;
-        }
-        let mut x = self.scaled(&scale.into());
-        for _ in 0..100 {
-            let gram = x.transposed().times(&x);
-            if gram.largest_difference(&Matrix::identity()) < 1e-40 {
-                return Some(x);
-            }
-            let step = Matrix::from_entries(|i, j| {
-                let three = Expansion::from(if i == j { 3.0 } else { 0.0 });
-                &(&three - &gram.0[i][j]) * &Expansion::from(0.5)
-            });
-            x = x.times(&step);
-        }
-        None
-    }
-
-    /// The angle in radians between the rotation nearest to `self` and an
-    /// exact one; NaN if there is no nearest one.
-    pub fn angle_to(&self, exact: &Matrix) -> f64 {
-        let Some(nearest) = self.nearest_rotation() else {
-            return f64::NAN;
-        };
-        let between = exact.transposed().times(&nearest).0;
-        // trace = 1 + 2 cos; the antisymmetric part is sin times the axis.
-        // Together they give every angle to full precision.
-        let mut square = 0.0;
-        for (i, j) in [(1, 2), (2, 0), (0, 1)] {
-            square += ((&between[i][j] - &between[j][i]).estimate() / 2.0).powi(2);
-        }
-        let diagonal = &(&between[0][0] + &between[1][1]) + &between[2][2];
-        let cos = (&diagonal - &Expansion::from(1.0)).estimate() / 2.0;
-        square.sqrt().atan2(cos)
+    /// What the matrix has beyond the identity, rounded.
+    fn beyond_identity(&self) -> DMat3 {
+        let one = |i, j| Expansion::from(if i == j { 1.0 } else { 0.0 });
+        let entry = |i: usize, j: usize| (&self.0[j][i] - &one(i, j)).estimate();
+        DMat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| entry(i, j))))
     }
 }
 
@@ -212,10 +81,71 @@ impl From<DMat3> for Matrix {
     }
 }
 
+/// The larger of two errors. NaN is the largest: `max` would lose it.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}
+
+fn largest(matrix: &DMat3) -> f64 {
+    let sizes = matrix.to_cols_array().map(f64::abs);
+    sizes.into_iter().fold(0.0, larger)
+}
+
+/// Most steps of Newton's iteration: in more, the rounding of a zero grows to one.
+const MOST_STEPS: u32 = 60;
+
+/// Errors of axes X that ought to be R, without cancellation.
+///
+/// Largest entry of `X^T X - I`, which is zero for a rotation; the angle in radians;
+/// length of the difference of n; how much longer than one n is.
+pub fn errors(axes: DMat3, exact: &Matrix) -> [f64; 4] {
+    let axes = Matrix::from(axes);
+    let gram = axes.transposed_times(&axes).beyond_identity();
+    let off = exact.transposed_times(&axes).beyond_identity();
+    // |n| - 1 = (|n|^2 - 1)/(|n| + 1).
+    let longer = gram.z_axis.z;
+    let longer = longer / ((longer + 1.0).sqrt() + 1.0);
+    [
+        largest(&gram),
+        angle(off),
+        off.z_axis.length(),
+        longer.abs(),
+    ]
+}
+
+/// The angle of the rotation nearest to I + E (its polar factor); NaN if there is none.
+///
+/// Newton's iteration Y(3I - Y^T Y)/2 (Higham 1986, eq. 3.1 in its inverse-free form)
+/// for Y = I + E, in terms of E: an angle of any size keeps its digits.
+fn angle(mut off: DMat3) -> f64 {
+    // Scaled so that the squares of the singular values add to 3: each is
+    // then below sqrt(3), where the iteration converges.
+    let entries = (DMat3::IDENTITY + off).to_cols_array();
+    let scale = (3.0 / entries.iter().map(|x| x * x).sum::<f64>()).sqrt();
+    off = off * scale + DMat3::IDENTITY * (scale - 1.0);
+    for _ in 0..MOST_STEPS {
+        let gram = off + off.transpose() + off.transpose() * off;
+        if largest(&gram) < 1e-14 {
+            // trace = 1 + 2 cos; the antisymmetric part is sin times the axis.
+            // Together they give every angle to full precision.
+            let apart = off - off.transpose();
+            let twice = DVec3::new(apart.y_axis.z, apart.z_axis.x, apart.x_axis.y);
+            let trace = off.x_axis.x + off.y_axis.y + off.z_axis.z;
+            return (twice.length() / 2.0).atan2(1.0 + trace / 2.0);
+        }
+        off = off - gram * 0.5 - off * gram * 0.5;
+    }
+    f64::NAN
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
+    fn apart(a: &Matrix, b: &Matrix) -> f64 {
+        let entries = a.0.iter().flatten().zip(b.0.iter().flatten());
+        let apart = entries.map(|(a, b)| (a - b).estimate().abs());
+        apart.fold(0.0, larger)
+    }
 
     fn degrees(value: f64) -> Expansion {
         Expansion::from(value)
@@ -290,7 +220,7 @@ mod tests {
         let sum = |a: &Expansion, b: &Expansion| (a + b).leading(TERMS);
         let product = |a: &Expansion, b: &Expansion| (&(a * b) * &two).leading(TERMS);
         let minus = |a: Expansion| -&a;
-        Matrix([
+        let rows = Matrix([
             [
                 diagonal(y, z),
                 sum(&product(x, y), &minus(product(w, z))),
@@ -306,18 +236,17 @@ mod tests {
                 sum(&product(y, z), &product(w, x)),
                 diagonal(x, y),
             ],
-        ])
+        ]);
+        rows.transposed()
     }
 
     #[test]
     fn the_power_agrees_with_quaternions_step_by_step() {
         for steps in [1, 2, 7, 2000] {
-            let off = step()
-                .power(steps)
-                .largest_difference(&by_quaternions(steps));
+            let off = apart(&step().power(steps), &by_quaternions(steps));
             assert!(off < 1e-50, "{steps}: {off:e}");
         }
-        assert_eq!(step().power(0).largest_difference(&Matrix::identity()), 0.0);
+        assert_eq!(apart(&step().power(0), &Matrix::identity()), 0.0);
     }
 
     #[test]
@@ -326,15 +255,16 @@ mod tests {
         // powers: 10^7 = 3^14 + 5217031.
         let about = Matrix::about(2, &degrees(0.7)).power(10_000_000);
         let closed = Matrix::about(2, &Expansion::product(0.7, 1e7));
-        assert!(about.largest_difference(&closed) < 1e-45);
+        assert!(apart(&about, &closed) < 1e-45);
         let mut cubed = step();
         for _ in 0..14 {
             cubed = cubed.times(&cubed).times(&cubed);
         }
         let split = cubed.times(&step().power(5_217_031));
         let whole = step().power(10_000_000);
-        assert!(whole.largest_difference(&split) < 1e-45);
-        assert!(whole.orthogonality_error() < 1e-45);
+        assert!(apart(&whole, &split) < 1e-45);
+        let gram = whole.transposed_times(&whole);
+        assert!(apart(&gram, &Matrix::identity()) < 1e-45);
     }
 
     #[test]
@@ -349,69 +279,33 @@ mod tests {
                 2.828_620_622_082_605e-17,
             ),
         ] {
-            let entry = &step().power(steps).0[0][2];
+            let entry = &step().power(steps).0[2][0];
             let off = &(entry - &Expansion::from(high)) - &Expansion::from(low);
             assert!(off.estimate().abs() < 1e-32, "{steps}: {off:?}");
         }
     }
 
     #[test]
-    fn angles_are_measured_from_1e_20_to_pi() {
-        let base = step().power(12_345);
-        for angle in [1e-20, 1e-9, 0.3, 90.0, 179.999_999, 180.0] {
-            let off = base.times(&Matrix::about(1, &degrees(angle)));
-            let found = off.angle_to(&base).to_degrees();
-            assert!((found / angle - 1.0).abs() < 1e-9, "{angle}: {found}");
-        }
-        // Stretching is no turning, and twenty per cent of it are no problem.
+    fn angles_are_measured_from_1e_15_to_pi() {
+        // Axes that are exactly so: the reference is what is turned.
         let stretched = DMat3::from_diagonal(DVec3::new(1.2, 1.0, 0.9));
-        let turn = base.times(&Matrix::about(0, &degrees(0.3)));
-        let found = turn.times(&Matrix::from(stretched)).angle_to(&base);
-        assert!((found.to_degrees() / 0.3 - 1.0).abs() < 1e-12, "{found}");
-        let off = Matrix::from(stretched);
-        assert!(off.angle_to(&Matrix::identity()) < 1e-30);
-        assert!((off.orthogonality_error() - 0.44).abs() < 1e-12);
-        let (far, longer) = off.column_error(&Matrix::identity(), 0);
-        assert!((far - 0.2).abs() < 1e-12 && (longer - 0.2).abs() < 1e-12);
-        let (far, longer) = off.column_error(&Matrix::identity(), 2);
-        assert!((far - 0.1).abs() < 1e-12 && (longer + 0.1).abs() < 1e-12);
-        for nothing in [DMat3::ZERO, DMat3::from_diagonal(DVec3::X), DMat3::NAN] {
-            assert!(Matrix::from(nothing).angle_to(&base).is_nan());
-        }
-        assert!(Matrix::from(DMat3::NAN).orthogonality_error().is_nan());
-    }
-
-    #[test]
-    fn the_chase_of_a_sine_is_that_of_another_program() {
-        // Position and velocity by the closed form with 50 digits, from (1, 0).
-        for (stiffness, t, wanted) in [
-            (
-                1e2,
-                0.25,
-                [0.373_848_712_904_617_2, -1.346_139_945_323_537_3],
-            ),
-            (
-                1e2,
-                2.0,
-                [0.964_056_336_238_460_4, -0.225_591_948_837_311_96],
-            ),
-            (
-                1e4,
-                0.25,
-                [0.227_955_377_434_252_8, 0.973_568_851_059_739_9],
-            ),
-            (
-                1e6,
-                2.0,
-                [0.910_126_990_946_457_1, -0.414_326_996_892_246_4],
-            ),
-        ] {
-            for frames in [1, 64] {
-                let way = linear_way(f64::sqrt(stiffness), t / frames as f64, frames);
-                for (found, wanted) in way[frames - 1].into_iter().zip(wanted) {
-                    assert!((found - wanted).abs() < 4e-16, "{stiffness} {t}: {found}");
-                }
+        for degree in [1e-15, 1e-9, 0.3, 90.0, 179.999_999, 180.0] {
+            for axes in [DMat3::IDENTITY, stretched] {
+                let [_, found, ..] = errors(axes, &Matrix::about(1, &degrees(degree)));
+                let found = found.to_degrees();
+                assert!((found / degree - 1.0).abs() < 1e-9, "{degree}: {found}");
             }
         }
+        let shear = DMat3::from_cols(DVec3::X, DVec3::new(1e-5, 1.0, 0.0), DVec3::Z);
+        let [_, found, ..] = errors(shear, &Matrix::identity());
+        assert!((found / libm::atan(0.5e-5) - 1.0).abs() < 1e-9, "{found}");
+        let found = errors(stretched, &Matrix::identity());
+        for (found, wanted) in found.into_iter().zip([0.44, 0.0, 0.1, 0.1]) {
+            assert!((found - wanted).abs() < 1e-12, "{found}");
+        }
+        for nothing in [DMat3::ZERO, DMat3::from_diagonal(DVec3::X), DMat3::NAN] {
+            assert!(errors(nothing, &step())[1].is_nan());
+        }
+        assert!(errors(DMat3::NAN, &step())[0].is_nan());
     }
 }

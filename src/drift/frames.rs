@@ -1,40 +1,25 @@
-//! Ways to keep a camera basis while it is turned step by step, in both precisions.
+//! Ways to keep a camera basis while it is turned step by step.
 //!
-//! Also ways to carry an eye around a centre; walks of many equal steps, with looks on the
-//! way, as tasks of the timed pass.
+//! Walks of many equal steps, with looks on the way, as tasks of the timed pass.
 
 use std::f64::consts::PI;
 use std::hint::black_box;
 
-use glam::{DMat3, DVec3};
-use serde::Serialize;
+use glam::{DMat3, DVec3, Quat, Vec3};
+use single::{DEGREE, LEVEL, sin_cos, turned, wide};
 
 use crate::camera::{self, look_at};
 use crate::measure::TimedTask;
 
-/// The turn of every step: yaw, pitch and roll in degrees about the camera's
-/// own axes, in this order, as [`crate::camera::Frame`] turns. The doubles are taken
-/// as exact.
-#[derive(Clone, Copy, Default, Debug, Serialize)]
-pub struct Turn {
-    /// About the camera's v, degrees per step.
-    pub yaw_deg: f64,
-    /// About the camera's u, degrees per step.
-    pub pitch_deg: f64,
-    /// About the camera's n, degrees per step.
-    pub roll_deg: f64,
-}
+/// Yaw, pitch and roll of every step, in degrees about the camera's own axes, in this
+/// order, as [`camera::Frame`] turns. The doubles are taken as exact.
+pub type Turn = [f64; 3];
 
-impl Turn {
-    /// A turn by yaw, pitch and roll in degrees.
-    pub const fn new(yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> Turn {
-        Turn {
-            yaw_deg,
-            pitch_deg,
-            roll_deg,
-        }
-    }
-}
+/// Slow and about no axis in particular.
+pub const STEADY: Turn = [0.7, 0.3, 0.1];
+
+/// A 360th of a turn to the left.
+pub const ONE_DEGREE: Turn = [1.0, 0.0, 0.0];
 
 /// Takes equal steps: the axes after each of the ascending numbers of them.
 pub type Walk = fn(&Turn, &[u64]) -> Vec<DMat3>;
@@ -63,7 +48,7 @@ pub fn walk<W, S, P>(
 /// Queries of a round of the timed pass: all the same.
 pub const QUERIES: usize = 8;
 
-/// Steps of a frame or an eye in one query.
+/// Steps of a frame in one query.
 pub const QUERY_STEPS: u64 = 500;
 
 /// A task of the timed pass that asks for nothing.
@@ -72,8 +57,8 @@ pub fn task(run: impl Fn() + 'static) -> TimedTask<'static> {
 }
 
 /// The task of [`QUERY_STEPS`] equal steps.
-pub fn walking(walk: Walk, by: Turn) -> TimedTask<'static> {
-    task(move || drop(walk(&by, &[QUERY_STEPS])))
+pub fn walking(walk: Walk) -> TimedTask<'static> {
+    task(move || drop(walk(&STEADY, &[QUERY_STEPS])))
 }
 
 /// Corrections of the axes of a frame.
@@ -84,47 +69,33 @@ pub const POLAR: u8 = 2;
 /// Rotations between two polar corrections, as in the toolkit's camera.
 pub const CORRECT_EVERY: u32 = 100;
 
-/// Units of summed angles.
-pub const RADIANS: u8 = 0;
-pub const DEGREES: u8 = 1;
-pub const WRAPPED: u8 = 2;
-
-/// Distance from the centre of the orbit to the eye. A camera that looks at
-/// the centre has its eye at `centre + 10 n`.
-pub const ORBIT_RADIUS: f64 = 10.0;
-
-const CENTRE: DVec3 = DVec3::new(5.0, -1.0, 2.0);
-const START: DVec3 = DVec3::new(CENTRE.x + ORBIT_RADIUS, CENTRE.y, CENTRE.z);
-
-/// The same text in both precisions. Every step gets its angles as if from a mouse,
-/// and takes their sines and cosines.
+/// The same text in both precisions.
 macro_rules! precision {
-    ($module:ident, $real:ident, $vector:ident, $quaternion:ident, $matrix:ident, $sin:path, $cos:path) => {
+    ($module:ident, $real:ident, $vector:ident, $matrix:ident, $sin:path, $cos:path) => {
         pub mod $module {
-            use glam::{$matrix, $quaternion, $vector};
+            use glam::{$matrix, $vector};
 
             use crate::drift::frames::*;
 
             #[inline(always)]
-            fn sin_cos(radians: $real) -> ($real, $real) {
+            pub fn sin_cos(radians: $real) -> ($real, $real) {
                 ($sin(radians), $cos(radians))
             }
 
             /// Degrees to radians, by one rounded factor.
-            const DEGREE: $real = std::f64::consts::PI as $real / 180.0;
+            pub const DEGREE: $real = PI as $real / 180.0;
 
-            fn wide(axes: [$vector; 3]) -> DMat3 {
+            pub const LEVEL: [$vector; 3] = [$vector::X, $vector::Y, $vector::Z];
+
+            pub fn wide(axes: [$vector; 3]) -> DMat3 {
                 DMat3::from_cols_array_2d(&axes.map(|axis| axis.to_array().map(f64::from)))
             }
 
-            /// u, v and n after yaw, pitch and roll with these sines and
-            /// cosines: the formulas of `camera::controls`, inlined as those are.
+            /// u, v and n after yaw, pitch and roll in radians: the formulas of
+            /// `camera::controls`, inlined as those are.
             #[inline(always)]
-            fn turned(
-                [mut u, mut v, mut n]: [$vector; 3],
-                by: [($real, $real); 3],
-            ) -> [$vector; 3] {
-                let [(sin, cos), pitch, roll] = by;
+            pub fn turned([mut u, mut v, mut n]: [$vector; 3], by: [$real; 3]) -> [$vector; 3] {
+                let [(sin, cos), pitch, roll] = by.map(sin_cos);
                 (n, u) = (n * cos + u * sin, u * cos - n * sin);
                 let (sin, cos) = pitch;
                 (v, n) = (v * cos + n * sin, n * cos - v * sin);
@@ -133,18 +104,11 @@ macro_rules! precision {
                 [u, v, n]
             }
 
-            #[inline(always)]
-            fn degrees(turn: &Turn) -> [$real; 3] {
-                [turn.yaw_deg, turn.pitch_deg, turn.roll_deg].map(|angle| angle as $real)
-            }
-
-            const LEVEL: [$vector; 3] = [$vector::X, $vector::Y, $vector::Z];
-
-            /// Axes that are turned in place.
+            /// Axes that are turned in place. Every step gets its angles as if from a
+            /// mouse, and takes their sines and cosines.
             pub fn frame<const CORRECTION: u8>(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
                 let step = |(axes, rotations): &mut ([$vector; 3], u32), turn: &Turn| {
-                    let by = degrees(turn).map(|angle| sin_cos(angle * DEGREE));
-                    *axes = turned(*axes, by);
+                    *axes = turned(*axes, turn.map(|angle| angle as $real * DEGREE));
                     if CORRECTION == GRAM_SCHMIDT {
                         let [u, _, n] = *axes;
                         let n = n.normalize();
@@ -164,112 +128,53 @@ macro_rules! precision {
                 };
                 walk((LEVEL, 0), turn, looks, step, |(axes, _)| wide(*axes))
             }
-
-            /// A quaternion that is multiplied by the step's.
-            pub fn quaternion(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
-                let step = |q: &mut $quaternion, turn: &Turn| {
-                    let half = degrees(turn).map(|angle| sin_cos(angle * DEGREE * 0.5));
-                    let yaw = $quaternion::from_xyzw(0.0, half[0].0, 0.0, half[0].1);
-                    let pitch = $quaternion::from_xyzw(half[1].0, 0.0, 0.0, half[1].1);
-                    let roll = $quaternion::from_xyzw(0.0, 0.0, half[2].0, half[2].1);
-                    *q = (*q * (yaw * pitch * roll)).normalize();
-                };
-                let axes = |q: &$quaternion| wide(LEVEL.map(|axis| *q * axis));
-                walk($quaternion::IDENTITY, turn, looks, step, axes)
-            }
-
-            /// Sums of angles, and the axes that follow from them.
-            pub fn angles<const KIND: u8>(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
-                let step = |(sums, axes): &mut ([$real; 3], [$vector; 3]), turn: &Turn| {
-                    for (sum, angle) in sums.iter_mut().zip(degrees(turn)) {
-                        *sum += angle * if KIND == RADIANS { DEGREE } else { 1.0 };
-                        if KIND == WRAPPED && sum.abs() >= 360.0 {
-                            // No rounding: the rest needs no more bits.
-                            *sum %= 360.0;
-                        }
-                    }
-                    let unit = if KIND == RADIANS { 1.0 } else { DEGREE };
-                    *axes = turned(LEVEL, sums.map(|sum| sin_cos(sum * unit)));
-                };
-                walk(([0.0; 3], LEVEL), turn, looks, step, |(_, axes)| {
-                    wide(*axes)
-                })
-            }
-
-            /// An eye that is turned about the centre; `RESTORED` corrects its distance.
-            pub fn carried<const RESTORED: bool>(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
-                let [centre, start] = [CENTRE, START].map(|p| p.to_array().map(|x| x as $real));
-                let (centre, start) = ($vector::from(centre), $vector::from(start));
-                let step = |eye: &mut $vector, turn: &Turn| {
-                    let (sin, cos) = sin_cos(turn.yaw_deg as $real * DEGREE / 2.0);
-                    let turn = $quaternion::from_xyzw(0.0, 0.0, sin, cos);
-                    let mut offset = turn * (*eye - centre);
-                    if RESTORED {
-                        offset = offset.normalize() * ORBIT_RADIUS as $real;
-                    }
-                    *eye = centre + offset;
-                };
-                let place = |eye: &$vector| from_centre(eye.to_array().map(f64::from).into());
-                walk(start, turn, looks, step, place)
-            }
         }
     };
 }
 
-precision!(single, f32, Vec3, Quat, Mat3, libm::sinf, libm::cosf);
-precision!(double, f64, DVec3, DQuat, DMat3, libm::sin, libm::cos);
+precision!(single, f32, Vec3, Mat3, libm::sinf, libm::cosf);
+precision!(double, f64, DVec3, DMat3, libm::sin, libm::cos);
 
-/// The offset of an eye from the centre, in radii, as column u.
-fn from_centre(eye: DVec3) -> DMat3 {
-    DMat3::from_cols((eye - CENTRE) / ORBIT_RADIUS, DVec3::ZERO, DVec3::ZERO)
-}
-
-/// Orbit of this toolkit's camera.
-pub fn toolkit_orbit(by: &Turn, looks: &[u64]) -> Vec<DMat3> {
-    let frame = look_at(START, CENTRE, DVec3::Z);
-    let frame = frame.expect("two points and an up vector make a frame");
-    let step = |frame: &mut camera::Frame, by: &Turn| {
-        let turned = frame.orbit(CENTRE, DVec3::Z, by.yaw_deg, 0.0);
-        turned.expect("the z axis is an axis");
+/// An f32 quaternion that is multiplied by the step's.
+pub fn quaternion(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+    let step = |q: &mut Quat, turn: &Turn| {
+        let half = turn.map(|angle| sin_cos(angle as f32 * DEGREE * 0.5));
+        let yaw = Quat::from_xyzw(0.0, half[0].0, 0.0, half[0].1);
+        let pitch = Quat::from_xyzw(half[1].0, 0.0, 0.0, half[1].1);
+        let roll = Quat::from_xyzw(0.0, 0.0, half[2].0, half[2].1);
+        *q = (*q * (yaw * pitch * roll)).normalize();
     };
-    walk(frame, by, looks, step, |frame| from_centre(frame.eye))
+    let axes = |q: &Quat| wide(LEVEL.map(|axis| *q * axis));
+    walk(Quat::IDENTITY, turn, looks, step, axes)
 }
 
-/// An eye that is computed from the sum of its angles.
-pub fn summed_orbit(by: &Turn, looks: &[u64]) -> Vec<DMat3> {
-    let step = |(sum, eye): &mut (f64, DVec3), by: &Turn| {
-        *sum = (*sum + by.yaw_deg) % 360.0;
-        let angle = sum.to_radians();
-        let direction = DVec3::new(libm::cos(angle), libm::sin(angle), 0.0);
-        *eye = CENTRE + direction * ORBIT_RADIUS;
+/// Sums of f32 angles in radians, and the axes that follow from them.
+pub fn radians(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+    let step = |(sums, axes): &mut ([f32; 3], [Vec3; 3]), turn: &Turn| {
+        *sums = [0, 1, 2].map(|k| sums[k] + turn[k] as f32 * DEGREE);
+        *axes = turned(LEVEL, *sums);
     };
-    walk((0.0, START), by, looks, step, |(_, eye)| from_centre(*eye))
+    let axes = |(_, axes): &([f32; 3], [Vec3; 3])| wide(*axes);
+    walk(([0.0; 3], LEVEL), turn, looks, step, axes)
 }
 
-/// Basis of this toolkit's camera.
-pub fn toolkit(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
-    stretched(turn, looks, 1.0)
-}
-
-/// The same with the angles of the lecture's programs.
-pub fn lecture(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
-    #[expect(clippy::approx_constant, reason = "it is what is measured")]
-    const STRETCH: f64 = 3.142 / PI;
-    stretched(turn, looks, STRETCH)
-}
-
+/// Basis of this toolkit's camera, with angles that are stretched.
 #[inline(always)]
-fn stretched(turn: &Turn, looks: &[u64], stretch: f64) -> Vec<DMat3> {
+pub fn toolkit(turn: &Turn, looks: &[u64], stretch: f64) -> Vec<DMat3> {
     let level = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y);
     let level = level.expect("two points and an up vector make a frame");
     let step = |frame: &mut camera::Frame, turn: &Turn| {
-        frame.yaw(turn.yaw_deg * stretch);
-        frame.pitch(turn.pitch_deg * stretch);
-        frame.roll(turn.roll_deg * stretch);
+        frame.yaw(turn[0] * stretch);
+        frame.pitch(turn[1] * stretch);
+        frame.roll(turn[2] * stretch);
     };
     let axes = |frame: &camera::Frame| DMat3::from_cols(frame.u(), frame.v(), frame.n());
     walk(level, turn, looks, step, axes)
 }
+
+/// The lecture's programs take pi for this.
+#[expect(clippy::approx_constant, reason = "it is what is measured")]
+pub const LECTURE: f64 = 3.142 / PI;
 
 #[cfg(test)]
 mod tests {
@@ -277,12 +182,8 @@ mod tests {
 
     #[test]
     fn looks_are_taken_after_exactly_so_many_steps() {
-        let by = Turn {
-            yaw_deg: 3.0,
-            ..Turn::default()
-        };
-        let step = |at: &mut f64, by: &Turn| *at += by.yaw_deg;
-        let places = walk(5.0, &by, &[0, 1, 10, 10, 12], step, |at| *at);
+        let step = |at: &mut f64, by: &f64| *at += by;
+        let places = walk(5.0, &3.0, &[0, 1, 10, 10, 12], step, |at| *at);
         assert_eq!(places, [5.0, 8.0, 35.0, 35.0, 41.0]);
     }
 }

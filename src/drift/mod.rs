@@ -13,17 +13,18 @@ use serde::Serialize;
 pub use arm::Method as ArmMethod;
 pub use arm::{ARMS, ArmKind};
 pub use arm_study::{ArmChoice, ArmOptions, ArmPoint, StabilityLimit};
-pub use frames::{ORBIT_RADIUS, Turn};
-pub use rated::{Rated, Recommendation};
-pub use rotation::{OrbitDrift, PERIOD, RotationDrift, SWING_DEG, TurnDrift};
+pub use frames::Turn;
+pub use rated::Recommendation;
+pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 
 use crate::measure::{
     OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed_rounds, timed_to_end,
 };
+use crate::statistics::{Estimate, flat};
 use exact::larger;
-use frames::{QUERIES, QUERY_STEPS, walking};
-use rated::rated;
-use rotation::{CARRIERS, METHODS, Method, STEADY, SWING, moments};
+use frames::{QUERIES, QUERY_STEPS, STEADY, walking};
+use rated::recommended;
+use rotation::{METHODS, Method, Period, TOOLKIT};
 
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
 pub const MOST_STEPS: u64 = 1_000_000_000;
@@ -36,8 +37,7 @@ const TURNS: [u64; 2] = [1, 1000];
 pub struct DriftOptions {
     /// Up to how many steps.
     pub steps: u64,
-    /// Largest error of a recommended method after all of them: a frame's angle
-    /// in radians and orthogonality, an eye's distance in radii.
+    /// Largest angle in radians and orthogonality of a recommended method after all of them.
     pub tolerance_rad: f64,
     /// Which spring arms are studied.
     pub arm: ArmOptions,
@@ -60,6 +60,24 @@ pub struct ArmReport {
     pub choices: Vec<ArmChoice>,
 }
 
+/// A way to turn as a point of error against time.
+#[derive(Debug, Serialize)]
+pub struct Rated {
+    /// Name in tables and JSON.
+    pub name: &'static str,
+    /// One line about what it does.
+    pub summary: &'static str,
+    /// The way of this toolkit's camera.
+    pub is_default: bool,
+    /// The larger of angle and orthogonality after the most steps; NaN if it is lost.
+    pub error: f64,
+    /// Thread CPU time with its 95 % interval, which needs three processes.
+    #[serde(flatten, serialize_with = "flat::ns_per_step")]
+    pub time_per_step: Option<Estimate>,
+    /// Good enough to be recommended.
+    pub qualifies: bool,
+}
+
 /// Everything `cullbench drift` finds.
 #[derive(Default, Debug, Serialize)]
 pub struct DriftReport {
@@ -71,7 +89,7 @@ pub struct DriftReport {
     pub processes: usize,
     /// In each process.
     pub rounds: usize,
-    /// The turn of one step.
+    /// Yaw, pitch and roll of one step, degrees.
     pub turn_per_step: Turn,
     /// Steps that the figures of `rotation` are the maxima of.
     pub period_steps: u64,
@@ -79,23 +97,17 @@ pub struct DriftReport {
     pub rotation: Vec<RotationDrift>,
     /// The same in whole turns of steps of one degree.
     pub one_degree_turns: Vec<TurnDrift>,
-    /// Ways to carry an eye around, by method and number of steps.
-    pub orbit: Vec<OrbitDrift>,
     /// Ways to turn, error against time.
     pub rotation_methods: Vec<Rated>,
-    /// Ways to carry an eye, error against time.
-    pub orbit_methods: Vec<Rated>,
     /// Which way to turn.
     pub recommended_rotation: Recommendation,
-    /// Which way to carry an eye.
-    pub recommended_orbit: Recommendation,
     /// The spring arms.
     pub arm: ArmReport,
 }
 
 /// Number of jobs that [`prepare`] reports to `progress`.
 pub fn jobs(options: &DriftOptions) -> usize {
-    METHODS.len() + CARRIERS.len() + arm_study::settings(&options.arm).len()
+    METHODS.len() + arm_study::settings(&options.arm).len()
 }
 
 /// Powers of ten from a thousand on, and the most steps themselves.
@@ -109,8 +121,8 @@ fn looks(most: u64) -> Vec<u64> {
 ///
 /// `begin` gets each job's name before it starts.
 pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
-    let looks = looks(options.steps);
-    let moments = moments(&looks);
+    let looks = looks(options.steps).into_iter();
+    let periods: Vec<Period> = looks.map(Period::new).collect();
     let mut report = DriftReport {
         steps: options.steps,
         tolerance_rad: options.tolerance_rad,
@@ -120,13 +132,10 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
     };
     for method in METHODS {
         begin(method.name);
-        report.rotation.extend(method.drift(&moments));
-        let turns = method.turn_drift(&TURNS);
+        let drifts = periods.iter().map(|period| method.drift(period));
+        report.rotation.extend(drifts);
+        let turns = TURNS.map(|turns| method.turn_drift(turns));
         report.one_degree_turns.extend(turns);
-    }
-    for carrier in CARRIERS {
-        begin(carrier.name);
-        report.orbit.extend(rotation::orbit_drift(carrier, &looks));
     }
     let mut points = Vec::new();
     for setting in arm_study::settings(&options.arm) {
@@ -145,13 +154,12 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
     report
 }
 
-/// All timed tasks: bases, eyes, arms.
+/// All timed tasks: bases, then arms.
 fn tasks(options: &DriftOptions) -> Vec<TimedTask<'static>> {
-    let frames = METHODS.iter().map(|method| walking(method.walk, STEADY));
-    let eyes = CARRIERS.iter().map(|carrier| walking(carrier.walk, SWING));
+    let frames = METHODS.iter().map(|method| walking(method.walk));
     let settings = arm_study::settings(&options.arm).into_iter();
-    let arms = settings.flat_map(arm_study::tasks).map(|(task, _)| task);
-    frames.chain(eyes).chain(arms).collect()
+    let arms = settings.flat_map(arm_study::tasks);
+    frames.chain(arms).collect()
 }
 
 /// Plans the timed pass, the same in every process.
@@ -169,17 +177,24 @@ impl DriftReport {
     pub fn conclude(&mut self, processes: &[ProcessTimes], rounds: u32) {
         let times = OverProcesses::of(processes);
         (self.processes, self.rounds) = (processes.len(), rounds as usize);
-        let turned = self.rotation.chunk_by(|a, b| a.method == b.method);
-        let turned = METHODS.iter().zip(turned.map(frame_error));
-        let carried = self.orbit.chunk_by(|a, b| a.method == b.method);
-        let carried = carried.map(|own| Some(own.last()?.position_error / ORBIT_RADIUS));
-        let carried = CARRIERS.iter().zip(carried);
-        let limit = (self.tolerance_rad, self.steps);
-        let turned = rated(turned, &times, 0, limit);
-        let carried = rated(carried, &times, METHODS.len(), limit);
-        (self.rotation_methods, self.recommended_rotation) = turned;
-        (self.orbit_methods, self.recommended_orbit) = carried;
-        let mut first = METHODS.len() + CARRIERS.len();
+        let last = self.rotation.iter().filter(|row| row.steps == self.steps);
+        let mut candidates = Vec::new();
+        for (task, (method, last)) in METHODS.iter().zip(last).enumerate() {
+            let (name, error) = (method.name, last.error());
+            candidates.push((name.to_owned(), error, times.ln_ns(task)));
+            self.rotation_methods.push(Rated {
+                name,
+                summary: method.summary,
+                is_default: name == TOOLKIT,
+                error,
+                time_per_step: times.ns(task).map(|ns| ns.per(QUERY_STEPS as f64)),
+                qualifies: error <= self.tolerance_rad,
+            });
+        }
+        let (tolerance, steps) = (self.tolerance_rad, self.steps as f64);
+        let rule = format!("an error within {tolerance:e} after {steps:e} steps");
+        self.recommended_rotation = recommended(&candidates, tolerance, &rule);
+        let mut first = METHODS.len();
         let settings = self.arm.points.chunk_by_mut(|a, b| a.setting == b.setting);
         for points in settings {
             let choice = arm_study::conclude(points, &times, first, self.arm.tolerance);
@@ -204,22 +219,23 @@ pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
     };
     let of = |name: &&str| METHODS.iter().find(|method| method.name == *name);
     let methods: Vec<&Method> = names.iter().filter_map(of).collect();
-    let moments = moments(&[steps]);
-    let tasks: Vec<TimedTask> = methods.iter().map(|m| walking(m.walk, STEADY)).collect();
+    let period = Period::new(steps);
+    let tasks: Vec<TimedTask> = methods.iter().map(|m| walking(m.walk)).collect();
     let timed = timed_rounds(QUERIES, &tasks, &protocol);
     let times = OverProcesses::of(&[ProcessTimes::of(&timed)]);
     let row = |(task, method): (usize, &&Method)| {
         let ns = times.ns(task).map(|ns| ns.per(QUERY_STEPS as f64).value);
-        (frame_error(&method.drift(&moments)), ns.unwrap_or(f64::NAN))
+        let error = method.drift(&period).error();
+        ((!error.is_nan()).then_some(error), ns.unwrap_or(f64::NAN))
     };
     methods.iter().enumerate().map(row).collect()
 }
 
-/// The larger error of the last drift; `None` for a basis that is lost.
-fn frame_error(drifts: &[RotationDrift]) -> Option<f64> {
-    let last = drifts.last()?;
-    let error = larger(last.angle_error_rad, last.orthogonality_error);
-    (!error.is_nan()).then_some(error)
+impl RotationDrift {
+    /// The larger error; NaN for a basis that is lost.
+    fn error(&self) -> f64 {
+        larger(self.angle_error_rad, self.orthogonality_error)
+    }
 }
 
 #[cfg(test)]

@@ -1,30 +1,8 @@
-//! Methods as points of error against time, and which one to take.
+//! Which method to take, by error and time.
 
 use serde::Serialize;
 
-use super::frames::QUERY_STEPS;
-use super::rotation::{self, Method};
-use crate::measure::OverProcesses;
-use crate::statistics::{ALPHA, Estimate, flat, ranks};
-
-/// A way to turn or carry as a point of error against time.
-#[derive(Debug, Serialize)]
-pub struct Rated {
-    /// Name in tables and JSON.
-    pub name: &'static str,
-    /// One line about what it does.
-    pub summary: &'static str,
-    /// The way of this toolkit's camera.
-    pub is_default: bool,
-    /// Worst error after the most steps: of a frame the larger of angle and
-    /// orthogonality, of an eye the distance in radii. `None` if it is not finite.
-    pub error: Option<f64>,
-    /// Thread CPU time with its 95 % interval, which needs three processes.
-    #[serde(flatten, serialize_with = "flat::ns_per_step")]
-    pub time_per_step: Option<Estimate>,
-    /// Good enough to be recommended.
-    pub qualifies: bool,
-}
+use crate::statistics::{ALPHA, ranks};
 
 /// A method to take, and why.
 #[derive(Default, Debug, Serialize)]
@@ -39,79 +17,39 @@ pub struct Recommendation {
     pub reason: String,
 }
 
-/// A method that has an error, with ln of its time in every process.
-pub struct Candidate {
-    pub name: String,
-    pub error: f64,
-    pub ln_ns: Vec<f64>,
-}
+/// Name of a method, its error (NaN if it is lost), ln of its time in every process.
+pub type Candidate = (String, f64, Vec<f64>);
 
-/// Rates methods by their errors and the times of the tasks from `first` on, and
-/// recommends one within a tolerance after `steps` steps.
-pub fn rated<'m>(
-    rows: impl Iterator<Item = (&'m Method, Option<f64>)>,
-    times: &OverProcesses,
-    first: usize,
-    (tolerance, steps): (f64, u64),
-) -> (Vec<Rated>, Recommendation) {
-    let (mut all, mut candidates) = (Vec::new(), Vec::new());
-    for (task, (method, error)) in (first..).zip(rows) {
-        let name = method.name;
-        candidates.extend(error.map(|error| Candidate {
-            name: name.to_owned(),
-            error,
-            ln_ns: times.ln_ns(task),
-        }));
-        all.push(Rated {
-            name,
-            summary: method.summary,
-            is_default: [rotation::TOOLKIT, rotation::TOOLKIT_ORBIT].contains(&name),
-            error,
-            time_per_step: times.ns(task).map(|ns| ns.per(QUERY_STEPS as f64)),
-            qualifies: error.is_some_and(|error| error <= tolerance),
-        });
-    }
-    let rule = format!(
-        "an error within {tolerance:e} after {:e} steps",
-        steps as f64
-    );
-    (all, recommended(&candidates, tolerance, &rule))
-}
-
-/// Smaller margins, as a share of a limit, are reported.
+/// Smaller margins, as a share of the limit, are said.
 const SMALL_MARGIN: f64 = 0.05;
-
-/// Words for a figure near its limit; empty for others.
-pub fn small_margin(figure: &str, limit: &str, margin: Option<f64>) -> String {
-    match margin {
-        Some(margin) if margin < SMALL_MARGIN => {
-            format!("; {figure} is only {:.2} % below {limit}", 100.0 * margin)
-        }
-        _ => String::new(),
-    }
-}
 
 /// Recommends the most precise of the fastest candidates within the tolerance, by a
 /// paired test over the processes.
 pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Recommendation {
-    let good = candidates.iter().filter(|c| c.error <= tolerance);
-    let (good, ln_ns): (Vec<_>, Vec<_>) = good.map(|c| (c, c.ln_ns.clone())).unzip();
+    let good: Vec<_> = candidates.iter().filter(|c| c.1 <= tolerance).collect();
+    let ln_ns: Vec<_> = good.iter().map(|c| c.2.clone()).collect();
     let ranked = good.iter().zip(ranks(&ln_ns, ALPHA));
-    let mut fastest: Vec<&Candidate> = ranked.filter(|c| c.1 == 1).map(|c| *c.0).collect();
-    fastest.sort_by(|a, b| a.error.total_cmp(&b.error));
-    let as_fast: Vec<String> = fastest.iter().skip(1).map(|c| c.name.clone()).collect();
-    let nearest = candidates.iter().min_by(|a, b| a.error.total_cmp(&b.error));
+    let mut fastest: Vec<_> = ranked.filter(|c| c.1 == 1).map(|c| *c.0).collect();
+    fastest.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let as_fast: Vec<String> = fastest.iter().skip(1).map(|c| c.0.clone()).collect();
+    let sound = candidates.iter().filter(|c| !c.1.is_nan());
+    let nearest = sound.min_by(|a, b| a.1.total_cmp(&b.1));
     let (count, others) = (good.len(), as_fast.join(", "));
     let mut reason = match (fastest.len(), nearest) {
         (0, None) => format!("no method has {rule}"),
-        (0, Some(near)) => format!("no method has {rule}: {} has {:.1e}", near.name, near.error),
+        (0, Some((name, error, _))) => format!("no method has {rule}: {name} has {error:.1e}"),
         (1, _) => format!("the cheapest of {count} with {rule}"),
         _ => format!("the most precise of the cheapest (as fast: {others}) of {count} with {rule}"),
     };
-    let margin = fastest.first().map(|c| 1.0 - c.error / tolerance);
-    reason += &small_margin("its error", "the limit", margin);
+    let margin = fastest.first().map(|c| 1.0 - c.1 / tolerance);
+    if let Some(margin) = margin.filter(|margin| *margin < SMALL_MARGIN) {
+        reason += &format!(
+            "; its error is only {:.2} % below the limit",
+            100.0 * margin
+        );
+    }
     Recommendation {
-        name: fastest.first().map(|c| c.name.clone()),
+        name: fastest.first().map(|c| c.0.clone()),
         as_fast,
         margin,
         reason,
@@ -125,15 +63,11 @@ mod tests {
     /// Rough and fast, precise, slower and less precise; the third is `noise` faster or
     /// slower in every other process.
     fn three(processes: i32, noise: f64) -> Vec<Candidate> {
-        let row = |(name, error, ns): (&str, f64, f64)| Candidate {
-            name: name.to_owned(),
-            error,
-            ln_ns: (0..processes)
-                .map(|n| {
-                    let noise = if name == "slow" { noise } else { 0.0 };
-                    ns.ln() + 0.1 * f64::from(n % 3) + if n % 2 == 0 { noise } else { -noise }
-                })
-                .collect(),
+        let row = |(name, error, ns): (&str, f64, f64)| {
+            let noise = if name == "slow" { noise } else { 0.0 };
+            let ln_ns =
+                |n: i32| ns.ln() + 0.1 * f64::from(n % 3) + if n % 2 == 0 { noise } else { -noise };
+            (name.to_owned(), error, (0..processes).map(ln_ns).collect())
         };
         [
             ("rough", 0.96e-3, 5.0),
@@ -168,7 +102,8 @@ mod tests {
         assert!((near.margin.unwrap_or(0.0) - 0.04).abs() < 1e-12);
         let said = "; its error is only 4.00 % below the limit";
         assert!(near.reason.ends_with(said), "{}", near.reason);
-        assert_eq!(small_margin("its step", "the limit", Some(0.051)), "");
+        let far = recommended(&three(1, 0.0), 1e-2, "such errors");
+        assert!(!far.reason.contains("below"), "{}", far.reason);
     }
 
     #[test]
