@@ -134,7 +134,7 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
 /// Title of a table of errors, and its cell.
 type Errors = (&'static str, fn(&RotationDrift) -> f64);
 
-/// Errors of bases after each number of steps: a row per method, a column per number.
+/// Errors of bases: a row per method, a column per number of steps.
 fn rotations(report: &DriftReport) -> Vec<Block> {
     let note = format!(
         "Each figure is the largest of the {} steps that end there, a period between two \

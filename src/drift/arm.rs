@@ -153,8 +153,9 @@ impl Chase {
         states
     }
 
-    /// The same of a linear arm behind `sin t` itself: it swings by `a sin t + b cos t`,
-    /// and how its start differs from that is released.
+    /// The same of a linear arm behind `sin t` itself.
+    ///
+    /// It swings by `a sin t + b cos t`, and how its start differs from that is released.
     pub fn linear_way(&self) -> Vec<State> {
         let k = self.arm.stiffness;
         let share = k / ((k + 1.0) * (k + 1.0));

@@ -219,7 +219,7 @@ pub fn errors(setting: Setting, seconds: f64) -> Vec<ArmPoint> {
     points
 }
 
-/// Tasks of all points of a setting: a query is the first second, the arm on its way in.
+/// Tasks of all points of a setting: the first second, the arm on its way in.
 pub fn tasks(setting: Setting) -> impl Iterator<Item = TimedTask<'static>> {
     efforts().map(move |(method, substeps)| {
         let chase = Chase::new(setting.arm, setting.stiffness, setting.rate_hz, 1.0);

@@ -67,7 +67,7 @@ impl Matrix {
         turn
     }
 
-    /// What the matrix has beyond the identity, rounded.
+    /// The matrix less the identity, rounded.
     fn beyond_identity(&self) -> DMat3 {
         let one = |i, j| Expansion::from(if i == j { 1.0 } else { 0.0 });
         let entry = |i: usize, j: usize| (&self.0[j][i] - &one(i, j)).estimate();
@@ -113,7 +113,7 @@ pub fn errors(axes: DMat3, exact: &Matrix) -> [f64; 4] {
     ]
 }
 
-/// The angle of the rotation nearest to I + E (its polar factor); NaN if there is none.
+/// The angle of the rotation nearest to I + E, its polar factor; NaN without one.
 ///
 /// Newton's iteration Y(3I - Y^T Y)/2 (Higham 1986, eq. 3.1 in its inverse-free form)
 /// for Y = I + E, in terms of E: an angle of any size keeps its digits.

@@ -11,8 +11,9 @@ use single::{DEGREE, LEVEL, sin_cos, turned, wide};
 use crate::camera::{self, look_at};
 use crate::measure::TimedTask;
 
-/// Yaw, pitch and roll of every step, in degrees about the camera's own axes, in this
-/// order, as [`camera::Frame`] turns. The doubles are taken as exact.
+/// Yaw, pitch and roll of every step, in degrees about the camera's own axes.
+///
+/// In this order, as [`camera::Frame`] turns. The doubles are taken as exact.
 pub type Turn = [f64; 3];
 
 /// Slow and about no axis in particular.

@@ -37,7 +37,7 @@ const TURNS: [u64; 2] = [1, 1000];
 pub struct DriftOptions {
     /// Up to how many steps.
     pub steps: u64,
-    /// Largest angle in radians and orthogonality of a recommended method after all of them.
+    /// Largest angle (radians) and orthogonality of a recommended method after them.
     pub tolerance_rad: f64,
     /// Which spring arms are studied.
     pub arm: ArmOptions,

@@ -17,7 +17,7 @@ pub struct Recommendation {
     pub reason: String,
 }
 
-/// Name of a method, its error (NaN if it is lost), ln of its time in every process.
+/// A method: its name, error (NaN if it is lost), ln of its time in every process.
 pub type Candidate = (String, f64, Vec<f64>);
 
 /// Smaller margins, as a share of the limit, are said.

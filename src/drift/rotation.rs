@@ -1,4 +1,6 @@
-//! Drift of camera bases from the exact turn: a row of [`METHODS`] for each way to keep one.
+//! Drift of camera bases from the exact turn.
+//!
+//! A row of [`METHODS`] for each way to keep one.
 
 use std::array::from_fn;
 
@@ -89,7 +91,7 @@ pub struct TurnDrift {
     pub angle_error_rad: f64,
 }
 
-/// The frames that methods ought to have in the [`PERIOD`] that ends at a number of steps.
+/// The frames that methods ought to have in the [`PERIOD`] before a number of steps.
 pub struct Period {
     steps: Vec<u64>,
     turns: Vec<Matrix>,

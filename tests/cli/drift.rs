@@ -237,7 +237,6 @@ fn the_table_says_the_same_for_people() {
     let names = [METHODS, STEPPED].map(set).into_iter().flatten();
     for name in names.chain([
         "f64-polar-100 (default)",
-        "unstable",
         "0.8284",
         "8.147e-4",
         "linear k=1e6, 60 Hz",
