@@ -91,7 +91,7 @@ pub struct TurnDrift {
     pub angle_error_rad: f64,
 }
 
-/// The frames that methods ought to have in the [`PERIOD`] before a number of steps.
+/// Frames that methods ought to have in the [`PERIOD`] up to a number of steps.
 pub struct Period {
     steps: Vec<u64>,
     turns: Vec<Matrix>,
