@@ -1,27 +1,22 @@
-//! Scene, cameras, fastest tree and visible surfaces that all rules read.
+//! Scene, cameras and fastest tree that all rules read.
 
 use glam::{DVec3, Vec3};
 
 use super::options::{AdviseInput, AdviseOptions, planned};
 use crate::camera::{PlaneOptions, Surroundings};
 use crate::culling::{CameraView, Culling, CullingTest};
-use crate::funnel::{Chain, FunnelInput, World};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::input::InputError;
 use crate::measure::{Workload, WorkloadError, input_of};
 use crate::path::CameraPath;
-use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
-use crate::visibility::SampleGrid;
 
 /// Most verdicts of the oracle: some 50 ns each.
 const MOST_JUDGED: usize = 1_000_000;
 /// Most cameras that are compared with the oracle.
 const MOST_TRUTHS: usize = 16;
-/// Pixels of the default occlusion buffer.
-pub const BUFFER: SampleGrid = SampleGrid::new(320, 180);
 
 pub struct Case<'a> {
     pub workload: &'a Workload<'a>,
@@ -32,8 +27,6 @@ pub struct Case<'a> {
     /// The fastest scan.
     pub scan: StructureSpec,
     pub options: AdviseOptions,
-    /// Every camera as a view of the funnel, or the reason for which there is none.
-    pub world: Result<World<'a>, String>,
 }
 
 impl<'a> Case<'a> {
@@ -45,23 +38,6 @@ impl<'a> Case<'a> {
         let AdviseInput { scene, path, .. } = *all;
         let [spec, scan] = [tree, scan].map(|label| planned(all.structures, label));
         let (spec, scan) = (spec?, scan?);
-        let input = FunnelInput {
-            scene,
-            path,
-            most_views: usize::MAX,
-            samples: BUFFER,
-            cut_outs: None,
-            mirror: None,
-            chain: &Chain::empty(),
-            structures: &[],
-            protocol: all.protocol,
-            claim: None,
-            inner_boxes: None,
-            loading: Default::default(),
-            execution: spec.execution,
-            all: true,
-            picks: false,
-        };
         Ok(Case {
             index: spec.build(input_of(scene, &scene.items))?,
             workload,
@@ -69,8 +45,6 @@ impl<'a> Case<'a> {
             spec,
             scan,
             options: *all.options,
-            world: World::new(scene, &input, &|_| ())
-                .map_err(|_| "cameras without rays of their own".to_owned()),
         })
     }
 
@@ -91,19 +65,6 @@ impl<'a> Case<'a> {
             Some((camera, truth))
         });
         truths.collect()
-    }
-
-    /// Appends the items that the tree finds for a camera of the path.
-    pub fn query(&self, camera: usize, out: &mut Vec<ItemId>) {
-        let view = self.workload.views[camera].as_any();
-        self.index.query(view, out);
-    }
-
-    /// Items that the tree finds for a camera of the path.
-    pub fn found(&self, camera: usize) -> Vec<ItemId> {
-        let mut found = Vec::new();
-        self.query(camera, &mut found);
-        found
     }
 
     /// The six-plane volumes of the path.

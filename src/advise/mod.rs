@@ -21,7 +21,7 @@ pub use omission::{Check, Omission};
 pub use options::{AdviseInput, AdviseOptions};
 
 use crate::culling::CullingTest;
-use crate::funnel::StudyError;
+use crate::funnel::{self, FunnelPlan, StudyError};
 use crate::measure::{
     OverProcesses, Part, ProcessTimes, ReportCell, Schedule, SharedWork, timed_to_end,
 };
@@ -31,6 +31,7 @@ use crate::statistics::Estimate;
 use case::Case;
 use rule::{Draft, Rule, Unfit};
 use rules::RULES;
+use rules::stages::Stages;
 use trials::{Answered, BASE, Trials};
 
 /// Structure, test and features to leave out, with the evidence.
@@ -88,6 +89,8 @@ pub struct TrialPlan {
     /// Number of ids, by task and camera.
     expected: Vec<Vec<u64>>,
     beside: Beside,
+    /// Times of the stages, if the scene and the cameras have such.
+    stages: Option<FunnelPlan>,
 }
 
 /// Compared advice before its times.
@@ -103,6 +106,7 @@ pub struct Prepared {
     counted: Vec<Part>,
     structure: StructureChoice,
     motion: Option<MotionChoice>,
+    funnel: Result<funnel::Prepared, String>,
 }
 
 /// Runs every rule with and without its feature on the fastest tree.
@@ -138,13 +142,17 @@ pub fn prepare(
         entered.trials.compare(sides);
     }
     let tasks = entered.trials.tasks(&answered.counts);
+    let stages = Stages::of(input, &structures[0])?;
+    let funnel = funnel::prepare(&stages.input(input), progress).map_err(|error| error.to_string());
     Ok(Prepared {
         plan: TrialPlan {
             structures,
             schedule: Schedule::new(path.cameras.len(), &tasks, input.protocol),
             expected: answered.counts.clone(),
             beside,
+            stages: funnel.as_ref().ok().map(|prepared| prepared.plan.clone()),
         },
+        funnel,
         structure,
         motion,
         cells,
@@ -174,11 +182,17 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, Study
     }
     let once_ns = entered.trials.once_ns.clone();
     let tasks = entered.trials.tasks(&plan.expected);
-    Ok(ProcessTimes {
+    let mut times = ProcessTimes {
         once_ns,
         parts: plan.beside.times(input)?,
         ..ProcessTimes::of(&timed_to_end(&tasks, &plan.schedule, input.protocol))
-    })
+    };
+    if let Some(of_stages) = &plan.stages {
+        let stages = Stages::of(input, &plan.structures[0])?;
+        let found = funnel::time(&stages.input(input), of_stages)?;
+        times.ln_ns.extend(found.ln_ns);
+    }
+    Ok(times)
 }
 
 impl Prepared {
@@ -193,7 +207,15 @@ impl Prepared {
         let here = groups.first().filter(|_| beside.has_policies());
         let here = here.map_or(&self.cells, |group| &group.cells);
         let changes = beside.changes(here, &groups);
-        let choice = (&self.structure, &test, &changes[..]);
+        // The times of the stages come behind those of the tasks.
+        let tasks = self.plan.expected.len();
+        let of_stages = processes.iter().map(|process| ProcessTimes {
+            ln_ns: process.ln_ns[tasks..].to_vec(),
+            ..ProcessTimes::default()
+        });
+        let of_stages: Vec<ProcessTimes> = of_stages.collect();
+        let funnel = self.funnel.map(|prepared| prepared.conclude(&of_stages));
+        let choice = (&self.structure, &test, &changes[..], &funnel);
         let settled = self.rules.into_iter().map(|(rule, draft)| match draft {
             Ok(draft) => rule.settled(draft, answered, &times, choice),
             Err(reason) => rule.not_applicable(reason),

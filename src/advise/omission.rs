@@ -125,7 +125,7 @@ pub(super) enum By {
 }
 
 /// Times and answers with a feature (kept) and without it (left out).
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Check {
     /// The structure or the work that was measured.
     pub on: String,
@@ -220,15 +220,12 @@ impl Omission {
 }
 
 #[cfg(test)]
-pub use tests::check;
-
-#[cfg(test)]
 mod tests {
     use super::super::rule::{Finding, some_rule};
     use super::*;
 
     /// A check with the given ratio and decision of the clock.
-    pub fn check(ratio: f64, pays: Option<bool>) -> Check {
+    fn check(ratio: f64, pays: Option<bool>) -> Check {
         Check {
             on: "wide".to_owned(),
             kept_ns: ratio * 100.0,
@@ -236,13 +233,9 @@ mod tests {
             ratio: Some(Estimate::exact(ratio)),
             same_answers: true,
             same_expected: true,
-            kept_excess: None,
-            left_out_excess: None,
-            kept_false_negative_ppm: None,
-            left_out_false_negative_ppm: None,
-            errors: None,
             judged: 10,
             pays,
+            ..Check::default()
         }
     }
 

@@ -5,7 +5,7 @@ use super::change::Change;
 use super::choice::{StructureChoice, TestChoice};
 use super::omission::{By, Check, Decision, LeftOutIf, Omission, is_longer};
 use super::trials::{Answered, Sides, Trials};
-use crate::funnel::StudyError;
+use crate::funnel::{FunnelReport, StudyError};
 use crate::measure::OverProcesses;
 use crate::statistics::Estimate;
 
@@ -41,8 +41,15 @@ pub fn not_applicable(reason: impl ToString) -> Unfit {
     Unfit::NotApplicable(reason.to_string())
 }
 
-/// Structure and test to take, and where other structures are faster.
-type Choice<'f> = (&'f StructureChoice, &'f TestChoice, &'f [Change]);
+/// Structure and test to take, where other structures are faster, and the stages.
+type Choice<'f> = (
+    &'f StructureChoice,
+    &'f TestChoice,
+    &'f [Change],
+    &'f Funnel,
+);
+/// The funnel of a few views, or the reason for which there is none.
+pub type Funnel = Result<FunnelReport, String>;
 
 /// Measured facts of a rule.
 pub struct Facts<'f> {
@@ -54,6 +61,7 @@ pub struct Facts<'f> {
     pub structure: &'f StructureChoice,
     pub test: &'f TestChoice,
     pub changes: &'f [Change],
+    pub funnel: &'f Funnel,
 }
 
 impl Facts<'_> {
@@ -81,6 +89,8 @@ pub struct Finding {
     pub confirmed: Option<bool>,
     /// Decision that replaces that of rule and clock.
     pub decision: Option<Decision>,
+    /// Measurement of a rule without tasks of its own.
+    pub check: Option<Check>,
 }
 
 impl Finding {
@@ -88,6 +98,14 @@ impl Finding {
         Finding {
             reason: reason.into(),
             compared: Some([statistic, threshold]),
+            ..Finding::default()
+        }
+    }
+
+    /// A rule that does not apply, for a reason.
+    pub fn none(reason: String) -> Finding {
+        Finding {
+            reason,
             ..Finding::default()
         }
     }
@@ -151,6 +169,7 @@ impl Draft {
             structure: choice.0,
             test: choice.1,
             changes: choice.2,
+            funnel: choice.3,
         }
     }
 }
@@ -158,11 +177,7 @@ impl Draft {
 impl Rule {
     /// The omission of a rule that does not apply.
     pub fn not_applicable(&self, reason: String) -> Omission {
-        let finding = Finding {
-            reason,
-            ..Finding::default()
-        };
-        self.omission(finding, Vec::new())
+        self.omission(Finding::none(reason), Vec::new())
     }
 
     /// The omission that follows from the measured facts.
@@ -174,8 +189,10 @@ impl Rule {
         choice: Choice,
     ) -> Omission {
         let facts = draft.facts(answered, times, choice);
-        let finding = (draft.conclude)(&facts);
-        self.omission(finding, facts.checks)
+        let mut finding = (draft.conclude)(&facts);
+        let mut checks = facts.checks;
+        checks.extend(finding.check.take());
+        self.omission(finding, checks)
     }
 
     /// Weighs statistic, clock and answers.

@@ -5,7 +5,7 @@
 
 use std::ops::Deref;
 
-use super::case::{Case, some_of};
+use super::case::Case;
 use super::omission::{Check, is_longer};
 use crate::culling::CameraView;
 use crate::index::DynIndex;
@@ -75,16 +75,6 @@ impl<'c> Trials<'c> {
         self.asks.len() - 1
     }
 
-    /// Mean number of ids of a task over at most `most` cameras, evenly spread.
-    pub fn mean_count(&self, task: usize, most: usize) -> f64 {
-        let mut out = Vec::new();
-        mean(some_of(self.case.cameras(), most).map(|camera| {
-            out.clear();
-            (self.asks[task].0)(camera, &mut out);
-            out.len() as f64
-        }))
-    }
-
     /// Runs every task for every camera, and compares with the truth.
     pub fn answered(&self) -> Answered {
         let truths = self.case.truths();
@@ -149,12 +139,6 @@ impl Answered {
     pub fn by_camera(&self, task: usize) -> Option<&[ErrorCount]> {
         self.errors[task].as_deref()
     }
-}
-
-/// Mean of some values; 0 without any.
-pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let values: Vec<f64> = values.collect();
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// The two sides of a check, by their tasks.

@@ -49,7 +49,7 @@ pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
     let lines: [(&str, Holds); 4] = [
         ("Does not apply: ", &|rule| no(rule).is_some()),
         (
-            "Pays from: each feature alone on the tree, where funnel measures it within its chain: ",
+            "Pays from: each stage beside the others, as funnel measures it: ",
             &|rule| rule.note.contains("pays from"),
         ),
         ("WRONG: answers with and without differ: ", &|rule| {

@@ -246,6 +246,7 @@ pub fn plain_input<'s>(
         execution: args.kernel.execution()?,
         all: true,
         picks: true,
+        sorted: false,
     })
 }
 

@@ -17,7 +17,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         true => [all_views, String::new()],
         false => [
             format!("{} of {all_views}", text::count(report.views)),
-            format!("; --frames {} takes all, as advise does", report.cameras),
+            format!("; --frames {} takes all", report.cameras),
         ],
     };
     let mut blocks = vec![

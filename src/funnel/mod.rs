@@ -26,19 +26,17 @@ pub use error::StudyError;
 pub(crate) use error::check_memory;
 pub use fragment_stage::FragmentCounts;
 pub use item_stages::Fate;
-pub(crate) use item_stages::Run;
 pub use orders::OrderRow;
 pub use picks::PickRow;
 pub use report::{FunnelReport, Gain, StageRow};
 pub use stage::{Chain, NONE, StageKind, back_ends, left_out_of};
-pub(crate) use stage::{OCCLUSION_ROWS, PORTAL_CLIP};
-pub use study::{failure, prepare, time};
+pub use study::{Prepared, failure, prepare, time};
 pub use sweep::{StageSweep, SweepPoint, prepare_sweep, time_sweep};
 pub use task::FunnelPlan;
 pub use triangle_stage::BYTES_PER_TRIANGLE;
 pub(crate) use truth::RaysEnd;
 pub use world::FunnelInput;
-pub(crate) use world::{Shape, World};
+pub(crate) use world::Shape;
 
 #[cfg(test)]
 pub(crate) use stage::BackEnd;

@@ -26,6 +26,9 @@ use crate::visibility::fragment::{
 use crate::visibility::truth::{Crossing, Probe, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
+/// As listed, and from front to back.
+pub const SORTED: [&str; 2] = ["none", "box-distance"];
+
 /// A depth order over all views. Counts are means per view.
 #[derive(Clone, Debug, Serialize)]
 pub struct OrderRow {
@@ -84,7 +87,7 @@ impl Left {
         world: &World,
         all: &Solids,
         rays: &Rays,
-        items: &[ItemId],
+        (items, is_all): (&[ItemId], bool),
     ) -> (Vec<&'static order::OrderRow>, Left) {
         let boxes = all.some(items);
         let triangles = world.shape.triangles().map(|surfaces| surfaces.some(items));
@@ -93,9 +96,9 @@ impl Left {
             planes: triangles.as_ref().and(world.scene.own_tree.as_ref()),
             surfaces: triangles.as_ref(),
         };
-        let built = ORDERS
-            .iter()
-            .filter_map(|row| Some((row, (row.build)(&to_order)?)));
+        let wanted = ORDERS.iter();
+        let wanted = wanted.filter(|row| is_all || SORTED.contains(&row.name));
+        let built = wanted.filter_map(|row| Some((row, (row.build)(&to_order)?)));
         let (rows, orders) = built.unzip();
         let left = Left {
             orders,
@@ -113,12 +116,12 @@ impl Left {
 }
 
 impl Orders {
-    /// Orders of the items behind `steps`; none if `too_much` would be drawn.
+    /// Orders of the items behind `steps`, all or two; none if `too_much` would be drawn.
     pub fn new(
         world: &World,
         stages: &ItemStages,
         steps: &[Step],
-        too_much: Option<&String>,
+        (is_all, too_much): (bool, Option<&String>),
     ) -> Orders {
         let all = match world.shape.boxes() {
             Some(solids) => Cow::Borrowed(solids),
@@ -127,7 +130,7 @@ impl Orders {
         let drawn = world.views().filter(|_| too_much.is_none());
         let views = drawn.map(|view| {
             let items = world.listed(stages.items(steps, view));
-            Left::of(world, &all, world.rays(view), &items)
+            Left::of(world, &all, world.rays(view), (&items, is_all))
         });
         let (rows, views): (Vec<_>, Vec<Left>) = views.unzip();
         Orders {

@@ -13,7 +13,7 @@ use super::task::FunnelKey;
 use super::truth::Errors;
 use crate::measure::OverProcesses;
 use crate::shown::{counted, significant, time};
-use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
+use crate::statistics::{ALPHA, Estimate, flat, ratio, trimmed_mean};
 use crate::visibility::Level;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
@@ -189,6 +189,9 @@ pub struct Gain {
     /// 0 if it saves time as well; null if it removes nothing or has no time.
     #[serde(flatten, serialize_with = "flat::break_even_ns")]
     pub break_even: Option<Estimate>,
+    /// Time with the stage / time without it.
+    #[serde(skip)]
+    pub ratio: Option<Estimate>,
     /// Tasks with the stage, and without it.
     #[serde(skip)]
     pub(super) tasks: [Vec<FunnelKey>; 2],
@@ -196,7 +199,7 @@ pub struct Gain {
 
 impl Gain {
     /// A gain without times, from counts and tasks with the stage and without it.
-    pub(super) fn new(
+    pub(crate) fn new(
         stage: StageKind,
         (back_end, unit): (&str, &'static str),
         [with_count, without_count]: [f64; 2],
@@ -211,6 +214,7 @@ impl Gain {
             with_count,
             without_count,
             break_even: None,
+            ratio: None,
             tasks,
         }
     }
@@ -223,6 +227,9 @@ impl Gain {
     pub(super) fn set(&mut self, times: &OverProcesses<FunnelKey>) {
         let [with, without] = self.tasks.each_ref().map(|tasks| sums(times, tasks));
         (self.with_ns, self.without_ns) = (centre(&with), centre(&without));
+        let [own, other] = [&with, &without].map(|ns| ns.iter().map(|ns| ns.ln()).collect());
+        let (own, other): (Vec<f64>, Vec<f64>) = (own, other);
+        self.ratio = ratio(&other, &own, &other);
         let removed = self.removed();
         if removed > 0.0 {
             let costs = with.iter().zip(&without).map(|(a, b)| (a - b) / removed);

@@ -6,7 +6,7 @@ use super::bounds::{bounds, covered_key};
 use super::error::{LeftOutRow, StudyError, check_fits, check_memory};
 use super::fragment_stage::{FragmentCounts, FragmentStage, Tested, mirrored};
 use super::item_stages::{ItemStages, PlanView};
-use super::orders::Orders;
+use super::orders::{OrderRow, Orders, SORTED};
 use super::picks::Picks;
 use super::report::{CutOutRow, FunnelReport, Gain, StageRow, conclusions};
 use super::stage::{Chain, NONE, StageKind, Step, Z, default_test, left_out_of};
@@ -61,10 +61,10 @@ impl<'w> Study<'w> {
         let triangles = TriangleStage::new(world, &items, &steps);
         let culled = (&triangles, chain.of(StageKind::Triangle));
         let fragments = FragmentStage::new(world, &items, &steps, culled);
+        let ordered = (input.all, fragments.too_much.as_ref());
         Ok(Study {
-            orders: input
-                .all
-                .then(|| Orders::new(world, &items, &steps, fragments.too_much.as_ref())),
+            orders: (input.all || input.sorted)
+                .then(|| Orders::new(world, &items, &steps, ordered)),
             picks: (input.all && input.picks).then(|| Picks::new(world)),
             world,
             chain,
@@ -139,6 +139,17 @@ impl<'w> Study<'w> {
         of_items.chain(behind).collect()
     }
 
+    /// What the chain leaves drawn from front to back, and as listed.
+    fn gain_of_sorting(&self, orders: &[OrderRow]) -> Option<Gain> {
+        let [listed, sorted] = SORTED.map(|name| orders.iter().find(|row| row.name == name));
+        let (listed, sorted) = (listed?, sorted?);
+        let timed = self.items.timed(self.chain);
+        let with = [&timed[..], &[FunnelKey::Order(sorted.name.to_owned())]].concat();
+        let counts = [sorted.shaded_count, listed.shaded_count];
+        let named = (sorted.name, "fragments");
+        Some(Gain::new(StageKind::Fragment, named, counts, [with, timed]))
+    }
+
     /// Unit and counts with and without a stage behind those of whole items. Without a
     /// test every fragment of the remaining items is shaded.
     fn counts_behind(&self, row: &StageRow, rows: &[StageRow]) -> (&'static str, [f64; 2]) {
@@ -204,12 +215,12 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
     let z = tested.iter().find(|tested| tested.back_end.name == Z);
     let tallies = z.iter().flat_map(|z| &z.tallies);
     let covered: Vec<u64> = tallies.map(|tally| tally.covered).collect();
-    let (mut bounds, bound_tasks): (Vec<_>, Vec<_>) = bounds(&world, &study.triangles, &covered)
-        .into_iter()
-        .unzip();
-    if !input.all {
-        bounds.clear();
-    }
+    let bounds = input
+        .all
+        .then(|| bounds(&world, &study.triangles, &covered));
+    let (bounds, bound_tasks): (Vec<_>, Vec<_>) = bounds.into_iter().flatten().unzip();
+    let mut gains = study.gains(&rows);
+    gains.extend(study.gain_of_sorting(&orders).filter(|_| input.sorted));
     let cut_outs = input.cut_outs.zip(world.cut_outs.as_ref());
     let ground = world.hiders.ground.as_ref();
     let report = FunnelReport {
@@ -227,7 +238,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
             item_count: made.count(),
         }),
         chain: input.chain.clone(),
-        gains: study.gains(&rows),
+        gains,
         stages: rows,
         inner_boxes: world.hiders.inner.clone(),
         ground: ground.map(|ground| ground.row.clone()),
@@ -259,10 +270,11 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
 pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes, StudyError> {
     let world = World::new(input.scene, input, &|_| ())?;
     let study = Study::new(&world, input)?;
-    let covered = plan.expected(&covered_key()).unwrap_or_default();
-    let bounds = bounds(&world, &study.triangles, covered).into_iter();
     let mut tasks = study.tasks();
-    tasks.extend(bounds.map(|(_, task)| task));
+    if let Some(covered) = plan.expected(&covered_key()) {
+        let bounds = bounds(&world, &study.triangles, covered).into_iter();
+        tasks.extend(bounds.map(|(_, task)| task));
+    }
     Ok(plan.time(tasks, input))
 }
 

@@ -18,7 +18,7 @@ use crate::kernel::Kernel;
 use crate::measure::Ask;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::triangle::{
-    Clusters, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, facing,
+    Clusters, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, TriangleRow, facing,
 };
 
 /// Bytes per triangle of a mesh beside its scene; 310 were measured.
@@ -45,16 +45,19 @@ fn eye(scene: &Scene, camera: &Camera) -> Eye {
     Eye::of(camera, origin_of(scene, camera))
 }
 
-/// Clusters and all back ends over them, in the order of [`TRIANGLE_ROWS`].
+/// Clusters and the compared back ends over them.
 struct Built {
     clusters: Arc<Clusters>,
-    culls: Vec<Box<dyn TriangleCull>>,
+    culls: Vec<(&'static str, Box<dyn TriangleCull>)>,
 }
 
 impl Built {
-    fn of(surfaces: Arc<Surfaces>) -> Rc<Built> {
+    fn of(world: &World, surfaces: Arc<Surfaces>) -> Rc<Built> {
         let clusters = Arc::new(Clusters::of(surfaces, MOST_TRIANGLES));
-        let culls = TRIANGLE_ROWS.iter().map(|row| (row.build)(&clusters));
+        let compared = world.rows(StageKind::Triangle);
+        let is_compared = |row: &&TriangleRow| compared.iter().any(|(own, _)| own.name == row.name);
+        let rows = TRIANGLE_ROWS.iter().filter(is_compared);
+        let culls = rows.map(|row| (row.name, (row.build)(&clusters)));
         Rc::new(Built {
             culls: culls.collect(),
             clusters,
@@ -83,7 +86,7 @@ impl TriangleStage {
     /// A box takes 12 triangles, which is much memory where a stage before is left out.
     pub fn new(world: &World, stages: &ItemStages, steps: &[Step]) -> TriangleStage {
         let whole = match &world.shape {
-            Shape::Triangles(all) => Ok(Built::of(all.clone())),
+            Shape::Triangles(all) => Ok(Built::of(world, all.clone())),
             Shape::Boxes(solids) => Err(solids),
         };
         let views = world.views().map(|view| {
@@ -92,7 +95,7 @@ impl TriangleStage {
             let built = whole.clone().unwrap_or_else(|solids| {
                 let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
                 let origin = origin_of(world.scene, camera);
-                Built::of(Arc::new(Surfaces::of_boxes_about(origin, boxes)))
+                Built::of(world, Arc::new(Surfaces::of_boxes_about(origin, boxes)))
             });
             let given = match whole.is_ok() {
                 true => Selection::of_items(&built.clusters, items.iter().copied()),
@@ -116,34 +119,35 @@ impl TriangleStage {
         &self.views[view].built.clusters
     }
 
-    /// Triangles that a row leaves; all of them without a row.
-    fn kept(&self, row: Option<usize>, view: usize) -> Selection {
+    /// Triangles that a back end leaves; all of them by none.
+    fn kept(&self, name: &str, view: usize) -> Selection {
         let faces = &self.views[view];
         let mut kept = faces.given.clone();
-        if let Some(row) = row {
-            faces.built.culls[row].cull(&faces.eye, self.kernel, &mut kept);
+        let mut culls = faces.built.culls.iter();
+        if let Some((_, cull)) = culls.find(|(own, _)| *own == name) {
+            cull.cull(&faces.eye, self.kernel, &mut kept);
         }
         kept
     }
 
     /// Every back end; the ids are of clusters with a triangle left.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
-        let rows = TRIANGLE_ROWS.iter().enumerate();
-        rows.map(move |(index, row)| {
+        let built = self.views.first().map(|faces| &faces.built.culls);
+        built.into_iter().flatten().map(move |(name, _)| {
             let ask: Ask = Box::new(move |view, out| {
-                let kept = self.kept(Some(index), view);
+                let kept = self.kept(name, view);
                 let clusters = kept.words().iter().zip(0..);
                 let left = clusters.filter(|(word, _)| **word != 0);
                 out.extend(left.map(|(_, cluster)| cluster));
             });
-            let key = FunnelKey::Stage(StageKind::Triangle, row.name.to_owned());
+            let key = FunnelKey::Stage(StageKind::Triangle, (*name).to_owned());
             (key, ask)
         })
     }
 
     /// Triangles of a view that a back end leaves, by their index among the surfaces.
     pub fn triangles(&self, name: &str, view: usize) -> Vec<u32> {
-        let kept = self.kept(row(name), view);
+        let kept = self.kept(name, view);
         let mut triangles = Vec::with_capacity(kept.triangles());
         for (cluster, word) in kept.words().iter().enumerate() {
             let all = self.clusters(view).triangles_of(cluster).iter().enumerate();
@@ -155,7 +159,7 @@ impl TriangleStage {
     /// Counts of a back end in every view, against the exact side of each triangle.
     pub fn counts(&self, name: &str) -> Vec<ViewCounts> {
         let count = |(view, faces): (usize, &Faces)| {
-            let (kept, right) = (self.kept(row(name), view), &faces.truth);
+            let (kept, right) = (self.kept(name, view), &faces.truth);
             let [input, output, truth] =
                 [&faces.given, &kept, right].map(|of| of.triangles() as u64);
             ViewCounts {
@@ -170,11 +174,6 @@ impl TriangleStage {
         };
         self.views.iter().enumerate().map(count).collect()
     }
-}
-
-/// Index of a back end in [`TRIANGLE_ROWS`]; `None` for no test.
-fn row(name: &str) -> Option<usize> {
-    TRIANGLE_ROWS.iter().position(|row| row.name == name)
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::statistics::{Rate, rate};
 use crate::visibility::truth::{
     RayIndex, SampleTruth, SolidBox, SurfaceIndex, visible_by_random_rays,
 };
-use crate::visibility::{Ray, Rays, SampleGrid, fragment};
+use crate::visibility::{Rays, SampleGrid, fragment};
 
 /// Samples that estimate how many items are in front at all samples.
 const FEW: SampleGrid = SampleGrid::new(16, 9);
@@ -111,17 +111,6 @@ impl RaysEnd<'_> {
             }
             RaysEnd::Boxes(index, None) => SampleTruth::of(index, rays, grid, threads),
             RaysEnd::Triangles(index) => SampleTruth::of(index, rays, grid, threads),
-        }
-    }
-
-    /// Items along a ray, in any order, some of them several times.
-    pub fn all_along(&self, ray: &Ray) -> Vec<ItemId> {
-        fn items<At>(met: Vec<(ItemId, At)>) -> Vec<ItemId> {
-            met.into_iter().map(|(item, _)| item).collect()
-        }
-        match self {
-            RaysEnd::Boxes(index, _) => items(index.all_along(ray)),
-            RaysEnd::Triangles(index) => items(index.all_along(ray)),
         }
     }
 

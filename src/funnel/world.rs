@@ -60,6 +60,8 @@ pub struct FunnelInput<'a> {
     pub all: bool,
     /// Picking, if `all`.
     pub picks: bool,
+    /// What the chain leaves sorted from front to back, without `all`.
+    pub sorted: bool,
 }
 
 /// Items as rays meet them.
@@ -432,6 +434,7 @@ mod tests {
             execution: Execution::default(),
             all: true,
             picks: true,
+            sorted: false,
         };
         let world = World::new(&scene, &input, &|_| ()).expect("a world");
         let mut found = 0;

@@ -14,7 +14,7 @@ use super::process::*;
 
 const SMALL: &str =
     "advise --scene uniform:n=900 --path orbit:frames=6 --structure linear,wide,bvh --processes";
-const RULES: &str = "needless-planes plane-masks no-index six-planes regions occlusion occlusion-buffer \
+const RULES: &str = "needless-planes plane-masks no-index six-planes regions occlusion \
      cones sorting third-dimension rebasing rebuild f64-kernel frame-correction";
 
 /// Advice from one process, for checks of everything but times.
@@ -175,7 +175,7 @@ fn every_rule_is_there_once_with_both_sides_checked() {
                 assert_eq!(check["kept_excess"], check["left_out_excess"], "{omission}");
             }
             // What is hidden is in the frustum all the same: another truth.
-            if !set("rebuild occlusion occlusion-buffer cones").contains(name) {
+            if !set("rebuild occlusion cones sorting").contains(name) {
                 for side in ["kept", "left_out"] {
                     let missed = number(check, &format!("{side}_false_negative_ppm"));
                     assert_eq!(missed, 0.0, "{omission}");
@@ -187,7 +187,7 @@ fn every_rule_is_there_once_with_both_sides_checked() {
         let checks = array(rule(small(), name), "checks");
         checks.iter().all(|check| check["same_expected"] == true)
     };
-    for name in "needless-planes plane-masks no-index sorting third-dimension rebuild".split(' ') {
+    for name in "needless-planes plane-masks no-index third-dimension rebuild".split(' ') {
         assert!(expected(name), "{name}");
     }
 }

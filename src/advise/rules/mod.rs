@@ -1,14 +1,13 @@
 //! The rules of omission, a function each, which enters both sides of a rule.
 
-mod drawing;
 mod planes;
-mod removal;
-mod stages;
+pub(super) mod stages;
 mod structures;
 
 use super::omission::By::{Rule as Statistic, Time};
 use super::omission::LeftOutIf::{AtLeast, AtMost};
 use super::rule::Rule;
+use crate::funnel::StageKind::{Fragment, Occlusion, Region, Triangle};
 
 /// All rules: name, work to leave out, feature; statistic; decision.
 pub(super) const RULES: &[Rule] = rows! {
@@ -26,20 +25,17 @@ pub(super) const RULES: &[Rule] = rows! {
         "cost of drawing what six planes let through, ns a query",
         AtMost, Statistic, planes::six_planes;
     "regions", "the region stage (portals)", "portals", false,
-        "share of the items in the view that lie in no region that is seen",
-        AtMost, Statistic, stages::regions;
+        "share of the items left by the other stages that lie in no region that is seen",
+        AtMost, Statistic, |trials| stages::reads(trials, Region);
     "occlusion", "occlusion culling", "occlusion culling", false,
-        "share of the items in the view that others hide",
-        AtMost, Statistic, stages::occlusion;
-    "occlusion-buffer", "half of the occlusion buffer's columns and rows", "320x180 buffer", false,
-        "share of the items left by 160x90 that 320x180 removes as well",
-        AtMost, Statistic, stages::occlusion_buffer;
+        "share of the items left by the other stages that others hide",
+        AtMost, Statistic, |trials| stages::reads(trials, Occlusion);
     "cones", "normal cones of clusters of triangles", "normal cones", false,
-        "share of the triangles of the items in the view whose cluster faces away",
-        AtMost, Statistic, drawing::cones;
+        "share of the triangles of the items left whose cluster faces away",
+        AtMost, Statistic, |trials| stages::reads(trials, Triangle);
     "sorting", "sorting what is left from front to back", "depth sorting", false,
         "share of the shaded fragments that an early z-test saves once items are sorted",
-        AtMost, Statistic, drawing::sorting;
+        AtMost, Statistic, |trials| stages::reads(trials, Fragment);
     "third-dimension", "the third dimension of cells", "third dimension", false,
         "height of the scene",
         AtMost, Time, structures::third_dimension;

@@ -93,10 +93,7 @@ pub(super) fn plane_masks(trials: &mut Trials) -> Result<Draft, Unfit> {
         without += tree.counted(&Unmasked(volume)).1;
     }
     let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
-    let mut finding = Finding {
-        reason: "no plane is ever tested".to_owned(),
-        ..Finding::default()
-    };
+    let mut finding = Finding::none("no plane is ever tested".to_owned());
     if all > 0 {
         let reason = format!("{fewer} plane tests with masks, {all} without");
         let saved = 1.0 - fewer as f64 / all as f64;

@@ -1,111 +1,218 @@
-//! Rules about the region and the occlusion stage.
+//! Rules about the stages behind the frustum, read off a funnel of a few views.
 //!
-//! One side removes items that the other returns, so the drawing that this saves is weighed
+//! One side removes what the other returns, so the drawing that this saves is weighed
 //! against the time that it takes.
 
-use std::cell::RefCell;
-
-use super::super::case::{BUFFER, Case, some_of};
-use super::super::rule::{Draft, Unfit, not_applicable};
-use super::super::trials::{BASE, Sides, Trials};
-use super::removal::{PROBED, PROBES, of_items};
-use crate::funnel::{OCCLUSION_ROWS, PORTAL_CLIP, Run, left_out_of};
+use super::super::omission::{Check, is_longer};
+use super::super::options::{AdviseInput, AdviseOptions, planned};
+use super::super::rule::{Draft, Finding, Unfit};
+use super::super::trials::Trials;
+use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE, StageKind};
+use crate::index::{BuildError, StructureSpec};
 use crate::visibility::SampleGrid;
-use crate::visibility::region::{IdSet, Scratch, seen_by_samples};
 
-/// The region stage.
-///
-/// It pays where walls close off most of the items in the frustum, and is left out where
-/// the eye is in the open. Predicted from the regions that a few rays pass.
-pub(super) fn regions(trials: &mut Trials) -> Result<Draft, Unfit> {
-    let case = trials.case;
-    let scene = case.scene();
-    let none = || match left_out_of(scene) {
-        Some(row) => not_applicable(row.reason),
-        None => not_applicable("the scene has no rooms or sectors that portals join"),
+/// Most views, and most items of all of them.
+const VIEWS: usize = 8;
+const ITEMS: usize = 100_000;
+/// Samples of a view and of the occlusion buffer; of the image that is shaded.
+const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
+const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
+
+/// The stages on the fastest tree.
+pub struct Stages {
+    chain: Chain,
+    tree: StructureSpec,
+}
+
+impl Stages {
+    pub fn of(all: &AdviseInput, tree: &str) -> Result<Stages, BuildError> {
+        let tree = planned(all.structures, tree)?;
+        let chain = Chain::for_scene(all.scene, false)
+            .with(StageKind::Object, &tree.label)
+            .with(StageKind::Triangle, "several-cones")
+            .with(StageKind::Fragment, NONE);
+        Ok(Stages { chain, tree })
+    }
+
+    pub fn input<'s>(&'s self, all: &AdviseInput<'s>) -> FunnelInput<'s> {
+        FunnelInput {
+            scene: all.scene,
+            path: all.path,
+            most_views: (ITEMS / all.scene.items.len().max(1)).clamp(1, VIEWS),
+            samples: SAMPLES,
+            cut_outs: None,
+            mirror: None,
+            chain: &self.chain,
+            structures: std::slice::from_ref(&self.tree),
+            protocol: all.protocol,
+            claim: None,
+            inner_boxes: None,
+            loading: Default::default(),
+            execution: self.tree.execution,
+            all: false,
+            picks: false,
+            sorted: true,
+        }
+    }
+}
+
+/// What a stage removes, and the cost of what it does not.
+struct Removal<'f> {
+    gain: &'f Gain,
+    /// Singular and plural.
+    unit: [&'static str; 2],
+    /// Candidates for which one that is counted stands.
+    scale: f64,
+    /// Cost of one that is not removed, ns.
+    cost_ns: f64,
+}
+
+/// A rule about a stage; where the funnel has none it does not apply, for a reason.
+pub(super) fn reads(trials: &Trials, stage: StageKind) -> Result<Draft, Unfit> {
+    let options = trials.case.options;
+    Ok(Draft::concluded(Vec::new(), move |facts| {
+        let funnel = facts.funnel.as_ref().map_err(String::clone);
+        let removal = funnel.and_then(|funnel| removal(funnel, stage, &options));
+        removal.map_or_else(Finding::none, |removal| removal.weigh())
+    }))
+}
+
+/// The gain of a stage; of the fragment stage, that of sorting.
+fn removal<'f>(
+    funnel: &'f FunnelReport,
+    stage: StageKind,
+    options: &AdviseOptions,
+) -> Result<Removal<'f>, String> {
+    let gain = |stage| funnel.gains.iter().find(|gain| gain.stage == stage);
+    let blocks = funnel.solid_blocks.as_ref();
+    let hides_nothing = blocks.is_some_and(|row| row.box_count == 0);
+    let none = match stage {
+        StageKind::Occlusion => "no boxes are known in the solid between the map's rooms",
+        _ => "the scene has no rooms or sectors that portals join",
     };
-    let world = case.world.as_ref().map_err(not_applicable)?;
-    let regions = world.regions.as_ref().ok_or_else(none)?;
-    let row = regions.row(PORTAL_CLIP).ok_or_else(none)?;
-    let graph = &regions.graph;
-    if graph.openings().is_empty() {
-        return Err(none());
-    }
-    let state = RefCell::new((Scratch::default(), IdSet::default(), Vec::new()));
-    // Items of the visible regions against the six planes; all items by the tree where the
-    // eye is in no region.
-    let kept = trials.unjudged(move |n, out| {
-        let (scratch, marks, seen) = &mut *state.borrow_mut();
-        match row.from_eye(world.rays(n), scratch, seen) {
-            true => {
-                regions.items.of_regions(seen, marks, out);
-                out.retain(|&id| world.views[n].volume.sees(&scene.items[id as usize]));
-            }
-            false => case.query(n, out),
+    let mut left_out = funnel.left_out.iter();
+    let is_own = |section, name| match stage {
+        StageKind::Fragment => section == "orders",
+        _ => name == stage.name(),
+    };
+    let found = gain(stage).filter(|_| stage != StageKind::Occlusion || !hides_nothing);
+    let own = found.ok_or_else(|| {
+        let row = left_out.find(|row| is_own(row.section, row.name));
+        row.map_or(none, |row| &row.reason).to_owned()
+    })?;
+    let items = gain(StageKind::Occlusion).map_or(f64::NAN, |gain| gain.with_count);
+    let of_item = own.without_count / items;
+    let large = SHADED.samples() as f64 / SAMPLES.samples() as f64;
+    let (unit, scale, cost_ns) = match stage {
+        StageKind::Triangle => (["triangle", "triangles"], 1.0, options.draw_ns / of_item),
+        StageKind::Fragment => (
+            ["shaded fragment", "shaded fragments"],
+            large,
+            options.shade_ns,
+        ),
+        _ => (["item", "items"], 1.0, options.draw_ns),
+    };
+    Ok(Removal {
+        gain: own,
+        unit,
+        scale,
+        cost_ns,
+    })
+}
+
+impl Removal<'_> {
+    /// Leaves out where removing takes longer than drawing the removed candidates.
+    fn weigh(&self) -> Finding {
+        let (gain, cost_ns, [one, many]) = (self.gain, self.cost_ns, self.unit);
+        let [with, without] = [gain.with_count, gain.without_count].map(|n| n * self.scale);
+        if without == 0.0 {
+            return Finding::none(format!("no {one} is in any view that was looked at"));
         }
-    });
-    // The share of the items in view that lie in no region that a few rays pass.
-    let (mut met, mut gone) = (0, 0);
-    let (mut homes, mut seen, mut listed) = (Vec::new(), Vec::new(), Vec::new());
-    for camera in some_of(case.cameras(), PROBED) {
-        let found = case.found(camera);
-        met += found.len();
-        if graph.homes(world.rays(camera), &mut homes) {
-            seen_by_samples(graph, world.rays(camera), PROBES, &mut seen);
-            regions
-                .items
-                .of_regions(&seen, &mut IdSet::default(), &mut listed);
-            let is_gone = |id: &&u32| listed.binary_search(id).is_err();
-            gone += found.iter().filter(is_gone).count();
+        let removed = without - with;
+        let left_out_ns = gain.without_ns.unwrap_or(f64::NAN);
+        let kept_ns = gain
+            .ratio
+            .map_or(f64::NAN, |ratio| ratio.value * left_out_ns);
+        let testing = kept_ns - left_out_ns;
+        let from = (testing > 0.0 && removed > 0.0).then_some(testing / removed);
+        let told = |show: &dyn Fn(f64) -> String| from.map_or_else(String::new, show);
+        let share = removed / without;
+        let pays = (testing / (cost_ns * without)).max(0.0);
+        let reason = format!(
+            "{removed:.1} of {without:.1} {many} a view are removed ({:.1} %), which saves {} ns each{}",
+            share * 100.0,
+            (cost_ns * 1e3).round() / 1e3,
+            told(&|ns| format!("; pays above {ns:.1} ns per {one}"))
+        );
+        let note = format!(
+            "{} ns/{}{}",
+            (cost_ns * 1e1).round() / 1e1,
+            one.trim_start_matches("shaded "),
+            told(&|ns| format!(", pays from {ns:.*}", if ns < 10.0 { 2 } else { 0 }))
+        );
+        let check = Check {
+            on: format!(
+                "{} {}, the others as in funnel",
+                gain.stage.name(),
+                gain.back_end
+            ),
+            kept_ns,
+            left_out_ns,
+            ratio: gain.ratio,
+            same_answers: gain.unit == "fragments" || removed == 0.0,
+            pays: gain.ratio.and_then(is_longer),
+            ..Check::default()
+        };
+        Finding {
+            check: Some(check),
+            ..Finding::new(share, pays, reason)
+                .noted(note)
+                .costing([kept_ns + with * cost_ns, left_out_ns + without * cost_ns])
         }
     }
-    let on = format!("portal-clip against {}", case.spec.label);
-    let predicted = gone as f64 / met.max(1) as f64;
-    Ok(of_items(trials, Sides::new(on, kept, BASE), predicted))
 }
 
-/// The buffer with half of the columns and rows of [`BUFFER`].
-const SMALL: SampleGrid = SampleGrid::new(BUFFER.width / 2, BUFFER.height / 2);
+#[cfg(test)]
+mod tests {
+    use super::super::super::omission::{By, Decision, LeftOutIf, Omission};
+    use super::super::super::rule::some_rule;
+    use super::*;
+    use crate::statistics::Estimate;
 
-/// The default back end, by the tree of the occluders.
-fn masked_inner<'c>(case: &'c Case, buffer: SampleGrid) -> Result<Run<'c>, Unfit> {
-    let world = case.world.as_ref().map_err(not_applicable)?;
-    let blocks = world.hiders.blocks.as_ref();
-    if blocks.is_some_and(|row| row.box_count == 0) {
-        let reason = "no boxes are known in the solid between the map's rooms";
-        return Err(not_applicable(reason));
+    fn settled([with_count, without_count]: [f64; 2], ratio: f64, cost_ns: f64) -> Omission {
+        let counts = [with_count, without_count];
+        let named = ("rays", "items");
+        let mut gain = Gain::new(StageKind::Occlusion, named, counts, Default::default());
+        (gain.without_ns, gain.ratio) = (Some(100.0), Some(Estimate::exact(ratio)));
+        let removal = Removal {
+            gain: &gain,
+            unit: ["thing", "things"],
+            scale: 1.0,
+            cost_ns,
+        };
+        let mut finding = removal.weigh();
+        let checks = finding.check.take().into_iter().collect();
+        some_rule(LeftOutIf::AtMost, By::Rule).omission(finding, checks)
     }
-    Ok(world.run_occlusion(&OCCLUSION_ROWS[0], buffer))
-}
 
-/// The occlusion stage.
-///
-/// It pays where the eye is among things that hide others, and is left out where it looks
-/// down on them. Predicted from a few of the cameras: rays to a few items predicted 68 % of
-/// a wood, of which 28 % is removed, since many items there hide a part of a pixel or of an
-/// item.
-pub(super) fn occlusion(trials: &mut Trials) -> Result<Draft, Unfit> {
-    let case = trials.case;
-    let run = masked_inner(case, BUFFER)?;
-    let kept = trials.unjudged(move |n, out| run(n, None, out));
-    let [left, given] = [kept, BASE].map(|task| trials.mean_count(task, PROBED));
-    let predicted = if given > 0.0 { 1.0 - left / given } else { 0.0 };
-    let SampleGrid { width, height } = BUFFER;
-    let on = format!("masked-inner {width}x{height} against {}", case.spec.label);
-    Ok(of_items(trials, Sides::new(on, kept, BASE), predicted))
-}
-
-/// Half of the occlusion buffer's columns and rows.
-pub(super) fn occlusion_buffer(trials: &mut Trials) -> Result<Draft, Unfit> {
-    let case = trials.case;
-    let [large, small] = [masked_inner(case, BUFFER)?, masked_inner(case, SMALL)?];
-    let kept = trials.unjudged(move |n, out| large(n, None, out));
-    let left_out = trials.unjudged(move |n, out| small(n, None, out));
-    let [few, more] = [kept, left_out].map(|task| trials.mean_count(task, PROBED));
-    let on = "masked-inner 320x180 against 160x90";
-    Ok(of_items(
-        trials,
-        Sides::new(on, kept, left_out),
-        1.0 - few / more,
-    ))
+    #[test]
+    fn a_stage_is_left_out_where_it_takes_longer_than_what_it_saves() {
+        // 200 ns for 40 of 50: pays above 5 ns each.
+        let dear = settled([10.0, 50.0], 3.0, 5.1);
+        assert_eq!(dear.decision, Decision::Keep);
+        assert_eq!(dear.statistic, Some(0.8));
+        assert!((dear.threshold.unwrap() - 200.0 / 255.0).abs() < 1e-12);
+        for part in ["40.0 of 50.0 things", "above 5.0 ns per thing"] {
+            assert!(dear.reason.contains(part), "{}", dear.reason);
+        }
+        let cheap = settled([10.0, 50.0], 3.0, 4.9);
+        assert_eq!(cheap.decision, Decision::LeaveOut);
+        // It costs 300 + 49 with and 100 + 245 without.
+        assert!((cheap.saving.unwrap() - (1.0 - 345.0 / 349.0)).abs() < 1e-12);
+        let of_all = |ratio| settled([50.0, 50.0], ratio, 1e9).decision;
+        assert_eq!([3.0, 0.5].map(of_all), [Decision::LeaveOut; 2]);
+        let nothing = settled([0.0, 0.0], 3.0, 1.0);
+        assert_eq!((nothing.predicted, nothing.threshold), (None, None));
+        assert!(nothing.reason.contains("no thing"), "{}", nothing.reason);
+    }
 }

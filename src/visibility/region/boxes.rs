@@ -12,7 +12,7 @@ use super::id_set::{IdSet, RegionId};
 use super::locate::{BoxGrid, covers};
 use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
-use crate::visibility::{Ray, Rays, SampleGrid};
+use crate::visibility::Ray;
 
 /// A ground of boxes, one a region.
 #[derive(Debug)]
@@ -192,24 +192,4 @@ fn way_out(b: &WorldBox, ray: &Ray) -> Option<(usize, f64, f64)> {
         }
     }
     first
-}
-
-/// Replaces `out` by the regions that the rays of an image pass, ascending: a truth
-/// by samples, to which no row may answer with less.
-pub fn seen_by_samples(
-    graph: &RegionGraph,
-    rays: &Rays,
-    grid: SampleGrid,
-    out: &mut Vec<RegionId>,
-) {
-    let mut seen = IdSet::default();
-    seen.clear(graph.len());
-    for row in 0..grid.height {
-        for column in 0..grid.width {
-            graph
-                .ground()
-                .follow(graph, &rays.sample(grid, column, row), &mut seen);
-        }
-    }
-    seen.list(out);
 }

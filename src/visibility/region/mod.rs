@@ -20,7 +20,6 @@ mod row;
 mod search;
 mod view;
 
-pub use boxes::seen_by_samples;
 pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
 pub use id_set::{IdSet, RegionId};
 pub use locate::{RegionItems, without};

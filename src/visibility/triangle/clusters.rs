@@ -38,41 +38,17 @@ impl Clusters {
     /// # Panics
     /// If `most` is outside 1..=64.
     pub fn of(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
-        Clusters::by_run(&surfaces, most, grow)
-    }
-
-    /// Clusters of `most` triangles, 1 to 64, in the order of the list. O(t).
-    ///
-    /// Two are the faces of a box.
-    ///
-    /// # Panics
-    /// If `most` is outside 1..=64.
-    pub fn as_listed(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
-        Clusters::by_run(&surfaces, most, |_, run, most, clusters| {
-            clusters.triangles.extend(run.clone());
-            // Each ends where the next one starts.
-            let ends = run.clone().step_by(most).skip(1);
-            clusters.starts.extend(ends.chain([run.end]));
-        })
-    }
-
-    /// Clusters of each run of triangles of one kind and alike in sides.
-    fn by_run(
-        surfaces: &Arc<Surfaces>,
-        most: usize,
-        add: impl Fn(&Surfaces, Range<u32>, usize, &mut Clusters),
-    ) -> Clusters {
         assert!((1..=MOST_TRIANGLES).contains(&most), "1 to 64 triangles");
         let mut clusters = Clusters {
-            surfaces: surfaces.clone(),
             triangles: Vec::with_capacity(surfaces.triangles.len()),
             starts: vec![0],
             of_item: Vec::with_capacity(surfaces.items()),
+            surfaces: surfaces.clone(),
         };
         for item in 0..surfaces.items() {
             let first = clusters.len() as u32;
             for run in surfaces.runs(item) {
-                add(surfaces, run, most, &mut clusters);
+                grow(&surfaces, run, most, &mut clusters);
             }
             clusters.of_item.push(first..clusters.len() as u32);
         }
@@ -259,39 +235,15 @@ mod tests {
     }
 
     #[test]
-    fn faces_of_boxes_are_clusters_as_listed() {
-        let scene = crate::scene::load("city:n=20", &Default::default()).unwrap();
-        let surfaces = Arc::new(Surfaces::from_boxes(&scene));
-        let faces = Clusters::as_listed(surfaces.clone(), 2);
-        assert_eq!((faces.len(), faces.of_item[7].clone()), (120, 42..48));
-        for cluster in 0..faces.len() {
-            let extent = bounds(&faces, cluster).extent();
-            assert_eq!(faces.triangles_of(cluster).len(), 2);
-            assert_eq!(extent.to_array().iter().filter(|e| **e == 0.0).count(), 1);
-            assert_eq!(
-                surfaces.item_of(faces.triangles_of(cluster)[1]),
-                cluster / 6
-            );
-        }
-        // 12 triangles in fives: the last cluster of an item has two.
-        let fives = Clusters::as_listed(surfaces, 5);
-        let sizes = (3..6).map(|cluster| fives.triangles_of(cluster).len());
-        assert_eq!(sizes.collect::<Vec<_>>(), [5, 5, 2]);
-    }
-
-    #[test]
     fn an_item_without_triangles_is_no_cluster() {
         let scene = crate::scene::load("city:n=2", &Default::default()).unwrap();
         let mut surfaces = Surfaces::from_boxes(&scene);
         let whole = surfaces.of_item[1].clone();
         surfaces.of_item.insert(1, whole.start..whole.start);
-        for clusters in
-            [Clusters::as_listed, Clusters::of].map(|make| make(surfaces.clone().into(), 2))
-        {
-            assert!(clusters.of_item[1].is_empty());
-            assert!((0..clusters.len()).all(|cluster| !clusters.triangles_of(cluster).is_empty()));
-            assert_eq!(clusters.one_sided().count(), clusters.len());
-        }
+        let clusters = Clusters::of(surfaces.into(), 2);
+        assert!(clusters.of_item[1].is_empty());
+        assert!((0..clusters.len()).all(|cluster| !clusters.triangles_of(cluster).is_empty()));
+        assert_eq!(clusters.one_sided().count(), clusters.len());
     }
 
     #[test]
@@ -300,12 +252,10 @@ mod tests {
         let mut surfaces = Surfaces::from_boxes(&scene);
         surfaces.two_sided[4] = true;
         surfaces.kinds[20..].fill(SurfaceKind::Clear);
-        for make in [Clusters::as_listed, Clusters::of] {
-            let clusters = make(surfaces.clone().into(), 64);
-            assert_eq!(clusters.starts, [0, 4, 5, 12, 20, 24]);
-            assert_eq!(clusters.of_item, [0..3, 3..5]);
-            assert_eq!(clusters.one_sided().count(), 4);
-        }
+        let clusters = Clusters::of(surfaces.into(), 64);
+        assert_eq!(clusters.starts, [0, 4, 5, 12, 20, 24]);
+        assert_eq!(clusters.of_item, [0..3, 3..5]);
+        assert_eq!(clusters.one_sided().count(), 4);
     }
 
     #[test]

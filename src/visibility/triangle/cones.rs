@@ -88,13 +88,6 @@ impl Cone {
         })
     }
 
-    /// The share of all directions of view along which all triangles face away.
-    ///
-    /// They are a cap of 90° - alpha about the axis.
-    pub fn turned_away(&self) -> f64 {
-        ((1.0 - self.sine) / 2.0).max(0.0)
-    }
-
     /// k² as f32, rounded up.
     pub fn square(&self) -> f32 {
         round_up(self.sine * self.sine * (1.0 + COSINE))

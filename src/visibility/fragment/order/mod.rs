@@ -132,18 +132,6 @@ fn sorted(key: fn(&Camera, &WorldBox) -> f64) -> Box<dyn DepthOrder> {
     Box::new(order)
 }
 
-/// Sorts items by the distance of the nearest point of each box. O(n log n).
-///
-/// # Panics
-/// If there is no such item.
-pub fn front_to_back(solids: &Solids, camera: &Camera, items: &mut [ItemId]) {
-    let key = |&item: &ItemId| (nearest(camera, &solids.boxes[item as usize]), item);
-    let mut keyed: Vec<_> = items.iter().map(key).collect();
-    sort(&mut keyed);
-    let places = items.iter_mut().zip(keyed);
-    places.for_each(|(to, (_, item))| *to = item);
-}
-
 fn sort(keyed: &mut [(f64, ItemId)]) {
     keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
 }
