@@ -58,7 +58,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
         study.advance();
     }
     let prepared = advise::prepare(&input, Group::of(&parts).cells, &begin)?;
-    let trials = |timing| Job::Trials(prepared.plan.clone(), timing);
+    let trials = |timing| Job::Trials(prepared.plan.clone().into(), timing);
     let step = "with and without every rule";
     let times = study.times(step, setting.path.lens_scale, trials)?;
     let advice = prepared.conclude(&input, &times);

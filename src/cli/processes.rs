@@ -425,7 +425,7 @@ pub enum Job {
         samples: bool,
     },
     /// Both sides of every rule (`advise`).
-    Trials(TrialPlan, Timing),
+    Trials(Box<TrialPlan>, Timing),
     /// All points (`precision`).
     Points(PointPlan, Timing),
     /// Frames, eyes and arms (`drift`).

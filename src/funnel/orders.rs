@@ -26,7 +26,7 @@ use crate::visibility::fragment::{
 use crate::visibility::truth::{Crossing, Probe, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
-/// As listed, and from front to back.
+/// Items as listed, and from front to back.
 pub const SORTED: [&str; 2] = ["none", "box-distance"];
 
 /// A depth order over all views. Counts are means per view.
@@ -116,7 +116,9 @@ impl Left {
 }
 
 impl Orders {
-    /// Orders of the items behind `steps`, all or two; none if `too_much` would be drawn.
+    /// Orders of the items behind `steps`, all or [`SORTED`].
+    ///
+    /// None if `too_much` would be drawn.
     pub fn new(
         world: &World,
         stages: &ItemStages,

@@ -139,7 +139,7 @@ impl<'w> Study<'w> {
         of_items.chain(behind).collect()
     }
 
-    /// What the chain leaves drawn from front to back, and as listed.
+    /// The remaining items drawn from front to back, and as listed.
     fn gain_of_sorting(&self, orders: &[OrderRow]) -> Option<Gain> {
         let [listed, sorted] = SORTED.map(|name| orders.iter().find(|row| row.name == name));
         let (listed, sorted) = (listed?, sorted?);

@@ -60,7 +60,7 @@ pub struct FunnelInput<'a> {
     pub all: bool,
     /// Picking, if `all`.
     pub picks: bool,
-    /// What the chain leaves sorted from front to back, without `all`.
+    /// Sorting the remaining items from front to back, without `all`.
     pub sorted: bool,
 }
 

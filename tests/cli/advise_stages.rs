@@ -73,7 +73,7 @@ fn the_stages_behind_the_frustum_are_weighed_on_maps_and_meshes_too() {
         })
     };
     // Free drawing is worth no stage, dear drawing is worth one that removes much.
-    let dear = of("--scene freedm-map20 --draw-ns 1e5 --shade-ns 100");
+    let dear = of("--scene freedm-map20 --draw-ns 1e7 --shade-ns 1000");
     let free = of("--scene freedm-map20 --draw-ns 0 --shade-ns 0");
     for (i, least) in [0.2, 0.2, 0.01].into_iter().enumerate() {
         assert!(dear[i].0 == "keep" && dear[i].1 > least, "{i} {dear:?}");

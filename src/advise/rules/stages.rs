@@ -56,7 +56,7 @@ impl Stages {
     }
 }
 
-/// What a stage removes, and the cost of what it does not.
+/// Candidates that a stage removes, and the cost of those that it does not.
 struct Removal<'f> {
     gain: &'f Gain,
     /// Singular and plural.
