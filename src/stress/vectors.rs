@@ -8,7 +8,6 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use serde::de::{DeserializeOwned, Error, IgnoredAny, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer};
-use strsim::damerau_levenshtein;
 
 use crate::camera::{Camera, CameraError, Lens};
 use crate::geometry::{Aabb, Plane};
@@ -16,6 +15,7 @@ use crate::input::{InputError, note, read_file};
 use crate::json::{JsonError, from_json};
 use crate::oracle::Pose;
 use crate::shown::plain;
+use crate::spec::nearest;
 
 /// The vectors that come with the program.
 pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
@@ -302,13 +302,9 @@ fn note_unknown(bytes: &[u8], file: &str) {
     // The built-in vectors have every field.
     let known = fields(BUILT_IN.as_bytes());
     for name in fields(bytes).difference(&known) {
-        let most = (name.len() / 3).min(3);
-        let edits = |field: &&String| damerau_levenshtein(&name.to_lowercase(), field);
-        if let Some(guess) = known.iter().find(|field| edits(field) <= most) {
-            let name = plain(name);
-            note(&format!(
-                "{file}: field '{name}' is not read (did you mean '{guess}'?)"
-            ));
+        if let Some(guess) = nearest(name, known.iter().map(String::as_str)) {
+            let found = format!("field '{}' is not read", plain(name));
+            note(&format!("{file}: {found} (did you mean '{guess}'?)"));
         }
     }
 }

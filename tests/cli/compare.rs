@@ -493,39 +493,3 @@ fn a_run_that_was_stopped_is_to_be_finished() {
         "{text}"
     );
 }
-
-/// The files of a run are inputs, whichever of them is named.
-#[test]
-fn no_page_takes_the_place_of_an_input() {
-    let folder = with_change(|_| ());
-    let at = |name: &str| folder.path().join(name);
-    for name in ["run", "results/baselines"] {
-        fs::create_dir_all(at(name)).expect("made");
-    }
-    fs::copy(at("old.json"), at("run/report.json")).expect("writable");
-    fs::copy(at("old.json"), at("results/baselines/main.json")).expect("writable");
-    for name in ["summary.csv", "samples.csv", "stream.jsonl"] {
-        fs::write(at("run").join(name), name).expect("writable");
-    }
-    let mut lines = vec![
-        "compare --baseline main new.json --html results/baselines/main.json".to_owned(),
-        "compare --baseline main run --html run/report.json".to_owned(),
-        format!("compare --against {0} --html {0}", super::PROGRAM),
-    ];
-    for name in ["report.json", "summary.csv", "samples.csv", "stream.jsonl"] {
-        lines.extend([
-            format!("compare run new.json --html run/{name}"),
-            format!("compare new.json run/report.json --html run/{name}"),
-            format!("report run --html run/{name}"),
-            format!("report run/report.json --markdown run/{name}"),
-            format!("report run new.json --history run/{name}"),
-        ]);
-    }
-    all_refused(
-        &folder,
-        &lines,
-        "an input or another output; expected a file",
-    );
-    works(folder.path(), "report run --html run/report.html");
-    works(folder.path(), "report run --html run/report.html");
-}

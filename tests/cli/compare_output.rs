@@ -1,4 +1,4 @@
-//! `compare`: its JSON, and reports that cannot be compared.
+//! `compare`: its JSON, reports it cannot compare, files it must not overwrite.
 
 use std::fs;
 
@@ -138,4 +138,40 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
     ] {
         all_refused(&folder, &[format!("{COMPARE} {options}")], wanted);
     }
+}
+
+/// The files of a run are inputs, whichever of them is named.
+#[test]
+fn no_page_takes_the_place_of_an_input() {
+    let folder = with_change(|_| ());
+    let at = |name: &str| folder.path().join(name);
+    for name in ["run", "results/baselines"] {
+        fs::create_dir_all(at(name)).expect("made");
+    }
+    fs::copy(at("old.json"), at("run/report.json")).expect("writable");
+    fs::copy(at("old.json"), at("results/baselines/main.json")).expect("writable");
+    for name in ["summary.csv", "samples.csv", "stream.jsonl"] {
+        fs::write(at("run").join(name), name).expect("writable");
+    }
+    let mut lines = vec![
+        "compare --baseline main new.json --html results/baselines/main.json".to_owned(),
+        "compare --baseline main run --html run/report.json".to_owned(),
+        format!("compare --against {0} --html {0}", super::PROGRAM),
+    ];
+    for name in ["report.json", "summary.csv", "samples.csv", "stream.jsonl"] {
+        lines.extend([
+            format!("compare run new.json --html run/{name}"),
+            format!("compare new.json run/report.json --html run/{name}"),
+            format!("report run --html run/{name}"),
+            format!("report run/report.json --markdown run/{name}"),
+            format!("report run new.json --history run/{name}"),
+        ]);
+    }
+    all_refused(
+        &folder,
+        &lines,
+        "an input or another output; expected a file",
+    );
+    works(folder.path(), "report run --html run/report.html");
+    works(folder.path(), "report run --html run/report.html");
 }
