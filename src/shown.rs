@@ -2,7 +2,6 @@
 //! a picture or a page would obey, and counts with the word they count. It defines
 //! which characters are harmless, for every output there is.
 
-use std::borrow::Cow;
 use std::io;
 
 /// Text on one line: line breaks and tabs are spaces, and what would steer the
@@ -148,35 +147,6 @@ fn is_harmful(c: char) -> bool {
         || u32::from(c) & 0xFFFE == 0xFFFE
 }
 
-/// A text as a field of CSV. Spreadsheets take what begins with `=`, `+`, `-` or
-/// `@` for a formula and carry it out; an apostrophe in front marks it as text.
-/// Numbers stay as they are. [`from_field`] is the way back.
-pub fn field(text: &str) -> Cow<'_, str> {
-    match is_formula(text) {
-        true => format!("'{text}").into(),
-        false => text.into(),
-    }
-}
-
-/// The same of a text that is shown: without anything that a terminal would obey.
-/// Line breaks stay, for CSV has them within quotes.
-pub fn shown_field(text: &str) -> String {
-    field(&lines(text)).into_owned()
-}
-
-/// The text of a field that [`field`] may have marked.
-pub fn from_field(field: &str) -> &str {
-    let marked = field.strip_prefix('\'');
-    marked.filter(|text| is_formula(text)).unwrap_or(field)
-}
-
-fn is_formula(text: &str) -> bool {
-    // What reads as marked is marked once more. A spreadsheet drops white space.
-    let unmarked = text.trim_start_matches('\'');
-    let begins = unmarked.trim_start().starts_with(['=', '+', '-', '@']);
-    begins && !text.parse::<f64>().is_ok_and(f64::is_finite)
-}
-
 /// Lower-case hexadecimal.
 pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
@@ -280,34 +250,6 @@ mod tests {
             let legal = matches!(c, ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..);
             assert!(legal, "{c:?}");
         }
-    }
-
-    #[test]
-    fn formulas_are_marked_as_text_and_read_back() {
-        for text in [
-            "=1+1",
-            "+cmd|' /C calc'!A0",
-            "-2+3",
-            "@SUM(A1)",
-            "\t=1",
-            "-",
-            "-inf",
-            "'=1",
-            "''=1",
-        ] {
-            assert_eq!(field(text), format!("'{text}"));
-            assert_eq!(from_field(&field(text)), text);
-        }
-        for text in ["", "city:n=3", "-3.5", "+7", "-1e9", "'", "'a'", "a=b"] {
-            assert_eq!(field(text), text);
-            assert_eq!(from_field(text), text);
-        }
-    }
-
-    #[test]
-    fn a_shown_field_steers_no_terminal_and_no_spreadsheet() {
-        assert_eq!(shown_field("\u{1b}[2J\na"), "\\u{1b}[2J\na");
-        assert_eq!(shown_field("\t=1"), "' =1");
     }
 
     #[test]

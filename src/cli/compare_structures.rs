@@ -15,7 +15,7 @@ use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{Answer, Verdict, guarded, input_of};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::{Scene, available_bytes};
-use crate::shown::shown_field;
+use crate::shown::lines;
 use crate::threads::share;
 
 /// One structure's answer to one question.
@@ -263,7 +263,7 @@ impl<W: Write> Write for Unread<W> {
 /// A value as CSV holds it: ids separated by spaces.
 fn cell(value: &Value) -> String {
     match value {
-        Value::String(text) => shown_field(text),
+        Value::String(text) => lines(text),
         Value::Array(ids) => ids.iter().map(cell).collect::<Vec<_>>().join(" "),
         other => other.to_string(),
     }

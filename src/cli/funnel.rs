@@ -28,7 +28,7 @@ use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
 use crate::measure::ProcessTimes;
 use crate::scene::{LoadOptions, Scene};
-use crate::shown::shown_field;
+use crate::shown::lines;
 use crate::spec::SpecError;
 use crate::visibility::region::Pvs;
 use crate::visibility::{Guarantee, SampleGrid};
@@ -281,7 +281,7 @@ pub fn write(report: &FunnelReport, folder: &Path) -> anyhow::Result<()> {
         let about = ["scene", "path"].map(str::to_owned).into_iter();
         out.write_record(about.chain(columns))?;
         for row in rows {
-            let own = [&report.scene, &report.path].map(|name| shown_field(name));
+            let own = [&report.scene, &report.path].map(|name| lines(name));
             let fields = fields.split_whitespace();
             let cells = fields.map(|path| cell(row.pointer(&format!("/{path}"))));
             out.write_record(own.into_iter().chain(cells))?;
@@ -301,7 +301,7 @@ fn column(path: &str) -> String {
 fn cell(value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null) => String::new(),
-        Some(Value::String(text)) => shown_field(text),
+        Some(Value::String(text)) => lines(text),
         Some(Value::Array(list)) => list.len().to_string(),
         Some(Value::Object(list)) => list.len().to_string(),
         Some(plain) => plain.to_string(),

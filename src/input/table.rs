@@ -3,7 +3,6 @@
 //! Rows are read one by one with errors that name file, line and column. It defines the
 //! mechanics that the box, camera and point readers share; what the columns mean is theirs.
 
-use std::borrow::Cow;
 use std::collections::HashSet;
 
 use super::{InputError, finite, note};
@@ -23,7 +22,7 @@ pub struct TableReader<'b> {
     delimiter: u8,
     header: Vec<String>,
     header_line: u64,
-    record: csv::ByteRecord,
+    record: csv::StringRecord,
     /// Begin of the last record in bytes, and its line.
     at: (usize, u64),
 }
@@ -32,7 +31,7 @@ pub struct TableReader<'b> {
 pub struct Row<'a> {
     file: &'a str,
     header: &'a [String],
-    record: &'a csv::ByteRecord,
+    record: &'a csv::StringRecord,
     line: u64,
 }
 
@@ -42,9 +41,17 @@ impl<'b> TableReader<'b> {
     /// Fields are separated by the one of `,`, `;`, tab and `|` that gives most of `names`.
     ///
     /// # Errors
-    /// An empty file, a column named twice, a quote that is never closed, text that is no
-    /// comma-separated UTF-8 with a header.
+    /// Text that is no UTF-8, an empty file, a column named twice, a quote that is never
+    /// closed.
     pub fn open(bytes: &'b [u8], file: &str, names: &[&str]) -> Result<Self, InputError> {
+        let no_text = |at: usize, found: &str| {
+            InputError::line(file, lines(&bytes[..at]) + 1, found, "UTF-8 text")
+        };
+        if let Some(zero) = bytes.iter().position(|byte| *byte == 0) {
+            return Err(no_text(zero, "zero bytes, as in UTF-16 text"));
+        }
+        let text = str::from_utf8(bytes);
+        text.map_err(|error| no_text(error.valid_up_to(), "a byte that is no UTF-8"))?;
         let delimiter = delimiter(bytes, names);
         let mut csv = csv::ReaderBuilder::new()
             .flexible(true)
@@ -52,9 +59,8 @@ impl<'b> TableReader<'b> {
             .trim(csv::Trim::Headers)
             .from_reader(bytes);
         // From memory nothing fails to be read.
-        let fields = csv.byte_headers().cloned().unwrap_or_default();
-        let header = fields.iter().map(String::from_utf8_lossy);
-        let header = header.map(|name| name.trim_start_matches('\u{feff}').to_owned());
+        let fields = csv.headers().cloned().unwrap_or_default();
+        let header = fields.iter().map(|name| name.trim_start_matches('\u{feff}').to_owned());
         let header: Vec<String> = header.collect();
         let mut table = TableReader {
             file: file.to_owned(),
@@ -63,15 +69,11 @@ impl<'b> TableReader<'b> {
             delimiter,
             header: Vec::new(),
             header_line: 1,
-            record: csv::ByteRecord::new(),
+            record: csv::StringRecord::new(),
             at: (0, 1),
         };
         table.header_line = table.line_of_record_at(0);
         let complain = |found: String, expected: &str| table.error(found, expected.to_owned());
-        if fields.as_slice().contains(&0) {
-            let found = "zero bytes, as in UTF-16 text".to_owned();
-            return Err(complain(found, "UTF-8 text"));
-        }
         check_quotes(bytes, delimiter, file)?;
         if header.iter().all(String::is_empty) {
             let found = match header.len() {
@@ -170,7 +172,7 @@ impl<'b> TableReader<'b> {
 
     /// The next row, or what is wrong with it; `None` at the end of the file.
     pub fn next_row(&mut self) -> Option<Result<Row<'_>, InputError>> {
-        let read = self.csv.read_byte_record(&mut self.record);
+        let read = self.csv.read_record(&mut self.record);
         read.ok().filter(|is_there| *is_there)?;
         let start = self.record.position().map_or(0, csv::Position::byte);
         let line = self.line_of_record_at(start as usize);
@@ -199,16 +201,14 @@ impl<'b> TableReader<'b> {
 }
 
 impl Row<'_> {
-    /// The field as text without blanks around it.
-    ///
-    /// Bytes that are no UTF-8 are replaced.
-    pub fn text(&self, column: usize) -> Cow<'_, str> {
-        String::from_utf8_lossy(self.record[column].trim_ascii())
+    /// The field without blanks around it.
+    pub fn text(&self, column: usize) -> &str {
+        self.record[column].trim_ascii()
     }
 
     /// The same with its blanks.
-    pub fn label(&self, column: usize) -> Cow<'_, str> {
-        String::from_utf8_lossy(&self.record[column])
+    pub fn label(&self, column: usize) -> &str {
+        &self.record[column]
     }
 
     /// A finite f64.

@@ -20,7 +20,7 @@ use super::{Report, ReportCell};
 use crate::input::InputError;
 use crate::measure::{METRICS, Part, TaskSamples};
 use crate::path::CameraFacts;
-use crate::shown::shown_field;
+use crate::shown::lines;
 
 /// The folder of a run that is being measured, locked against others.
 pub struct RunFolder {
@@ -113,7 +113,7 @@ impl RunFolder {
                     motion => format!("{} + {motion}", key.path),
                 };
                 let names =
-                    [&key.scene, &path, &key.cache, label, &key.test].map(|name| shown_field(name));
+                    [&key.scene, &path, &key.cache, label, &key.test].map(|name| lines(name));
                 for s in samples {
                     let at = (part.process, s.round, s.frame, s.queries);
                     let [cpu_ns, wall_ns] = [s.cpu_ns, s.wall_ns].map(|ns| format!("{ns:.3}"));
@@ -326,17 +326,17 @@ pub fn save_report(folder: &Path, report: &Report) -> Result<(), InputError> {
 type Column = (&'static str, fn(&ReportCell) -> String);
 
 const SUMMARY_COLUMNS: [Column; 16] = [
-    ("scene", |cell| shown_field(&cell.scene.name)),
-    ("path", |cell| shown_field(&cell.path.name)),
+    ("scene", |cell| lines(&cell.scene.name)),
+    ("path", |cell| lines(&cell.path.name)),
     ("cache", |cell| cell.path.cache.clone()),
-    ("structure", |cell| shown_field(&cell.structure)),
+    ("structure", |cell| lines(&cell.structure)),
     ("test", |cell| cell.test.clone()),
     ("arithmetic", |cell| cell.path.arithmetic.clone()),
     ("planes", |cell| cell.path.planes.clone()),
     ("epsilon", |cell| cell.path.epsilon.to_string()),
     ("status", |cell| cell.status.name().to_owned()),
     ("reason", |cell| {
-        shown_field(cell.reason.as_deref().unwrap_or_default())
+        lines(cell.reason.as_deref().unwrap_or_default())
     }),
     ("rank", |cell| text(cell.rank)),
     ("processes", |cell| cell.times.processes.to_string()),
@@ -366,13 +366,13 @@ const INPUT_COLUMNS: [Column; 16] = [
         let lens = cell.path.lens.as_ref();
         text(lens.and_then(|lens| Some(lens.matrix.as_ref()?.convention.as_str())))
     }),
-    ("motion", |cell| shown_field(&cell.path.motion)),
+    ("motion", |cell| lines(&cell.path.motion)),
     ("views_per_frame", |cell| match cell.path.views_per_frame {
         0 => String::new(),
         views => views.to_string(),
     }),
     ("chose", |cell| {
-        shown_field(cell.chose.as_deref().unwrap_or_default())
+        lines(cell.chose.as_deref().unwrap_or_default())
     }),
 ];
 

@@ -15,7 +15,7 @@ use super::{Report, SCHEMA_VERSION};
 use crate::input::InputError;
 use crate::json::{JsonError, from_json};
 use crate::measure::{GroupKey, Part, TaskKind};
-use crate::shown::{plain, shown_field};
+use crate::shown::{lines, plain};
 use crate::statistics::median;
 
 /// Reads a report from its file, or from the folder of a run, finished or not.
@@ -209,7 +209,7 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
         let own = |label: &str| {
             let key = &kept.key;
             let names = [&key.scene, &key.path, &key.cache, &key.test, label];
-            let readings = cells.get(&names.map(shown_field))?;
+            let readings = cells.get(&names.map(|name| lines(name)))?;
             let cameras = schedule?;
             let reading = |(&(frame, queries), ns): (&(u32, u32), &Vec<f64>)| {
                 let first = cameras.iter().position(|camera| *camera == frame)?;

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::{Labels, Scene, WorldBox};
 use crate::input::{InputError, TableReader, note};
 use crate::query::ItemId;
-use crate::shown::{field, from_field, shortened};
+use crate::shown::shortened;
 
 const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
 
@@ -86,7 +86,7 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
     let columns = table.columns(&BOUNDS)?;
     let others = table.header().iter().enumerate();
     let others = others.filter(|(i, _)| !columns.contains(i));
-    let labels = others.map(|(i, name)| (i, Labels::new(from_field(name))));
+    let labels = others.map(|(i, name)| (i, Labels::new(name)));
     let mut labels: Vec<(usize, Labels)> = labels.collect();
     let (mut boxes, mut kept, mut first_bad, mut bad) = (Vec::new(), Vec::new(), None, 0);
     while let Some(row) = table.next_row() {
@@ -111,7 +111,7 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
                 }
             }
             for (column, label) in &mut labels {
-                label.push(from_field(&row.label(*column)));
+                label.push(row.label(*column));
             }
             Ok(b)
         });
@@ -144,7 +144,7 @@ pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
         csv.write_field(bound)?;
     }
     for label in &scene.labels {
-        csv.write_field(field(&label.column).as_ref())?;
+        csv.write_field(&label.column)?;
     }
     csv.write_record(None::<&[u8]>)?;
     let mut record = csv::ByteRecord::new();
@@ -154,7 +154,7 @@ pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
             record.push_field(value.to_string().as_bytes());
         }
         for label in &scene.labels {
-            record.push_field(field(label.get(item)).as_bytes());
+            record.push_field(label.get(item).as_bytes());
         }
         csv.write_byte_record(&record)?;
     }

@@ -1,6 +1,6 @@
 //! Names and labels from untrusted input, in every kind of output.
 //!
-//! They may contain control sequences of terminals, markup, or formulas of spreadsheets.
+//! They may contain control sequences of terminals, markup, or signs in front.
 
 use std::fs;
 
@@ -103,10 +103,10 @@ fn control_characters_leave_pictures_and_pages_well_formed() {
 }
 
 #[test]
-fn formulas_are_text_in_every_table() {
+fn text_stays_as_it_is_in_every_table() {
     let boxes = format!("{BOXES},=kind,level\n0,0,0,1,1,1,=1+1,-2\n5,0,0,6,1,1,@a,-x\n");
     let name = "=1+1\nb,c\u{1b}[2J.csv";
-    let told = "'=1+1\nb,c\\u{1b}[2J.csv";
+    let told = "=1+1\nb,c\\u{1b}[2J.csv";
     let folder = with_good_files(&[(name, boxes.as_bytes())]);
     let run = format!(
         "run --scene {name} --path orbit:frames=2 --structure linear --no-bounds --out run"
@@ -121,12 +121,12 @@ fn formulas_are_text_in_every_table() {
             assert_eq!(row["structure"].trim_end_matches("#twin"), "linear");
         }
     }
-    // The report is for programs: the name as it is.
+    // The same as in the report, but for what steers a terminal.
     let report = fs::read_to_string(folder.path().join("run/report.json")).expect("a report");
     assert_eq!(json(&report)["cells"][0]["scene"]["name"], name);
     // Labels come back as they were; numbers are numbers.
     let once = works(folder.path(), &format!("scene convert {name}"));
-    let wanted = format!("{BOXES},'=kind,level\n0,0,0,1,1,1,'=1+1,-2\n5,0,0,6,1,1,'@a,'-x\n");
+    let wanted = format!("{BOXES},=kind,level\n0,0,0,1,1,1,=1+1,-2\n5,0,0,6,1,1,@a,-x\n");
     assert_eq!(once, wanted);
     fs::write(folder.path().join("once.csv"), &once).expect("writable");
     assert_eq!(works(folder.path(), "scene convert once.csv"), once);

@@ -217,8 +217,15 @@ fn header_errors_fit_one_line() {
 }
 
 #[test]
-fn only_bytes_that_are_no_utf_8_are_replaced() {
-    let mut table = TableReader::open(b"x,y,kind\n1,2,gr\xfcn a\n", "t.csv", &NAMES).unwrap();
-    let row = table.next_row().unwrap().unwrap();
-    assert_eq!(row.text(2), "gr\u{fffd}n a");
+fn bytes_that_are_no_utf_8_are_refused_with_their_line() {
+    let told = |text: &[u8]| match TableReader::open(text, "t.csv", &NAMES) {
+        Ok(_) => "taken".to_owned(),
+        Err(error) => error.to_string(),
+    };
+    assert_eq!(
+        told(b"x,y,kind\r\n1,2,gr\xc3\xbcn a\r\n1,2,gr\xfcn a\n"),
+        "t.csv, line 3: a byte that is no UTF-8; expected UTF-8 text"
+    );
+    let told = told(b"x,y,kind\n1,2,a\0b\n");
+    assert!(told.starts_with("t.csv, line 2: zero bytes"), "{told}");
 }
