@@ -60,7 +60,9 @@ impl<'b> TableReader<'b> {
             .from_reader(bytes);
         // From memory nothing fails to be read.
         let fields = csv.headers().cloned().unwrap_or_default();
-        let header = fields.iter().map(|name| name.trim_start_matches('\u{feff}').to_owned());
+        let header = fields
+            .iter()
+            .map(|name| name.trim_start_matches('\u{feff}').to_owned());
         let header: Vec<String> = header.collect();
         let mut table = TableReader {
             file: file.to_owned(),
