@@ -84,17 +84,17 @@ pub fn share(text: &str) -> Result<f64, SpecError> {
     }
 }
 
-/// "5%", "5 %" or "0.05". From 100 % on everything would pass.
+/// "5%", "5 %" or "0.05". A bare 5 could be meant as either, and as 500 % it
+/// would let everything pass.
 pub fn threshold(typed: &str) -> Result<f64, SpecError> {
     let typed = typed.trim();
     let share = match typed.strip_suffix('%') {
         Some(percents) => parse_number(&format!("{}%", percents.trim_end())),
-        None => parse_number(typed),
+        None => parse_number(typed).filter(|share| *share < 1.0),
     };
-    let share = share.filter(|share| (0.0..1.0).contains(share));
-    let what = "a percentage such as 5% or a share such as 0.05, from 0 to below 1";
+    let what = "a percentage such as 5% or a share from 0 to below 1 such as 0.05";
     // Zero has two signs and one meaning.
-    expected(share, what).map(f64::abs)
+    expected(share.filter(|share| *share >= 0.0), what).map(f64::abs)
 }
 
 /// A metric that runs are compared by.
@@ -170,12 +170,12 @@ mod tests {
             (" 0.05 ", 0.05),
             ("0", 0.0),
             ("0%", 0.0),
-            ("99%", 0.99),
+            ("150%", 1.5),
         ] {
             assert_eq!(threshold(typed), Ok(share), "{typed}");
         }
         assert!(threshold("-0").is_ok_and(f64::is_sign_positive));
-        let bad = "nan NaN% -5% -0.1 inf inf% 100% 500% 1e999 5 1.5 5k five % 5%% - --all";
+        let bad = "nan NaN% -5% -0.1 inf inf% 1e999 5 1.5 5k five % 5%% - --all";
         for typed in bad.split(' ').chain(["", "5 5%"]) {
             let error = threshold(typed).expect_err(typed).to_string();
             assert!(
