@@ -30,23 +30,7 @@ impl Boundable for Aabb {
 /// O(n log n): clustering has a bound, and what would be reinserted in quadratic time
 /// stays where it is.
 pub fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
-    finished(clustered(boxes, &params), params)
-}
-
-/// The same by the crate's own clustering, whose time has no bound.
-#[cfg(feature = "peers")]
-pub fn build_as_it_comes(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
-    let tree = obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(
-        params.ploc_search_distance,
-        boxes,
-        (0..boxes.len() as u32).collect(),
-        params.sort_precision,
-        params.search_depth_threshold,
-    );
-    finished(tree, params)
-}
-
-fn finished(mut tree: Bvh2, params: BvhBuildParams) -> Bvh2 {
+    let mut tree = clustered(boxes, &params);
     let share = params.reinsertion_batch_ratio;
     reinsert(&mut tree, share);
     let leaf = params.max_prims_per_leaf.clamp(1, 255);

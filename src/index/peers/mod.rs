@@ -11,8 +11,6 @@ mod obvhs;
 mod parry3d;
 mod rstar;
 
-use super::BuildError;
-use super::items::Record;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 
@@ -48,28 +46,6 @@ fn placed<T>(
     Some(placed)
 }
 
-/// Most items with the same bounds for a builder of quadratic time.
-const MOST_ALIKE: usize = 50_000;
-
-/// Refuses more than [`MOST_ALIKE`] items with the same bounds. O(n log n).
-fn refuse_stacks(structure: &'static str, items: &[Record]) -> Result<(), BuildError> {
-    if items.len() <= MOST_ALIKE {
-        return Ok(());
-    }
-    let mut keys: Vec<_> = items.iter().map(|item| item.bounds.bits()).collect();
-    keys.sort_unstable();
-    match keys.chunk_by(|a, b| a == b).map(<[_]>::len).max() {
-        Some(alike) if alike > MOST_ALIKE => Err(BuildError::Refused {
-            structure,
-            reason: format!(
-                "{alike} items have the same bounds, and its builder needs quadratic time for \
-                 such; expected at most {MOST_ALIKE}"
-            ),
-        }),
-        _ => Ok(()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,6 +58,31 @@ mod tests {
         index.visible(volume, &mut ids);
         ids.sort_unstable();
         ids
+    }
+
+    /// A row of denormal points overflows the stack of one builder; a row of points, and
+    /// stacks, take quadratic time by another one's own clustering.
+    #[test]
+    fn rows_of_points_are_refused_or_built_soon() {
+        let row = |step: f32, n: u16| -> Vec<Aabb> {
+            let at = |i: u16| Aabb::around(Vec3::X * (f32::from(i) * step), Vec3::ZERO);
+            (0..n).map(at).collect()
+        };
+        let tiny = f32::from_bits(1);
+        let built = |name: &str, items: &[Aabb]| {
+            let spec = StructureSpec::parse(name).expect("a structure");
+            spec.build(items).map(|_| ()).map_err(|e| e.to_string())
+        };
+        let refused = built("peer-parry3d", &row(tiny, 20_000)).expect_err("too narrow");
+        assert!(refused.contains("more than 2048 items"), "{refused}");
+        for (step, n) in [(tiny, 2048), (tiny * 1e8, 20_000), (1.0, 20_000), (0.0, 20_000)] {
+            assert_eq!(built("peer-parry3d", &row(step, n)), Ok(()), "{step:e}");
+        }
+        for step in [tiny, 0.0, 1.0] {
+            let started = std::time::Instant::now();
+            assert_eq!(built("peer-obvhs", &row(step, 60_000)), Ok(()), "{step:e}");
+            assert!(started.elapsed().as_secs() < 20, "{step:e}");
+        }
     }
 
     /// Few and many items step, jump, grow and shrink, frame after frame.

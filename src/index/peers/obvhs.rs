@@ -9,7 +9,6 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use serde::{Deserialize, Serialize};
 
-use super::refuse_stacks;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::{Positions, Record};
@@ -91,12 +90,11 @@ impl BoxTested for PeerObvhs {
     type Params = ObvhsParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
-        refuse_stacks(Self::ABOUT.name, &items)?;
         if items.is_empty() {
             return Ok(PeerObvhs::default());
         }
         let boxes: Vec<Aabb> = items.iter().map(|item| item.bounds).collect();
-        let mut bvh = ploc::build_as_it_comes(&boxes, BvhBuildParams::medium_build());
+        let mut bvh = ploc::build(&boxes, BvhBuildParams::medium_build());
         bvh.reorder_in_stack_traversal_order();
         // A walk keeps one entry a level; the crate's default is 96.
         bvh.max_depth = bvh.max_depth.max(bvh.depth(0) + 2);

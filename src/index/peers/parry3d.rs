@@ -48,6 +48,32 @@ pub struct PeerParry3d {
     workspace: BvhWorkspace,
 }
 
+/// Most distinct centres in too narrow a space: the crate's builder splits them off one by
+/// one and recurses for each, which 2 MiB of stack hold.
+const MOST_NARROW: usize = 2048;
+/// Extents of centres whose eight bins overflow the builder's scale of f32.
+const TOO_NARROW: f32 = 8.0 / f32::MAX;
+
+/// Refuses items that would overflow the stack of the builder. O(n log n).
+fn refuse_narrow(structure: &'static str, items: &[Record]) -> Result<(), BuildError> {
+    for axis in 0..3 {
+        let centres = items.iter().map(|item| item.bounds.centre()[axis]);
+        // Distinct numbers farther from zero differ by more.
+        let mut centres: Vec<f32> = centres.filter(|c| c.abs() < 1e-30).collect();
+        centres.sort_unstable_by(f32::total_cmp);
+        centres.dedup();
+        let is_narrow = |some: &[f32]| some[MOST_NARROW] - some[0] < TOO_NARROW;
+        if centres.windows(MOST_NARROW + 1).any(is_narrow) {
+            let reason = format!(
+                "its builder recurses for each of more than {MOST_NARROW} items within {TOO_NARROW:e} \
+                 of each other; expected fewer"
+            );
+            return Err(BuildError::Refused { structure, reason });
+        }
+    }
+    Ok(())
+}
+
 fn crate_box(b: &Aabb) -> ParryAabb {
     let vector = |v: Vec3| parry3d::math::Vector::new(v.x, v.y, v.z);
     ParryAabb::new(vector(b.min), vector(b.max))
@@ -73,6 +99,7 @@ impl BoxTested for PeerParry3d {
     type Params = Parry3dParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+        refuse_narrow(Self::ABOUT.name, &items)?;
         let leaves: Vec<ParryAabb> = items.iter().map(|item| crate_box(&item.bounds)).collect();
         Ok(PeerParry3d {
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves),
