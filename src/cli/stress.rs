@@ -132,7 +132,7 @@ fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
     for section in &mut sections {
         section.rows.retain(|row| row.status == Status::Fail);
         for row in &mut section.rows {
-            row.got = format!("{} by {kernel}", row.got).into();
+            row.kernel = Some(kernel.name());
         }
         section.name = format!("{} by {kernel}", section.name);
         section.tally = Tally::default();

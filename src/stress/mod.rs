@@ -86,6 +86,9 @@ pub struct Row {
     pub expected: Said,
     /// Answer of the structure.
     pub got: Said,
+    /// Instruction set, if it is not the chosen one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kernel: Option<&'static str>,
 }
 
 /// Checks that belong together: a category of vectors, a family of extremes.

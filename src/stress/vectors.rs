@@ -1,13 +1,14 @@
 //! Test vectors: boxes, cameras or planes with the answers of exact arithmetic.
 //! Fields have the names of the JSON files; numbers and names have readers.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
-use serde::de::{DeserializeOwned, Error, IgnoredAny, Unexpected, Visitor};
+use serde::de::{DeserializeOwned, Error, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer};
+use serde_json::Value;
 
 use crate::camera::{Camera, CameraError, Lens};
 use crate::geometry::{Aabb, Plane};
@@ -16,6 +17,7 @@ use crate::json::{JsonError, from_json};
 use crate::oracle::Pose;
 use crate::shown::plain;
 use crate::spec::nearest;
+use crate::stress::Level;
 
 /// The vectors that come with the program.
 pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
@@ -49,11 +51,15 @@ pub struct Vector {
     pub expected_visible_camera: Option<Names>,
     /// Boxes that touch the camera's view and do not reach into it.
     pub touch_camera: Option<Names>,
-    observed_f32_pvertex_mul_add: Option<Names>,
+    /// Answer of the f32 six-plane test.
+    pub observed_f32_pvertex_mul_add: Option<Names>,
+    observed_f32_pvertex_fma: Option<Names>,
     /// Answer of the six-plane test without any rounding.
     pub p_vertex_exact_visible: Option<Names>,
     expect_camera_error: Option<Declared>,
     expect_planes_error: Option<Declared>,
+    /// Indices of the planes whose normal is zero, among those that are finite.
+    pub degenerate_planes: Option<Names>,
     /// Boxes that must be refused: a bound is not finite.
     pub expect_rejected_at_load: Option<Names>,
     /// Boxes that must never be returned: a lower bound is above its upper one.
@@ -173,38 +179,42 @@ impl Vector {
     /// A list without names is no claim. Planes that must be refused may have names: the
     /// format's generator lists what the finite ones among them leave visible.
     fn unjudged(&self) -> impl Iterator<Item = &'static str> {
-        let named =
-            |lists: &[&Option<Names>]| lists.iter().copied().flatten().flatten().count() > 0;
-        let seen = named(&[&self.expected_visible_camera, &self.touch_camera]);
-        let of_planes = named(&[
-            &self.expected_visible_planes,
-            &self.touch_planes,
-            &self.p_vertex_exact_visible,
-            &self.observed_f32_pvertex_mul_add,
-        ]);
+        let seen = !self.named(Level::Camera).is_empty();
+        let of_planes = !self.named(Level::Planes).is_empty();
         let (no_camera, no_planes) = (self.camera.is_none(), self.planes().is_none());
         let is_refused = self.camera_error().is_some();
-        let equal = |(a, b): (&Bits, &Narrow)| a.0 == b.0 || a.0.is_nan() && b.0.is_nan();
-        let agree = |(bits, decimals): (&Vec<Array<Bits, 4>>, &Vec<Array<Narrow, 4>>)| {
-            let mut rows = bits.iter().zip(decimals);
-            bits.len() == decimals.len() && rows.all(|(a, b)| a.0.iter().zip(&b.0).all(equal))
-        };
-        let both = self.planes_f32_hex.as_ref().zip(self.planes.as_ref());
         let found = [
             (no_camera && (seen || is_refused)).then_some("claims about a camera but no camera"),
             (seen && is_refused).then_some("boxes seen by a camera that must be refused"),
             (no_planes && (of_planes || self.planes_error().is_some()))
                 .then_some("claims about planes but no planes"),
-            (!both.is_none_or(agree))
-                .then_some("'planes' other than 'planes_f32_hex', which count"),
         ];
         found.into_iter().flatten()
     }
 
-    /// Answer of the f32 six-plane test; by default that of the exact one.
-    pub fn six_plane(&self) -> Option<&Names> {
-        let observed = self.observed_f32_pvertex_mul_add.as_ref();
-        observed.or(self.p_vertex_exact_visible.as_ref())
+    /// Names in the lists about the camera or about the planes.
+    pub fn named(&self, level: Level) -> BTreeSet<&Name> {
+        let lists: &[&Option<Names>] = match level {
+            Level::Camera => &[&self.expected_visible_camera, &self.touch_camera],
+            Level::Planes => &[
+                &self.expected_visible_planes,
+                &self.touch_planes,
+                &self.p_vertex_exact_visible,
+                &self.observed_f32_pvertex_mul_add,
+                &self.observed_f32_pvertex_fma,
+            ],
+        };
+        lists.iter().copied().flatten().flatten().collect()
+    }
+
+    /// Returns whether `planes` and `planes_f32_hex` are the same numbers, if both are given.
+    pub fn planes_agree(&self) -> bool {
+        let equal = |(a, b): (&Bits, &Narrow)| a.0 == b.0 || a.0.is_nan() && b.0.is_nan();
+        let both = self.planes_f32_hex.as_ref().zip(self.planes.as_ref());
+        both.is_none_or(|(bits, decimals)| {
+            let mut rows = bits.iter().zip(decimals);
+            bits.len() == decimals.len() && rows.all(|(a, b)| a.0.iter().zip(&b.0).all(equal))
+        })
     }
 
     /// Reason why the camera must be refused.
@@ -242,7 +252,7 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
 /// Reads a file of vectors: an object with the array `vectors`, or the array
 /// alone. Numbers may be given as the words NaN, Infinity (inf) and
 /// -Infinity (-inf); unknown fields are ignored, with a note where one is like a
-/// known, and so are claims that nothing can judge.
+/// known or a camera has it, and so are claims that nothing can judge.
 ///
 /// # Errors
 /// One line: the file, the path of the field, what was found and expected.
@@ -293,21 +303,44 @@ fn note_unjudged(vectors: &[Vector], file: &str) {
     }
 }
 
-/// Tells of fields that the format does not have and that are nearly one of it.
-fn note_unknown(bytes: &[u8], file: &str) {
-    let fields = |bytes| -> BTreeSet<String> {
-        let vectors: Vec<BTreeMap<String, IgnoredAny>> = list(bytes).unwrap_or_default();
-        vectors.into_iter().flat_map(BTreeMap::into_keys).collect()
-    };
-    // The built-in vectors have every field.
-    let known = fields(BUILT_IN.as_bytes());
-    for name in fields(bytes).difference(&known) {
-        if let Some(guess) = nearest(name, known.iter().map(String::as_str)) {
-            let found = format!("field '{}' is not read", plain(name));
-            note(&format!("{file}: {found} (did you mean '{guess}'?)"));
-        }
+/// Collects the fields of objects, each below the field that holds the object.
+fn fields(holder: &str, value: &Value, found: &mut BTreeSet<[String; 2]>) {
+    match value {
+        Value::Array(list) => list.iter().for_each(|value| fields(holder, value, found)),
+        Value::Object(map) => map.iter().for_each(|(name, value)| {
+            found.insert([holder, name].map(str::to_owned));
+            fields(name, value, found);
+        }),
+        _ => {}
     }
 }
+
+/// Tells of fields that the format does not have and that are nearly one of it, or that a
+/// camera has: they may change its view.
+fn note_unknown(bytes: &[u8], file: &str) {
+    let all = |bytes| {
+        let (mut found, value) = (BTreeSet::new(), from_json(bytes).unwrap_or(Value::Null));
+        let holder = if value.is_array() { "vectors" } else { "file" };
+        fields(holder, &value, &mut found);
+        found.retain(|[holder, _]| HOLDERS.contains(&holder.as_str()));
+        found
+    };
+    // The built-in vectors have every field.
+    let known = all(BUILT_IN.as_bytes());
+    for [holder, name] in all(bytes).difference(&known) {
+        let own = known.iter().filter(|[of, _]| of == holder);
+        let guess = match nearest(name, own.map(|[_, field]| field.as_str())) {
+            Some(guess) => format!(" (did you mean '{guess}'?)"),
+            None if holder == "camera" => String::new(),
+            None => continue,
+        };
+        let found = format!("field '{}' of '{holder}' is not read", plain(name));
+        note(&format!("{file}: {found}{guess}"));
+    }
+}
+
+/// Objects with fields of the format; others have names of boxes.
+const HOLDERS: [&str; 5] = ["file", "vectors", "camera", "boxes", "points"];
 
 /// The first id that occurred before, and its index.
 fn repeated<'v>(ids: impl Iterator<Item = &'v Name>) -> Option<(usize, &'v Name)> {

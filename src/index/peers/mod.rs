@@ -75,7 +75,12 @@ mod tests {
         };
         let refused = built("peer-parry3d", &row(tiny, 20_000)).expect_err("too narrow");
         assert!(refused.contains("more than 2048 items"), "{refused}");
-        for (step, n) in [(tiny, 2048), (tiny * 1e8, 20_000), (1.0, 20_000), (0.0, 20_000)] {
+        for (step, n) in [
+            (tiny, 2048),
+            (tiny * 1e8, 20_000),
+            (1.0, 20_000),
+            (0.0, 20_000),
+        ] {
             assert_eq!(built("peer-parry3d", &row(step, n)), Ok(()), "{step:e}");
         }
         for step in [tiny, 0.0, 1.0] {

@@ -121,6 +121,7 @@ impl Findings {
                 status: Status::Fail,
                 expected: expected.into(),
                 got: got.into(),
+                kernel: None,
             },
             item,
             about: None,
