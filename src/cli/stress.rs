@@ -24,6 +24,9 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let mut ids = BTreeSet::new();
     for file in &args.vectors {
         let mut more = read_vectors_file(file)?;
+        if more.is_empty() {
+            bail!("{}: no vector; expected at least one", file.display());
+        }
         for Name(id) in more.iter_mut().map(|vector| &mut vector.id) {
             // Another file has this id as well.
             if !ids.insert(id.clone()) {
@@ -34,9 +37,6 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     }
     if args.vectors.is_empty() {
         vectors = built_in()?;
-    }
-    if vectors.is_empty() {
-        bail!("nothing to do: no vector in the file; expected at least one");
     }
     let cases = args.cases;
     if args.seed.is_some() && cases == 0 {
@@ -101,7 +101,9 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let interrupted = interrupt::asked();
     bar.finish_and_clear();
     if !interrupted && by_others == 0 && sections.iter().all(|section| section.rows.is_empty()) {
-        bail!("nothing was checked; expected planes, a camera or points in a vector");
+        let files = args.vectors.iter().map(|file| file.display().to_string());
+        let files = text::joined(files);
+        bail!("{files}: nothing to check; expected planes, a camera or points in a vector");
     }
     unread_is_fine(match args.format {
         TableFormat::Json => json(&sections),
@@ -127,7 +129,7 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
 /// Cases of each extreme by another instruction set than the chosen one.
 const OF_OTHERS: u64 = 2;
 
-/// The failures by another instruction set, under its name.
+/// The failures by another instruction set, which they name.
 fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
     for section in &mut sections {
         section.rows.retain(|row| row.status == Status::Fail);
@@ -187,11 +189,13 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     for row in rows().filter(|row| row.status == Status::Fail) {
         writeln!(
             out,
-            "{}, {} level, {}, {}:\n  expected {}\n  got {}",
+            "{}, {} level, {}, {}{}{}:\n  expected {}\n  got {}",
             text::plain(&row.id),
             row.level.name(),
             row.structure,
             row.test,
+            row.kernel.map_or("", |_| " by "),
+            row.kernel.unwrap_or_default(),
             row.expected,
             row.got
         )?;

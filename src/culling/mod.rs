@@ -177,7 +177,11 @@ impl Culling {
         let found = match self.planes.method {
             PlaneMethod::Frame if epsilon >= DEFAULT_EPSILON => return None,
             PlaneMethod::Frame if self.arithmetic == Arithmetic::F64 => "f64".to_owned(),
-            PlaneMethod::Frame => format!("c = {epsilon}"),
+            // No sign of zero, and exponents of small numbers.
+            PlaneMethod::Frame => {
+                let c = format!("{:?}", epsilon + 0.0);
+                format!("c = {}", c.trim_end_matches(".0"))
+            }
             method => format!("planes by {}", method.name()),
         };
         Some(format!(

@@ -263,9 +263,13 @@ fn eyes<'a>(
             Some(column) => Some(row.finite_number(column)?),
             None => defaults.depths(eye).1,
         };
-        let height = height.filter(|column| !row.text(*column).is_empty());
+        let is_filled = |column: &usize| !row.text(*column).is_empty();
+        let height = height.filter(is_filled);
+        if height.and(fovy).is_some_and(|column| is_filled(&column)) {
+            let found = "fovy_deg and ortho_height".to_owned();
+            return Err(row.error(found, "one of them, not both".to_owned()));
+        }
         let height = height.map(|column| row.finite_number(column)).transpose()?;
-        // Not read where the lens is orthographic.
         let fovy_deg = number(fovy.filter(|_| height.is_none()), defaults.fovy_deg)?;
         let aspect = number(aspect, defaults.aspect)?;
         let near = number(near, defaults.near.unwrap_or_else(|| defaults.near_of(far)))?;

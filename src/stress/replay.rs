@@ -7,8 +7,8 @@ use glam::{DVec3, Vec3};
 
 use super::sheet::{Built, ORACLE, Sheet, slack};
 use super::{Level, Name, Names, Row, Said, Status, Vector, VectorBox, VectorCamera};
-use crate::camera::{PlaneOptions, Surroundings};
-use crate::culling::{Culling, CullingTest, TESTS};
+use crate::camera::{CameraError, PlaneOptions, Surroundings};
+use crate::culling::{Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::oracle::Oracle;
@@ -114,7 +114,7 @@ impl Replay<'_> {
     fn camera(&self, sheet: &mut Sheet, stated: &VectorCamera, boxes: &[Built]) {
         let vector = sheet.vector;
         let around = Surroundings::of_boxes(sheet.items);
-        let camera = stated.camera();
+        let camera = stated.camera().map_err(CullingError::from);
         let sound = camera.as_ref().ok();
         let sound = sound.filter(|_| vector.camera_error().is_none());
         let oracle = sound.and_then(|c| Oracle::of_camera(&stated.pose(), &c.lens, DVec3::ZERO));
@@ -133,12 +133,13 @@ impl Replay<'_> {
                 planes: self.planes,
                 ..Culling::default()
             };
-            let view = match &camera {
-                Ok(camera) => culling.view(camera, &around).map_err(|e| e.to_string()),
-                Err(error) => Err(error.to_string()),
-            };
+            let view = camera.clone();
+            let view = view.and_then(|camera| culling.view(&camera, &around));
             let declared = match (vector.camera_error(), &view) {
                 (Some(text), _) => Some(text.into()),
+                (None, Err(CullingError::Camera(CameraError::Sums { .. }))) => {
+                    Some("a view or, where sums could overflow, a refusal".into())
+                }
                 // A camera that cannot be made sees nothing.
                 (None, Err(_)) if wanted.is_empty() && vector.expected_visible_camera.is_some() => {
                     Some(Said::of_names(&wanted))
@@ -149,7 +150,7 @@ impl Replay<'_> {
             let Some(view) = accepted(
                 sheet,
                 [name, "a camera"],
-                view,
+                view.map_err(|e| e.to_string()),
                 declared,
                 otherwise,
                 structures,
@@ -436,6 +437,60 @@ mod tests {
         let text = r#"[{"id":"v","boxes":[{"id":"b","lo":[0,0,0],"hi":[1,1,1]},
             {"id":"inv","lo":[0,0,0],"hi":[1,-1,1]}],"expect_empty_boxes":["b","inv","none"]}]"#;
         assert_eq!(failed(text), ["v/b", "v/none"]);
+        assert_eq!(
+            failed(&text.replace(r#","inv","none"]"#, r#","none"]"#)),
+            ["v/b", "v/inv", "v/none"]
+        );
+    }
+
+    /// The planes of `planes_f32_hex`, and one that is no constraint.
+    #[test]
+    fn claims_about_planes_and_names_are_judged() {
+        let fails = |claims: &str| {
+            failed(&format!(
+                r#"[{{"id":"v","planes":[[1,0,0,0],[0,0,0,1]],"planes_f32_hex":[["0x3f800000",
+                "0x00000000","0x00000000","0x00000000"],["0x00000000","0x00000000",
+                "0x00000000","0x3f800000"]],"boxes":[{{"id":"b","lo":[0,0,0],"hi":[1,1,1]}}],
+                {claims}}}]"#
+            ))
+        };
+        for (claims, wanted) in [
+            (r#""degenerate_planes":[1]"#, ""),
+            (r#""degenerate_planes":[]"#, "v/degenerate_planes"),
+            (r#""degenerate_planes":[0,1]"#, "v/degenerate_planes"),
+            (r#""touch_planes":["c"],"expect_planes_error":"no""#, "v/c"),
+            (r#""observed_f32_pvertex_fma":["c"]"#, "v/c"),
+        ] {
+            let failed = fails(claims);
+            let is_right = wanted.is_empty() == failed.is_empty();
+            let is_named = wanted.is_empty() || failed.iter().any(|id| id == wanted);
+            assert!(is_right && is_named, "{claims}: {failed:?}");
+        }
+        let other = r#"[{"id":"v","planes":[[2,0,0,0]],"planes_f32_hex":[["0x3f800000",
+            "0x00000000","0x00000000","0x00000000"]],"boxes":[]}]"#;
+        assert_eq!(failed(other), ["v/planes"]);
+    }
+
+    #[test]
+    fn the_f32_test_is_held_to_no_exact_answer() {
+        let mut judged = 0;
+        for mut vector in built_in().unwrap() {
+            let (observed, exact) = (
+                vector.observed_f32_pvertex_mul_add.take(),
+                &vector.p_vertex_exact_visible,
+            );
+            if observed.as_ref() == exact.as_ref() {
+                continue;
+            }
+            let structures = Registry::builtin().structures("linear").unwrap();
+            let rows = replay(&vector, &structures);
+            assert!(
+                rows.iter().all(|row| row.status != Status::Fail),
+                "{rows:?}"
+            );
+            judged += 1;
+        }
+        assert!(judged > 0);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::fmt;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
-use serde::de::{DeserializeOwned, Error, Unexpected, Visitor};
+use serde::de::{Error, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
@@ -285,11 +285,11 @@ pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError>
     Ok(vectors)
 }
 
-fn list<V: DeserializeOwned>(bytes: &[u8]) -> Result<Vec<V>, JsonError> {
+fn list(bytes: &[u8]) -> Result<Vec<Vector>, JsonError> {
     let is_array = bytes.iter().find(|byte| b"[{".contains(byte)) == Some(&b'[');
     match is_array {
         true => from_json(bytes),
-        false => from_json(bytes).map(|file: File<V>| file.vectors),
+        false => from_json(bytes).map(|file: File| file.vectors),
     }
 }
 
@@ -350,11 +350,11 @@ fn repeated<'v>(ids: impl Iterator<Item = &'v Name>) -> Option<(usize, &'v Name)
 
 #[derive(Deserialize)]
 #[serde(expecting = "an object with the array 'vectors'")]
-struct File<V> {
+struct File {
     #[serde(default, deserialize_with = "format")]
     #[expect(dead_code, reason = "there is but one")]
     format: (),
-    vectors: Vec<V>,
+    vectors: Vec<Vector>,
 }
 
 /// Name of a box or a vector: text, or a whole number taken as text.

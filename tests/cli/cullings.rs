@@ -255,7 +255,11 @@ fn orthographic_cameras_are_typed() {
                    0,0,300,1,1,0,0,1,0,60,,-10,500\n\
                    100,50,40,0,0,0,0,0,1,40,,1,900\n\
                    100,50,40,0,0,0,0,0,1,,60,1,900\n";
-    let here = folder(&[("c.csv", cameras.as_bytes())]);
+    let both = cameras.replace("60,,-10", "60,90,-10");
+    let here = folder(&[("c.csv", cameras.as_bytes()), ("both.csv", both.as_bytes())]);
+    let line = "query --scene city:n=2000 --cameras both.csv";
+    let wanted = "both.csv, line 2: fovy_deg and ortho_height | not both";
+    assert_refused(&cullbench(here.path(), line), wanted, line);
     let scene = "--scene city:n=2000 --path c.csv";
     let told = works(here.path(), &format!("query {scene} --structure all"));
     let counts = rows(&told);

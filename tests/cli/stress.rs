@@ -326,7 +326,7 @@ fn a_file_that_is_wrong_is_refused_in_one_line() {
             b"[{\"id\": \"q\", \"expected_visible_camera\": [[]]}]",
             "expected_visible_camera[0]: a list; expected a name",
         ),
-        ("nothing.json", b"[{\"id\": \"q\", \"boxes\": []}]", "nothing was checked | expected"),
+        ("nothing.json", b"[{\"id\": \"q\", \"boxes\": []}]", "nothing to check | expected"),
     ];
     for (name, bytes, wanted) in cases {
         let folder = folder(&[(name, bytes)]);

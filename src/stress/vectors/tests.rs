@@ -142,10 +142,17 @@ fn claims_and_fields_that_are_not_judged_are_told() {
         (r#""p_vertex_exact_visible":["b"]"#, of_planes),
         (r#""expect_planes_error":true"#, of_planes),
         (&seen, "boxes seen by a camera that must be refused"),
-        (&differ("2"), "'planes' other than 'planes_f32_hex'"),
         (
             r#""Camera":{},"x":1"#,
-            "field 'Camera' is not read (did you mean 'camera'?)",
+            "field 'Camera' of 'vectors' is not read (did you mean 'camera'?)",
+        ),
+        (
+            &camera.replace("near", "Far\":8,\"near"),
+            "field 'Far' of 'camera' is not read (did you mean 'far'?)",
+        ),
+        (
+            &camera.replace("near", "ortho_height\":8,\"near"),
+            "field 'ortho_height' of 'camera' is not read",
         ),
         // A list without names claims nothing.
         (
