@@ -207,7 +207,7 @@ impl Vector {
         lists.iter().copied().flatten().flatten().collect()
     }
 
-    /// Returns whether `planes` and `planes_f32_hex` are the same numbers, if both are given.
+    /// True unless `planes` and `planes_f32_hex` are both given and differ.
     pub fn planes_agree(&self) -> bool {
         let equal = |(a, b): (&Bits, &Narrow)| a.0 == b.0 || a.0.is_nan() && b.0.is_nan();
         let both = self.planes_f32_hex.as_ref().zip(self.planes.as_ref());
@@ -315,8 +315,9 @@ fn fields(holder: &str, value: &Value, found: &mut BTreeSet<[String; 2]>) {
     }
 }
 
-/// Tells of fields that the format does not have and that are nearly one of it, or that a
-/// camera has: they may change its view.
+/// Tells of fields that the format does not have.
+///
+/// Those that are nearly one of it, and all of a camera: they may change its view.
 fn note_unknown(bytes: &[u8], file: &str) {
     let all = |bytes| {
         let (mut found, value) = (BTreeSet::new(), from_json(bytes).unwrap_or(Value::Null));

@@ -48,8 +48,10 @@ pub struct PeerParry3d {
     workspace: BvhWorkspace,
 }
 
-/// Most distinct centres in too narrow a space: the crate's builder splits them off one by
-/// one and recurses for each, which 2 MiB of stack hold.
+/// Most distinct centres in too narrow a space.
+///
+/// The crate's builder splits them off one by one and recurses for each, which 2 MiB of
+/// stack hold.
 const MOST_NARROW: usize = 2048;
 /// Extents of centres whose eight bins overflow the builder's scale of f32.
 const TOO_NARROW: f32 = 8.0 / f32::MAX;
