@@ -21,6 +21,7 @@ use super::run_resume::RunOptions;
 use super::study::progress;
 use super::{run_plan, text};
 use crate::index::Registry;
+use crate::input;
 use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Share};
 use crate::report::{Basis, Changes, ReportCell, WORK, changes};
 use crate::scene;
@@ -54,6 +55,9 @@ pub fn compare_against<'a>(
     let sides = [side(binary)?, side(&new)?];
     let plan = run_plan::plan_of(registry, &args.what, SUITE, Some(STRUCTURES))?;
     plan.check_inputs()?;
+    if let Some((pipe, _)) = input::pipes().first() {
+        bail!("'{pipe}' can be read only once; expected a file, which both programs can read");
+    }
     interrupt::from_now_on_finish();
     let bar = progress(0, " pairs");
     let duel = Duel {

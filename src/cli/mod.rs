@@ -65,7 +65,6 @@ mod worker;
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::ffi::OsString;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -162,7 +161,7 @@ fn start(registry: Registry) -> ExitCode {
             tell_notes(tell);
         }
     }
-    let ending = one_stdin().and_then(|()| dispatch(&registry, cli.command));
+    let ending = one_stdin(&cli.command).and_then(|()| dispatch(&registry, cli.command));
     if ending.is_ok() {
         tell_warnings();
     }
@@ -197,10 +196,21 @@ fn refused(error: &clap::Error) -> ExitCode {
     }
 }
 
-/// Refuses standard input for two options at once.
-fn one_stdin() -> anyhow::Result<()> {
-    let is_stdin = |arg: &OsString| arg == "-" || arg.as_encoded_bytes().ends_with(b"=-");
-    let count = std::env::args_os().filter(is_stdin).count();
+/// Refuses standard input for two inputs at once; an output takes or refuses `-` itself.
+fn one_stdin(command: &Command) -> anyhow::Result<()> {
+    let args = std::env::args_os().map(|arg| arg.to_string_lossy().into_owned());
+    let words = args.collect::<Vec<_>>().join("\n") + "\n";
+    let words = words.replace("=-\n", "\n-\n");
+    let words: Vec<&str> = words.lines().collect();
+    let outputs = ["-o", "--out", "--svg", "--html", "--csv", "--markdown"];
+    let inputs = words
+        .windows(2)
+        .filter(|pair| pair[1] == "-" && !outputs.contains(&pair[0]));
+    let output = match command {
+        Command::Scene(SceneCommand::Convert(args)) => args.output.as_deref(),
+        _ => None,
+    };
+    let count = inputs.count() - usize::from(output == Some(Path::new("-")));
     anyhow::ensure!(count < 2, "'-' {count} times; expected standard input once");
     Ok(())
 }

@@ -55,7 +55,7 @@ impl Ended {
         };
         let who = structure.map(|structure| format!("{structure}: "));
         bail!(
-            "{}{}; expected one that finishes",
+            "{}{}; expected one that finishes its work",
             who.unwrap_or_default(),
             verdict.reason.unwrap_or_default()
         )

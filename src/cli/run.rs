@@ -69,6 +69,7 @@ fn check_why(args: &RunArgs, plan: &RunPlan) -> anyhow::Result<()> {
 /// The cells as JSON lines, nothing measured.
 fn print_plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     let plan = plan(registry, args)?;
+    plan.check_files()?;
     let mut out = io::stdout().lock();
     for cell in plan.plan.cells() {
         writeln!(out, "{}", serde_json::to_string(&cell)?)?;
@@ -135,16 +136,17 @@ impl<'a> Run<'a> {
             self.stream.finished_at = Some(at);
         }
         let report = self.stream.report();
+        if let Some(error) = failed {
+            // A part of the cells makes no conclusion; what is on disk stays.
+            let _ = save_report(self.folder.path(), &report);
+            return Err(error);
+        }
         // Tables before files: where a file cannot be written, what was measured is seen.
         let why = |structure: &String| run_why::show(&report, structure);
         let shown = show(&report, self.args.all_columns);
         let shown = shown.and_then(|()| self.args.why.as_ref().map_or(Ok(()), why));
         let shown = unread_is_fine(shown);
-        let saved = save_report(self.folder.path(), &report);
-        if let Some(error) = failed {
-            return Err(error);
-        }
-        saved?;
+        save_report(self.folder.path(), &report)?;
         write_page(&report, self.folder.path())?;
         let save = self.args.save.as_deref().filter(|_| !stopped);
         if let Some(name) = save {
@@ -322,13 +324,21 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
         let gives = "the same for a scene of your own";
         return Some(format!("next    {program} run --scene FILE  {gives}"));
     }
-    let scene = quoted(&first.scene.name);
-    let mut line = format!("next    {program} advise --scene {scene}");
+    let option = |name: &str, value: &str| {
+        // A value that begins with a minus needs the sign.
+        let sign = if value.starts_with('-') { "=" } else { " " };
+        format!("--{name}{sign}{}", quoted(value))
+    };
+    let mut line = format!(
+        "next    {program} advise {}",
+        option("scene", &first.scene.name)
+    );
     let path = Some(&first.path.name).filter(|path| *path != DEFAULT_PATH);
-    let path = path.map(|path| format!("--path {}", quoted(path)));
+    let path = path.map(|path| option("path", path));
     let motion = Some(&first.path.motion).filter(|motion| !motion.is_empty());
-    let motion = motion.map(|motion| format!("--motion {}", quoted(motion)));
-    let path = path.into_iter().chain(motion);
+    let path = path
+        .into_iter()
+        .chain(motion.map(|motion| option("motion", motion)));
     let recorded = RunOptions::recorded(args).ok()?;
     let read = recorded.words(|name| READS.split(' ').any(|read| read == name));
     for option in path.chain(read) {

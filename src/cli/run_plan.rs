@@ -2,20 +2,22 @@
 //! checked as far as possible before anything runs.
 
 use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
 
-use anyhow::{bail, ensure};
+use anyhow::{Context, bail, ensure};
 
 use super::args::RunArgs;
 use super::shared_args::WhatArgs;
 use super::suite_file::{self, ChosenSuite, planned};
 use crate::culling::Culling;
 use crate::index::Registry;
-use crate::input::{InputError, note, tell_warnings};
+use crate::input::{InputError, is_readable, names_file, note, tell_warnings};
 use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
 use crate::motion::Motion;
 use crate::path::{self, LensDefaults};
 use crate::report::{KeptPart, Stream};
-use crate::scene::{self, FETCHED, Scene, every_part};
+use crate::scene::{self, FETCHED, Scene, every_part, split_part};
 use crate::spec::SpecError;
 use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES};
 
@@ -142,10 +144,29 @@ impl RunPlan {
     /// Reads every input: a mistake in the last file should not show after an
     /// hour. A suite as it comes is known to be sound.
     pub fn check_inputs(&self) -> anyhow::Result<()> {
+        self.check_files()?;
         for scene in &self.plan.scenes {
             scene::check_fits(&scene.source, &self.plan.load)?;
         }
         self.check_scenes(&|_, _| Ok(()))
+    }
+
+    /// Refuses a file that is not there; of a suite's file the error names the suite.
+    pub fn check_files(&self) -> anyhow::Result<()> {
+        let scenes = self.plan.scenes.iter();
+        let sources = scenes.flat_map(|scene| scene.paths.iter().chain([&scene.source]));
+        for source in sources.chain(&self.plan.motions) {
+            let file = Path::new(split_part(source).0);
+            if names_file(source) && !is_readable(file) {
+                let found = fs::metadata(file).map_err(InputError::io(file, "file"));
+                let suite = self.suite.as_ref();
+                match suite.filter(|suite| suite.ends_with(".toml")) {
+                    Some(suite) => found.context(suite.clone())?,
+                    None => found?,
+                };
+            }
+        }
+        Ok(())
     }
 
     /// Checks that the plan of a run that was begun is still the same, and so are its

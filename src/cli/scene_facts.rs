@@ -318,7 +318,13 @@ fn shown([least, most]: [f64; 2]) -> String {
 
 /// Four digits, no more zeros than needed.
 fn figure(value: f64) -> String {
-    let rounded = format!("{value:.3e}").parse().unwrap_or(value) + 0.0;
+    // No lens has 180 degrees.
+    let digits = if (179.9..180.0).contains(&value) {
+        6
+    } else {
+        3
+    };
+    let rounded = format!("{value:.digits$e}").parse().unwrap_or(value) + 0.0;
     match rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
         true => rounded.to_string(),
         false => format!("{rounded:e}"),
@@ -409,6 +415,7 @@ mod tests {
         assert_eq!(told, ["0 m", "3.4 km", "12.3 m", "5 mm", "1 um"]);
         assert_eq!(length(64.0, Some("map units")), "64 map units");
         assert_eq!(length(7.63e-6, None), "7.63e-6");
+        assert_eq!([179.99, 59.999_96].map(figure), ["179.99", "60"]);
         let told = [11_065, 1_234_567].map(people);
         assert_eq!(told, ["11,065", "1.23 million"]);
     }

@@ -94,7 +94,13 @@ fn written(file: &str) -> Result<ChosenSuite, InputError> {
         let begin = error.span().map_or(0, |span| span.start);
         let line = 1 + text.bytes().take(begin).filter(|b| *b == b'\n').count();
         let found = error.message().replace('\n', ", ").replace('`', "'");
-        InputError::new(format_args!("{file}, line {line}: {found}"))
+        let expected = "; expected a suite: [[scenes]], each with a scene and its paths";
+        let expected = if found.contains("expected") {
+            ""
+        } else {
+            expected
+        };
+        InputError::new(format_args!("{file}, line {line}: {found}{expected}"))
     })?;
     let bad = |found: &dyn Display| InputError::new(format_args!("{file}: {found}"));
     let like = suite.like.as_deref().unwrap_or(SUITES[0].name);

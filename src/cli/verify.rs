@@ -57,11 +57,11 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     interrupt::from_now_on_finish();
     let started = Instant::now();
     let bar = ProgressBar::new(scenes.len() as u64 + 1);
-    let mut checks = Vec::new();
-    let mut interrupted = false;
+    let (mut checks, mut skipped_items, mut interrupted) = (Vec::new(), 0, false);
     'scenes: for source in &scenes {
         bar.set_message(text::plain(source));
         let scene = load_scene(source, &args.scene_args, 2 * structures.len())?;
+        skipped_items += scene.skipped_items;
         let subjects = [CullingTest::SixPlane, CullingTest::Sphere].map(|test| {
             let build = |spec| Subject::build(spec, false, &scene, test);
             structures.iter().cloned().map(build).collect()
@@ -87,6 +87,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     let outcome = Outcome {
         ok: checks.iter().all(|c| c.difference.is_none()),
         verdicts: checks.iter().map(|c| c.verdicts).sum(),
+        skipped_items,
         mismatches: checks.iter().filter(|c| c.difference.is_some()).count(),
         against_cameras: is_safe(&culling),
         seconds: started.elapsed().as_secs_f64(),

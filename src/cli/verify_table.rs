@@ -30,6 +30,8 @@ pub(super) struct Check {
 pub(super) struct Outcome {
     pub(super) ok: bool,
     pub(super) verdicts: u64,
+    /// Bad items that were left out of the scenes.
+    pub(super) skipped_items: usize,
     /// Checks with a difference, however many verdicts are wrong in each.
     pub(super) mismatches: usize,
     /// True if answers were compared with the cameras as written too.

@@ -120,7 +120,10 @@ pub fn measure_part(
             task_ns: plan.protocol.task_ns * pass.share(),
             ..plan.protocol
         };
-        let schedule = keyed.schedule(given, workload.views.len(), &protocol);
+        let mut schedule = keyed.schedule(given, workload.views.len(), &protocol);
+        schedule.share_rounds(keyed.keys(), |(label, kind)| {
+            (structure_of(label, &[]), *kind)
+        });
         let labels = keyed.keys().iter().map(|(label, _)| label);
         let structures: Vec<_> = labels.map(|l| structure_of(l, &bounds)).collect();
         let turn = |task: usize| {

@@ -349,7 +349,7 @@ const SUMMARY_COLUMNS: [Column; 16] = [
 ];
 
 /// Columns of summary.csv behind those of the metrics.
-const INPUT_COLUMNS: [Column; 16] = [
+const INPUT_COLUMNS: [Column; 17] = [
     ("up", |cell| cell.scene.up.clone()),
     ("unit", |cell| text(cell.scene.unit.as_ref())),
     ("fovy_deg_min", |cell| end(cell, |l| l.fovy_deg, 0)),
@@ -374,6 +374,7 @@ const INPUT_COLUMNS: [Column; 16] = [
     ("chose", |cell| {
         lines(cell.chose.as_deref().unwrap_or_default())
     }),
+    ("skipped_items", |cell| cell.scene.skipped_items.to_string()),
 ];
 
 /// The least or the most of a value of the lenses of a cell.

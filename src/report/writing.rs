@@ -231,7 +231,7 @@ pub(super) fn version(path: &Path, found: u32) -> InputError {
 /// A folder that holds a run already.
 pub(super) fn taken(path: &Path) -> InputError {
     InputError::new(format_args!(
-        "{} already holds a run; expected an empty or new folder (continue it with --resume)",
+        "{} already holds a run; expected an empty or new folder (run --resume continues a run)",
         path.display()
     ))
 }

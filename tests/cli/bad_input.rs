@@ -319,6 +319,9 @@ fn points_that_are_none_are_refused() {
         &locate("--boxes bad.csv"),
         "bad.csv, | no column 'min_z'",
     );
+    let folder = with_good_files(&[("bad.csv", BOXES.as_bytes())]);
+    let wanted = "bad.csv, line 2: no box; expected at least one row";
+    all_refused(&folder, &locate("--boxes bad.csv"), wanted);
 }
 
 /// A structure of docs/PEERS.md is no misspelt one.
@@ -382,6 +385,11 @@ fn several_bad_rows_are_counted_and_skipped_on_request() {
     let report = fs::read_to_string(folder.path().join("new/run/report.json"));
     let report = json(&report.expect("a report"));
     assert_eq!(report["cells"][0]["scene"]["skipped_items"], 3);
+    let summary = fs::read_to_string(folder.path().join("new/run/summary.csv"));
+    assert_eq!(rows(&summary.expect("a table"))[0]["skipped_items"], "3");
+    let verify = "verify --scene bad.csv --path orbit:frames=2 --skip-bad-items --format json";
+    let verified = json(&cullbench(folder.path(), verify).out);
+    assert_eq!(verified["skipped_items"], 3);
     let written = fs::read_to_string(folder.path().join("kept.csv")).expect("written");
     assert_eq!(written.lines().count(), 3);
 }

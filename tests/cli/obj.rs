@@ -146,6 +146,29 @@ fn standard_input_is_one_of_scene_cameras_and_points() {
     let run = "run --scene - --path c.csv --structure linear,bvh --processes 2 --out run";
     let done = fed(folder.path(), run, "y.obj");
     assert_eq!(done.code, Some(0), "{}", done.err);
+    // Outputs are no inputs: convert's is standard output, a picture's is refused by name.
+    let done = fed(folder.path(), "scene convert - - --up y", "y.obj");
+    let named = cullbench(folder.path(), "scene convert y.obj --up y");
+    assert_eq!(done.out, named.out);
+    for out in ["-o -", "--out=-"] {
+        let done = fed(folder.path(), &format!("scene draw - {out}"), "y.obj");
+        assert_refused(&done, "--out is '-'; expected a file", out);
+    }
+    // Both programs of a comparison would have to read it.
+    for inputs in [
+        "--scene -",
+        "--scene=- --path c.csv",
+        "--scene y.obj --path -",
+    ] {
+        let line = format!("compare --against {} --gate work {inputs}", super::PROGRAM);
+        let file = if inputs.ends_with('-') && inputs.contains("y.obj") {
+            "c.csv"
+        } else {
+            "y.obj"
+        };
+        let done = fed(folder.path(), &line, file);
+        assert_refused(&done, "'-' can be read only once; expected a file", inputs);
+    }
     let done = fed(folder.path(), &line("-", "-"), "y.obj");
     assert_eq!(done.code, Some(2));
     assert_eq!(

@@ -77,6 +77,10 @@ fn a_suite_of_a_file_is_run_as_written_and_grows_over_its_sizes() {
 fn a_file_that_is_no_suite_is_refused_with_its_line() {
     for (text, wanted) in [
         ("x = 3", "bad.toml, line 1: | 'x' | expected one of"),
+        (
+            "processes = 3",
+            "line 1: missing field 'scenes'; expected a suite: [[scenes]], each",
+        ),
         ("scenes = []", "bad.toml: no scenes; expected"),
         (
             "[[scenes]]\npath = [3]",
@@ -93,12 +97,18 @@ fn a_file_that_is_no_suite_is_refused_with_its_line() {
         ),
         (
             "[[scenes]]\nscene = 'no.glb'",
-            "no.glb: | expected an existing file",
+            "error: bad.toml: no.glb: No such | expected an existing file",
+        ),
+        (
+            "[[scenes]]\nscene = 'city'\npaths = ['no.csv']",
+            "error: bad.toml: no.csv: No such | expected an existing file",
         ),
         ("[[scenes", "bad.toml, line 1: | expected"),
     ] {
         let folder = with_good_files(&[("bad.toml", text.as_bytes())]);
-        all_refused(&folder, &["run --suite bad.toml --out new"], wanted);
+        let run = "run --suite bad.toml";
+        let lines = [format!("{run} --out new"), format!("{run} --plan")];
+        all_refused(&folder, &lines, wanted);
     }
     let folder = with_good_files(&[]);
     all_refused(
@@ -106,4 +116,14 @@ fn a_file_that_is_no_suite_is_refused_with_its_line() {
         &["run --suite no.toml --out new"],
         "no.toml: | expected",
     );
+    // What a plan names is there, by hand as well.
+    for named in [
+        "--scene no.csv",
+        "--path no.csv",
+        "--motion no.csv",
+        "--scene no.pk3#a",
+    ] {
+        let wanted = "error: no. | : No such | expected an existing file";
+        all_refused(&folder, &[format!("run {named} --plan")], wanted);
+    }
 }
