@@ -196,7 +196,9 @@ fn refused(error: &clap::Error) -> ExitCode {
     }
 }
 
-/// Refuses standard input for two inputs at once; an output takes or refuses `-` itself.
+/// Refuses standard input for two inputs at once.
+///
+/// An output takes or refuses `-` itself.
 fn one_stdin(command: &Command) -> anyhow::Result<()> {
     let args = std::env::args_os().map(|arg| arg.to_string_lossy().into_owned());
     let words = args.collect::<Vec<_>>().join("\n") + "\n";
