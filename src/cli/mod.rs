@@ -161,7 +161,7 @@ fn start(registry: Registry) -> ExitCode {
             tell_notes(tell);
         }
     }
-    let ending = one_stdin(&cli.command).and_then(|()| dispatch(&registry, cli.command));
+    let ending = program::one_stdin(&cli.command).and_then(|()| dispatch(&registry, cli.command));
     if ending.is_ok() {
         tell_warnings();
     }
@@ -194,27 +194,6 @@ fn refused(error: &clap::Error) -> ExitCode {
         Err(unread) if is_broken_pipe(&unread) => ExitCode::SUCCESS,
         Err(full) => failed(format!("{full}{}", expected_by(&full, "file"))),
     }
-}
-
-/// Refuses standard input for two inputs at once.
-///
-/// An output takes or refuses `-` itself.
-fn one_stdin(command: &Command) -> anyhow::Result<()> {
-    let args = std::env::args_os().map(|arg| arg.to_string_lossy().into_owned());
-    let words = args.collect::<Vec<_>>().join("\n") + "\n";
-    let words = words.replace("=-\n", "\n-\n");
-    let words: Vec<&str> = words.lines().collect();
-    let outputs = ["-o", "--out", "--svg", "--html", "--csv", "--markdown"];
-    let inputs = words
-        .windows(2)
-        .filter(|pair| pair[1] == "-" && !outputs.contains(&pair[0]));
-    let output = match command {
-        Command::Scene(SceneCommand::Convert(args)) => args.output.as_deref(),
-        _ => None,
-    };
-    let count = inputs.count() - usize::from(output == Some(Path::new("-")));
-    anyhow::ensure!(count < 2, "'-' {count} times; expected standard input once");
-    Ok(())
 }
 
 /// Runs a command.
