@@ -215,8 +215,8 @@ impl Row<'_> {
 
     /// A finite f64.
     pub fn finite_number(&self, column: usize) -> Result<f64, InputError> {
-        finite(&self.text(column)).map_err(|expected| {
-            let (name, text) = (&self.header[column], shortened(&self.text(column), 60));
+        finite(self.text(column)).map_err(|expected| {
+            let (name, text) = (&self.header[column], shortened(self.text(column), 60));
             self.error(format!("{name} '{text}'"), expected.to_owned())
         })
     }

@@ -146,7 +146,7 @@ fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
     let (text, items) = (row.text(column), scene.items.len());
     let id = text.parse::<ItemId>().ok();
     id.and_then(|id| scene.item_of(id)).ok_or_else(|| {
-        let found = format!("id '{}'", crate::shown::shortened(&text, 60));
+        let found = format!("id '{}'", crate::shown::shortened(text, 60));
         let last = items
             .checked_sub(1)
             .map(|last| scene.row_of(last as ItemId));

@@ -209,7 +209,7 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
         let own = |label: &str| {
             let key = &kept.key;
             let names = [&key.scene, &key.path, &key.cache, &key.test, label];
-            let readings = cells.get(&names.map(|name| lines(name)))?;
+            let readings = cells.get(&names.map(lines))?;
             let cameras = schedule?;
             let reading = |(&(frame, queries), ns): (&(u32, u32), &Vec<f64>)| {
                 let first = cameras.iter().position(|camera| *camera == frame)?;
