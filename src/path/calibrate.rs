@@ -17,12 +17,15 @@ pub(super) const MOST_TESTS: usize = 160_000 * MOST_CAMERAS;
 /// more items than that: a share of 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;
 
+/// Far plane in near planes, at least, where near was named.
+const LEAST_DEPTH: f64 = 1.01;
+
 /// Largest ratio of the share that is reached to the one requested.
 ///
 /// Three items instead of two.
 const MOST_ABOVE: f64 = 1.5;
 
-/// The scale of far (and near, a thousandth of it) at which on average `share`
+/// The scale of far (and of a near that is a thousandth of it) at which on average `share`
 /// of the items is visible, within the sample's accuracy.
 ///
 /// # Errors
@@ -89,7 +92,7 @@ pub(super) fn most_cameras(items: usize) -> usize {
     (MOST_TESTS / items.max(1)).clamp(16, MOST_CAMERAS)
 }
 
-/// The cameras with far and near scaled alike.
+/// The cameras with far scaled, and near where it is a thousandth of far.
 pub(super) fn scaled(
     path: &str,
     cameras: &[Camera],
@@ -110,14 +113,20 @@ fn count(
 }
 
 fn rescaled(camera: &Camera, scale: f64) -> Result<Camera, CameraError> {
-    let mut camera = *camera;
-    if let LensKind::Perspective { .. } = camera.lens.kind() {
-        // An infinite far plane is replaced: its near stood at far/1000.
-        let lens = &camera.lens;
-        let far = lens.far().unwrap_or(lens.near() * 1000.0) * scale;
-        camera.lens = Lens::new(*lens.kind(), far / 1000.0, Some(far))?;
+    let Camera { frame, lens } = *camera;
+    if let LensKind::Matrix(_) = lens.kind() {
+        return Ok(*camera);
     }
-    Ok(camera)
+    // An infinite far plane is replaced: its near stood at far/1000.
+    let far = lens.far().unwrap_or(lens.near() * 1000.0);
+    let is_named = lens.far().is_some() && lens.near() != far / 1000.0;
+    let scaled = far * scale;
+    let (near, far) = match is_named {
+        true => (lens.near(), scaled.max(lens.near() * LEAST_DEPTH)),
+        false => (scaled / 1000.0, scaled),
+    };
+    let lens = Lens::new(*lens.kind(), near, Some(far))?;
+    Ok(Camera { frame, lens })
 }
 
 /// At most `most` elements, evenly spaced.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::calibrate::{MOST_TESTS, every_nth};
 use super::{CameraPath, LensDefaults};
-use crate::camera::{Camera, Frame, Lens, LensKind, PlaneOptions, ViewProjection};
+use crate::camera::{Camera, FARTHEST, Frame, Lens, LensKind, PlaneOptions, ViewProjection};
 use crate::input::note;
 use crate::scene::{Scene, UpAxis};
 use crate::shown::counted;
@@ -177,20 +177,29 @@ impl CameraPath {
 impl LensDefaults {
     /// Tells of what is given and has no effect on the cameras of a path.
     pub(super) fn note_unused(&self, path: &CameraPath) {
-        let is_matrix = |camera: &Camera| matches!(camera.lens.kind(), LensKind::Matrix(_));
-        let lens = |of: &LensDefaults| (of.fovy_deg, of.aspect, of.near, of.far);
-        let is_given = lens(self) != lens(&LensDefaults::default());
-        let (is_unused, what) = match path.cameras.first().is_some_and(is_matrix) {
-            true => (
-                is_given,
-                "--fovy, --aspect, --near and --far are for cameras without matrices",
-            ),
-            false => (
-                self.matrix.is_some(),
-                "--matrix-convention is for cameras that are matrices",
-            ),
+        let names = ["--fovy", "--aspect", "--near", "--far"];
+        let endless = |far: Option<f64>| Some(far.unwrap_or(f64::INFINITY));
+        let of = |lens: &Lens| {
+            let depths = [Some(lens.near()), endless(lens.far())];
+            [fovy_deg(lens), aspect(lens), depths[0], depths[1]]
         };
-        if is_unused {
+        let (plain, far) = (LensDefaults::default(), self.far);
+        let given = [
+            Some(self.fovy_deg).filter(|fovy| *fovy != plain.fovy_deg),
+            Some(self.aspect).filter(|aspect| *aspect != plain.aspect),
+            self.near,
+            far.and_then(|far| endless(far.filter(|far| *far <= FARTHEST))),
+        ];
+        let has = |is: &dyn Fn(&Lens) -> bool| path.cameras.iter().any(|camera| is(&camera.lens));
+        let is_unused =
+            |at: &usize| given[*at].is_some() && !has(&|lens| of(lens)[*at] == given[*at]);
+        let unused: Vec<&str> = (0..4).filter(is_unused).map(|at| names[at]).collect();
+        if !unused.is_empty() {
+            let what = "not used, its cameras have their own";
+            note(&format!("{}: {what}: {}", path.name, unused.join(", ")));
+        }
+        if self.matrix.is_some() && !has(&|lens| matches!(lens.kind(), LensKind::Matrix(_))) {
+            let what = "--matrix-convention is for cameras that are matrices";
             note(&format!("{}: {what}", path.name));
         }
     }

@@ -35,7 +35,7 @@ pub struct CameraPath {
     pub lines: Vec<u64>,
     /// Times of all cameras of the file in seconds, ascending; empty if one has none.
     pub times: Vec<f64>,
-    /// Scale of far and near that `visible=` has found.
+    /// Scale of far that `visible=` has found.
     pub lens_scale: Option<f64>,
 }
 
@@ -149,8 +149,8 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
 
 /// Parameters that every generated path takes.
 pub const PATH_PARAMS: &str = "frames=256, seed=1 (of random choices), fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000, \
-     far=the scene's diagonal (or inf), visible (choose far so that this share of the items \
-     is visible on average, e.g. visible=2%, or this many of them, e.g. visible=2000)";
+     far=from the farthest eye to the centre and half the diagonal more (or inf), visible (choose far so that this share of the items is visible on average, e.g. \
+     visible=2%, or this many of them, e.g. visible=2000)";
 
 /// The error of a path that a scene cannot have: what was found and expected.
 fn unfit(path: &str, reason: impl Display) -> InputError {
@@ -343,10 +343,17 @@ impl Optics {
         // From the farthest eye everything up to the far side is in reach.
         let farthest = poses.iter().map(|p| (p.eye - stage.centre()).length());
         let natural = farthest.fold(0.0, f64::max) + stage.radius();
-        let far = match spec.text("far").as_deref() {
-            Some("inf") => None,
-            Some(_) => Some(spec.number("far", natural)?),
-            None => defaults.far.unwrap_or(Some(natural)),
+        let visible = spec.text("visible");
+        let far = match (spec.text("far").as_deref(), &visible) {
+            (Some(far), Some(visible)) => {
+                let found =
+                    format_args!("far={far} beside visible={visible}; expected one of them");
+                return Err(SpecError::new(found));
+            }
+            (Some("inf"), _) => None,
+            (Some(_), _) => Some(spec.number("far", natural)?),
+            (None, None) => defaults.far.unwrap_or(Some(natural)),
+            (None, Some(_)) => Some(natural),
         };
         let far = far.filter(|far| *far <= FARTHEST);
         let near = match spec.text("near") {
@@ -362,7 +369,6 @@ impl Optics {
                 spec.name()
             )));
         }
-        let visible = spec.text("visible");
         let named = ["fovy", "aspect", "near", "far"].map(|name| spec.text(name).is_some());
         let visible = visible.map(|text| visible_share(spec, &text, stage.scene.items.len()));
         Ok(Optics {
@@ -398,13 +404,12 @@ impl Optics {
         numbered.collect()
     }
 
-    /// The lens of a place, where neither parameters nor a share of items replace it.
+    /// The lens of a place, where neither parameters nor, for far, a share of items replace it.
     fn lens(&self, own: Option<PlaceView>) -> Result<Lens, CameraError> {
         let Some(own) = own else {
             return Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far);
         };
         let [fovy, aspect, near, far] = self.named;
-        let [near, far] = [near, far].map(|is_named| is_named || self.visible.is_some());
         let aspect = own.aspect.filter(|_| !aspect).unwrap_or(self.aspect);
         let fovy_deg = own.fovy_deg.filter(|_| !fovy).unwrap_or(self.fovy_deg);
         let kind = match own.ortho_height.filter(|_| !fovy) {
@@ -412,7 +417,11 @@ impl Optics {
             None => LensKind::Perspective { fovy_deg, aspect },
         };
         let near = if near { self.near } else { own.near };
-        let far = if far { self.far } else { own.far };
+        let far = if far || self.visible.is_some() {
+            self.far
+        } else {
+            own.far
+        };
         Lens::new(kind, near, far.filter(|far| *far <= FARTHEST))
     }
 }

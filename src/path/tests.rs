@@ -109,6 +109,30 @@ fn a_visible_share_can_be_asked_for() {
 }
 
 #[test]
+fn a_near_that_was_asked_for_stays_beside_a_visible_share() {
+    let scene = scene("uniform:n=5000");
+    let plain = LensDefaults::default();
+    let of_options = LensDefaults {
+        near: Some(0.25),
+        ..plain.clone()
+    };
+    for (source, defaults, wanted) in [
+        ("flythrough:frames=8,visible=5%,near=0.5", &plain, Some(0.5)),
+        ("flythrough:frames=8,visible=5%", &of_options, Some(0.25)),
+        ("street:frames=8,visible=1%", &plain, Some(0.1)),
+        ("flythrough:frames=8,visible=5%", &plain, None),
+    ] {
+        for camera in load(source, &scene, defaults).unwrap().cameras {
+            let (near, far) = (camera.lens.near(), camera.lens.far().unwrap());
+            assert_eq!(near, wanted.unwrap_or(far / 1000.0), "{source}");
+        }
+    }
+    let error = load("orbit:visible=5%,far=10", &scene, &plain).unwrap_err();
+    let wanted = "far=10 beside visible=5%; expected one of them";
+    assert!(error.to_string().contains(wanted), "{error}");
+}
+
+#[test]
 fn a_count_is_met_in_scenes_of_any_size() {
     for n in [5_000, 1_000_000] {
         let scene = scene(&format!("uniform:n={n}"));

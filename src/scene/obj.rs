@@ -173,10 +173,12 @@ impl Obj<'_> {
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;
                 let name = String::from_utf8_lossy(&line[start..]);
-
+                let lines = name
+                    .lines()
+                    .map(|line| line.trim().trim_end_matches('\\').trim());
+                let name = lines.collect::<Vec<_>>().join(" ").trim().to_owned();
                 self.items.pop_if(|(_, first)| *first == self.corners.len());
-                self.items
-                    .push((name.trim_ascii().to_owned(), self.corners.len()));
+                self.items.push((name, self.corners.len()));
             }
             _ if word.contains(&0) => {
                 let found = "zero bytes, as in UTF-16 text".to_owned();

@@ -192,7 +192,14 @@ fn read_beside(
         let names = [&format!("{file}#{}", entry.name), name];
         let folder = entry.name.rfind('/').map_or("", |end| &entry.name[..=end]);
         let beside = |uri: &str| {
-            let wanted = format!("{folder}{}", uri.trim_start_matches("./"));
+            let mut parts: Vec<&str> = folder.split_terminator('/').collect();
+            for part in uri.split('/').filter(|part| *part != ".") {
+                match parts.last() {
+                    Some(last) if part == ".." && *last != ".." => drop(parts.pop()),
+                    _ => parts.push(part),
+                }
+            }
+            let wanted = parts.join("/");
             let entry = zip::unpack(&archive, &entries, file, Some(&wanted))?;
             let found = format!("no '{}'", shortened(&wanted, 80));
             let other = InputError::at(file, "directory", found, "the name of an entry");

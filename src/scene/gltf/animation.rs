@@ -123,9 +123,7 @@ pub fn transform([moved, turned, scaled]: Parts) -> DAffine3 {
 
 /// The lens of a camera; its up vector is of no meaning.
 fn lens(camera: &Value) -> Option<PlaceView> {
-    let (perspective, parallel) = (&camera["perspective"], &camera["orthographic"]);
-    let mut both = [perspective, parallel].into_iter();
-    let lens = both.find(|lens| lens.is_object())?;
+    let lens = &camera[camera["type"].as_str()?];
     let number = |name: &str| lens[name].as_f64();
     let aspect = || Some(number("xmag")? / number("ymag")?);
     Some(PlaceView {

@@ -22,7 +22,8 @@ fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
         let end = at + 8 + number(at)? as usize;
         Some((bytes.get(at + 4..at + 8)?, bytes.get(at + 8..end)?))
     };
-    let (_, json) = chunk(12).filter(|(kind, _)| *kind == b"JSON" && number(4) == Some(2))?;
+    let is_whole = number(4)? == 2 && number(8)? as usize <= bytes.len();
+    let (_, json) = chunk(12).filter(|(kind, _)| *kind == b"JSON" && is_whole)?;
     let mut at = 20 + json.len();
     while at + 8 <= bytes.len() {
         let (kind, body) = chunk(at)?;
@@ -106,12 +107,17 @@ impl<'f> File<'f> {
         let error = |found: String| InputError::at(name, "JSON", found, "glTF 2.0");
         let (json, mut bin) = match bytes.starts_with(b"glTF") {
             true => glb(bytes).ok_or_else(|| {
-                let found = "a GLB of another version or with chunks beyond its end";
+                let found = "a GLB of another version, or with a length or chunks beyond its end";
                 InputError::byte(name, 4, found, "a GLB of version 2, its first chunk JSON")
             })?,
             false => (bytes, None),
         };
         let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+        // Some exporters pad with zero bytes in the place of spaces.
+        let json = &json[..json
+            .iter()
+            .rposition(|byte| *byte != 0)
+            .map_or(0, |last| last + 1)];
         let root = serde_json::from_slice(json).or_else(|e| {
             let json: Value = serde_json::from_slice(json).unwrap_or_default();
             // In glTF 1.0, what 2.0 numbers has names.
@@ -122,8 +128,10 @@ impl<'f> File<'f> {
             lenient(json).ok_or_else(|| error(found))
         });
         let root: Root = root?;
-        if !root.asset.version.starts_with("2.") {
-            let version = shortened(&root.asset.version, 20);
+        let (own, least) = (&root.asset.version, root.asset.min_version.as_ref());
+        let other = Some(own).filter(|own| !own.starts_with("2."));
+        if let Some(version) = other.or(least.filter(|least| *least != "2.0")) {
+            let version = shortened(version, 20);
             return Err(error(format!("glTF of version '{version}'")));
         }
         let exact = serde_json::from_slice(json).map_err(|e| error(message(&e.to_string())))?;
@@ -154,7 +162,7 @@ impl<'f> File<'f> {
             let data = data.ok().filter(|_| head.ends_with(";base64"));
             return data.ok_or_else(|| error("bytes that are no base64", "base64 data"));
         }
-        if uri.contains("://") {
+        if uri.contains("://") || uri.is_empty() {
             let found = format!("'{}'", shortened(uri, 60));
             return Err(error(&found, "a file beside this one"));
         }

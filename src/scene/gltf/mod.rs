@@ -169,7 +169,18 @@ impl File<'_> {
     /// Transform of a node relative to its parent.
     fn local(&self, index: usize) -> Result<DAffine3, InputError> {
         let found = match <[f64; 16]>::deserialize(&self.exact.nodes[index]["matrix"]) {
-            Ok(matrix) => DAffine3::from_mat4(DMat4::from_cols_array(&matrix)),
+            Ok(matrix) => {
+                let matrix = DMat4::from_cols_array(&matrix);
+                let last = matrix.row(3);
+                if last.is_finite() && !last.abs_diff_eq(DVec4::W, 1e-6) {
+                    let (place, found) = (
+                        format!("nodes[{index}].matrix"),
+                        format!("a last row of {last}"),
+                    );
+                    return Err(self.error(place, found, "[0, 0, 0, 1]"));
+                }
+                DAffine3::from_mat4(matrix)
+            }
             Err(_) => transform(self.parts(index)),
         };
         match found.is_finite() {
