@@ -80,8 +80,9 @@ pub fn compare_against<'a>(
     let busy = busy.filter(|busy| is_timed && *busy > 0.5 * cores as f64);
     let note = |busy| {
         format!(
-            "the machine was busy (load average {busy:.1} on {cores} cores): both sides suffered \
-             alike, and it may take more pairs"
+            "the machine was busy (load average {busy:.1} on {}): both sides suffered alike, and \
+             it may take more pairs",
+            text::counted(cores, "core")
         )
     };
     let left_out = match plan.structures == STRUCTURES {

@@ -14,6 +14,7 @@ use super::surface::enter_growths;
 use super::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
+use crate::shown::counted;
 use crate::statistics::two_speeds;
 
 /// A line of stream.jsonl.
@@ -304,9 +305,9 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
     let busy = |load: &f64| *load > BUSY * machine.cores as f64;
     if let Some(load) = machine.load.filter(busy) {
         warnings.push(format!(
-            "the machine was busy when the run began (load average {load:.1} on {} cores): close \
+            "the machine was busy when the run began (load average {load:.1} on {}): close \
              other programs, or wait, and run again",
-            machine.cores
+            counted(machine.cores, "core")
         ));
     }
     if two_speeds * 10 > tasks {

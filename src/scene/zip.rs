@@ -297,6 +297,7 @@ pub mod tests {
         for (uri, name) in [
             ("./%C3%BC%20%281%29.bin", "in/\u{fc} (1).bin"),
             ("100%/%+f%", "in/100%/%+f%"),
+            ("../sub/./x.bin", "sub/x.bin"),
         ] {
             assert_eq!(read(&with(uri, name), None), Ok(1), "{uri}");
         }

@@ -10,7 +10,7 @@ fn what_is_wrong_is_named_with_its_place() {
     let bytes = STANDARD.decode(uri.split_once(',').unwrap().1).unwrap();
     let bytes = [&bytes[..12], &[0xff; 4], &bytes[16..]].concat();
     let nan = format!("data:;base64,{}", STANDARD.encode(bytes));
-    let cases: [(&str, Value, &str); 14] = [
+    let cases: [(&str, Value, &str); 17] = [
         ("/nodes/2/camera", json!(1), "nodes[2].camera: index 1"),
         (
             "/buffers/0/uri",
@@ -64,6 +64,21 @@ fn what_is_wrong_is_named_with_its_place() {
             "/asset/version",
             json!("1.0"),
             "glTF of version '1.0'; expected glTF 2.0",
+        ),
+        (
+            "/asset",
+            json!({"version": "2.0", "minVersion": "2.1"}),
+            "glTF of version '2.1'; expected glTF 2.0",
+        ),
+        (
+            "/buffers/0/uri",
+            json!(""),
+            "buffers[0].uri: ''; expected a file beside",
+        ),
+        (
+            "/nodes/0",
+            json!({"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 2]}),
+            "nodes[0].matrix: a last row of [0, 0, 0, 2]; expected [0, 0, 0, 1]",
         ),
     ];
     for (place, value, wanted) in cases {
