@@ -25,8 +25,9 @@ const LEAST_DEPTH: f64 = 1.01;
 /// Three items instead of two.
 const MOST_ABOVE: f64 = 1.5;
 
-/// The scale of far (and of a near that is a thousandth of it) at which on average `share`
-/// of the items is visible, within the sample's accuracy.
+/// The scale of far at which `share` of the items is visible on average.
+///
+/// Within the sample's accuracy. A near that is a thousandth of far is scaled with it.
 ///
 /// # Errors
 /// A share that even four times the present far plane does not reach, or that is less

@@ -404,7 +404,9 @@ impl Optics {
         numbered.collect()
     }
 
-    /// The lens of a place, where neither parameters nor, for far, a share of items replace it.
+    /// The lens of a place, where no parameters replace it.
+    ///
+    /// A share of items replaces far.
     fn lens(&self, own: Option<PlaceView>) -> Result<Lens, CameraError> {
         let Some(own) = own else {
             return Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far);
