@@ -63,8 +63,8 @@ pub struct WhatArgs {
     #[arg(long, visible_alias = "cameras", value_name = "PATH")]
     pub path: Vec<String>,
     /// Structures, e.g. linear,bvh:leaf=4, or all, or default (all but auto and
-    /// the textbook forms); may be repeated [default: all for the suites standard and full, else
-    /// default; compare --against: the trees, linear and wide]
+    /// the textbook forms); may be repeated [default: all for the suite standard, else default;
+    /// compare --against: the trees, linear and wide]
     #[arg(long, value_name = "LIST")]
     pub structure: Vec<String>,
     /// The culling test: sphere, six-plane, six-box or exact; may be repeated
