@@ -114,7 +114,7 @@ fn a_near_that_was_asked_for_stays_beside_a_visible_share() {
     let plain = LensDefaults::default();
     let of_options = LensDefaults {
         near: Some(0.25),
-        ..plain.clone()
+        ..plain
     };
     for (source, defaults, wanted) in [
         ("flythrough:frames=8,visible=5%,near=0.5", &plain, Some(0.5)),
