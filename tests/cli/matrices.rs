@@ -126,15 +126,23 @@ fn options_of_other_cameras_are_told_once() {
         ("m.csv", matrix.as_bytes()),
     ]);
     let convention = "--matrix-convention column-gl";
-    let lens = |name: &str| format!("note: m.csv: not used, its cameras have their own: {name}\n");
+    let lens = |cameras: &str, name: &str| {
+        format!("note: {cameras}: not used, its cameras have their own: {name}\n")
+    };
     let of = |cameras: &str| {
         format!("note: {cameras}: --matrix-convention is for cameras that are matrices\n")
     };
     for (cameras, note) in [
         (format!("m.csv {convention}"), String::new()),
-        (format!("m.csv {convention} --near 3"), lens("--near")),
-        (format!("m.csv {convention} --fovy 30"), lens("--fovy")),
-        ("eye.csv --near 3".to_owned(), String::new()),
+        (
+            format!("m.csv {convention} --near 3"),
+            lens("m.csv", "--near"),
+        ),
+        (
+            format!("m.csv {convention} --fovy 30"),
+            lens("m.csv", "--fovy"),
+        ),
+        ("eye.csv --near 3".to_owned(), lens("eye.csv", "--near")),
         (format!("eye.csv {convention}"), of("eye.csv")),
         (format!("orbit:frames=2 {convention}"), of("orbit:frames=2")),
     ] {
