@@ -8,17 +8,15 @@ use super::process::*;
 #[test]
 fn occlusion_is_left_out_from_the_air_and_kept_on_the_street() {
     let of = |path: &str| {
-        let line = format!(
-            "advise --scene city:n=4000 --path {path} --structure linear,wide --draw-ns 5000"
-        );
+        let line = format!("advise --scene city:n=4000 --structure linear,wide --path {path}");
         let advice = advice(Path::new("."), &line);
         let rule = rule(&advice, "occlusion");
         (rule["decision"].clone(), number(rule, "statistic"))
     };
-    let (street, hidden) = of("street:frames=12");
+    let (street, hidden) = of("street:frames=12 --draw-ns 5000");
     assert_eq!(street, "keep");
     assert!(hidden > 0.5, "{hidden}");
-    let (air, hidden) = of("outside:frames=12");
+    let (air, hidden) = of("outside:frames=12 --draw-ns 50");
     assert_eq!(air, "leave_out");
     assert!(hidden < 0.5, "{hidden}");
 }

@@ -281,9 +281,15 @@ fn cameras_may_be_told_in_every_way_of_the_format() {
     }
     // Columns win over options; options stand in for columns.
     let bare = format!("{EYE_LOOK}\n1,-2,3,1,98,3\n");
-    assert_eq!(
-        answer(same[0], "--fovy 20 --aspect 1 --near 300 --far 310"),
-        wanted
+    fs::write(folder.path().join("c.csv"), same[0]).expect("writable");
+    let options = "--fovy 20 --aspect 1 --near 300 --far 310";
+    let line = format!("query --scene {scene} --cameras c.csv --ids {options}");
+    let told = cullbench(folder.path(), &line);
+    assert_eq!(told.out, wanted);
+    assert!(
+        told.err
+            .contains("not used, its cameras have their own: --fovy"),
+        "{told:?}"
     );
     assert_eq!(
         answer(&bare, "--fovy 50 --aspect 1.5 --near 2 --far 400"),
