@@ -28,6 +28,7 @@ mod history;
 mod interrupt;
 mod list;
 mod merge;
+mod one_stdin;
 mod plan;
 mod policies;
 mod precision;
@@ -161,7 +162,7 @@ fn start(registry: Registry) -> ExitCode {
             tell_notes(tell);
         }
     }
-    let ending = program::one_stdin(&cli.command).and_then(|()| dispatch(&registry, cli.command));
+    let ending = one_stdin::one_stdin(&cli.command).and_then(|()| dispatch(&registry, cli.command));
     if ending.is_ok() {
         tell_warnings();
     }
