@@ -38,7 +38,7 @@ TIMED = {"dominated_by", "is_tie", "on_front", "twin", "as_fast", "reason", "rat
          "conclusion", "conclusions", "memory_bytes_per_item", "summary", "expected"}
 TIMED_ENDS = ("_ns", "_ns_lower", "_ns_upper", "ratio_lower", "ratio_upper", "us_per_second",
               "us_per_second_lower", "us_per_second_upper", "ns_per_step", "ns_per_step_lower",
-              "ns_per_step_upper", "ns_per_item", "ns_per_box", "ns_per_ray", "ns_per_decided", "ns_per_removed")
+              "ns_per_step_upper", "ns_per_item", "ns_per_ray", "ns_per_decided", "ns_per_removed")
 # A quantile of Student's t, whose last digit changes with the code around it.
 ROUNDED = {"elsewhere"}
 program = ""

@@ -7,8 +7,7 @@ use super::document::Block;
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time, time_plus_minus};
 use crate::precision::{
-    CullingErrors, Names, Point, Precision, RegionErrors, SIZE_RATIOS, SWEEPS, SizeRow,
-    StableAfter, SweepRow,
+    CullingErrors, Names, Point, Precision, RegionErrors, SWEEPS, SizeRow, StableAfter, SweepRow,
 };
 use crate::report::grouped;
 use crate::statistics::Rate;
@@ -265,23 +264,14 @@ fn sizes_table(rows: &[SizeRow]) -> Table {
     table
 }
 
-/// Basis of the table, and the cost of each test.
+/// Basis of the table.
 fn sizes_note(rows: &[SizeRow]) -> String {
     let first = &rows[0];
-    let mut middle = rows
-        .iter()
-        .filter(|row| row.size_over_depth == SIZE_RATIOS[2]);
-    let tests = middle.next().unwrap_or(first).tests.iter();
-    let costs = tests.filter_map(|t| {
-        let ns = significant(t.ns_per_box?);
-        Some(format!("{} {ns}", t.test))
-    });
     format!(
         "Field of view 60 degrees, 16:9; {} frusta and {} for each ratio; ± bounds the result of another seed (99.999 %), from \
-         the spread over the frusta. ns per box in blocks of sixteen: {}.",
+         the spread over the frusta.",
         text::count(first.frusta),
         text::counted(first.cubes as usize, "cube"),
-        costs.collect::<Vec<_>>().join(", ")
     )
 }
 

@@ -11,11 +11,10 @@ use crate::culling::{
 };
 use crate::geometry::{Aabb, BoxBlocks, MAX_PLANES, sphere_cube};
 use crate::kernel::Plain;
-use crate::measure::Stopwatch;
 use crate::oracle::{Oracle, Pose, Verdict};
 use crate::query::{QueryVolume, each_volume};
 use crate::scene::SeededRng;
-use crate::statistics::{Rate, median, rate};
+use crate::statistics::{Rate, rate};
 
 /// Edge of the cubes / depth of the frustum.
 pub const SIZE_RATIOS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 10.0];
@@ -45,16 +44,12 @@ pub struct SizeError {
     pub excess: Option<Rate>,
     /// Visible cubes that were not returned.
     pub false_negative_count: u64,
-    /// Linear scan in blocks of sixteen, thread CPU time, median.
-    pub ns_per_box: Option<f64>,
 }
 
 /// Cubes of one frustum on each axis of a grid, one in each of its cells: spread
 /// evenly they tell a frustum's share better than as many anywhere.
 const GRID: usize = 8;
 const BATCH: usize = GRID * GRID * GRID;
-/// One frustum of `REPEATS` is timed, its cubes `REPEATS` times in turn.
-const REPEATS: usize = 32;
 const FOVY_DEG: f64 = 60.0;
 const ASPECT: f64 = 16.0 / 9.0;
 /// Near plane / depth.
@@ -72,15 +67,14 @@ const TESTS: [&str; 7] = [
     "exact f64",
 ];
 
-/// Judges about `cubes` cubes for every ratio, the same frusta for each;
-/// deterministic but for the times.
+/// Judges about `cubes` cubes for every ratio, the same frusta for each.
 ///
 /// # Errors
 /// None for these cameras; the type says what cannot happen.
 pub fn size_sweep(cubes: usize, seed: u64) -> Result<Vec<SizeRow>, CullingError> {
     let mut rng = SeededRng::new(seed);
     let mut tallies = SIZE_RATIOS.map(|_| Tally::default());
-    for n in 0..cubes.div_ceil(BATCH) {
+    for _ in 0..cubes.div_ceil(BATCH) {
         let camera = random_camera(&mut rng)?;
         let Some(oracle) = Oracle::of_camera(&Pose::of(&camera), &camera.lens, DVec3::ZERO) else {
             continue;
@@ -88,7 +82,7 @@ pub fn size_sweep(cubes: usize, seed: u64) -> Result<Vec<SizeRow>, CullingError>
         let views = views(&camera)?;
         for (tally, ratio) in tallies.iter_mut().zip(SIZE_RATIOS) {
             let cubes = strewn(&mut rng, &camera, ratio);
-            tally.add(&oracle, &views, &cubes, n % REPEATS == 0);
+            tally.add(&oracle, &views, &cubes);
         }
     }
     let rows = tallies.iter().zip(SIZE_RATIOS);
@@ -109,8 +103,6 @@ struct TestTally {
     extra: Vec<[f64; 2]>,
     /// Cubes that are in and not returned.
     missed: u64,
-    /// Nanoseconds per box.
-    times: Vec<f64>,
 }
 
 /// A frustum in any direction, at zero, of depth 1.
@@ -191,7 +183,7 @@ fn views(camera: &Camera) -> Result<[CameraView; TESTS.len()], CullingError> {
 }
 
 impl Tally {
-    fn add(&mut self, oracle: &Oracle, views: &[CameraView], cubes: &[Aabb], is_timed: bool) {
+    fn add(&mut self, oracle: &Oracle, views: &[CameraView], cubes: &[Aabb]) {
         let verdicts: Vec<Verdict> = cubes.iter().map(|cube| oracle.verdict(cube)).collect();
         self.cubes += cubes.len() as u64;
         self.visible += verdicts.iter().filter(|v| **v != Verdict::Out).count() as u64;
@@ -202,7 +194,7 @@ impl Tally {
                 CameraView::Spheres(_) => &balls,
                 _ => &boxes,
             };
-            each_volume!(view.as_any(), volume => test.add(volume, blocks, &verdicts, is_timed));
+            each_volume!(view.as_any(), volume => test.add(volume, blocks, &verdicts));
         }
     }
 
@@ -212,7 +204,6 @@ impl Tally {
             test,
             excess: rate(&own.extra),
             false_negative_count: own.missed,
-            ns_per_box: median(&own.times),
         });
         SizeRow {
             size_over_depth: ratio,
@@ -225,26 +216,11 @@ impl Tally {
 }
 
 impl TestTally {
-    fn add<V: QueryVolume>(
-        &mut self,
-        view: &V,
-        blocks: &BoxBlocks,
-        verdicts: &[Verdict],
-        is_timed: bool,
-    ) {
+    fn add<V: QueryVolume>(&mut self, view: &V, blocks: &BoxBlocks, verdicts: &[Verdict]) {
         let mut admitted = vec![0; verdicts.len().div_ceil(16)];
         let mask = view.mask();
-        let repeats = if is_timed { REPEATS } else { 1 };
-        let watch = Stopwatch::start();
-        for _ in 0..repeats {
-            let blocks = std::hint::black_box(blocks);
-            for ((_, lanes, block), slot) in blocks.range(0, verdicts.len()).zip(&mut admitted) {
-                *slot = view.kept_lanes(Plain, block, mask) & lanes;
-            }
-        }
-        if is_timed {
-            let tests = (repeats * verdicts.len()) as f64;
-            self.times.push(watch.lap().cpu_ns / tests);
+        for ((_, lanes, block), slot) in blocks.range(0, verdicts.len()).zip(&mut admitted) {
+            *slot = view.kept_lanes(Plain, block, mask) & lanes;
         }
         let (mut extra, mut visible) = (0.0, 0.0);
         for (i, verdict) in verdicts.iter().enumerate() {

@@ -72,7 +72,7 @@ fn json_has_the_documented_fields() {
                   missed_region_count worst_false query_ns query_ns_lower query_ns_upper \
                   dominated_by is_tie on_front";
     let size = "size_over_depth frusta cubes visible tests";
-    let size_error = "test excess false_negative_count ns_per_box";
+    let size_error = "test excess false_negative_count";
     let swept = format!(
         "sweep value test planes arithmetic epsilon false_negative_ppm excess {errors} refused"
     );
