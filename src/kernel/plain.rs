@@ -1,5 +1,6 @@
-//! Sixteen lanes as plain arrays, which the compiler turns into vectors of the target:
-//! for any processor, for interpreters, and for the tests of the other kernels. No
+//! Sixteen lanes as plain arrays, which the compiler turns into vectors.
+//!
+//! For any processor, for interpreters, and for the tests of the other kernels. No
 //! unsafe code.
 
 use super::isa::{Isa, LANES, LaneMask, Pack};

@@ -14,5 +14,5 @@ pub use judged::{CullingErrors, Names};
 pub use point::{Point, StableAfter};
 pub use points::{PointPlan, Precision, PrecisionInput, prepare, time};
 pub use region_search::RegionErrors;
-pub use size_sweep::{SIZE_RATIOS, SizeRow, size_sweep};
+pub use size_sweep::{SizeRow, size_sweep};
 pub use sweeps::{SWEEPS, SweepRow, sweep};

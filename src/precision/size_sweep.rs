@@ -17,7 +17,7 @@ use crate::scene::SeededRng;
 use crate::statistics::{Rate, rate};
 
 /// Edge of the cubes / depth of the frustum.
-pub const SIZE_RATIOS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 10.0];
+const SIZE_RATIOS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 10.0];
 
 /// One ratio: false positives / visible, and what a test costs per box.
 #[derive(Clone, PartialEq, Debug, Serialize)]
