@@ -246,7 +246,7 @@ mod tests {
     fn judged(camera: &Camera, cubes: &[Aabb]) -> Tally {
         let oracle = Oracle::of_camera(&Pose::of(camera), &camera.lens, DVec3::ZERO).unwrap();
         let mut tally = Tally::default();
-        tally.add(&oracle, &views(camera).unwrap(), cubes, false);
+        tally.add(&oracle, &views(camera).unwrap(), cubes);
         tally
     }
 
