@@ -261,16 +261,12 @@ pub struct PathInfo {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub motion: String,
     /// Number of queries of a frame of the motion; absent for a still scene.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub views_per_frame: usize,
 }
 
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde passes a reference"
-)]
-fn is_zero(count: &usize) -> bool {
-    *count == 0
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 impl PathInfo {

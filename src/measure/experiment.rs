@@ -116,13 +116,10 @@ impl Plan {
             false => &self.motions[..],
         };
         let mut groups = Vec::new();
-        for of_spheres in [false, true] {
-            for path in &scene.paths {
-                let caches = scene.caches.iter();
-                for (&cold, motion) in caches.flat_map(|c| motions.iter().map(move |m| (c, m))) {
-                    let cullings = self.cullings.iter();
-                    let own = cullings.filter(|c| (c.test == CullingTest::Sphere) == of_spheres);
-                    groups.extend(own.map(|&culling| SceneGroup {
+        for path in &scene.paths {
+            for &cold in &scene.caches {
+                for motion in motions {
+                    groups.extend(self.cullings.iter().map(|&culling| SceneGroup {
                         path: path.clone(),
                         cold,
                         culling,
@@ -131,6 +128,7 @@ impl Plan {
                 }
             }
         }
+        groups.sort_by_key(|group| group.culling.test == CullingTest::Sphere);
         groups
     }
 
@@ -202,32 +200,29 @@ impl Plan {
         let once = self.structures.iter().map(|s| (s, false));
         // A structure that has ended a process is not tried again, not as a twin either.
         let twin = twin.filter(|spec| self.has_all() && !share.failed.contains_key(&spec.label));
-        let mut subjects: Vec<_> = once.chain(twin.map(|s| (s, true))).enumerate().collect();
+        let mut subjects: Vec<_> = once.chain(twin.map(|s| (s, true))).collect();
         // Another order in each process: what is built first gets other pages than what follows.
         let first = share.process as usize % subjects.len().max(1);
         subjects.rotate_left(first);
-        let mut built: Vec<(usize, Subject)> = subjects
-            .into_iter()
-            .map(|(place, (spec, is_twin))| {
-                if let Some(verdict) = share.failed.get(&spec.label) {
-                    let subject = Subject {
-                        spec: spec.clone(),
-                        is_twin,
-                        built: Err(verdict.clone()),
-                    };
-                    return (place, subject);
-                }
-                notice(Some(&spec.label), "building");
-                let built = Subject::build(spec.clone(), is_twin, scene, test);
-                if !self.has_updates(share) || is_twin {
-                    return (place, built);
-                }
-                notice(Some(&spec.label), "updating");
-                (place, built.with_updates(scene, test))
-            })
-            .collect();
-        built.sort_unstable_by_key(|(place, _)| *place);
-        built.into_iter().map(|(_, subject)| subject).collect()
+        let built = subjects.into_iter().map(|(spec, is_twin)| {
+            if let Some(verdict) = share.failed.get(&spec.label) {
+                return Subject {
+                    spec: spec.clone(),
+                    is_twin,
+                    built: Err(verdict.clone()),
+                };
+            }
+            notice(Some(&spec.label), "building");
+            let built = Subject::build(spec.clone(), is_twin, scene, test);
+            if !self.has_updates(share) || is_twin {
+                return built;
+            }
+            notice(Some(&spec.label), "updating");
+            built.with_updates(scene, test)
+        });
+        let mut built: Vec<Subject> = built.collect();
+        built.rotate_right(first);
+        built
     }
 }
 
@@ -332,10 +327,9 @@ pub fn measure_scene(
                 seed: plan.seed.wrapping_add(u64::from(share.process)),
                 cache_bytes: sweep,
             },
-            bounds: if plan.bounds && plan.has_all() {
-                BOUNDS
-            } else {
-                &[]
+            bounds: match plan.bounds && plan.has_all() {
+                true => BOUNDS,
+                false => &[],
             },
             known,
             plan_only: share.plan_only,

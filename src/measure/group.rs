@@ -52,11 +52,7 @@ impl GroupPlan<'_> {
             scene: self.scene.clone(),
             path: self.path,
             known,
-            judged: None,
-            subjects: Vec::new(),
-            failed: BTreeMap::new(),
-            bounds: Vec::new(),
-            tasks: Vec::new(),
+            ..Part::default()
         }
     }
 }
@@ -86,31 +82,24 @@ pub fn measure_part(
     stop: &dyn Fn() -> bool,
 ) -> Option<(Part, Vec<TaskSamples>)> {
     let answered = plan.known.filter(|known| !known.visible.is_empty());
-    let (mut entries, judged) = match answered {
+    let (mut entries, judged, answers) = match answered {
         None => count(workload, subjects, notice),
         Some(known) => {
-            let entry = |subject| {
-                let verdict = compare_digests(subject, workload, known, notice);
-                Entry {
-                    subject,
-                    part: SubjectPart::of(subject, verdict),
-                    counted: None,
-                }
+            let entry = |subject| Entry {
+                subject,
+                part: SubjectPart::of(subject, compare_digests(subject, workload, known, notice)),
+                counted: None,
             };
-            (subjects.iter().map(entry).collect(), None)
+            let answers = [known.visible.clone(), known.located.clone()];
+            (subjects.iter().map(entry).collect(), None, answers)
         }
     };
     if stop() {
         return None;
     }
-    let answers = match answered {
-        Some(known) => [known.visible.clone(), known.located.clone()],
-        None => right_answers(&entries),
-    };
     let (mut bounds, mut tasks, mut samples) = (Vec::new(), Vec::new(), Vec::new());
     let mut schedules = [None, None];
-    let passes = if plan.locate { 2 } else { 1 };
-    for &pass in &Pass::ALL[..passes] {
+    for &pass in &Pass::ALL[..1 + usize::from(plan.locate)] {
         let mut keyed = tasks_of(workload, &entries, pass, &answers[pass as usize]);
         if pass == Pass::Queries {
             bounds = add_bounds(&mut keyed, workload, subjects, &answers[0], plan.bounds);
@@ -271,12 +260,13 @@ fn tail(timed: &Timed, largest: usize, schedule: &Schedule) -> Vec<f64> {
     groups.values().filter_map(middle).collect()
 }
 
+/// Entries, errors, and the right answers of both passes.
+type Count<'a> = (Vec<Entry<'a>>, Option<Judged>, [Vec<Answer>; 2]);
+
 /// Compares all answers with the reference, and the reference with the oracle.
-fn count<'a>(
-    workload: &Workload,
-    subjects: &'a [Subject],
-    notice: Notice,
-) -> (Vec<Entry<'a>>, Option<Judged>) {
+///
+/// The right answers are those of the first structure that is right; none if none is.
+fn count<'a>(workload: &Workload, subjects: &'a [Subject], notice: Notice) -> Count<'a> {
     let counted = count_pass(workload, subjects, notice);
     let judged = judge(workload, MOST_JUDGED);
     // All right answers are the same set, and so are its errors.
@@ -285,7 +275,8 @@ fn count<'a>(
         true => Some(Verdict::new(Status::LeftOut, NO_ITEMS)),
         false => judged.unsafe_verdict(),
     };
-    let entries = subjects.iter().zip(counted).map(|(subject, counted)| {
+    let entries = subjects.iter().zip(counted);
+    let entries = entries.map(|(subject, counted)| {
         let is_ok = counted.verdict.status == Status::Ok;
         let verdict = of_all.clone().filter(|_| is_ok);
         let verdict = verdict.unwrap_or_else(|| counted.verdict.clone());
@@ -298,14 +289,10 @@ fn count<'a>(
             counted: Some(counted),
         }
     });
-    (entries.collect(), Some(judged))
-}
-
-/// The right answers, from the first structure that is right; empty if none is.
-fn right_answers(entries: &[Entry]) -> [Vec<Answer>; 2] {
-    let right = entries.iter().find(|e| e.runs());
-    let counted = right.and_then(|e| e.counted.as_ref());
-    counted.map_or_else(Default::default, |c| c.answers.clone())
+    let entries: Vec<Entry> = entries.collect();
+    let right = entries.iter().find(|entry| entry.runs());
+    let right = right.and_then(|entry| Some(entry.counted.as_ref()?.answers.clone()));
+    (entries, Some(judged), right.unwrap_or_default())
 }
 
 /// Compares the answers for all cameras of the schedules with the first process's.
@@ -367,6 +354,7 @@ pub(super) fn counts(counted: &Counted, items: usize) -> BTreeMap<String, f64> {
         counts.sum::<u64>() as f64
     });
     let [cost, locate_cost] = &counted.costs;
+    let accepted = cost.items_accepted_untested;
     let mean = |count: u64| count as f64 / queries;
     let means = [
         ("visible_count", visible / queries),
@@ -374,17 +362,14 @@ pub(super) fn counts(counted: &Counted, items: usize) -> BTreeMap<String, f64> {
         ("nodes_tested", mean(cost.nodes_tested)),
         ("planes_tested", mean(cost.planes_tested)),
         ("items_tested", mean(cost.items_tested)),
-        (
-            "items_accepted_untested",
-            mean(cost.items_accepted_untested),
-        ),
+        ("items_accepted_untested", mean(accepted)),
         ("comparisons", locate_cost.comparisons() as f64 / searches),
         ("regions_found", found / searches),
     ];
-    let measured = means
+    let measured = means.into_iter().filter(|(_, mean)| mean.is_finite());
+    measured
         .map(|(name, mean)| (name.to_owned(), mean))
-        .into_iter();
-    measured.filter(|(_, mean)| mean.is_finite()).collect()
+        .collect()
 }
 
 #[cfg(test)]

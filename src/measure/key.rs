@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Key of a group: all settings that cells must share to be compared.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct GroupKey {
     /// Name of the scene, parameters included.
     pub scene: String,

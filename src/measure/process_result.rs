@@ -17,7 +17,7 @@ use super::{
 };
 
 /// Results of one process for one group of cells.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Part {
     /// Key of the group.

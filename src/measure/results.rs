@@ -210,10 +210,9 @@ impl<'p> MergedParts<'p> {
             times: self.times(label),
             metrics: self.metrics(label, subject, judged.as_ref(), is_right),
             error: judged,
-            left_out: match subject {
-                Some(_) if is_right => self.left_out(label),
-                _ => Vec::new(),
-            },
+            left_out: subject
+                .filter(|_| is_right)
+                .map_or(Vec::new(), |_| self.left_out(label)),
             samples_ref: None,
             chose: self.subjects(label).find_map(|s| s.chose.clone()),
         }
@@ -225,43 +224,25 @@ impl<'p> MergedParts<'p> {
         let has_few_groups = |task: &TaskPart| task.tail_ns.len() < LEAST_TAIL;
         let mut queries = self.tasks(label, TaskKind::Query);
         let is_untimed = |task| !moves && self.ln_ns(label, task).is_none();
-        let few = format!("fewer than {LEAST_READINGS} readings per frame");
-        let large = format!("scenes of more than {MOST_UPDATED} items are not moved");
-        let groups = format!("fewer than {LEAST_TAIL} comparable groups of cameras");
+        let has_few_readings = moves && self.readings(label) < LEAST_READINGS;
+        let is_large = !moves && scene.total_count > MOST_UPDATED;
+        let has_no_tail = !moves && queries.any(has_few_groups);
+        let few = format!("worst_frame_ns: fewer than {LEAST_READINGS} readings per frame");
+        let large = format!("update_ms: scenes of more than {MOST_UPDATED} items are not moved");
+        let groups = format!("query_ns_p95: fewer than {LEAST_TAIL} comparable groups of cameras");
+        let moving = "query_ns_p95, locate_ns: not measured of items that move";
+        let untimed = "query_ns: no time in some process";
+        let unsearched = "locate_ns: this suite times frustum queries only";
         let reasons = [
-            (
-                moves,
-                "query_ns_p95, locate_ns",
-                "not measured of items that move",
-            ),
-            (
-                moves && self.readings(label) < LEAST_READINGS,
-                "worst_frame_ns",
-                &few,
-            ),
-            (
-                is_untimed(TaskKind::Query),
-                "query_ns",
-                "no time in some process",
-            ),
-            (
-                !moves && scene.total_count > MOST_UPDATED,
-                "update_ms",
-                &large,
-            ),
-            (
-                is_untimed(TaskKind::Locate),
-                "locate_ns",
-                "this suite times frustum queries only",
-            ),
-            (
-                !moves && queries.any(has_few_groups),
-                "query_ns_p95",
-                &groups,
-            ),
+            (moves, moving),
+            (has_few_readings, &few),
+            (is_untimed(TaskKind::Query), untimed),
+            (is_large, &large),
+            (is_untimed(TaskKind::Locate), unsearched),
+            (has_no_tail, &groups),
         ];
-        let holds = reasons.into_iter().filter(|(holds, ..)| *holds);
-        holds.map(|(_, of, why)| format!("{of}: {why}")).collect()
+        let holds = reasons.into_iter().filter(|(holds, _)| *holds);
+        holds.map(|(_, reason)| reason.to_owned()).collect()
     }
 
     fn times(&self, label: &str) -> CellTimes {
@@ -273,28 +254,27 @@ impl<'p> MergedParts<'p> {
             Some((task.batch as usize, plan.schedule.cameras.len()))
         });
         let (batch, cameras_timed) = planned.unwrap_or_default();
-        let mut by_process = BTreeMap::new();
-        for metric in METRICS {
-            if let Of::Time(task) = metric.of
-                && let Some(own) = self.ln_ns(label, task)
-            {
-                let ns = own.iter().map(|x| x.exp()).collect();
-                by_process.insert(metric.name.to_owned(), ns);
-            }
-        }
+        let builds: Vec<f64> = self.subjects(label).filter_map(|s| s.build_ms).collect();
+        let by_process = METRICS.iter().map(|metric| {
+            let times = match metric.of {
+                Of::Time(task) => self.ln_ns(label, task).unwrap_or_default(),
+                _ => return (metric.name, Vec::new()),
+            };
+            (metric.name, times.iter().map(|x| x.exp()).collect())
+        });
+        let by_process = by_process.chain([("build_ms", builds)]);
+        let by_process = by_process.filter(|(_, times)| !times.is_empty());
         let queries = self.tasks(label, TaskKind::Query);
         let rounds = queries.map(|task| task.rounds_ns.len());
-        let builds: Vec<f64> = self.subjects(label).filter_map(|s| s.build_ms).collect();
-        if !builds.is_empty() {
-            by_process.insert("build_ms".to_owned(), builds);
-        }
         CellTimes {
             processes: self.ln_ns(label, TaskKind::Query).map_or(0, <[f64]>::len),
             rounds: rounds.min().unwrap_or(0),
             cameras_timed,
             cameras_checked: self.known.map_or(0, |known| known.visible.len()),
             batch,
-            by_process,
+            by_process: by_process
+                .map(|(name, times)| (name.to_owned(), times))
+                .collect(),
         }
     }
 
