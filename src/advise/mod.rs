@@ -29,7 +29,7 @@ use crate::motion::Motion;
 use crate::statistics::Estimate;
 
 use case::Case;
-use rule::{Draft, Rule, Unfit};
+use rule::{Draft, Facts, Rule, Unfit};
 use rules::RULES;
 use rules::stages::Stages;
 use trials::{Answered, BASE, Trials};
@@ -215,9 +215,17 @@ impl Prepared {
         });
         let of_stages: Vec<ProcessTimes> = of_stages.collect();
         let funnel = self.funnel.map(|prepared| prepared.conclude(&of_stages));
-        let choice = (&self.structure, &test, &changes[..], &funnel);
+        let choices = || Facts {
+            checks: Vec::new(),
+            once_ns: [f64::NAN; 2],
+            once_ratio: None,
+            structure: &self.structure,
+            test: &test,
+            changes: &changes,
+            funnel: &funnel,
+        };
         let settled = self.rules.into_iter().map(|(rule, draft)| match draft {
-            Ok(draft) => rule.settled(draft, answered, &times, choice),
+            Ok(draft) => rule.settled(draft, answered, &times, choices()),
             Err(reason) => rule.not_applicable(reason),
         });
         Advice {

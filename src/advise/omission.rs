@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::rule::Rule;
 use crate::statistics::{Estimate, flat};
 use crate::verify::ErrorCount;
 
@@ -26,16 +27,9 @@ pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
 /// A feature that may be left out, with the decision.
 #[derive(Clone, Debug, Serialize)]
 pub struct Omission {
-    /// Name of the rule, `plane-masks`.
-    pub rule: &'static str,
-    /// The feature that is left out, in words.
-    pub left_out: &'static str,
-    /// Feature that is needed or not: `plane masks`.
-    #[serde(skip)]
-    pub feature: &'static str,
-    /// `true` if the feature is what leaves out, not what is left out.
-    #[serde(skip)]
-    pub is_saving: bool,
+    /// Its rule: names of feature and statistic.
+    #[serde(flatten)]
+    pub rule: &'static Rule,
     /// Time kept and left out, with all that follows from it, ns.
     #[serde(skip)]
     pub cost_ns: Option<[f64; 2]>,
@@ -45,14 +39,10 @@ pub struct Omission {
     /// `true` if the choice of the structure or test decides, not the clock.
     #[serde(skip)]
     pub is_chosen: bool,
-    /// Name and unit of the statistic.
-    pub statistic_name: &'static str,
     /// Null where the rule does not apply to this scene.
     pub statistic: Option<f64>,
     /// Null without a statistic.
     pub threshold: Option<f64>,
-    /// Side of the threshold on which the rule leaves out.
-    pub left_out_if: LeftOutIf,
     /// `true` if statistic and threshold leave out.
     pub predicted: Option<bool>,
     /// Share of the time that leaving it out saves; negative where it costs.
@@ -185,8 +175,8 @@ impl Omission {
     /// Returns `true` if the feature is needed; `None` where the rule does not apply.
     pub fn is_needed(&self) -> Option<bool> {
         match self.decision {
-            Decision::LeaveOut => Some(self.is_saving),
-            Decision::Keep => Some(!self.is_saving),
+            Decision::LeaveOut => Some(self.rule.is_saving),
+            Decision::Keep => Some(!self.rule.is_saving),
             Decision::NotApplicable => None,
         }
     }
@@ -194,24 +184,23 @@ impl Omission {
     /// Time with and without the feature, with all that follows from it, ns.
     pub fn sides_ns(&self) -> [f64; 2] {
         let mut sides = self.cost_ns.unwrap_or([f64::NAN; 2]);
-        if self.is_saving {
+        if self.rule.is_saving {
             sides.reverse();
         }
         sides
     }
 
     /// Decides by the clock or the rule; a side that misses more is never taken.
-    pub(super) fn decide(&mut self, by: By, predicted: bool) {
+    pub(super) fn decide(&mut self, predicted: bool) {
         let mut leave_out = predicted;
         if let Some(check) = self.checks.first() {
-            if by == By::Time {
+            if self.rule.by == By::Time {
                 self.confirmed = check.pays.map(|pays| pays == predicted);
                 leave_out = check.pays.unwrap_or(predicted);
             }
             if check.loses() || check.is_wrong() {
                 leave_out = false;
-                self.reason
-                    .push_str("; without it, something visible would be missed");
+                self.reason += "; without it, something visible would be missed";
                 self.note = "without, items are missed".to_owned();
             }
         }

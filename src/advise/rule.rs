@@ -1,6 +1,8 @@
 //! A rule of omission: its declaration, both sides as tasks, and the omission that
 //! follows from the facts.
 
+use serde::Serialize;
+
 use super::change::Change;
 use super::choice::{StructureChoice, TestChoice};
 use super::omission::{By, Check, Decision, LeftOutIf, Omission, is_longer};
@@ -10,18 +12,28 @@ use crate::measure::OverProcesses;
 use crate::statistics::Estimate;
 
 /// A row of the table of rules.
+#[derive(Debug, Serialize)]
 pub struct Rule {
+    /// Name of the rule, `plane-masks`.
+    #[serde(rename = "rule")]
     pub name: &'static str,
+    /// The feature that is left out, in words.
     pub left_out: &'static str,
     /// Feature that is needed or not, as the terminal names it.
+    #[serde(skip)]
     pub feature: &'static str,
     /// `true` if the feature is what leaves out, not what is left out.
+    #[serde(skip)]
     pub is_saving: bool,
+    /// Name and unit of the statistic.
     pub statistic_name: &'static str,
+    /// Side of the threshold on which the rule leaves out.
     pub left_out_if: LeftOutIf,
-    pub by: By,
+    #[serde(skip)]
+    pub(super) by: By,
     /// Enters both sides.
-    pub prepare: for<'c> fn(&mut Trials<'c>) -> Result<Draft, Unfit>,
+    #[serde(skip)]
+    pub(super) prepare: for<'c> fn(&mut Trials<'c>) -> Result<Draft, Unfit>,
 }
 
 /// A rule without a draft.
@@ -41,17 +53,10 @@ pub fn not_applicable(reason: impl ToString) -> Unfit {
     Unfit::NotApplicable(reason.to_string())
 }
 
-/// Structure and test to take, where other structures are faster, and the stages.
-type Choice<'f> = (
-    &'f StructureChoice,
-    &'f TestChoice,
-    &'f [Change],
-    &'f Funnel,
-);
 /// The funnel of a few views, or the reason for which there is none.
 pub type Funnel = Result<FunnelReport, String>;
 
-/// Measured facts of a rule.
+/// Facts of a rule: choices, and its own measurements.
 pub struct Facts<'f> {
     pub checks: Vec<Check>,
     /// Times of [`Draft::once`], ns.
@@ -152,43 +157,35 @@ impl Draft {
             conclude: Box::new(conclude),
         }
     }
-
-    fn facts<'f>(
-        &mut self,
-        answered: &Answered,
-        times: &OverProcesses,
-        choice: Choice<'f>,
-    ) -> Facts<'f> {
-        let sides = std::mem::take(&mut self.sides).into_iter();
-        let once_ns = |n| self.once.map_or(f64::NAN, |first| times.once_ns(first + n));
-        let once_ratio = |first| times.once_ratio(first + 1, first);
-        Facts {
-            checks: sides.map(|sides| sides.check(answered, times)).collect(),
-            once_ns: [0, 1].map(once_ns),
-            once_ratio: self.once.and_then(once_ratio),
-            structure: choice.0,
-            test: choice.1,
-            changes: choice.2,
-            funnel: choice.3,
-        }
-    }
 }
 
 impl Rule {
     /// The omission of a rule that does not apply.
-    pub fn not_applicable(&self, reason: String) -> Omission {
+    pub fn not_applicable(&'static self, reason: String) -> Omission {
         self.omission(Finding::none(reason), Vec::new())
     }
 
-    /// The omission that follows from the measured facts.
+    /// The omission that follows from the choices and the times.
     pub fn settled(
-        &self,
-        mut draft: Draft,
+        &'static self,
+        draft: Draft,
         answered: &Answered,
         times: &OverProcesses,
-        choice: Choice,
+        choices: Facts,
     ) -> Omission {
-        let facts = draft.facts(answered, times, choice);
+        let sides = draft.sides.into_iter();
+        let once_ns = |n| {
+            draft
+                .once
+                .map_or(f64::NAN, |first| times.once_ns(first + n))
+        };
+        let once_ratio = |first| times.once_ratio(first + 1, first);
+        let facts = Facts {
+            checks: sides.map(|sides| sides.check(answered, times)).collect(),
+            once_ns: [0, 1].map(once_ns),
+            once_ratio: draft.once.and_then(once_ratio),
+            ..choices
+        };
         let mut finding = (draft.conclude)(&facts);
         let mut checks = facts.checks;
         checks.extend(finding.check.take());
@@ -196,9 +193,10 @@ impl Rule {
     }
 
     /// Weighs statistic, clock and answers.
-    pub fn omission(&self, finding: Finding, checks: Vec<Check>) -> Omission {
-        let is_left_out = self.left_out_if;
-        let predicted = finding.compared.and_then(|both| is_left_out.holds(both));
+    pub fn omission(&'static self, finding: Finding, checks: Vec<Check>) -> Omission {
+        let predicted = finding
+            .compared
+            .and_then(|both| self.left_out_if.holds(both));
         let predicted = finding.predicted.or(predicted);
         let [statistic, threshold] = [0, 1].map(|i| finding.compared.map(|both| both[i]));
         let first = checks.first();
@@ -217,17 +215,12 @@ impl Rule {
         });
         let is_tie = ratio.is_some_and(|ratio| is_longer(ratio).is_none());
         let mut omission = Omission {
-            rule: self.name,
-            left_out: self.left_out,
-            feature: self.feature,
-            is_saving: self.is_saving,
+            rule: self,
             cost_ns,
             note: finding.note,
             is_chosen: finding.decision.is_some(),
-            statistic_name: self.statistic_name,
             statistic: statistic.filter(|x| x.is_finite()),
             threshold: threshold.filter(|x| x.is_finite()),
-            left_out_if: self.left_out_if,
             predicted,
             saving: finding.saving,
             decision: Decision::NotApplicable,
@@ -237,7 +230,7 @@ impl Rule {
             is_tie: finding.is_tie.unwrap_or(is_tie),
         };
         if let Some(predicted) = predicted {
-            omission.decide(self.by, predicted);
+            omission.decide(predicted);
         }
         omission.decision = finding.decision.unwrap_or(omission.decision);
         omission
@@ -252,8 +245,8 @@ mod tests {
     use super::*;
 
     /// A rule that enters nothing.
-    pub fn some_rule(left_out_if: LeftOutIf, by: By) -> Rule {
-        Rule {
+    pub fn some_rule(left_out_if: LeftOutIf, by: By) -> &'static Rule {
+        Box::leak(Box::new(Rule {
             name: "rule",
             left_out: "something",
             feature: "something",
@@ -262,6 +255,6 @@ mod tests {
             left_out_if,
             by,
             prepare: |_| Ok(Draft::new(Vec::new(), Finding::default())),
-        }
+        }))
     }
 }

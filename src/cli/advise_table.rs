@@ -64,7 +64,7 @@ pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
         let named = advice.omissions.iter().filter(|rule| is_in(rule));
         let why = |rule: &Omission| some(no(rule), |why| format!(" ({why})"));
         let names: Vec<String> = named
-            .map(|rule| rule.feature.to_owned() + &why(rule))
+            .map(|rule| rule.rule.feature.to_owned() + &why(rule))
             .collect();
         if !names.is_empty() {
             say(&(what.to_owned() + &names.join(", ")))?;
@@ -184,7 +184,7 @@ fn share(share: f64) -> String {
 
 /// Reason for which a feature is neither needed nor not needed.
 fn not_for(advice: &Advice, omission: &Omission) -> Option<String> {
-    let of_nodes = ["plane-masks", "third-dimension", "rebuild"].contains(&omission.rule);
+    let of_nodes = ["plane-masks", "third-dimension", "rebuild"].contains(&omission.rule.name);
     let taken = &advice.structure;
     let scan = taken.name.as_ref().filter(|_| of_nodes && taken.is_scan);
     match omission.is_needed() {
@@ -219,7 +219,7 @@ fn rule_table(advice: &Advice) -> Table {
                 true => "tie".to_owned(),
                 false => some(finite(ratio), |x| format!("{} x", significant(x))),
             };
-            let feature = format!("  {}", rule.feature);
+            let feature = format!("  {}", rule.rule.feature);
             table.add_row([feature, shown(with), shown(without), ratio, note.to_owned()]);
         }
     }
@@ -235,7 +235,7 @@ fn evidence(advice: &Advice, width: usize) -> Vec<String> {
         let otherwise = feature.confirmed.filter(|confirmed| !confirmed);
         let otherwise = some(otherwise, |_| " (predicted otherwise)".to_owned());
         let reason = format!("{}{otherwise}", feature.reason);
-        [feature.feature.to_owned(), reason]
+        [feature.rule.feature.to_owned(), reason]
     });
     vec![
         "Structures, all answers checked:".to_owned(),
@@ -315,11 +315,11 @@ fn test_table(choice: &TestChoice) -> Table {
 /// Every measurement with and without a feature.
 fn check_table(features: &[Omission]) -> Table {
     let columns: &[Column<(&Omission, &Check)>] = &[
-        ("feature", |(rule, _)| rule.feature.to_owned()),
+        ("feature", |(rule, _)| rule.rule.feature.to_owned()),
         ("measured on", |(_, check)| check.on.clone()),
         (">with / without", |(rule, check)| {
             some(check.ratio, |ratio| {
-                text::within(match rule.is_saving {
+                text::within(match rule.rule.is_saving {
                     false => ratio,
                     true => Estimate {
                         value: ratio.value.recip(),
@@ -331,7 +331,7 @@ fn check_table(features: &[Omission]) -> Table {
         }),
         (">false positives %, both", |(rule, check)| {
             let mut both = [check.kept_excess, check.left_out_excess];
-            if rule.is_saving {
+            if rule.rule.is_saving {
                 both.reverse();
             }
             let percent = |share: f64| format!("{:.3}", share * 100.0);

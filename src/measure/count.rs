@@ -260,13 +260,12 @@ fn verdict(
     explain: impl FnOnce(usize) -> String,
 ) -> Verdict {
     match answered {
+        Err(fault @ Fault::Panicked(_)) => {
+            Verdict::new(Status::Panicked, fault.explained(|_| None))
+        }
         Err(fault) => {
-            let status = Status::of(&fault);
             let told = fault.explained(|id| Some(explain(id)));
-            match status {
-                Status::Panicked => Verdict::new(status, told),
-                _ => Verdict::new(status, format!("{question}: {told}")),
-            }
+            Verdict::new(Status::of(&fault), format!("{question}: {told}"))
         }
         Ok(()) if spent > PATIENCE => {
             let reason = format!("the count pass took longer than {} s", PATIENCE.as_secs());

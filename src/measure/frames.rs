@@ -7,6 +7,7 @@
 
 use super::clock::Stopwatch;
 use super::group::{GroupPlan, counts, measure_part, task_part};
+use super::key::TaskKey;
 use super::moving::{Frames, Laps, Moving, ageing, replay, times_of};
 use super::process_result::{Known, Part, SubjectPart, TaskSamples};
 use super::schedule::Orders;
@@ -23,12 +24,10 @@ const AGES_EVERY: u32 = 4;
 /// Most CPU time of a structure in the count pass, ns.
 const PATIENCE_NS: f64 = 120e9;
 /// Tasks of a structure; [`TaskKind::Further`] only with several views.
-const KINDS: [TaskKind; 4] = [
-    TaskKind::Update,
-    TaskKind::Query,
-    TaskKind::Further,
-    TaskKind::Frame,
-];
+const KINDS: [TaskKind; 4] = {
+    use TaskKind::{Frame, Further, Query, Update};
+    [Update, Query, Further, Frame]
+};
 
 /// A structure of the group with its results so far.
 struct Entry<'a> {
@@ -231,24 +230,24 @@ impl Entry<'_> {
 }
 
 /// Rounds of each structure, from the time of its replay in the count pass.
-fn schedule(
-    entries: &[Entry],
-    frames: &Frames,
-    protocol: &Protocol,
-) -> KeyedSchedule<(String, TaskKind)> {
+fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSchedule<TaskKey> {
     let own = |e: &Entry| ((protocol.task_ns / e.replay_ns) as usize).clamp(1, protocol.rounds[1]);
     let timed = entries.iter().filter(|entry| entry.runs());
     let rounds = timed.clone().map(own).max().unwrap_or(0);
-    let (mut keys, mut tasks) = (Vec::new(), Vec::new());
-    for entry in timed {
-        let several = frames.workload.views_per_frame > 1;
-        let kinds = KINDS.into_iter();
-        for kind in kinds.filter(|k| several || *k != TaskKind::Further) {
-            keys.push((entry.part.label.clone(), kind));
-            let every = (rounds / own(entry)) as u32;
-            tasks.push(TaskPlan { batch: 1, every });
-        }
-    }
+    let several = frames.workload.views_per_frame > 1;
+    let kinds = KINDS
+        .into_iter()
+        .filter(|kind| several || *kind != TaskKind::Further);
+    let tasks = timed.flat_map(|entry| {
+        let every = (rounds / own(entry)) as u32;
+        kinds.clone().map(move |kind| {
+            (
+                (entry.part.label.clone(), kind),
+                TaskPlan { batch: 1, every },
+            )
+        })
+    });
+    let (keys, tasks) = tasks.unzip();
     KeyedSchedule {
         keys,
         schedule: Schedule {
@@ -264,7 +263,7 @@ fn schedule(
 fn time(
     entries: &mut [Entry],
     frames: &Frames,
-    planned: &KeyedSchedule<(String, TaskKind)>,
+    planned: &KeyedSchedule<TaskKey>,
     plan: &GroupPlan,
     notice: Notice,
     stop: &dyn Fn() -> bool,
@@ -273,12 +272,10 @@ fn time(
     for round in 0..planned.schedule.rounds {
         for n in orders.next() {
             let entry = &mut entries[n];
-            let own = |key: &(String, TaskKind)| key.0 == entry.part.label;
-            let task = planned.keys.iter().position(own);
-            let Some(task) = task.filter(|_| entry.runs()) else {
-                continue;
-            };
-            if !round.is_multiple_of(planned.schedule.tasks[task].every.max(1)) {
+            let mut tasks = planned.keys.iter().zip(&planned.schedule.tasks);
+            let own = tasks.find(|(key, _)| key.0 == entry.part.label);
+            let is_due = own.is_some_and(|(_, task)| round.is_multiple_of(task.every.max(1)));
+            if !is_due || !entry.runs() {
                 continue;
             }
             notice(Some(&entry.subject.spec.label), TIMING);
@@ -286,8 +283,7 @@ fn time(
                 return None;
             }
             let is_first = entry.rounds.is_empty();
-            let spec = &entry.subject.spec;
-            let laps = guarded(|| replay(spec, frames, is_first, stop));
+            let laps = guarded(|| replay(&entry.subject.spec, frames, is_first, stop));
             match laps.unwrap_or_else(Err) {
                 Ok(Some(laps)) => entry.rounds.push(laps),
                 Ok(None) => return None,

@@ -94,8 +94,7 @@ impl Subject {
     pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Subject {
         let updates = |spec: &StructureSpec| {
             let items = test.items(&scene.items);
-            let spare = spec.build(input_of(scene, &items)).map_err(Verdict::from)?;
-            measure_updates(spec, scene, &items, spare)
+            measure_updates(spec, scene, &items, spec.build(input_of(scene, &items))?)
         };
         if let Ok(built) = &mut self.built {
             match guarded(|| updates(&self.spec)).unwrap_or_else(Err) {
@@ -124,8 +123,7 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
         // This thread's CPU time says nothing about what others did for it.
         let lap = watch.lap();
         let alone = spec.execution.threads <= 1;
-        let ms = if alone { lap.cpu_ns } else { lap.wall_ns } / 1e6;
-        built.map(|index| (index, ms)).map_err(Verdict::from)
+        built.map(|index| (index, if alone { lap.cpu_ns } else { lap.wall_ns } / 1e6))
     };
     let (mut index, mut build_ms) = build()?;
     if build_ms < AGAIN_BELOW_MS {
@@ -135,11 +133,10 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
         (index, build_ms) = build()?;
     }
     let boxes = scene.regions.boxes(&scene.items);
-    let regions = if std::ptr::eq(boxes, &items[..]) {
-        None
-    } else {
-        Some(spec.build(input_of(scene, boxes)).map_err(Verdict::from)?)
-    };
+    let others = !std::ptr::eq(boxes, &items[..]);
+    let regions = others
+        .then(|| spec.build(input_of(scene, boxes)))
+        .transpose()?;
     Ok(Built {
         memory: index.memory(),
         build_ms,

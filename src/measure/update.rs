@@ -30,15 +30,11 @@ pub(super) fn measure_updates(
     let mut items = items.to_vec();
     let mut times = Vec::with_capacity(UPDATE_SHARES.len());
     let first = move_share(&mut items, USUAL_SHARE);
-    let update = |index: &mut Box<dyn DynIndex>, items: &[Aabb], moved: &[ItemId]| {
-        let updated = spec.update(index, input_of(scene, items), moved);
-        updated.map(drop).map_err(Verdict::from)
-    };
-    update(&mut index, &items, &first)?;
+    spec.update(&mut index, input_of(scene, &items), &first)?;
     for share in UPDATE_SHARES {
         let moved = move_share(&mut items, share);
         let watch = Stopwatch::start_for(spec.is_threaded());
-        update(&mut index, &items, &moved)?;
+        spec.update(&mut index, input_of(scene, &items), &moved)?;
         times.push(watch.lap().cpu_ns / 1e6);
     }
     if let Some(moved) = items.iter().find(|b| !b.is_empty()) {

@@ -28,7 +28,6 @@ pub struct RunFolder {
     /// Locked for as long as it is open.
     stream: File,
     samples: File,
-    samples_end: u64,
 }
 
 impl RunFolder {
@@ -64,7 +63,6 @@ impl RunFolder {
             path: path.to_owned(),
             stream,
             samples: open(&path.join(SAMPLES))?,
-            samples_end: 0,
         };
         if let Err(error) = folder.begin_samples() {
             folder.discard();
@@ -79,9 +77,7 @@ impl RunFolder {
             self.samples.set_len(0)?;
             self.samples.write_all(SAMPLE_COLUMNS.as_bytes())
         };
-        write().map_err(writing::io(&self.path.join(SAMPLES)))?;
-        self.samples_end = SAMPLE_COLUMNS.len() as u64;
-        Ok(())
+        write().map_err(writing::io(&self.path.join(SAMPLES)))
     }
 
     /// The folder that is written to.
@@ -112,8 +108,8 @@ impl RunFolder {
                     "" => key.path.clone(),
                     motion => format!("{} + {motion}", key.path),
                 };
-                let names =
-                    [&key.scene, &path, &key.cache, label, &key.test].map(|name| lines(name));
+                let names = [&key.scene, &path, &key.cache, label, &key.test];
+                let names = names.map(|name| lines(name));
                 for s in samples {
                     let at = (part.process, s.round, s.frame, s.queries);
                     let [cpu_ns, wall_ns] = [s.cpu_ns, s.wall_ns].map(|ns| format!("{ns:.3}"));
@@ -127,11 +123,11 @@ impl RunFolder {
         let io = writing::io(&file);
         let text = write().map_err(|error| io(error.into()))?;
         self.samples.write_all(&text).map_err(io)?;
-        self.samples_end += text.len() as u64;
+        let samples_end = self.samples.metadata().map_err(io)?.len();
         let kept = KeptPart {
             part,
             rows,
-            samples_end: self.samples_end,
+            samples_end,
         };
         self.append(Line::Part(&kept))?;
         Ok(kept)
@@ -216,16 +212,12 @@ impl StoppedRun {
             samples: open(&self.path.join(SAMPLES))?,
             path: self.path,
             stream: self.stream,
-            samples_end: 0,
         };
         let path = folder.path.clone();
         let io = writing::io(&path);
         folder.stream.set_len(self.length).map_err(io)?;
         match stream.parts.last() {
-            Some(kept) => {
-                folder.samples.set_len(kept.samples_end).map_err(io)?;
-                folder.samples_end = kept.samples_end;
-            }
+            Some(kept) => folder.samples.set_len(kept.samples_end).map_err(io)?,
             None => folder.begin_samples()?,
         }
         sweep(&path);
@@ -254,12 +246,9 @@ fn open(file: &Path) -> Result<File, InputError> {
         let found = io::Error::other("a link or a device; expected a file of the run's own");
         return Err(writing::io(file)(found));
     }
-    let opened = OpenOptions::new()
-        .read(true)
-        .append(true)
-        .create(true)
-        .open(file);
-    opened.map_err(writing::io(file))
+    let mut options = OpenOptions::new();
+    let options = options.read(true).append(true).create(true);
+    options.open(file).map_err(writing::io(file))
 }
 
 /// Bytes of samples.csv up to the first NUL; none without its first line.
@@ -335,9 +324,7 @@ const SUMMARY_COLUMNS: [Column; 16] = [
     ("planes", |cell| cell.path.planes.clone()),
     ("epsilon", |cell| cell.path.epsilon.to_string()),
     ("status", |cell| cell.status.name().to_owned()),
-    ("reason", |cell| {
-        lines(cell.reason.as_deref().unwrap_or_default())
-    }),
+    ("reason", |cell| lines(&text(cell.reason.as_ref()))),
     ("rank", |cell| text(cell.rank)),
     ("processes", |cell| cell.times.processes.to_string()),
     ("rounds", |cell| cell.times.rounds.to_string()),
@@ -367,13 +354,10 @@ const INPUT_COLUMNS: [Column; 17] = [
         text(lens.and_then(|lens| Some(lens.matrix.as_ref()?.convention.as_str())))
     }),
     ("motion", |cell| lines(&cell.path.motion)),
-    ("views_per_frame", |cell| match cell.path.views_per_frame {
-        0 => String::new(),
-        views => views.to_string(),
+    ("views_per_frame", |cell| {
+        text(Some(cell.path.views_per_frame).filter(|views| *views > 0))
     }),
-    ("chose", |cell| {
-        lines(cell.chose.as_deref().unwrap_or_default())
-    }),
+    ("chose", |cell| lines(&text(cell.chose.as_ref()))),
     ("skipped_items", |cell| cell.scene.skipped_items.to_string()),
 ];
 

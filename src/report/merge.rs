@@ -58,8 +58,8 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
         }
     }
     let whole = begin.header.whole().to_vec();
-    let has = |key: &&GroupKey| shards.iter().any(|(_, s)| s.header.groups.contains(key));
-    let missing: Vec<GroupKey> = whole.iter().filter(|key| !has(key)).cloned().collect();
+    let has = |key: &GroupKey| shards.iter().any(|(_, s)| s.header.groups.contains(key));
+    let (groups, missing): (Vec<_>, Vec<_>) = whole.iter().cloned().partition(has);
     if !missing.is_empty() && !partial {
         return Err(InputError::new(format!(
             "no shard has {}; expected all of the plan (--partial joins what is there)",
@@ -88,22 +88,24 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
         (scene(&part.key), part.process, place(&part.key))
     });
     let mut samples_end = SAMPLE_COLUMNS.len() as u64;
-    let (mut kept, mut samples) = (Vec::new(), Vec::new());
-    for (part, (file, range)) in parts {
-        samples_end += range[1] - range[0];
+    let kept = parts.into_iter().map(|(part, samples)| {
+        samples_end += samples.1[1] - samples.1[0];
         let part = part.clone();
-        kept.push(KeptPart {
-            samples_end,
-            ..part
-        });
-        samples.push((file, range));
-    }
-    let headers: Vec<&Stream> = shards.iter().map(|(_, stream)| stream).collect();
+        (
+            KeptPart {
+                samples_end,
+                ..part
+            },
+            samples,
+        )
+    });
+    let (kept, samples) = kept.unzip();
+    let streams: Vec<&Stream> = shards.iter().map(|(_, stream)| stream).collect();
     Ok(Merged {
         stream: Stream {
-            header: joined(&headers, args, !missing.is_empty()),
+            header: joined(&streams, args, groups),
             parts: kept,
-            finished_at: headers.iter().filter_map(|s| s.finished_at.clone()).max(),
+            finished_at: streams.iter().filter_map(|s| s.finished_at.clone()).max(),
         },
         missing,
         samples,
@@ -174,24 +176,28 @@ impl Merged {
 
 /// Why a shard is not one of the same plan, from the same machine and build.
 fn another_plan(begin: &Header, own: &Header, first: &Path) -> Option<String> {
-    let difference = begin.differs_in_plan(own);
-    let difference = difference.or_else(|| begin.differs_in_place(own));
     let first = first.display();
-    if let Some(Setting {
-        of, what, old, new, ..
-    }) = difference
-    {
-        let differs = format!("{of} differs: {what} '{new}', and '{old}' in {first}");
-        return Some(differs + "; expected the same in all shards");
-    }
-    (begin.whole() != own.whole()).then(|| {
-        format!("a shard of another plan than {first}; expected the same scenes, paths and tests")
+    let differs = begin.differs(own).map(
+        |Setting {
+             of, what, old, new, ..
+         }| {
+            let differs = format!("{of} differs: {what} '{new}', and '{old}' in {first}");
+            differs + "; expected the same in all shards"
+        },
+    );
+    let is_other = begin.whole() != own.whole();
+    differs.or_else(|| {
+        is_other.then(|| {
+            format!(
+                "a shard of another plan than {first}; expected the same scenes, paths and tests"
+            )
+        })
     })
 }
 
 /// The cell that two shards have in common, or the scene that is not the same
 /// under one name.
-fn overlap(own: &Stream, other: &Stream, first: &Path) -> Option<String> {
+fn overlap<'s>(own: &'s Stream, other: &'s Stream, first: &Path) -> Option<String> {
     let first = first.display();
     let mut groups = own.header.groups.iter();
     if let Some(key) = groups.find(|key| other.header.groups.contains(key)) {
@@ -201,19 +207,15 @@ fn overlap(own: &Stream, other: &Stream, first: &Path) -> Option<String> {
         ));
     }
     // One that could not be looked at has no digest.
-    let scenes = |stream: &'_ Stream| -> Vec<(String, String)> {
+    let scenes = |stream: &'s Stream| {
         let parts = stream.parts.iter().map(|kept| &kept.part);
         let known = parts.filter(|part| !part.scene.digest.is_empty());
-        known
-            .map(|part| (part.key.scene.clone(), part.scene.digest.clone()))
-            .collect()
+        known.map(|part| (&part.key.scene, &part.scene.digest))
     };
-    let before = scenes(other);
-    let differs = |(name, digest): &(String, String)| {
-        let mut same = before.iter().filter(|(other, _)| other == name);
-        same.any(|(_, other)| other != digest)
+    let differs = |(name, digest): &(&String, &String)| {
+        scenes(other).any(|(other, found)| other == *name && found != *digest)
     };
-    let (scene, _) = scenes(own).into_iter().find(differs)?;
+    let (scene, _) = scenes(own).find(differs)?;
     Some(format!(
         "scene '{scene}' is another one than in {first}; expected the same file"
     ))
@@ -223,27 +225,22 @@ fn overlap(own: &Stream, other: &Stream, first: &Path) -> Option<String> {
 const NAMED: usize = 4;
 
 /// The header of the run that the shards are together.
-fn joined(shards: &[&Stream], args: &[String], is_partial: bool) -> Header {
+fn joined(shards: &[&Stream], args: &[String], groups: Vec<GroupKey>) -> Header {
     let headers = || shards.iter().map(|stream| &stream.header);
     let mut header = shards[0].header.clone();
     let loads = headers().filter_map(|h| h.machine.load);
     header.machine.load = loads.reduce(f64::max);
     let begun = headers().map(|h| &h.run.started_at).min();
-    let begun = begun.cloned().unwrap_or_default();
-    header.run.started_at = begun;
+    header.run.started_at = begun.cloned().unwrap_or_default();
     header.run.id = format!("{}-of-{}", header.run.id, shards.len());
     let program = header.run.command.split(' ').next().unwrap_or_default();
     header.run.command = [&[program.to_owned()], args].concat().join(" ");
     header.args = args.to_vec();
     let whole = header.whole().to_vec();
-    let has = |key: &&GroupKey| headers().any(|h| h.groups.contains(key));
-    header.groups = whole.iter().filter(has).cloned().collect();
-    header.run.shard = None;
-    header.whole = Vec::new();
-    if is_partial {
-        let shards: Vec<&str> = headers().filter_map(|h| h.run.shard.as_deref()).collect();
-        header.run.shard = Some(shards.join("+"));
-        header.whole = whole;
-    }
+    let shards: Vec<&str> = headers().filter_map(|h| h.run.shard.as_deref()).collect();
+    let is_partial = groups.len() < whole.len();
+    header.run.shard = is_partial.then(|| shards.join("+"));
+    header.whole = if is_partial { whole } else { Vec::new() };
+    header.groups = groups;
     header
 }

@@ -83,14 +83,10 @@ impl Header {
             run: RunInfo {
                 id,
                 started_at,
-                finished_at: None,
-                command: String::new(),
                 seed: plan.seed,
-                suite: None,
                 generator: GENERATOR_NAME.to_owned(),
                 processes: plan.effort.processes,
-                shard: None,
-                missing: Vec::new(),
+                ..RunInfo::default()
             },
             args: Vec::new(),
             machine,
@@ -109,9 +105,11 @@ impl Header {
         differences(self.place(), other.place()).next()
     }
 
-    /// The first fact in which the plans of two runs differ, the shard apart.
-    pub fn differs_in_plan(&self, other: &Header) -> Option<Setting> {
-        differences(self.plan(), other.plan()).next()
+    /// The first fact in which two runs differ, the shard apart: of their plans, or else
+    /// of machine, build or program.
+    pub fn differs(&self, other: &Header) -> Option<Setting> {
+        let of_plans = differences(self.plan(), other.plan()).next();
+        of_plans.or_else(|| self.differs_in_place(other))
     }
 
     fn place(&self) -> Vec<Fact> {
@@ -151,10 +149,8 @@ impl Header {
 
     /// The groups of the whole plan, in order.
     pub fn whole(&self) -> &[GroupKey] {
-        match self.whole.is_empty() {
-            true => &self.groups,
-            false => &self.whole,
-        }
+        let is_whole = self.whole.is_empty();
+        if is_whole { &self.groups } else { &self.whole }
     }
 }
 
@@ -196,10 +192,8 @@ impl Stream {
     pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
         let parts = self.parts.iter().map(Line::Part);
         let finished = self.finished_at.iter().map(|at| Line::Finished { at });
-        [Line::Run(&self.header)]
-            .into_iter()
-            .chain(parts)
-            .chain(finished)
+        let first = std::iter::once(Line::Run(&self.header));
+        first.chain(parts).chain(finished)
     }
 
     /// Returns true if every process has measured every group.
@@ -252,17 +246,17 @@ impl Stream {
             if let Some(twin) = &group.twin {
                 report.noise.add(&key.scene, &first.path, &key.test, twin);
             }
-            let rows = |label: &str| {
-                let rows = kept.iter().filter_map(|kept| kept.rows.get(label));
+            let cell = |cell: ReportCell| {
+                let rows = kept
+                    .iter()
+                    .filter_map(|kept| kept.rows.get(&cell.structure));
                 let rows = rows.fold(0, |sum: u64, rows| sum.saturating_add(*rows));
-                (rows > 0).then(|| SamplesRef {
-                    file: super::writing::SAMPLES.to_owned(),
-                    rows,
-                })
-            };
-            let cell = |cell: ReportCell| ReportCell {
-                samples_ref: rows(&cell.structure),
-                ..cell
+                let file = super::writing::SAMPLES.to_owned();
+                let samples_ref = (rows > 0).then_some(SamplesRef { file, rows });
+                ReportCell {
+                    samples_ref,
+                    ..cell
+                }
             };
             report.cells.extend(group.cells.into_iter().map(cell));
             report.bounds.extend(group.bounds.into_iter().map(cell));

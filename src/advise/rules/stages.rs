@@ -56,33 +56,22 @@ impl Stages {
     }
 }
 
-/// Candidates that a stage removes, and the cost of those that it does not.
-struct Removal<'f> {
-    gain: &'f Gain,
-    /// Singular and plural.
-    unit: [&'static str; 2],
-    /// Candidates for which one that is counted stands.
-    scale: f64,
-    /// Cost of one that is not removed, ns.
-    cost_ns: f64,
-}
-
 /// A rule about a stage; where the funnel has none it does not apply, for a reason.
 pub(super) fn reads(trials: &Trials, stage: StageKind) -> Result<Draft, Unfit> {
     let options = trials.case.options;
     Ok(Draft::concluded(Vec::new(), move |facts| {
         let funnel = facts.funnel.as_ref().map_err(String::clone);
-        let removal = funnel.and_then(|funnel| removal(funnel, stage, &options));
-        removal.map_or_else(Finding::none, |removal| removal.weigh())
+        let found = funnel.and_then(|funnel| finding(funnel, stage, &options));
+        found.unwrap_or_else(Finding::none)
     }))
 }
 
-/// The gain of a stage; of the fragment stage, that of sorting.
-fn removal<'f>(
-    funnel: &'f FunnelReport,
+/// The gain of a stage, weighed; of the fragment stage, that of sorting.
+fn finding(
+    funnel: &FunnelReport,
     stage: StageKind,
     options: &AdviseOptions,
-) -> Result<Removal<'f>, String> {
+) -> Result<Finding, String> {
     let gain = |stage| funnel.gains.iter().find(|gain| gain.stage == stage);
     let blocks = funnel.solid_blocks.as_ref();
     let hides_nothing = blocks.is_some_and(|row| row.box_count == 0);
@@ -103,72 +92,62 @@ fn removal<'f>(
     let items = gain(StageKind::Occlusion).map_or(f64::NAN, |gain| gain.with_count);
     let of_item = own.without_count / items;
     let large = SHADED.samples() as f64 / SAMPLES.samples() as f64;
-    let (unit, scale, cost_ns) = match stage {
-        StageKind::Triangle => (["triangle", "triangles"], 1.0, options.draw_ns / of_item),
-        StageKind::Fragment => (
-            ["shaded fragment", "shaded fragments"],
-            large,
-            options.shade_ns,
-        ),
-        _ => (["item", "items"], 1.0, options.draw_ns),
-    };
-    Ok(Removal {
-        gain: own,
-        unit,
-        scale,
-        cost_ns,
+    Ok(match stage {
+        StageKind::Triangle => weigh(own, "triangle", 1.0, options.draw_ns / of_item),
+        StageKind::Fragment => weigh(own, "shaded fragment", large, options.shade_ns),
+        _ => weigh(own, "item", 1.0, options.draw_ns),
     })
 }
 
-impl Removal<'_> {
-    /// Leaves out where removing takes longer than drawing the removed candidates.
-    fn weigh(&self) -> Finding {
-        let (gain, cost_ns, [one, many]) = (self.gain, self.cost_ns, self.unit);
-        let [with, without] = [gain.with_count, gain.without_count].map(|n| n * self.scale);
-        if without == 0.0 {
-            return Finding::none(format!("no {one} is in any view that was looked at"));
-        }
-        let removed = without - with;
-        let left_out_ns = gain.without_ns.unwrap_or(f64::NAN);
-        let kept_ns = gain
-            .ratio
-            .map_or(f64::NAN, |ratio| ratio.value * left_out_ns);
-        let testing = kept_ns - left_out_ns;
-        let from = (testing > 0.0 && removed > 0.0).then_some(testing / removed);
-        let told = |show: &dyn Fn(f64) -> String| from.map_or_else(String::new, show);
-        let share = removed / without;
-        let pays = (testing / (cost_ns * without)).max(0.0);
-        let reason = format!(
-            "{removed:.1} of {without:.1} {many} a view are removed ({:.1} %), which saves {} ns each{}",
-            share * 100.0,
-            (cost_ns * 1e3).round() / 1e3,
-            told(&|ns| format!("; pays above {ns:.1} ns per {one}"))
-        );
-        let note = format!(
-            "{} ns/{}{}",
-            (cost_ns * 1e1).round() / 1e1,
-            one.trim_start_matches("shaded "),
-            told(&|ns| format!(", pays from {ns:.*}", if ns < 10.0 { 2 } else { 0 }))
-        );
-        let check = Check {
-            on: format!(
-                "{} {}, the others as in funnel",
-                gain.stage.name(),
-                gain.back_end
-            ),
-            kept_ns,
-            left_out_ns,
-            ratio: gain.ratio,
-            same_answers: gain.unit == "fragments" || removed == 0.0,
-            pays: gain.ratio.and_then(is_longer),
-            ..Check::default()
-        };
-        Finding {
-            check: Some(check),
-            ..Finding::new(share, pays, reason)
-                .noted(note)
-                .costing([kept_ns + with * cost_ns, left_out_ns + without * cost_ns])
-        }
+/// Leaves out where removing takes longer than drawing the removed candidates.
+///
+/// A counted candidate, `one`, stands for `scale` of them; one that is not removed costs
+/// `cost_ns`.
+fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
+    let [with, without] = [gain.with_count, gain.without_count].map(|n| n * scale);
+    if without == 0.0 {
+        return Finding::none(format!("no {one} is in any view that was looked at"));
+    }
+    let removed = without - with;
+    let left_out_ns = gain.without_ns.unwrap_or(f64::NAN);
+    let kept_ns = gain
+        .ratio
+        .map_or(f64::NAN, |ratio| ratio.value * left_out_ns);
+    let testing = kept_ns - left_out_ns;
+    let from = (testing > 0.0 && removed > 0.0).then_some(testing / removed);
+    let told = |show: &dyn Fn(f64) -> String| from.map_or_else(String::new, show);
+    let share = removed / without;
+    let pays = (testing / (cost_ns * without)).max(0.0);
+    let reason = format!(
+        "{removed:.1} of {without:.1} {one}s a view are removed ({:.1} %), which saves {} ns each{}",
+        share * 100.0,
+        (cost_ns * 1e3).round() / 1e3,
+        told(&|ns| format!("; pays above {ns:.1} ns per {one}"))
+    );
+    let note = format!(
+        "{} ns/{}{}",
+        (cost_ns * 1e1).round() / 1e1,
+        one.trim_start_matches("shaded "),
+        told(&|ns| format!(", pays from {ns:.*}", if ns < 10.0 { 2 } else { 0 }))
+    );
+    let check = Check {
+        on: format!(
+            "{} {}, the others as in funnel",
+            gain.stage.name(),
+            gain.back_end
+        ),
+        kept_ns,
+        left_out_ns,
+        ratio: gain.ratio,
+        same_answers: gain.unit == "fragments" || removed == 0.0,
+        pays: gain.ratio.and_then(is_longer),
+        ..Check::default()
+    };
+    Finding {
+        check: Some(check),
+        ..Finding::new(share, pays, reason)
+            .noted(note)
+            .costing([kept_ns + with * cost_ns, left_out_ns + without * cost_ns])
     }
 }
 
@@ -184,13 +163,7 @@ mod tests {
         let named = ("rays", "items");
         let mut gain = Gain::new(StageKind::Occlusion, named, counts, Default::default());
         (gain.without_ns, gain.ratio) = (Some(100.0), Some(Estimate::exact(ratio)));
-        let removal = Removal {
-            gain: &gain,
-            unit: ["thing", "things"],
-            scale: 1.0,
-            cost_ns,
-        };
-        let mut finding = removal.weigh();
+        let mut finding = weigh(&gain, "thing", 1.0, cost_ns);
         let checks = finding.check.take().into_iter().collect();
         some_rule(LeftOutIf::AtMost, By::Rule).omission(finding, checks)
     }
