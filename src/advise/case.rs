@@ -37,7 +37,6 @@ impl<'a> Case<'a> {
     ) -> Result<Case<'a>, BuildError> {
         let AdviseInput { scene, path, .. } = *all;
         let [spec, scan] = [tree, scan].map(|label| planned(all.structures, label));
-        let (spec, scan) = (spec?, scan?);
         Ok(Case {
             index: spec.build(input_of(scene, &scene.items))?,
             workload,

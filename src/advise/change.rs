@@ -11,7 +11,6 @@ use super::omission::is_longer;
 use super::options::{AdviseInput, planned};
 use crate::culling::{Culling, CullingTest};
 use crate::funnel::StudyError;
-use crate::index::StructureSpec;
 use crate::measure::{
     Group, GroupPlan, Known, Part, PathInfo, ProcessTimes, ReportCell, SceneInfo, Subject,
     Workload, measure_queries_or_frames,
@@ -151,23 +150,21 @@ impl Beside {
 
     /// Measures the workloads in one process.
     pub(super) fn times(&self, input: &AdviseInput) -> Result<Vec<Part>, StudyError> {
-        let changed = self.changed.iter();
-        let parts = changed.map(|changed| Some(changed.measured(input, self)?.1));
         let reason = "another scene or motion than the advice was planned for";
-        let parts: Option<Vec<Part>> = parts.collect();
-        parts.ok_or_else(|| StudyError::Refused(reason.to_owned()))
+        let parts = self.changed.iter().map(|changed| {
+            let measured = changed.measured(input, self).map(|(_, part)| part);
+            measured.ok_or_else(|| StudyError::Refused(reason.to_owned()))
+        });
+        parts.collect()
     }
 
     /// The group of each workload, from the count pass and all processes.
     pub(super) fn groups(&self, counted: Vec<Part>, processes: &[ProcessTimes]) -> Vec<Group> {
         let groups = counted.into_iter().enumerate().map(|(n, counted)| {
-            let mut parts = vec![counted];
-            parts.extend(
-                processes
-                    .iter()
-                    .filter_map(|times| times.parts.get(n).cloned()),
-            );
-            Group::of(&parts)
+            let timed = processes
+                .iter()
+                .filter_map(|times| times.parts.get(n).cloned());
+            Group::of(&[counted].into_iter().chain(timed).collect::<Vec<_>>())
         });
         groups.collect()
     }
@@ -255,11 +252,11 @@ impl Changed {
         let workload = Workload::moving(scene, &path, &culling, motion, input.views).ok()?;
         let labels = beside.contenders.iter();
         let further = beside.policies.iter().filter(|_| self.axis.is_none());
-        let labels = labels.chain(further);
-        let specs = labels.map(|label| planned(input.structures, label));
-        let specs: Vec<StructureSpec> = specs.collect::<Result<_, _>>().ok()?;
+        let specs = labels
+            .chain(further)
+            .map(|label| planned(input.structures, label));
         let build = |spec| Subject::build(spec, false, scene, CullingTest::SixPlane);
-        let subjects: Vec<Subject> = specs.into_iter().map(build).collect();
+        let subjects: Vec<Subject> = specs.map(build).collect();
         let plan = GroupPlan {
             scene: &SceneInfo::of(scene),
             path: PathInfo::of(&path.name, &workload, false),

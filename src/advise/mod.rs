@@ -142,7 +142,7 @@ pub fn prepare(
         entered.trials.compare(sides);
     }
     let tasks = entered.trials.tasks(&answered.counts);
-    let stages = Stages::of(input, &structures[0])?;
+    let stages = Stages::of(input, &structures[0]);
     let funnel = funnel::prepare(&stages.input(input), progress).map_err(|error| error.to_string());
     Ok(Prepared {
         plan: TrialPlan {
@@ -188,7 +188,7 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, Study
         ..ProcessTimes::of(&timed_to_end(&tasks, &plan.schedule, input.protocol))
     };
     if let Some(of_stages) = &plan.stages {
-        let stages = Stages::of(input, &plan.structures[0])?;
+        let stages = Stages::of(input, &plan.structures[0]);
         let found = funnel::time(&stages.input(input), of_stages)?;
         times.ln_ns.extend(found.ln_ns);
     }

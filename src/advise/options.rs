@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::culling::Culling;
 use crate::funnel::{StudyError, check_memory};
-use crate::index::{BuildError, Execution, StructureSpec};
+use crate::index::{Execution, StructureSpec};
 use crate::measure::{Protocol, Workload};
 use crate::motion::Motion;
 use crate::path::CameraPath;
@@ -92,23 +92,17 @@ impl<'a> AdviseInput<'a> {
 ///
 /// One of the list, one under a policy of the advice's own (`wide@rebuild`), or one of this
 /// crate.
-pub(super) fn planned(
-    structures: &[StructureSpec],
-    label: &str,
-) -> Result<StructureSpec, BuildError> {
+pub(super) fn planned(structures: &[StructureSpec], label: &str) -> StructureSpec {
     let (alone, policy) = label.split_once('@').unwrap_or((label, ""));
     let named = |name: &str| structures.iter().find(|spec| spec.label == name).cloned();
-    let mut spec = match named(label).or_else(|| named(alone)) {
-        Some(spec) => spec,
-        None => {
-            let execution = structures.first().map(|spec| spec.execution);
-            let name = if alone == SCAN { SCAN } else { TREE };
-            return default_of(name, execution.unwrap_or_default());
-        }
+    let Some(mut spec) = named(label).or_else(|| named(alone)) else {
+        let execution = structures.first().map(|spec| spec.execution);
+        let name = if alone == SCAN { SCAN } else { TREE };
+        return default_of(name, execution.unwrap_or_default());
     };
     spec.policy = policy.parse().unwrap_or(spec.policy);
     label.clone_into(&mut spec.label);
-    Ok(spec)
+    spec
 }
 
 /// Structures of the rules where the list has no tree, no scan.
@@ -116,13 +110,7 @@ pub(super) const TREE: &str = "wide";
 pub(super) const SCAN: &str = "linear";
 
 /// A structure of this crate with its default parameters.
-pub(super) fn default_of(
-    name: &'static str,
-    execution: Execution,
-) -> Result<StructureSpec, BuildError> {
-    let spec = StructureSpec::parse(name).map_err(|error| BuildError::Params {
-        structure: name,
-        reason: error.to_string(),
-    })?;
-    Ok(spec.by(execution))
+pub(super) fn default_of(name: &'static str, execution: Execution) -> StructureSpec {
+    let spec = StructureSpec::parse(name).expect("a name of this crate's own");
+    spec.by(execution)
 }

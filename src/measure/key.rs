@@ -40,7 +40,7 @@ impl GroupKey {
 }
 
 /// Key of a cell: a structure in a group.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CellKey {
     /// Group that the cell is compared within.
     #[serde(flatten)]

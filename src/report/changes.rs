@@ -70,9 +70,8 @@ pub fn changes(
     if basis == Basis::Reports {
         // Structures that move are ranked by their frames.
         let frames = metrics.iter().find(|metric| **metric == "frame_ns");
-        let metric = frames
-            .or(metrics.first())
-            .filter(|metric| !WORK.contains(metric));
+        let metric = frames.or(metrics.first());
+        let metric = metric.filter(|metric| !WORK.contains(metric));
         found.common_shift = metric.and_then(|metric| common_shift(&comparable, metric));
     }
     found.rows.sort_by(JudgedRow::order);
@@ -105,15 +104,10 @@ fn row((old, new): Pair, outcome: Outcome, reason: Option<String>) -> JudgedRow 
     JudgedRow {
         outcome,
         cell: new.key(),
-        metric: None,
-        old: None,
-        new: None,
-        judgement: None,
-        processes: [0; 2],
         old_status: old.status,
         new_status: new.status,
         reason,
-        pairs_ln_ns: None,
+        ..JudgedRow::default()
     }
 }
 
@@ -139,11 +133,10 @@ fn as_a_whole(basis: Basis, pair: Pair) -> Option<JudgedRow> {
 
 /// A pair with both values of a metric, not yet judged.
 fn valued(pair: Pair, metric: &'static str) -> JudgedRow {
-    let (old, new) = (pair.0.value(metric), pair.1.value(metric));
     JudgedRow {
         metric: Some(metric),
-        old,
-        new,
+        old: pair.0.value(metric),
+        new: pair.1.value(metric),
         ..row(pair, Outcome::Unmeasured, None)
     }
 }
@@ -176,11 +169,10 @@ fn is_sound(value: f64) -> bool {
 
 fn logs((old, new): Pair, metric: &str) -> Option<Logs> {
     let of = |cell: &ReportCell| {
+        let logs = cell.ln_ns(metric);
+        let is_sound = !logs.is_empty() && logs.iter().all(|ln| ln.is_finite());
         // Nothing is slower or faster among no items.
-        let has_items = cell.scene.total_count > 0;
-        let times = cell.times.by_process.get(metric).filter(|_| has_items)?;
-        let sound = !times.is_empty() && times.iter().all(|time| is_sound(*time));
-        sound.then(|| times.iter().map(|time| time.ln()).collect::<Vec<f64>>())
+        (is_sound && cell.scene.total_count > 0).then_some(logs)
     };
     Some([of(old)?, of(new)?])
 }
@@ -247,10 +239,8 @@ fn judge_pairs(timed: Vec<Candidate>, threshold: f64) {
     for ((row, logs), judgement) in timed.into_iter().zip(judged) {
         let ratio = judgement.map(|found| found.ratio);
         row.old = trimmed_mean(&logs[0]).map(|old| old.mean.exp()).or(row.old);
-        row.new = row
-            .old
-            .zip(ratio)
-            .map_or(row.new, |(old, ratio)| Some(old * ratio));
+        let new = row.old.zip(ratio).map(|(old, ratio)| old * ratio);
+        row.new = new.or(row.new);
         row.reason = why_inconclusive(true, row.processes);
         row.pairs_ln_ns = Some(logs);
         conclude(row, judgement);

@@ -39,7 +39,7 @@ pub static WORK: &[&str] = &["nodes_tested", "items_tested", "planes_tested", "c
 
 named! {
     /// Outcome of a cell, worst first.
-    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
+    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
     #[serde(rename_all = "snake_case")]
     #[non_exhaustive]
     pub enum Outcome {
@@ -54,6 +54,7 @@ named! {
         /// Not the same question: not judged.
         Different = "different",
         /// No time above zero on one side at least: not judged.
+        #[default]
         Unmeasured = "unmeasured",
         /// Right in neither report: not judged.
         FailedInBoth = "failed_in_both",
@@ -105,7 +106,7 @@ impl From<Change> for Outcome {
 }
 
 /// A cell of a comparison, by one metric or as a whole.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize)]
 #[non_exhaustive]
 pub struct JudgedRow {
     /// Slower, faster, same, or why it cannot be said.

@@ -50,17 +50,12 @@ pub(super) fn without_false_ranks(cells: &mut [ReportCell]) {
 /// Cells in the order of the ranks from the run, the faster first within a
 /// rank; those without a rank come last.
 fn ranked(mut cells: Vec<&ReportCell>) -> Vec<&ReportCell> {
-    let order = |cell: &ReportCell| {
-        let time = cell.rank.and_then(|_| Some(cell.time()?.value));
-        (
-            cell.rank.unwrap_or(usize::MAX),
-            time.unwrap_or(f64::INFINITY),
-        )
+    let time = |cell: &ReportCell| {
+        let time = cell.rank.and_then(|_| cell.time());
+        time.map_or(f64::INFINITY, |time| time.value)
     };
-    cells.sort_by(|a, b| {
-        let (a, b) = (order(a), order(b));
-        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-    });
+    cells.sort_by(|a, b| time(a).total_cmp(&time(b)));
+    cells.sort_by_key(|cell| cell.rank.unwrap_or(usize::MAX));
     cells
 }
 
@@ -80,10 +75,8 @@ impl<'r> Comparison<'r> {
 
     /// The cells with a rank, fastest first.
     pub fn sound(&self) -> impl Iterator<Item = &'r ReportCell> {
-        self.cells
-            .iter()
-            .copied()
-            .filter(|cell| cell.rank.is_some())
+        let cells = self.cells.iter().copied();
+        cells.filter(|cell| cell.rank.is_some())
     }
 
     /// The cell of a structure, if it has a rank.
@@ -100,12 +93,8 @@ impl<'r> Comparison<'r> {
         }
         let base = self.sound_cell(base)?;
         let value = times_as_fast(base, cell)?;
-        let logs = |cell: &ReportCell| -> Option<Vec<f64>> {
-            let times = cell.times.by_process.get(cell.ranked_by())?;
-            Some(times.iter().map(|time| time.ln()).collect())
-        };
-        let logs = logs(base).zip(logs(cell));
-        let found = logs.and_then(|(base, own)| speedup(&base, &own));
+        let [logs, own] = [base, cell].map(|cell| cell.ln_ns(cell.ranked_by()));
+        let found = speedup(&logs, &own);
         // About the ratio of the two shown values.
         let ends = found.map(|found| found.per(found.value / value));
         let ends = ends.and_then(|ends| ends.lower.zip(ends.upper));
@@ -303,6 +292,7 @@ impl<'r> Overall<'r> {
         let base = timed().find(|(name, _)| *name == YARDSTICK);
         let base = base.or_else(|| timed().max_by(|a, b| a.1.total_cmp(&b.1)));
         let of_base = base.and_then(|(name, _)| logs(name)).unwrap_or_default();
+        let less = |own: &[f64], base: &[f64]| own.iter().zip(base).map(|(a, b)| a - b).collect();
         let standing = |&structure: &&'r str| Mean {
             structure,
             speedup: base.zip(mean(structure)).map(|(base, mean)| base.1 / mean),
@@ -310,11 +300,7 @@ impl<'r> Overall<'r> {
                 .filter(|c| c.winners().any(|cell| cell.structure == structure))
                 .count(),
             logs: match logs(structure) {
-                Some(own) if !of_base.is_empty() => own
-                    .iter()
-                    .zip(&of_base)
-                    .map(|(own, base)| own - base)
-                    .collect(),
+                Some(own) if !of_base.is_empty() => less(&own, &of_base),
                 _ => mean(structure).map(f64::ln).into_iter().collect(),
             },
         };

@@ -220,10 +220,8 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
                     ns: median(ns)?,
                 })
             };
-            Some((
-                label.to_owned(),
-                readings.iter().filter_map(reading).collect(),
-            ))
+            let readings = readings.iter().filter_map(reading).collect();
+            Some((label.to_owned(), readings))
         };
         let labels = kept.subjects.iter().map(|subject| subject.label.as_str());
         let views = Views {

@@ -105,8 +105,7 @@ impl Header {
         differences(self.place(), other.place()).next()
     }
 
-    /// The first fact in which two runs differ, the shard apart: of their plans, or else
-    /// of machine, build or program.
+    /// The first fact in which the plans of two runs differ, or else their places.
     pub fn differs(&self, other: &Header) -> Option<Setting> {
         let of_plans = differences(self.plan(), other.plan()).next();
         of_plans.or_else(|| self.differs_in_place(other))

@@ -8,7 +8,7 @@ use super::super::options::{AdviseInput, AdviseOptions, planned};
 use super::super::rule::{Draft, Finding, Unfit};
 use super::super::trials::Trials;
 use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE, StageKind};
-use crate::index::{BuildError, StructureSpec};
+use crate::index::StructureSpec;
 use crate::visibility::SampleGrid;
 
 /// Most views, and most items of all of them.
@@ -25,13 +25,13 @@ pub struct Stages {
 }
 
 impl Stages {
-    pub fn of(all: &AdviseInput, tree: &str) -> Result<Stages, BuildError> {
-        let tree = planned(all.structures, tree)?;
+    pub fn of(all: &AdviseInput, tree: &str) -> Stages {
+        let tree = planned(all.structures, tree);
         let chain = Chain::for_scene(all.scene, false)
             .with(StageKind::Object, &tree.label)
             .with(StageKind::Triangle, "several-cones")
             .with(StageKind::Fragment, NONE);
-        Ok(Stages { chain, tree })
+        Stages { chain, tree }
     }
 
     pub fn input<'s>(&'s self, all: &AdviseInput<'s>) -> FunnelInput<'s> {

@@ -55,7 +55,7 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
 pub(super) fn third_dimension(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let (scene, by) = (case.scene(), case.spec.execution);
-    let (octree, quadtree) = (default_of("octree", by)?, default_of("quadtree", by)?);
+    let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, by));
     let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
     let extent = scene.bounds.max.as_dvec3() - scene.bounds.min.as_dvec3();
     let mut extents = extent.to_array();
