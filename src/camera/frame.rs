@@ -227,7 +227,8 @@ impl Frame {
         let gram = basis.transpose() * basis - DMat3::IDENTITY;
         gram.to_cols_array()
             .into_iter()
-            .fold(0.0, |worst: f64, e| worst.max(e.abs()))
+            .map(f64::abs)
+            .fold(0.0, f64::max)
     }
 
     /// One Newton step towards the nearest orthonormal frame (polar factor;

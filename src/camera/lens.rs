@@ -101,18 +101,12 @@ impl Lens {
         }
         finite("near", near)?;
         let parallel = matches!(kind, LensKind::Orthographic { .. });
-        let found = || format!("near is {near}");
-        require(
-            parallel || near > 0.0,
-            found,
+        let (found, rule) = (
+            || format!("near is {near}"),
             "near > 0 for a perspective lens",
-        )?;
-        let far = if parallel {
-            far.or(Some(f64::INFINITY))
-        } else {
-            far
-        };
-        if let Some(far) = far {
+        );
+        require(parallel || near > 0.0, found, rule)?;
+        if let Some(far) = far.or(parallel.then_some(f64::INFINITY)) {
             finite("far", far)?;
             let found = || format!("near is {near} and far {far}");
             require(near < far, found, "near < far")?;
@@ -185,11 +179,8 @@ impl Lens {
         if let LensKind::Matrix(matrix) = self.kind {
             return matrix.corners_about(&[]);
         }
-        let far = self.far()?;
-        let mut corners = [DVec3::ZERO; 8];
-        corners[..4].copy_from_slice(&self.corners_at(frame, self.near()));
-        corners[4..].copy_from_slice(&self.corners_at(frame, far));
-        Some(corners)
+        let ends = [self.near, self.far?].map(|depth| self.corners_at(frame, depth));
+        ends.concat().try_into().ok()
     }
 
     /// The four corners of what is seen at a depth: bit 0 is right, bit 1 top.

@@ -31,6 +31,16 @@ impl MatrixConvention {
             MatrixConvention::RowD3d => MatrixConvention::ColumnD3d,
         }
     }
+
+    /// The entries by this convention as those for column vectors, or the reverse.
+    fn in_columns(self, entries: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
+        match self {
+            MatrixConvention::ColumnGl | MatrixConvention::ColumnD3d => entries,
+            MatrixConvention::RowGl | MatrixConvention::RowD3d => {
+                [0, 1, 2, 3].map(|i| entries.map(|row| row[i]))
+            }
+        }
+    }
 }
 
 /// The names of the entries: row, then column, as they are written down.
@@ -84,12 +94,8 @@ impl ViewProjection {
                 "0 or a size from 1e-60 to 1e60",
             )?;
         }
-        let transposed = [0, 1, 2, 3].map(|i| entries.map(|row| row[i]));
         let mut matrix = ViewProjection {
-            rows: match convention {
-                MatrixConvention::ColumnGl | MatrixConvention::ColumnD3d => entries,
-                MatrixConvention::RowGl | MatrixConvention::RowD3d => transposed,
-            },
+            rows: convention.in_columns(entries),
             convention,
             is_reversed: false,
             is_parallel: false,
@@ -139,23 +145,14 @@ impl ViewProjection {
 
     /// The matrix that the other order of rows and columns makes of the same entries.
     pub fn transposed(&self) -> Option<ViewProjection> {
-        let is_row = matches!(
-            self.convention,
-            MatrixConvention::RowGl | MatrixConvention::RowD3d
-        );
-        let rows = match is_row {
-            true => [0, 1, 2, 3].map(|i| self.rows.map(|row| row[i])),
-            false => self.rows,
-        };
-        ViewProjection::new(rows, self.convention.transposed()).ok()
+        let entries = self.convention.in_columns(self.rows);
+        ViewProjection::new(entries, self.convention.transposed()).ok()
     }
 
     /// Returns whether depth begins at 0, and not at -w.
     pub fn is_from_zero(&self) -> bool {
-        match self.convention {
-            MatrixConvention::ColumnGl | MatrixConvention::RowGl => false,
-            MatrixConvention::ColumnD3d | MatrixConvention::RowD3d => true,
-        }
+        use MatrixConvention::{ColumnD3d, RowD3d};
+        matches!(self.convention, ColumnD3d | RowD3d)
     }
 
     /// Returns whether the clip space may have y downward.
@@ -173,10 +170,9 @@ impl ViewProjection {
         let [x, y, z, w] = self.exact_rows();
         let sum = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] + &b[k]);
         let difference = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] - &b[k]);
-        let low = if self.is_from_zero() {
-            z.clone()
-        } else {
-            sum(&w, &z)
+        let low = match self.is_from_zero() {
+            true => z.clone(),
+            false => sum(&w, &z),
         };
         let (at_low, at_high) = match self.is_reversed {
             false => (FrustumPlane::Near, FrustumPlane::Far),
@@ -227,10 +223,9 @@ impl ViewProjection {
         let rows = self.exact_rows();
         let cofactor = |i: usize, j: usize| {
             let minor = minor(&rows, i, j);
-            if (i + j).is_multiple_of(2) {
-                minor
-            } else {
-                -&minor
+            match (i + j) % 2 {
+                0 => minor,
+                _ => -&minor,
             }
         };
         let adjugate: [Four; 4] = std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i)));
@@ -261,11 +256,8 @@ fn minor(rows: &[Four; 4], row: usize, column: usize) -> Expansion {
     let [a, b, c] = [0, 1, 2].map(|i| &rows[i + usize::from(i >= row)]);
     let [i, j, k] = [0, 1, 2].map(|i| i + usize::from(i >= column));
     let pair = |i: usize, j: usize| &(&b[i] * &c[j]) - &(&b[j] * &c[i]);
-    let (first, second, third) = (
-        &a[i] * &pair(j, k),
-        &a[j] * &pair(i, k),
-        &a[k] * &pair(i, j),
-    );
+    let [first, second, third] =
+        [(i, j, k), (j, i, k), (k, i, j)].map(|(i, j, k)| &a[i] * &pair(j, k));
     &(&first - &second) + &third
 }
 

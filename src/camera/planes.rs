@@ -192,9 +192,8 @@ impl Camera {
 impl Camera {
     /// The frame about the sum of some points, one after the other.
     fn frame_about(&self, zero: &[DVec3]) -> Frame {
-        let frame = self.frame;
-        zero.iter()
-            .fold(frame, |frame, &zero| frame.relative_to(zero))
+        let moved = |frame: Frame, zero: &DVec3| frame.relative_to(*zero);
+        zero.iter().fold(self.frame, moved)
     }
 
     fn planes_f64(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, PlaneF64)> {
@@ -214,11 +213,8 @@ impl Camera {
         let c = options.epsilon;
         let are_sound = (0.0..f64::INFINITY).contains(&c) && of_scene.cmpge(DVec3::ZERO).all();
         let found = || format!("epsilon is {c} and reach {of_scene}");
-        require(
-            are_sound,
-            found,
-            "numbers of at least 0, and a finite epsilon",
-        )?;
+        let rule = "numbers of at least 0, and a finite epsilon";
+        require(are_sound, found, rule)?;
         if let largest @ f64::INFINITY = of_scene.element_sum() {
             return Err(CameraError::Sums { largest });
         }
@@ -258,11 +254,8 @@ impl Camera {
         };
         // An infinite far plane is the absence of `far`, whatever its row holds.
         let count = if lens.far().is_some() { 6 } else { 5 };
-        Ok(FrustumPlane::ALL
-            .into_iter()
-            .zip(rows)
-            .take(count)
-            .collect())
+        let named = FrustumPlane::ALL.into_iter().zip(rows);
+        Ok(named.take(count).collect())
     }
 }
 

@@ -59,11 +59,8 @@ impl ViewProjection {
         let (across, upward) = (aside(x), aside(y));
         let is_mirrored = across.cross(upward).dot(forward) > 0.0;
         // Only Vulkan's clip space has y downward.
-        let up = if is_mirrored && self.is_vulkan() {
-            -upward
-        } else {
-            upward
-        };
+        let is_downward = is_mirrored && self.is_vulkan();
+        let up = if is_downward { -upward } else { upward };
         let frame = Pose::Forward { eye, forward, up }.frame()?;
         let axes = [(x, frame.u()), (y, frame.v())];
         let lens = match parallel {
@@ -168,14 +165,12 @@ impl Camera {
                 "at most 1e-4 where rays are needed, or another --matrix-convention",
             )?;
         }
-        let is_unclear = matrix.is_from_zero() && self.may_be_reversed();
-        require(
-            !is_unclear,
-            || {
-                "the orthographic matrix has reversed depth or a mirrored image, so either end may be near".to_owned()
-            },
-            "eye_x.., look_x.. and ortho_height in its place",
-        )?;
+        if matrix.is_from_zero() && self.may_be_reversed() {
+            return Err(CameraError::invalid(
+                "the orthographic matrix has reversed depth or a mirrored image, so either end may be near",
+                "eye_x.., look_x.. and ortho_height in its place",
+            ));
+        }
         Ok(found.camera)
     }
 }

@@ -171,9 +171,9 @@ pub trait BoxTested: Sized + Send + Sync {
         self
     }
 
-    /// Its [`RegionIndex::refit`].
-    fn follow(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
-        false
+    /// Its [`RegionIndex::refit`]; `None` if a rebuild is needed.
+    fn follow(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> Option<()> {
+        None
     }
 
     /// Its [`RegionIndex::memory`].
@@ -197,7 +197,7 @@ impl<X: BoxTested> RegionIndex for X {
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        self.follow(items, moved)
+        self.follow(items, moved).is_some()
     }
 
     fn memory(&self) -> MemoryUsage {

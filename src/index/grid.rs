@@ -9,7 +9,7 @@ use std::ops::{ControlFlow, Range};
 use glam::{UVec3, Vec3};
 
 use super::box_test::{BoxTest, BoxTested, Tally};
-use super::items::{Record, bounds_of_centres};
+use super::items::Record;
 use super::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
 use crate::geometry::Aabb;
 use crate::query::{ItemId, Recorder, Sink};
@@ -141,7 +141,7 @@ impl BoxTested for UniformGrid {
     type Params = NoParams;
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
-        let centres = bounds_of_centres(items.iter().map(|item| item.bounds.centre()));
+        let centres = Aabb::of_points(items.iter().map(|item| item.bounds.centre()));
         let counts = match items.is_empty() {
             true => UVec3::ONE,
             false => cells_for(centres.extent(), items.len()),

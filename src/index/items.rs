@@ -6,7 +6,6 @@
 use std::ops::Deref;
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
 
 use super::BuildError;
 use crate::geometry::{Aabb, LANES};
@@ -76,11 +75,6 @@ impl Record {
         let records = boxes.iter().zip(0..);
         records.map(|(&bounds, id)| Record { bounds, id }).collect()
     }
-}
-
-/// Smallest box that holds the given centres.
-pub fn bounds_of_centres(centres: impl Iterator<Item = Vec3>) -> Aabb {
-    centres.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)))
 }
 
 /// Position of each item, computed at the first refit.

@@ -74,5 +74,5 @@ pub use linear::{Linear, LinearParams, LinearScalar};
 pub use registry::{Registry, Row, StructureSpec};
 pub use shared_query::QueryThreads;
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
-pub use tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
+pub use tree::{Built, PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
 pub use wide::{Auto, AutoParams, BlockOrder, Moving, Wide, WideParams};

@@ -41,12 +41,11 @@ pub fn clustered(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let spread = spec.number_between("spread", 0.02, 0.0, 10.0)? * side;
     let centres: Vec<_> = (0..clusters).map(|_| rng.point() * side).collect();
     let mut total = 0.0;
-    let cumulative: Vec<f64> = (1..=clusters)
-        .map(|k| {
-            total += 1.0 / k as f64;
-            total
-        })
-        .collect();
+    let weights = (1..=clusters).map(|k| {
+        total += 1.0 / k as f64;
+        total
+    });
+    let cumulative: Vec<f64> = weights.collect();
     let size = 0.2 * spread / libm::cbrt(n.max(1) as f64 / clusters as f64).max(1.0);
     let boxes = (0..n).map(|_| {
         let draw = rng.unit() * total;
@@ -96,15 +95,15 @@ impl CityGrid {
 ///
 /// Wide in two axes and thin in the third, with sizes from decimetres to a hundred metres.
 pub fn city(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
-    let CityGrid {
-        block,
-        street,
-        blocks,
-        corner,
-    } = CityGrid::of(spec, n)?;
+    let grid = CityGrid::of(spec, n)?;
+    let (block, street, corner) = (grid.block, grid.street, grid.corner);
     let pitch = block + street;
     let boxes = (0..n).map(|_| {
-        let cell = DVec3::new(rng.below(blocks) as f64, rng.below(blocks) as f64, 0.0);
+        let cell = DVec3::new(
+            rng.below(grid.blocks) as f64,
+            rng.below(grid.blocks) as f64,
+            0.0,
+        );
         let low = cell * pitch + DVec3::new(corner, corner, 0.0);
         if rng.unit() < BUILDINGS {
             building(low, block, -corner, rng)
@@ -208,10 +207,10 @@ impl Terrain {
     /// A ground tile: it spans the heights at its corners and centre.
     fn tile(&self, [x, y]: [f64; 2], edge: f64) -> WorldBox {
         let samples = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.5)];
-        let heights = samples.map(|(u, v)| self.altitude(x + u * edge, y + v * edge));
-        let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        WorldBox::new(DVec3::new(x, y, low), DVec3::new(x + edge, y + edge, high))
+        WorldBox::union_of(samples.map(|(u, v)| {
+            let (x, y) = (x + u * edge, y + v * edge);
+            WorldBox::at(DVec3::new(x, y, self.altitude(x, y)))
+        }))
     }
 }
 
@@ -224,15 +223,14 @@ pub fn shell(spec: &mut Spec, n: usize, _: &mut SeededRng) -> Made {
     let natural = 1.25 * (n.max(1) as f64).sqrt();
     let radius = spec.number_between("radius", natural, 0.0, f64::INFINITY)?;
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
-    Ok((0..n)
-        .map(|i| {
-            let z = 1.0 - 2.0 * (i as f64 + POLES) / (n as f64 - 1.0 + 2.0 * POLES);
-            let turn = TAU * (i as f64 / golden).fract();
-            let across = (1.0 - z * z).max(0.0).sqrt();
-            let unit = DVec3::new(across * libm::cos(turn), across * libm::sin(turn), z);
-            WorldBox::around(unit * radius, DVec3::ONE)
-        })
-        .collect())
+    let boxes = (0..n).map(|i| {
+        let z = 1.0 - 2.0 * (i as f64 + POLES) / (n as f64 - 1.0 + 2.0 * POLES);
+        let turn = TAU * (i as f64 / golden).fract();
+        let across = (1.0 - z * z).max(0.0).sqrt();
+        let unit = DVec3::new(across * libm::cos(turn), across * libm::sin(turn), z);
+        WorldBox::around(unit * radius, DVec3::ONE)
+    });
+    Ok(boxes.collect())
 }
 
 /// Boxes of unit spheres on a cubic grid of spacing 2, in rows or shuffled.
@@ -240,13 +238,11 @@ pub fn grid3(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let shuffled = spec.whole("shuffled", 0, 1)? == 1;
     let side = side_of(n, 3);
     let half = (side / 2) as f64;
-    let mut boxes: Vec<WorldBox> = (0..n)
-        .map(|i| {
-            let cell = [i % side, i / side % side, i / side / side];
-            let centre = DVec3::from(cell.map(|c| 2.0 * (c as f64 - half)));
-            WorldBox::around(centre, DVec3::splat(2.0))
-        })
-        .collect();
+    let boxes = (0..n).map(|i| {
+        let centre = (lattice_cell(i, side) - half) * 2.0;
+        WorldBox::around(centre, DVec3::splat(2.0))
+    });
+    let mut boxes: Vec<WorldBox> = boxes.collect();
     for last in (1..n * usize::from(shuffled)).rev() {
         boxes.swap(last, rng.below(last + 1));
     }
@@ -257,14 +253,13 @@ pub fn grid3(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
 pub fn bepu(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let natural = 15.625 * libm::cbrt(n.max(1) as f64);
     let side = spec.number_between("side", natural, 0.0, f64::INFINITY)?;
-    Ok((0..n)
-        .map(|_| {
-            let x = rng.point();
-            let to_5 = x * x * x * x * x;
-            let edges = DVec3::ONE + 99.0 * to_5 * to_5;
-            WorldBox::around(rng.point() * side, edges)
-        })
-        .collect())
+    let boxes = (0..n).map(|_| {
+        let x = rng.point();
+        let to_5 = x * x * x * x * x;
+        let edges = DVec3::ONE + 99.0 * to_5 * to_5;
+        WorldBox::around(rng.point() * side, edges)
+    });
+    Ok(boxes.collect())
 }
 
 /// Boxes scattered evenly in a block that is far longer than wide and high.
@@ -273,12 +268,11 @@ pub fn corridor(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let length = spec.number_between("length", 1000.0 * width, 0.0, f64::INFINITY)?;
     let block = DVec3::new(length, width, width);
     let size = 0.2 * libm::cbrt(length / n.max(1) as f64 * width * width);
-    Ok((0..n)
-        .map(|_| {
-            let centre = rng.point() * block;
-            WorldBox::around(centre, (rng.point() + 0.5) * size)
-        })
-        .collect())
+    let boxes = (0..n).map(|_| {
+        let centre = rng.point() * block;
+        WorldBox::around(centre, (rng.point() + 0.5) * size)
+    });
+    Ok(boxes.collect())
 }
 
 /// Rectangles of the plane z = 0 that tile a square.
@@ -310,9 +304,8 @@ pub fn tiles2d(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
 /// Piles of coincident boxes: no plane separates the items of one.
 pub fn stack(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let piles = spec.count("piles", 16, 1_000_000)? as usize;
-    let places: Vec<WorldBox> = (0..piles)
-        .map(|_| WorldBox::around(rng.point() * 1000.0, (rng.point() + 0.5) * 20.0))
-        .collect();
+    let place = |_| WorldBox::around(rng.point() * 1000.0, (rng.point() + 0.5) * 20.0);
+    let places: Vec<WorldBox> = (0..piles).map(place).collect();
     Ok((0..n).map(|i| places[i % piles]).collect())
 }
 
@@ -324,15 +317,19 @@ pub fn voxels(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let relief = spec.number_between("relief", 0.2, -1.0, 10.0)?;
     let side = side_of(n.div_ceil(DEEP), 2);
     let seed = rng.below(1 << 32) as u64;
-    Ok((0..n)
-        .map(|i| {
-            let column = i / DEEP;
-            let at = DVec3::new((column % side) as f64, (column / side) as f64, 0.0);
-            let height = fractal(at * (4.0 / side as f64), 6, seed) * relief * side as f64;
-            let low = at + DVec3::Z * (height.floor() - (i % DEEP) as f64);
-            WorldBox::new(low, low + DVec3::ONE)
-        })
-        .collect())
+    let boxes = (0..n).map(|i| {
+        let column = i / DEEP;
+        let at = DVec3::new((column % side) as f64, (column / side) as f64, 0.0);
+        let height = fractal(at * (4.0 / side as f64), 6, seed) * relief * side as f64;
+        let low = at + DVec3::Z * (height.floor() - (i % DEEP) as f64);
+        WorldBox::new(low, low + DVec3::ONE)
+    });
+    Ok(boxes.collect())
+}
+
+/// The cell of that number in a cubic lattice, row by row.
+pub fn lattice_cell(i: usize, side: usize) -> DVec3 {
+    DVec3::from([i % side, i / side % side, i / side / side].map(|c| c as f64))
 }
 
 /// The least side whose power holds `n` cells; at least 1.

@@ -309,17 +309,17 @@ impl Scene {
 }
 
 /// The origin that suits the boxes, by the finite ones.
-fn choose_origin(boxes: impl Iterator<Item = WorldBox>) -> DVec3 {
-    let finite = boxes.filter(|b| b.min.is_finite() && b.max.is_finite());
-    let all = WorldBox::union_of(finite);
-    origin_between(all.min, all.max)
-}
-
+///
 /// Zero on every axis where moving the boxes would gain less than two bits:
 /// their coordinates then stay as written and exact ties stay ties. Otherwise
 /// the centre, rounded to a power of two near the width, so that round
 /// coordinates stay round.
-fn origin_between(low: DVec3, high: DVec3) -> DVec3 {
+fn choose_origin(boxes: impl Iterator<Item = WorldBox>) -> DVec3 {
+    let finite = boxes.filter(|b| b.min.is_finite() && b.max.is_finite());
+    let WorldBox {
+        min: low,
+        max: high,
+    } = WorldBox::union_of(finite);
     let axis = |k: usize| {
         let (width, centre) = (high[k] - low[k], low[k] / 2.0 + high[k] / 2.0);
         // An empty scene's width is -inf and its centre NaN.
@@ -334,7 +334,7 @@ fn origin_between(low: DVec3, high: DVec3) -> DVec3 {
             grid => (centre / grid).round() * grid,
         }
     };
-    DVec3::new(axis(0), axis(1), axis(2))
+    [0, 1, 2].map(axis).into()
 }
 
 /// An error of an item of a scene that was not read from a file.

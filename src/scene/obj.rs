@@ -75,10 +75,10 @@ pub fn read_obj(
     }
     options.check_fits(name, None, triangles)?;
     if !obj.unread.is_empty() {
-        let unread: Vec<&String> = obj.unread.iter().collect();
+        let unread = first_of(&obj.unread.iter().collect::<Vec<_>>(), 8);
+        let what = "all surfaces are opaque";
         note(&format!(
-            "{file}: lines that are not read: {}; all surfaces are opaque",
-            first_of(&unread, 8)
+            "{file}: lines that are not read: {unread}; {what}"
         ));
     }
     Ok(Scene {
@@ -173,10 +173,9 @@ impl Obj<'_> {
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;
                 let name = String::from_utf8_lossy(&line[start..]);
-                let lines = name
-                    .lines()
-                    .map(|line| line.trim().trim_end_matches('\\').trim());
-                let name = lines.collect::<Vec<_>>().join(" ").trim().to_owned();
+                let plain = |line: &str| line.trim().trim_end_matches('\\').trim().to_owned();
+                let lines: Vec<String> = name.lines().map(plain).collect();
+                let name = lines.join(" ").trim().to_owned();
                 self.items.pop_if(|(_, first)| *first == self.corners.len());
                 self.items.push((name, self.corners.len()));
             }

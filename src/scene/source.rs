@@ -29,13 +29,11 @@ pub fn split_part(source: &str) -> (&str, Option<&str>) {
     let cuts = source.match_indices('#').rev();
     let mut parts = cuts.map(|(at, _)| (&source[..at], Some(&source[at + 1..])));
     let is_there = |(file, _): &(&str, _)| is_readable(Path::new(file));
-    match Path::new(source).exists() {
-        true => (source, None),
-        false => match parts.clone().find(is_there) {
-            Some(found) => found,
-            None => parts.next().unwrap_or((source, None)),
-        },
+    if Path::new(source).exists() {
+        return (source, None);
     }
+    let found = parts.clone().find(is_there).or_else(|| parts.next());
+    found.unwrap_or((source, None))
 }
 
 /// The scenes of `maps.wad#*` or `pak.pk3#*`, one by one; of others the source.
@@ -76,17 +74,15 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     if options.items == ItemKind::Triangles {
         scene = scene.by_triangle(options)?;
     }
-    if let Regions::Leaves(map) = &scene.regions
-        && map.bare > 0
-    {
-        let what = "without triangles (flares), no items";
-        note(&format!(
-            "{source}: {} {what}",
-            counted(map.bare, "surface")
-        ));
-    }
     let is_of_map = matches!(options.items, ItemKind::Surfaces | ItemKind::Brushes);
-    if is_of_map && !matches!(scene.regions, Regions::Leaves(_)) {
+    if let Regions::Leaves(map) = &scene.regions {
+        if map.bare > 0 {
+            let bare = counted(map.bare, "surface");
+            note(&format!(
+                "{source}: {bare} without triangles (flares), no items"
+            ));
+        }
+    } else if is_of_map {
         let items = options.items.name();
         let expected =
             format_args!("{source}: no {items}; expected a Quake III map for --items {items}");

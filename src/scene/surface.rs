@@ -227,9 +227,7 @@ impl Surfaces {
 
     /// The smallest box that holds an item; empty for an item without triangles.
     pub fn bounds(&self, item: usize) -> Aabb {
-        self.of(item).flatten().fold(Aabb::EMPTY, |all, p| {
-            Aabb::new(all.min.min(p), all.max.max(p))
-        })
+        Aabb::of_points(self.of(item).flatten())
     }
 
     /// Smallest box in the world that holds triangles as they were written.

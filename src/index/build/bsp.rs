@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::bsp_split_planes::{ARRANGED, between_layers, by_surface_area, divide};
 use crate::geometry::PlaneTree;
 use crate::index::items::Record;
-use crate::index::tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, build_top_down};
+use crate::index::tree::{Built, Part, Splitter, Tree, TreeBuilder, build_top_down};
 use crate::index::{BuildError, Info, Input, Kind, Origin, check_range};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
@@ -66,11 +66,10 @@ impl BspParams {
         &self,
         own_tree: Option<&'a PlaneTree>,
     ) -> Result<(PlaneSource, Option<&'a PlaneTree>), BuildError> {
+        let has_own = own_tree.is_some_and(|own| own.root.is_some());
         Ok(match self.builder {
-            PlaneSource::Auto => match own_tree.filter(|own| own.root.is_some()) {
-                Some(own) => (PlaneSource::Import, Some(own)),
-                None => (PlaneSource::Median, None),
-            },
+            PlaneSource::Auto if has_own => (PlaneSource::Import, own_tree),
+            PlaneSource::Auto => (PlaneSource::Median, None),
             PlaneSource::Import if own_tree.is_none() => {
                 return Err(BuildError::Params {
                     structure: BspBuilder::INFO.name,
@@ -160,7 +159,7 @@ impl TreeBuilder for BspBuilder {
     type Params = BspParams;
     const BY_PLANES: bool = true;
 
-    fn build(input: &Input<'_>, params: &BspParams) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
+    fn build(input: &Input<'_>, params: &BspParams) -> Built {
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 4096.0)?;
         let (source, imported) = params.chosen(input.own_tree)?;
         let mut splitter = PlaneSplitter {

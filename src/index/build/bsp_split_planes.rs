@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 use crate::geometry::{Aabb, LANES};
-use crate::index::items::{Record, bounds_of_centres};
+use crate::index::items::Record;
 
 /// Moves the records that belong to the back to the front of the slice, in any
 /// order, and returns their number. O(n).
@@ -24,7 +24,7 @@ pub fn divide(records: &mut [Record], to_back: impl Fn(&Record) -> bool) -> usiz
 pub const ARRANGED: usize = LANES;
 
 fn centres(records: &[Record]) -> Aabb {
-    bounds_of_centres(records.iter().map(|r| r.bounds.centre()))
+    Aabb::of_points(records.iter().map(|r| r.bounds.centre()))
 }
 
 /// The median along the widest axis, or beside it where it would separate items of
@@ -107,7 +107,11 @@ pub fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
             *count += 1;
         }
     }
-    let cost = |(bounds, count): (Aabb, usize)| half_area(&bounds) * count as f32;
+    // An empty box has no area.
+    let cost = |(bounds, count): (Aabb, usize)| match count {
+        0 => 0.0,
+        _ => bounds.half_area() * count as f32,
+    };
     let mut best: Option<(f32, usize, usize)> = None;
     for &k in &usable {
         let with = |(bounds, count): (Aabb, usize), i: usize| {
@@ -131,9 +135,4 @@ pub fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
     let (_, k, split) = best?;
     let back = divide(records, |r| bin(r, k) < split);
     Some((Vec3::AXES[k], back))
-}
-
-fn half_area(b: &Aabb) -> f32 {
-    let e = b.extent().max(Vec3::ZERO);
-    e.x * e.y + e.y * e.z + e.z * e.x
 }

@@ -5,7 +5,6 @@
 
 use std::borrow::Cow;
 
-use glam::Vec3;
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use serde::{Deserialize, Serialize};
@@ -13,8 +12,8 @@ use serde::{Deserialize, Serialize};
 use super::ploc;
 use crate::geometry::Aabb;
 use crate::index::items::indexable;
-use crate::index::tree::{PackedTree, Tree, TreeBuilder};
-use crate::index::{BuildError, Info, Input, Kind, Origin, check_range};
+use crate::index::tree::{Built, PackedTree, Tree, TreeBuilder};
+use crate::index::{Info, Input, Kind, Origin, check_range};
 use crate::query::ItemId;
 
 /// A BVH built bottom-up (PLOC: Meister and Bittner 2018, "Parallel locally
@@ -185,7 +184,7 @@ impl TreeBuilder for BvhBuilder {
     );
     type Params = BvhParams;
 
-    fn build(input: &Input<'_>, params: &BvhParams) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
+    fn build(input: &Input<'_>, params: &BvhParams) -> Built {
         let items = input.items;
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 255.0)?;
         let config = BvhBuildParams {

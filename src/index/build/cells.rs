@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::Aabb;
 use crate::index::items::Record;
-use crate::index::tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, build_top_down};
-use crate::index::{BuildError, Info, Input, Kind, Origin, check_range};
+use crate::index::tree::{Built, Part, Splitter, Tree, TreeBuilder, build_top_down};
+use crate::index::{Info, Input, Kind, Origin, check_range};
 
 /// An octree with fitted nodes (Meagher 1982, "Geometric modeling using octree
 /// encoding"; loose variant Ulrich 2000).
@@ -46,10 +46,7 @@ impl TreeBuilder for OctreeBuilder {
     );
     type Params = CellParams;
 
-    fn build(
-        input: &Input<'_>,
-        params: &CellParams,
-    ) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
+    fn build(input: &Input<'_>, params: &CellParams) -> Built {
         params.build(Self::INFO.name, input.items, &[0, 1, 2], None)
     }
 }
@@ -63,10 +60,7 @@ impl TreeBuilder for QuadtreeBuilder {
     );
     type Params = CellParams;
 
-    fn build(
-        input: &Input<'_>,
-        params: &CellParams,
-    ) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
+    fn build(input: &Input<'_>, params: &CellParams) -> Built {
         let axes = widest_axes(&Aabb::union_of(input.items));
         let height = 3 - axes[0] - axes[1];
         params.build(Self::INFO.name, input.items, &axes, Some(height))
@@ -116,7 +110,7 @@ impl CellParams {
         items: &[Aabb],
         axes: &[usize],
         column: Option<usize>,
-    ) -> Result<(PackedTree, Vec<Vec3>), BuildError> {
+    ) -> Built {
         check_range(structure, "leaf", self.leaf.into(), 1.0, 4096.0)?;
         check_range(structure, "depth", self.depth.into(), 0.0, 64.0)?;
         check_range(structure, "loose", self.loose.into(), 1.0, 16.0)?;
@@ -139,10 +133,8 @@ impl CellParams {
             level: 0,
         };
         let records = Record::all(items)?;
-        Ok((
-            build_top_down(records, leaf, root, &mut splitter),
-            Vec::new(),
-        ))
+        let tree = build_top_down(records, leaf, root, &mut splitter);
+        Ok((tree, Vec::new()))
     }
 }
 
@@ -223,14 +215,10 @@ const SLABS: usize = 16;
 impl Columns {
     /// Decides whether the items of a cell are stacked. O(items).
     fn is_column(&self, cell: &Cell, records: &[Record]) -> bool {
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        for record in records {
-            let at = record.bounds.centre()[self.axis];
-            (low, high) = (low.min(at), high.max(at));
-        }
+        let centres = Aabb::of_points(records.iter().map(|record| record.bounds.centre()));
         // Divided first: the product with the number of items may overflow.
         let most = LEAVES_OF_A_CUBE * self.leaf as f32 / records.len() as f32;
-        cell.half <= (high * 0.5 - low * 0.5) * most
+        cell.half <= centres.half_extent()[self.axis] * most
     }
 
     /// Sorts the items by height and divides them evenly.
@@ -301,7 +289,7 @@ impl Splitter for CellSplitter<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::RegionIndex;
+    use crate::index::{PackedTree, RegionIndex};
 
     #[test]
     fn the_narrowest_axis_is_left_alone() {

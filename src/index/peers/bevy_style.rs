@@ -57,14 +57,12 @@ impl BoxTested for PeerBevyStyle {
     }
 
     /// Overwrites the bounds.
-    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = placed(&self.entities, |e| e.item.id, items, moved) else {
-            return false;
-        };
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
+        let placed = placed(&self.entities, |e| e.item.id, items, moved)?;
         for (at, bounds) in placed {
             self.entities[at].item.bounds = bounds;
         }
-        true
+        Some(())
     }
 
     fn used(&self) -> MemoryUsage {

@@ -138,10 +138,8 @@ impl BoxTested for PeerBvh {
 
     /// `Bvh::update_shapes`, which removes and adds shape by shape; a build where most
     /// shapes have moved, or where areas overflow.
-    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = placed(&self.shapes, |s| s.item.id, items, moved) else {
-            return false;
-        };
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
+        let placed = placed(&self.shapes, |s| s.item.id, items, moved)?;
         let overflows = |(_, b): &(usize, Aabb)| b.reach().max_element() > LARGEST;
         let builds = placed.len() * 2 > self.shapes.len();
         let builds = builds || self.scaled || placed.iter().any(overflows);
@@ -151,10 +149,10 @@ impl BoxTested for PeerBvh {
         }
         if builds {
             let built = Self::of(self.shapes.iter().map(|s| s.item).collect());
-            return built.map(|built| *self = built).is_ok();
+            return built.map(|built| *self = built).ok();
         }
         self.tree.update_shapes(&changed, &mut self.shapes);
-        true
+        Some(())
     }
 
     fn used(&self) -> MemoryUsage {

@@ -115,16 +115,12 @@ impl BoxTested for PeerObvhs {
         PeerObvhs { update, ..self }
     }
 
-    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
         self.positions.prepare(&self.ids, items.len());
         let place_of = |&id: &ItemId| self.positions.of(id).map(|at| (at, items[id as usize]));
         let is_empty = |id: &ItemId| items[*id as usize].is_empty();
-        if moved
-            .iter()
-            .any(|id| place_of(id).is_none() != is_empty(id))
-        {
-            return false;
-        }
+        let stays = |id: &ItemId| place_of(id).is_none() == is_empty(id);
+        moved.iter().all(stays).then_some(())?;
         let placed: Vec<(usize, Aabb)> = moved.iter().filter_map(place_of).collect();
         self.bvh.init_primitives_to_nodes_if_uninit();
         let all = placed.len() * ALL_SHARE >= self.ids.len();
@@ -152,7 +148,7 @@ impl BoxTested for PeerObvhs {
         if all && !moves {
             self.bvh.refit_all();
         }
-        true
+        Some(())
     }
 
     fn used(&self) -> MemoryUsage {

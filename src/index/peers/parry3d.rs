@@ -115,10 +115,8 @@ impl BoxTested for PeerParry3d {
         PeerParry3d { update, ..self }
     }
 
-    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = placed(&self.ids, |id| *id, items, moved) else {
-            return false;
-        };
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
+        let placed = placed(&self.ids, |id| *id, items, moved)?;
         for (leaf, bounds) in &placed {
             let (leaf, bounds) = (*leaf as u32, crate_box(bounds));
             // A leaf that holds the new bounds would keep its old ones.
@@ -130,7 +128,7 @@ impl BoxTested for PeerParry3d {
             }
         }
         if self.update == Parry3dUpdate::Reinsert {
-            return true;
+            return Some(());
         }
         if placed.len() * ALL_SHARE < self.ids.len() {
             let leaves: Vec<u32> = placed.iter().map(|(leaf, _)| *leaf as u32).collect();
@@ -141,7 +139,7 @@ impl BoxTested for PeerParry3d {
         if self.update == Parry3dUpdate::Optimize {
             self.bvh.optimize_incremental(&mut self.workspace);
         }
-        true
+        Some(())
     }
 
     fn used(&self) -> MemoryUsage {

@@ -64,10 +64,8 @@ impl BoxTested for PeerRstar {
     }
 
     /// `remove` and `insert`, item by item; `bulk_load` from a quarter moved on.
-    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let Some(placed) = placed(&self.items, |item| item.id, items, moved) else {
-            return false;
-        };
+    fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
+        let placed = placed(&self.items, |item| item.id, items, moved)?;
         let bulk = placed.len() * BULK_SHARE > self.items.len();
         for (at, bounds) in placed {
             let item = &mut self.items[at];
@@ -83,7 +81,7 @@ impl BoxTested for PeerRstar {
         if bulk {
             self.tree = RTree::bulk_load(self.items.clone());
         }
-        true
+        Some(())
     }
 
     fn used(&self) -> MemoryUsage {

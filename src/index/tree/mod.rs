@@ -34,6 +34,9 @@ pub use node::TreeNode;
 pub use packed::PackedTree;
 pub use partition::{Part, Splitter, build_top_down};
 
+/// A tree with a normal for each node, or none.
+pub type Built = Result<(PackedTree, Vec<Vec3>), BuildError>;
+
 /// A builder of packed trees; [`Tree<Self>`](Tree) is the structure.
 pub trait TreeBuilder: Send + Sync {
     /// [`RegionIndex::INFO`]; `refits` and `ranges` are capabilities of every tree.
@@ -50,10 +53,7 @@ pub trait TreeBuilder: Send + Sync {
     ///
     /// # Errors
     /// The errors of [`RegionIndex::build`].
-    fn build(
-        input: &Input<'_>,
-        params: &Self::Params,
-    ) -> Result<(PackedTree, Vec<Vec3>), BuildError>;
+    fn build(input: &Input<'_>, params: &Self::Params) -> Built;
 }
 
 /// A packed tree by the builder `B`: [`Octree`](super::Octree),

@@ -11,7 +11,6 @@ use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Aabb, LANES};
-use crate::index::items::bounds_of_centres;
 use crate::query::ItemId;
 use crate::threads::share;
 
@@ -179,7 +178,7 @@ const BITS: u32 = 16;
 /// centres within their own bounds, 16 bits an axis.
 fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
     let centre = |id: ItemId| items[id as usize].centre();
-    let bounds = bounds_of_centres(ids.iter().map(|&id| centre(id)));
+    let bounds = Aabb::of_points(ids.iter().map(|&id| centre(id)));
     let cells = (1u32 << BITS) as f32;
     // In halves, so that the width of a scene of all numbers stays finite.
     let half = bounds.half_extent();

@@ -30,6 +30,16 @@ fn apart<P: Piece<Avx512>>(isa: Avx512, piece: P) -> P::Output {
 // instructions.
 // Loads and stores are unaligned ones within their arrays.
 
+/// Methods of [`Isa`] that are one instruction.
+macro_rules! lanewise {
+    ($($name:ident: $instruction:ident),+) => {$(
+        #[inline(always)]
+        fn $name(self, a: __m512, b: __m512) -> __m512 {
+            unsafe { $instruction(a, b) }
+        }
+    )+};
+}
+
 impl Isa for Avx512 {
     const MANY_REGISTERS: bool = true;
 
@@ -70,25 +80,10 @@ impl Isa for Avx512 {
     fn splat(self, x: f32) -> __m512 {
         unsafe { _mm512_set1_ps(x) }
     }
-    #[inline(always)]
-    fn add(self, a: __m512, b: __m512) -> __m512 {
-        unsafe { _mm512_add_ps(a, b) }
-    }
-    #[inline(always)]
-    fn mul(self, a: __m512, b: __m512) -> __m512 {
-        unsafe { _mm512_mul_ps(a, b) }
-    }
+    lanewise!(add: _mm512_add_ps, mul: _mm512_mul_ps, min: _mm512_min_ps, max: _mm512_max_ps);
     #[inline(always)]
     fn near_mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
         unsafe { _mm512_fmadd_ps(a, b, c) }
-    }
-    #[inline(always)]
-    fn min(self, a: __m512, b: __m512) -> __m512 {
-        unsafe { _mm512_min_ps(a, b) }
-    }
-    #[inline(always)]
-    fn max(self, a: __m512, b: __m512) -> __m512 {
-        unsafe { _mm512_max_ps(a, b) }
     }
     #[inline(always)]
     fn sub_abs(self, a: __m512, b: __m512) -> __m512 {

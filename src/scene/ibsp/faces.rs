@@ -23,7 +23,7 @@ const GRID: f64 = 64.0;
 
 /// Control points of a patch as triangles; an odd number in rows and columns.
 pub fn patch(points: &[Vec3], width: usize) -> Faces {
-    let bounds = bounds_of(points);
+    let bounds = Aabb::of_points(points.iter().copied());
     let (mut all, mut triangles) = (Vec::new(), Vec::new());
     let weights = |step: usize| {
         let t = step as f32 / SEGMENTS as f32;
@@ -50,12 +50,6 @@ pub fn patch(points: &[Vec3], width: usize) -> Faces {
         }
     }
     (all, triangles)
-}
-
-pub fn bounds_of(points: &[Vec3]) -> Aabb {
-    points.iter().fold(Aabb::EMPTY, |all, &p| {
-        Aabb::new(all.min.min(p), all.max.max(p))
-    })
 }
 
 /// The box of a brush: its first six sides are those of its box.

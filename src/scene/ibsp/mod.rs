@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use self::faces::{PER_PATCH, bounds_of, brush, brush_box, patch};
+use self::faces::{PER_PATCH, brush, brush_box, patch};
 use self::lumps::lump;
 pub use self::tree::{LeafNode, LeafTree};
 use super::records::Table;
@@ -237,6 +237,7 @@ fn faces_of(
     let of_vertex = |vertex| vertices.vector(vertex, 0);
     let points = surfaces.range(i, 12, vertices)?.map(of_vertex);
     let points = points.collect::<Result<Vec<Vec3>, _>>()?;
+    let bounds = Aabb::of_points(points.iter().copied());
     let label = match surfaces.int(i, 8) {
         1 => "polygon",
         2 => {
@@ -247,7 +248,7 @@ fn faces_of(
                 let found = format!("a patch of {width} x {height} of {} points", points.len());
                 return Err(surfaces.error(i, 96, found, "odd numbers from 3 on"));
             }
-            return Ok(Some(("patch", bounds_of(&points), patch(&points, width))));
+            return Ok(Some(("patch", bounds, patch(&points, width))));
         }
         3 => "mesh",
         4 => return Ok(None),
@@ -268,7 +269,7 @@ fn faces_of(
     // They turn right, seen from the front.
     let triangles = order.chunks_exact(3).map(|c| [c[0], c[2], c[1]]);
     let triangles: Vec<[u32; 3]> = triangles.collect();
-    Ok((!triangles.is_empty()).then(|| (label, bounds_of(&points), (points, triangles))))
+    Ok((!triangles.is_empty()).then(|| (label, bounds, (points, triangles))))
 }
 
 /// The places where players begin, looking as they do.

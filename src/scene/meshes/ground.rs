@@ -157,11 +157,8 @@ impl Shape {
     pub fn add(&mut self, other: &Shape) {
         let first = self.points.len() as u32;
         self.points.extend_from_slice(&other.points);
-        let moved = other
-            .triangles
-            .iter()
-            .map(|t| t.map(|corner| first + corner));
-        self.triangles.extend(moved);
+        let moved = |t: &[u32; 3]| t.map(|corner| first + corner);
+        self.triangles.extend(other.triangles.iter().map(moved));
     }
 }
 

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
+use crate::scene::families::lattice_cell;
 use crate::scene::rng::fractal;
 use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 
@@ -25,17 +26,10 @@ pub fn spheres(triangles: usize, seed: u64) -> Surfaces {
     let mut surfaces = Surfaces::about(DVec3::ZERO);
     let mut rng = SeededRng::new(seed);
     for i in 0..count {
-        let cell = DVec3::new(
-            (i % side) as f64,
-            (i / side % side) as f64,
-            (i / (side * side)) as f64,
-        );
-        let centre = (cell + rng.point() * 0.3) * SPACING;
+        let centre = (lattice_cell(i, side) + rng.point() * 0.3) * SPACING;
         let radius = rng.between(0.5, 2.0);
-        let points: Vec<Vec3> = directions
-            .iter()
-            .map(|d| (centre + *d * radius).as_vec3())
-            .collect();
+        let points = directions.iter().map(|d| (centre + d * radius).as_vec3());
+        let points: Vec<Vec3> = points.collect();
         surfaces.push(SurfaceKind::Opaque, false, &points, &faces);
     }
     surfaces
@@ -57,10 +51,8 @@ pub fn statue(triangles: usize, seed: u64) -> Surfaces {
     let frequency = libm::sqrt(triangles as f64 / 20.0) as u32;
     let (directions, faces) = icosphere(frequency);
     let shape = Body::new(seed);
-    let points: Vec<Vec3> = directions
-        .iter()
-        .map(|d| (*d * DVec3::new(1.0, 1.0, TALL) * shape.radius(*d)).as_vec3())
-        .collect();
+    let stretched = |d: &DVec3| (d * DVec3::new(1.0, 1.0, TALL) * shape.radius(*d)).as_vec3();
+    let points: Vec<Vec3> = directions.iter().map(stretched).collect();
     let mut surfaces = Surfaces::about(DVec3::ZERO);
     surfaces.push(SurfaceKind::Opaque, false, &points, &faces);
     surfaces
