@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::mem;
 use std::sync::{Mutex, PoisonError};
 
+use crate::shown::counted;
+
 /// Receiver of the lines, all lines so far, and warnings that were not told yet.
 type Told = (fn(&str), BTreeSet<String>, Vec<String>);
 
@@ -24,6 +26,13 @@ pub(crate) fn note(text: &str) {
             tell(&note);
         }
     });
+}
+
+/// A line for each count above zero of what it counts and what was done with it.
+pub(crate) fn note_counted<const N: usize>(file: &str, rows: [(usize, &str, &str); N]) {
+    for (count, one, what) in rows.into_iter().filter(|row| row.0 > 0) {
+        note(&format!("{file}: {} {what}", counted(count, one)));
+    }
 }
 
 /// Holds one line about a doubtful input for [`tell_warnings`].

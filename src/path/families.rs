@@ -31,13 +31,11 @@ pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, In
     let count = spec.whole_of("waypoints", 8, 4..=10_000)? as usize;
     let mut rng = stage.rng();
     let (low, extent) = (stage.bounds.min, stage.extent());
-    let points: Vec<DVec3> = (0..count)
-        .map(|_| {
-            let share = rng.point() * 0.8 + 0.1;
-            let z = stage.flight_level(share.z);
-            (low + extent * share).with_z(z)
-        })
-        .collect();
+    let points = (0..count).map(|_| {
+        let share = rng.point() * 0.8 + 0.1;
+        (low + extent * share).with_z(stage.flight_level(share.z))
+    });
+    let points: Vec<DVec3> = points.collect();
     let step = 1e-3;
     let pose = |turn: f64| {
         let at = turn * count as f64;
@@ -68,11 +66,7 @@ fn spline(points: &[DVec3], at: f64) -> DVec3 {
     let mix = |a: DVec3, b: DVec3, from: usize, to: usize| {
         a + (b - a) * ((t - knots[from]) / (knots[to] - knots[from]))
     };
-    let a = [
-        mix(p[0], p[1], 0, 1),
-        mix(p[1], p[2], 1, 2),
-        mix(p[2], p[3], 2, 3),
-    ];
+    let a = [0, 1, 2].map(|i| mix(p[i], p[i + 1], i, i + 1));
     let b = [mix(a[0], a[1], 0, 2), mix(a[1], a[2], 1, 3)];
     mix(b[0], b[1], 1, 2)
 }
@@ -137,11 +131,8 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputErr
         let i = turn * stage.count as f64;
         let z = 0.98 * (1.0 - 2.0 * turn);
         let ring = (1.0 - z * z).sqrt();
-        let arm = DVec3::new(
-            ring * libm::cos(i * GOLDEN_ANGLE),
-            ring * libm::sin(i * GOLDEN_ANGLE),
-            z,
-        );
+        let (x, y) = (libm::cos(i * GOLDEN_ANGLE), libm::sin(i * GOLDEN_ANGLE));
+        let arm = DVec3::new(ring * x, ring * y, z);
         Pose::new(stage.centre() + arm * distance, -arm)
     };
     Ok(stage.turns().map(pose).collect())
@@ -152,11 +143,12 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputErr
 /// Roll and lens are the file's, where it states them. `frames` of them at most.
 pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
     if stage.scene.places.is_empty() {
-        let reason = format!(
-            "scene '{}' has no camera places of its own; expected one with places, such as a Doom map",
+        let wanted = "expected one with places, such as a Doom map";
+        let found = format!(
+            "scene '{}' has no camera places of its own",
             stage.scene.name
         );
-        return Err(unfit("places", reason));
+        return Err(unfit("places", format_args!("{found}; {wanted}")));
     }
     let places = stage.scene.places.iter();
     let mut poses: Vec<Pose> = places.map(|place| pose(stage, place)).collect();

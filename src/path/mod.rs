@@ -383,9 +383,8 @@ impl Optics {
 
     fn cameras(&self, path: &str, up: UpAxis, poses: &[Pose]) -> Result<Vec<Camera>, InputError> {
         let camera = |pose: &Pose| -> Result<Camera, CameraError> {
-            let upward = pose
-                .view
-                .map_or_else(|| up_for(pose.forward), |view| view.up);
+            let own = pose.view.map(|view| view.up);
+            let upward = own.unwrap_or_else(|| up_for(pose.forward));
             let axes = [pose.eye, pose.forward, upward];
             let [eye, forward, upward] = axes.map(|v| up.from_z_up(v));
             let frame = Frame::looking_along(eye, forward, upward)?;
@@ -419,11 +418,8 @@ impl Optics {
             None => LensKind::Perspective { fovy_deg, aspect },
         };
         let near = if near { self.near } else { own.near };
-        let far = if far || self.visible.is_some() {
-            self.far
-        } else {
-            own.far
-        };
+        let is_named = far || self.visible.is_some();
+        let far = if is_named { self.far } else { own.far };
         Lens::new(kind, near, far.filter(|far| *far <= FARTHEST))
     }
 }

@@ -128,10 +128,8 @@ pub fn read_cameras_csv(
     let (all, empty) = (cameras.len(), cameras.len() - times.len());
     if ![0, all].contains(&empty) {
         times.clear();
-        let what = "rows; no time is used";
-        note(&format!(
-            "{file}: time_s is empty in {empty} of {all} {what}"
-        ));
+        let of = format!("{empty} of {all} rows");
+        note(&format!("{file}: time_s is empty in {of}; no time is used"));
     }
     Ok(CameraPath {
         lens_scale: None,
@@ -273,10 +271,9 @@ fn eyes<'a>(
         let fovy_deg = number(fovy.filter(|_| height.is_none()), defaults.fovy_deg)?;
         let aspect = number(aspect, defaults.aspect)?;
         let near = number(near, defaults.near.unwrap_or_else(|| defaults.near_of(far)))?;
-        let looking = if by_forward {
-            Frame::looking_along
-        } else {
-            look_at
+        let looking = match by_forward {
+            true => Frame::looking_along,
+            false => look_at,
         };
         let frame = looking(eye, target, up).map_err(|error| match error {
             CameraError::Invalid { found, .. } if !has_up && found.starts_with("up is") => {

@@ -57,10 +57,8 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputE
     let directions: Vec<DVec3> = (0..stage.count).map(|_| level(&mut rng)).collect();
     for _ in 0..MORE {
         // All places of an eye may have been under trees.
-        let high = stands
-            .iter_mut()
-            .filter(|stand| stand.is_on_top)
-            .collect::<Vec<_>>();
+        let high = stands.iter_mut().filter(|stand| stand.is_on_top);
+        let high: Vec<&mut Stand> = high.collect();
         let others = lowest(stage, height, high.len(), &mut rng);
         for (stand, other) in high.into_iter().zip(others) {
             if other.rise < stand.rise || !other.is_on_top {
@@ -69,9 +67,8 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputE
         }
     }
     let poses = stands.iter().zip(directions);
-    Ok(poses
-        .map(|(stand, ahead)| Pose::new(stand.eye, ahead))
-        .collect())
+    let poses = poses.map(|(stand, ahead)| Pose::new(stand.eye, ahead));
+    Ok(poses.collect())
 }
 
 /// A position that an eye may take.
@@ -164,8 +161,7 @@ fn fill(stage: &Stage, columns: &mut [Column]) {
     for item in 0..mesh.items() {
         for [p, q, r] in mesh.of(item) {
             let [u, v] = [q - p, r - p].map(|edge| stage.up.to_z_up(edge).truncate().as_dvec2());
-            let bounds = Aabb::new(p.min(q).min(r), p.max(q).max(r));
-            add(item, u.perp_dot(v) > 0.0, &bounds);
+            add(item, u.perp_dot(v) > 0.0, &Aabb::of_points([p, q, r]));
         }
     }
 }

@@ -41,10 +41,8 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputE
     let height = spec.number_between("height", natural, 0.0, 1e6)?;
     let doors = spec.count("doors", 32, 100_000)? as usize;
     if plan.doors.is_empty() {
-        let reason = format!(
-            "scene '{}' has no doors; expected rooms or a Doom map (the path 'street' needs none)",
-            stage.scene.name
-        );
+        let wanted = "expected rooms or a Doom map (the path 'street' needs none)";
+        let reason = format_args!("scene '{}' has no doors; {wanted}", stage.scene.name);
         return Err(unfit("walk", reason));
     }
     let way = plan.way(doors, height, &mut stage.rng());
@@ -57,10 +55,9 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputE
         let next = lengths.partition_point(|&l| l <= length).min(way.len() - 1);
         let from = next.saturating_sub(1);
         let step = lengths[next] - lengths[from];
-        let share = if step > 0.0 {
-            (length - lengths[from]) / step
-        } else {
-            0.0
+        let share = match step > 0.0 {
+            true => (length - lengths[from]) / step,
+            false => 0.0,
         };
         way[from].lerp(way[next], share.min(1.0))
     };
@@ -110,16 +107,14 @@ impl Plan {
 
     fn of_map(map: &WadMap) -> Plan {
         let floors = map.sectors.iter().map(|sector| sector.heights[0]);
-        let ends = |line: usize| {
-            map.lines[line]
-                .ends
-                .map(|end| DVec2::from(end.map(f64::from)))
-        };
+        let lines = map.lines.iter();
+        let walls = lines.map(|line| line.ends.map(|end| DVec2::from(end.map(f64::from))));
+        let walls: Vec<[DVec2; 2]> = walls.collect();
         let doors = map.lines.iter().enumerate().filter_map(|(i, line)| {
             let sides = [line.sectors[0]?, line.sectors[1]?];
             let [a, b] = sides.map(|side| map.sectors[side as usize].heights);
             let opening = a[1].min(b[1]) - a[0].max(b[0]);
-            let [from, to] = ends(i);
+            let [from, to] = walls[i];
             // A line with an effect may open.
             let is_way = sides[0] != sides[1] && (opening >= FITTING || line.action != 0);
             is_way.then_some(Door {
@@ -128,8 +123,8 @@ impl Plan {
                 wall: Some(i),
             })
         });
-        let walls = (0..map.lines.len()).map(ends).collect();
-        Plan::new(doors.collect(), floors.collect(), walls)
+        let doors = doors.collect();
+        Plan::new(doors, floors.collect(), walls)
     }
 
     /// Corners of a walk through `count` doors, eyes `height` above the floors.

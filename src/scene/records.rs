@@ -20,7 +20,52 @@ pub struct Table<'a> {
     pub record: usize,
 }
 
-impl Table<'_> {
+impl<'a> Table<'a> {
+    /// Some bytes of a file, each a record.
+    pub fn new(file: &'a str, name: &'static str, bytes: &'a [u8], range: Range<usize>) -> Self {
+        Table {
+            file,
+            name,
+            start: range.start,
+            data: &bytes[range],
+            record: 1,
+        }
+    }
+
+    /// The bytes whose offset and number stand at the entry of a directory.
+    ///
+    /// An empty table is at its entry: its offset means nothing.
+    pub fn of_entry(
+        file: &'a str,
+        name: &'static str,
+        bytes: &'a [u8],
+        entry: usize,
+    ) -> Result<Self, InputError> {
+        let [offset, size] = [0, 4].map(|at| int_at(bytes, entry + at));
+        let range = match size {
+            0 => Some(entry..entry),
+            _ => range_within(offset, size, bytes.len()),
+        };
+        let range = range.ok_or_else(|| {
+            let found = format!("lump {name} at {offset}, {size} bytes long");
+            let expected = format!("a lump within the file's {} bytes", bytes.len());
+            InputError::byte(file, entry, found, expected)
+        })?;
+        Ok(Table::new(file, name, bytes, range))
+    }
+
+    /// The same bytes as records of a size.
+    pub fn of_records(self, record: usize) -> Result<Self, InputError> {
+        let size = self.data.len();
+        match size.is_multiple_of(record) {
+            true => Ok(Table { record, ..self }),
+            false => {
+                let found = format!("{} of {size} bytes", self.name);
+                Err(self.error(0, 0, found, format!("a multiple of {record} bytes")))
+            }
+        }
+    }
+
     pub fn len(&self) -> usize {
         self.data.len() / self.record
     }

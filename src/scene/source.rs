@@ -15,8 +15,8 @@ use super::{
     FAMILIES, Family, ItemKind, LoadOptions, MESHES, Regions, SAMPLES, Sample, Scene, WadMap,
     boxes_csv, map_names,
 };
-use crate::input::{InputError, is_readable, note, read_file};
-use crate::shown::{counted, shortened};
+use crate::input::{InputError, is_readable, note, note_counted, read_file};
+use crate::shown::shortened;
 use crate::spec::{Spec, SpecError, nearest};
 
 /// First part of the name of every mesh.
@@ -76,12 +76,8 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     }
     let is_of_map = matches!(options.items, ItemKind::Surfaces | ItemKind::Brushes);
     if let Regions::Leaves(map) = &scene.regions {
-        if map.bare > 0 {
-            let bare = counted(map.bare, "surface");
-            note(&format!(
-                "{source}: {bare} without triangles (flares), no items"
-            ));
-        }
+        let what = "without triangles (flares), no items";
+        note_counted(source, [(map.bare, "surface", what)]);
     } else if is_of_map {
         let items = options.items.name();
         let expected =

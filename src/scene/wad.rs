@@ -162,11 +162,9 @@ impl WadMap {
         let sectors = line.sectors.iter().flatten();
         // A closed door's ceiling may lie below its floor.
         let heights = sectors.flat_map(|&sector| self.sectors[sector as usize].heights);
-        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| {
-            (low.min(z), high.max(z))
-        });
         let [a, b] = line.ends.map(|[x, y]| DVec2::new(x.into(), y.into()));
-        WorldBox::new(a.min(b).extend(low), a.max(b).extend(high))
+        let corners = heights.flat_map(|z| [a, b].map(|end| WorldBox::at(end.extend(z))));
+        WorldBox::union_of(corners)
     }
 
     /// The map as a scene: linedefs first, then things, in lump order.

@@ -5,8 +5,8 @@ use std::collections::HashSet;
 use super::animation::part;
 use super::file::File;
 use super::{Order, Placed};
-use crate::input::note;
-use crate::shown::{counted, first_of, shortened};
+use crate::input::{note, note_counted};
+use crate::shown::{first_of, shortened};
 
 /// Parts of names of extensions that need no note.
 ///
@@ -46,7 +46,7 @@ impl File<'_> {
         let read = |is: &dyn Fn(usize) -> bool| order.iter().filter(|(node, _)| is(*node)).count();
         let has_mesh = |node: usize| nodes[node].mesh.is_some();
         let meshes = (0..nodes.len()).filter(|node| has_mesh(*node)).count();
-        for (count, one, what) in [
+        note_counted(self.name, [
             (items(&|i| nodes[i.node].skin.is_some()), "item", "with a skin, placed by its node and not by joints"),
             (items(&is_morphed), "item", "with morph weights, as stored and not morphed"),
             (items(&|i| moved[i.node]), "item", "that an animation moves, where its node stands"),
@@ -54,11 +54,7 @@ impl File<'_> {
             (read(&|n| nodes[n].camera.is_some()) - cameras, "camera", "without a direction of view, left out"),
             (root.scenes.len().saturating_sub(1), "further scene", "not read"),
             (meshes - read(&has_mesh), "node", "with a mesh outside of the scene, not read"),
-        ] {
-            if count > 0 {
-                note(&format!("{}: {} {what}", self.name, counted(count, one)));
-            }
-        }
+        ]);
         let is_unknown = |name: &&String| !HARMLESS.iter().any(|part| name.contains(part));
         let required = root.extensions_required.iter().filter(is_unknown);
         let names: Vec<String> = required.map(|name| shortened(name, 40)).collect();

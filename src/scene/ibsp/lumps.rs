@@ -1,7 +1,7 @@
 //! The lumps of an IBSP file: tables of 32-bit numbers. No byte is trusted.
 
 use crate::input::InputError;
-use crate::scene::records::{Table, int_at, range_within};
+use crate::scene::records::Table;
 
 /// Names and sizes of the records of the lumps, in their order.
 const LUMPS: [(&str, usize); 17] = [
@@ -40,8 +40,6 @@ const OTHERS: [(&[u8], &str); 7] = [
 /// Another format, a lump beyond the file or one that is no whole number of records.
 pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'a>, InputError> {
     let (name, record) = LUMPS[number];
-    let error =
-        |offset, found, expected: String| Err(InputError::byte(file, offset, found, expected));
     if !bytes.starts_with(b"IBSP\x2e\0\0\0") {
         let other = OTHERS.iter().find(|other| bytes.starts_with(other.0));
         let start = bytes.get(..8).unwrap_or(bytes).escape_ascii();
@@ -49,29 +47,18 @@ pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'
             Some((_, engine)) => format!("a map of {engine}"),
             None => format!("'{start}'"),
         };
-        return error(0, found, "IBSP of version 46 (Quake III)".to_owned());
+        let expected = "IBSP of version 46 (Quake III)";
+        return Err(InputError::byte(file, 0, found, expected));
     }
     let entry = 8 + 8 * number;
     if bytes.len() < entry + 8 {
-        let found = "the end of the file".to_owned();
-        return error(bytes.len(), found, "a directory of 17 lumps".to_owned());
+        let expected = "a directory of 17 lumps";
+        return Err(InputError::byte(
+            file,
+            bytes.len(),
+            "the end of the file",
+            expected,
+        ));
     }
-    let [at, length] = [0, 4].map(|part| int_at(bytes, entry + part));
-    let Some(range) = range_within(at, length, bytes.len()) else {
-        let found = format!("{name} at {at}, {length} bytes long");
-        let expected = format!("within the file's {} bytes", bytes.len());
-        return error(entry, found, expected);
-    };
-    let (start, data) = (range.start, &bytes[range]);
-    if data.len() % record != 0 {
-        let found = format!("{name} of {length} bytes");
-        return error(entry, found, format!("a multiple of {record} bytes"));
-    }
-    Ok(Table {
-        file,
-        name,
-        start,
-        data,
-        record,
-    })
+    Table::of_entry(file, name, bytes, entry)?.of_records(record)
 }

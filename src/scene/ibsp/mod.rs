@@ -20,8 +20,7 @@ use super::{
     CameraPlace, ItemKind, Labels, LoadOptions, Regions, Scene, SurfaceKind, Surfaces, WorldBox,
 };
 use crate::geometry::Aabb;
-use crate::input::{InputError, note};
-use crate::shown::counted;
+use crate::input::{InputError, note_counted};
 
 /// Height of a player's eyes above a spawn point, in map units.
 const EYE_HEIGHT: f64 = 26.0;
@@ -315,11 +314,7 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
     }
     let bad = (bad, "spawn point", "without a place, left out");
     let what = "with an origin, where the file has it and not there";
-    for (count, one, what) in [bad, (moved, "part", what)] {
-        if count > 0 {
-            note(&format!("{file}: {} {what}", counted(count, one)));
-        }
-    }
+    note_counted(file, [bad, (moved, "part", what)]);
     places
 }
 

@@ -4,9 +4,8 @@
 
 use std::collections::HashSet;
 use std::fmt::Display;
-use std::ops::Range;
 
-use super::records::{Table, int_at, range_within};
+use super::records::{Table, int_at};
 use crate::input::InputError;
 use crate::shown::{first_of, part_hint};
 
@@ -161,33 +160,22 @@ impl<'a> Wad<'a> {
         }
         let table = |of: &'static str, record: usize| -> Result<Table<'_>, InputError> {
             let at = self.lumps[marker].entry;
-            let range = match lump(of) {
-                Some(lump) => self.range(lump)?,
-                None if MAY_LACK.contains(&of) => at..at,
+            let table = match lump(of) {
+                Some(lump) => Table::of_entry(self.file, of, self.bytes, lump.entry)?,
+                None if MAY_LACK.contains(&of) => Table::new(self.file, of, self.bytes, at..at),
                 None => {
                     let found = format!("map {name} without {of}");
                     return Err(self.error(at, found, "all lumps of a Doom map, in their order"));
                 }
             };
-            let (start, data) = (range.start, &self.bytes[range]);
-            let mut kinds = NODE_KINDS.iter();
-            if let Some((magic, kind)) = kinds.find(|kind| data.starts_with(kind.0.as_bytes()))
+            let begins = |kind: &&(&str, &str)| table.data.starts_with(kind.0.as_bytes());
+            if let Some((magic, kind)) = NODE_KINDS.iter().find(begins)
                 && BUILT.contains(&of)
             {
                 let found = format!("map {name} with {kind} nodes ({magic} in {of})");
-                return Err(self.error(start, found, OWN_NODES));
+                return Err(self.error(table.start, found, OWN_NODES));
             }
-            if data.len() % record != 0 {
-                let found = format!("{of} of {} bytes", data.len());
-                return Err(self.error(start, found, format!("a multiple of {record} bytes")));
-            }
-            Ok(Table {
-                file: self.file,
-                name: of,
-                start,
-                data,
-                record,
-            })
+            table.of_records(record)
         };
         let [segs, leaves] = [table("SEGS", 12)?, table("SSECTORS", 4)?];
         let nodes = table("NODES", 28)?;
@@ -214,21 +202,6 @@ impl<'a> Wad<'a> {
             nodes,
             sectors: table("SECTORS", 26)?,
             reject: table("REJECT", 1)?.data,
-        })
-    }
-
-    /// The bytes of a lump; an empty range at the directory entry for an empty lump,
-    /// whose place means nothing.
-    fn range(&self, lump: &Lump) -> Result<Range<usize>, InputError> {
-        let [offset, size] = [0, 4].map(|at| int_at(self.bytes, lump.entry + at));
-        if size == 0 {
-            return Ok(lump.entry..lump.entry);
-        }
-        let whole = range_within(offset, size, self.bytes.len());
-        whole.ok_or_else(|| {
-            let found = format!("lump {} at {offset}, {size} bytes long", lump.name);
-            let expected = format!("a lump within the file's {} bytes", self.bytes.len());
-            self.error(lump.entry, found, expected)
         })
     }
 

@@ -10,7 +10,8 @@ type Lumps = Vec<(String, Vec<u8>)>;
 /// The lumps of the sample: a marker and those of its map.
 fn map12() -> Lumps {
     let wad = Wad::open(MAP12, "in.wad").unwrap();
-    let lump = |l: &Lump| (l.name.clone(), MAP12[wad.range(l).unwrap()].to_vec());
+    let data = |l: &Lump| Table::of_entry("in.wad", "", MAP12, l.entry).unwrap().data;
+    let lump = |l: &Lump| (l.name.clone(), data(l).to_vec());
     wad.lumps.iter().map(lump).collect()
 }
 
