@@ -4,6 +4,7 @@
 //! mechanics that the box, camera and point readers share; what the columns mean is theirs.
 
 use std::collections::HashSet;
+use std::fmt::Display;
 
 use super::{InputError, finite, note};
 use crate::shown::{counted, first_of, shortened};
@@ -60,10 +61,8 @@ impl<'b> TableReader<'b> {
             .from_reader(bytes);
         // From memory nothing fails to be read.
         let fields = csv.headers().cloned().unwrap_or_default();
-        let header = fields
-            .iter()
-            .map(|name| name.trim_start_matches('\u{feff}').to_owned());
-        let header: Vec<String> = header.collect();
+        let plain = |name: &str| name.trim_start_matches('\u{feff}').to_owned();
+        let header: Vec<String> = fields.iter().map(plain).collect();
         let mut table = TableReader {
             file: file.to_owned(),
             bytes,
@@ -75,25 +74,24 @@ impl<'b> TableReader<'b> {
             at: (0, 1),
         };
         table.header_line = table.line_of_record_at(0);
-        let complain = |found: String, expected: &str| table.error(found, expected.to_owned());
         check_quotes(bytes, delimiter, file)?;
         if header.iter().all(String::is_empty) {
             let found = match header.len() {
                 0 | 1 => "an empty file".to_owned(),
                 columns => format!("{} without a name", counted(columns, "column")),
             };
-            return Err(complain(found, "a header line"));
+            return Err(table.error(found, "a header line"));
         }
         let mut seen = HashSet::with_capacity(header.len());
         for name in header.iter().filter(|name| !name.is_empty()) {
             if seen.contains(name.as_str()) && is_data(&header) {
                 let all = joined(&header, delimiter);
                 let found = format!("data '{all}' in place of the header");
-                return Err(complain(found, "a line with the names of the columns"));
+                return Err(table.error(found, "a line with the names of the columns"));
             }
             if !seen.insert(name.as_str()) {
                 let found = format!("column '{}' twice", shortened(name, 60));
-                return Err(complain(found, "each column once"));
+                return Err(table.error(found, "each column once"));
             }
         }
         table.header = header;
@@ -141,7 +139,7 @@ impl<'b> TableReader<'b> {
     }
 
     /// An error in the header.
-    pub fn error(&self, found: String, expected: String) -> InputError {
+    pub fn error(&self, found: impl Display, expected: impl Display) -> InputError {
         InputError::line(&self.file, self.header_line, found, expected)
     }
 
@@ -153,22 +151,20 @@ impl<'b> TableReader<'b> {
             !name.is_empty() && !known.contains(&name) && !LABELS.contains(&name)
         };
         let unread = self.header.iter().filter(is_unread);
-        let named: Vec<String> = unread
-            .map(|name| {
-                let synonym = synonyms.iter().find(|(other, _)| name == other);
-                let guess = synonym.map(|(_, guess)| *guess);
-                let shown = shortened(name, 60);
-                match guess.or_else(|| nearest(&shown, known.iter().copied())) {
-                    Some(guess) => format!("'{shown}' (did you mean '{guess}'?)"),
-                    None => format!("'{shown}'"),
-                }
-            })
-            .collect();
+        let named = unread.map(|name| {
+            let synonym = synonyms.iter().find(|(other, _)| name == other);
+            let guess = synonym.map(|(_, guess)| *guess);
+            let shown = shortened(name, 60);
+            match guess.or_else(|| nearest(&shown, known.iter().copied())) {
+                Some(guess) => format!("'{shown}' (did you mean '{guess}'?)"),
+                None => format!("'{shown}'"),
+            }
+        });
+        let named: Vec<String> = named.collect();
         if !named.is_empty() {
-            let (file, line, named) = (&self.file, self.header_line, first_of(&named, 16));
-            note(&format!(
-                "{file}, line {line}: columns that are not read: {named}"
-            ));
+            let place = format!("{}, line {}", self.file, self.header_line);
+            let named = first_of(&named, 16);
+            note(&format!("{place}: columns that are not read: {named}"));
         }
     }
 
@@ -191,11 +187,8 @@ impl<'b> TableReader<'b> {
                 // If all are numbers, some of them may be behind a decimal comma.
                 let is_split = self.delimiter == b',' && found > wanted;
                 let is_split = is_split && (0..found).all(|k| row.text(k).parse::<f64>().is_ok());
-                let why = match is_split {
-                    true => ", without decimal commas",
-                    false => "",
-                };
-                let expected = format!("{wanted}, as in the header{why}");
+                let why = is_split.then_some(", without decimal commas");
+                let expected = format!("{wanted}, as in the header{}", why.unwrap_or(""));
                 Err(row.error(counted(found, "field"), expected))
             }
         })
@@ -217,7 +210,7 @@ impl Row<'_> {
     pub fn finite_number(&self, column: usize) -> Result<f64, InputError> {
         finite(self.text(column)).map_err(|expected| {
             let (name, text) = (&self.header[column], shortened(self.text(column), 60));
-            self.error(format!("{name} '{text}'"), expected.to_owned())
+            self.error(format_args!("{name} '{text}'"), expected)
         })
     }
 
@@ -227,7 +220,7 @@ impl Row<'_> {
     }
 
     /// An error at this row.
-    pub fn error(&self, found: String, expected: String) -> InputError {
+    pub fn error(&self, found: impl Display, expected: impl Display) -> InputError {
         InputError::line(self.file, self.line, found, expected)
     }
 }
@@ -285,11 +278,7 @@ fn lines(bytes: &[u8]) -> u64 {
 /// open another field.
 fn check_quotes(bytes: &[u8], delimiter: u8, file: &str) -> Result<(), InputError> {
     // A byte order mark, which the CSV reader drops.
-    let mut begin = if bytes.starts_with(b"\xef\xbb\xbf") {
-        3
-    } else {
-        0
-    };
+    let mut begin = 3 * usize::from(bytes.starts_with(b"\xef\xbb\xbf"));
     let fault = |open: usize, found: String| {
         let expected = "'\"' at both ends of a field, and doubled within it";
         InputError::line(file, lines(&bytes[..open]) + 1, found, expected)

@@ -113,12 +113,11 @@ fn finite(range: Option<[f64; 2]>) -> [Option<f64>; 2] {
 
 /// Lens of a camera; that of a matrix without one stays the matrix.
 fn plain_lens(camera: &Camera) -> Lens {
-    match camera.lens.kind() {
-        LensKind::Matrix(matrix) => matrix
-            .unprojected()
-            .map_or(camera.lens, |found| found.camera.lens),
-        _ => camera.lens,
-    }
+    let LensKind::Matrix(matrix) = camera.lens.kind() else {
+        return camera.lens;
+    };
+    let found = matrix.unprojected();
+    found.map_or(camera.lens, |found| found.camera.lens)
 }
 
 fn fovy_deg(lens: &Lens) -> Option<f64> {
@@ -268,12 +267,10 @@ fn rolled_up(up: UpAxis, camera: &Camera) -> Option<DVec3> {
 
 /// Matrices that are no camera's, and those whose transposes are.
 fn unstraight(cameras: &[Camera]) -> Option<String> {
-    let matrices = cameras
-        .iter()
-        .filter_map(|camera| match camera.lens.kind() {
-            LensKind::Matrix(matrix) if !matrix.is_straight() => Some(matrix),
-            _ => None,
-        });
+    let matrices = cameras.iter().filter_map(|c| match c.lens.kind() {
+        LensKind::Matrix(matrix) if !matrix.is_straight() => Some(matrix),
+        _ => None,
+    });
     let matrices: Vec<&ViewProjection> = matrices.collect();
     let first = matrices.first()?;
     let what = share(matrices.len(), cameras);

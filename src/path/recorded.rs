@@ -111,7 +111,7 @@ pub fn read_cameras_csv(
             let time = row.finite_number(column)?;
             if time < last {
                 let found = format!("time_s {time} after {last}");
-                return Err(row.error(found, "times in ascending order".to_owned()));
+                return Err(row.error(found, "times in ascending order"));
             }
             last = time;
             times.push(time);
@@ -172,10 +172,8 @@ fn rows<T>(
 /// The error of a row whose numbers make no camera.
 fn refused(row: &Row, error: &CameraError) -> InputError {
     match error {
-        CameraError::Invalid { found, expected } => {
-            row.error(found.clone(), (*expected).to_owned())
-        }
-        other => row.error(other.to_string(), "a camera".to_owned()),
+        CameraError::Invalid { found, expected } => row.error(found, expected),
+        other => row.error(other, "a camera"),
     }
 }
 
@@ -199,17 +197,13 @@ fn matrices<'a>(
 ) -> Result<CameraReader<'a>, InputError> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
     if let Some(other) = OF_EYES.iter().find(|name| table.column(name).is_some()) {
-        return Err(table.error(
-            format!("columns of a matrix and '{other}'"),
-            "m00 to m33 alone, or an eye and a lens".to_owned(),
-        ));
+        let found = format_args!("columns of a matrix and '{other}'");
+        return Err(table.error(found, "m00 to m33 alone, or an eye and a lens"));
     }
     let convention = convention.ok_or_else(|| {
         let known = MATRIX_CONVENTIONS.map(|row| row.1).join(", ");
-        table.error(
-            "matrices, but not how to read them".to_owned(),
-            format!("--matrix-convention with one of {known}"),
-        )
+        let expected = format!("--matrix-convention with one of {known}");
+        table.error("matrices, but not how to read them", expected)
     })?;
     Ok(Box::new(move |row| {
         let mut entries = [[0.0; 4]; 4];
@@ -227,19 +221,15 @@ fn eyes<'a>(
     let vector = |name: &str| {
         let names = ["x", "y", "z"].map(|axis| format!("{name}_{axis}"));
         let has_any = names.iter().any(|name| table.column(name).is_some());
-        (
-            has_any,
-            table.columns(&names.each_ref().map(String::as_str)),
-        )
+        let columns = table.columns(&names.each_ref().map(String::as_str));
+        (has_any, columns)
     };
     let eye = vector("eye").1?;
     let [(has_look, look), (by_forward, forward), (has_up, up)] =
         ["look", "forward", "up"].map(vector);
     if has_look && by_forward {
-        return Err(table.error(
-            "columns look_* and forward_*".to_owned(),
-            "a place to look at or a direction, not both".to_owned(),
-        ));
+        let expected = "a place to look at or a direction, not both";
+        return Err(table.error("columns look_* and forward_*", expected));
     }
     let target = if by_forward { forward? } else { look? };
     let up = has_up.then_some(up).transpose()?;
@@ -264,8 +254,7 @@ fn eyes<'a>(
         let is_filled = |column: &usize| !row.text(*column).is_empty();
         let height = height.filter(is_filled);
         if height.and(fovy).is_some_and(|column| is_filled(&column)) {
-            let found = "fovy_deg and ortho_height".to_owned();
-            return Err(row.error(found, "one of them, not both".to_owned()));
+            return Err(row.error("fovy_deg and ortho_height", "one of them, not both"));
         }
         let height = height.map(|column| row.finite_number(column)).transpose()?;
         let fovy_deg = number(fovy.filter(|_| height.is_none()), defaults.fovy_deg)?;

@@ -7,6 +7,7 @@
 //! appendix B1, "Object Files (.obj)".
 
 use std::collections::BTreeSet;
+use std::fmt::Display;
 
 use glam::DVec3;
 
@@ -66,8 +67,8 @@ pub fn read_obj(
     let triangles = obj.corners.len() as u64;
     let number = number.max(2) - 1;
     if triangles == 0 {
-        let found = "no faces".to_owned();
-        return Err(obj.error(number, found, "at least one line 'f' with three corners"));
+        let expected = "at least one line 'f' with three corners";
+        return Err(obj.error(number, "no faces", expected));
     }
     if triangles > u64::from(u32::MAX) / 4 || obj.points.len() as u64 > u64::from(u32::MAX) {
         let found = format!("{triangles} triangles");
@@ -124,7 +125,7 @@ struct Obj<'f> {
 }
 
 impl Obj<'_> {
-    fn error(&self, line: u64, found: String, expected: &str) -> InputError {
+    fn error(&self, line: u64, found: impl Display, expected: impl Display) -> InputError {
         InputError::line(self.file, line, found, expected)
     }
 
@@ -166,7 +167,7 @@ impl Obj<'_> {
                 });
                 let fan: Vec<[u32; 3]> = fan.collect::<Result<_, InputError>>()?;
                 if fan.is_empty() {
-                    return Err(self.error(number, "2 corners".to_owned(), "three or more"));
+                    return Err(self.error(number, "2 corners", "three or more"));
                 }
                 self.corners.extend(fan);
             }
@@ -180,8 +181,7 @@ impl Obj<'_> {
                 self.items.push((name, self.corners.len()));
             }
             _ if word.contains(&0) => {
-                let found = "zero bytes, as in UTF-16 text".to_owned();
-                return Err(self.error(number, found, "UTF-8 text"));
+                return Err(self.error(number, "zero bytes, as in UTF-16 text", "UTF-8 text"));
             }
             _ if KNOWN.contains(&word) || self.unread.len() == MOST_UNREAD => {}
             _ => {
@@ -208,7 +208,7 @@ impl Obj<'_> {
                     0 => "vertices before faces".to_owned(),
                     _ => format!("an index from 1 to {count} or from -{count} to -1"),
                 };
-                Err(self.error(number, found, &expected))
+                Err(self.error(number, found, expected))
             }
         }
     }

@@ -114,10 +114,8 @@ impl<'f> File<'f> {
         };
         let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
         // Some exporters pad with zero bytes in the place of spaces.
-        let json = &json[..json
-            .iter()
-            .rposition(|byte| *byte != 0)
-            .map_or(0, |last| last + 1)];
+        let last = json.iter().rposition(|byte| *byte != 0);
+        let json = &json[..last.map_or(0, |last| last + 1)];
         let root = serde_json::from_slice(json).or_else(|e| {
             let json: Value = serde_json::from_slice(json).unwrap_or_default();
             // In glTF 1.0, what 2.0 numbers has names.
@@ -223,20 +221,14 @@ impl<'f> File<'f> {
         let Some(view) = accessor.buffer_view.filter(|_| accessor.sparse.is_none()) else {
             return Ok(Err("has sparse accessors or none with bytes".to_owned()));
         };
-        let view = self.get(
-            &self.root.buffer_views,
-            view,
-            &format!("{place}.bufferView"),
-        )?;
+        let of_view = format!("{place}.bufferView");
+        let view = self.get(&self.root.buffer_views, view, &of_view)?;
         let extensions = view.extensions.as_ref();
         if let Some(name) = extensions.and_then(|e| e.others.keys().next()) {
             return Ok(Err(format!("is compressed ({})", shortened(name, 40))));
         }
-        let buffer = self.get(
-            &self.buffers,
-            Index::new(view.buffer.value() as u32),
-            &place,
-        )?;
+        let buffer = Index::new(view.buffer.value() as u32);
+        let buffer = self.get(&self.buffers, buffer, &place)?;
         let size = kind.size() * width;
         let stride = view.byte_stride.filter(|_| accessor.count.0 > 1);
         let stride = stride.map_or(size, |stride| stride.0);
@@ -252,9 +244,8 @@ impl<'f> File<'f> {
         };
         let elements = own.chunks(stride).take(count as usize);
         let numbers = elements.flat_map(|element| element[..size].chunks_exact(kind.size()));
-        Ok(Ok(numbers
-            .map(|bytes| number(bytes, kind, accessor.normalized))
-            .collect()))
+        let numbers = numbers.map(|bytes| number(bytes, kind, accessor.normalized));
+        Ok(Ok(numbers.collect()))
     }
 }
 

@@ -107,9 +107,8 @@ impl File<'_> {
         place: &str,
     ) -> Result<Mesh, InputError> {
         let extensions = primitive.extensions.as_ref();
-        if let Some(name) =
-            extensions.and_then(|e| e.others.keys().find(|n| n.contains("compression")))
-        {
+        let mut names = extensions.into_iter().flat_map(|e| e.others.keys());
+        if let Some(name) = names.find(|name| name.contains("compression")) {
             return Ok(Err(format!("is compressed ({})", shortened(name, 40))));
         }
         let points: Vec<DVec3> = match self.values(positions, 3, place)? {
@@ -123,13 +122,8 @@ impl File<'_> {
                 Err(reason) => return Ok(Err(reason)),
             },
         };
-        if let Some(index) = order.iter().find(|&&index| index as usize >= points.len()) {
-            let expected = format!("an index below {}", points.len());
-            return Err(self.error(
-                format!("{place}.indices"),
-                format!("index {index}"),
-                &expected,
-            ));
+        if let Some(&index) = order.iter().find(|&&index| index as usize >= points.len()) {
+            self.get(&points, Index::new(index), &format!("{place}.indices"))?;
         }
         let is_bad = |&&index: &&u32| !points[index as usize].is_finite();
         if let Some(&index) = order.iter().find(is_bad) {
@@ -138,9 +132,7 @@ impl File<'_> {
             return Err(self.error(place, found, "finite numbers"));
         }
         let corners: Vec<[u32; 3]> = match primitive.mode {
-            Checked::Valid(Mode::Triangles) => {
-                order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
-            }
+            Checked::Valid(Mode::Triangles) => order.as_chunks().0.to_vec(),
             Checked::Valid(Mode::TriangleStrip) => {
                 let strip = order.windows(3).enumerate();
                 strip.map(|(i, c)| [c[i % 2], c[1 - i % 2], c[2]]).collect()

@@ -79,11 +79,9 @@ pub(super) fn read_beside(
     let meshes: Vec<Mesh> = meshes
         .map(|mesh| file.mesh(mesh))
         .collect::<Result<_, _>>()?;
-    let mut labels = Labels::new("name".to_owned());
-    for item in &placed {
-        let node = file.root.nodes[item.node].name.as_deref();
-        labels.push(node.unwrap_or_default());
-    }
+    let mut labels = Labels::new("name");
+    let names = placed.iter().map(|item| &file.root.nodes[item.node].name);
+    names.for_each(|name| labels.push(name.as_deref().unwrap_or_default()));
     let reason = |mesh: usize| Some((mesh, meshes[mesh].as_ref().err()?));
     let unplain = placed.iter().find_map(|item| reason(item.mesh));
     let scene = match unplain {
@@ -173,24 +171,23 @@ impl File<'_> {
                 let matrix = DMat4::from_cols_array(&matrix);
                 let last = matrix.row(3);
                 if last.is_finite() && !last.abs_diff_eq(DVec4::W, 1e-6) {
-                    let (place, found) = (
-                        format!("nodes[{index}].matrix"),
-                        format!("a last row of {last}"),
-                    );
+                    let (place, found) = ("matrix", format!("a last row of {last}"));
+                    let place = format!("nodes[{index}].{place}");
                     return Err(self.error(place, found, "[0, 0, 0, 1]"));
                 }
                 DAffine3::from_mat4(matrix)
             }
             Err(_) => transform(self.parts(index)),
         };
-        match found.is_finite() {
-            true => Ok(found),
-            false => Err(self.error(
-                format!("nodes[{index}]"),
-                "a transform that is not finite",
-                "finite numbers and a rotation that is not zero",
-            )),
+        if found.is_finite() {
+            return Ok(found);
         }
+        let (place, found) = (format!("nodes[{index}]"), "a transform that is not finite");
+        Err(self.error(
+            place,
+            found,
+            "finite numbers and a rotation that is not zero",
+        ))
     }
 
     /// The parts of the transform of a node that it states.
@@ -215,10 +212,9 @@ impl File<'_> {
         let place = format!("nodes[{index}].extensions.EXT_mesh_gpu_instancing");
         let index = |at: &Value| Some(Index::new(u32::try_from(at.as_u64()?).unwrap_or(u32::MAX)));
         let all = attributes.as_object().into_iter().flat_map(Map::values);
-        let counts = all.filter_map(index).map(|at| {
-            let accessor = self.get(&self.root.accessors, at, &place)?;
-            Ok(accessor.count.0)
-        });
+        let accessors = all.filter_map(index);
+        let accessors = accessors.map(|at| self.get(&self.root.accessors, at, &place));
+        let counts = accessors.map(|accessor| Ok(accessor?.count.0));
         let counts: Vec<u64> = counts.collect::<Result<_, InputError>>()?;
         let [least, count] = [counts.iter().min(), counts.iter().max()].map(|c| *c.unwrap_or(&0));
         let bytes: usize = self.buffers.iter().map(|buffer| buffer.len()).sum();
