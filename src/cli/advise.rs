@@ -3,8 +3,7 @@
 
 use super::advise_table::show;
 use super::args::AdviseArgs;
-use super::processes::Message;
-use super::processes::{Job, Timing};
+use super::processes::{Job, Message, Timing};
 use super::study::{Setting, Study};
 use super::{Ending, print, tell, text};
 use crate::advise::{self, AdviseInput, AdviseOptions, TrialPlan};
@@ -50,11 +49,11 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
             share,
             samples: false,
         };
-        let found = study.workers.found(process, scene, &begin)?;
-        parts.extend(found.into_iter().filter_map(|said| match said {
+        let part = |said| match said {
             Message::Part(part, _) => Some(*part),
             _ => None,
-        }));
+        };
+        parts.extend(study.workers.found(process, scene, &begin, part)?);
         study.advance();
     }
     let prepared = advise::prepare(&input, Group::of(&parts).cells, &begin)?;
@@ -72,9 +71,6 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
     let study = &args.study;
     let structures = study.kernel.structures(registry, &study.structure)?;
     let alone = Experiment::new(&study.scene).path(&study.path);
-    if let [_, second, ..] = &args.moves.motion[..] {
-        anyhow::bail!("--motion '{second}' is a second one; expected one motion");
-    }
     let mut plan = Plan {
         lens: study.lens.defaults()?,
         load: study.scene_args.options(structures.len()),

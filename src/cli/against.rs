@@ -17,7 +17,7 @@ use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{CompareTable, Side};
 use super::interrupt::{self, Interrupted};
 use super::processes::{Job, Message, Request, Worker, processors, see_through};
-use super::run_resume::RunOptions;
+use super::run_resume::TypedOptions;
 use super::study::progress;
 use super::{run_plan, text};
 use crate::index::Registry;
@@ -148,7 +148,7 @@ fn side(program: &Path) -> anyhow::Result<Side> {
 
 /// The options of `run` that were typed behind `compare`.
 fn typed() -> anyhow::Result<Vec<String>> {
-    Ok(RunOptions::of("compare", std::env::args_os())?.words(|_| true))
+    Ok(TypedOptions::of("compare", "run", std::env::args_os())?.words(|_| true))
 }
 
 /// The arguments of `run` for the same measurement.

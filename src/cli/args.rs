@@ -8,12 +8,9 @@ use crate::drift::{ARMS, ArmKind};
 use crate::funnel::StageKind;
 use crate::stress::extremes::DEFAULT_CASES;
 use clap::builder::ArgPredicate;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
-use super::command_args::CompareArgs;
-use super::command_args::FunnelArgs;
-use super::command_args::SceneCommand;
-use super::command_args::ViewArgs;
+use super::command_args::{CompareArgs, FunnelArgs, SceneCommand, ViewArgs};
 use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, MotionArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs,
     TableFormat, WhatArgs,
@@ -319,6 +316,7 @@ pub struct PrecisionArgs {
 
 #[derive(Args, Debug)]
 #[command(mut_arg("structure", |arg| arg.help("Structures to choose from, e.g. linear,bvh:leaf=4")))]
+#[command(mut_arg("motion", |arg| arg.action(ArgAction::Set)))]
 pub struct AdviseArgs {
     #[command(flatten)]
     pub study: StudyArgs,

@@ -26,7 +26,7 @@ use crate::report::{
 };
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
-    let page = [("--html", args.html.as_deref())];
+    let page = [("--html", &args.html)];
     ensure!(
         args.gate == Gate::Time || !args.fail_inconclusive,
         "--fail-inconclusive is of times; expected none with --gate work"
@@ -50,7 +50,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         (None, Some(old), Some(new)) => [old.clone(), new.clone()],
         _ => bail!("two reports, or --against BINARY: expected one of them"),
     };
-    expect_places(&page, &files.each_ref().map(PathBuf::as_path))?;
+    expect_places(&page, &files)?;
     let [old, new] = [read_report(&files[0])?, read_report(&files[1])?];
     if let Some(name) = &args.baseline {
         ensure!(

@@ -10,6 +10,7 @@ use serde::ser::SerializeSeq;
 use serde_json::{Map, Value};
 
 use super::shared_args::RowFormat;
+use super::unread_is_fine;
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{Answer, Verdict, guarded, input_of};
@@ -198,24 +199,25 @@ pub fn write(
     columns: &[Column<'_, Row>],
     ask: impl FnOnce(&mut dyn FnMut(Vec<Row>) -> io::Result<()>) -> anyhow::Result<bool>,
 ) -> anyhow::Result<bool> {
-    let mut out = BufWriter::new(Unread(io::stdout().lock()));
+    let mut out = BufWriter::new(io::stdout().lock());
     let agree = match format {
         RowFormat::Csv => {
             let mut csv = csv::Writer::from_writer(&mut out);
             // Written with the first row: an error before it is all that is said.
             let mut header = Some(columns.iter().map(|column| column.0));
-            let agree = ask(&mut |rows| {
+            let mut put = |rows: Vec<Row>| -> csv::Result<()> {
                 if let Some(columns) = header.take() {
                     csv.write_record(columns)?;
                 }
                 let cells = |row| columns.iter().map(move |(_, value)| cell(&value(row)));
                 let mut rows = rows.iter().map(cells);
-                Ok(rows.try_for_each(|cells| csv.write_record(cells))?)
-            });
-            if let Some(columns) = header.filter(|_| agree.is_ok()) {
-                csv.write_record(columns)?;
+                rows.try_for_each(|cells| csv.write_record(cells))
+            };
+            let agree = ask(&mut |rows| unread_is_fine(put(rows).map_err(io::Error::from)));
+            if agree.is_ok() {
+                unread_is_fine(put(Vec::new()).map_err(io::Error::from))?;
             }
-            csv.flush()?;
+            unread_is_fine(csv.flush())?;
             agree
         }
         RowFormat::Json => {
@@ -229,35 +231,20 @@ pub fn write(
             };
             let agree = ask(&mut |rows| {
                 let mut rows = rows.iter().map(object);
-                Ok(rows.try_for_each(|object| array.serialize_element(&object))?)
+                let put = rows.try_for_each(|object| array.serialize_element(&object));
+                unread_is_fine(put.map_err(io::Error::from))
             });
-            array.end().map_err(io::Error::from)?;
-            writeln!(out)?;
+            unread_is_fine(array.end().map_err(io::Error::from))?;
+            unread_is_fine(writeln!(out))?;
             agree
         }
     };
     match agree {
-        Ok(_) => out.flush()?,
+        Ok(_) => unread_is_fine(out.flush())?,
         // No answers but a beginning: it is not shown.
         Err(_) => drop(out.into_parts()),
     }
     agree
-}
-
-/// Output that may be closed by its reader.
-struct Unread<W>(W);
-
-impl<W: Write> Write for Unread<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self.0.write(bytes) {
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(bytes.len()),
-            other => other,
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        super::unread_is_fine(self.0.flush())
-    }
 }
 
 /// A value as CSV holds it: ids separated by spaces.

@@ -20,11 +20,8 @@ use crate::measure::{ProcessTimes, Protocol, Schedule};
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
-    let outputs = [
-        ("--svg", args.svg.as_deref()),
-        ("--html", args.html.as_deref()),
-    ];
-    expect_places(&outputs, &[])?;
+    let outputs = [("--svg", &args.svg), ("--html", &args.html)];
+    expect_places(&outputs, &[""; 0])?;
     let options = options(args);
     let jobs = drift::jobs(&options);
     let study = Study::new(String::new(), jobs as u64, &args.spread)?;

@@ -37,16 +37,9 @@ use crate::visibility::{Guarantee, SampleGrid};
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> {
-    let outputs = [
-        ("--svg", args.svg.as_deref()),
-        ("--html", args.html.as_deref()),
-    ];
-    let inputs = [
-        args.pvs.as_deref(),
-        Some(args.study.scene.as_ref()),
-        Some(args.study.path.as_ref()),
-    ];
-    let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
+    let outputs = [("--svg", &args.svg), ("--html", &args.html)];
+    let mut inputs = vec![Path::new(&args.study.scene), args.study.path.as_ref()];
+    inputs.extend(args.pvs.as_deref());
     expect_places(&outputs, &inputs)?;
     expect_folder("--csv", args.csv.as_deref())?;
     if args.mirror.is_some() && args.cut_out.is_some() {

@@ -76,13 +76,14 @@ use crate::input::{InputError, hold_files, tell_notes, tell_warnings};
 use crate::report::{folder_of, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene, split_part};
 use crate::shown::expected_by;
+use anyhow::ensure;
 use clap::{CommandFactory, Parser};
 use interrupt::Interrupted;
 use serde::Serialize;
 
 use args::{Cli, Command};
 use command_args::SceneCommand;
-use shared_args::{SceneArgs, TableFormat};
+use shared_args::TableFormat;
 
 /// Exit code after Ctrl-C.
 const INTERRUPTED: u8 = 130;
@@ -271,12 +272,8 @@ fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 
-/// Loads a scene for `structures` structures at once, with a note on bad items.
-fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Result<Scene> {
-    load_scene_by(source, &args.options(structures))
-}
-
-fn load_scene_by(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
+/// Loads a scene, with a note on bad items.
+fn load_scene(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
     let scene = crate::scene::load(source, options)?;
     if scene.skipped_items > 0 {
         tell(&format!(
@@ -290,7 +287,10 @@ fn load_scene_by(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
 
 /// Checks before the work that outputs can be written, and that none is an input or
 /// another output. Inputs may be specs and names, or parts of files.
-fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow::Result<()> {
+fn expect_places(
+    outputs: &[(&str, &Option<PathBuf>)],
+    inputs: &[impl AsRef<Path>],
+) -> anyhow::Result<()> {
     // The file system's own name, also of a file that does not exist yet.
     let known = |file: &Path| -> Option<PathBuf> {
         let place = folder_of(file).canonicalize().ok()?.join(file.file_name()?);
@@ -298,7 +298,8 @@ fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow:
     };
     // A run is all that was measured, and what was made of it but for its page.
     let names = ["report.json", "summary.csv", "samples.csv", "stream.jsonl"];
-    let files = inputs.iter().flat_map(|&input| {
+    let files = inputs.iter().flat_map(|input| {
+        let input = input.as_ref();
         let source = input.to_str().map(|source| split_part(source).0);
         let input = source.map_or(input, Path::new);
         let is_report = input.ends_with(names[0]);
@@ -309,11 +310,21 @@ fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow:
     let files = files.filter(|file| file.is_file());
     let mut taken: Vec<PathBuf> = files.filter_map(|file| known(&file)).collect();
     for &(option, file) in outputs {
-        expect_place_for(option, file)?;
-        let Some(place) = file.and_then(known) else {
-            continue;
-        };
-        anyhow::ensure!(
+        let Some(file) = file else { continue };
+        expect_named(option, file, "file")?;
+        let (shown, folder) = (file.display(), folder_of(file));
+        ensure!(
+            !file.is_dir(),
+            "{shown}: a folder; expected a file for {option}"
+        );
+        ensure!(
+            folder.is_dir(),
+            "{}: expected an existing folder for {option}",
+            folder.display()
+        );
+        try_place(file)?;
+        let Some(place) = known(file) else { continue };
+        ensure!(
             !taken.contains(&place),
             "{}: an input or another output; expected a file of its own for {option}",
             place.display()
@@ -323,39 +334,19 @@ fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow:
     Ok(())
 }
 
-/// Checks that one output can be written.
-fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
-    let Some(file) = file else {
-        return Ok(());
-    };
-    anyhow::ensure!(
-        file != Path::new("-"),
-        "{option} is '-'; expected a file, such as './-'"
+fn expect_named(option: &str, place: &Path, what: &str) -> anyhow::Result<()> {
+    ensure!(
+        place != Path::new("-"),
+        "{option} is '-'; expected a {what}, such as './-'"
     );
-    anyhow::ensure!(
-        !file.is_dir(),
-        "{}: a folder; expected a file for {option}",
-        file.display()
-    );
-    let folder = folder_of(file);
-    anyhow::ensure!(
-        folder.is_dir(),
-        "{}: expected an existing folder for {option}",
-        folder.display()
-    );
-    Ok(try_place(file)?)
+    Ok(())
 }
 
 /// Checks that a folder is writable, or that one of this name can be made.
 fn expect_folder(option: &str, folder: Option<&Path>) -> anyhow::Result<()> {
-    let Some(folder) = folder else {
-        return Ok(());
-    };
-    anyhow::ensure!(
-        folder != Path::new("-"),
-        "{option} is '-'; expected a folder, such as './-'"
-    );
-    anyhow::ensure!(
+    let Some(folder) = folder else { return Ok(()) };
+    expect_named(option, folder, "folder")?;
+    ensure!(
         folder.is_dir() || !folder.exists(),
         "{}: not a folder; expected a folder for {option}",
         folder.display()

@@ -30,12 +30,8 @@ const CUBES_PER_CAMERA: usize = 10_000;
 const SWEEP_CAMERAS: usize = 200;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<Ending> {
-    let inputs = [args.study.scene.as_ref(), args.study.path.as_ref()];
-    let outputs = [
-        ("--svg", args.svg.as_deref()),
-        ("--html", args.html.as_deref()),
-    ];
-    expect_places(&outputs, &inputs)?;
+    let outputs = [("--svg", &args.svg), ("--html", &args.html)];
+    expect_places(&outputs, &[&args.study.scene, &args.study.path])?;
     if let Some(stage) = args.stage {
         return sweep_stage(registry, args, stage);
     }

@@ -135,13 +135,8 @@ pub fn numbers(names: &Names) -> String {
 /// The first point of each culling, in their order by test; points come fastest
 /// first.
 fn fastest(points: &[CullingPoint]) -> Vec<&CullingPoint> {
-    let mut found: Vec<&CullingPoint> = Vec::new();
-    for point in points {
-        let is_same = |other: &&CullingPoint| other.errors.names == point.errors.names;
-        if !found.iter().any(is_same) {
-            found.push(point);
-        }
-    }
+    let all = grouped(points.iter().map(|p| (&p.errors.names, p)));
+    let mut found: Vec<&CullingPoint> = all.iter().map(|(_, own)| own[0]).collect();
     found.sort_by_key(|p| (p.errors.names.test, culling(p)));
     found
 }
@@ -214,13 +209,7 @@ fn structure(point: &CullingPoint) -> String {
 
 /// The fastest point of each kind of numbers.
 fn regions_table(p: &Precision) -> Table {
-    let mut rows: Vec<&Point<RegionErrors>> = Vec::new();
-    for point in &p.region_points {
-        let is_same = |row: &&Point<RegionErrors>| row.errors.numbers == point.errors.numbers;
-        if !rows.iter().any(is_same) {
-            rows.push(point);
-        }
-    }
+    let all = grouped(p.region_points.iter().map(|p| (p.errors.numbers, p)));
     let columns: &[Column<&Point<RegionErrors>>] = &[
         ("", |r| mark(r.on_front, r.is_tie).to_owned()),
         ("numbers", |r| r.errors.numbers.to_owned()),
@@ -232,7 +221,7 @@ fn regions_table(p: &Precision) -> Table {
         (">farthest", |r| significant(r.errors.worst_false)),
         (">per point", |r| time_plus_minus(r.time)),
     ];
-    Table::with(rows, columns)
+    Table::with(all.iter().map(|(_, own)| own[0]), columns)
 }
 
 fn stability_table(p: &Precision) -> Table {

@@ -342,19 +342,20 @@ impl Workers {
         see_through(&self.program, &request, self.patience, keep, step)
     }
 
-    /// Runs a job that needs every process; its messages.
+    /// Runs a job that needs every process; what `pick` takes of its messages.
     ///
     /// # Errors
     /// The errors of [`see_through`]; a process that does not finish.
-    pub fn found(
+    pub fn found<T>(
         &self,
         process: u32,
         job: Job,
         step: &dyn Fn(&str),
-    ) -> anyhow::Result<Vec<Message>> {
+        pick: impl Fn(Message) -> Option<T>,
+    ) -> anyhow::Result<Vec<T>> {
         let mut found = Vec::new();
         let mut keep = |said| {
-            found.push(said);
+            found.extend(pick(said));
             Ok(())
         };
         let ended = self.see_through(process, job, &mut keep, step)?;

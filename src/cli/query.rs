@@ -24,7 +24,7 @@ const PLACES: &str = "places";
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
-    let mut scene = load_scene(&args.scene, &args.scene_args, 1)?;
+    let mut scene = load_scene(&args.scene, &args.scene_args.options(1))?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let mut motion = None;
     if let Some(source) = &args.motion {
@@ -96,7 +96,7 @@ pub fn frustum(
 
 pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
-    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
+    let scene = load_scene(&args.scene, &args.scene_args.options(1))?;
     let what = match args.sought.points {
         Some(_) => "point",
         None => "box",

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, bail};
 
@@ -25,13 +25,12 @@ use crate::report::{
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
     let outputs = [
-        ("--markdown", args.markdown.as_deref()),
-        ("--html", args.html.as_deref()),
-        ("--bencher", args.bencher.as_deref()),
-        ("--history", args.history.as_deref()),
+        ("--markdown", &args.markdown),
+        ("--html", &args.html),
+        ("--bencher", &args.bencher),
+        ("--history", &args.history),
     ];
-    let inputs: Vec<&Path> = args.reports.iter().map(PathBuf::as_path).collect();
-    expect_places(&outputs, &inputs)?;
+    expect_places(&outputs, &args.reports)?;
     expect_folder("--svg", args.svg.as_deref())?;
     if let Some(path) = &args.history {
         let reports = args.reports.iter().map(|path| read_report(path));

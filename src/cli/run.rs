@@ -14,7 +14,7 @@ use super::interrupt::Interrupted;
 use super::processes::{Ended, Job, Message, Workers};
 use super::report::{show, show_written, write_page};
 use super::run_plan::{RunPlan, plan};
-use super::run_resume::{RunOptions, create, go_on, resume};
+use super::run_resume::{TypedOptions, create, go_on, resume};
 use super::study::progress;
 use super::{Ending, compare, expect_folder, interrupt, run_why, tell, text, unread_is_fine};
 use crate::index::Registry;
@@ -327,7 +327,7 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
     let option = |name: &str, value: &str| {
         // A value that begins with a minus needs the sign.
         let sign = if value.starts_with('-') { "=" } else { " " };
-        format!("--{name}{sign}{}", quoted(value))
+        format!("--{name}{sign}{}", text::quoted(value))
     };
     let mut line = format!(
         "next    {program} advise {}",
@@ -339,7 +339,7 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
     let path = path
         .into_iter()
         .chain(motion.map(|motion| option("motion", motion)));
-    let recorded = RunOptions::recorded(args).ok()?;
+    let recorded = TypedOptions::recorded(args).ok()?;
     let read = recorded.words(|name| READS.split(' ').any(|read| read == name));
     for option in path.chain(read) {
         let last = line.rsplit('\n').next().unwrap_or_default();
@@ -355,13 +355,4 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
     let gives = "  which shortcuts pay here";
     let is_within = line.chars().count() + gives.len() <= width;
     Some(line + if is_within { gives } else { "" })
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,%+@".contains(c);
-    match word.chars().all(is_plain) {
-        true => word.to_owned(),
-        false => format!("'{}'", word.replace('\'', "'\\''")),
-    }
 }

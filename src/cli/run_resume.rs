@@ -119,18 +119,15 @@ const NOT_OF_THE_PLAN: [&str; 6] = ["resume", "out", "timeout", "save", "all_col
 
 /// The recorded options, if those typed now say nothing else.
 fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
-    let before = RunOptions::recorded(recorded)?;
-    let now = RunOptions::of("run", std::env::args_os())?;
-    for (id, name, _) in RunOptions::all()
-        .into_iter()
-        .filter(|(id, ..)| now.is_typed(id))
-    {
+    let before = TypedOptions::recorded(recorded)?;
+    let now = TypedOptions::of("run", "run", std::env::args_os())?;
+    for (id, name, _) in now.typed() {
         ensure!(
-            NOT_OF_THE_PLAN.contains(&id.as_str()) || before.values(&id) == now.values(&id),
+            NOT_OF_THE_PLAN.contains(&id.as_str()) || before.values(id) == now.values(id),
             "--{name} is '{}', and the run was begun {}; expected the same or none: \
              --resume continues with the recorded options",
-            now.values(&id).join(" "),
-            before.told(&id)
+            now.values(id).join(" "),
+            before.told(id)
         );
     }
     // What was typed now and is no part of the plan takes the place of what is recorded.
@@ -151,14 +148,14 @@ const NO_RUN: &str = "no run was recorded there; expected the folder of a run";
 /// Checks that two runs were begun with the same options, apart from folder and
 /// shard.
 pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
-    let (one, other) = (RunOptions::recorded(one)?, RunOptions::recorded(other)?);
-    for (id, name, _) in RunOptions::all() {
+    let (one, other) = (TypedOptions::recorded(one)?, TypedOptions::recorded(other)?);
+    for (id, name, _) in &one.all {
         let is_free = id == "shard" || NOT_OF_THE_PLAN.contains(&id.as_str());
         ensure!(
-            is_free || one.values(&id) == other.values(&id),
+            is_free || one.values(id) == other.values(id),
             "was begun {} for --{name}, and the first shard {}; expected the same options",
-            other.told(&id),
-            one.told(&id)
+            other.told(id),
+            one.told(id)
         );
     }
     Ok(())
@@ -174,58 +171,60 @@ fn first() -> std::iter::Once<String> {
     std::iter::once(program::name().to_owned())
 }
 
-/// The options of `run`, as they were typed behind a command.
-pub struct RunOptions(ArgMatches);
+/// The options of a command, as they were typed behind it or another.
+pub struct TypedOptions {
+    matches: ArgMatches,
+    /// Ids and names of all options; true for those with a value.
+    all: Vec<(String, String, bool)>,
+}
 
-impl RunOptions {
+impl TypedOptions {
     /// The options of a run that was begun.
-    pub fn recorded(args: &[String]) -> anyhow::Result<RunOptions> {
-        RunOptions::of("run", first().chain(args.to_vec()))
+    pub fn recorded(args: &[String]) -> anyhow::Result<TypedOptions> {
+        TypedOptions::of("run", "run", first().chain(args.to_vec()))
     }
 
-    /// Those of a command line.
+    /// Those of `owner` in a line of `command`.
     pub fn of(
         command: &str,
+        owner: &str,
         line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
-    ) -> anyhow::Result<RunOptions> {
-        let matches = Cli::command()
-            .try_get_matches_from(line)
-            .map_err(one_line)?;
-        let run = matches.subcommand_matches(command).cloned();
-        Ok(RunOptions(run.context(NO_RUN)?))
+    ) -> anyhow::Result<TypedOptions> {
+        let mut cli = Cli::command();
+        let matches = cli.try_get_matches_from_mut(line).map_err(one_line)?;
+        let matches = matches.subcommand_matches(command).cloned();
+        let owner = cli.find_subcommand(owner).into_iter();
+        let all = owner.flat_map(|owner| owner.get_arguments()).map(|arg| {
+            let id = arg.get_id().as_str();
+            let name = arg.get_long().unwrap_or(id).to_owned();
+            (id.to_owned(), name, arg.get_action().takes_values())
+        });
+        Ok(TypedOptions {
+            matches: matches.context(NO_RUN)?,
+            all: all.collect(),
+        })
     }
 
-    fn is_typed(&self, id: &str) -> bool {
-        let is_known = self.0.try_contains_id(id).unwrap_or(false);
-        is_known && self.0.value_source(id) == Some(ValueSource::CommandLine)
+    fn typed(&self) -> impl Iterator<Item = &(String, String, bool)> {
+        self.all.iter().filter(|(id, ..)| {
+            let is_known = self.matches.try_contains_id(id).unwrap_or(false);
+            is_known && self.matches.value_source(id) == Some(ValueSource::CommandLine)
+        })
     }
 
     /// The typed options as words, `--up=y`; those of which `is_wanted` takes the name.
     pub fn words(&self, is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
-        let all = RunOptions::all().into_iter();
-        let typed = all.filter(|(id, name, _)| self.is_typed(id) && is_wanted(name));
+        let typed = self.typed().filter(|(_, name, _)| is_wanted(name));
         let words = typed.flat_map(|(id, name, has_value)| match has_value {
-            true => (self.values(&id).iter().map(|v| format!("--{name}={v}"))).collect(),
+            true => (self.values(id).iter().map(|v| format!("--{name}={v}"))).collect(),
             false => vec![format!("--{name}")],
         });
         words.collect()
     }
 
-    /// Ids and names of all options; true for those with a value.
-    fn all() -> Vec<(String, String, bool)> {
-        let command = Cli::command();
-        let run = command.find_subcommand("run").into_iter();
-        let arguments = run.flat_map(|run| run.get_arguments());
-        let named = arguments.map(|arg| {
-            let id = arg.get_id().as_str();
-            let name = arg.get_long().unwrap_or(id).to_owned();
-            (id.to_owned(), name, arg.get_action().takes_values())
-        });
-        named.collect()
-    }
-
     fn values(&self, id: &str) -> Vec<String> {
-        let raw = self.0.try_get_raw(id).ok().flatten().into_iter().flatten();
+        let raw = self.matches.try_get_raw(id).ok().flatten();
+        let raw = raw.into_iter().flatten();
         raw.map(|value| value.to_string_lossy().into_owned())
             .collect()
     }
@@ -311,7 +310,7 @@ mod tests {
             ),
         ] {
             let words: Vec<String> = recorded.split(' ').map(str::to_owned).collect();
-            let error = RunOptions::recorded(&words)
+            let error = TypedOptions::recorded(&words)
                 .err()
                 .expect(recorded)
                 .to_string();

@@ -17,7 +17,7 @@ use crate::scene::{Regions, Scene, UpAxis, write_boxes_csv};
 use crate::spec::SpecError;
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
-    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
+    let scene = load_scene(&args.scene, &args.scene_args.options(1))?;
     let defaults = args.lens.defaults()?.of_scene(&scene);
     let path = args.path.as_ref();
     let path = path.map(|path| path::load(path, &scene, &defaults));
@@ -115,7 +115,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
 
 pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
     let out = expect_other(args.out.as_deref(), &args.scene)?;
-    let scene = load_scene(&args.scene, &args.scene_args, 0)?;
+    let scene = load_scene(&args.scene, &args.scene_args.options(0))?;
     write(scene.settled()?, out)
 }
 
@@ -125,7 +125,7 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
         expect_csv(out)?;
     }
     let out = expect_other(out, &args.scene)?;
-    let scene = load_scene(&args.scene, &args.scene_args, 0)?;
+    let scene = load_scene(&args.scene, &args.scene_args.options(0))?;
     let (origin, lost) = (scene.origin, left_behind(&scene));
     let kept = scene.settled()?;
     if !lost.is_empty() {
@@ -150,7 +150,7 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
 /// The file to write, which is not the input; none for standard output.
 fn expect_other<'f>(out: Option<&'f Path>, scene: &str) -> anyhow::Result<Option<&'f Path>> {
     let out = out.filter(|out| *out != Path::new("-"));
-    expect_places(&[("--out", out)], &[Path::new(scene)])?;
+    expect_places(&[("--out", &out.map(Path::to_owned))], &[scene])?;
     Ok(out)
 }
 

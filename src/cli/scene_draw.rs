@@ -2,8 +2,6 @@
 //!
 //! With a camera, both in the colours of a query's verdicts.
 
-use std::path::Path;
-
 use glam::Vec3;
 
 use super::command_args::SceneDrawArgs;
@@ -56,13 +54,13 @@ const CELL_VERDICTS: &[Class] = rows! { Class { colour, words, is_key }
 };
 
 pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending> {
-    let inputs = [Some(&args.scene), args.camera.as_ref()];
-    let inputs: Vec<&Path> = inputs.into_iter().flatten().map(Path::new).collect();
-    expect_places(&[("--out", Some(&args.out))], &inputs)?;
+    let inputs: Vec<&String> = args.camera.iter().chain([&args.scene]).collect();
+    expect_places(&[("--out", &Some(args.out.clone()))], &inputs)?;
     let defaults = args.lens.defaults()?;
     let structure = args.structure.as_deref();
     let structure = structure.map(|text| divided(registry, text)).transpose()?;
-    let scene = load_scene(&args.scene, &args.scene_args, structure.iter().len())?;
+    let loading = args.scene_args.options(structure.iter().len());
+    let scene = load_scene(&args.scene, &loading)?;
     let mut caption = vec![scene.name.clone()];
     let camera = match &args.camera {
         None => None,

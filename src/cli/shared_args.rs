@@ -5,7 +5,7 @@
 use super::policies::under_policies;
 use super::values;
 use crate::camera::{
-    DEFAULT_EPSILON, MATRIX_CONVENTIONS, PLANE_METHODS, PlaneMethod, PlaneOptions,
+    DEFAULT_EPSILON, MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod, PlaneOptions,
 };
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, TESTS};
 use crate::index::{Execution, Registry, StructureSpec};
@@ -162,12 +162,7 @@ impl KernelArgs {
         Ok(specs.into_iter().map(|spec| spec.by(execution)).collect())
     }
 
-    /// The largest number of threads.
-    pub fn most_threads(&self) -> usize {
-        self.threads.iter().copied().max().unwrap_or(1)
-    }
-
-    /// Fails if this machine lacks the instruction set.
+    /// The instruction set, which this machine must have, and the largest number of threads.
     pub fn execution(&self) -> Result<Execution, SpecError> {
         let kernel = self.name.unwrap_or_else(Kernel::best);
         let kernel = kernel.checked().map_err(|error| {
@@ -176,7 +171,7 @@ impl KernelArgs {
         })?;
         Ok(Execution {
             kernel,
-            threads: self.most_threads(),
+            threads: self.threads.iter().copied().max().unwrap_or(1),
         })
     }
 }
@@ -261,8 +256,8 @@ pub struct LensArgs {
     /// column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d
     /// (clip = x M); reversed depth (but not of an orthographic matrix) and infinite far
     /// are recognised
-    #[arg(long, value_name = "NAME")]
-    pub matrix_convention: Option<String>,
+    #[arg(long, value_name = "NAME", value_parser = values::choice("matrix convention", &MATRIX_CONVENTIONS))]
+    pub matrix_convention: Option<MatrixConvention>,
 }
 
 impl LensArgs {
@@ -274,10 +269,8 @@ impl LensArgs {
                 "--near is {near} and --far {far}; expected near < far"
             )));
         }
-        let matrix = self.matrix_convention.as_deref();
-        let convention = values::choice("matrix convention", &MATRIX_CONVENTIONS);
         Ok(LensDefaults {
-            matrix: matrix.map(convention).transpose()?,
+            matrix: self.matrix_convention,
             fovy_deg: self.fovy,
             aspect: self.aspect,
             near: self.near,

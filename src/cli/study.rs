@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::processes::{Job, Message, Timing, Workers};
 use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
-use super::{Ending, interrupt, load_scene_by, print, tell, text};
+use super::{Ending, interrupt, load_scene, print, tell, text};
 use crate::index::{Registry, StructureSpec};
 use crate::input::{is_readable, tell_warnings};
 use crate::measure::{NO_ITEMS, ProcessTimes, Protocol, Status};
@@ -57,7 +57,7 @@ impl Setting {
         // An impossible lens is reported before anything is loaded.
         let lens = args.lens.defaults()?;
         let scene = match timing {
-            None => load_scene_by(&args.scene, &held(structures.len()))?,
+            None => load_scene(&args.scene, &held(structures.len()))?,
             Some(_) => scene::load(&args.scene, &args.scene_args.options(0))?,
         };
         if scene.items.is_empty() {
@@ -200,11 +200,11 @@ impl Study {
                 self.bar.set_position(self.before + u64::from(process));
                 self.begin(step);
             };
-            let found = self.workers.found(process, job(timing), &told)?;
-            all.extend(found.into_iter().filter_map(|said| match said {
+            let times = |said| match said {
                 Message::Times(times) => Some(times),
                 _ => None,
-            }));
+            };
+            all.extend(self.workers.found(process, job(timing), &told, times)?);
         }
         self.bar.finish_and_clear();
         Ok(all)

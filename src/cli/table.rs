@@ -130,13 +130,6 @@ impl Table {
             .collect()
     }
 
-    /// The table without a column.
-    pub fn without(&self, name: &str) -> Table {
-        let columns = 0..self.header.len();
-        let left = columns.filter(|&column| self.header[column] != name);
-        self.of_columns(&left.collect::<Vec<_>>())
-    }
-
     fn of_columns(&self, columns: &[usize]) -> Table {
         let chosen = |row: &Vec<String>| columns.iter().map(|&c| row[c].clone()).collect();
         let is_right = |&place: &usize| self.right.contains(&columns[place]);

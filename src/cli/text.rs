@@ -267,6 +267,15 @@ pub fn by_source(comparison: &Comparison) -> Option<String> {
 /// Meaning of the figures of [`by_source`].
 pub const BY_SOURCE: &str = "by storage/planes/test";
 
+/// A word as a shell takes it.
+pub fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,%+@".contains(c);
+    match word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
+}
+
 /// Text of an element or an attribute.
 pub fn html(text: &str) -> String {
     let mut text = plain(text).replace('&', "&amp;");

@@ -9,6 +9,7 @@ use glam::Vec3;
 use indicatif::ProgressBar;
 
 use super::args::VerifyArgs;
+use super::run_resume::TypedOptions;
 use super::verify_table::{Check, Outcome, RANDOM, show};
 use super::{Ending, interrupt, load_scene, print, program, tell, text};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
@@ -18,7 +19,7 @@ use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
 use crate::measure::{Status, Subject, Verdict, Workload, count_pass, guarded, judge};
 use crate::path::{self, CameraPath};
 use crate::query::{ItemId, Located};
-use crate::scene::{FAMILIES, ItemKind, Regions, SAMPLES, Scene, every_part};
+use crate::scene::{FAMILIES, Regions, SAMPLES, Scene, every_part};
 use crate::verify::{
     ErrorCount, Fault, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment,
     explain_visibility, points_on_faces, variants,
@@ -60,7 +61,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     let (mut checks, mut skipped_items, mut interrupted) = (Vec::new(), 0, false);
     'scenes: for source in &scenes {
         bar.set_message(text::plain(source));
-        let scene = load_scene(source, &args.scene_args, 2 * structures.len())?;
+        let scene = load_scene(source, &args.scene_args.options(2 * structures.len()))?;
         skipped_items += scene.skipped_items;
         let subjects = [CullingTest::SixPlane, CullingTest::Sphere].map(|test| {
             let build = |spec| Subject::build(spec, false, &scene, test);
@@ -72,7 +73,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
                 break 'scenes;
             }
             let cameras = path::load(&path, &scene, &defaults)?;
-            let again = reproduce(source, &path, args);
+            let again = reproduce(source, &path)?;
             checks.extend(check_path(&scene, &cameras, &culling, &subjects, &again)?);
         }
         bar.inc(1);
@@ -145,39 +146,19 @@ fn paths(args: &VerifyArgs, scene: &Scene) -> Vec<String> {
     PATHS.into_iter().chain(own).map(str::to_owned).collect()
 }
 
-/// The command that checks this scene and path alone.
-fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
-    let (lens, culling, read) = (&args.lens, &args.culling, &args.scene_args);
-    let mut command = format!(
-        "{} verify --scene '{scene}' --path '{path}' --planes {} --arithmetic {} --fovy {} \
-         --aspect {}",
-        program::name(),
-        culling.planes.name(),
-        culling.arithmetic.name(),
-        lens.fovy,
-        lens.aspect
-    );
-    let threads: Vec<String> = args.kernel.threads.iter().map(usize::to_string).collect();
-    let differs = |value: &str, from: &str| (value != from).then(|| value.to_owned());
-    let mut add = |option: &str, value: Option<String>| {
-        command += &text::some(value, |value| format!(" --{option} {value}"));
-    };
-    add("epsilon", culling.epsilon.map(|c| c.to_string()));
-    add("near", lens.near.map(|near| near.to_string()));
-    add("far", lens.far.map(|far| far.to_string()));
-    add("matrix-convention", lens.matrix_convention.clone());
-    add("up", read.up.map(|up| up.name().to_owned()));
-    let items = differs(read.items.name(), ItemKind::default().name());
-    add("items", items);
-    let named = differs(&args.structure, "all");
-    add("structure", named.map(|names| format!("'{names}'")));
-    add("threads", differs(&threads.join(","), "1"));
-    let kernel = args.kernel.name.map(|kernel| kernel.name().to_owned());
-    add("kernel", kernel);
-    if read.skip_bad_items {
-        command += " --skip-bad-items";
-    }
-    command
+/// The command that checks this scene and path alone, with the other options as typed.
+fn reproduce(scene: &str, path: &str) -> anyhow::Result<String> {
+    let own = ["scene", "path", "cases", "seed", "format"];
+    let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
+    let others = typed.words(|name| !own.contains(&name));
+    let others: String = others
+        .iter()
+        .map(|word| format!(" {}", text::quoted(word)))
+        .collect();
+    let (program, scene, path) = (program::name(), text::quoted(scene), text::quoted(path));
+    Ok(format!(
+        "{program} verify --scene {scene} --path {path}{others}"
+    ))
 }
 
 /// The queries of a path for each kind of volume, and for each other culling test

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::table::{Column, Table};
 use super::text;
+use crate::report::grouped;
 use crate::shown::shortened;
 
 /// Scene of the random cases.
@@ -45,14 +46,9 @@ pub(super) struct Outcome {
 pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
     let mut out = text::terminal();
     let width = text::width();
-    let mut names: Vec<&str> = Vec::new();
-    let all = outcome.checks.iter().map(|check| check.structure.as_str());
-    all.for_each(|name| names.extend((!names.contains(&name)).then_some(name)));
-    let of = |name: &&str| -> Vec<&Check> {
-        let checks = outcome.checks.iter();
-        checks.filter(|check| check.structure == *name).collect()
-    };
-    let columns: &[Column<Vec<&Check>>] = &[
+    let all = outcome.checks.iter();
+    let all = grouped(all.map(|check| (check.structure.as_str(), check)));
+    let columns: &[Column<&Vec<&Check>>] = &[
         ("structure", |own| shortened(&own[0].structure, 30)),
         (">paths", |own| {
             let of_paths = own.iter().filter(|check| check.scene != RANDOM);
@@ -72,7 +68,7 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
             statuses.join(", ")
         }),
     ];
-    let table = Table::with(names.iter().map(of), columns);
+    let table = Table::with(all.iter().map(|(_, own)| own), columns);
     writeln!(out, "{}", table.fitted(width))?;
     for check in &outcome.checks {
         if let Some(difference) = &check.difference {
@@ -81,18 +77,18 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
             writeln!(out, "{about}:\n  {difference}")?;
         }
     }
-    let differ = |name: &&&str| of(name).iter().any(|check| check.difference.is_some());
-    let all = text::counted(names.len(), "structure");
+    let own = all.iter().map(|(_, own)| own);
+    let differ = own.filter(|own| own.iter().any(|check| check.difference.is_some()));
+    let of = text::counted(all.len(), "structure");
+    let reference = "the reference scan";
     let checked = format!(
         "{}: {} in {:.1} s ({:.1} million/s), {}",
-        match names.iter().filter(differ).count() {
-            0 if names.len() == 1 => format!("{} returns the sets of the reference scan", names[0]),
-            0 => format!("All {all} return the sets of the reference scan"),
-            1 =>
-                format!("1 of {all} differs from the reference scan or misses what the cameras see"),
-            wrong => format!(
-                "{wrong} of {all} differ from the reference scan or miss what the cameras see"
-            ),
+        match (differ.count(), &all[..]) {
+            (0, [(one, _)]) => format!("{one} returns the sets of {reference}"),
+            (0, _) => format!("All {of} return the sets of {reference}"),
+            (1, _) => format!("1 of {of} differs from {reference} or misses what the cameras see"),
+            (wrong, _) =>
+                format!("{wrong} of {of} differ from {reference} or miss what the cameras see"),
         },
         text::counted(outcome.verdicts as usize, "verdict"),
         outcome.seconds,

@@ -3,7 +3,6 @@
 //! Items have the colours of their verdicts in each view.
 
 use std::io::{self, Write};
-use std::path::Path;
 
 use anyhow::{Context, ensure};
 use glam::{DMat4, DVec3, DVec4, I64Vec3};
@@ -35,11 +34,11 @@ use crate::visibility::Rays;
 const MOST_ITEMS: usize = 2_000_000;
 
 pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
-    let inputs = [&args.scene, &args.path].map(|input| Path::new(input.as_str()));
-    expect_places(&[("--out", Some(&args.out))], &inputs)?;
+    let out = [("--out", &Some(args.out.clone()))];
+    expect_places(&out, &[&args.scene, &args.path])?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
-    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
+    let scene = load_scene(&args.scene, &args.scene_args.options(1))?;
     let items = scene.items.len();
     ensure!(
         items <= MOST_ITEMS,
@@ -79,7 +78,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         ask,
         &mut each,
     )?;
-    let threads = args.kernel.most_threads();
+    let threads = args.kernel.execution()?.threads;
     let surfaces = args
         .samples
         .map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
