@@ -14,7 +14,7 @@ mod trials;
 
 use serde::{Deserialize, Serialize};
 
-pub use change::{Axis, Beside, Change, Turn};
+pub use change::{Axis, Beside, Change};
 pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
 pub use motion::{MotionChoice, policy_of};
 pub use omission::{Check, Omission};

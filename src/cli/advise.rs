@@ -57,9 +57,8 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
         study.advance();
     }
     let prepared = advise::prepare(&input, Group::of(&parts).cells, &begin)?;
-    let trials = |timing| Job::Trials(prepared.plan.clone().into(), timing);
     let step = "with and without every rule";
-    let times = study.times(step, setting.path.lens_scale, trials)?;
+    let times = study.times(step, setting.path.lens_scale, &prepared.plan)?;
     let advice = prepared.conclude(&input, &times);
     setting.note_solid(args.format);
     print(args.format, &advice, || show(&advice, args.all_columns))?;
@@ -71,9 +70,12 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
     let study = &args.study;
     let structures = study.kernel.structures(registry, &study.structure)?;
     let alone = Experiment::new(&study.scene).path(&study.path);
+    if let [_, second, ..] = &args.moves.motion[..] {
+        anyhow::bail!("--motion '{second}' is a second one; expected one motion");
+    }
     let mut plan = Plan {
         lens: study.lens.defaults()?,
-        load: study.scene_args.options(structures.len()),
+        load: study.lens.scene_args.options(structures.len()),
         effort: Effort {
             processes: study.spread.processes,
             ..EFFORT
@@ -94,7 +96,7 @@ fn setting(
     timing: Option<&Timing>,
 ) -> anyhow::Result<(Setting, usize)> {
     let study = &args.study;
-    let held = |structures| study.scene_args.options(structures);
+    let held = |structures| study.lens.scene_args.options(structures);
     let mut setting = Setting::load(registry, study, ROUNDS, timing, held)?;
     setting.structures = plan(registry, args)?.structures;
     let all = setting.path.cameras.len();

@@ -2,12 +2,11 @@
 
 use std::io::{self, Write};
 
-use super::run_verdict::gains;
+use super::run_verdict::{gains, times};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time, time_within};
 use crate::advise::{
-    Advice, Axis, Check, Omission, StructureChoice, StructureRow, TestChoice, TestRow, Turn,
-    policy_of,
+    Advice, Axis, Check, Omission, StructureChoice, StructureRow, TestChoice, TestRow, policy_of,
 };
 use crate::measure::YARDSTICK;
 use crate::statistics::Estimate;
@@ -87,13 +86,13 @@ fn taken(advice: &Advice) -> String {
         row.query_ns.is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
     });
     let faster = next.and_then(|next| {
-        let times = significant(next.ns()? / row?.ns()?);
-        Some(format!("{times} x {}, the next", next.structure))
+        let times = times(next.ns()? / row?.ns()?);
+        Some(format!("{times} {}, the next", next.structure))
     });
     let is_next = next.is_some_and(|next| next.structure == YARDSTICK);
     let linear = row.and_then(|row| row.speedup);
     let linear = linear.filter(|_| !choice.is_scan && !is_next);
-    let linear = linear.map(|times| format!("{} x linear", significant(times)));
+    let linear = linear.map(|speedup| format!("{} linear", times(speedup)));
     let figures = bracketed(linear.into_iter().chain(faster), ", ");
     let test = some(advice.test.name, |test| {
         format!(", test {test}{}", ties(&advice.test.ties))
@@ -120,15 +119,12 @@ fn in_motion(advice: &Advice) -> Option<String> {
     let (row, others) = motion.policies.split_first()?;
     let frame = row.ns()?;
     let longer = others.iter().filter_map(|row| {
-        let longer = significant(row.ns()? / frame);
-        Some(format!(
-            "{} takes {longer} x as long",
-            policy_of(&row.structure)
-        ))
+        let (policy, longer) = (policy_of(&row.structure), times(row.ns()? / frame));
+        Some(format!("{policy} takes {longer} as long"))
     });
     let ruled_out = motion.ruled_out.iter().map(|(policy, builds)| {
-        let longer = significant(builds / frame);
-        format!("{policy} at least {longer} x, its builds alone")
+        let longer = times(builds / frame);
+        format!("{policy} at least {longer}, its builds alone")
     });
     let others = bracketed(longer.chain(ruled_out), "; ");
     Some(format!(
@@ -156,14 +152,12 @@ fn changes(advice: &Advice) -> String {
         };
         let turns = [("below", &change.below), ("above", &change.above)];
         let turns = turns.into_iter().filter_map(|(side, turn)| {
-            let Turn {
-                structure,
-                at,
-                lower,
-                upper,
-            } = turn.as_ref()?;
-            let [at, lower, upper] = [*at, *lower, *upper].map(show);
-            Some(format!("{side} {at} ({lower} to {upper}) {structure}"))
+            let turn = turn.as_ref()?;
+            let [at, lower, upper] = [turn.at, turn.lower, turn.upper].map(show);
+            Some(format!(
+                "{side} {at} ({lower} to {upper}) {}",
+                turn.structure
+            ))
         });
         let turns: Vec<String> = turns.collect();
         let [low, high] = change.measured.map(show);
@@ -204,20 +198,23 @@ fn rule_table(advice: &Advice) -> Table {
                 table.add_row([title, "with", "without", ratio, ""]);
             }
             let [with, without] = rule.sides_ns();
-            let ratio = if needed {
-                without / with
+            let (more, less) = if needed {
+                (without, with)
             } else {
-                with / without
+                (with, without)
             };
+            let ratio = more / less;
             let finite = |x: f64| Some(x).filter(|x| x.is_finite());
             let shown = |ns| some(finite(ns), text::time);
-            let note = match rule.is_chosen && ratio < 1.0 {
-                true => "the choice above decides",
-                false => &rule.note,
+            let is_decided = rule.is_chosen && ratio < 1.0;
+            let note = if is_decided {
+                "the choice above decides"
+            } else {
+                &rule.note
             };
             let ratio = match rule.is_tie {
                 true => "tie".to_owned(),
-                false => some(finite(ratio), |x| format!("{} x", significant(x))),
+                false => some(finite(ratio), times),
             };
             let feature = format!("  {}", rule.rule.feature);
             table.add_row([feature, shown(with), shown(without), ratio, note.to_owned()]);
@@ -288,10 +285,8 @@ fn structure_table(choice: &StructureChoice) -> Table {
 }
 
 fn test_table(choice: &TestChoice) -> Table {
-    let columns: &[Column<(bool, &TestRow)>] = &[
-        ("", |(is_chosen, _)| {
-            if *is_chosen { "*" } else { "" }.to_owned()
-        }),
+    let columns: &[Column<(&str, &TestRow)>] = &[
+        ("", |(mark, _)| (*mark).to_owned()),
         ("test", |(_, r)| r.test.to_owned()),
         (">query [95 % interval]", |(_, r)| {
             some(r.query_ns, time_within)
@@ -305,11 +300,14 @@ fn test_table(choice: &TestChoice) -> Table {
         }),
         (">query and drawing", |(_, r)| some(r.total_ns, time)),
     ];
-    let rows = choice.rows.iter();
-    Table::with(
-        rows.map(|row| (choice.name == Some(row.test), row)),
-        columns,
-    )
+    let mark = |row: &TestRow| {
+        if choice.name == Some(row.test) {
+            "*"
+        } else {
+            ""
+        }
+    };
+    Table::with(choice.rows.iter().map(|row| (mark(row), row)), columns)
 }
 
 /// Every measurement with and without a feature.
@@ -318,16 +316,15 @@ fn check_table(features: &[Omission]) -> Table {
         ("feature", |(rule, _)| rule.rule.feature.to_owned()),
         ("measured on", |(_, check)| check.on.clone()),
         (">with / without", |(rule, check)| {
-            some(check.ratio, |ratio| {
-                text::within(match rule.rule.is_saving {
-                    false => ratio,
-                    true => Estimate {
-                        value: ratio.value.recip(),
-                        lower: ratio.upper.map(f64::recip),
-                        upper: ratio.lower.map(f64::recip),
-                    },
-                })
-            })
+            let inverse = |ratio: Estimate| Estimate {
+                value: ratio.value.recip(),
+                lower: ratio.upper.map(f64::recip),
+                upper: ratio.lower.map(f64::recip),
+            };
+            match rule.rule.is_saving {
+                true => some(check.ratio.map(inverse), text::within),
+                false => some(check.ratio, text::within),
+            }
         }),
         (">false positives %, both", |(rule, check)| {
             let mut both = [check.kept_excess, check.left_out_excess];

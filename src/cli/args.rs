@@ -8,7 +8,7 @@ use crate::drift::{ARMS, ArmKind};
 use crate::funnel::StageKind;
 use crate::stress::extremes::DEFAULT_CASES;
 use clap::builder::ArgPredicate;
-use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::command_args::{CompareArgs, FunnelArgs, SceneCommand, ViewArgs};
 use super::shared_args::{
@@ -213,13 +213,9 @@ pub struct QueryArgs {
     #[arg(long, value_enum, default_value = "csv")]
     pub format: RowFormat,
     #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
     pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]
@@ -276,13 +272,9 @@ pub struct VerifyArgs {
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
     #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
     pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]
@@ -316,7 +308,6 @@ pub struct PrecisionArgs {
 
 #[derive(Args, Debug)]
 #[command(mut_arg("structure", |arg| arg.help("Structures to choose from, e.g. linear,bvh:leaf=4")))]
-#[command(mut_arg("motion", |arg| arg.action(ArgAction::Set)))]
 pub struct AdviseArgs {
     #[command(flatten)]
     pub study: StudyArgs,

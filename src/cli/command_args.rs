@@ -5,9 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 
-use super::shared_args::{
-    CullingArgs, KernelArgs, LensArgs, SceneArgs, StudyArgs, TableFormat, WhatArgs,
-};
+use super::shared_args::{CullingArgs, LensArgs, SceneArgs, StudyArgs, TableFormat, WhatArgs};
 use super::{program, values};
 use crate::query::ItemId;
 use crate::suite::DEFAULT_PATH;
@@ -42,13 +40,9 @@ pub struct ViewArgs {
     #[arg(long, value_name = "WxH", value_parser = values::samples)]
     pub samples: Option<SampleGrid>,
     #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
     pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
 }
 
 const FUNNEL_HELP: &str = include_str!("assets/help/funnel.txt");
@@ -139,8 +133,6 @@ pub struct SceneInfoArgs {
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
     #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
     pub lens: LensArgs,
 }
 
@@ -204,8 +196,6 @@ pub struct SceneDrawArgs {
     /// The SVG file to write
     #[arg(long, short, value_name = "FILE")]
     pub out: PathBuf,
-    #[command(flatten)]
-    pub scene_args: SceneArgs,
     #[command(flatten)]
     pub lens: LensArgs,
 }

@@ -86,74 +86,58 @@ impl<'d> Diagram<'d> {
         }
     }
 
+    /// Height of a value, px.
+    fn y(&self, value: f64) -> f64 {
+        10.0 + (self.height - 20.0) * (1.0 - self.axes[1].along(value))
+    }
+
+    fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [self.axes[0].percent(x), self.y(y)]
+    }
+
     pub fn draw(&self) -> Figure {
         let [x_axis, y_axis] = &self.axes;
         let names = self.names();
         let bottom = self.height.max(LINE * (names.len() + 1) as f64);
-        let y = |value: f64| 10.0 + (self.height - 20.0) * (1.0 - y_axis.along(value));
-        let mut parts = String::new();
-        let (mut left, mut free) = (0, -LINE);
+        let (mut parts, mut left) = (String::new(), 0);
         for tick in y_axis.all_ticks() {
-            let name = (y_axis.shown)(tick);
+            let (name, y) = ((y_axis.shown)(tick), self.y(tick));
             left = left.max(name.chars().count());
-            parts += &line("grid", [0.0, 100.0], [y(tick), y(tick)]);
-            let y = y(tick) + 4.0;
+            parts += &line("grid", [0.0, 100.0], [y, y]);
             parts += &format!(
-                "<text class=\"y\" x=\"0\" dx=\"-8\" y=\"{y:.1}\">{}</text>\n",
+                "<text class=\"y\" x=\"0\" dx=\"-8\" y=\"{:.1}\">{}</text>\n",
+                y + 4.0,
                 html(&name)
             );
         }
-        for tick in x_axis.all_ticks() {
-            let x = x_axis.percent(tick);
-            parts += &line("grid", [x, x], [0.0, bottom]);
-            let name = (x_axis.shown)(tick);
-            // Percent of the narrowest plot.
-            let half = 50.0 * CHARACTER * name.chars().count() as f64 / 200.0;
-            if x - half < free {
-                continue;
-            }
-            free = x + half;
-            parts += &format!(
-                "<text class=\"tick\" x=\"{x:.2}%\" y=\"{:.1}\">{}</text>\n",
-                bottom + LINE,
-                html(&name)
-            );
-        }
+        parts += &x_axis.across(None, bottom);
         let mut coloured = 0;
-        let mut named = names.iter();
         let classes = self.series.iter().map(|series| {
             let own = class(series.look, series.is_scan, coloured);
             coloured += usize::from(!series.is_scan);
             own
         });
         let classes: Vec<String> = classes.collect();
+        let named = names.iter().map(|(name, end, at)| beside(name, *end, *at));
+        let named: Vec<String> = named.collect();
+        let is_apart = self.joined == Joined::Apart;
         // The strongest are drawn last, in front of the others.
-        let groups = self.series.iter().zip(&classes).map(|(series, class)| {
-            let name = match self.joined {
-                Joined::Apart => String::new(),
-                _ => named.next().map_or(String::new(), |(name, at)| {
-                    let end = series
-                        .points
-                        .last()
-                        .map_or([100.0, *at], |p| self.place(p, &y));
-                    beside(name, end, *at)
-                }),
-            };
-            self.group(series, class, &y, &name)
-        });
-        let groups: Vec<String> = groups.collect();
-        parts.extend(groups.into_iter().rev());
+        for (n, series) in self.series.iter().enumerate().rev() {
+            let name = if is_apart { "" } else { &named[n] };
+            parts += &self.group(series, &classes[n], name);
+        }
         if !self.front.is_empty() {
-            let places = self.front.iter().map(|[a, b]| [x_axis.percent(*a), y(*b)]);
+            let places = self.front.iter().map(|at| self.place(*at));
             parts += &self.curve("front", &places.collect::<Vec<_>>());
         }
         let height = bottom + 2.5 * LINE;
         let mut legend = (String::new(), 0.0);
-        if self.joined == Joined::Apart {
-            for ((value, _), (name, at)) in self.levels.iter().zip(&names) {
-                let name = beside(name, [100.0, y(*value)], *at);
-                parts += &format!("<g class=\"level\">{name}</g>\n");
-            }
+        if is_apart {
+            parts.extend(
+                named
+                    .iter()
+                    .map(|name| format!("<g class=\"level\">{name}</g>\n")),
+            );
             legend = self.legend(&classes, height);
         }
         parts += &format!(
@@ -161,7 +145,7 @@ impl<'d> Diagram<'d> {
             bottom + 2.0 * LINE,
             html(x_axis.title)
         );
-        let right = names.iter().map(|(name, _)| name.chars().count()).max();
+        let right = names.iter().map(|name| name.0.chars().count()).max();
         Figure {
             caption: self.caption.clone(),
             margins: [
@@ -187,19 +171,15 @@ impl<'d> Diagram<'d> {
         )
     }
 
-    fn place(&self, point: &Point, y: &dyn Fn(f64) -> f64) -> [f64; 2] {
-        [self.axes[0].percent(point.at[0]), y(point.at[1])]
-    }
-
-    fn group(&self, series: &Series, class: &str, y: &dyn Fn(f64) -> f64, name: &str) -> String {
-        let places: Vec<[f64; 2]> = series.points.iter().map(|p| self.place(p, y)).collect();
+    fn group(&self, series: &Series, class: &str, name: &str) -> String {
+        let places: Vec<[f64; 2]> = series.points.iter().map(|p| self.place(p.at)).collect();
         let mut shapes = match self.joined {
             Joined::Apart => String::new(),
             _ => self.curve("curve", &places),
         };
         for (point, place) in series.points.iter().zip(&places) {
             shapes += &text::some(point.ends, |ends| {
-                line("interval", [place[0]; 2], ends.map(y))
+                line("interval", [place[0]; 2], ends.map(|end| self.y(end)))
             });
             shapes += &text::some(point.wide, |ends| {
                 let ends = ends.map(|end| self.axes[0].percent(end));
@@ -222,35 +202,29 @@ impl<'d> Diagram<'d> {
         )
     }
 
-    /// Names beside the plot with their heights, at least a line apart.
-    fn names(&self) -> Vec<(String, f64)> {
-        let y = |value: f64| 14.0 + (self.height - 20.0) * (1.0 - self.axes[1].along(value));
-        let ends: Vec<(String, f64)> = match self.joined {
-            Joined::Apart => self
-                .levels
-                .iter()
-                .map(|(v, n)| (n.clone(), y(*v)))
-                .collect(),
-            _ => {
-                let end = |series: &Series| {
-                    let end = series.points.last().map_or(0.0, |point| point.at[1]);
-                    (series.name.clone(), y(end))
-                };
-                self.series.iter().map(end).collect()
-            }
+    /// Names beside the plot with the ends of their lines, and heights a line apart.
+    fn names(&self) -> Vec<(String, [f64; 2], f64)> {
+        let end = |series: &Series| {
+            let last = series.points.last().map(|point| self.place(point.at));
+            (series.name.clone(), last.unwrap_or([100.0, self.height]))
+        };
+        let level = |(at, name): &(f64, String)| (name.clone(), [100.0, self.y(*at)]);
+        let ends: Vec<(String, [f64; 2])> = match self.joined {
+            Joined::Apart => self.levels.iter().map(level).collect(),
+            _ => self.series.iter().map(end).collect(),
         };
         let mut order: Vec<usize> = (0..ends.len()).collect();
-        order.sort_by(|a, b| ends[*b].1.total_cmp(&ends[*a].1));
+        order.sort_by(|a, b| ends[*b].1[1].total_cmp(&ends[*a].1[1]));
         let mut free = self.height.max(LINE * (ends.len() + 1) as f64);
         let mut placed = vec![0.0; ends.len()];
         for (n, &i) in order.iter().enumerate() {
             let above = LINE * (order.len() - 1 - n) as f64 + 10.0;
-            placed[i] = ends[i].1.min(free).max(above);
+            placed[i] = (ends[i].1[1] + 4.0).min(free).max(above);
             free = placed[i] - LINE;
         }
         let named = ends.into_iter().zip(placed);
         named
-            .map(|((name, _), at)| (shortened(&name, NAME), at))
+            .map(|((name, end), at)| (shortened(&name, NAME), end, at))
             .collect()
     }
 
@@ -309,14 +283,7 @@ pub struct Row {
 pub fn rows(caption: String, axis: &Axis, one: Option<f64>, rows: &[Row]) -> Figure {
     let bottom = LINE * 1.5 * rows.len() as f64 + 8.0;
     let y = |row: usize| LINE * (1.5 * row as f64 + 1.0);
-    let mut parts = String::new();
-    for tick in axis.all_ticks() {
-        let (x, name) = (axis.percent(tick), html(&(axis.shown)(tick)));
-        let class = if Some(tick) == one { "one" } else { "grid" };
-        parts += &line(class, [x, x], [0.0, bottom]);
-        let y = bottom + LINE;
-        parts += &format!("<text class=\"tick\" x=\"{x:.2}%\" y=\"{y:.1}\">{name}</text>\n");
-    }
+    let mut parts = axis.across(one, bottom);
     let mut names: Vec<&str> = Vec::new();
     for (n, row) in rows.iter().enumerate() {
         let (x, look, y0) = (axis.percent(row.value), Look::of(&row.name), y(n));
@@ -389,7 +356,7 @@ mod tests {
         ];
         let series = (0..25).map(series).collect();
         let diagram = Diagram::of("<c>".to_owned(), axes, Joined::Marked, series);
-        let mut heights: Vec<f64> = diagram.names().into_iter().map(|name| name.1).collect();
+        let mut heights: Vec<f64> = diagram.names().into_iter().map(|name| name.2).collect();
         heights.sort_by(f64::total_cmp);
         assert!(heights.windows(2).all(|pair| pair[1] - pair[0] >= LINE));
         let figure = diagram.draw();

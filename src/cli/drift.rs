@@ -5,7 +5,7 @@ use super::args::DriftArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, show, to_page};
 use super::figure::{Axis, Figure, Look, is_drawn, picture};
-use super::processes::{Job, Timing};
+use super::processes::Timing;
 use super::study::Study;
 use super::table::{Column, Table};
 use super::text::{self, some, time_plus_minus};
@@ -37,8 +37,7 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
         study.advance();
     });
     let schedule = drift::plan(&options, &protocol(args, 0));
-    let job = |timing| Job::Drift(schedule.clone(), timing);
-    let times = study.times("everything, timed", None, job)?;
+    let times = study.times("everything, timed", None, &schedule)?;
     report.conclude(&times, schedule.rounds);
     print(args.format, &report, || show(&blocks(&report, args.all)))?;
     if let Some(file) = &args.svg {

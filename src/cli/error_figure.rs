@@ -6,6 +6,7 @@
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::figure::{Axis, Figure, is_drawn, left_out};
 use super::text;
+use crate::report::grouped;
 
 /// A point of a structure with a test.
 pub struct Measured {
@@ -69,21 +70,15 @@ impl Against<'_> {
         let beyond = all - self.points.len();
         let (front, levels) = (self.front(), self.levels());
         let mut series: Vec<Series> = Vec::new();
-        for Measured {
-            structure,
-            mut point,
-            ..
-        } in self.points
-        {
-            point.is_large = front.contains(&point.at);
-            point.wide = point.wide.filter(|_| point.is_large);
-            match series.iter_mut().find(|s| s.name == structure) {
-                Some(series) => series.points.push(point),
-                None => {
-                    let is_scan = structure.starts_with("linear");
-                    series.push(Series::of(&structure, is_scan, vec![point]));
-                }
-            }
+        let points = self.points.into_iter();
+        for (structure, own) in grouped(points.map(|own| (own.structure, own.point))) {
+            let points = own.into_iter().map(|mut point| {
+                point.is_large = front.contains(&point.at);
+                point.wide = point.wide.filter(|_| point.is_large);
+                point
+            });
+            let is_scan = structure.starts_with("linear");
+            series.push(Series::of(&structure, is_scan, points.collect()));
         }
         let places = || series.iter().flat_map(|series| &series.points);
         let error = |error: f64| match error <= self.none * 1.01 {

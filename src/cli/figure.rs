@@ -73,11 +73,9 @@ impl<'t> Axis<'t> {
             false => 1.0 / factor..factor,
         };
         Axis {
-            title,
             values,
             is_log: true,
-            ticks: Vec::new(),
-            shown,
+            ..Axis::linear(title, 0.0..1.0, shown)
         }
     }
 
@@ -141,6 +139,25 @@ impl<'t> Axis<'t> {
             }
         }
         round_values([start, end], 5.0).1
+    }
+
+    /// Lines across a plot down to `bottom`, and their texts below where these have room.
+    pub fn across(&self, one: Option<f64>, bottom: f64) -> String {
+        let (mut parts, mut free) = (String::new(), -LINE);
+        for tick in self.all_ticks() {
+            let (x, name) = (self.percent(tick), (self.shown)(tick));
+            let class = if Some(tick) == one { "one" } else { "grid" };
+            parts += &line(class, [x, x], [0.0, bottom]);
+            // Percent of the narrowest plot.
+            let half = 50.0 * CHARACTER * name.chars().count() as f64 / 200.0;
+            if x - half >= free {
+                free = x + half;
+                let (y, name) = (bottom + LINE, html(&name));
+                parts +=
+                    &format!("<text class=\"tick\" x=\"{x:.2}%\" y=\"{y:.1}\">{name}</text>\n");
+            }
+        }
+        parts
     }
 }
 

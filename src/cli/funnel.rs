@@ -15,7 +15,7 @@ use super::diagram::{Row, rows};
 use super::document::{Block, show, to_page};
 use super::figure::{Axis, Figure};
 use super::plan::Plan;
-use super::processes::{Job, Timing};
+use super::processes::Timing;
 use super::shared_args::{StudyArgs, TableFormat};
 use super::sheet::Class;
 use super::study::{Setting, Study};
@@ -59,9 +59,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     };
     let prepared = funnel::prepare(&input, &begin)?;
     study.advance();
-    let job = |timing| Job::Funnel(prepared.plan.clone(), timing);
     let lens_scale = stages.setting.path.lens_scale;
-    let times = study.times("every stage, timed", lens_scale, job)?;
+    let times = study.times("every stage, timed", lens_scale, &prepared.plan)?;
     if let Some(verdict) = funnel::failure(&times) {
         let reason = verdict.reason.as_deref().unwrap_or("no reason");
         bail!("a stage failed when it was timed: {reason}");
@@ -146,12 +145,9 @@ fn chain(
             if !known.iter().any(|row| row.name == name) {
                 let stage = stage.name();
                 if let [_] = known[..] {
-                    let why = funnel::left_out_of(scene);
-                    let why = why.map_or(String::new(), |row| format!(": {}", row.reason));
+                    let nothing = nothing_for_it(scene);
                     return Err(SpecError::new(format_args!(
-                        "--{stage} is '{name}'; expected none: scene '{}' has nothing for that \
-                         stage{why}",
-                        scene.name
+                        "--{stage} is '{name}'; expected none: {nothing}"
                     )));
                 }
                 let names = known.iter().map(|row| row.name);
@@ -162,6 +158,14 @@ fn chain(
         }
     }
     Ok(chain)
+}
+
+/// Reason for which a scene has no back end of a stage.
+pub fn nothing_for_it(scene: &Scene) -> String {
+    let why = text::some(funnel::left_out_of(scene), |row| {
+        format!(": {}", row.reason)
+    });
+    format!("scene '{}' has nothing for that stage{why}", scene.name)
 }
 
 /// The claim of what is seen from each region that a file holds.
@@ -187,7 +191,7 @@ impl Stages {
     ) -> anyhow::Result<Stages> {
         let held = |structures| LoadOptions {
             per_triangle: funnel::BYTES_PER_TRIANGLE,
-            ..args.study.scene_args.options(structures + 2)
+            ..args.study.lens.scene_args.options(structures + 2)
         };
         let setting = Setting::load(registry, &args.study, ROUNDS, timing, held)?;
         Ok(Stages {
@@ -235,7 +239,7 @@ pub fn plain_input<'s>(
         protocol: &setting.protocol,
         claim: None,
         inner_boxes: None,
-        loading: args.scene_args.options(0),
+        loading: args.lens.scene_args.options(0),
         execution: args.kernel.execution()?,
         all: true,
         picks: true,

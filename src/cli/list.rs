@@ -10,15 +10,15 @@ use super::shared_args::TableFormat;
 use super::table::Table;
 use super::{Ending, print_json, program, text};
 use crate::culling::TESTS;
-use crate::index::Registry;
+use crate::index::{Info, Registry};
 use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
 use crate::motion::{MOTION_PARAMS, MOTIONS};
 use crate::path::{PATH_PARAMS, PATHS};
 use crate::scene::{FAMILIES, FETCHED, MESHES, SAMPLES, SCENE_PARAMS};
 use crate::suite::SUITES;
 
-/// Name, further columns by name, summary.
-type Row = (String, Vec<(&'static str, Value)>, String);
+/// Further columns of rows, in the order of the tables.
+const COLUMNS: [&str; 6] = ["kind", "origin", "capabilities", "timed", "params", "unit"];
 
 pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     let topics = match args.topic {
@@ -27,29 +27,25 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     };
     let mut out = io::stdout().lock();
     let mut all = Map::new();
-    for topic in &topics {
-        let (name, note, rows) = rows(registry, *topic)?;
-        match args.format {
-            TableFormat::Json => {
-                all.insert(name.to_owned(), rows.into_iter().map(as_json).collect());
-            }
-            TableFormat::Table => {
-                let rows: Vec<_> = rows.into_iter().map(told).collect();
-                let in_line = rows.iter().all(|row| row.1.join("; ").len() < 60);
-                let rows = rows
-                    .into_iter()
-                    .map(|(name, columns, summary)| match in_line {
-                        true if !columns.is_empty() => {
-                            [name, format!("{summary} ({})", columns.join("; "))]
-                        }
-                        _ => [name, [vec![summary], columns].concat().join("\n")],
-                    });
-                let entries = text::entries(&rows.collect::<Vec<_>>(), text::width());
-                writeln!(out, "{name}\n{entries}")?;
-                if !note.is_empty() {
-                    writeln!(out, "{}\n", text::wrapped(note.trim_end(), text::width()))?;
-                }
-            }
+    for topic in topics {
+        let (name, note, rows) = rows(registry, topic)?;
+        if args.format == TableFormat::Json {
+            all.insert(name.to_owned(), rows.into());
+            continue;
+        }
+        let columns: Vec<Vec<String>> = rows.iter().map(told).collect();
+        let in_line = columns.iter().all(|own| own.join("; ").len() < 60);
+        let rows = rows.iter().zip(columns).map(|(row, columns)| {
+            let [name, summary] = ["name", "summary"].map(|key| text_of(&row[key]));
+            let text = match in_line && !columns.is_empty() {
+                true => format!("{summary} ({})", columns.join("; ")),
+                false => [vec![summary], columns].concat().join("\n"),
+            };
+            [name, text]
+        });
+        writeln!(out, "{name}\n{}", entries(rows))?;
+        if !note.is_empty() {
+            writeln!(out, "{}\n", text::wrapped(note.trim_end(), text::width()))?;
         }
     }
     if args.format == TableFormat::Json {
@@ -63,102 +59,81 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// A row for people: its name, what the columns hold, its summary.
-fn told((name, columns, summary): Row) -> (String, Vec<String>, String) {
-    let of = |value: &Value| match value {
-        Value::String(text) => text.clone(),
-        Value::Array(words) => {
-            let words = words.iter().filter_map(Value::as_str);
-            words.collect::<Vec<_>>().join(", ")
-        }
-        other => other.to_string(),
-    };
-    let told = columns.iter().map(|(column, value)| {
+/// What the further columns of a row hold, for people.
+fn told(row: &Value) -> Vec<String> {
+    let told = COLUMNS.iter().filter_map(|column| {
         // Parameters as they are typed behind the name.
-        let value = of(value).replace("\":", "=").replace(['{', '}', '"'], "");
-        (column, value)
+        let value = text_of(row.get(column)?).replace("\":", "=");
+        Some((column, value.replace(['{', '}', '"'], "")))
     });
     let told = told.filter(|(_, value)| !value.is_empty());
-    let told = told.map(|(column, value)| format!("{column} {value}"));
-    (name, told.collect(), summary)
+    told.map(|(column, value)| format!("{column} {value}"))
+        .collect()
 }
 
-fn entries<'r>(rows: impl Iterator<Item = [&'r str; 2]>) -> String {
-    let rows = rows.map(|row| row.map(str::to_owned));
+fn text_of(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(words) => text::joined(words.iter().filter_map(Value::as_str)),
+        other => other.to_string(),
+    }
+}
+
+fn entries(rows: impl Iterator<Item = [impl Into<String>; 2]>) -> String {
+    let rows = rows.map(|row| row.map(Into::into));
     text::entries(&rows.collect::<Vec<_>>(), text::width())
 }
 
-fn as_json((name, columns, summary): Row) -> Value {
-    let mut row = json!({ "name": name, "summary": summary });
-    for (column, value) in columns {
-        row[column] = value;
-    }
-    row
-}
-
-/// Rows with one further column: name, column and summary.
-fn rows_with<'r>(
-    column: &'static str,
-    rows: impl IntoIterator<Item = [&'r str; 3]>,
-) -> impl Iterator<Item = Row> {
-    let rows = rows.into_iter();
-    rows.map(move |[name, value, summary]| {
-        let columns = vec![(column, value.into())];
-        (name.to_owned(), columns, summary.to_owned())
-    })
+/// A row of a name, one further column and a summary.
+fn row(name: &str, column: &str, value: &str, summary: &str) -> Value {
+    json!({ "name": name, column: value, "summary": summary })
 }
 
 /// Name of a topic, a note on it, and its rows.
-fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
+fn rows(
+    registry: &Registry,
+    topic: ListTopic,
+) -> anyhow::Result<(&'static str, String, Vec<Value>)> {
     Ok(match topic {
         ListTopic::Structures => {
-            let rows = registry.rows().iter().map(|row| {
-                let info = row.info;
+            let row = |info: &Info| {
                 let params = registry.structure(info.name)?.params;
-                let timed = if info.on_request {
-                    "if named"
-                } else {
-                    "by default"
-                };
-                let columns = vec![
-                    ("kind", info.kind.name().into()),
-                    ("origin", info.origin.to_string().into()),
-                    ("capabilities", info.capabilities.names().into()),
-                    ("timed", timed.into()),
-                    ("params", params.to_string().into()),
-                ];
-                Ok((info.name.to_owned(), columns, info.summary.to_owned()))
-            });
-            let rows = rows.collect::<anyhow::Result<_>>()?;
+                Ok(json!({
+                    "name": info.name,
+                    "kind": info.kind.name(),
+                    "origin": info.origin.to_string(),
+                    "capabilities": info.capabilities.names(),
+                    "timed": if info.on_request { "if named" } else { "by default" },
+                    "params": params.to_string(),
+                    "summary": info.summary,
+                }))
+            };
+            let rows = registry.rows().iter().map(|own| row(&own.info));
             let note = "Parameters follow the name: bvh:leaf=4,preset=medium\nLists of \
                         structures: all, default (those timed by default) or names separated by \
                         commas";
+            let rows = rows.collect::<anyhow::Result<_>>()?;
             ("structures", note.to_owned(), rows)
         }
         ListTopic::Scenes => {
-            let mut rows: Vec<[String; 3]> = Vec::new();
-            for f in FAMILIES {
+            let families = FAMILIES.iter().map(|f| {
                 let params = format!("{SCENE_PARAMS}, {}", f.params);
-                rows.push([f.name.to_owned(), params, f.summary.to_owned()]);
-            }
-            rows.extend(
-                MESHES
-                    .iter()
-                    .map(|m| [m.name, SCENE_PARAMS, m.summary].map(str::to_owned)),
-            );
-            for s in SAMPLES {
+                row(f.name, "params", &params, f.summary)
+            });
+            let meshes = MESHES.iter();
+            let meshes = meshes.map(|m| row(m.name, "params", SCENE_PARAMS, m.summary));
+            let samples = SAMPLES.iter().map(|s| {
                 let params = format!("real; {}", s.licence);
-                rows.push([s.name.to_owned(), params, s.summary.to_owned()]);
-            }
-            for f in FETCHED.iter() {
+                row(s.name, "params", &params, s.summary)
+            });
+            let fetched = FETCHED.iter().map(|f| {
                 let state = match f.is_there() {
                     true => "fetched".to_owned(),
                     false => format!("missing: scripts/fetch.py {}", f.name),
                 };
                 let params = format!("{state}; {}", f.licence);
-                let path = f.path().to_string_lossy().into_owned();
-                rows.push([path, params, f.summary.clone()]);
-            }
+                row(&f.path().to_string_lossy(), "params", &params, &f.summary)
+            });
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, \
                  glTF or GLB, OBJ, a Doom WAD (maps.wad#MAP07 picks a map), a Quake III BSP, or a \
@@ -166,31 +141,35 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                 program::name(),
                 entries(SUITES.iter().map(|s| [s.name, s.summary]))
             );
-            let rows = rows.iter().map(|row| row.each_ref().map(String::as_str));
-            ("scenes", note, rows_with("params", rows).collect())
+            let rows = families.chain(meshes).chain(samples).chain(fetched);
+            ("scenes", note, rows.collect())
         }
         ListTopic::Paths => {
-            let rows = PATHS.iter().map(|p| [p.name, p.params, p.summary]);
+            let rows = PATHS
+                .iter()
+                .map(|p| row(p.name, "params", p.params, p.summary));
             let note = format!(
                 "Parameters of every path: {PATH_PARAMS}.\nA path is also a file: a cameras CSV (eye_x.. and look_x.. or forward_x.., or matrices m00..m33)."
             );
-            ("paths", note, rows_with("params", rows).collect())
+            ("paths", note, rows.collect())
         }
         ListTopic::Tests => {
-            let row = |(name, summary): (&str, &str)| (name.to_owned(), vec![], summary.to_owned());
-            let rows = TESTS.iter().map(|(_, name, summary)| row((name, summary)));
+            let rows = TESTS.iter();
+            let rows = rows.map(|(_, name, what)| json!({ "name": name, "summary": what }));
             ("tests", String::new(), rows.collect())
         }
         ListTopic::Metrics => {
-            let rows = METRICS.iter().map(|m| [m.name, m.unit, m.summary]);
+            let rows = METRICS
+                .iter()
+                .map(|m| row(m.name, "unit", m.unit, m.summary));
             let bounds = entries(BOUNDS.iter().map(|b| [b.name, b.summary]));
             let note = format!("Lower bounds in reports and tables (no structures):\n{bounds}");
-            ("metrics", note, rows_with("unit", rows).collect())
+            ("metrics", note, rows.collect())
         }
         ListTopic::Motions => {
-            let rows = MOTIONS.iter().flat_map(|m| {
+            let rows = MOTIONS.iter().map(|m| {
                 let params = format!("share={}, step={}", m.share, m.step);
-                rows_with("params", [[m.name, &params, m.summary]]).collect::<Vec<_>>()
+                row(m.name, "params", &params, m.summary)
             });
             let note = format!(
                 "Parameters of every motion: {MOTION_PARAMS}.\nA motion is also a file: a motion \

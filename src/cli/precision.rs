@@ -7,9 +7,9 @@ use anyhow::bail;
 use super::args::PrecisionArgs;
 use super::document::{Block, show, to_page};
 use super::figure::picture;
-use super::funnel::plain_input;
+use super::funnel::{nothing_for_it, plain_input};
 use super::precision_conclusions::is_wrong;
-use super::processes::{Job, Timing};
+use super::processes::Timing;
 use super::study::{Setting, Study};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time_plus_minus};
@@ -54,8 +54,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
             sweeps.extend(sweep(which, cameras, spread.seed));
         }
     }
-    let points = |timing| Job::Points(prepared.plan.clone(), timing);
-    let times = study.times("every point, timed", setting.path.lens_scale, points)?;
+    let lens_scale = setting.path.lens_scale;
+    let times = study.times("every point, timed", lens_scale, &prepared.plan)?;
     let precision = prepared.conclude(&times);
     let wrong =
         precision.points.iter().any(is_wrong) || precision.region_points.iter().any(is_wrong);
@@ -105,7 +105,7 @@ fn setting(
     args: &PrecisionArgs,
     timing: Option<&Timing>,
 ) -> anyhow::Result<Setting> {
-    let held = |structures| args.study.scene_args.options(2 * structures);
+    let held = |structures| args.study.lens.scene_args.options(2 * structures);
     Setting::load(registry, &args.study, ROUNDS, timing, held)
 }
 
@@ -143,7 +143,7 @@ fn stage_setting(
 ) -> anyhow::Result<(Setting, Chain)> {
     let held = |_| LoadOptions {
         per_triangle: funnel::BYTES_PER_TRIANGLE,
-        ..args.study.scene_args.options(3)
+        ..args.study.lens.scene_args.options(3)
     };
     let (study, rounds) = (&args.study, STAGE_ROUNDS);
     let mut setting = Setting::load(registry, study, rounds, timing, held)?;
@@ -163,13 +163,8 @@ fn sweep_stage(
     let known = funnel::back_ends(stage, scene, false);
     if known.iter().all(|row| row.name == NONE) {
         // Every scene has something for the others.
-        let (name, stage) = (&scene.name, stage.name());
-        let why = funnel::left_out_of(scene);
-        let why = why.map_or(String::new(), |row| format!(": {}", row.reason));
-        bail!(
-            "scene '{name}' has nothing for the {stage} stage{why}; expected a scene with rooms or \
-             sectors"
-        );
+        let (stage, nothing) = (stage.name(), nothing_for_it(scene));
+        bail!("--stage is {stage}: {nothing}; expected a scene with rooms or sectors");
     }
     let about = format!("{}, {} stage: ", args.study.scene, stage.name());
     let study = Study::new(about, 0, &args.study.spread)?;
@@ -178,9 +173,8 @@ fn sweep_stage(
     let prepared = funnel::prepare_sweep(&input, stage)?;
     let items = text::counted(scene.items.len(), "item");
     study.announce(&items, "less than a minute");
-    let job = |timing| Job::Sweep(prepared.plan.clone(), timing);
     let lens_scale = setting.path.lens_scale;
-    let times = study.times("every point, timed", lens_scale, job)?;
+    let times = study.times("every point, timed", lens_scale, &prepared.plan)?;
     let sweep = prepared.conclude(&times);
     print(args.format, &sweep, || show(&stage_blocks(&sweep)))?;
     let is_broken =
@@ -192,12 +186,10 @@ fn sweep_stage(
 pub fn time_stage(
     registry: &Registry,
     args: &PrecisionArgs,
+    stage: StageKind,
     plan: &FunnelPlan,
     timing: &Timing,
 ) -> anyhow::Result<ProcessTimes> {
-    let Some(stage) = args.stage else {
-        bail!("a sweep without a stage");
-    };
     let (setting, chain) = stage_setting(registry, args, Some(timing))?;
     let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
     Ok(funnel::time_sweep(&input, stage, plan)?)

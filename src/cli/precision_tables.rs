@@ -47,38 +47,35 @@ pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
         text::counted(p.rounds, "round")
     );
     let mut blocks = vec![Block::Line(head)];
-    let mut add = |title: String, table: Table, note: &str| {
-        blocks.push(Block::Heading(2, title));
-        blocks.push(Block::Table(table));
-        if !note.is_empty() {
-            blocks.push(Block::Line(note.to_owned()));
-        }
+    let mut add = |title: &str, table: Table, note: &str| {
+        blocks.extend([Block::heading(title), Block::Table(table)]);
+        blocks.extend((!note.is_empty()).then(|| Block::line(note)));
     };
     if all {
         let fastest = fastest(&p.points);
         let title = "Errors, by test, numbers and planes";
-        add(title.to_owned(), errors_table(&fastest), ERRORS_NOTE);
+        add(title, errors_table(&fastest), ERRORS_NOTE);
         let title = "Times, the fastest structure for each";
-        add(title.to_owned(), times_table(&fastest), "");
+        add(title, times_table(&fastest), "");
     }
     let title = "Pareto front of error, memory and time, fastest first";
     let front = front_table(p).within(room, &["tie", "B/item", "FN ppm"]);
-    add(title.to_owned(), front, FRONT_NOTE);
+    add(title, front, FRONT_NOTE);
     if all {
         let title = "Region search, the fastest structure for each";
-        add(title.to_owned(), regions_table(p), "");
+        add(title, regions_table(p), "");
         let title = "Cameras after which the order of the points by time is final";
-        add(title.to_owned(), stability_table(p), "");
+        add(title, stability_table(p), "");
     }
     if all && !outcome.size_sweep.is_empty() {
         let title = "False positives / visible, %, by cube edge s / depth D of the frustum";
         let note = sizes_note(&outcome.size_sweep);
-        add(title.to_owned(), sizes_table(&outcome.size_sweep), &note);
+        add(title, sizes_table(&outcome.size_sweep), &note);
         for (sweep, name, what) in SWEEPS {
             let rows = outcome.sweeps.iter().filter(|row| row.sweep == sweep);
             let (table, note) = swept_errors(&rows.collect::<Vec<_>>());
             let title = format!("Missed visible items (ppm) by {name} ({what}), nothing rebased");
-            add(title, table, &note);
+            add(&title, table, &note);
         }
     }
     let failed = p.points.iter().filter_map(|point| {
@@ -118,14 +115,12 @@ fn culling(point: &CullingPoint) -> String {
 
 /// Numbers, planes where they are not the frame's, and epsilon.
 pub fn numbers(names: &Names) -> String {
-    let Names {
-        arithmetic, planes, ..
-    } = names;
-    let planes = match *planes {
+    let arithmetic = names.arithmetic;
+    let planes = match names.planes {
         "frame" => String::new(),
         planes => format!(" {planes}"),
     };
-    let epsilon = match *arithmetic {
+    let epsilon = match arithmetic {
         "f64" => String::new(),
         _ => format!(" c={}", names.epsilon),
     };

@@ -11,15 +11,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use tempfile::NamedTempFile;
 
 use super::interrupt::{self, Interrupted};
 use super::run_resume::typed_args;
-use crate::advise::TrialPlan;
-use crate::funnel::FunnelPlan;
 use crate::input;
-use crate::measure::{Part, ProcessTimes, Schedule, Share, Status, TaskSamples, Verdict};
-use crate::precision::PointPlan;
+use crate::measure::{Part, ProcessTimes, Share, Status, TaskSamples, Verdict};
 use crate::report::temporary_in;
 use crate::shown::shortened;
 
@@ -425,16 +423,8 @@ pub enum Job {
         /// True to receive samples beside the parts.
         samples: bool,
     },
-    /// Both sides of every rule (`advise`).
-    Trials(Box<TrialPlan>, Timing),
-    /// All points (`precision`).
-    Points(PointPlan, Timing),
-    /// Frames, eyes and arms (`drift`).
-    Drift(Schedule, Timing),
-    /// Every stage of the funnel with every back end (`funnel`).
-    Funnel(FunnelPlan, Timing),
-    /// One stage with every back end (`precision --stage`).
-    Sweep(FunnelPlan, Timing),
+    /// All that a study times, by its own plan.
+    Times(Value, Timing),
 }
 
 /// Parameters of a process beside its plan.

@@ -22,9 +22,9 @@ use crate::spec::SpecError;
 const PLACES: &str = "places";
 
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
-    let structures = args.kernel.structures(registry, &args.structure)?;
+    let structures = args.culling.kernel.structures(registry, &args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
-    let mut scene = load_scene(&args.scene, &args.scene_args.options(1))?;
+    let mut scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let mut motion = None;
     if let Some(source) = &args.motion {

@@ -49,7 +49,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
         bail!("nothing to do: this shard has no scene; expected at most as many shards as paths");
     }
     interrupt::from_now_on_finish();
-    let machine = Machine::capture().by(args.what.kernel.execution()?.kernel);
+    let machine = Machine::capture().by(args.what.culling.kernel.execution()?.kernel);
     let (folder, stream) = create(args, &plan, machine)?;
     Run::new(args, plan, folder, stream)?.all()
 }

@@ -71,14 +71,14 @@ pub fn plan_of(
     cullings.iter().try_for_each(Culling::check)?;
     each_once("test", tests())?;
     let names = structures;
-    let structures = args.kernel.structures(registry, &names)?;
+    let structures = args.culling.kernel.structures(registry, &names)?;
     let mut plan = Plan {
         scenes: scenes(args, &suite)?,
         cullings,
         lens: args.lens.defaults()?,
         motions: Vec::new(),
         views_per_frame: 1,
-        load: args.scene_args.options(structures.len()),
+        load: args.lens.scene_args.options(structures.len()),
         structures,
         effort: suite.effort,
         bounds: !args.no_bounds,

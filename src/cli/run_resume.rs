@@ -241,7 +241,7 @@ impl TypedOptions {
 fn same_place(header: &Header, begun: &RunArgs) -> anyhow::Result<()> {
     let here = Header {
         schema_version: SCHEMA_VERSION,
-        machine: Machine::capture().by(begun.what.kernel.execution()?.kernel),
+        machine: Machine::capture().by(begun.what.culling.kernel.execution()?.kernel),
         toolchain: Toolchain::capture(),
         source: Source::capture(),
         binary: binary_digest(),

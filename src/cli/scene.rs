@@ -17,7 +17,7 @@ use crate::scene::{Regions, Scene, UpAxis, write_boxes_csv};
 use crate::spec::SpecError;
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
-    let scene = load_scene(&args.scene, &args.scene_args.options(1))?;
+    let scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
     let defaults = args.lens.defaults()?.of_scene(&scene);
     let path = args.path.as_ref();
     let path = path.map(|path| path::load(path, &scene, &defaults));

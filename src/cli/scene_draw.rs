@@ -59,7 +59,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     let defaults = args.lens.defaults()?;
     let structure = args.structure.as_deref();
     let structure = structure.map(|text| divided(registry, text)).transpose()?;
-    let loading = args.scene_args.options(structure.iter().len());
+    let loading = args.lens.scene_args.options(structure.iter().len());
     let scene = load_scene(&args.scene, &loading)?;
     let mut caption = vec![scene.name.clone()];
     let camera = match &args.camera {

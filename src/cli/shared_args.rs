@@ -85,13 +85,9 @@ pub struct WhatArgs {
     #[command(flatten)]
     pub moves: MotionArgs,
     #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
     pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
 }
 
 /// Motion of the items, and the frames of it.
@@ -191,8 +187,6 @@ pub struct StudyArgs {
     #[command(flatten)]
     pub spread: SpreadArgs,
     #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
     pub lens: LensArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
@@ -234,9 +228,11 @@ const LEAST_ROUNDS: usize = 3;
 /// CPU time of a task in all processes, ns.
 const TASK_NS: f64 = 150e6;
 
-/// Lens of cameras without their own values.
+/// Reading of a scene, and the lens of cameras without their own values.
 #[derive(Args, Debug)]
 pub struct LensArgs {
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
     /// Vertical field of view in degrees for cameras without one
     #[arg(long, value_name = "DEG", default_value_t = 60.0, value_parser = values::field_of_view)]
     pub fovy: f64,
@@ -280,7 +276,7 @@ impl LensArgs {
     }
 }
 
-/// Derivation of a camera's planes, and the numbers of the culling test.
+/// Derivation of a camera's planes, the numbers of the culling test, and its execution.
 #[derive(Args, Debug)]
 pub struct CullingArgs {
     /// Derivation of the planes: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32,
@@ -295,6 +291,8 @@ pub struct CullingArgs {
     /// Number format of the culling test: f32, f64, f32-relative
     #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::choice("arithmetic", &ARITHMETICS))]
     pub arithmetic: Arithmetic,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
 }
 
 impl CullingArgs {

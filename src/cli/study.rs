@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
+use serde::Serialize;
 use serde_json::json;
 
 use super::processes::{Job, Message, Timing, Workers};
@@ -58,7 +59,7 @@ impl Setting {
         let lens = args.lens.defaults()?;
         let scene = match timing {
             None => load_scene(&args.scene, &held(structures.len()))?,
-            Some(_) => scene::load(&args.scene, &args.scene_args.options(0))?,
+            Some(_) => scene::load(&args.scene, &args.lens.scene_args.options(0))?,
         };
         if scene.items.is_empty() {
             return Err(LeftOut(scene.name).into());
@@ -172,16 +173,17 @@ impl Study {
         self.bar.inc(1);
     }
 
-    /// The times of all processes, one after the other.
+    /// The times of all processes, one after the other, by the plan of the command.
     ///
     /// From now on Ctrl-C stops the work at the next safe place; before it ends the program.
     pub fn times(
         self,
         step: &str,
         lens_scale: Option<f64>,
-        job: impl Fn(Timing) -> Job,
+        plan: &impl Serialize,
     ) -> anyhow::Result<Vec<ProcessTimes>> {
         interrupt::from_now_on_finish();
+        let plan = serde_json::to_value(plan)?;
         let mut all = Vec::new();
         let started = Instant::now();
         for process in 0..self.processes {
@@ -204,7 +206,8 @@ impl Study {
                 Message::Times(times) => Some(times),
                 _ => None,
             };
-            all.extend(self.workers.found(process, job(timing), &told, times)?);
+            let job = Job::Times(plan.clone(), timing);
+            all.extend(self.workers.found(process, job, &told, times)?);
         }
         self.bar.finish_and_clear();
         Ok(all)

@@ -38,7 +38,7 @@ const PATHS: [&str; 4] = [
 const CASES: u64 = 20_000;
 
 pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> {
-    let structures = args.kernel.structures(registry, &args.structure)?;
+    let structures = args.culling.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let culling = args.culling.culling(CullingTest::SixPlane.name())?;
     let by_hand = !args.scene.is_empty() || !args.path.is_empty();
@@ -61,7 +61,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     let (mut checks, mut skipped_items, mut interrupted) = (Vec::new(), 0, false);
     'scenes: for source in &scenes {
         bar.set_message(text::plain(source));
-        let scene = load_scene(source, &args.scene_args.options(2 * structures.len()))?;
+        let scene = load_scene(source, &args.lens.scene_args.options(2 * structures.len()))?;
         skipped_items += scene.skipped_items;
         let subjects = [CullingTest::SixPlane, CullingTest::Sphere].map(|test| {
             let build = |spec| Subject::build(spec, false, &scene, test);

@@ -36,9 +36,9 @@ const MOST_ITEMS: usize = 2_000_000;
 pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let out = [("--out", &Some(args.out.clone()))];
     expect_places(&out, &[&args.scene, &args.path])?;
-    let structures = args.kernel.structures(registry, &args.structure)?;
+    let structures = args.culling.kernel.structures(registry, &args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
-    let scene = load_scene(&args.scene, &args.scene_args.options(1))?;
+    let scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
     let items = scene.items.len();
     ensure!(
         items <= MOST_ITEMS,
@@ -69,16 +69,9 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         }
         Ok(())
     };
-    let agree = ask_all(
-        &structures,
-        &scene,
-        boxes,
-        ("camera", views),
-        true,
-        ask,
-        &mut each,
-    )?;
-    let threads = args.kernel.execution()?.threads;
+    let questions = ("camera", views);
+    let agree = ask_all(&structures, &scene, boxes, questions, true, ask, &mut each)?;
+    let threads = args.culling.kernel.execution()?.threads;
     let surfaces = args
         .samples
         .map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
@@ -94,25 +87,20 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         let front = front.with_context(|| cameras.place(view))?;
         let truth = Truth::of_scene(camera, &scene);
         let fates = fates(items, answer, truth.as_ref(), front.as_deref());
-        order
-            .iter()
-            .for_each(|&id| totals[fates[id as usize] as usize] += 1);
         let fates: Vec<Fate> = order.iter().map(|&id| fates[id as usize]).collect();
+        fates.iter().for_each(|fate| totals[*fate as usize] += 1);
         let index = if all > most { view * all / most } else { view };
         bar.inc(1);
         data.frames
             .push(Frame::of(index, camera, scene.origin, &fates));
     }
     bar.finish_and_clear();
-    data.samples = args
-        .samples
-        .map(|grid| format!("{}x{}", grid.width, grid.height));
+    let samples = args.samples;
+    data.samples = samples.map(|grid| format!("{}x{}", grid.width, grid.height));
     let told = conclusion(&data, totals, agree);
     let facts = CameraFacts::of(&cameras.cameras);
-    let (axes, lens) = (
-        scene_facts::axes(&SceneInfo::of(&scene)),
-        scene_facts::lens(&facts),
-    );
+    let axes = scene_facts::axes(&SceneInfo::of(&scene));
+    let lens = scene_facts::lens(&facts);
     let matrix = text::some(facts.matrix.as_ref(), |matrix| {
         format!("; matrices: {}", scene_facts::matrices(matrix))
     });
@@ -131,16 +119,12 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         html(&about),
     );
     let title = format!("cullbench view {}", data.scene);
-    let text = page(
-        &title,
-        include_str!("assets/view.css"),
-        &body,
-        concat!(
-            include_str!("assets/view_data.js"),
-            include_str!("assets/view_gl.js"),
-            include_str!("assets/view.js")
-        ),
+    let script = concat!(
+        include_str!("assets/view_data.js"),
+        include_str!("assets/view_gl.js"),
+        include_str!("assets/view.js")
     );
+    let text = page(&title, include_str!("assets/view.css"), &body, script);
     write_text(&args.out, &text)?;
     let megabytes = text::significant(text.len() as f64 / 1e6);
     let line = format!("{}, {megabytes} MB. {told}", args.out.display());
@@ -387,10 +371,8 @@ impl ViewData {
 
     /// Adds the tests of a structure in its next view.
     pub fn count(&mut self, row: &Row) {
-        let known = self
-            .structures
-            .iter()
-            .position(|own| own.name == row.structure);
+        let mut known = self.structures.iter();
+        let known = known.position(|own| own.name == row.structure);
         let at = known.unwrap_or_else(|| {
             self.structures.push(Counters {
                 name: row.structure.clone(),

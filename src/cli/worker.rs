@@ -9,13 +9,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use anyhow::bail;
 use clap::Parser;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use serde_json::{Value, from_value};
 
 use super::Ending;
 use super::args::{Cli, Command};
-use super::processes::{Job, Message, PROTOCOL, Request};
+use super::processes::{Job, Message, PROTOCOL, Request, Timing};
 use super::{advise, drift, funnel, precision, run_plan};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{Part, Plan, ProcessTimes, Share, TIMING, TaskSamples, measure_scene};
@@ -33,14 +35,14 @@ pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
     io::stdin().lock().read_line(&mut line)?;
     let request: Request = serde_json::from_str(&line)?;
     end_with_the_parent();
-    match answer(registry, &request) {
+    match answer(registry, request) {
         Ok(()) => send(&Message::Done)?,
         Err(error) => send(&Message::Failed(super::told_once(&error)))?,
     }
     Ok(Ending::Ok)
 }
 
-fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
+fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
     anyhow::ensure!(
         request.protocol == PROTOCOL,
         "protocol {} is requested; expected {PROTOCOL}: the two programs are of different versions",
@@ -50,33 +52,35 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     // Before the processor is chosen: it may wake up on another one.
     here.at.clone().tell_of_turns();
     let _held = vary_layout(request.layout);
-    crate::input::hold_files(request.files.clone());
+    crate::input::hold_files(request.files);
     for (source, file) in &request.spooled {
         crate::input::stand_in(source, file)?;
     }
-    let typed = [String::new()].into_iter().chain(request.args.clone());
+    let typed = [String::new()].into_iter().chain(request.args);
     let command = Cli::try_parse_from(typed)?.command;
-    if let Job::Scene {
-        scene,
-        share,
-        samples,
-    } = &request.job
-    {
-        let plan = match command {
-            Command::Run(args) => run_plan::plan(registry, &args)?.plan,
-            Command::Advise(args) => advise::plan(registry, &args)?,
-            _ => anyhow::bail!(OTHER),
-        };
-        // Threads that are started later stay where this one does.
-        if !plan.structures.iter().any(StructureSpec::is_threaded) {
-            stay_on(request.cpu);
+    match request.job {
+        Job::Scene {
+            scene,
+            share,
+            samples,
+        } => {
+            let plan = match command {
+                Command::Run(args) => run_plan::plan(registry, &args)?.plan,
+                Command::Advise(args) => advise::plan(registry, &args)?,
+                _ => bail!(OTHER),
+            };
+            // Threads that are started later stay where this one does.
+            if !plan.structures.iter().any(StructureSpec::is_threaded) {
+                stay_on(request.cpu);
+            }
+            here.scene(&plan, scene, &share, samples)?;
         }
-        here.scene(&plan, *scene, share, *samples)?;
-    } else {
-        stay_on(request.cpu);
-        here.at.set(None, TIMING);
-        here.tell(&here.at.message());
-        here.tell(&Message::Times(times(registry, &request.job, &command)?));
+        Job::Times(plan, timing) => {
+            stay_on(request.cpu);
+            here.at.set(None, TIMING);
+            here.tell(&here.at.message());
+            here.tell(&Message::Times(times(registry, plan, &timing, &command)?));
+        }
     }
     match here.failed.into_inner() {
         Some(error) => Err(error.into()),
@@ -85,22 +89,21 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
 }
 
 /// Times of one process of a study.
-fn times(registry: &Registry, job: &Job, command: &Command) -> anyhow::Result<ProcessTimes> {
-    match (job, command) {
-        (Job::Trials(plan, timing), Command::Advise(args)) => {
-            advise::time(registry, args, plan, timing)
-        }
-        (Job::Points(plan, timing), Command::Precision(args)) => {
-            precision::time(registry, args, plan, timing)
-        }
-        (Job::Sweep(plan, timing), Command::Precision(args)) => {
-            precision::time_stage(registry, args, plan, timing)
-        }
-        (Job::Funnel(plan, timing), Command::Funnel(args)) => {
-            funnel::time(registry, args, plan, timing)
-        }
-        (Job::Drift(plan, timing), Command::Drift(args)) => Ok(drift::time(args, plan, timing)),
-        _ => anyhow::bail!(OTHER),
+fn times(
+    registry: &Registry,
+    plan: Value,
+    timing: &Timing,
+    command: &Command,
+) -> anyhow::Result<ProcessTimes> {
+    match command {
+        Command::Advise(args) => advise::time(registry, args, &from_value(plan)?, timing),
+        Command::Precision(args) => match args.stage {
+            Some(stage) => precision::time_stage(registry, args, stage, &from_value(plan)?, timing),
+            None => precision::time(registry, args, &from_value(plan)?, timing),
+        },
+        Command::Funnel(args) => funnel::time(registry, args, &from_value(plan)?, timing),
+        Command::Drift(args) => Ok(drift::time(args, &from_value(plan)?, timing)),
+        _ => bail!(OTHER),
     }
 }
 
