@@ -47,10 +47,8 @@ pub fn shortened(text: &str, most: usize) -> String {
 /// ```
 pub fn message(text: &str) -> String {
     let text = plain(text);
-    let words: Vec<String> = text
-        .split(' ')
-        .map(|word| without_middle(word, [160, 80]))
-        .collect();
+    let words = text.split(' ').map(|word| without_middle(word, [160, 80]));
+    let words: Vec<String> = words.collect();
     without_middle(&words.join(" "), [1200, 400])
 }
 

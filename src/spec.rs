@@ -56,24 +56,18 @@ impl SpecError {
 
 /// The known word most like `word`, if any is alike at all.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    known
-        .into_iter()
-        .map(|k| (likeness(&word.to_lowercase(), k), k))
-        .filter(|(score, _)| *score > 0.6)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, k)| k)
+    let word = word.to_lowercase();
+    let alike = known.into_iter().map(|k| (likeness(&word, k), k));
+    let alike = alike.filter(|(score, _)| *score > 0.6);
+    Some(alike.max_by(|a, b| a.0.total_cmp(&b.0))?.1)
 }
 
 /// 1 for equal words. Swapped and missing letters count little (Damerau), and
 /// so does a missing ending (Jaro and Winkler).
 fn likeness(word: &str, known: &str) -> f64 {
     let edits = strsim::normalized_damerau_levenshtein(word, known);
-    let prefix = if word.len() > 2 {
-        strsim::jaro_winkler(word, known) - 0.2
-    } else {
-        0.0
-    };
-    edits.max(prefix)
+    let prefix = strsim::jaro_winkler(word, known) - 0.2;
+    edits.max(if word.len() > 2 { prefix } else { 0.0 })
 }
 
 /// A number with an optional suffix: `250`, `1e6`, `100k`, `10M`, `2%`,

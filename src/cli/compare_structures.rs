@@ -85,10 +85,10 @@ pub fn ask_all(
         for spec in structures {
             let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
             let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
-            let index = match only
+            let built = only
                 .take()
-                .map_or_else(|| spec.build(input_of(scene, boxes)), Ok)
-            {
+                .map_or_else(|| spec.build(input_of(scene, boxes)), Ok);
+            let index = match built {
                 Ok(index) => index,
                 // One of many: the others' answers are worth having.
                 Err(error @ (BuildError::Refused { .. } | BuildError::OutOfMemory { .. }))
@@ -103,11 +103,7 @@ pub fn ask_all(
             };
             // The first structure finds how many questions' answers there is room for.
             let (mut held, first) = (0, answers.is_empty());
-            let end = if first {
-                questions
-            } else {
-                from + answers.len()
-            };
+            let end = [from + answers.len(), questions][usize::from(first)];
             let mut next = from;
             while next < end && (!first || held < room) {
                 let count = (end - next).min(block * spec.execution.threads.max(1));
@@ -170,18 +166,15 @@ fn all_agree(rows: &[Row], what: &str, right: impl Fn(usize) -> Option<Answer>) 
         if base.answer != row.answer {
             agree = false;
             let is_right = right(row.question);
-            let agreed = [*base, row]
-                .into_iter()
-                .find(|row| Some(row.answer) == is_right);
+            let mut both = [*base, row].into_iter();
+            let agreed = both.find(|row| Some(row.answer) == is_right);
+            let is_alike = (base.answer.count, base.id_sum) == (row.answer.count, row.id_sum);
             super::tell(&format!(
                 "error: {what} {}: {}, {}{}; the reference scan agrees with {}",
                 row.question,
                 base.told(),
                 row.told(),
-                match (base.answer.count, base.id_sum) == (row.answer.count, row.id_sum) {
-                    true => ", but other ids",
-                    false => "",
-                },
+                ["", ", but other ids"][usize::from(is_alike)],
                 agreed.map_or("neither", |row| &row.structure)
             ));
         }
@@ -224,10 +217,8 @@ pub fn write(
             let mut json = serde_json::Serializer::pretty(&mut out);
             let mut array = json.serialize_seq(None).map_err(io::Error::from)?;
             let object = |row: &Row| -> Map<String, Value> {
-                let fields = columns.iter();
-                fields
-                    .map(|(name, value)| ((*name).to_owned(), value(row)))
-                    .collect()
+                let field = |(name, value): &Column<'_, Row>| ((*name).to_owned(), value(row));
+                columns.iter().map(field).collect()
             };
             let agree = ask(&mut |rows| {
                 let mut rows = rows.iter().map(object);

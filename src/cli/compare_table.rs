@@ -72,11 +72,8 @@ impl CompareTable<'_> {
             "ok" => "no regression".to_owned(),
             other => other.replace('_', " "),
         };
-        let worst = self
-            .changes
-            .rows
-            .first()
-            .filter(|_| self.ending() != Ending::Ok);
+        let worst = self.changes.rows.first();
+        let worst = worst.filter(|_| self.ending() != Ending::Ok);
         let worst = worst.filter(|row| row.outcome < Outcome::Different);
         let worst = text::some(worst, |row| {
             let ratio = row.ratio().filter(|ratio| ratio.is_finite());

@@ -12,9 +12,10 @@ use super::text::{self, some, time_plus_minus};
 use super::{Ending, expect_places, print, write_text};
 use crate::drift::{
     self, ARMS, ArmChoice, ArmKind, ArmOptions, ArmPoint, ArmReport, DriftOptions, DriftReport,
-    ORBIT_RADIUS, Rated, RotationDrift, StabilityLimit,
+    ORBIT_RADIUS, Rated, Recommendation, RotationDrift, StabilityLimit,
 };
 use crate::measure::{ProcessTimes, Protocol, Schedule};
+use crate::report::grouped;
 
 /// Rounds of what is timed, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -179,10 +180,14 @@ fn rated(report: &DriftReport, all: bool) -> Table {
     table
 }
 
+fn chosen(choice: &Recommendation) -> &str {
+    choice.name.as_deref().unwrap_or("nothing")
+}
+
 /// The recommended way to turn, with its figures.
 fn recommended(report: &DriftReport) -> String {
     let choice = &report.recommended_rotation;
-    let name = choice.name.as_deref().unwrap_or("nothing");
+    let name = chosen(choice);
     let mut methods = report.rotation_methods.iter();
     let figures = some(methods.find(|row| row.name == name), |row| {
         let time = time_plus_minus(row.time_per_step);
@@ -226,21 +231,16 @@ fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
 
 /// The method to take for each stiffness of each arm.
 fn arm_conclusions(report: &ArmReport) -> impl Iterator<Item = String> {
-    report
-        .choices
-        .chunk_by(|a, b| a.setting.arm == b.setting.arm)
-        .map(|own| {
-            let each = own.iter().map(|c| {
-                let name = c.choice.name.as_deref().unwrap_or("nothing");
-                format!("{name} at k={:e}", c.setting.stiffness)
-            });
-            format!(
-                "Recommended for a {} arm: {}, the cheapest with an error within {:e}.",
-                own[0].setting.arm.name(),
-                each.collect::<Vec<_>>().join(", "),
-                report.tolerance
-            )
-        })
+    let choices = report.choices.iter();
+    let arms = grouped(choices.map(|c| (c.setting.arm.name(), c))).into_iter();
+    arms.map(|(arm, own)| {
+        let each = own.iter();
+        let each = each.map(|c| format!("{} at k={:e}", chosen(&c.choice), c.setting.stiffness));
+        let (each, within) = (text::joined(each), report.tolerance);
+        format!(
+            "Recommended for a {arm} arm: {each}, the cheapest with an error within {within:e}."
+        )
+    })
 }
 
 /// A table of an arm: a row per method, a column per stiffness.
@@ -280,8 +280,11 @@ fn within(points: &[&ArmPoint], tolerance: f64) -> String {
 /// "1.98 2.00".
 fn orders(points: &[&ArmPoint]) -> String {
     let orders = points.iter().filter_map(|p| p.observed_order);
-    let orders: Vec<String> = orders.map(|order| format!("{order:.1}")).collect();
-    orders.join(" ")
+    orders
+        .map(|order| format!("{order:.1} "))
+        .collect::<String>()
+        .trim_end()
+        .to_owned()
 }
 
 fn stability(limits: &[StabilityLimit]) -> Table {
@@ -302,12 +305,8 @@ fn choices(report: &ArmReport, all: bool) -> Table {
             let (arm, k, rate) = (setting.arm.name(), setting.stiffness, setting.rate_hz);
             format!("{arm} k={k:e}, {rate} Hz")
         }),
-        ("method", |c| {
-            c.choice.name.clone().unwrap_or("nothing".into())
-        }),
-        (">error", |c| {
-            some(c.position_error, |error| format!("{error:.1e}"))
-        }),
+        ("method", |c| chosen(&c.choice).to_owned()),
+        (">error", |c| some(c.position_error, scientific)),
         (">time per s", |c| {
             some(c.us_per_second, |us| text::time(us * 1e3))
         }),
@@ -366,9 +365,7 @@ fn arm_figures(report: &ArmReport) -> Vec<Figure> {
 
 /// All as one picture: a row per arm, a column per stiffness.
 fn draw(report: &ArmReport) -> String {
-    let linear = report
-        .choices
-        .iter()
-        .filter(|c| c.setting.arm == report.choices[0].setting.arm);
+    let of_first = |c: &&ArmChoice| c.setting.arm == report.choices[0].setting.arm;
+    let linear = report.choices.iter().filter(of_first);
     picture(&arm_figures(report), linear.count().max(1))
 }

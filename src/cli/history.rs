@@ -115,10 +115,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
         Block::Line(conclusion(&reports, compared, &changed)),
     ];
     all.extend(blocks);
-    all.extend([
-        Block::Heading(2, "Runs".to_owned()),
-        Block::Table(runs(&reports)),
-    ]);
+    all.extend([Block::heading("Runs"), Block::Table(runs(&reports))]);
     to_html(&title, &all)
 }
 

@@ -71,9 +71,8 @@ impl Plan<'_> {
     fn items(&self) -> (Vec<Drawn>, Vec<String>) {
         let (origin, up) = (self.scene.origin, self.scene.up);
         let middle = self.scene.world_bounds();
-        let eye = self
-            .camera
-            .map_or(middle.min / 2.0 + middle.max / 2.0, |c| c.frame.eye);
+        let middle = middle.min / 2.0 + middle.max / 2.0;
+        let eye = self.camera.map_or(middle, |c| c.frame.eye);
         let eye = up.to_z_up(eye);
         let storey = self.camera.and_then(|camera| self.storey(camera));
         let (mut apart, mut all) = (0, Vec::new());
@@ -89,11 +88,9 @@ impl Plan<'_> {
                 apart += 1;
                 continue;
             }
-            let distance = match is_key {
-                true => -1.0,
-                false => eye.clamp(min, max).distance(eye),
-            };
-            all.push((distance, [min.truncate(), max.truncate()], class));
+            let distance = eye.clamp(min, max).distance(eye);
+            let rect = [min.truncate(), max.truncate()];
+            all.push((if is_key { -1.0 } else { distance }, rect, class));
         }
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let far = all.len().saturating_sub(MOST_DRAWN);
@@ -161,10 +158,8 @@ impl Plan<'_> {
             }
         }
         if !path.is_empty() {
-            let _ = writeln!(
-                body,
-                "<path fill=\"none\" stroke=\"#707070\" stroke-width=\".6\" d=\"{path}\"/>"
-            );
+            let line = "stroke=\"#707070\" stroke-width=\".6\"";
+            let _ = writeln!(body, "<path fill=\"none\" {line} d=\"{path}\"/>");
         }
     }
 
@@ -176,10 +171,9 @@ impl Plan<'_> {
             let words = format!("{}: {count} of {total}", class.words);
             (format!("fill=\"{}\"", class.colour), words)
         });
-        let cells = self
-            .cells
-            .iter()
-            .flat_map(|drawn| counted(drawn.classes, drawn.cells.len(), drawn.class_of));
+        let cells = self.cells.iter();
+        let cells =
+            cells.flat_map(|drawn| counted(drawn.classes, drawn.cells.len(), drawn.class_of));
         let cells = cells.map(|(class, count)| {
             let colour = class.colour;
             let fill = if class.is_key { colour } else { "#fff" };
@@ -211,25 +205,18 @@ fn window(items: &[Drawn], cells: impl Iterator<Item = Rect>, eye: Option<DVec2>
     let bounds = bounds.unwrap_or_default();
     let middles = items.iter().map(|item| [centre(item.rect); 2]);
     let middles = middles.reduce(union);
-    let close = middles
-        .filter(|middles| longest(*middles) > 0.0 && longest(*middles) < longest(bounds) / 3.0);
-    let mut window = cells.fold(close.unwrap_or(bounds), union);
-    if let Some(eye) = eye {
-        let with = union(window, [eye; 2]);
-        if longest(with) <= 2.0 * longest(window) {
-            window = with;
-        }
-    }
-    window
+    let is_close = |m: &Rect| longest(*m) > 0.0 && longest(*m) < longest(bounds) / 3.0;
+    let window = cells.fold(middles.filter(is_close).unwrap_or(bounds), union);
+    let with = eye.map(|eye| union(window, [eye; 2]));
+    let with = with.filter(|with| longest(*with) <= 2.0 * longest(window));
+    with.unwrap_or(window)
 }
 
 /// Marks items that would cover two others or a fiftieth of the drawing.
 fn outline_floors(items: &mut [Drawn], sheet: &Sheet) {
     let large = |rect: Rect| longest(rect) * sheet.scale > 8.0;
-    let middles: Vec<_> = items
-        .iter()
-        .map(|item| (centre(item.rect), longest(item.rect)))
-        .collect();
+    let middle = |item: &Drawn| (centre(item.rect), longest(item.rect));
+    let middles: Vec<_> = items.iter().map(middle).collect();
     for item in items.iter_mut().filter(|item| large(item.rect)) {
         let ([low, high], length) = (item.rect, longest(item.rect));
         let covers =

@@ -12,13 +12,11 @@ use crate::statistics::Rate;
 
 pub fn conclusions(outcome: &Outcome) -> Vec<String> {
     let p = &outcome.precision;
-    let points = of_points(p).into_iter().chain(of_storage(p));
-    let searches = of_regions(p)
+    let (sizes, sweeps) = (of_sizes(&outcome.size_sweep), of_sweeps(&outcome.sweeps));
+    let others = [of_storage(p), of_regions(p), sizes, sweeps];
+    of_points(p)
         .into_iter()
-        .chain(of_sizes(&outcome.size_sweep));
-    points
-        .chain(searches)
-        .chain(of_sweeps(&outcome.sweeps))
+        .chain(others.into_iter().flatten())
         .collect()
 }
 
@@ -142,15 +140,12 @@ fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
     let worst = SWEEPS.iter().filter_map(|(sweep, name, _)| {
         let own = rows.iter().filter(|row| row.sweep == *sweep);
         let worst = own.max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
-        (lost(worst) > 0.0).then(|| {
-            format!(
-                "{} {} ({}, {} ppm)",
-                name,
-                swept(worst.value),
-                numbers(&worst.names),
-                text::count(lost(worst).round() as usize)
-            )
-        })
+        let (value, numbers) = (swept(worst.value), numbers(&worst.names));
+        let lost = Some(lost(worst).round() as usize).filter(|_| lost(worst) > 0.0)?;
+        Some(format!(
+            "{name} {value} ({numbers}, {} ppm)",
+            text::count(lost)
+        ))
     });
     let worst: Vec<String> = worst.collect();
     let others = match worst.is_empty() {
@@ -222,7 +217,9 @@ pub fn figures(precision: &Precision) -> Vec<Figure> {
         axes: ["time per point", "points with a wrong answer, %"],
         shown: &text::time,
         none: 1e-2,
-        points: (precision.region_points.iter())
+        points: precision
+            .region_points
+            .iter()
             .filter_map(of_region)
             .collect(),
     };

@@ -49,11 +49,9 @@ fn value(error: &clap::Error) -> Option<String> {
         Some(ContextValue::String(text)) => text.as_str(),
         _ => "",
     };
-    let (option, found) = (
-        told(ContextKind::InvalidArg),
-        told(ContextKind::InvalidValue),
-    );
-    let option = option.split(' ').next().unwrap_or_default();
+    let found = told(ContextKind::InvalidValue);
+    let option = told(ContextKind::InvalidArg).split(' ').next();
+    let option = option.unwrap_or_default();
     Some(match said.starts_with("expected") {
         true => format!("{option} is '{found}'; {said}"),
         false => said,

@@ -49,11 +49,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         ("items_tested", &|row| json!(row.cost.items_tested)),
         ("visible_ids", &|row| json!(shown(&scene, row))),
     ];
-    let columns = if args.ids {
-        &columns[..]
-    } else {
-        &columns[..8]
-    };
+    let columns = &columns[..if args.ids { 9 } else { 8 }];
     let (items, questions) = (&workload.items, ("camera", workload.views.len()));
     let agree = write(args.format, columns, |each| {
         ask_all(&structures, &scene, items, questions, args.ids, ask, each)

@@ -106,17 +106,13 @@ fn glossary(blocks: &[Block]) -> [Block; 2] {
         [column, info.map_or("", |info| info.summary)]
     });
     let bounds = BOUNDS.iter().map(|bound| [bound.name, bound.summary]);
-    let meanings = MEANINGS
-        .iter()
-        .filter_map(|line| line.split_once(" | "))
-        .map(<[&str; 2]>::from)
-        .chain(figures)
-        .chain(bounds);
+    let meanings = MEANINGS.iter().filter_map(|line| line.split_once(" | "));
+    let meanings = meanings.map(<[&str; 2]>::from).chain(figures).chain(bounds);
     let mut table = Table::of("column | meaning");
     for row in meanings.filter(|row| occurs(row[0])) {
         table.add_row(row);
     }
-    [Block::Heading(2, "Columns".to_owned()), Block::Table(table)]
+    [Block::heading("Columns"), Block::Table(table)]
 }
 
 /// Columns that are no metrics.

@@ -63,13 +63,10 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
         }
     };
     let structures: Vec<Row> = drawn.iter().enumerate().map(row).collect();
+    let is_within = drawn.iter().any(|row| row.1.1.is_some());
+    let interval = ["", ", 95 % interval"][usize::from(is_within)];
     let caption = format!(
-        "Speed-ups over {base}{}; a line joins structures of one rank{}",
-        if drawn.iter().any(|row| row.1.1.is_some()) {
-            ", 95 % interval"
-        } else {
-            ""
-        },
+        "Speed-ups over {base}{interval}; a line joins structures of one rank{}",
         left_out(all.len() - drawn.len())
     );
     Some(rows(caption, &axis, Some(1.0), &structures))

@@ -282,11 +282,11 @@ pub fn distinct<T: PartialEq>(
     let names: Vec<String> = all.iter().map(short).collect();
     let named = || all.iter().zip(&names);
     let is_taken = |one, name| named().any(|(other, of)| of == name && other != one);
-    let of_two = named().map(|(one, name)| is_taken(one, name).then(|| full(one)));
-    of_two
-        .zip(&names)
-        .map(|(full, name)| full.unwrap_or(name.clone()))
-        .collect()
+    let shown = named().map(|(one, name)| match is_taken(one, name) {
+        true => full(one),
+        false => name.clone(),
+    });
+    shown.collect()
 }
 
 /// A file without its folder, a spec without keys and frames: "city 100k".

@@ -131,16 +131,17 @@ impl SceneFacts {
         let count = scene.items.len();
         let three = |values: [f64; 3]| values.map(length).join(", ");
         let extent = ("extent", self.extent.map(length).join(" x "));
-        let ends = [
-            self.size_min,
-            self.size_median,
-            self.size_p99,
-            self.size_max,
-        ];
-        let [Some(least), Some(median), Some(p99), Some(most)] = ends.map(|s| s.map(length)) else {
+        if count == 0 {
             return vec![extent, ("sizes", "no items".to_owned())];
-        };
-        let sizes = format!("longest edge min {least}, median {median}, p99 {p99}, max {most}");
+        }
+        let size = |of: Option<f64>| text::some(of, length);
+        let sizes = format!(
+            "longest edge min {}, median {}, p99 {}, max {}",
+            size(self.size_min),
+            size(self.size_median),
+            size(self.size_p99),
+            size(self.size_max)
+        );
         let axes = ["x", "y", "z"].into_iter().zip(self.flat_counts);
         let flat = axes.filter(|(_, flat)| *flat > 0).map(|(axis, flat)| {
             let share = text::percent(flat as f64 / count as f64);
@@ -150,17 +151,15 @@ impl SceneFacts {
             none if none.is_empty() => "no items thinner than 1 % of their longest edge".to_owned(),
             some => format!("{some} (below 1 % of the longest edge)"),
         };
-        let overlap = self
-            .overlap_mean
-            .zip(self.overlap_share)
-            .map(|(mean, share)| {
-                let of = match self.overlap_sample_count < count {
-                    true => format!(" (of {} sampled)", people(self.overlap_sample_count)),
-                    false => String::new(),
-                };
-                let (share, mean) = (text::percent(share), text::short(mean));
-                format!("{share} meet other items, {mean} on average{of}")
+        let overlap = self.overlap_mean.zip(self.overlap_share);
+        let overlap = overlap.map(|(mean, share)| {
+            let sampled = Some(self.overlap_sample_count).filter(|sampled| *sampled < count);
+            let of = text::some(sampled, |sampled| {
+                format!(" (of {} sampled)", people(sampled))
             });
+            let (share, mean) = (text::percent(share), text::short(mean));
+            format!("{share} meet other items, {mean} on average{of}")
+        });
         let copies = match self.coincident_count {
             0 => "no two items have the same bounds".to_owned(),
             copies => format!("{} with the bounds of an item before them", people(copies)),
@@ -319,11 +318,7 @@ fn shown([least, most]: [f64; 2]) -> String {
 /// Four digits, no more zeros than needed.
 fn figure(value: f64) -> String {
     // No lens has 180 degrees.
-    let digits = if (179.9..180.0).contains(&value) {
-        6
-    } else {
-        3
-    };
+    let digits = [3, 6][usize::from((179.9..180.0).contains(&value))];
     let rounded = format!("{value:.digits$e}").parse().unwrap_or(value) + 0.0;
     match rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
         true => rounded.to_string(),

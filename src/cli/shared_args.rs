@@ -142,10 +142,8 @@ impl KernelArgs {
         let mut specs: Vec<StructureSpec> = Vec::new();
         for spec in registry.structures(list)? {
             let join = if spec.label.contains(':') { ',' } else { ':' };
-            let shared = self
-                .threads
-                .iter()
-                .filter(|n| **n > 1 && self.threads.len() > 1);
+            let several = self.threads.iter().filter(|_| self.threads.len() > 1);
+            let shared = several.filter(|n| **n > 1);
             let labels = shared.map(|n| format!("{}{join}threads={n}", spec.label));
             // A structure without the parameter is entered once.
             let shared = labels.filter_map(|label| registry.structure(&label).ok());

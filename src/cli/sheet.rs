@@ -148,11 +148,10 @@ impl Sheet {
             );
         }
         for (row, note) in notes.iter().enumerate() {
-            let y = below + LINE * (rows + row) as f64 + 11.0;
+            let (y, note) = (below + LINE * (rows + row) as f64 + 11.0, html(note));
             let _ = writeln!(
                 svg,
-                "<text x=\"{LEFT}\" y=\"{y:.1}\" fill=\"#555\">{}</text>",
-                html(note)
+                "<text x=\"{LEFT}\" y=\"{y:.1}\" fill=\"#555\">{note}</text>"
             );
         }
         svg + "</svg>\n"
@@ -228,17 +227,10 @@ impl Cells<'_> {
 
     /// Fills bounds of cells below the items.
     pub fn fill(&self, outlines: &[Outline], sheet: &Sheet, body: &mut String) {
-        for (class, look) in self
-            .classes
-            .iter()
-            .enumerate()
-            .filter(|(_, look)| look.is_key)
-        {
-            let _ = write!(
-                body,
-                "<path fill=\"{}\" fill-opacity=\".15\" d=\"",
-                look.colour
-            );
+        let looks = self.classes.iter().enumerate();
+        for (class, look) in looks.filter(|(_, look)| look.is_key) {
+            let colour = look.colour;
+            let _ = write!(body, "<path fill=\"{colour}\" fill-opacity=\".15\" d=\"");
             let of_class = outlines.iter().filter(|o| (self.class_of)(o.cell) == class);
             of_class.for_each(|outline| sheet.push_rect(outline.rect, body));
             body.push_str("\"/>\n");
@@ -251,25 +243,17 @@ impl Cells<'_> {
         for level in (0..=deepest.unwrap_or(0)).rev() {
             let width = [3.5, 2.5, 1.7, 1.1].get(level as usize).unwrap_or(&0.7);
             for (class, look) in self.classes.iter().enumerate() {
-                let of_class = outlines.iter().filter(|outline| {
-                    self.cells[outline.cell].level == level
-                        && (self.class_of)(outline.cell) == class
-                });
+                let is_of =
+                    |cell: usize| self.cells[cell].level == level && (self.class_of)(cell) == class;
                 let mut path = String::new();
-                for outline in of_class {
-                    for (corner, &place) in outline.corners.iter().enumerate() {
-                        let [x, y] = sheet.at(place);
-                        let command = if corner == 0 { "M" } else { "L" };
-                        let _ = write!(path, "{command}{x} {y}");
-                    }
-                    path.push('Z');
+                for outline in outlines.iter().filter(|outline| is_of(outline.cell)) {
+                    let corners = outline.corners.iter().map(|&corner| sheet.at(corner));
+                    let corners: Vec<String> = corners.map(|[x, y]| format!("{x} {y}")).collect();
+                    path += &format!("M{}Z", corners.join("L"));
                 }
                 if !path.is_empty() {
-                    let _ = writeln!(
-                        body,
-                        "<path fill=\"none\" stroke=\"{}\" stroke-width=\"{width}\" d=\"{path}\"/>",
-                        look.colour
-                    );
+                    let line = format!("stroke=\"{}\" stroke-width=\"{width}\"", look.colour);
+                    let _ = writeln!(body, "<path fill=\"none\" {line} d=\"{path}\"/>");
                 }
             }
         }
@@ -284,16 +268,13 @@ impl Cells<'_> {
         let level = sides.filter(|side| is_level(side)).count();
         let mut notes = vec!["thicker outlines: upper levels".to_owned()];
         if !below.is_empty() {
-            notes.push(format!(
-                "not drawn: {} below level {}",
-                text::counted(below.len(), "cell"),
-                self.depth
-            ));
+            let below = text::counted(below.len(), "cell");
+            notes.push(format!("not drawn: {below} below level {}", self.depth));
         }
         if level > 0 {
+            let level = text::counted(level, "cell");
             notes.push(format!(
-                "{} bounded by a plane that is not upright: as the cell around",
-                text::counted(level, "cell")
+                "{level} bounded by a plane that is not upright: as the cell around"
             ));
         }
         notes

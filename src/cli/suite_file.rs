@@ -95,11 +95,7 @@ fn written(file: &str) -> Result<ChosenSuite, InputError> {
         let line = 1 + text.bytes().take(begin).filter(|b| *b == b'\n').count();
         let found = error.message().replace('\n', ", ").replace('`', "'");
         let expected = "; expected a suite: [[scenes]], each with a scene and its paths";
-        let expected = if found.contains("expected") {
-            ""
-        } else {
-            expected
-        };
+        let expected = [expected, ""][usize::from(found.contains("expected"))];
         InputError::new(format_args!("{file}, line {line}: {found}{expected}"))
     })?;
     let bad = |found: &dyn Display| InputError::new(format_args!("{file}: {found}"));
@@ -108,11 +104,8 @@ fn written(file: &str) -> Result<ChosenSuite, InputError> {
     let mut effort = like.effort;
     effort.processes = suite.processes.unwrap_or(effort.processes);
     if !(1..=1000).contains(&effort.processes) {
-        let expected = "expected a whole number from 1 to 1000";
-        return Err(bad(&format_args!(
-            "processes is {}; {expected}",
-            effort.processes
-        )));
+        let (processes, expected) = (effort.processes, "expected a whole number from 1 to 1000");
+        return Err(bad(&format_args!("processes is {processes}; {expected}")));
     }
     let mut scenes = Vec::new();
     for row in suite.scenes {
@@ -120,9 +113,8 @@ fn written(file: &str) -> Result<ChosenSuite, InputError> {
         scenes.extend(parts.map(|source| planned(source, row.paths.clone(), row.cold)));
     }
     if scenes.is_empty() {
-        return Err(bad(
-            &"no scenes; expected [[scenes]] with a scene and its paths",
-        ));
+        let nothing = "no scenes; expected [[scenes]] with a scene and its paths";
+        return Err(bad(&nothing));
     }
     let structures = suite.structures;
     let states_structures = structures.is_some();

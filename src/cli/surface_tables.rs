@@ -43,17 +43,10 @@ fn winners(surface: &Surface) -> Table {
 /// "wide = bvh: 12.3 (at 34.70 %)": those of one rank share the place, the fastest
 /// comes first.
 fn winner(place: &Place) -> String {
-    let names: Vec<&str> = place
-        .comparison
-        .winners()
-        .map(|c| c.structure.as_str())
-        .collect();
+    let winners: Vec<&ReportCell> = place.comparison.winners().collect();
+    let names: Vec<&str> = winners.iter().map(|c| c.structure.as_str()).collect();
     let mut told = names.join(" = ");
-    let ratio = place
-        .comparison
-        .winners()
-        .next()
-        .and_then(|cell| cell.value("speedup"));
+    let ratio = winners.first().and_then(|cell| cell.value("speedup"));
     let ratio = ratio.filter(|_| !place.scan_wins());
     told += &text::some(ratio, |ratio| format!(": {}", text::significant(ratio)));
     if place.is_off_class() {
@@ -144,7 +137,7 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
 fn of_growths(growths: &[Growth]) -> Table {
     let columns: &[Column<&Growth>] = &[
         ("world, path, cache, test", |g| {
-            format!("{}, {}, {}, {}", g.world, g.path, g.cache, g.test)
+            text::joined([&g.world, g.path, g.cache, g.test])
         }),
         ("structure", |g| g.structure.to_owned()),
         (">visible", |g| text::count(g.visible.round() as usize)),
@@ -267,12 +260,12 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
         pictures.push(Picture { name, svg });
     };
     for surface in surfaces(comparisons(report)) {
-        for (shown, figure) in growth(&surface) {
-            add(
-                [&surface.world, surface.cache, surface.test, &shown],
-                figure,
-            );
-        }
+        let Surface {
+            world, cache, test, ..
+        } = &surface;
+        growth(&surface)
+            .into_iter()
+            .for_each(|(shown, figure)| add([world, cache, test, &shown], figure));
     }
     for comparison in &comparisons(report) {
         let about = comparison.about();
@@ -301,11 +294,8 @@ fn file_name(words: [&str; 4], taken: &[Picture]) -> String {
 
 /// Letters, digits and points; a dash for anything else.
 fn slug(words: &str) -> String {
-    let plain = words.chars().map(|c| match c {
-        c if c.is_ascii_alphanumeric() || c == '.' => c,
-        _ => '-',
-    });
-    let name: String = plain.collect::<String>().replace("--", "-");
+    let is_odd = |c: char| !c.is_ascii_alphanumeric() && c != '.';
+    let name = words.replace(is_odd, "-").replace("--", "-");
     name.trim_matches(['-', '.']).to_owned()
 }
 

@@ -124,10 +124,8 @@ impl Table {
                 }
             }
         }
-        parts
-            .iter()
-            .map(|columns| self.of_columns(columns))
-            .collect()
+        let table = |columns: &Vec<usize>| self.of_columns(columns);
+        parts.iter().map(table).collect()
     }
 
     fn of_columns(&self, columns: &[usize]) -> Table {

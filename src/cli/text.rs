@@ -60,15 +60,10 @@ fn basis_of_times(report: &Report) -> String {
             of_planned(counted(least, "process"))
         );
     }
-    let few = if least < 10 {
-        "; fewer than ten make wide intervals"
-    } else {
-        ""
-    };
+    let few = ["", "; fewer than ten make wide intervals"][usize::from(least < 10)];
     let over = of_planned(format!("{least} processes"));
-    let twins: Vec<bool> = (report.noise.twins.iter())
-        .filter_map(|twin| twin.holds_one())
-        .collect();
+    let twins = report.noise.twins.iter();
+    let twins: Vec<bool> = twins.filter_map(|twin| twin.holds_one()).collect();
     let hold = twins.iter().filter(|holds| **holds).count();
     let check = match twins.len() {
         0 => String::new(),
@@ -278,16 +273,10 @@ pub fn quoted(word: &str) -> String {
 
 /// Text of an element or an attribute.
 pub fn html(text: &str) -> String {
-    let mut text = plain(text).replace('&', "&amp;");
-    for (mark, name) in [
-        ("<", "&lt;"),
-        (">", "&gt;"),
-        ("\"", "&quot;"),
-        ("'", "&#39;"),
-    ] {
-        text = text.replace(mark, name);
-    }
-    text
+    let text = plain(text).replace('&', "&amp;").replace('<', "&lt;");
+    text.replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#39;")
 }
 
 /// A share as a percentage, never rounded up to 100.
