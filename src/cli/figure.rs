@@ -141,7 +141,7 @@ impl<'t> Axis<'t> {
         round_values([start, end], 5.0).1
     }
 
-    /// Lines across a plot down to `bottom`, and their texts below where these have room.
+    /// Lines across a plot down to `bottom`, and texts below that do not overlap.
     pub fn across(&self, one: Option<f64>, bottom: f64) -> String {
         let (mut parts, mut free) = (String::new(), -LINE);
         for tick in self.all_ticks() {

@@ -59,7 +59,7 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// What the further columns of a row hold, for people.
+/// Further columns of a row, for people.
 fn told(row: &Value) -> Vec<String> {
     let told = COLUMNS.iter().filter_map(|column| {
         // Parameters as they are typed behind the name.

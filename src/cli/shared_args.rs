@@ -156,7 +156,9 @@ impl KernelArgs {
         Ok(specs.into_iter().map(|spec| spec.by(execution)).collect())
     }
 
-    /// The instruction set, which this machine must have, and the largest number of threads.
+    /// The instruction set, and the largest number of threads.
+    ///
+    /// Fails if this machine lacks the instruction set.
     pub fn execution(&self) -> Result<Execution, SpecError> {
         let kernel = self.name.unwrap_or_else(Kernel::best);
         let kernel = kernel.checked().map_err(|error| {
@@ -274,7 +276,7 @@ impl LensArgs {
     }
 }
 
-/// Derivation of a camera's planes, the numbers of the culling test, and its execution.
+/// Derivation of planes, numbers of the culling test, and its execution.
 #[derive(Args, Debug)]
 pub struct CullingArgs {
     /// Derivation of the planes: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32,

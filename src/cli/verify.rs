@@ -146,7 +146,7 @@ fn paths(args: &VerifyArgs, scene: &Scene) -> Vec<String> {
     PATHS.into_iter().chain(own).map(str::to_owned).collect()
 }
 
-/// The command that checks this scene and path alone, with the other options as typed.
+/// The command that checks this scene and path alone; other options as typed.
 fn reproduce(scene: &str, path: &str) -> anyhow::Result<String> {
     let own = ["scene", "path", "cases", "seed", "format"];
     let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
