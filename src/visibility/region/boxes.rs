@@ -1,18 +1,16 @@
 //! Graphs of regions that are boxes, such as the rooms of a scene.
 //!
-//! Rays are followed from region to region in plain f64. Kept simple: it is the reference that
-//! back ends are tested with.
+//! Solids close their borders.
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
-use super::id_set::{IdSet, RegionId};
+use super::id_set::RegionId;
 use super::locate::{BoxGrid, covers};
 use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
-use crate::visibility::Ray;
 
 /// A ground of boxes, one a region.
 #[derive(Debug)]
@@ -35,16 +33,6 @@ impl Ground for Boxes {
             self.regions.meeting(solid, |id| out.push(id));
         });
         inside
-    }
-
-    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
-        let start = ray.at(ray.near);
-        let mut homes = Vec::new();
-        self.regions
-            .meeting(&WorldBox::new(start, start), |id| homes.push(id));
-        for home in homes {
-            follow_boxes(graph, home, ray, seen);
-        }
     }
 }
 
@@ -149,47 +137,4 @@ fn thick(sides: [RegionId; 2], hole: &WorldBox) -> Vec<Opening> {
         }
     };
     faces.map(opening).collect()
-}
-
-/// Adds the regions, boxes each, that a ray passes from its near to its far end,
-/// until it meets a border where there is no opening. `home` holds its beginning.
-pub fn follow_boxes(graph: &RegionGraph, home: RegionId, ray: &Ray, seen: &mut IdSet) {
-    let (mut region, mut depth) = (home, ray.near);
-    // A ray passes each region once.
-    for _ in 0..graph.len() {
-        seen.insert(region);
-        let b = graph.parts(region)[0];
-        let Some((axis, at, t)) = way_out(&b, ray) else {
-            return;
-        };
-        depth = t.max(depth);
-        if depth > ray.far {
-            return;
-        }
-        let p = ray.at(depth);
-        let through = |exit: &&u32| {
-            let opening = &graph.openings()[**exit as usize];
-            let same = OpeningPlane::Axis { axis, at } == opening.plane;
-            let [low, high] = opening.bounds();
-            same && (0..3).all(|k| k == axis || low[k] < p[k] && p[k] < high[k])
-        };
-        match graph.exits(region).iter().find(through) {
-            Some(&exit) => region = graph.openings()[exit as usize].other(region),
-            None => return,
-        }
-    }
-}
-
-/// The face by which a ray leaves a box: axis, coordinate and depth.
-fn way_out(b: &WorldBox, ray: &Ray) -> Option<(usize, f64, f64)> {
-    let mut first: Option<(usize, f64, f64)> = None;
-    for axis in 0..3 {
-        let d = ray.direction[axis];
-        let at = if d > 0.0 { b.max[axis] } else { b.min[axis] };
-        let t = (at - ray.origin[axis]) / d;
-        if d != 0.0 && first.is_none_or(|(_, _, least)| t < least) {
-            first = Some((axis, at, t));
-        }
-    }
-    first
 }

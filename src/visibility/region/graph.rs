@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::id_set::{Csr, IdSet, RegionId};
+use super::id_set::{Csr, RegionId};
 use crate::scene::WorldBox;
-use crate::visibility::{Ray, Rays};
+use crate::visibility::Rays;
 
 /// Finds the regions of a place.
 pub trait Ground: Send + Sync + std::fmt::Debug {
@@ -18,10 +18,6 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
     ///
     /// None unless regions differ from their parts.
     fn more_at(&self, _: &WorldBox, _: &mut Vec<RegionId>) {}
-
-    /// Adds the regions that a ray passes before it meets what is opaque, by a
-    /// search that shares nothing with the back ends.
-    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet);
 }
 
 /// Regions joined by openings: sight leads from one to another through these only.
@@ -181,16 +177,6 @@ impl Opening {
             (_, true) if side <= 0 => Some(front),
             _ => None,
         }
-    }
-
-    /// Lower and upper corner of the box about it.
-    pub fn bounds(&self) -> [DVec3; 2] {
-        let corners = self.corners.into_iter();
-        let [low, high] = [
-            corners.clone().reduce(DVec3::min),
-            corners.reduce(DVec3::max),
-        ];
-        [low, high].map(|corner| corner.expect("four corners"))
     }
 
     /// The other of its two regions.

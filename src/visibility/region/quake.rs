@@ -7,13 +7,9 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::graph::{Ground, RegionGraph};
-use super::id_set::{IdSet, RegionId};
+use super::id_set::RegionId;
 use super::row::Pvs;
 use crate::scene::{BspChild, LeafNode, QuakeMap, WorldBox};
-use crate::visibility::Ray;
-
-/// Farthest depth at which rays are followed: beyond every map.
-const FARTHEST: f64 = 1e10;
 
 /// Map units by which boxes are grown: map compilers round corners and planes.
 const SLACK: f64 = 0.125;
@@ -70,31 +66,6 @@ impl Ground for LeafGround {
     /// Regions have no parts: all of their items are found here.
     fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
         self.regions_at(b, out);
-    }
-
-    fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
-        let far = ray.far.min(FARTHEST);
-        let mut open = vec![(BspChild::Node(0), ray.near, far)];
-        while let Some((at, near, far)) = open.pop() {
-            match at {
-                BspChild::Solid => return,
-                BspChild::Leaf(leaf) => {
-                    seen.insert(self.0.tree.clusters[leaf as usize]);
-                }
-                BspChild::Node(node) => {
-                    let node = self.node(node);
-                    let [a, b] = [near, far].map(|depth| value(node, ray.at(depth)));
-                    let first = usize::from(a < 0.0);
-                    let (here, beyond) = (node.children[first], node.children[1 - first]);
-                    if (a < 0.0) == (b < 0.0) {
-                        open.push((here, near, far));
-                    } else {
-                        let at = (near + (far - near) * (a / (a - b))).clamp(near, far);
-                        open.extend([(beyond, at, far), (here, near, at)]);
-                    }
-                }
-            }
-        }
     }
 }
 

@@ -20,10 +20,9 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::graph::{Ground, Opening, OpeningPlane, RegionGraph};
-use super::id_set::{IdSet, RegionId};
+use super::id_set::RegionId;
 use super::row::Pvs;
 use crate::scene::{Dispute, Linedef, Regions, Scene, WadMap, WorldBox};
-use crate::visibility::Ray;
 
 pub use surfaces::surfaces_of;
 
@@ -266,41 +265,5 @@ impl Ground for SectorGround {
     /// Leaves of the map's tree differ from its sectors by what a node builder rounds.
     fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
         self.regions_at(b, out);
-    }
-
-    fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
-        let start = ray.at(ray.near);
-        let Some(mut sector) = self.sector_at(start.truncate()) else {
-            return;
-        };
-        let (o, d) = (ray.origin.truncate(), ray.direction.truncate());
-        let mut crossings = Vec::new();
-        for line in &self.map.lines {
-            let [a, b] = line.ends.map(plan);
-            let (sa, sb) = (d.perp_dot(a - o), d.perp_dot(b - o));
-            if (sa < 0.0) == (sb < 0.0) {
-                continue;
-            }
-            let t = (a - o).perp_dot(b - a) / d.perp_dot(b - a);
-            if t >= ray.near && t <= ray.far {
-                // It begins right of the ray: crossed from its left to its right.
-                crossings.push((t, line, sa < 0.0));
-            }
-        }
-        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
-        seen.insert(sector);
-        for (t, line, to_right) in crossings {
-            let z = ray.origin.z + ray.direction.z * t;
-            let [floor, ceiling] = self.map.sectors[sector as usize];
-            let passes = |[low, high]: [f64; 2]| low < z && z < high;
-            let is_inside = floor <= z && z <= ceiling;
-            if !is_inside || !self.map.opening(line).is_some_and(passes) {
-                return;
-            }
-            if let Some(next) = line.sectors[usize::from(!to_right)] {
-                sector = next;
-                seen.insert(sector);
-            }
-        }
     }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::super::doom::DoomMap;
 use super::super::*;
-use super::from_eye;
 use super::worlds::*;
+use super::{follow, from_eye};
 use crate::scene::{Scene, SeededRng, load};
 
 fn sample(scene: &Scene) -> (Arc<DoomMap>, Arc<RegionGraph>) {
@@ -31,7 +31,7 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
             seen.clear(graph.len());
             for _ in 0..300 {
                 let ray = rays.through(rng.unit(), rng.unit());
-                graph.ground().follow(&graph, &ray, &mut seen);
+                follow::sectors(&map, &graph, &ray, &mut seen);
             }
             let mut truth = Vec::new();
             seen.list(&mut truth);

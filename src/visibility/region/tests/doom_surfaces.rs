@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::super::doom::DoomMap;
 use super::super::*;
+use super::follow;
 use super::from_eye::rows;
 use super::worlds::*;
 use crate::query::ItemId;
@@ -129,7 +130,7 @@ fn rays_end_where_rays_through_sectors_end() {
                 let ray = rays.through(rng.unit(), rng.unit());
                 let sight = index.front_of(&ray);
                 whole.clear(world.graph.len());
-                world.graph.ground().follow(&world.graph, &ray, &mut whole);
+                follow::sectors(&world.map, &world.graph, &ray, &mut whole);
                 let (mut all, mut until) = (Vec::new(), Vec::new());
                 whole.list(&mut all);
                 let Some(meeting) = sight.meeting else {
@@ -147,8 +148,7 @@ fn rays_end_where_rays_through_sectors_end() {
                     ..ray
                 };
                 part.clear(world.graph.len());
-                let ground = world.graph.ground();
-                ground.follow(&world.graph, &shorter, &mut part);
+                follow::sectors(&world.map, &world.graph, &shorter, &mut part);
                 part.list(&mut until);
                 assert_eq!(all, until, "{name} {ray:?}");
                 ended += 1;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::super::*;
+use super::follow;
 use super::worlds::*;
 use crate::scene::SeededRng;
 use crate::visibility::Rays;
@@ -17,7 +18,7 @@ fn sampled(graph: &RegionGraph, rays: &Rays, count: usize, rng: &mut SeededRng) 
     seen.clear(graph.len());
     for _ in 0..count {
         let ray = rays.through(rng.unit(), rng.unit());
-        graph.ground().follow(graph, &ray, &mut seen);
+        follow::boxes(graph, &ray, &mut seen);
     }
     let mut out = Vec::new();
     seen.list(&mut out);

@@ -2,6 +2,7 @@
 
 mod doom;
 mod doom_surfaces;
+mod follow;
 mod from_eye;
 mod items;
 mod quake;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::follow;
 use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{Regions, Scene, load};
 use crate::visibility::Rays;
@@ -43,13 +44,16 @@ fn a_region_sees_what_the_table_of_the_map_has() {
 
 #[test]
 fn rays_tell_that_the_table_lacks_the_second_room() {
-    let (_, row) = two_rooms();
+    let (scene, _) = two_rooms();
+    let Regions::Leaves(map) = &scene.regions else {
+        panic!("no leaves");
+    };
     let passed = |forward: DVec3| {
         let mut seen = IdSet::default();
         seen.clear(3);
         let rays = rays([64.0, 64.0, 30.0], forward);
         let ray = rays.through(0.5, 0.5);
-        row.graph.ground().follow(&row.graph, &ray, &mut seen);
+        follow::leaves(map, &ray, &mut seen);
         let mut list = Vec::new();
         seen.list(&mut list);
         list
