@@ -366,10 +366,11 @@ pub fn mirrored(
         let all = draw(&reflected, bodies(solids, &others), &Tests::default());
         seen.tally.asked += stencil.tested;
         let [own, other] = [&seen, &all].map(|drawn| drawn.ids());
-        let marks = (0..own.len()).filter(|&sample| stencil.holds(sample));
+        let marks = (0..own.len()).filter(|&sample| stencil.marked[sample]);
         wrong += marks.filter(|&sample| own[sample] != other[sample]).count() as u64;
-        views += usize::from(stencil.count() > 0);
-        marked += stencil.count();
+        let count = stencil.marked.iter().filter(|marked| **marked).count();
+        views += usize::from(count > 0);
+        marked += count;
         shown += seen.visible(&reflected).len();
         with.push(seen.tally);
         without.push(all.tally);

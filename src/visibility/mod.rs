@@ -44,13 +44,6 @@ named! {
     }
 }
 
-impl Guarantee {
-    /// Returns `true` if no visible item is ever missing.
-    pub fn is_safe(self) -> bool {
-        matches!(self, Guarantee::Exact | Guarantee::Conservative)
-    }
-}
-
 /// A row of a stage's table of back ends.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]

@@ -208,37 +208,12 @@ impl Screen {
 }
 
 /// Some of the samples of an image.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, Debug)]
 pub struct Stencil {
-    marked: Vec<bool>,
+    /// `true` for a sample that may be drawn on.
+    pub marked: Vec<bool>,
     /// Number of samples whose rays were tested to mark it.
     pub tested: u64,
-}
-
-impl Stencil {
-    /// A stencil without marked samples.
-    pub fn new(samples: usize) -> Stencil {
-        Stencil {
-            marked: vec![false; samples],
-            tested: 0,
-        }
-    }
-
-    /// Marks a sample.
-    pub fn mark(&mut self, sample: usize) {
-        self.marked[sample] = true;
-    }
-
-    /// Tests whether the sample may be drawn on.
-    #[inline]
-    pub fn holds(&self, sample: usize) -> bool {
-        self.marked[sample]
-    }
-
-    /// Number of samples that may be drawn on. O(samples).
-    pub fn count(&self) -> usize {
-        self.marked.iter().filter(|marked| **marked).count()
-    }
 }
 
 /// The samples of an image with their rays.
@@ -309,7 +284,7 @@ impl<B: Body> Canvas<B> {
         for row in rows {
             for column in columns.clone() {
                 let sample = (row * self.grid().width + column) as usize;
-                if stencil.is_some_and(|stencil| !stencil.holds(sample)) {
+                if stencil.is_some_and(|stencil| !stencil.marked[sample]) {
                     kept_out += 1;
                     continue;
                 }

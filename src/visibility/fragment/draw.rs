@@ -247,24 +247,21 @@ impl Drawn {
     ///
     /// A rectangle is a box without thickness along one axis.
     pub fn stencil(&self, canvas: &Canvas, rectangles: &[WorldBox]) -> Stencil {
-        let mut stencil = Stencil::new(canvas.grid().samples());
+        let mut marked = vec![false; canvas.grid().samples()];
+        let mut tested = 0;
         for rectangle in rectangles {
             let place = canvas.screen().rectangle(rectangle);
-            let [tested, _] = canvas.scan(place, None, |sample, probe| {
+            let [asked, _] = canvas.scan(place, None, |sample, probe| {
                 let is_before = |at| {
                     let before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
                     self.front(sample).is_none_or(before)
                 };
-                if probe
-                    .enter(rectangle, probe.ray().far)
-                    .is_some_and(is_before)
-                {
-                    stencil.mark(sample);
-                }
+                let entered = probe.enter(rectangle, probe.ray().far);
+                marked[sample] |= entered.is_some_and(is_before);
             });
-            stencil.tested += tested;
+            tested += asked;
         }
-        stencil
+        Stencil { marked, tested }
     }
 }
 

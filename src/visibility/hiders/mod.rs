@@ -14,7 +14,7 @@ use super::occlusion::OccluderScene;
 use super::{Rays, Solids};
 use crate::geometry::Aabb;
 use crate::scene::Scene;
-use crate::visibility::inscribed::{CELLS, InnerBoxes};
+use crate::visibility::inscribed::{CELLS, inner_boxes};
 use crate::visibility::region::doom::DoomMap;
 
 pub use super::inscribed::InnerRow;
@@ -42,8 +42,8 @@ impl Hiders {
     /// boxes inside.
     pub fn of(scene: &Scene, solids: Option<&Solids>, most: usize, threads: usize) -> Hiders {
         let inner = scene.surfaces.as_ref();
-        let inner = inner.map(|surfaces| InnerBoxes::of(surfaces, CELLS, most, threads));
-        let (within, inner) = inner.map(|inner| (inner.boxes, inner.row)).unzip();
+        let inner = inner.map(|surfaces| inner_boxes(surfaces, CELLS, most, threads));
+        let (within, inner) = inner.unzip();
         let (blocks, row) = blocks(scene).unzip();
         let ground = Ground::of(scene);
         let within = within.unwrap_or_default();

@@ -180,49 +180,43 @@ pub struct InnerRow {
     pub build_ns: f64,
 }
 
-/// The boxes inside all items of a mesh, and their counts.
-#[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
-pub struct InnerBoxes {
-    /// Each with its item, by ascending item; scene-local.
-    pub boxes: Vec<(ItemId, Aabb)>,
-    /// Their counts.
-    pub row: InnerRow,
-}
-
-impl InnerBoxes {
-    /// Boxes for each item, as [`inscribed_boxes`] finds them.
-    ///
-    /// The same on any number of threads.
-    pub fn of(surfaces: &Surfaces, cells: usize, most: usize, threads: usize) -> InnerBoxes {
-        const CHUNK: usize = 16;
-        let begun = Instant::now();
-        let mut found = vec![None; surfaces.items()];
-        let chunks = found.chunks_mut(CHUNK).enumerate();
-        threads::share(threads, chunks, |(chunk, found)| {
-            for (place, found) in found.iter_mut().enumerate() {
-                *found = inscribed_boxes(surfaces, chunk * CHUNK + place, cells, most);
-            }
-        });
-        let (mut boxes, mut boxed_count) = (Vec::new(), 0);
-        let [mut inner, mut whole] = [0.0, 0.0];
-        for (item, found) in (0..).zip(&found) {
-            let Some(found) = found else { continue };
-            inner += found.share * found.volume;
-            whole += found.volume;
-            boxed_count += 1;
-            boxes.extend(found.boxes.iter().map(|b| (item, *b)));
+/// Boxes inside each item of a mesh, as [`inscribed_boxes`] finds them.
+///
+/// Each box with its item, by ascending item; scene-local. The same on any number of
+/// threads.
+pub fn inner_boxes(
+    surfaces: &Surfaces,
+    cells: usize,
+    most: usize,
+    threads: usize,
+) -> (Vec<(ItemId, Aabb)>, InnerRow) {
+    const CHUNK: usize = 16;
+    let begun = Instant::now();
+    let mut found = vec![None; surfaces.items()];
+    let chunks = found.chunks_mut(CHUNK).enumerate();
+    threads::share(threads, chunks, |(chunk, found)| {
+        for (place, found) in found.iter_mut().enumerate() {
+            *found = inscribed_boxes(surfaces, chunk * CHUNK + place, cells, most);
         }
-        let row = InnerRow {
-            item_count: surfaces.items(),
-            boxed_count,
-            box_limit: most,
-            box_count: boxes.len(),
-            volume_share: (boxed_count > 0).then(|| inner / whole),
-            build_ns: begun.elapsed().as_nanos() as f64,
-        };
-        InnerBoxes { boxes, row }
+    });
+    let (mut boxes, mut boxed_count) = (Vec::new(), 0);
+    let [mut inner, mut whole] = [0.0, 0.0];
+    for (item, found) in (0..).zip(&found) {
+        let Some(found) = found else { continue };
+        inner += found.share * found.volume;
+        whole += found.volume;
+        boxed_count += 1;
+        boxes.extend(found.boxes.iter().map(|b| (item, *b)));
     }
+    let row = InnerRow {
+        item_count: surfaces.items(),
+        boxed_count,
+        box_limit: most,
+        box_count: boxes.len(),
+        volume_share: (boxed_count > 0).then(|| inner / whole),
+        build_ns: begun.elapsed().as_nanos() as f64,
+    };
+    (boxes, row)
 }
 
 /// Returns `true` if the open box is inside a closed piece.
@@ -413,19 +407,19 @@ mod tests {
     #[test]
     fn only_closed_opaque_items_have_one() {
         let forest = mesh("forest", 20_000);
-        let found = InnerBoxes::of(&forest, 12, BOXES, 1);
-        assert_eq!(found.boxes, InnerBoxes::of(&forest, 12, BOXES, 3).boxes);
-        let mut trees: Vec<ItemId> = found.boxes.iter().map(|(item, _)| *item).collect();
+        let (boxes, row) = inner_boxes(&forest, 12, BOXES, 1);
+        assert_eq!(boxes, inner_boxes(&forest, 12, BOXES, 3).0);
+        let mut trees: Vec<ItemId> = boxes.iter().map(|(item, _)| *item).collect();
         trees.dedup();
         let is_tree = |item: &ItemId| forest.of_item[*item as usize].len() == 118;
         assert!(trees.is_sorted() && trees.iter().all(is_tree));
-        assert!(trees.len() > 20 && trees.len() == found.row.boxed_count);
-        for (item, inner) in &found.boxes {
+        assert!(trees.len() > 20 && trees.len() == row.boxed_count);
+        for (item, inner) in &boxes {
             assert!(is_inside(&forest, *item as usize, inner));
         }
-        let share = found.row.volume_share.unwrap();
+        let share = row.volume_share.unwrap();
         assert!(share > 0.2 && share < 1.0, "{share}");
-        let ground = InnerBoxes::of(&mesh("terrain", 2000), CELLS, BOXES, 1).row;
+        let (_, ground) = inner_boxes(&mesh("terrain", 2000), CELLS, BOXES, 1);
         assert_eq!((ground.boxed_count, ground.volume_share), (0, None));
     }
 
@@ -443,7 +437,7 @@ mod tests {
         house.two_sided.extend([true; 2]);
         assert_eq!(inscribed_boxes(&house, 0, 8, 1), whole);
         assert_eq!(
-            InnerBoxes::of(&house, 8, 1, 1).row.volume_share,
+            inner_boxes(&house, 8, 1, 1).1.volume_share,
             Some(whole.unwrap().share)
         );
         // A wall of glass leaves the house open.

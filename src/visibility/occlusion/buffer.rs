@@ -7,6 +7,7 @@ use super::rect::{Candidate, Rect, Rects};
 use super::scene::OccluderScene;
 use super::view::View;
 use crate::kernel::{Isa, LaneMask};
+use crate::query::Bits;
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// A depth buffer of occluders.
@@ -36,10 +37,7 @@ pub trait OcclusionBuffer {
     #[inline(always)]
     fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask {
         let mut hidden = 0;
-        let mut left = lanes;
-        while left != 0 {
-            let lane = left.trailing_zeros();
-            left &= left - 1;
+        for lane in Bits(lanes.into()) {
             hidden |= LaneMask::from(self.hides(isa, &rects.get(lane as usize))) << lane;
         }
         hidden

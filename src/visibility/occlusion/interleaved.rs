@@ -17,7 +17,7 @@ use super::scene::OccluderScene;
 use super::view::View;
 use crate::geometry::PlaneMask;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
-use crate::query::ItemId;
+use crate::query::{Bits, ItemId};
 
 /// Survivors are drawn that may cover at least this part of the image: a pixel of
 /// 320 x 180.
@@ -110,7 +110,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
     fn run<I: Isa>(self, isa: I) -> CullStats {
         let (state, scene, view) = (self.state, self.scene, self.view);
         let mut stats = CullStats::default();
-        if scene.is_empty() {
+        if scene.len() == 0 {
             return stats;
         }
         let pixels = view.grid.width * view.grid.height;
@@ -166,10 +166,8 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             lanes &= seen;
             lanes &= !buffer.hides_lanes(isa, &rects, lanes & flat);
             if level > 0 {
-                let mut left = lanes;
-                while left != 0 {
-                    let lane = left.trailing_zeros() as usize;
-                    left &= left - 1;
+                for lane in Bits(lanes.into()) {
+                    let lane = lane as usize;
                     let (level, block) = (entry.level - 1, (index * LANES + lane) as u32);
                     let key = key(depth_bits(rects.depth[lane]), level, block);
                     queue.push(Reverse((key, entries.len() as u32)));
@@ -207,9 +205,8 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             if drawn > 0 {
                 left &= !buffer.hides_lanes(isa, &rects, left);
             }
-            while left != 0 {
-                survivors.push(survivor(left.trailing_zeros() as usize));
-                left &= left - 1;
+            for lane in Bits(left.into()) {
+                survivors.push(survivor(lane as usize));
             }
             stats.drawn += drawn;
         }
@@ -240,10 +237,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
 #[inline(always)]
 fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> usize {
     let mut count = 0;
-    let mut left = lanes;
-    while left != 0 {
-        let lane = left.trailing_zeros();
-        left &= left - 1;
+    for lane in Bits(lanes.into()) {
         let key = depth_bits(depth[lane as usize]) & !15 | lane;
         let mut at = count;
         while at > 0 && order[at - 1] > key {

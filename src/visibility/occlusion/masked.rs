@@ -11,6 +11,7 @@ use super::outline::{Coverage, Nearness, Outline};
 use super::rect::{Rect, Rects};
 use super::view::{TILE_HEIGHT, TILE_WIDTH};
 use crate::kernel::{Isa, LANES, LaneMask, each, first_lanes, pairs};
+use crate::query::Bits;
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Pixels of a tile: bit `8 * row + column`.
@@ -103,10 +104,8 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
                 };
                 // In most cases the reference depth of the tile decides.
                 let passed = isa.at_most(isa.load(reference), nearness);
-                let mut open = passed & first_lanes(last + 1 - column);
-                while open != 0 {
-                    let i = open.trailing_zeros() as usize;
-                    open &= open - 1;
+                for i in Bits((passed & first_lanes(last + 1 - column)).into()) {
+                    let i = i as usize;
                     let pixels = pixels_of(rect, column + i, row);
                     let shown = pixels & !self.mask[at + i] != 0;
                     let behind = self.working[at + i] > rect.nearness;
@@ -146,10 +145,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
                 hidden &= !asked | self.hidden_in_row(isa, rects, asked, wide, y);
             }
         }
-        let mut left = lanes & !small;
-        while left != 0 {
-            let lane = left.trailing_zeros();
-            left &= left - 1;
+        for lane in Bits((lanes & !small).into()) {
             hidden |= LaneMask::from(self.hides(isa, &rects.get(lane as usize))) << lane;
         }
         hidden
@@ -194,10 +190,8 @@ impl<const WHOLE: bool> Masked<WHOLE> {
                 continue;
             }
             let mut masks = [0; LANES];
-            let mut left = behind;
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize;
-                left &= left - 1;
+            for lane in Bits(behind.into()) {
+                let lane = lane as usize;
                 masks[lane] = self.mask[at[lane] as usize + side];
             }
             // The results of the other lanes are unspecified.

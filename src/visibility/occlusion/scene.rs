@@ -121,13 +121,9 @@ impl OccluderScene {
     }
 
     /// Number of boxes in the tree: items, and what hides and is none.
+    #[allow(clippy::len_without_is_empty)] // No caller needs `is_empty`.
     pub fn len(&self) -> usize {
         self.ids.len()
-    }
-
-    /// Returns `true` if there are no boxes.
-    pub fn is_empty(&self) -> bool {
-        self.ids.is_empty()
     }
 
     /// The item at a position in tree order; `None` for what hides and is no item.

@@ -131,7 +131,9 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
                 })
                 .collect();
             assert!(built.len() >= 2);
-            let wide = WideRay::of(&Boxes::of(&solids), Kernel::best());
+            let boxes = Boxes::of(&solids);
+            let wide = Kernel::available().map(|kernel| (kernel, WideRay::of(&boxes, kernel)));
+            let wide: Vec<_> = wide.collect();
             for _ in 0..if count > 100 { 60 } else { 120 } {
                 let ray = worlds.ray();
                 let truth = all_judged(&ray, &solids);
@@ -145,11 +147,10 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
                     let wrong = differing(first, nearest, &ray, &truth);
                     assert_eq!(wrong, 0, "{name} {ray:?}");
                 }
-                for kernel in Kernel::available() {
-                    let first = |ray: &Ray| wide.first_by(kernel, ray);
-                    let nearest = |ray: &Ray, count, hits: &mut Vec<Hit>| {
-                        wide.nearest_by(kernel, ray, count, hits);
-                    };
+                for (kernel, wide) in &wide {
+                    let first = |ray: &Ray| wide.first(ray);
+                    let nearest =
+                        |ray: &Ray, count, hits: &mut Vec<Hit>| wide.nearest(ray, count, hits);
                     assert_eq!(
                         differing(first, nearest, &ray, &truth),
                         0,
@@ -227,7 +228,9 @@ fn boxes_of_any_size_are_picked_alike() {
 fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
     let mut worlds = Worlds::new(3, 1.0, DVec3::ZERO);
     let solids = worlds.boxes(150);
-    let wide = WideRay::of(&Boxes::of(&solids), Kernel::best());
+    let boxes = Boxes::of(&solids);
+    let wide = Kernel::available().map(|kernel| (kernel, WideRay::of(&boxes, kernel)));
+    let wide: Vec<_> = wide.collect();
     let sizes = [
         0.0, 1e-70, 1e-30, -1e-26, 6e-17, -6e-17, 1e-9, 0.2, -1.0, 1.0, 900.0, -900.0,
     ];
@@ -239,10 +242,9 @@ fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
         ray.origin *= [1.0, 1.0, -1e12][worlds.rng.below(3)];
         let truth = all_judged(&ray, &solids);
         met += usize::from(!truth.is_empty());
-        for kernel in Kernel::available() {
-            let first = |ray: &Ray| wide.first_by(kernel, ray);
-            let nearest =
-                |ray: &Ray, count, hits: &mut Vec<Hit>| wide.nearest_by(kernel, ray, count, hits);
+        for (kernel, wide) in &wide {
+            let first = |ray: &Ray| wide.first(ray);
+            let nearest = |ray: &Ray, count, hits: &mut Vec<Hit>| wide.nearest(ray, count, hits);
             assert_eq!(
                 differing(first, nearest, &ray, &truth),
                 0,

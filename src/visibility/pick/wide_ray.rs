@@ -15,32 +15,32 @@ use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Candidates, Visit
 pub struct WideRay<B>(BodyIndex<B>);
 
 impl<B: Body> WideRay<B> {
-    /// Builds the tree; as a [`Pick`] it answers by `kernel`. O(n log n).
+    /// Builds the tree, whose answers are those of any `kernel`. O(n log n).
     pub fn of(bodies: &Bodies<B>, kernel: Kernel) -> WideRay<B> {
         WideRay(BodyIndex::of(bodies, kernel))
     }
+}
 
-    /// [`Pick::first`] by the given instruction set.
+impl<B: Body> Pick for WideRay<B> {
     #[inline]
-    pub fn first_by(&self, kernel: Kernel, ray: &Ray) -> Option<Hit> {
+    fn first(&self, ray: &Ray) -> Option<Hit> {
         let of = &self.0;
         if B::IS_BOX && !of.tree.is_passed_by(ray) {
-            return kernel.run(SearchFirst { of, ray });
+            return of.kernel.run(SearchFirst { of, ray });
         }
         let mut first = First::<B>::new(of.probe(ray), ray.far);
-        of.walk(kernel, ray, &mut first);
+        of.walk(ray, &mut first);
         first.hit(of.items())
     }
 
-    /// [`Pick::nearest`] by the given instruction set.
-    pub fn nearest_by(&self, kernel: Kernel, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
         let of = &self.0;
         if count == 0 || of.tree.is_passed_by(ray) {
             return hits.clear();
         }
         let probe = of.probe(ray);
         let met = match B::IS_BOX {
-            true => kernel.run(SearchNearest {
+            true => of.kernel.run(SearchNearest {
                 of,
                 ray,
                 probe: &probe,
@@ -53,21 +53,11 @@ impl<B: Body> WideRay<B> {
                     lowest: Lowest::new(count, ray.far),
                     met: Vec::new(),
                 };
-                of.walk(kernel, ray, &mut found);
+                of.walk(ray, &mut found);
                 found.met
             }
         };
         exactly::nearest::<B>(&probe, met, count, hits);
-    }
-}
-
-impl<B: Body> Pick for WideRay<B> {
-    fn first(&self, ray: &Ray) -> Option<Hit> {
-        self.first_by(self.0.kernel, ray)
-    }
-
-    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
-        self.nearest_by(self.0.kernel, ray, count, hits);
     }
 }
 

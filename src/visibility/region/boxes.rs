@@ -54,7 +54,7 @@ impl RegionGraph {
             regions: BoxGrid::new(boxes),
             borders: BoxGrid::new(Vec::new()),
         };
-        RegionGraph::new(&regions, openings, Arc::new(ground))
+        RegionGraph::new(regions, openings, Arc::new(ground))
     }
 
     /// The regions of a scene that is a tiling of boxes whose borders, but for the
@@ -72,14 +72,14 @@ impl RegionGraph {
         let borders = borders.map(|item| WorldBox::of(item, scene.origin));
         graph.ground = Arc::new(Boxes {
             borders: BoxGrid::new(borders.collect()),
-            regions: BoxGrid::new(graph.parts.all.clone()),
+            regions: BoxGrid::new(graph.parts.concat()),
         });
         Some(graph)
     }
 
     /// Tests, by item, for a possible border between regions; furniture is none.
     pub fn borders(&self, scene: &Scene) -> Vec<bool> {
-        let boxes = BoxGrid::new(self.parts.all.clone());
+        let boxes = BoxGrid::new(self.parts.concat());
         let closes = |item: &Aabb| !is_within_one(&boxes, &WorldBox::of(item, scene.origin));
         scene.items.iter().map(closes).collect()
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::id_set::{Csr, RegionId};
+use super::id_set::RegionId;
 use crate::scene::WorldBox;
 use crate::visibility::Rays;
 
@@ -24,46 +24,42 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
 #[derive(Clone, Debug)]
 pub struct RegionGraph {
     /// The boxes that each region lies in.
-    pub(super) parts: Csr<WorldBox>,
+    pub(super) parts: Vec<Vec<WorldBox>>,
     openings: Vec<Opening>,
-    exits: Csr<u32>,
+    exits: Vec<Vec<u32>>,
     pub(super) ground: Arc<dyn Ground>,
 }
 
 impl RegionGraph {
     /// Links regions, each with the boxes that hold it, by openings.
     pub fn new(
-        regions: &[Vec<WorldBox>],
+        parts: Vec<Vec<WorldBox>>,
         openings: Vec<Opening>,
         ground: Arc<dyn Ground>,
     ) -> RegionGraph {
-        let mut exits = vec![Vec::new(); regions.len()];
+        let mut exits = vec![Vec::new(); parts.len()];
         for (i, opening) in (0u32..).zip(&openings) {
             for side in opening.sides {
                 exits[side as usize].push(i);
             }
         }
         RegionGraph {
-            parts: Csr::of(regions),
+            parts,
             openings,
-            exits: Csr::of(&exits),
+            exits,
             ground,
         }
     }
 
     /// Number of regions.
+    #[allow(clippy::len_without_is_empty)] // No caller needs `is_empty`.
     pub fn len(&self) -> usize {
-        self.exits.count()
-    }
-
-    /// Tests whether there are no regions.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.exits.len()
     }
 
     /// The boxes that together hold a region; one in most graphs.
     pub fn parts(&self, region: RegionId) -> &[WorldBox] {
-        self.parts.list(region)
+        &self.parts[region as usize]
     }
 
     /// All openings; an exit is an index in this list.
@@ -73,7 +69,7 @@ impl RegionGraph {
 
     /// The openings on a region's border.
     pub fn exits(&self, region: RegionId) -> &[u32] {
-        self.exits.list(region)
+        &self.exits[region as usize]
     }
 
     /// Finder of the regions of a place.

@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::graph::RegionGraph;
-use super::id_set::{Csr, IdSet, RegionId};
+use super::id_set::{IdSet, RegionId};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 
@@ -17,7 +17,7 @@ pub struct BoxGrid {
     per_unit: DVec3,
     count: [usize; 3],
     /// The boxes of each bucket.
-    buckets: Csr<u32>,
+    buckets: Vec<Vec<u32>>,
 }
 
 impl BoxGrid {
@@ -46,13 +46,13 @@ impl BoxGrid {
             low,
             per_unit: DVec3::new(per(0), per(1), per(2)),
             count,
-            buckets: Csr::of(&[]),
+            buckets: Vec::new(),
         };
         let mut lists = vec![Vec::new(); count[0] * count[1] * count[2]];
         for (id, b) in (0..).zip(&grid.boxes) {
-            grid.buckets(b, |bucket| lists[bucket as usize].push(id));
+            grid.buckets(b, |bucket| lists[bucket].push(id));
         }
-        grid.buckets = Csr::of(&lists);
+        grid.buckets = lists;
         grid
     }
 
@@ -66,7 +66,7 @@ impl BoxGrid {
     pub fn meeting(&self, b: &WorldBox, mut found: impl FnMut(u32)) {
         let meets = |id: u32| b.meets(&self.boxes[id as usize]);
         self.buckets(b, |bucket| {
-            let entries = self.buckets.list(bucket).iter().copied();
+            let entries = self.buckets[bucket].iter().copied();
             entries.filter(|id| meets(*id)).for_each(&mut found);
         });
     }
@@ -79,13 +79,13 @@ impl BoxGrid {
         (at as usize).min(self.count[axis] - 1)
     }
 
-    fn buckets(&self, b: &WorldBox, mut found: impl FnMut(u32)) {
+    fn buckets(&self, b: &WorldBox, mut found: impl FnMut(usize)) {
         let from = [0, 1, 2].map(|k| self.cell(k, b.min[k]));
         let to = [0, 1, 2].map(|k| self.cell(k, b.max[k]));
         for z in from[2]..=to[2] {
             for y in from[1]..=to[1] {
                 for x in from[0]..=to[0] {
-                    found(((z * self.count[1] + y) * self.count[0] + x) as u32);
+                    found((z * self.count[1] + y) * self.count[0] + x);
                 }
             }
         }
@@ -142,7 +142,7 @@ pub fn without(b: &WorldBox, other: &WorldBox) -> Vec<WorldBox> {
 /// The items of each region.
 #[derive(Clone, Debug)]
 pub struct RegionItems {
-    lists: Csr<ItemId>,
+    lists: Vec<Vec<ItemId>>,
     items: usize,
 }
 
@@ -156,7 +156,7 @@ impl RegionItems {
         let regions = 0..graph.len() as u32;
         let owners = regions.flat_map(|region| graph.parts(region).iter().map(move |_| region));
         let owners: Vec<RegionId> = owners.collect();
-        let grid = BoxGrid::new(graph.parts.all.clone());
+        let grid = BoxGrid::new(graph.parts.concat());
         let mut lists = vec![Vec::new(); graph.len()];
         let mut met = Vec::new();
         for (id, item) in (0..).zip(&scene.items) {
@@ -169,20 +169,20 @@ impl RegionItems {
             met.iter().for_each(|&owner| lists[owner as usize].push(id));
         }
         RegionItems {
-            lists: Csr::of(&lists),
+            lists,
             items: scene.items.len(),
         }
     }
 
     /// The items that meet a region, ascending.
     pub fn of_region(&self, region: RegionId) -> &[ItemId] {
-        self.lists.list(region)
+        &self.lists[region as usize]
     }
 
     /// Replaces `out` by the items of the regions, ascending. All regions together
     /// are all items. O(items of the regions + n / 64).
     pub fn of_regions(&self, regions: &[RegionId], marks: &mut IdSet, out: &mut Vec<ItemId>) {
-        if regions.len() == self.lists.count() {
+        if regions.len() == self.lists.len() {
             out.clear();
             out.extend(0..self.items as u32);
             return;

@@ -73,7 +73,7 @@ impl RegionGraph {
     /// The clusters of a map.
     pub fn of_quake(map: &Arc<QuakeMap>) -> RegionGraph {
         let parts = vec![Vec::new(); map.clusters];
-        RegionGraph::new(&parts, Vec::new(), Arc::new(LeafGround(map.clone())))
+        RegionGraph::new(parts, Vec::new(), Arc::new(LeafGround(map.clone())))
     }
 }
 

@@ -107,13 +107,9 @@ impl Pvs {
     }
 
     /// Number of regions.
+    #[allow(clippy::len_without_is_empty)] // No caller needs `is_empty`.
     pub fn len(&self) -> usize {
         self.rows.len()
-    }
-
-    /// Tests whether there are no regions.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
     }
 
     /// The regions that a region sees, ascending.

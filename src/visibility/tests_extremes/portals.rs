@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::case::looking;
 use crate::camera::Lens;
 use crate::scene::{SeededRng, WorldBox};
+use crate::visibility::Guarantee;
 use crate::visibility::Rays;
 use crate::visibility::region::{
     Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, leads_through, rectangle,
@@ -85,7 +86,9 @@ impl Chain {
             .map(|opening| narrower(*opening, shrink));
         let narrow = RegionGraph::of_boxes(self.rooms.clone(), narrow.collect());
         let rows = rows(&Arc::new(narrow));
-        let safe = rows.iter().filter(|row| row.back_end.guarantee.is_safe());
+        let safe = rows
+            .iter()
+            .filter(|row| row.back_end.guarantee <= Guarantee::Conservative);
         Some(safe.map(|row| self.answer(row)).collect())
     }
 

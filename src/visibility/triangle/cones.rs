@@ -136,30 +136,6 @@ fn apex_of(planes: &[([Vec3; 3], DVec3)], axis: DVec3) -> Option<Vec3> {
     None
 }
 
-/// A view, prepared for tests of cones.
-#[derive(Clone, Copy, Debug)]
-pub struct Prepared {
-    /// The eye in f32, negated: a difference is then a sum.
-    pub minus_eye: [f32; 3],
-    /// -M.
-    pub minus_margin: f32,
-    /// `true` if the eye is at infinity: the apex does not matter.
-    pub is_parallel: bool,
-}
-
-impl Prepared {
-    /// `None` if the eye is so far away that the test could overflow.
-    pub fn of(eye: &Eye) -> Option<Prepared> {
-        let margin = 2.0 * eye.error * (1.0 + 1.0 / (1 << 19) as f64);
-        let is_near = eye.nearest.abs().max_element() < FAR;
-        is_near.then(|| Prepared {
-            minus_eye: (-eye.nearest).to_array(),
-            minus_margin: -round_up(margin.max(LEAST_MARGIN)),
-            is_parallel: eye.weight == 0.0,
-        })
-    }
-}
-
 /// Rounds of moving triangles to the nearest of the directions.
 const ROUNDS: usize = 8;
 
@@ -214,10 +190,11 @@ impl<const N: usize> Cones<N> {
 
 impl<const N: usize> TriangleCull for Cones<N> {
     fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
-        if let Some(view) = &Prepared::of(eye) {
+        // From farther away the test could overflow.
+        if eye.nearest.abs().max_element() < FAR {
             kernel.run(Query {
                 all: self,
-                view,
+                eye,
                 words: kept.blocks_mut(),
             });
         }
@@ -226,7 +203,7 @@ impl<const N: usize> TriangleCull for Cones<N> {
 
 struct Query<'a, const N: usize> {
     all: &'a Cones<N>,
-    view: &'a Prepared,
+    eye: &'a Eye,
     words: &'a mut [[u64; LANES]],
 }
 
@@ -235,7 +212,7 @@ impl<const N: usize> Work for Query<'_, N> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let view = Broadcast::of(isa, self.view);
+        let view = Broadcast::of(isa, self.eye);
         for (i, words) in self.words.iter_mut().enumerate() {
             for (n, block) in self.all.cones[i].iter().enumerate() {
                 let gone = rejected(isa, block, &view);
@@ -365,28 +342,28 @@ fn dot<I: Isa>(isa: I, [x, y, z]: [I::Floats; 3], [a, b, c]: [I::Floats; 3]) -> 
     isa.add(xy, isa.mul(z, c))
 }
 
-/// A view in all lanes.
+/// An eye in all lanes.
 #[derive(Clone, Copy)]
 struct Broadcast<I: Isa> {
+    /// A difference is then a sum.
     minus_eye: [I::Floats; 3],
+    /// -M.
     minus_margin: I::Floats,
     zero: I::Floats,
+    /// `true` if the eye is at infinity: the apex does not matter.
     is_parallel: bool,
 }
 
 impl<I: Isa> Broadcast<I> {
-    /// All numbers of a view.
     #[inline(always)]
-    fn of(isa: I, view: &Prepared) -> Broadcast<I> {
+    fn of(isa: I, eye: &Eye) -> Broadcast<I> {
+        let [x, y, z] = (-eye.nearest).to_array();
+        let margin = 2.0 * eye.error * (1.0 + 1.0 / (1 << 19) as f64);
         Broadcast {
-            minus_eye: [
-                isa.splat(view.minus_eye[0]),
-                isa.splat(view.minus_eye[1]),
-                isa.splat(view.minus_eye[2]),
-            ],
-            minus_margin: isa.splat(view.minus_margin),
+            minus_eye: [isa.splat(x), isa.splat(y), isa.splat(z)],
+            minus_margin: isa.splat(-round_up(margin.max(LEAST_MARGIN))),
             zero: isa.splat(0.0),
-            is_parallel: view.is_parallel,
+            is_parallel: eye.weight == 0.0,
         }
     }
 }

@@ -11,7 +11,6 @@ mod slabs;
 #[cfg(test)]
 pub(super) mod tests;
 
-use self::ray_index::Search;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
 use crate::threads;
@@ -79,13 +78,13 @@ impl SampleTruth {
         let mut others = vec![Vec::new(); (grid.height as usize).div_ceil(BAND)];
         let rows = front.chunks_mut((width * BAND).max(1)).zip(&mut others);
         threads::share(threads, rows.enumerate(), |(band, (front, others))| {
-            let mut search = Search::new();
+            let mut seen = Front::new();
             for (place, sample) in front.iter_mut().enumerate() {
                 let (column, row) = (place % width, band * BAND + place / width);
                 let ray = rays.sample(grid, column as u32, row as u32);
-                search.front(index, &ray, is_opaque);
-                others.extend_from_slice(&search.before);
-                if let Some((first, ties)) = search.front.split_first() {
+                seen.search(index, &ray, is_opaque);
+                others.extend_from_slice(&seen.before);
+                if let Some((first, ties)) = seen.front.split_first() {
                     others.extend_from_slice(ties);
                     *sample = *first;
                 }
@@ -133,12 +132,12 @@ pub fn visible_by_random_rays<B: Body>(
     threads::share(threads, found.iter_mut().enumerate(), |(chunk, found)| {
         // A random stream per chunk, whichever thread takes it.
         let mut rng = SeededRng::new(seed.wrapping_add((chunk as u64) << 32));
-        let mut search = Search::new();
+        let mut seen = Front::new();
         for _ in 0..CHUNK.min(count - chunk * CHUNK) {
             let (x, y) = (rng.unit(), rng.unit());
-            search.front(index, &rays.through(x, y), &|_, _, _| true);
-            found.extend_from_slice(&search.front);
-            found.extend_from_slice(&search.before);
+            seen.search(index, &rays.through(x, y), &|_, _, _| true);
+            found.extend_from_slice(&seen.front);
+            found.extend_from_slice(&seen.before);
         }
         found.sort_unstable();
         found.dedup();

@@ -34,10 +34,12 @@ pub type RayIndex = BodyIndex<SolidBox>;
 /// An index of triangles. Clear ones and cut-outs hide nothing.
 pub type SurfaceIndex = BodyIndex<Facet>;
 
-/// The items that are seen along a ray.
-#[derive(Clone, PartialEq, Debug)]
+/// The items that are seen along a ray; its memory serves for many.
+#[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Front<At> {
+    /// What the ray meets and what hides nothing.
+    through: Vec<(ItemId, At)>,
     /// Items that the ray meets first among those that hide, ascending.
     ///
     /// Several are a tie. Empty if the ray meets none from near to far.
@@ -102,9 +104,9 @@ impl<B: Body> BodyIndex<B> {
 
     /// Shows each body that a ray may meet to a visitor, nearest nodes first.
     #[inline]
-    pub fn walk<V: Visit<B>>(&self, kernel: Kernel, ray: &Ray, visitor: &mut V) {
+    pub fn walk<V: Visit<B>>(&self, ray: &Ray, visitor: &mut V) {
         if !self.tree.is_passed_by(ray) {
-            kernel.run(Walk {
+            self.kernel.run(Walk {
                 of: self,
                 ray,
                 visitor,
@@ -114,13 +116,9 @@ impl<B: Body> BodyIndex<B> {
 
     /// Searches for what is seen along a ray, exactly.
     pub fn front_of(&self, ray: &Ray) -> Front<B::At> {
-        let mut search = Search::new();
-        let meeting = search.front(self, ray, &|_, _, _| true);
-        Front {
-            front: search.front,
-            before: search.before,
-            meeting,
-        }
+        let mut front = Front::new();
+        front.search(self, ray, &|_, _, _| true);
+        front
     }
 
     /// Least number of tests of bodies by the rays to all samples of a grid.
@@ -130,7 +128,7 @@ impl<B: Body> BodyIndex<B> {
             let ray = rays.sample(grid, column, row);
             let meeting = self.front_of(&ray).meeting;
             let end = meeting.map_or(ray.far, |at| B::Probe::at_most(&at));
-            self.walk(self.kernel, &ray, &mut |_: &B| {
+            self.walk(&ray, &mut |_: &B| {
                 tests += 1;
                 end
             });
@@ -142,7 +140,7 @@ impl<B: Body> BodyIndex<B> {
     pub fn all_along(&self, ray: &Ray) -> Vec<(ItemId, B::At)> {
         let probe = self.probe(ray);
         let mut met = Vec::new();
-        self.walk(self.kernel, ray, &mut |body: &B| {
+        self.walk(ray, &mut |body: &B| {
             met.extend(body.meet(&probe, ray.far).map(|at| (body.item(), at)));
             ray.far
         });
@@ -215,41 +213,33 @@ impl<B: Body, V: Visit<B>> Candidates for AtOnce<'_, B, V> {
     }
 }
 
-/// Memory of a search, kept from ray to ray.
-pub(super) struct Search<At> {
-    through: Vec<(ItemId, At)>,
-    /// [`Front::front`] of the last ray.
-    pub front: Vec<ItemId>,
-    /// [`Front::before`] of the last ray.
-    pub before: Vec<ItemId>,
-}
-
-impl<At: Copy> Search<At> {
-    pub fn new() -> Search<At> {
-        Search {
+impl<At: Copy> Front<At> {
+    pub(super) fn new() -> Front<At> {
+        Front {
             through: Vec::new(),
             front: Vec::new(),
             before: Vec::new(),
+            meeting: None,
         }
     }
 
-    /// Sets `front` and `before`; returns where the ray meets the front items.
+    /// Replaces what is seen along the last ray.
     ///
     /// Rays pass through points of bodies that are not `is_opaque`.
     #[inline]
-    pub fn front<B: Body<At = At>>(
+    pub(super) fn search<B: Body<At = At>>(
         &mut self,
         index: &BodyIndex<B>,
         ray: &Ray,
         is_opaque: &impl Fn(&B, &B::Probe, &At) -> bool,
-    ) -> Option<At> {
+    ) {
         let probe = index.probe(ray);
         let (front, through) = (&mut self.front, &mut self.through);
         front.clear();
         through.clear();
         let mut best: Option<At> = None;
         let mut limit = ray.far;
-        index.walk(index.kernel, ray, &mut |body: &B| {
+        index.walk(ray, &mut |body: &B| {
             let Some(at) = body.meet(&probe, limit) else {
                 return limit;
             };
@@ -279,6 +269,6 @@ impl<At: Copy> Search<At> {
             items.dedup();
         }
         self.before.retain(|item| !self.front.contains(item));
-        best
+        self.meeting = best;
     }
 }

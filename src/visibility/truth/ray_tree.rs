@@ -12,9 +12,9 @@ use glam::{DVec3, Vec3};
 
 use super::slabs::{Rows, Slabs};
 use crate::geometry::Aabb;
-use crate::index::Record;
+use crate::index::{Record, by_surface_area};
 use crate::kernel::{Isa, LANES, LaneMask};
-use crate::query::ItemId;
+use crate::query::{Bits, ItemId};
 use crate::visibility::Ray;
 
 /// The nodes, some 45 bytes of them a box.
@@ -83,30 +83,25 @@ impl RayTree {
             let node = &self.nodes[at.node()];
             let tested = slabs.test(isa, &node.rows, found.bound());
             let items = at.items();
-            let mut left = tested.lanes;
+            let left = tested.lanes;
             if left != 0 {
                 let less_entry = isa.to_array(tested.less_entry);
-                let mut here = left & items;
-                while here != 0 {
-                    let lane = here.trailing_zeros() as usize % LANES;
-                    here &= here - 1;
+                for lane in Bits((left & items).into()) {
+                    let lane = lane as usize % LANES;
                     let low = -less_entry[lane];
                     if low <= found.bound() {
                         let latest = || slabs.latest(&node.rows, lane, low);
                         found.offer(low, node.children[lane], latest);
                     }
                 }
-                left &= !items;
-                if left != 0 {
+                let mut nodes = Bits((left & !items).into()).map(|lane| {
+                    let lane = lane as usize % LANES;
+                    (-less_entry[lane], node.children[lane])
+                });
+                // The nearest so far is kept out of the stack.
+                if let Some(mut next) = nodes.next() {
                     let first = open.len();
-                    // The nearest so far is kept out of the stack.
-                    let lane = left.trailing_zeros() as usize % LANES;
-                    left &= left - 1;
-                    let mut next = (-less_entry[lane], node.children[lane]);
-                    while left != 0 {
-                        let lane = left.trailing_zeros() as usize % LANES;
-                        left &= left - 1;
-                        let other = (-less_entry[lane], node.children[lane]);
+                    for other in nodes {
                         let (low, high) = if other.0 < next.0 {
                             (other, next)
                         } else {
@@ -344,7 +339,9 @@ fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
             break;
         };
         let part = parts.swap_remove(largest);
-        let middle = part.range.start + halve(&mut items[part.range.clone()]);
+        // By halves where no cut parts the centres.
+        let cut = by_surface_area(&mut items[part.range.clone()]);
+        let middle = part.range.start + cut.map_or(part.len() / 2, |(_, below)| below);
         parts.push(Part::of(items, part.range.start..middle));
         parts.push(Part::of(items, middle..part.range.end));
     }
@@ -359,8 +356,6 @@ fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
     }
     parts
 }
-
-const BINS: usize = 16;
 
 /// A part of the items and its bounds.
 struct Part {
@@ -379,55 +374,6 @@ impl Part {
     fn len(&self) -> usize {
         self.range.len()
     }
-}
-
-/// Orders a set so that its first part, whose length is returned, is one side of
-/// the cheapest cut between bins; by halves where no cut parts the centres.
-fn halve(items: &mut [Record]) -> usize {
-    let centres = items.iter().map(|item| item.bounds.centre());
-    let (low, high) = centres.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), c| {
-        (low.min(c), high.max(c))
-    });
-    let scale = BINS as f32 / (high - low);
-    let bin = |item: &Record, axis: usize| {
-        let along = (item.bounds.centre()[axis] - low[axis]) * scale[axis];
-        (along as usize).min(BINS - 1)
-    };
-    let mut best: Option<(f32, usize, usize)> = None;
-    for axis in (0..3).filter(|&axis| scale[axis].is_finite()) {
-        let mut bins = [(Aabb::EMPTY, 0usize); BINS];
-        for item in items.iter() {
-            let bin = &mut bins[bin(item, axis)];
-            *bin = (bin.0.union(&item.bounds), bin.1 + 1);
-        }
-        // Bounds and count above each cut.
-        let mut above = [(Aabb::EMPTY, 0); BINS];
-        for i in (1..BINS).rev() {
-            let rest = above.get(i).copied().unwrap_or((Aabb::EMPTY, 0));
-            above[i - 1] = (rest.0.union(&bins[i].0), rest.1 + bins[i].1);
-        }
-        let mut below = (Aabb::EMPTY, 0);
-        for i in 0..BINS - 1 {
-            below = (below.0.union(&bins[i].0), below.1 + bins[i].1);
-            let cost =
-                below.0.half_area() * below.1 as f32 + above[i].0.half_area() * above[i].1 as f32;
-            let parts = below.1 > 0 && above[i].1 > 0;
-            if parts && cost.is_finite() && best.is_none_or(|best| cost < best.0) {
-                best = Some((cost, axis, i));
-            }
-        }
-    }
-    let Some((_, axis, last)) = best else {
-        return items.len() / 2;
-    };
-    let mut first = 0;
-    for i in 0..items.len() {
-        if bin(&items[i], axis) <= last {
-            items.swap(first, i);
-            first += 1;
-        }
-    }
-    first
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, Surfaces, WorldBox, load};
 use crate::visibility::hiders::Hiders;
-use crate::visibility::inscribed::InnerBoxes;
+use crate::visibility::inscribed::inner_boxes;
 use crate::visibility::truth::{SurfaceIndex, visible_by_random_rays};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
@@ -47,7 +47,7 @@ fn boxes_inside_meshes_hide_nothing_that_is_visible() {
     ] {
         let name = scene.name.clone();
         let mesh = scene.surfaces.clone().unwrap();
-        let inner = InnerBoxes::of(&mesh, 12, 4, 1).boxes;
+        let inner = inner_boxes(&mesh, 12, 4, 1).0;
         let ready = Ready {
             solids: Solids::of(&scene),
             occluders: OccluderScene::among(&scene, &inner, &[]),

@@ -8,6 +8,7 @@ use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
+use crate::visibility::Guarantee;
 use crate::visibility::SampleGrid;
 
 /// A handful of boxes of any shape, on a grid of whole numbers every other time
@@ -101,7 +102,7 @@ fn losses<B: OcclusionBuffer>(
                     "only what is in the view"
                 );
                 let lost_here = missing(&seen, &kept);
-                if !lost_here.is_empty() && B::GUARANTEE.is_safe() {
+                if !lost_here.is_empty() && B::GUARANTEE <= Guarantee::Conservative {
                     println!(
                         "{} seed {seed}: lost {lost_here:?} of {seen:?}",
                         std::any::type_name::<B>()

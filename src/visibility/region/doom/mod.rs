@@ -237,7 +237,7 @@ impl DoomMap {
             parts[sector as usize].push(WorldBox::new(min - all_heights, max + all_heights));
         }
         let ground = Arc::new(SectorGround::new(self.clone()));
-        Ok(RegionGraph::new(&parts, openings, ground))
+        Ok(RegionGraph::new(parts, openings, ground))
     }
 }
 
