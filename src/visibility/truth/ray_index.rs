@@ -38,7 +38,7 @@ pub type SurfaceIndex = BodyIndex<Facet>;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Front<At> {
-    /// What the ray meets and what hides nothing.
+    /// Bodies that hide nothing, where the ray meets them.
     through: Vec<(ItemId, At)>,
     /// Items that the ray meets first among those that hide, ascending.
     ///

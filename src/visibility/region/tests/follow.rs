@@ -1,4 +1,4 @@
-//! The regions that a ray passes before it meets what is opaque, one after the other.
+//! The regions that a ray passes before it meets what is opaque, one by one.
 //!
 //! Plain f64, by searches that share nothing with the back ends.
 
