@@ -38,6 +38,12 @@ pub enum Status {
     Refused,
 }
 
+impl Status {
+    fn of(is_right: bool) -> Status {
+        if is_right { Status::Pass } else { Status::Fail }
+    }
+}
+
 /// Names of boxes, or words.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 #[serde(untagged)]

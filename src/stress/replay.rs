@@ -120,8 +120,8 @@ impl Replay<'_> {
         let oracle = sound.and_then(|c| Oracle::of_camera(&stated.pose(), &c.lens, DVec3::ZERO));
         // The oracle decides what is visible if the file does not say it.
         let truth = oracle.as_ref().map(|oracle| sheet.seen_by(oracle));
-        let listed = vector.expected_visible_camera.clone();
-        let wanted = listed.or(truth).unwrap_or_default();
+        let listed = &vector.expected_visible_camera;
+        let wanted = listed.clone().or(truth).unwrap_or_default();
         let cubes = self.built(&CullingTest::Sphere.items(sheet.items));
         for (test, name, _) in TESTS {
             let structures = match test {
@@ -133,28 +133,22 @@ impl Replay<'_> {
                 planes: self.planes,
                 ..Culling::default()
             };
-            let view = camera.clone();
-            let view = view.and_then(|camera| culling.view(&camera, &around));
+            let camera = camera.clone();
+            let view = camera.and_then(|camera| culling.view(&camera, &around));
             let declared = match (vector.camera_error(), &view) {
                 (Some(text), _) => Some(text.into()),
                 (None, Err(CullingError::Camera(CameraError::Sums { .. }))) => {
                     Some("a view or, where sums could overflow, a refusal".into())
                 }
                 // A camera that cannot be made sees nothing.
-                (None, Err(_)) if wanted.is_empty() && vector.expected_visible_camera.is_some() => {
+                (None, Err(_)) if wanted.is_empty() && listed.is_some() => {
                     Some(Said::of_names(&wanted))
                 }
                 _ => None,
             };
-            let otherwise = Said::of_names(&wanted);
-            let Some(view) = accepted(
-                sheet,
-                [name, "a camera"],
-                view.map_err(|e| e.to_string()),
-                declared,
-                otherwise,
-                structures,
-            ) else {
+            let (view, visible) = (view.map_err(|e| e.to_string()), Said::of_names(&wanted));
+            let subject = [name, "a camera"];
+            let Some(view) = accepted(sheet, subject, view, declared, visible, structures) else {
                 continue;
             };
             let exact = oracle.as_ref().zip(sound);
@@ -176,11 +170,7 @@ impl Replay<'_> {
             }
         }
         if let Some(oracle) = &oracle {
-            sheet.verdicts(
-                oracle,
-                &vector.expected_visible_camera,
-                &vector.touch_camera,
-            );
+            sheet.verdicts(oracle, listed, &vector.touch_camera);
         }
     }
 }
@@ -192,11 +182,8 @@ const BESIDE: usize = 64;
 fn claims(sheet: &mut Sheet) {
     let vector = sheet.vector;
     let mut row = |about: &Name, expected: Said, got: Said| {
-        let status = match expected == got {
-            true => Status::Pass,
-            false => Status::Fail,
-        };
         let subject = [ORACLE, CullingTest::Exact.name()];
+        let status = Status::of(expected == got);
         sheet.row(Some(about), subject, status, expected, got);
     };
     if !vector.planes_agree() {
@@ -218,13 +205,7 @@ fn claims(sheet: &mut Sheet) {
     let inverted: BTreeSet<&Name> = sound.filter(|name| boxes[name]).collect();
     let listed = vector.expect_empty_boxes.iter();
     for names in listed.map(|names| names.iter().collect::<BTreeSet<&Name>>()) {
-        let said = |is_inverted| {
-            if is_inverted {
-                "inverted"
-            } else {
-                "not inverted"
-            }
-        };
+        let said = |is_inverted| ["not inverted", "inverted"][usize::from(is_inverted)];
         for name in &names | &inverted {
             let got = boxes.get(name).map_or("no such box", |&is| said(is));
             row(name, said(names.contains(name)).into(), got.into());
@@ -262,13 +243,8 @@ fn accepted<V>(
     };
     let expected = declared.unwrap_or(otherwise);
     for (structure, _) in structures {
-        sheet.row(
-            None,
-            [structure, test],
-            status,
-            expected.clone(),
-            got.clone(),
-        );
+        let subject = [*structure, test];
+        sheet.row(None, subject, status, expected.clone(), got.clone());
     }
     None
 }
@@ -277,14 +253,8 @@ fn given_planes(sheet: &mut Sheet, volume: Result<ConvexVolume, String>, built: 
     let vector = sheet.vector;
     let test = CullingTest::SixPlane.name();
     let declared = vector.planes_error().map(Said::from);
-    let Some(volume) = accepted(
-        sheet,
-        [test, "planes"],
-        volume,
-        declared,
-        "planes".into(),
-        built,
-    ) else {
+    let wanted = "planes".into();
+    let Some(volume) = accepted(sheet, [test, "planes"], volume, declared, wanted, built) else {
         return;
     };
     let scalar = || sheet.names_of(|b| volume.sees(b));
@@ -296,12 +266,8 @@ fn given_planes(sheet: &mut Sheet, volume: Result<ConvexVolume, String>, built: 
         sheet.compared([structure, test], &wanted, &answer, explain);
     }
     sheet.without_rounding(&volume);
-    let oracle = Oracle::of_volume(&volume);
-    sheet.verdicts(
-        &oracle,
-        &vector.expected_visible_planes,
-        &vector.touch_planes,
-    );
+    let (visible, touch) = (&vector.expected_visible_planes, &vector.touch_planes);
+    sheet.verdicts(&Oracle::of_volume(&volume), visible, touch);
 }
 
 /// Region search. Boxes are f32, so that a point of f64 may find too many of them:

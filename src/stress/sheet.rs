@@ -5,6 +5,8 @@
 use std::collections::BTreeMap;
 
 use super::{Level, Name, Names, Row, Said, Status, Vector};
+use glam::DVec3;
+
 use crate::arithmetic::Expansion;
 use crate::camera::{Camera, Lens, LensKind, Surroundings};
 use crate::culling::CullingTest;
@@ -39,12 +41,8 @@ pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     let near = camera.lens.near();
     let nearby = camera.lens.with_far(camera.lens.far().or(Some(near * 2.0)));
     let corners = nearby.ok().and_then(|lens| lens.corners(&camera.frame));
-    let reach = corners
-        .iter()
-        .flatten()
-        .fold(around.reach.as_dvec3(), |reach, corner| {
-            reach.max(corner.abs())
-        });
+    let corners = corners.iter().flatten().map(|corner| corner.abs());
+    let reach = corners.fold(around.reach.as_dvec3(), DVec3::max);
     let size = reach.max(b.reach().as_dvec3()).element_sum() + reach.element_sum();
     let eye = camera.frame.eye;
     let far_away = (eye.abs() + (eye - around.origin).abs()).element_sum()
@@ -140,14 +138,8 @@ impl Sheet<'_> {
         let empty = self.vector.expect_empty_boxes.as_ref();
         let is_empty = |name: &Name| empty.is_some_and(|names| names.contains(name));
         let has_empty = answer.iter().flatten().any(is_empty);
-        let status = match is_right && !has_empty {
-            true => Status::Pass,
-            false => Status::Fail,
-        };
-        let got = match answer {
-            Ok(names) => Said::of_names(names),
-            Err(text) => Said::Text(text.clone()),
-        };
+        let status = Status::of(is_right && !has_empty);
+        let got = answer.as_ref().map_or_else(Said::from, Said::of_names);
         self.row(about, subject, status, Said::of_names(wanted), got);
     }
 
@@ -172,10 +164,8 @@ impl Sheet<'_> {
             };
             faults.extend(got.map(|got| (name, is_wanted, got)));
         }
-        let is_unique = answer
-            .as_ref()
-            .is_ok_and(|names| names.len() == found.len());
-        let is_right = is_unique && faults.is_empty();
+        let is_unique = |names: &Vec<Name>| names.len() == found.len();
+        let is_right = faults.is_empty() && answer.as_ref().is_ok_and(is_unique);
         self.answered(None, subject, is_right, wanted, answer);
         for (name, is_wanted, got) in faults.into_iter().filter(|_| answer.is_ok()) {
             let expected = if is_wanted { "visible" } else { "not visible" };

@@ -115,10 +115,8 @@ impl VectorCamera {
     /// # Errors
     /// No such camera.
     pub fn camera(&self) -> Result<Camera, CameraError> {
-        let far = self
-            .far
-            .map(|far| far.0)
-            .filter(|&far| far != f64::INFINITY);
+        let far = self.far.map(|far| far.0);
+        let far = far.filter(|far| *far != f64::INFINITY);
         let frame = self.pose().frame()?;
         let lens = Lens::perspective(self.fovy_deg.0, self.aspect.0, self.near.0, far)?;
         Ok(Camera { frame, lens })
@@ -166,12 +164,14 @@ impl Vector {
     /// Planes in f32, bit for bit.
     pub fn planes(&self) -> Option<Vec<Plane>> {
         let plane = |[x, y, z, d]: [f32; 4]| Plane::new(Vec3::new(x, y, z), d);
-        let bits = self.planes_f32_hex.as_ref();
-        let bits = bits.map(|rows| rows.iter().map(|row| plane(row.0.map(|x| x.0))));
-        let decimals = self.planes.as_ref();
-        let decimals = decimals.map(|rows| rows.iter().map(|row| plane(row.0.map(|x| x.0))));
-        bits.map(Iterator::collect)
-            .or(decimals.map(Iterator::collect))
+        let bits = self.planes_f32_hex.as_ref().map(|rows| {
+            let rows = rows.iter().map(|row| plane(row.0.map(|x| x.0)));
+            rows.collect()
+        });
+        bits.or_else(|| {
+            let rows = self.planes.as_ref()?.iter();
+            Some(rows.map(|row| plane(row.0.map(|x| x.0))).collect())
+        })
     }
 
     /// Claims of the vector that no check can judge, in words.
@@ -257,20 +257,14 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
 /// # Errors
 /// One line: the file, the path of the field, what was found and expected.
 pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError> {
-    let wrong = |place: String, found: String, expected: String| {
-        InputError::at(file, place, found, expected)
-    };
     let vectors: Vec<Vector> = list(bytes).map_err(|error: JsonError| {
         let form = || format!("JSON in the form of {BUILT_IN_NAME}");
-        wrong(
-            error.place(),
-            error.found,
-            error.expected.unwrap_or_else(form),
-        )
+        let (place, expected) = (error.place(), error.expected.unwrap_or_else(form));
+        InputError::at(file, place, error.found, expected)
     })?;
     let again = |place: String, id: &Name| {
         let found = format!("the id '{}' a second time", plain(&id.0));
-        wrong(place, found, "an id of its own".to_owned())
+        InputError::at(file, place, found, "an id of its own")
     };
     if let Some((n, id)) = repeated(vectors.iter().map(|vector| &vector.id)) {
         return Err(again(format!("vectors[{n}]"), id));

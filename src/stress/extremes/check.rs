@@ -60,26 +60,7 @@ pub struct Fault {
     /// Index of the box; `None` where the whole answer is wrong.
     pub item: Option<usize>,
     /// The box and the truth about it, so that a reader can check by hand.
-    about: Option<String>,
-}
-
-impl Fault {
-    /// A row for the fault, and one for its box.
-    pub(super) fn rows(self, id: &str, level: Level) -> impl Iterator<Item = Row> {
-        let id = id.to_owned();
-        let about = self.item.zip(self.about).map(|(item, about)| Row {
-            id: format!("{id}/box {item}"),
-            level,
-            got: about.into(),
-            ..self.row.clone()
-        });
-        let whole = Row {
-            id,
-            level,
-            ..self.row
-        };
-        [whole].into_iter().chain(about)
-    }
+    pub about: Option<String>,
 }
 
 /// Structures by their labels, built over the boxes of a case.
@@ -266,24 +247,19 @@ impl Case {
                     arithmetic,
                     planes: self.planes,
                 };
-                let view = match culling.view(&self.camera, &self.around) {
-                    Ok(view) => view,
-                    Err(error) if self.may_refuse(&error) => {
-                        found.tally.refused += 1;
-                        continue;
-                    }
-                    Err(error) => {
-                        found.fault([SCALAR, &name], None, "a view", error.to_string());
-                        continue;
-                    }
-                };
                 let (items, built) = match test {
                     CullingTest::Sphere => &spheres,
                     _ => &boxes,
                 };
-                let seen = seen(items, view.as_any());
-                self.scalar(&culling, &name, &seen, &mut found);
-                found.compare(built, &name, view.as_any(), &seen[..share]);
+                match culling.view(&self.camera, &self.around) {
+                    Ok(view) => {
+                        let seen = seen(items, view.as_any());
+                        self.scalar(&culling, &name, &seen, &mut found);
+                        found.compare(built, &name, view.as_any(), &seen[..share]);
+                    }
+                    Err(error) if self.may_refuse(&error) => found.tally.refused += 1,
+                    Err(error) => found.fault([SCALAR, &name], None, "a view", error.to_string()),
+                }
             }
         }
         self.check_without_epsilon(&boxes.1, &cubes, share, &mut found);
@@ -368,13 +344,14 @@ impl Case {
         // are sums of others have lost digits; they are measured, not judged.
         let judged = promised || culling.test == CullingTest::SixPlane;
         let allowed = self.size() * F64_MARGIN;
-        let lost = if promised {
+        let lost = match promised {
+            true => drops.false_negatives + drops.touch_dropped > 0,
+            false => judged && drops.deepest > allowed,
+        };
+        if promised {
             found.tally.false_negatives += drops.false_negatives;
             found.tally.touch_dropped += drops.touch_dropped;
-            drops.false_negatives + drops.touch_dropped > 0
-        } else {
-            judged && drops.deepest > allowed
-        };
+        }
         if lost || drops.ghosts > 0 {
             let proven = "nothing dropped that is inside or touches, nothing empty returned";
             let expected = match promised {
@@ -394,17 +371,16 @@ impl Case {
 
     /// The exact test returns nothing that is out by more than its margin.
     fn tight(&self, name: &str, seen: &[bool], found: &mut Findings) {
-        for (i, (b, judgement)) in self.items.iter().zip(&self.judgements).enumerate() {
-            if !seen[i] || judgement.verdict != Verdict::Out || b.is_empty() {
-                continue;
-            }
-            let away = -self.oracle.depth(b);
+        let mut out = (0..seen.len()).filter_map(|i| {
+            let (b, verdict) = (&self.items[i], self.judgements[i].verdict);
+            let is_extra = seen[i] && verdict == Verdict::Out && !b.is_empty();
+            let away = is_extra.then(|| -self.oracle.depth(b))?;
             let margin = slack(&self.camera, &self.around, b);
-            if away > margin {
-                let expected = format!("nothing returned that is farther out than {margin:e}");
-                found.fault([SCALAR, name], Some(i), expected, format!("{away:e} out"));
-                return;
-            }
+            (away > margin).then_some((i, away, margin))
+        });
+        if let Some((i, away, margin)) = out.next() {
+            let expected = format!("nothing returned that is farther out than {margin:e}");
+            found.fault([SCALAR, name], Some(i), expected, format!("{away:e} out"));
         }
     }
 
@@ -443,6 +419,6 @@ const F64_MARGIN: f64 = 1.0 / (1u64 << 48) as f64;
 const HUGE: f64 = 1e38;
 
 /// Answer of the scalar loop, by item.
-fn seen(items: &[Aabb], view: AnyVolume<'_>) -> Vec<bool> {
+pub(super) fn seen(items: &[Aabb], view: AnyVolume<'_>) -> Vec<bool> {
     items.iter().map(|b| view.sees(b)).collect()
 }

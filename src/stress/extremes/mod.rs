@@ -6,7 +6,7 @@ mod check;
 mod volumes;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use super::{Level, Row, Section, Status};
 use crate::camera::{Camera, Surroundings};
@@ -58,12 +58,9 @@ impl Extremes<'_> {
 
     /// All families, a section each.
     pub fn run(&self, progress: Progress) -> Vec<Section> {
-        let planes = PLANES_FAMILIES
-            .iter()
-            .map(|f| self.planes_family(f, progress));
-        let cameras = CAMERA_FAMILIES
-            .iter()
-            .map(|f| self.camera_family(f, progress));
+        let (planes, cameras) = (PLANES_FAMILIES.iter(), CAMERA_FAMILIES.iter());
+        let planes = planes.map(|family| self.planes_family(family, progress));
+        let cameras = cameras.map(|family| self.camera_family(family, progress));
         planes.chain(cameras).collect()
     }
 
@@ -72,11 +69,8 @@ impl Extremes<'_> {
         for &variant in family.variants {
             let group = format!("{}/{}", family.name, (family.label)(variant));
             let outcomes = self.run_cases(family.name, self.cases, progress, |nth, seed| {
-                let share = if nth.is_multiple_of(ALL_EVERY) {
-                    BOXES
-                } else {
-                    FEW
-                };
+                let has_all = nth.is_multiple_of(ALL_EVERY);
+                let share = if has_all { BOXES } else { FEW };
                 let findings = match camera_case(family, variant, seed) {
                     Ok(case) => case.check(self.structures, share),
                     Err(reason) => {
@@ -122,12 +116,10 @@ impl Extremes<'_> {
         threads::share(self.threads, numbers, |nth| {
             let seed = self.seed.wrapping_add(nth);
             let (group, findings) = case(nth, seed);
-            let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
             done.push((nth, (seed, group, findings)));
         });
-        let mut done = done
-            .into_inner()
-            .unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
         done.sort_by_key(|(nth, _)| *nth);
         done.into_iter().map(|(_, outcome)| outcome).collect()
     }
@@ -144,11 +136,18 @@ impl Extremes<'_> {
             for [structure, test] in findings.checked {
                 *checked.entry([group.clone(), structure, test]).or_default() += 1;
             }
-            for fault in findings.faults {
-                for row in fault.rows(&format!("{group}/seed {seed}"), level) {
-                    failed.insert([group.clone(), row.structure.clone(), row.test.clone()]);
-                    section.rows.push(row);
-                }
+            for Fault { row, item, about } in findings.faults {
+                failed.insert([group.clone(), row.structure.clone(), row.test.clone()]);
+                let id = format!("{group}/seed {seed}");
+                let of_box = item.map(|item| format!("{id}/box {item}")).zip(about);
+                let of_box = of_box.map(|(id, about)| Row {
+                    id,
+                    level,
+                    got: about.into(),
+                    ..row.clone()
+                });
+                section.rows.push(Row { id, level, ..row });
+                section.rows.extend(of_box);
             }
         }
         checked.retain(|key, _| !failed.contains(key));

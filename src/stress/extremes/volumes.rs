@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use super::check::{Findings, SCALAR};
+use super::check::{Findings, SCALAR, seen};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, Plane, RelativeVolume, Spheres, sphere_cube,
 };
@@ -63,16 +63,12 @@ fn random(seed: u64) -> PlanesCase {
 /// number: no operation rounds, and all of them work on denormals.
 fn denormals(seed: u64) -> PlanesCase {
     let mut rng = SeededRng::new(seed ^ 0xDE_0A11);
-    let mut number = |most: usize| {
-        let magnitude = f32::from_bits(rng.below(most) as u32);
-        if rng.below(2) == 0 {
-            magnitude
-        } else {
-            -magnitude
-        }
-    };
     // Below the least normal number, 2^23 units.
-    let mut vector = || Vec3::new(number(1 << 22), number(1 << 22), number(1 << 22));
+    let mut number = || {
+        let magnitude = f32::from_bits(rng.below(1 << 22) as u32);
+        magnitude * [1.0, -1.0][rng.below(2)]
+    };
+    let mut vector = || Vec3::new(number(), number(), number());
     let items = (0..200).map(|_| {
         let (a, b) = (vector(), vector());
         Aabb::new(a.min(b), a.max(b))
@@ -114,27 +110,20 @@ impl PlanesCase {
         // Offsets about the point may be beyond f32.
         let relative = RelativeVolume::about(self.point, &self.volume).ok();
         let cubes: Vec<Aabb> = self.items.iter().map(sphere_cube).collect();
-        let boxes = (
-            &self.items,
-            found.built(structures, Input::new(&self.items)),
-        );
-        let input = Input::new(&cubes).spheres(true);
+        let (items, input) = (&self.items, Input::new(&cubes).spheres(true));
+        let boxes = (items, found.built(structures, Input::new(items)));
         let cubes = (&cubes, found.built(structures, input));
+        let relative = relative.as_ref().map(AnyVolume::from);
         let views: [(&str, Option<AnyVolume>, _); 5] = [
             ("six-plane", Some((&self.volume).into()), &boxes),
             ("six-plane f64", Some((&wide).into()), &boxes),
-            (
-                "six-plane f32-relative",
-                relative.as_ref().map(Into::into),
-                &boxes,
-            ),
+            ("six-plane f32-relative", relative, &boxes),
             ("sphere", Some((&spheres).into()), &cubes),
             ("locate", Some(self.point.into()), &boxes),
         ];
         for (name, view, (items, built)) in views {
             if let Some(view) = view {
-                let seen: Vec<bool> = items.iter().map(|b| view.sees(b)).collect();
-                found.compare(built, name, view, &seen);
+                found.compare(built, name, view, &seen(items, view));
             }
         }
         found.described(|item| explain_visibility(&self.items[item], &self.volume))
@@ -153,14 +142,14 @@ impl PlanesCase {
         for (i, b) in self.items.iter().enumerate() {
             let seen = self.volume.sees(b);
             let verdict = oracle.verdict(b);
-            let (expected, wrong) = if self.exact {
-                let wanted = sees_exactly(&self.volume, b);
-                ("the answer without any rounding", seen != wanted)
-            } else if seen {
-                ("no empty box", b.is_empty())
-            } else {
-                let deep = verdict != Verdict::Out && oracle.depth(b) > self.roundings(b);
-                ("nothing dropped beyond the rounding error", deep)
+            let is_deep = || verdict != Verdict::Out && oracle.depth(b) > self.roundings(b);
+            let (expected, wrong) = match (self.exact, seen) {
+                (true, _) => (
+                    "the answer without any rounding",
+                    seen != sees_exactly(&self.volume, b),
+                ),
+                (false, true) => ("no empty box", b.is_empty()),
+                (false, false) => ("nothing dropped beyond the rounding error", is_deep()),
             };
             if wrong {
                 let answer = if seen { "seen" } else { "dropped" };
@@ -179,13 +168,12 @@ impl PlanesCase {
         const TINY: f64 = f64::from_bits((1023 - 147) << 52);
         let reach = b.reach().as_dvec3();
         let planes = self.volume.planes().iter();
-        let errors = planes
-            .filter(|plane| plane.normal != Vec3::ZERO)
-            .map(|plane| {
-                let normal = plane.normal.as_dvec3();
-                let size = normal.abs().dot(reach) + f64::from(plane.d).abs();
-                (4.0 * UNIT_ROUNDOFF * size + TINY) / normal.length()
-            });
+        let errors = planes.filter(|plane| plane.normal != Vec3::ZERO);
+        let errors = errors.map(|plane| {
+            let normal = plane.normal.as_dvec3();
+            let size = normal.abs().dot(reach) + f64::from(plane.d).abs();
+            (4.0 * UNIT_ROUNDOFF * size + TINY) / normal.length()
+        });
         errors.fold(0.0, f64::max)
     }
 }
