@@ -130,9 +130,7 @@ impl<'c> Trials<'c> {
 impl Answered {
     /// Errors of a task over all judged cameras.
     pub fn errors(&self, task: usize) -> Option<ErrorCount> {
-        let mut sum = ErrorCount::default();
-        self.by_camera(task)?.iter().for_each(|own| sum += *own);
-        Some(sum)
+        Some(self.by_camera(task)?.iter().copied().sum())
     }
 
     /// Errors of a task, by judged camera.

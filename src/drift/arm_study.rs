@@ -74,15 +74,14 @@ pub struct StabilityLimit {
 }
 
 pub fn limits() -> Vec<StabilityLimit> {
-    let rows = METHODS
-        .iter()
-        .flat_map(|method| DAMPING_RATIOS.map(|zeta| (method, zeta)));
-    rows.map(|(method, zeta)| StabilityLimit {
-        method: method.name,
-        damping_ratio: zeta,
-        limit_omega_h: limit(method, zeta),
-    })
-    .collect()
+    let of = |method: &'static Method| {
+        DAMPING_RATIOS.map(|damping_ratio| StabilityLimit {
+            method: method.name,
+            damping_ratio,
+            limit_omega_h: limit(method, damping_ratio),
+        })
+    };
+    METHODS.iter().flat_map(of).collect()
 }
 
 /// Scope of the study.
@@ -156,23 +155,22 @@ pub struct ArmChoice {
 /// Every arm with every stiffness.
 pub fn settings(options: &ArmOptions) -> Vec<Setting> {
     let rate_hz = f64::from(options.rate_hz);
-    let of = |&arm: &ArmKind| {
-        let stiffnesses = options.stiffnesses.iter();
-        stiffnesses.map(move |&stiffness| Setting {
+    let mut all = Vec::new();
+    for &arm in &options.arms {
+        all.extend(options.stiffnesses.iter().map(|&stiffness| Setting {
             arm,
             stiffness,
             rate_hz,
             omega_h: stiffness.sqrt() / rate_hz,
-        })
-    };
-    options.arms.iter().flat_map(of).collect()
+        }));
+    }
+    all
 }
 
 /// Every method with every number of steps per frame.
 fn efforts() -> impl Iterator<Item = (&'static Method, u32)> {
-    METHODS
-        .iter()
-        .flat_map(|method| SUBSTEPS.map(|n| (method, n)))
+    let methods = METHODS.iter();
+    methods.flat_map(|method| SUBSTEPS.map(|n| (method, n)))
 }
 
 /// `omega h` of the steps of the reference: RK4 is then off by less than 1e-12.
@@ -223,11 +221,7 @@ pub fn errors(setting: Setting, seconds: f64) -> Vec<ArmPoint> {
 pub fn tasks(setting: Setting) -> impl Iterator<Item = TimedTask<'static>> {
     efforts().map(move |(method, substeps)| {
         let chase = Chase::new(setting.arm, setting.stiffness, setting.rate_hz, 1.0);
-        task(move || {
-            black_box(&chase).follow(method.step, substeps, |y| {
-                black_box(y);
-            });
-        })
+        task(move || black_box(&chase).follow(method.step, substeps, |y| _ = black_box(y)))
     })
 }
 

@@ -69,8 +69,8 @@ impl Matrix {
 
     /// The matrix less the identity, rounded.
     fn beyond_identity(&self) -> DMat3 {
-        let one = |i, j| Expansion::from(if i == j { 1.0 } else { 0.0 });
-        let entry = |i: usize, j: usize| (&self.0[j][i] - &one(i, j)).estimate();
+        let one = Matrix::identity();
+        let entry = |i: usize, j: usize| (&self.0[j][i] - &one.0[j][i]).estimate();
         DMat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| entry(i, j))))
     }
 }
@@ -105,12 +105,8 @@ pub fn errors(axes: DMat3, exact: &Matrix) -> [f64; 4] {
     // |n| - 1 = (|n|^2 - 1)/(|n| + 1).
     let longer = gram.z_axis.z;
     let longer = longer / ((longer + 1.0).sqrt() + 1.0);
-    [
-        largest(&gram),
-        angle(off),
-        off.z_axis.length(),
-        longer.abs(),
-    ]
+    let apart = off.z_axis.length();
+    [largest(&gram), angle(off), apart, longer.abs()]
 }
 
 /// The angle of the rotation nearest to I + E, its polar factor; NaN without one.

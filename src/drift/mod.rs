@@ -21,10 +21,9 @@ use crate::measure::{
     OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed_rounds, timed_to_end,
 };
 use crate::statistics::{Estimate, flat};
-use exact::larger;
 use frames::{QUERIES, QUERY_STEPS, STEADY, walking};
 use rated::recommended;
-use rotation::{METHODS, Method, Period, TOOLKIT};
+use rotation::{METHODS, Period, TOOLKIT};
 
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
 pub const MOST_STEPS: u64 = 1_000_000_000;
@@ -206,8 +205,8 @@ impl DriftReport {
 
 /// Errors of ways to turn after a number of steps, and their ns per step.
 ///
-/// Times are those of this process alone. The error of a basis that is lost is `None`;
-/// names without a method are left out.
+/// Times are those of this process alone, in the order of the table. The error of a basis
+/// that is lost is `None`; names without a method are left out.
 pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
     let protocol = Protocol {
         rounds: [5, 5],
@@ -217,25 +216,15 @@ pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
         seed: 1,
         cache_bytes: 0,
     };
-    let of = |name: &&str| METHODS.iter().find(|method| method.name == *name);
-    let methods: Vec<&Method> = names.iter().filter_map(of).collect();
-    let period = Period::new(steps);
-    let tasks: Vec<TimedTask> = methods.iter().map(|m| walking(m.walk)).collect();
+    let methods = METHODS.iter().filter(|method| names.contains(&method.name));
+    let tasks: Vec<TimedTask> = methods.clone().map(|m| walking(m.walk)).collect();
     let timed = timed_rounds(QUERIES, &tasks, &protocol);
-    let times = OverProcesses::of(&[ProcessTimes::of(&timed)]);
-    let row = |(task, method): (usize, &&Method)| {
-        let ns = times.ns(task).map(|ns| ns.per(QUERY_STEPS as f64).value);
-        let error = method.drift(&period).error();
-        ((!error.is_nan()).then_some(error), ns.unwrap_or(f64::NAN))
-    };
-    methods.iter().enumerate().map(row).collect()
-}
-
-impl RotationDrift {
-    /// The larger error; NaN for a basis that is lost.
-    fn error(&self) -> f64 {
-        larger(self.angle_error_rad, self.orthogonality_error)
-    }
+    let errors = methods.map(|method| method.drift(&Period::new(steps)).error());
+    let rows = errors.zip(timed).map(|(error, timed)| {
+        let ns = timed.ok().and_then(|timed| timed.ns()).unwrap_or(f64::NAN);
+        ((!error.is_nan()).then_some(error), ns / QUERY_STEPS as f64)
+    });
+    rows.collect()
 }
 
 #[cfg(test)]

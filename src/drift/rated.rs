@@ -43,10 +43,8 @@ pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Reco
     };
     let margin = fastest.first().map(|c| 1.0 - c.1 / tolerance);
     if let Some(margin) = margin.filter(|margin| *margin < SMALL_MARGIN) {
-        reason += &format!(
-            "; its error is only {:.2} % below the limit",
-            100.0 * margin
-        );
+        let percent = 100.0 * margin;
+        reason += &format!("; its error is only {percent:.2} % below the limit");
     }
     Recommendation {
         name: fastest.first().map(|c| c.0.clone()),

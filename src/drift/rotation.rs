@@ -80,6 +80,13 @@ pub struct RotationDrift {
     pub orbit_radius_error: f64,
 }
 
+impl RotationDrift {
+    /// The larger error; NaN for a basis that is lost.
+    pub(super) fn error(&self) -> f64 {
+        larger(self.angle_error_rad, self.orthogonality_error)
+    }
+}
+
 /// Error of a method after whole turns in steps of one degree.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TurnDrift {

@@ -255,6 +255,15 @@ pub struct BoxBlocks {
     count: usize,
 }
 
+impl<'b> FromIterator<&'b Aabb> for BoxBlocks {
+    fn from_iter<I: IntoIterator<Item = &'b Aabb>>(boxes: I) -> Self {
+        let boxes = boxes.into_iter();
+        let mut blocks = BoxBlocks::with_capacity(boxes.size_hint().0);
+        boxes.for_each(|b| blocks.push(b));
+        blocks
+    }
+}
+
 impl BoxBlocks {
     /// No boxes yet, and memory for `boxes` of them.
     pub fn with_capacity(boxes: usize) -> Self {

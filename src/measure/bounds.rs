@@ -66,11 +66,7 @@ fn read<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
 
 /// All non-empty boxes in blocks, as the structures store them.
 fn blocks_of(items: &[Aabb]) -> BoxBlocks {
-    let mut blocks = BoxBlocks::with_capacity(items.len());
-    for b in items.iter().filter(|b| !b.is_empty()) {
-        blocks.push(b);
-    }
-    blocks
+    items.iter().filter(|b| !b.is_empty()).collect()
 }
 
 fn memcpy<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {

@@ -38,12 +38,11 @@ pub(super) struct World {
 
 /// Direction of the street that a place is in, z up and in world coordinates.
 fn street(grid: &CityGrid, place: DVec3) -> Option<DVec3> {
-    let is_across =
-        |k: usize| (place[k] - grid.corner).rem_euclid(grid.block + grid.street) >= grid.block;
-    match (is_across(0), is_across(1)) {
-        (_, true) => Some(DVec3::X),
-        (true, false) => Some(DVec3::Y),
-        (false, false) => None,
+    let pitch = grid.block + grid.street;
+    let is_across = |k: usize| (place[k] - grid.corner).rem_euclid(pitch) >= grid.block;
+    match [is_across(0), is_across(1)] {
+        [_, true] => Some(DVec3::X),
+        [is_y, false] => is_y.then_some(DVec3::Y),
     }
 }
 
@@ -64,15 +63,12 @@ impl World {
         let (low, high) = (scene.bounds.min.as_dvec3(), scene.bounds.max.as_dvec3());
         let edges = scene.items.iter().map(longest);
         let mean = edges.sum::<f64>() / scene.items.len().max(1) as f64;
-        let apart = (high - low).length() / 1000.0;
+        let sizes = [mean, (high - low).length() / 1000.0, 1.0];
         World {
             start: scene.items.clone(),
             low,
             high,
-            mean: [mean, apart]
-                .into_iter()
-                .find(|size| *size > 0.0)
-                .unwrap_or(1.0),
+            mean: sizes.into_iter().find(|size| *size > 0.0).unwrap_or(1.0),
             up: scene.up,
             origin: scene.origin,
             city: city_grid(scene),

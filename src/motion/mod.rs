@@ -109,20 +109,19 @@ impl Motion {
             let known = MOTIONS.iter().map(|m| m.name);
             return Err(SpecError::unknown("motion", spec.name(), known).into());
         };
-        let unfit = |text: String| SpecError::new(format_args!("motion '{source}': {text}"));
+        let unfit =
+            |text: String| Err(SpecError::new(format_args!("motion '{source}': {text}")).into());
         let frames = spec.count("frames", 100, MOST_FRAMES)? as usize;
         let seed = spec.whole("seed", 1, u64::MAX)?;
         let share = spec.number("share", family.share)?;
         if !(share > 0.0 && share <= 1.0) {
-            return Err(unfit(format!("share={share}; expected above 0, at most 1")).into());
+            return unfit(format!("share={share}; expected above 0, at most 1"));
         }
         let step = spec.number_between("step", family.step, 0.0, 1e9)?;
         let same = match spec.text("same").as_deref() {
             None | Some("true") => true,
             Some("false") => false,
-            Some(other) => {
-                return Err(unfit(format!("same={other}; expected true or false")).into());
-            }
+            Some(other) => return unfit(format!("same={other}; expected true or false")),
         };
         spec.finish()?;
         let world = World::new(scene, step, seed);
@@ -131,7 +130,7 @@ impl Motion {
         let mut order: Vec<ItemId> = all.filter(|&id| law(&world, id, 1).is_some()).collect();
         if order.is_empty() {
             let found = format!("no item of '{}' can move so", scene.name);
-            return Err(unfit(format!("{found}; expected {}", laws::expected(family.name))).into());
+            return unfit(format!("{found}; expected {}", laws::expected(family.name)));
         }
         let mut rng = SeededRng::new(seed);
         for i in (1..order.len()).rev() {

@@ -147,24 +147,21 @@ fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
     let id = text.parse::<ItemId>().ok();
     id.and_then(|id| scene.item_of(id)).ok_or_else(|| {
         let found = format!("id '{}'", crate::shown::shortened(text, 60));
-        let last = items
-            .checked_sub(1)
-            .map(|last| scene.row_of(last as ItemId));
-        let most = last.map(|last| format!("0 to {last}"));
-        let ids = most.as_deref().unwrap_or("which has none");
+        let ids = match items.checked_sub(1) {
+            Some(last) => format!("0 to {}", scene.row_of(last as ItemId)),
+            None => "which has none".to_owned(),
+        };
         row.error(found, format!("an item of '{}', {ids}", scene.name))
     })
 }
 
 fn bounds(row: &Row, columns: &[usize; 8], scene: &Scene) -> Result<Aabb, InputError> {
-    if columns[2..]
-        .iter()
-        .all(|&column| row.text(column).is_empty())
-    {
+    let mut own = columns[2..].iter();
+    if own.clone().all(|&column| row.text(column).is_empty()) {
         return Ok(REMOVED);
     }
     let mut values = [0.0; 6];
-    for (value, &column) in values.iter_mut().zip(&columns[2..]) {
+    for (value, &column) in values.iter_mut().zip(&mut own) {
         *value = row.finite_number(column)?;
     }
     let [min, max] = [&values[..3], &values[3..]].map(DVec3::from_slice);

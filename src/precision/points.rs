@@ -185,7 +185,7 @@ impl<'a> Built<'a> {
         let structures = structures.map(|spec| Indexes::new(spec, scene));
         Ok(Built {
             judged: cullings().into_iter().map(judge).collect(),
-            structures: structures.collect::<Result<_, BuildError>>()?,
+            structures: structures.collect::<Result<_, _>>()?,
             queries: RegionQueries::new(scene, shots),
         })
     }
@@ -193,21 +193,16 @@ impl<'a> Built<'a> {
     /// All ways to cull, then all ways to search for a region: f32 by every structure,
     /// the other numbers by a loop.
     fn ways(&self) -> Vec<Way<'_>> {
-        let mut ways = Vec::new();
-        for indexes in &self.structures {
-            ways.extend(
-                self.judged
-                    .iter()
-                    .map(|judged| Way::Culling(indexes, judged)),
-            );
-        }
-        for indexes in &self.structures {
-            let numbers = [RegionNumbers::F32, RegionNumbers::Checked];
-            ways.extend(numbers.map(|numbers| Way::Region(Some(indexes), numbers)));
-        }
-        let scans = [RegionNumbers::F64, RegionNumbers::Exact];
-        ways.extend(scans.map(|numbers| Way::Region(None, numbers)));
-        ways
+        use RegionNumbers::{Checked, Exact, F32, F64};
+        let structures = self.structures.iter();
+        let culled = structures.clone().flat_map(|indexes| {
+            let judged = self.judged.iter();
+            judged.map(move |judged| Way::Culling(indexes, judged))
+        });
+        let searched = structures.map(Some);
+        let searched = searched.flat_map(|own| [F32, Checked].map(|n| Way::Region(own, n)));
+        let scans = [F64, Exact].map(|numbers| Way::Region(None, numbers));
+        culled.chain(searched).chain(scans).collect()
     }
 
     /// Appends the answer to the query of a camera.
@@ -231,12 +226,13 @@ impl<'a> Built<'a> {
             trial.expect(answer.iter().copied());
             if let Err(fault) = trial.ask(|out| self.answer(way, n, out)) {
                 // Not a point that misses items by its numbers: the structure is at fault.
-                let status = Some(Status::of(&fault)).filter(|status| *status != Status::Unsafe);
-                let reason = format!(
-                    "not the scan of its own planes: {}",
-                    fault.explained(|_| None)
-                );
-                return Err(Verdict::new(status.unwrap_or(Status::Wrong), reason));
+                let status = match Status::of(&fault) {
+                    Status::Unsafe => Status::Wrong,
+                    status => status,
+                };
+                let why = fault.explained(|_| None);
+                let reason = format!("not the scan of its own planes: {why}");
+                return Err(Verdict::new(status, reason));
             }
         }
         Ok(())
@@ -245,10 +241,8 @@ impl<'a> Built<'a> {
     fn tasks(&self, planned: &[PlannedTask]) -> Vec<TimedTask<'_>> {
         let ways = self.ways();
         let task = |planned: &PlannedTask| {
-            let way = ways[planned.way];
-            TimedTask::new(planned.expected.clone(), move |n, out| {
-                self.answer(way, n, out)
-            })
+            let (way, expected) = (ways[planned.way], planned.expected.clone());
+            TimedTask::new(expected, move |n, out| self.answer(way, n, out))
         };
         planned.iter().map(task).collect()
     }
@@ -279,19 +273,17 @@ pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
                 let test = judged.culling.test;
                 let memory = indexes.of(test).memory().total() as f64 / items as f64;
                 let mut point = judged.point(indexes.structure, memory);
-                let is_sound =
-                    judged.refused.is_none() && point.accepts(built.check(way, judged, items));
+                let is_made = judged.refused.is_none();
+                let is_sound = is_made && point.accepts(built.check(way, judged, items));
                 points.push(point);
                 (is_sound, &judged.answers)
             }
             Way::Region(indexes, numbers) => {
                 let judged = &region_judged[numbers as usize];
                 let mut point = judged.point(indexes.map_or("scan", |own| own.structure));
-                let found = match built.queries.agree(judged, indexes.map(Indexes::regions)) {
-                    true => Ok(()),
-                    false => Err(Verdict::new(Status::Wrong, "other regions".to_owned())),
-                };
-                let is_sound = point.accepts(found);
+                let agrees = built.queries.agree(judged, indexes.map(Indexes::regions));
+                let other = || Verdict::new(Status::Wrong, "other regions");
+                let is_sound = point.accepts(agrees.then_some(()).ok_or_else(other));
                 region_points.push(point);
                 (is_sound, &judged.answers)
             }
@@ -341,10 +333,12 @@ pub fn time(input: &PrecisionInput, plan: &PointPlan) -> Result<ProcessTimes, Bu
     let built = Built::new(input, &shots, None)?;
     let tasks = built.tasks(&plan.tasks);
     let timed = timed_to_end(&tasks, &plan.schedule, input.protocol);
-    let laps = timed.iter().map(|timed| timed.as_ref().ok());
-    let laps = laps.map(|timed| timed.map(|timed| by_camera(timed, cameras)));
+    let laps = timed.iter().map(|timed| match timed {
+        Ok(timed) => by_camera(timed, cameras),
+        Err(_) => Vec::new(),
+    });
     Ok(ProcessTimes {
-        by_camera: laps.map(Option::unwrap_or_default).collect(),
+        by_camera: laps.collect(),
         ..ProcessTimes::of(&timed)
     })
 }
@@ -352,10 +346,7 @@ pub fn time(input: &PrecisionInput, plan: &PointPlan) -> Result<ProcessTimes, Bu
 impl Prepared {
     /// The diagram from the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> Precision {
-        let Prepared {
-            mut precision,
-            plan,
-        } = self;
+        let (mut precision, plan) = (self.precision, self.plan);
         let times = OverProcesses::of(processes);
         // The twin comes last: the first task of its way is the original.
         let original = |way| plan.tasks.iter().position(|planned| planned.way == way);

@@ -188,7 +188,7 @@ impl Tally {
         self.cubes += cubes.len() as u64;
         self.visible += verdicts.iter().filter(|v| **v != Verdict::Out).count() as u64;
         let balls: Vec<Aabb> = cubes.iter().map(sphere_cube).collect();
-        let (boxes, balls) = (blocks(cubes), blocks(&balls));
+        let [boxes, balls] = [cubes, &balls].map(|own| own.iter().collect::<BoxBlocks>());
         for (test, view) in self.tests.iter_mut().zip(views) {
             let blocks = match view {
                 CameraView::Spheres(_) => &balls,
@@ -231,12 +231,6 @@ impl TestTally {
         }
         self.extra.push([extra, visible]);
     }
-}
-
-fn blocks(boxes: &[Aabb]) -> BoxBlocks {
-    let mut blocks = BoxBlocks::with_capacity(boxes.len());
-    boxes.iter().for_each(|b| blocks.push(b));
-    blocks
 }
 
 #[cfg(test)]

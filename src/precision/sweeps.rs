@@ -91,13 +91,11 @@ fn tests() -> Vec<SweptTest> {
         culling,
         has_plain_frame,
     };
+    let epsilon = 0.0;
     let bare = |arithmetic, method| {
         let culling = Culling {
             arithmetic,
-            planes: PlaneOptions {
-                method,
-                epsilon: 0.0,
-            },
+            planes: PlaneOptions { method, epsilon },
             ..Culling::default()
         };
         with(culling, false)
@@ -143,17 +141,14 @@ fn with_plain_frame(camera: &Camera) -> Result<Camera, CameraError> {
 /// cameras for each.
 pub fn sweep(sweep: Sweep, cameras: usize, seed: u64) -> Vec<SweepRow> {
     let tests = tests();
-    let mut rows = Vec::new();
-    for value in sweep.values() {
+    let at = |value| {
         let mut own: Vec<Judged> = tests.iter().map(|_| Judged::default()).collect();
         let mut rng = SeededRng::new(seed);
-        for _ in 0..cameras {
-            judge(&mut rng, sweep, value, &tests, &mut own);
-        }
+        (0..cameras).for_each(|_| judge(&mut rng, sweep, value, &tests, &mut own));
         let judged = tests.iter().zip(own);
-        rows.extend(judged.map(|(test, judged)| judged.row(sweep, value, test)));
-    }
-    rows
+        judged.map(move |(test, judged)| judged.row(sweep, value, test))
+    };
+    sweep.values().into_iter().flat_map(at).collect()
 }
 
 /// Errors of one test, by camera.
@@ -169,8 +164,7 @@ impl Judged {
             let errors = self.errors.iter().filter(|_| self.refused.is_none());
             (errors.map(|e| [count(e) as f64, e.visible as f64])).collect()
         };
-        let mut errors = ErrorCount::default();
-        self.errors.iter().for_each(|own| errors += *own);
+        let errors = self.errors.iter().copied().sum();
         SweepRow {
             sweep,
             value,

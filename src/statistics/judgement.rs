@@ -13,13 +13,11 @@ fn holm(p: &[f64], alpha: f64) -> Vec<bool> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
     let mut rejected = vec![false; p.len()];
-    for (step, &i) in order.iter().enumerate() {
-        let small_enough = p[i] <= alpha / (p.len() - step) as f64;
-        if !small_enough {
-            break;
-        }
-        rejected[i] = true;
-    }
+    let steps = order.iter().enumerate();
+    let small_enough = |(step, i): &(usize, &usize)| p[**i] <= alpha / (p.len() - step) as f64;
+    steps
+        .take_while(small_enough)
+        .for_each(|(_, &i)| rejected[i] = true);
     rejected
 }
 
@@ -222,10 +220,9 @@ fn more_pairs(
     }
     while with - without > 1 {
         let middle = without.midpoint(with);
-        if decides(middle) {
-            with = middle;
-        } else {
-            without = middle;
+        match decides(middle) {
+            true => with = middle,
+            false => without = middle,
         }
     }
     Some(with - cell.count)

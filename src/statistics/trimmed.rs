@@ -52,12 +52,11 @@ impl Trimmed {
 
     /// One-sided p of the hypothesis "the mean is at most `x`".
     pub fn p_above(&self, x: f64) -> f64 {
-        let distance = self.mean - x;
-        // No spread at all: 0 / 0 must not become a NaN.
-        if distance == 0.0 {
-            return 0.5;
+        match self.mean - x {
+            // No spread at all: 0 / 0 must not become a NaN.
+            0.0 => 0.5,
+            distance => student::upper_tail(distance / self.standard_error, self.df),
         }
-        student::upper_tail(distance / self.standard_error, self.df)
     }
 
     /// One-sided p of the hypothesis "the mean is at least `x`".
@@ -84,10 +83,7 @@ impl Trimmed {
 /// assert!((found.mean - 1.0).abs() < 0.02);
 /// ```
 pub fn trimmed_mean(values: &[f64]) -> Option<Trimmed> {
-    let centre = centre(values)?;
-    if values.len() < 3 {
-        return None;
-    }
+    let centre = centre(values).filter(|_| values.len() >= 3)?;
     Some(Trimmed::of(centre, &winsorised(values)))
 }
 
@@ -109,14 +105,11 @@ pub(super) fn centre(values: &[f64]) -> Option<f64> {
 pub(super) fn difference(old: &Trimmed, new: &Trimmed) -> Trimmed {
     let (a, b) = (old.standard_error.powi(2), new.standard_error.powi(2));
     let welch = (a + b).powi(2) / (a * a / old.df + b * b / new.df);
+    let pooled = old.df + new.df;
     Trimmed {
         mean: new.mean - old.mean,
         standard_error: (a + b).sqrt(),
-        df: if welch.is_finite() {
-            welch
-        } else {
-            old.df + new.df
-        },
+        df: if welch.is_finite() { welch } else { pooled },
         count: old.count.min(new.count),
     }
 }

@@ -45,17 +45,15 @@ pub fn judge_unpaired(
     };
     let estimates: Vec<Option<Trimmed>> = sides().map(estimate).collect();
     let names = estimates.iter().zip(structures);
-    let names: Vec<&str> = names
-        .filter_map(|(found, name)| found.map(|_| *name))
-        .collect();
+    let names = names.filter_map(|(found, name)| found.map(|_| *name));
+    let names: Vec<&str> = names.collect();
     // More processes leave the scatter of the runs as it is.
     let judged = judge_estimates(estimates, [threshold, FLOOR_OF_RUNS], |cells| {
         add_scatter_of_runs(cells, &names)
     });
-    sides()
-        .zip(judged)
-        .map(|((old, new), judged)| judged.or_else(|| without_interval(old, new)))
-        .collect()
+    let judged = sides().zip(judged);
+    let judged = judged.map(|((old, new), judged)| judged.or_else(|| without_interval(old, new)));
+    judged.collect()
 }
 
 /// Adds the scatter of the runs; the standard deviation that each cell got.
@@ -65,17 +63,11 @@ fn add_scatter_of_runs(cells: &mut [Trimmed], structures: &[&str]) -> Vec<f64> {
         of_structure.entry(structure).or_default().push(*cell);
     }
     // Relative to the others of its group a cell is expected not to move.
-    let of_all = match cells.len() >= LEAST_CELLS {
-        true => excess_variance(cells, 0.0),
-        false => 0.0,
-    };
+    let of_all = excess_variance(cells, 0.0, LEAST_CELLS);
     let added = cells.iter_mut().zip(structures).map(|(cell, structure)| {
         let own = &of_structure[structure];
         let middle = median(&own.iter().map(|cell| cell.mean).collect::<Vec<_>>());
-        let of_own = match middle.filter(|_| own.len() >= LEAST_OF_ONE) {
-            Some(middle) => excess_variance(own, middle),
-            None => 0.0,
-        };
+        let of_own = excess_variance(own, middle.unwrap_or_default(), LEAST_OF_ONE);
         let scatter = of_all.max(of_own).sqrt();
         cell.standard_error = cell.standard_error.hypot(scatter);
         scatter
@@ -84,8 +76,11 @@ fn add_scatter_of_runs(cells: &mut [Trimmed], structures: &[&str]) -> Vec<f64> {
 }
 
 /// Variance of the means about `middle` beyond their standard errors, by the median
-/// absolute deviation.
-fn excess_variance(cells: &[Trimmed], middle: f64) -> f64 {
+/// absolute deviation; none of fewer than `least` cells.
+fn excess_variance(cells: &[Trimmed], middle: f64, least: usize) -> f64 {
+    if cells.len() < least {
+        return 0.0;
+    }
     let of = |what: &dyn Fn(&Trimmed) -> f64| {
         median(&cells.iter().map(what).collect::<Vec<_>>()).unwrap_or(0.0)
     };

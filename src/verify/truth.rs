@@ -110,6 +110,14 @@ impl std::ops::AddAssign for ErrorCount {
     }
 }
 
+impl std::iter::Sum for ErrorCount {
+    fn sum<I: Iterator<Item = ErrorCount>>(all: I) -> ErrorCount {
+        let mut sum = ErrorCount::default();
+        all.for_each(|own| sum += own);
+        sum
+    }
+}
+
 impl Truth {
     /// Camera level: the camera's numbers are exact, items are boxes about
     /// `origin`. O(items), some 50 ns each. `None` if the pose makes no frame.
@@ -140,16 +148,13 @@ impl Truth {
     }
 
     fn of_judgements(oracle: Oracle, judgements: Vec<Judgement>) -> Truth {
-        let count =
-            |is_one: fn(&&Judgement) -> bool| judgements.iter().filter(is_one).count() as u64;
+        let all = judgements.iter();
+        let count = |is_one: fn(&&Judgement) -> bool| all.clone().filter(is_one).count() as u64;
         Truth {
             written: None,
             undecided: count(|judgement| judgement.undecided),
             visible: count(|judgement| judgement.verdict != Verdict::Out),
-            verdicts: judgements
-                .iter()
-                .map(|judgement| judgement.verdict)
-                .collect(),
+            verdicts: all.map(|judgement| judgement.verdict).collect(),
             oracle,
         }
     }
@@ -182,9 +187,8 @@ impl Truth {
     pub fn misses(&self, items: &[Aabb], answer: &[ItemId]) -> Vec<(ItemId, f64)> {
         let answered = self.answered(answer);
         let missed = answered.filter(|(_, verdict, returned)| *verdict == Verdict::In && !returned);
-        missed
-            .map(|(id, ..)| (id as ItemId, self.depth(id, &items[id])))
-            .collect()
+        let deep = missed.map(|(id, ..)| (id as ItemId, self.depth(id, &items[id])));
+        deep.collect()
     }
 
     /// The errors of an answer (any order, no id twice) about the very items

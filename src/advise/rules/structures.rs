@@ -145,8 +145,7 @@ pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
 const DRIFT: f64 = 2e-8;
 /// "Much less than the tolerance" is this share of it.
 const MUCH_LESS: f64 = 0.1;
-const KEPT: &str = "f32-polar-100";
-const LEFT_OUT: &str = "f32";
+const METHODS: [&str; 2] = ["f32", "f32-polar-100"];
 
 /// Correcting a camera's frame.
 ///
@@ -155,15 +154,12 @@ const LEFT_OUT: &str = "f32";
 pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
     let tolerance = trials.case.options.tolerance;
     let steps = trials.case.workload.cameras.len() as u64;
-    let rotations = rotations(&[KEPT, LEFT_OUT], steps);
-    let &[(kept, kept_ns), (left_out, left_out_ns)] = &rotations[..] else {
+    let rotations = rotations(&METHODS, steps);
+    let &[(left_out, left_out_ns), (kept, kept_ns)] = &rotations[..] else {
         return Err(not_applicable("no such method"));
     };
-    let walked = |error: Option<f64>| match error {
-        Some(error) => format!("{error:.1e}"),
-        None => "lost".to_owned(),
-    };
-    let (kept_error, left_out_error) = (walked(kept), walked(left_out));
+    let [kept_error, left_out_error] = [kept, left_out]
+        .map(|error| error.map_or("lost".to_owned(), |error| format!("{error:.1e}")));
     let compared = [steps as f64 * DRIFT, tolerance * MUCH_LESS];
     // A walk outweighs the estimate.
     let predicted = left_out.map(|error| error <= tolerance);
