@@ -27,12 +27,10 @@ pub struct JsonError {
 impl JsonError {
     /// Line, column and the path of the value.
     pub fn place(&self) -> String {
-        let JsonError {
-            line, column, path, ..
-        } = self;
-        match path.as_str() {
-            "" => format!("line {line}, column {column}"),
-            path => format!("line {line}, column {column}, {}", plain(path)),
+        let place = format!("line {}, column {}", self.line, self.column);
+        match self.path.as_str() {
+            "" => place,
+            path => format!("{place}, {}", plain(path)),
         }
     }
 
@@ -141,26 +139,22 @@ fn found(said: &str) -> String {
         Some(("floating", text)) => quoted(text.trim_start_matches("point ")),
         _ => text.to_owned(),
     };
-    for (begin, in_words) in [
-        ("invalid type: ", &value as &dyn Fn(&str) -> String),
-        ("invalid value: ", &value),
-        ("invalid length ", &|count| format!("{count} values")),
-        ("unknown variant ", &quoted),
-        ("unknown field ", &|name| {
-            format!("a field {}", quoted(name))
-        }),
-        ("missing field ", &|name| {
-            format!("no field {}", quoted(name))
-        }),
-        ("duplicate field ", &|name| {
-            format!("the field {} twice", quoted(name))
-        }),
+    for (begin, before, behind) in [
+        ("unknown variant ", "", ""),
+        ("unknown field ", "a field ", ""),
+        ("missing field ", "no field ", ""),
+        ("duplicate field ", "the field ", " twice"),
     ] {
-        if let Some(rest) = said.strip_prefix(begin) {
-            return in_words(rest);
+        if let Some(name) = said.strip_prefix(begin) {
+            return format!("{before}{}{behind}", quoted(name));
         }
     }
-    plain(said)
+    if let Some(count) = said.strip_prefix("invalid length ") {
+        return format!("{count} values");
+    }
+    let of_value = said.strip_prefix("invalid type: ");
+    let of_value = of_value.or(said.strip_prefix("invalid value: "));
+    of_value.map_or_else(|| plain(said), value)
 }
 
 fn expected(said: &str) -> String {

@@ -194,13 +194,6 @@ pub const REAL_PATHS: &[&str] = &["flythrough:frames=128", "outside:frames=64"];
 /// The way through a scene when none is named.
 pub const DEFAULT_PATH: &str = "flythrough";
 
-impl Suite {
-    /// The suite of exactly this name.
-    pub fn named(name: &str) -> Option<&'static Suite> {
-        SUITES.iter().find(|s| s.name == name)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,8 +1,9 @@
 //! `cullbench advise`: the structure, the culling test and the work to leave out
 //! for a scene and path, with the evidence. The library measures and weighs it.
 
-use super::advise_table::show;
+use super::advise_table::blocks;
 use super::args::AdviseArgs;
+use super::document::show;
 use super::processes::{Job, Message, Timing};
 use super::study::{Setting, Study};
 use super::{Ending, print, tell, text};
@@ -61,7 +62,9 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let times = study.times(step, setting.path.lens_scale, &prepared.plan)?;
     let advice = prepared.conclude(&input, &times);
     setting.note_solid(args.format);
-    print(args.format, &advice, || show(&advice, args.all_columns))?;
+    print(args.format, &advice, || {
+        show(&blocks(&advice, args.all_columns, text::width()))
+    })?;
     Ok(Ending::of(!advice.found_wrong_answers()))
 }
 

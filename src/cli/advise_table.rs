@@ -1,7 +1,6 @@
 //! Advice on a terminal: structure, policy, test, features, and the evidence.
 
-use std::io::{self, Write};
-
+use super::document::Block;
 use super::run_verdict::{gains, times};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time, time_within};
@@ -11,38 +10,34 @@ use crate::advise::{
 use crate::measure::YARDSTICK;
 use crate::statistics::Estimate;
 
-/// The advice, and before it the evidence where it is wanted.
-pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
-    let mut out = text::terminal();
-    let width = text::width();
-    let mut say = |line: &str| writeln!(out, "{}", text::wrapped(line, width));
-    say(&format!(
-        "{}: {}; {}: {}\n{}\n",
-        text::plain(&advice.scene),
-        text::counted(advice.items, "item"),
-        text::plain(&advice.path),
-        text::counted(advice.cameras, "camera"),
-        text::over(advice.processes, advice.twin.as_ref())
-    ))?;
-    for line in evidence(advice, width).iter().filter(|_| all_columns) {
-        say(line)?;
+/// The advice, and before it the evidence where it is wanted, for `width` characters.
+pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
+    let items = text::counted(advice.items, "item");
+    let cameras = text::counted(advice.cameras, "camera");
+    let mut blocks = vec![
+        Block::Line(format!(
+            "{}: {items}; {}: {cameras}",
+            advice.scene, advice.path
+        )),
+        Block::Line(text::over(advice.processes, advice.twin.as_ref())),
+    ];
+    if all_columns {
+        blocks.extend(evidence(advice));
     }
-    for row in &advice.structure.rows {
-        if let Some(reason) = &row.reason {
-            let reason = text::plain(reason);
-            say(&format!("{}: {}: {reason}", row.structure, row.status))?;
-        }
-    }
-    say(&(taken(advice) + "\n"))?;
+    blocks.push(Block::line(""));
+    let failed = advice.structure.rows.iter();
+    let failed = failed.filter_map(|row| Some((row, row.reason.as_ref()?)));
+    let failed = failed.map(|(row, why)| format!("{}: {}: {why}", row.structure, row.status));
     let threads = gains(&advice.threads).map(|gains| format!("Threads: {gains}"));
-    let changes = Some(changes(advice)).filter(|_| !advice.changes.is_empty());
-    for paragraph in [in_motion(advice), threads, changes].into_iter().flatten() {
-        say(&(paragraph + "\n"))?;
-    }
+    let more = [in_motion(advice), threads].into_iter().flatten();
+    let told = failed.chain([taken(advice)]);
+    let told = told.chain(more.flat_map(|paragraph| [String::new(), paragraph]));
+    blocks.extend(told.chain(changes(advice)).map(Block::Line));
     let rules = rule_table(advice);
-    let wrapped = rules.wrapped_last(width);
-    let rules = wrapped.unwrap_or_else(|| rules.within(width, &["gain", "cost", ""]));
-    say(rules.bare().trim_end())?;
+    blocks.push(Block::Table(match rules.wrapped_last(width) {
+        Some(_) => rules,
+        None => rules.within(width, &["gain", "cost", ""]),
+    }));
     let no = |rule: &Omission| not_for(advice, rule);
     type Holds<'h> = &'h dyn Fn(&Omission) -> bool;
     let lines: [(&str, Holds); 4] = [
@@ -55,24 +50,21 @@ pub fn show(advice: &Advice, all_columns: bool) -> io::Result<()> {
             rule.checks.iter().any(Check::is_wrong)
         }),
         (
-            "\nEstimated otherwise; the measured times decide: ",
+            "Estimated otherwise; the measured times decide: ",
             &|rule| rule.confirmed == Some(false) && !rule.is_chosen && no(rule).is_none(),
         ),
     ];
     for (what, is_in) in lines {
         let named = advice.omissions.iter().filter(|rule| is_in(rule));
         let why = |rule: &Omission| some(no(rule), |why| format!(" ({why})"));
-        let names: Vec<String> = named
-            .map(|rule| rule.rule.feature.to_owned() + &why(rule))
-            .collect();
-        if !names.is_empty() {
-            say(&(what.to_owned() + &names.join(", ")))?;
-        }
+        let names = named.map(|rule| rule.rule.feature.to_owned() + &why(rule));
+        let names = text::joined(names);
+        blocks.extend((!names.is_empty()).then(|| Block::Line(what.to_owned() + &names)));
     }
     if !all_columns {
-        say("\nevidence: --all-columns")?;
+        blocks.extend(["", "evidence: --all-columns"].map(Block::line));
     }
-    out.flush()
+    blocks
 }
 
 /// Structure and test to take, in a sentence.
@@ -140,8 +132,11 @@ fn in_motion(advice: &Advice) -> Option<String> {
 }
 
 /// From where on other structures are faster, a line per axis.
-fn changes(advice: &Advice) -> String {
-    let mut told = "Another structure is faster".to_owned();
+fn changes(advice: &Advice) -> Vec<String> {
+    if advice.changes.is_empty() {
+        return Vec::new();
+    }
+    let mut told = vec![String::new(), "Another structure is faster".to_owned()];
     for change in &advice.changes {
         let (what, show): (_, fn(f64) -> String) = match change.axis {
             Axis::Items => ("number of items", |items| {
@@ -159,14 +154,13 @@ fn changes(advice: &Advice) -> String {
                 turn.structure
             ))
         });
-        let turns: Vec<String> = turns.collect();
         let [low, high] = change.measured.map(show);
-        let turns = turns.join(", ");
-        told += &match turns.is_empty() {
-            true if low == high => format!("\n  {what}: only {low} was measured"),
-            true => format!("\n  {what}: not within {low} to {high}, which were measured"),
-            false => format!("\n  {what}: {turns}; measured from {low} to {high}"),
-        };
+        let turns = text::joined(turns);
+        told.push(match turns.is_empty() {
+            true if low == high => format!("  {what}: only {low} was measured"),
+            true => format!("  {what}: not within {low} to {high}, which were measured"),
+            false => format!("  {what}: {turns}; measured from {low} to {high}"),
+        });
     }
     told
 }
@@ -227,27 +221,29 @@ fn rule_table(advice: &Advice) -> Table {
 }
 
 /// Every structure, test and feature with its times.
-fn evidence(advice: &Advice, width: usize) -> Vec<String> {
-    let reasons = advice.omissions.iter().map(|feature| {
-        let otherwise = feature.confirmed.filter(|confirmed| !confirmed);
-        let otherwise = some(otherwise, |_| " (predicted otherwise)".to_owned());
-        let reason = format!("{}{otherwise}", feature.reason);
-        [feature.rule.feature.to_owned(), reason]
-    });
-    vec![
-        "Structures, all answers checked:".to_owned(),
-        structure_table(&advice.structure).fitted(width),
-        format!(
-            "Culling tests on {}, with {} ns to draw an item that cannot be seen:",
-            advice.test.structure, advice.options.draw_ns
-        ),
-        test_table(&advice.test).fitted(width),
-        "Features, measured with and without:".to_owned(),
-        check_table(&advice.omissions).fitted(width),
-        "The statistic decides; where both sides answer the same, the clock does if a paired test \
-         over the processes tells them apart."
-            .to_owned(),
-        text::entries(&reasons.collect::<Vec<_>>(), width),
+fn evidence(advice: &Advice) -> [Block; 8] {
+    let columns: [Column<&Omission>; 2] = [
+        ("feature", |feature| feature.rule.feature.to_owned()),
+        ("why", |feature| {
+            let is_otherwise = feature.confirmed == Some(false);
+            feature.reason.clone() + ["", " (predicted otherwise)"][usize::from(is_otherwise)]
+        }),
+    ];
+    let tests = format!(
+        "Culling tests on {}, with {} ns to draw an item that cannot be seen:",
+        advice.test.structure, advice.options.draw_ns
+    );
+    let note = "The statistic decides; where both sides answer the same, the clock does if a \
+                paired test over the processes tells them apart.";
+    [
+        Block::heading("Structures, all answers checked:"),
+        Block::Table(structure_table(&advice.structure)),
+        Block::heading(tests),
+        Block::Table(test_table(&advice.test)),
+        Block::heading("Features, measured with and without:"),
+        Block::Table(check_table(&advice.omissions)),
+        Block::line(note),
+        Block::Table(Table::with(&advice.omissions, &columns)),
     ]
 }
 

@@ -349,18 +349,18 @@ pub struct DriftArgs {
         long,
         value_name = "LIST",
         value_delimiter = ',',
-        default_value = "linear,collision",
-        value_parser = values::choice("arm", &ARMS)
+        default_value = "linear,collision"
     )]
+    #[arg(value_parser = values::choice("arm", &ARMS))]
     pub arm: Vec<ArmKind>,
     /// Stiffnesses of the spring arms, k in 1/s^2, critically damped
     #[arg(
         long,
         value_name = "LIST",
         value_delimiter = ',',
-        default_value = "1e2,1e4,1e6",
-        value_parser = values::within(0.01..=1e8)
+        default_value = "1e2,1e4,1e6"
     )]
+    #[arg(value_parser = values::within(0.01..=1e8))]
     pub stiffness: Vec<f64>,
     /// Frames per second of the spring arms
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = values::whole(1u32..=1000))]

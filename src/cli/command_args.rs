@@ -232,23 +232,13 @@ pub struct CompareArgs {
     #[command(flatten)]
     pub what: WhatArgs,
     /// Largest relative change that counts as no change, of time or work: 5% or 0.05
-    #[arg(
-        long,
-        value_name = "SHARE",
-        default_value = "5%",
-        value_parser = values::threshold,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "SHARE", default_value = "5%", value_parser = values::threshold)]
+    #[arg(allow_hyphen_values = true)]
     pub threshold: f64,
     /// Metrics to compare: query_ns, locate_ns, locate_batched_ns, build_ms, frame_ns,
     /// update_ns; may be repeated [default: query_ns, and frame_ns of motions]
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        value_parser = values::metric,
-        conflicts_with = "against"
-    )]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::metric)]
+    #[arg(conflicts_with = "against")]
     pub metric: Vec<&'static str>,
     /// Measure of a regression
     #[arg(long, value_enum, default_value = "time")]

@@ -3,7 +3,6 @@
 
 use std::io::{self, Write};
 
-use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::cell_names::{name, place, question, short_structure};
@@ -104,34 +103,18 @@ impl CompareTable<'_> {
     }
 
     fn json(&self) -> io::Result<()> {
-        #[derive(Serialize)]
-        struct Document<'c> {
-            old: &'c Value,
-            new: &'c Value,
-            verdict: &'static str,
-            gate: Gate,
-            counts: Value,
-            head: &'c str,
-            notes: &'c [String],
-            settings: &'c [Setting],
-            advice: Option<String>,
-            #[serde(flatten)]
-            changes: &'c Changes,
+        let mut document = serde_json::to_value(&self.changes)?;
+        document["old"] = self.old.json.clone();
+        document["new"] = self.new.json.clone();
+        document["verdict"] = json!(self.verdict().1);
+        document["gate"] = json!(self.args.gate);
+        for outcome in Outcome::ALL {
+            document["counts"][outcome.name()] = json!(self.changes.count(outcome));
         }
-        let changes = &self.changes;
-        let counts = Outcome::ALL.map(|o| (o.name().to_owned(), json!(changes.count(o))));
-        let document = Document {
-            old: &self.old.json,
-            new: &self.new.json,
-            verdict: self.verdict().1,
-            gate: self.args.gate,
-            counts: Value::Object(counts.into_iter().collect()),
-            head: self.head(),
-            notes: &self.notes,
-            settings: &self.settings,
-            advice: self.advice(),
-            changes,
-        };
+        document["head"] = json!(self.head());
+        document["notes"] = json!(self.notes);
+        document["settings"] = json!(self.settings);
+        document["advice"] = json!(self.advice());
         print_json(&document)
     }
 

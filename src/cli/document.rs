@@ -59,13 +59,10 @@ fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
         let number = |cell: &String| cell.trim_start_matches('*').parse::<f64>().ok();
         let most = row.iter().filter_map(number).fold(0.0, f64::max);
         let cells = row.iter().enumerate().map(|(column, cell)| {
-            let shade = match number(cell) {
-                Some(value) if is_heat => {
-                    let shade = 1.0 - (most / value).log2() / 3.0;
-                    format!(" style=\"--v:{:.2}\"", shade.clamp(0.0, 1.0))
-                }
-                _ => String::new(),
-            };
+            let shade = text::some(number(cell).filter(|_| is_heat), |value| {
+                let shade = 1.0 - (most / value).log2() / 3.0;
+                format!(" style=\"--v:{:.2}\"", shade.clamp(0.0, 1.0))
+            });
             let text = html(cell);
             match column {
                 0 => format!("<th scope=\"row\">{text}</th>"),
@@ -73,11 +70,9 @@ fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
                 _ => format!("<td>{text}</td>"),
             }
         });
-        let cells: String = cells.collect();
-        match row.first().filter(|_| of_structures) {
-            Some(name) => format!("<tr data-s=\"{}\">{cells}</tr>\n", html(name)),
-            None => format!("<tr>{cells}</tr>\n"),
-        }
+        let own = row.first().filter(|_| of_structures);
+        let own = text::some(own, |name| format!(" data-s=\"{}\"", html(name)));
+        format!("<tr{own}>{}</tr>\n", cells.collect::<String>())
     };
     format!(
         "<div class=\"t\" tabindex=\"0\"><table{}><caption>{}</caption>\n<thead><tr>{}</tr></thead>\n\

@@ -221,21 +221,15 @@ impl Look {
     /// The look of a structure by its label. Any other label than those with a look of
     /// their own has a hollow mark that its text decides.
     pub fn of(label: &str) -> Look {
-        if let Some(&(_, colour, shape)) = OWN.iter().find(|own| own.0 == label) {
-            return Look {
-                colour,
-                shape,
-                hollow: false,
-            };
-        }
         // FNV-1a.
         let hash = label.bytes().fold(0x811c_9dc5_u32, |hash, byte| {
             (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
         }) as usize;
+        let own = OWN.iter().find(|own| own.0 == label);
         Look {
-            colour: hash % GREY,
-            shape: hash / GREY % SHAPES.len(),
-            hollow: true,
+            colour: own.map_or(hash % GREY, |own| own.1),
+            shape: own.map_or(hash / GREY % SHAPES.len(), |own| own.2),
+            hollow: own.is_none(),
         }
     }
 }
@@ -325,17 +319,12 @@ pub fn picture(figures: &[Figure], columns: usize) -> String {
         y += height;
     }
     let width = width * columns.min(figures.len()).max(1) as f64;
-    let style = include_str!("assets/figure.css").to_owned();
     // Programs that are no browsers do not resolve variables.
-    let variables = [
-        ("bg", "#fff"),
-        ("fg", "#1b1d21"),
-        ("soft", "#5c636e"),
-        ("rule", "#d8dbe0"),
-    ];
-    let style = variables.iter().fold(style, |style, (name, value)| {
-        style.replace(&format!("var(--{name})"), value)
-    });
+    let style = include_str!("assets/figure.css").replace("var(--bg)", "#fff");
+    let style = style
+        .replace("var(--fg)", "#1b1d21")
+        .replace("var(--soft)", "#5c636e");
+    let style = style.replace("var(--rule)", "#d8dbe0");
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{y:.0}\" \
          viewBox=\"0 0 {width} {y:.0}\" font-family=\"sans-serif\" color=\"#1b1d21\">\n\

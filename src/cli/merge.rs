@@ -1,15 +1,14 @@
 //! `cullbench merge`: the shards of a plan become one run, with the files of one.
 
-use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::Context;
 
 use super::args::MergeArgs;
-use super::report::{show, show_written, write_page};
+use super::report::{close, show, write_page};
 use super::run_resume::same_recorded;
 use super::{Ending, expect_folder, interrupt, tell, text, unread_is_fine};
-use crate::report::{Report, Stream, merge as join, read_stream};
+use crate::report::{Stream, merge as join, read_stream};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     expect_folder("--out", Some(&args.out))?;
@@ -32,22 +31,11 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     let report = merged.stream.report();
     write_page(&report, &args.out)?;
     unread_is_fine(show(&report, false))?;
-    unread_is_fine(close(args, &report))?;
-    let failed = report.has_failed();
-    Ok(Ending::of(!failed))
-}
-
-fn close(args: &MergeArgs, report: &Report) -> io::Result<()> {
-    let mut out = text::terminal();
-    let basis = format!(
-        "{} of {}; {}",
-        text::counted(report.cells.len(), "cell"),
-        text::counted(args.runs.len(), "shard"),
-        text::conclusion(report)
-    );
-    writeln!(out, "\n{}", text::wrapped(&basis, text::width()))?;
-    show_written(&mut out, &args.out)?;
-    out.flush()
+    let cells = text::counted(report.cells.len(), "cell");
+    let shards = text::counted(args.runs.len(), "shard");
+    let basis = format!("{cells} of {shards}; {}", text::conclusion(&report));
+    unread_is_fine(close(&basis, None, &args.out))?;
+    Ok(Ending::of(!report.has_failed()))
 }
 
 /// The options but for those that say which shard, and where to.

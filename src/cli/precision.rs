@@ -89,12 +89,12 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
 /// Tables, then the conclusions.
 fn blocks(outcome: &precision_tables::Outcome, all: bool, room: usize) -> Vec<Block> {
     let mut blocks = precision_tables::blocks(outcome, all, room);
-    blocks.push(Block::Heading(2, "Conclusions:".to_owned()));
+    blocks.push(Block::heading("Conclusions:"));
     let told = precision_conclusions::conclusions(outcome).into_iter();
     blocks.extend(told.map(|sentence| Block::Line(format!("- {sentence}"))));
     if !all {
         let more = "every point, region search and sweeps: --all";
-        blocks.extend(["", more].map(|line| Block::Line(line.to_owned())));
+        blocks.extend(["", more].map(Block::line));
     }
     blocks
 }

@@ -298,11 +298,21 @@ fn about(report: &Report) -> Vec<String> {
     lines
 }
 
-/// Shows the files of a run.
-pub fn show_written(out: &mut impl Write, folder: &Path) -> io::Result<()> {
+/// Shows the basis of a run, further lines, and its files.
+pub fn close(
+    basis: &str,
+    lines: impl IntoIterator<Item = String>,
+    folder: &Path,
+) -> io::Result<()> {
+    let mut out = text::terminal();
+    writeln!(out, "\n{}", text::wrapped(basis, text::width()))?;
+    lines
+        .into_iter()
+        .try_for_each(|line| writeln!(out, "{line}"))?;
     writeln!(out, "report  {}", folder.join("report.html").display())?;
     let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg";
-    writeln!(out, "        {others}")
+    writeln!(out, "        {others}")?;
+    out.flush()
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 use super::args::RunArgs;
 use super::interrupt::Interrupted;
 use super::processes::{Ended, Job, Message, Workers};
-use super::report::{show, show_written, write_page};
+use super::report::{close, show, write_page};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{TypedOptions, create, go_on, resume};
 use super::study::progress;
@@ -285,7 +285,6 @@ impl<'a> Run<'a> {
         let failed = report.cells.iter().filter(|cell| cell.status.is_failure());
         let is_wrong = failed.clone().all(|cell| cell.status == Status::Wrong);
         let width = text::width();
-        let mut out = text::terminal();
         let basis = format!(
             "{} in {:.1} s, {} {}; {}",
             text::counted(report.cells.len(), "cell"),
@@ -294,20 +293,14 @@ impl<'a> Run<'a> {
             if is_wrong { "wrong" } else { "failed" },
             text::conclusion(report)
         );
-        writeln!(out, "\n{}", text::wrapped(&basis, width))?;
-        for warning in &report.noise.warnings {
-            let warning = format!("warning: {warning}");
-            writeln!(out, "{}", text::wrapped(&warning, width))?;
-        }
-        if let Some(line) = next(report, &self.stream.header.args, width) {
-            writeln!(out, "{line}")?;
-        }
-        show_written(&mut out, self.folder.path())?;
-        if let Some(name) = save {
+        let warnings = report.noise.warnings.iter();
+        let warnings = warnings.map(|said| text::wrapped(&format!("warning: {said}"), width));
+        let kept = save.map(|name| {
             let file = compare::baseline_file(name);
-            writeln!(out, "        {}: compare --baseline {name}", file.display())?;
-        }
-        out.flush()
+            format!("kept    {}: compare --baseline {name}", file.display())
+        });
+        let lines = warnings.chain(next(report, &self.stream.header.args, width));
+        close(&basis, lines.chain(kept), self.folder.path())
     }
 }
 
@@ -324,24 +317,20 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
         let gives = "the same for a scene of your own";
         return Some(format!("next    {program} run --scene FILE  {gives}"));
     }
-    let option = |name: &str, value: &str| {
+    let option = |(name, value, usual): (&str, &String, &str)| {
         // A value that begins with a minus needs the sign.
         let sign = if value.starts_with('-') { "=" } else { " " };
-        format!("--{name}{sign}{}", text::quoted(value))
+        (value != usual).then(|| format!("--{name}{sign}{}", text::quoted(value)))
     };
-    let mut line = format!(
-        "next    {program} advise {}",
-        option("scene", &first.scene.name)
-    );
-    let path = Some(&first.path.name).filter(|path| *path != DEFAULT_PATH);
-    let path = path.map(|path| option("path", path));
-    let motion = Some(&first.path.motion).filter(|motion| !motion.is_empty());
-    let path = path
-        .into_iter()
-        .chain(motion.map(|motion| option("motion", motion)));
+    let (scene, path) = (&first.scene.name, &first.path);
+    let mut line = format!("next    {program} advise {}", option(("scene", scene, ""))?);
+    let others = [
+        ("path", &path.name, DEFAULT_PATH),
+        ("motion", &path.motion, ""),
+    ];
     let recorded = TypedOptions::recorded(args).ok()?;
     let read = recorded.words(|name| READS.split(' ').any(|read| read == name));
-    for option in path.chain(read) {
+    for option in others.into_iter().filter_map(option).chain(read) {
         let last = line.rsplit('\n').next().unwrap_or_default();
         let is_within = last.chars().count() + option.chars().count() < width;
         // The shell joins the lines.

@@ -2,8 +2,6 @@
 //! linear scan is beaten, and how cost grows. For the end of `run` and for
 //! `report`; read off a report, nothing is measured.
 
-use std::collections::BTreeMap;
-
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::Block;
 use super::figure::{Axis, Figure, ends, is_drawn, left_out, picture};
@@ -159,7 +157,6 @@ fn of_growths(growths: &[Growth]) -> Table {
 ///
 /// One figure per class of shares that has at least two sizes; their axes are the same.
 pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
-    let mut beyond = BTreeMap::new();
     let curve = |class: f64, name: &str| -> (usize, Vec<Point>) {
         let points = surface.curve(name, class, "query_ns");
         let is_drawn = |p: &&(usize, f64)| is_drawn(p.0 as f64) && is_drawn(p.1);
@@ -187,10 +184,10 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     };
     let mut figures = Vec::new();
     for class in surface.classes() {
-        let mut series = Vec::new();
+        let (mut series, mut beyond) = (Vec::new(), 0);
         for name in surface.structures() {
             let (left_out, points) = curve(class, name);
-            *beyond.entry(class.to_bits()).or_insert(0) += left_out;
+            beyond += left_out;
             if points.len() > 1 {
                 series.push(Series::of(name, is_scan(name), points));
             }
@@ -199,7 +196,7 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
         let last = |series: &Series| series.points.last().map_or(f64::INFINITY, |p| p.at[1]);
         series.sort_by(|a, b| last(a).total_cmp(&last(b)));
         if !series.is_empty() {
-            figures.push((class, series));
+            figures.push((class, series, beyond));
         }
     }
     let points = || figures.iter().flat_map(|f| &f.1).flat_map(|s| &s.points);
@@ -209,21 +206,19 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     sizes.sort_by(f64::total_cmp);
     sizes.dedup();
     let size = |items: f64| text::count(items.round() as usize);
-    let figure = |(class, series)| {
+    let figure = |(class, series, beyond)| {
         let shown = share(class);
         let caption = format!(
             "{}: mean time per query against items, {shown} visible{}{}",
             title(surface),
             measured(surface, class),
-            left_out(beyond[&class.to_bits()])
+            left_out(beyond)
         );
         let mut x = Axis::log("items", items.iter().copied(), 1.05, &size);
         x.ticks.clone_from(&sizes);
         let y = Axis::log("", ns.iter().copied(), 1.1, &text::time);
-        (
-            shown,
-            Diagram::of(caption, [x, y], Joined::Marked, series).draw(),
-        )
+        let diagram = Diagram::of(caption, [x, y], Joined::Marked, series);
+        (shown, diagram.draw())
     };
     figures.into_iter().map(figure).collect()
 }
