@@ -231,12 +231,12 @@ impl Duel<'_> {
                 let judged: Vec<_> = timed.map(|row| row.judgement).collect();
                 if resolved(&judged, self.args.threshold) || pairs == most {
                     let mut known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
-                    let query = known.find_map(|known| known.query.as_ref());
+                    let query = known.find_map(|known| Some(&known.query.as_ref()?.schedule));
                     let head = format!(
                         "{} × {} rounds × {} cameras in {:.0} s",
                         text::counted(pairs, "pair"),
-                        query.map_or(0, |named| named.schedule.rounds),
-                        query.map_or(0, |named| named.schedule.cameras.len()),
+                        query.map_or(0, |schedule| schedule.rounds),
+                        query.map_or(0, |schedule| schedule.cameras.len()),
                         started.elapsed().as_secs_f64()
                     );
                     return Ok((changes, head));

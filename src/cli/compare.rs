@@ -140,12 +140,9 @@ const DRAWN: usize = 40;
 /// Refuses a comparison that judges nothing.
 fn expect_judged(changes: &Changes) -> anyhow::Result<()> {
     if changes.cells_in_common == 0 {
-        bail!(
-            "no cell in common: OLD has {}, NEW has {}; expected runs of the same scenes, \
-             paths, tests and structures",
-            counted(&changes.only_in_old),
-            counted(&changes.only_in_new)
-        );
+        let (old, new) = (counted(&changes.only_in_old), counted(&changes.only_in_new));
+        let expected = "expected runs of the same scenes, paths, tests and structures";
+        bail!("no cell in common: OLD has {old}, NEW has {new}; {expected}");
     }
     let cells = changes.cells_in_common;
     // A cell has a row per metric.
@@ -202,11 +199,10 @@ fn figure(changes: &Changes) -> Option<Figure> {
     let values = shown.iter().flat_map(ends);
     let mut axis = Axis::log("", values.chain(limits), 1.05, &change);
     axis.ticks = limits.to_vec();
+    let (worst, all) = (shown.len(), text::counted(changes.rows.len(), "figure"));
     let caption = format!(
-        "Change from OLD to NEW with its 95 % interval, the worst {} of {}; lines: no change, \
-         and the threshold",
-        shown.len(),
-        text::counted(changes.rows.len(), "figure")
+        "Change from OLD to NEW with its 95 % interval, the worst {worst} of {all}; lines: no \
+         change, and the threshold"
     );
     Some(rows(caption, &axis, Some(1.0), &shown))
 }

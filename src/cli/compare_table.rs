@@ -349,12 +349,11 @@ fn shift_line(shift: CommonShift) -> String {
     let interval = text::some(shift.lower.zip(shift.upper), |(lower, upper)| {
         format!(" [{}, {}]", percent(lower), percent(upper))
     });
+    let (metric, ratio) = (shift.metric, percent(shift.ratio));
+    let cells = text::counted(shift.cells, "cell");
     format!(
-        "the machine or the program as a whole: {} of NEW is {} %{interval} of OLD ({}); this \
-         comparison cannot tell which",
-        shift.metric,
-        percent(shift.ratio),
-        text::counted(shift.cells, "cell")
+        "the machine or the program as a whole: {metric} of NEW is {ratio} %{interval} of OLD \
+         ({cells}); this comparison cannot tell which"
     )
 }
 

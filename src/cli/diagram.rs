@@ -235,12 +235,10 @@ impl<'d> Diagram<'d> {
         let mut parts = String::new();
         for (n, (series, class)) in strong.enumerate() {
             let (x, y) = (25.0 * (n % 4) as f64, below + LINE * (n / 4) as f64);
-            parts += &format!(
-                "<g class=\"s {class}\">{}<text x=\"{x}%\" dx=\"10\" y=\"{:.1}\">{}</text></g>\n",
-                mark(series.look, "", [x, y], ""),
-                y + 4.0,
-                html(&shortened(&series.name, NAME))
-            );
+            let (mark, y) = (mark(series.look, "", [x, y], ""), y + 4.0);
+            let text = html(&shortened(&series.name, NAME));
+            let text = format!("<text x=\"{x}%\" dx=\"10\" y=\"{y:.1}\">{text}</text>");
+            parts += &format!("<g class=\"s {class}\">{mark}{text}</g>\n");
         }
         let lines = self.series.len().min(STRONG + 2).div_ceil(4);
         (parts, LINE * lines as f64)

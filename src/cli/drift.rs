@@ -102,12 +102,11 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
         ..3 => "times without intervals (--processes 10 gives them)",
         _ => "times with 95 % intervals",
     };
+    let (steps, rounds) = (steps(report.steps), text::counted(report.rounds, "round"));
+    let processes = text::counted(report.processes, "process");
     let mut blocks = vec![
         Block::line(format!(
-            "Camera updates after {} steps: {}, {} in each; {times}.",
-            steps(report.steps),
-            text::counted(report.processes, "process"),
-            text::counted(report.rounds, "round"),
+            "Camera updates after {steps} steps: {processes}, {rounds} in each; {times}."
         )),
         Block::heading(format!(
             "Camera bases turned by yaw {yaw}, pitch {pitch} and roll {roll} degrees per step"

@@ -93,12 +93,8 @@ impl Against<'_> {
         y.ticks.retain(|tick| *tick > self.none * 5.0);
         y.ticks.push(self.none);
         let x = Axis::log(self.axes[0], places().map(|p| p.at[0]), 1.5, self.shown);
-        let caption = format!(
-            "{}; up: {}. Large: on the line of least error{}",
-            self.caption,
-            self.axes[1],
-            left_out(beyond)
-        );
+        let (caption, error, rest) = (&self.caption, self.axes[1], left_out(beyond));
+        let caption = format!("{caption}; up: {error}. Large: on the line of least error{rest}");
         Diagram {
             front,
             levels,

@@ -304,17 +304,14 @@ pub fn picture(figures: &[Figure], columns: usize) -> String {
             }
             let caption = LINE * (lines.lines().count() + 1) as f64;
             let [left, right] = figure.margins;
+            let (x, y, width) = (x + left, y + caption, width - 24.0 - left - right);
+            let (below, own) = (&figure.legend.0, figure.height + figure.legend.1);
             parts += &format!(
-                "<svg x=\"{:.0}\" y=\"{:.0}\" width=\"{:.0}\" height=\"{:.0}\" \
-                 overflow=\"visible\">\n{}{}</svg>\n",
-                x + left,
-                y + caption,
-                width - 24.0 - left - right,
-                figure.height + figure.legend.1,
-                figure.parts,
-                figure.legend.0,
+                "<svg x=\"{x:.0}\" y=\"{y:.0}\" width=\"{width:.0}\" height=\"{own:.0}\" \
+                 overflow=\"visible\">\n{}{below}</svg>\n",
+                figure.parts
             );
-            height = height.max(caption + figure.height + figure.legend.1 + 12.0);
+            height = height.max(caption + own + 12.0);
         }
         y += height;
     }

@@ -20,23 +20,23 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
             format!("; --frames {} takes all", report.cameras),
         ],
     };
+    let (items, times) = (
+        text::counted(report.items, "item"),
+        spread(report.processes),
+    );
+    let [width, height] = report.samples;
     let mut blocks = vec![
         Block::Heading(1, format!("Funnel of {}, {}", report.scene, report.path)),
         Block::Line(format!(
-            "{}; {views} of {} x {} samples; {}; figures are means per view{more}.",
-            text::counted(report.items, "item"),
-            report.samples[0],
-            report.samples[1],
-            spread(report.processes),
+            "{items}; {views} of {width} x {height} samples; {times}; figures are means per \
+             view{more}."
         )),
     ];
     if let Some(made) = &report.cut_outs {
+        let (count, mask, tile) = (made.item_count, made.typed.mask.name(), made.typed.tile);
         blocks.push(Block::Line(format!(
-            "{} of the items are cut out by a mask ({}, tiles of {}): they hide nothing at its \
-             holes.",
-            made.item_count,
-            made.typed.mask.name(),
-            made.typed.tile
+            "{count} of the items are cut out by a mask ({mask}, tiles of {tile}): they hide \
+             nothing at its holes."
         )));
     }
     blocks.push(Block::Table(stages(report, false)));

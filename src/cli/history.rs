@@ -135,15 +135,15 @@ fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<Strin
         let differ = differ.join(", ");
         format!(" They differ in the {differ}: not all of a change is the program's own.")
     });
-    format!(
-        "From the first to the last of {}, {} of {} took longer and {} took less time (intervals \
-         apart){}{}. compare judges two runs.{note}",
+    let (runs, times) = (
         text::counted(reports.len(), "run"),
-        slower.len(),
         text::counted(compared, "time"),
-        faster.len(),
-        listed(slower),
-        listed(faster),
+    );
+    let (longer, less) = (slower.len(), faster.len());
+    let changed = listed(slower) + &listed(faster);
+    format!(
+        "From the first to the last of {runs}, {longer} of {times} took longer and {less} took \
+         less time (intervals apart){changed}. compare judges two runs.{note}"
     )
 }
 

@@ -41,20 +41,19 @@ fn of_points(p: &Precision) -> Vec<String> {
     let Some(fastest) = sound.clone().next() else {
         return vec!["No point that is safe by its margin has a time.".to_owned()];
     };
+    let extras = |point: &CullingPoint| percent(point.errors.excess);
+    let (name, time) = (named(fastest), text::time_plus_minus(fastest.time));
     let mut all = vec![format!(
-        "Fastest point that cannot miss an item: {} at {}, false positives {} %.",
-        named(fastest),
-        text::time_plus_minus(fastest.time),
-        percent(fastest.errors.excess)
+        "Fastest point that cannot miss an item: {name} at {time}, false positives {} %.",
+        extras(fastest)
     )];
     let extra = |point: &CullingPoint| point.errors.counts.map(|errors| errors.false_positives);
     let tight = sound.find(|point| extra(point) < extra(fastest));
     if let Some(tight) = tight {
+        let (times, name, extra) = (ratio(tight, fastest), named(tight), extras(tight));
+        let fewer = "Fewer false positives take";
         all.push(format!(
-            "Fewer false positives take {} times as long or more: {}, {} %.",
-            ratio(tight, fastest),
-            named(tight),
-            percent(tight.errors.excess)
+            "{fewer} {times} times as long or more: {name}, {extra} %."
         ));
     }
     let depth = |point: &CullingPoint| point.errors.worst_miss_px.unwrap_or(0.0);
@@ -83,12 +82,13 @@ fn of_storage(p: &Precision) -> Option<String> {
     let memory = |point: &&CullingPoint| point.errors.memory_bytes_per_item;
     let least = p.points.iter().filter(is_safe);
     let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
-    Some(format!(
-        "Least memory: {} at {} B/item, false positives {} %, {}.",
-        named(least),
-        text::significant(memory(&least)),
+    let (name, bytes) = (named(least), text::significant(memory(&least)));
+    let (extra, time) = (
         percent(least.errors.excess),
-        text::some(least.query_ns(), text::time)
+        text::some(least.query_ns(), text::time),
+    );
+    Some(format!(
+        "Least memory: {name} at {bytes} B/item, false positives {extra} %, {time}."
     ))
 }
 
@@ -101,14 +101,14 @@ fn of_regions(p: &Precision) -> Option<String> {
     let mut same = of("f32 + check").filter(|point| point.structure == plain.structure);
     let cost = same.next().and_then(|point| point.query_ns());
     let cost = cost.zip(plain.query_ns());
+    let (errors, rest) = (&plain.errors, &checked.errors);
+    let points = text::counted(errors.points as usize, "point");
+    let (wrong, farthest) = (percent(errors.wrong), text::significant(errors.worst_false));
+    let left = rest.false_region_count + rest.missed_region_count;
+    let times = text::significant(cost.map_or(f64::NAN, |(a, b)| a / b));
     Some(format!(
-        "Region search in f32 is wrong for {} % of {} (farthest {} outside); an exact test of the \
-         hits leaves {} wrong and takes {} times as long on {}.",
-        percent(plain.errors.wrong),
-        text::counted(plain.errors.points as usize, "point"),
-        text::significant(plain.errors.worst_false),
-        checked.errors.false_region_count + checked.errors.missed_region_count,
-        text::significant(cost.map_or(f64::NAN, |(a, b)| a / b)),
+        "Region search in f32 is wrong for {wrong} % of {points} (farthest {farthest} outside); an \
+         exact test of the hits leaves {left} wrong and takes {times} times as long on {}.",
         plain.structure
     ))
 }
@@ -119,15 +119,12 @@ fn of_sizes(rows: &[SizeRow]) -> Option<String> {
         elsewhere(found.and_then(|t| t.excess))
     };
     let (first, last) = (rows.first()?, rows.last()?);
+    let [planes, more] = [first, last].map(|row| of(row, "six-plane"));
+    let [exact, also] = [first, last].map(|row| of(row, "exact + epsilon"));
+    let [small, large] = [first, last].map(|row| row.size_over_depth);
     Some(format!(
-        "Six planes return {} % false positives where a cube's edge is {} of the frustum's depth, and {} % at {}; the exact test with \
-         epsilon {} and {} %.",
-        of(first, "six-plane"),
-        first.size_over_depth,
-        of(last, "six-plane"),
-        last.size_over_depth,
-        of(first, "exact + epsilon"),
-        of(last, "exact + epsilon")
+        "Six planes return {planes} % false positives where a cube's edge is {small} of the \
+         frustum's depth, and {more} % at {large}; the exact test with epsilon {exact} and {also} %."
     ))
 }
 
@@ -186,12 +183,9 @@ fn measured<E>(
 
 fn of(point: &CullingPoint) -> Option<Measured> {
     let (errors, missed) = (&point.errors, missed(point));
-    let note = format!(
-        "{}: {}, false positives {} %, {missed} missed",
-        named(point),
-        text::some(point.query_ns(), text::time),
-        percent(errors.excess)
-    );
+    let (name, time) = (named(point), text::some(point.query_ns(), text::time));
+    let extra = percent(errors.excess);
+    let note = format!("{name}: {time}, false positives {extra} %, {missed} missed");
     measured(point, errors.names.test, errors.excess, missed > 0, note)
 }
 

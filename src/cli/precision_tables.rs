@@ -36,15 +36,18 @@ pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
     let p = &outcome.precision;
     let visible = p.points.iter().find_map(|point| point.errors.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
-    let head = format!(
-        "{}: {}; {}: {}, {} visible in all; {}; {} in each",
-        p.scene,
-        text::counted(p.items, "item"),
-        p.path,
+    let items = text::counted(p.items, "item");
+    let (cameras, rounds) = (
         text::counted(p.cameras, "camera"),
+        text::counted(p.rounds, "round"),
+    );
+    let (visible, over) = (
         text::count(visible as usize),
         text::over(p.processes, p.twin.as_ref()),
-        text::counted(p.rounds, "round")
+    );
+    let head = format!(
+        "{}: {items}; {}: {cameras}, {visible} visible in all; {over}; {rounds} in each",
+        p.scene, p.path
     );
     let mut blocks = vec![Block::Line(head)];
     let mut add = |title: &str, table: Table, note: &str| {
@@ -251,11 +254,11 @@ fn sizes_table(rows: &[SizeRow]) -> Table {
 /// Basis of the table.
 fn sizes_note(rows: &[SizeRow]) -> String {
     let first = &rows[0];
+    let frusta = text::count(first.frusta);
+    let cubes = text::counted(first.cubes as usize, "cube");
     format!(
-        "Field of view 60 degrees, 16:9; {} frusta and {} for each ratio; ± bounds the result of another seed (99.999 %), from \
-         the spread over the frusta.",
-        text::count(first.frusta),
-        text::counted(first.cubes as usize, "cube"),
+        "Field of view 60 degrees, 16:9; {frusta} frusta and {cubes} for each ratio; ± bounds the \
+         result of another seed (99.999 %), from the spread over the frusta."
     )
 }
 

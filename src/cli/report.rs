@@ -270,26 +270,24 @@ fn about(report: &Report) -> Vec<String> {
     let unfinished = ["", "; not finished"][usize::from(run.finished_at.is_none())];
     let is_dirty = report.source.dirty == Some(true);
     let dirty = ["", " with a dirty working tree"][usize::from(is_dirty)];
+    let (cpu, kernel) = (known(&machine.cpu), known(&machine.kernel));
+    let (cores, isa) = (
+        text::counted(machine.cores, "core"),
+        &machine.instruction_set,
+    );
+    let (built, commit) = (&report.toolchain, known(&report.source.commit));
+    let (rustc, profile) = (known(&built.rustc), known(&built.profile));
+    let (flags, features) = (&built.flags, built.features.join(","));
     let mut lines = vec![
         format!(
             "{}, suite: {suite}, seed {}{unfinished}.",
             run.started_at, run.seed
         ),
         format!("Command: {}", run.command),
+        format!("Machine: {cpu}, {cores}, kernel {kernel}, instruction set {isa}."),
         format!(
-            "Machine: {}, {}, kernel {}, instruction set {}.",
-            known(&machine.cpu),
-            text::counted(machine.cores, "core"),
-            known(&machine.kernel),
-            machine.instruction_set
-        ),
-        format!(
-            "Built with {}, profile {}, flags '{}', features '{}'; source {}{dirty}.",
-            known(&report.toolchain.rustc),
-            known(&report.toolchain.profile),
-            report.toolchain.flags,
-            report.toolchain.features.join(","),
-            known(&report.source.commit)
+            "Built with {rustc}, profile {profile}, flags '{flags}', features '{features}'; source \
+             {commit}{dirty}."
         ),
         format!("{}.", text::conclusion(report)),
     ];

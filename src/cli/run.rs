@@ -285,14 +285,11 @@ impl<'a> Run<'a> {
         let failed = report.cells.iter().filter(|cell| cell.status.is_failure());
         let is_wrong = failed.clone().all(|cell| cell.status == Status::Wrong);
         let width = text::width();
-        let basis = format!(
-            "{} in {:.1} s, {} {}; {}",
-            text::counted(report.cells.len(), "cell"),
-            self.started.elapsed().as_secs_f64(),
-            failed.count(),
-            if is_wrong { "wrong" } else { "failed" },
-            text::conclusion(report)
-        );
+        let cells = text::counted(report.cells.len(), "cell");
+        let (failed, seconds) = (failed.count(), self.started.elapsed().as_secs_f64());
+        let how = ["failed", "wrong"][usize::from(is_wrong)];
+        let basis = text::conclusion(report);
+        let basis = format!("{cells} in {seconds:.1} s, {failed} {how}; {basis}");
         let warnings = report.noise.warnings.iter();
         let warnings = warnings.map(|said| text::wrapped(&format!("warning: {said}"), width));
         let kept = save.map(|name| {

@@ -45,14 +45,10 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
             inner: None,
             label: format!("{name} {}", times(*ratio)),
             note: format!(
-                "{name}: {}, {}",
+                "{name}: {}, {}{}",
                 text::some(time, |ns| text::time_within(ns.estimate())),
-                text::some(*ends, |[low, high]| format!(
-                    "{} [{}, {}]",
-                    times(*ratio),
-                    text::significant(low),
-                    text::significant(high)
-                ))
+                times(*ratio),
+                text::some(*ends, |ends| text::interval(ends.map(Some), 1.0))
             ),
             data: format!(
                 " data-rank=\"{}\" data-speedup=\"{ratio}\" data-query-ns=\"{}\"",
@@ -106,18 +102,15 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         if readings.len() >= LEAST_READINGS[1] {
             let mut ns: Vec<f64> = readings.iter().map(|r| r.ns).collect();
             ns.sort_by(f64::total_cmp);
-            let [low, first, median, third, high] =
+            let quantiles =
                 [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| quantile(&ns, share).unwrap_or(ns[0]));
+            let ([low, first, median, third, high], told) = (quantiles, quantiles.map(text::time));
             let name = cell.structure.clone();
             spread.push(Row {
-                label: format!("{name} {}", text::time(median)),
+                label: format!("{name} {}", told[2]),
                 note: format!(
                     "{name}: median {}, half of the views {} to {}, nine tenths {} to {}",
-                    text::time(median),
-                    text::time(first),
-                    text::time(third),
-                    text::time(low),
-                    text::time(high)
+                    told[2], told[1], told[3], told[0], told[4]
                 ),
                 name,
                 is_scan: cell.is_scan(),

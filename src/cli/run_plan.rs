@@ -247,12 +247,11 @@ pub fn same_digest(
         return Ok(());
     };
     let now = now();
-    anyhow::ensure!(
+    let (was, is) = (short(&before), short(&now));
+    ensure!(
         before == now,
-        "{what} '{name}' has changed since the run was begun: its digest was {} and is {}; \
-         expected the same: begin a new run",
-        short(&before),
-        short(&now)
+        "{what} '{name}' has changed since the run was begun: its digest was {was} and is {is}; \
+         expected the same: begin a new run"
     );
     Ok(())
 }

@@ -151,11 +151,10 @@ pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
     let (one, other) = (TypedOptions::recorded(one)?, TypedOptions::recorded(other)?);
     for (id, name, _) in &one.all {
         let is_free = id == "shard" || NOT_OF_THE_PLAN.contains(&id.as_str());
+        let (first, this) = (one.told(id), other.told(id));
         ensure!(
-            is_free || one.values(id) == other.values(id),
-            "was begun {} for --{name}, and the first shard {}; expected the same options",
-            other.told(id),
-            one.told(id)
+            is_free || first == this,
+            "was begun {this} for --{name}, and the first shard {first}; expected the same options"
         );
     }
     Ok(())

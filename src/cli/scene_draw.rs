@@ -66,15 +66,12 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
         None => None,
         Some(source) => {
             let path = path::load(source, &scene, &defaults)?;
-            let Some(camera) = path.cameras.get(args.frame) else {
-                anyhow::bail!(
-                    "--frame is {}; expected 0 to {}, the cameras of {}",
-                    args.frame,
-                    path.cameras.len().saturating_sub(1),
-                    path.name
-                );
+            let (frame, last) = (args.frame, path.cameras.len().saturating_sub(1));
+            let Some(camera) = path.cameras.get(frame) else {
+                let cameras = format!("0 to {last}, the cameras of {}", path.name);
+                anyhow::bail!("--frame is {frame}; expected {cameras}");
             };
-            caption.push(format!("camera {} of {}", args.frame, path.name));
+            caption.push(format!("camera {frame} of {}", path.name));
             Some(*camera)
         }
     };

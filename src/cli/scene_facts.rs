@@ -134,14 +134,14 @@ impl SceneFacts {
         if count == 0 {
             return vec![extent, ("sizes", "no items".to_owned())];
         }
-        let size = |of: Option<f64>| text::some(of, length);
-        let sizes = format!(
-            "longest edge min {}, median {}, p99 {}, max {}",
-            size(self.size_min),
-            size(self.size_median),
-            size(self.size_p99),
-            size(self.size_max)
-        );
+        let sizes = [
+            self.size_min,
+            self.size_median,
+            self.size_p99,
+            self.size_max,
+        ];
+        let [least, median, p99, most] = sizes.map(|size| text::some(size, length));
+        let sizes = format!("longest edge min {least}, median {median}, p99 {p99}, max {most}");
         let axes = ["x", "y", "z"].into_iter().zip(self.flat_counts);
         let flat = axes.filter(|(_, flat)| *flat > 0).map(|(axis, flat)| {
             let share = text::percent(flat as f64 / count as f64);
@@ -290,16 +290,13 @@ pub fn default_lens(defaults: &LensDefaults) -> String {
 
 /// "column-gl, depth -1 to 1; the first: eye (..), right (..), .."
 pub fn matrices(facts: &MatrixFacts) -> String {
-    let point = |v: [f64; 3]| format!("({})", v.map(figure).join(", "));
-    let [near, far] = facts.depth;
+    let vectors = [facts.eye, facts.right, facts.up, facts.forward];
+    let [eye, right, up, forward] = vectors.map(|v| format!("({})", v.map(figure).join(", ")));
+    let ([near, far], convention) = (facts.depth, &facts.convention);
     let mirrored = if facts.is_mirrored { ", mirrored" } else { "" };
     format!(
-        "{}, depth {near} to {far}{mirrored}; the first: eye {}, right {}, up {}, forward {}",
-        facts.convention,
-        point(facts.eye),
-        point(facts.right),
-        point(facts.up),
-        point(facts.forward)
+        "{convention}, depth {near} to {far}{mirrored}; the first: eye {eye}, right {right}, up \
+         {up}, forward {forward}"
     )
 }
 

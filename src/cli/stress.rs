@@ -187,18 +187,14 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     writeln!(out, "{}", Table::with(sections, columns).fitted(width))?;
     let rows = || sections.iter().flat_map(|section| &section.rows);
     for row in rows().filter(|row| row.status == Status::Fail) {
+        let (id, level) = (text::plain(&row.id), row.level.name());
+        let by = text::some(row.kernel, |kernel| format!(" by {kernel}"));
         writeln!(
             out,
-            "{}, {} level, {}, {}{}{}:\n  expected {}\n  got {}",
-            text::plain(&row.id),
-            row.level.name(),
-            row.structure,
-            row.test,
-            row.kernel.map_or("", |_| " by "),
-            row.kernel.unwrap_or_default(),
-            row.expected,
-            row.got
+            "{id}, {level} level, {}, {}{by}:",
+            row.structure, row.test
         )?;
+        writeln!(out, "  expected {}\n  got {}", row.expected, row.got)?;
     }
     let mut tally = Tally::default();
     sections.iter().for_each(|section| tally += section.tally);
@@ -218,13 +214,12 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         );
         writeln!(out, "{}\n", text::wrapped(&line, width))?;
     }
-    let count = |status| rows().filter(|row| row.status == status).count();
+    let count = |status| text::count(rows().filter(|row| row.status == status).count());
+    let [passed, refused, failed] = [Status::Pass, Status::Refused, Status::Fail].map(count);
+    let checks = text::counted(rows().count(), "check");
     let line = format!(
-        "{} in {seconds:.1} s: {} passed, {} refused as they must be, {} failed{note}",
-        text::counted(rows().count(), "check"),
-        text::count(count(Status::Pass)),
-        text::count(count(Status::Refused)),
-        text::count(count(Status::Fail)),
+        "{checks} in {seconds:.1} s: {passed} passed, {refused} refused as they must be, {failed} \
+         failed{note}"
     );
     writeln!(out, "{}", text::wrapped(&line, width))
 }

@@ -207,11 +207,9 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     sizes.dedup();
     let size = |items: f64| text::count(items.round() as usize);
     let figure = |(class, series, beyond)| {
-        let shown = share(class);
+        let (shown, title, measured) = (share(class), title(surface), measured(surface, class));
         let caption = format!(
-            "{}: mean time per query against items, {shown} visible{}{}",
-            title(surface),
-            measured(surface, class),
+            "{title}: mean time per query against items, {shown} visible{measured}{}",
             left_out(beyond)
         );
         let mut x = Axis::log("items", items.iter().copied(), 1.05, &size);

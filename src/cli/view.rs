@@ -40,12 +40,11 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
     let scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
     let items = scene.items.len();
+    let (found, most) = (text::count(items), text::count(MOST_ITEMS));
     ensure!(
         items <= MOST_ITEMS,
-        "{}: {} items; expected at most {} to draw",
-        scene.name,
-        text::count(items),
-        text::count(MOST_ITEMS)
+        "{}: {found} items; expected at most {most} to draw",
+        scene.name
     );
     let cameras = path::load(&args.path, &scene, &defaults)?;
     let (all, most) = (cameras.cameras.len(), args.frames);
@@ -189,14 +188,13 @@ fn conclusion(data: &ViewData, totals: [usize; FATES], agree: bool) -> String {
             format!("The {count} structures disagree; the sets are the first one's.")
         }
     };
-    format!(
-        "{} of {}: {} of {} returned per view, {}. {structures}",
+    let (parts, returned) = (parts.join(", "), mean(returned));
+    let (views, items) = (
         text::counted(views, "view"),
-        data.path,
-        mean(returned),
         text::counted(data.items, "item"),
-        parts.join(", "),
-    )
+    );
+    let path = &data.path;
+    format!("{views} of {path}: {returned} of {items} returned per view, {parts}. {structures}")
 }
 
 /// Digits of packed numbers, safe in JSON and HTML.
