@@ -153,14 +153,9 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 /// Whole numbers in groups of three.
 pub fn count(value: usize) -> String {
     let digits = value.to_string();
-    let mut grouped = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            grouped.push(',');
-        }
-        grouped.push(digit);
-    }
-    grouped
+    let groups = digits.as_bytes().rchunks(3).rev();
+    let groups = groups.map(|group| str::from_utf8(group).unwrap_or_default());
+    groups.collect::<Vec<_>>().join(",")
 }
 
 /// All digits of a number, with an exponent if it is longer than any count.

@@ -97,17 +97,14 @@ impl Spec {
         let end = text[begun..].find(':').map_or(text.len(), |at| begun + at);
         let (name, rest) = (&text[..end], text.get(end + 1..).unwrap_or_default());
         let mut given = BTreeMap::new();
+        let bad = |found: String| SpecError(format!("in '{text}': {found}"));
         for pair in rest.split(',').filter(|p| !p.trim().is_empty()) {
             let Some((key, value)) = pair.split_once('=') else {
-                return Err(SpecError(format!(
-                    "in '{text}': '{pair}'; expected key=value"
-                )));
+                return Err(bad(format!("'{pair}'; expected key=value")));
             };
             let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
             if given.insert(key.clone(), value).is_some() {
-                return Err(SpecError(format!(
-                    "in '{text}': '{key}' is given twice; expected it once"
-                )));
+                return Err(bad(format!("'{key}' is given twice; expected it once")));
             }
         }
         Ok(Spec {

@@ -25,10 +25,10 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let (setting, all) = setting(registry, args, None)?;
     let input = input(args, &setting, &options);
     if setting.path.cameras.len() < all {
+        let (used, all) = (setting.path.cameras.len(), text::counted(all, "camera"));
+        let used = text::count(used);
         tell(&format!(
-            "note: the rules look at {} of {}, evenly spread",
-            text::count(setting.path.cameras.len()),
-            text::counted(all, "camera")
+            "note: the rules look at {used} of {all}, evenly spread"
         ));
     }
     input.check()?;

@@ -10,7 +10,7 @@ use crate::advise::{
 use crate::measure::YARDSTICK;
 use crate::statistics::Estimate;
 
-/// The advice, and before it the evidence where it is wanted, for `width` characters.
+/// The advice, with the evidence if it is wanted, for `width` characters.
 pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
     let items = text::counted(advice.items, "item");
     let cameras = text::counted(advice.cameras, "camera");
@@ -265,9 +265,7 @@ fn structure_table(choice: &StructureChoice) -> Table {
         (">query [95 % interval]", |r| some(r.query_ns, time_within)),
         (">speed-up", |r| some(r.speedup, significant)),
         (">build", |r| some(r.build_ms, |ms| time(ms * 1e6))),
-        (">B/item", |r| {
-            some(r.memory_bytes_per_item, |bytes| format!("{bytes:.1}"))
-        }),
+        (">B/item", |r| some(r.memory_bytes_per_item, text::tenths)),
         (">break-even queries", |r| {
             some(r.break_even_queries, |n| text::count(n as usize))
         }),

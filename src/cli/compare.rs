@@ -2,7 +2,6 @@
 //! report.json and measures nothing; the verdicts come from `report`, the table
 //! from `compare_table`.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -114,13 +113,19 @@ fn processes(report: &Report) -> String {
 
 fn side(report: &Report) -> Side {
     let (run, source) = (&report.run, &report.source);
-    let commit = match &source.commit {
-        Some(commit) => format!("commit {}", commit.chars().take(12).collect::<String>()),
-        None => "commit unknown".to_owned(),
-    };
+    let commit: String = source
+        .commit
+        .as_deref()
+        .unwrap_or("unknown")
+        .chars()
+        .take(12)
+        .collect();
     let cells = text::counted(report.cells.len(), "cell");
     Side {
-        line: format!("{}, version {}, {commit}, {cells}", run.id, source.version),
+        line: format!(
+            "{}, version {}, commit {commit}, {cells}",
+            run.id, source.version
+        ),
         json: json!({
             "id": run.id,
             "started_at": run.started_at,
@@ -195,8 +200,7 @@ fn figure(changes: &Changes) -> Option<Figure> {
     let change = |ratio: f64| format!("{:+.0} %", (ratio - 1.0) * 100.0);
     let most = 1.0 + changes.threshold;
     let limits = [1.0 / most, 1.0, most];
-    let ends = |row: &Row| row.ends.unwrap_or([row.value; 2]);
-    let values = shown.iter().flat_map(ends);
+    let values = shown.iter().flat_map(Row::range);
     let mut axis = Axis::log("", values.chain(limits), 1.05, &change);
     axis.ticks = limits.to_vec();
     let (worst, all) = (shown.len(), text::counted(changes.rows.len(), "figure"));
@@ -227,13 +231,13 @@ pub fn save_baseline(name: &str, report: &Report) -> anyhow::Result<()> {
 /// The run is the newest of the others under results/ if none is named.
 fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]> {
     let file = baseline_file(name);
+    let expected = match names(BASELINES).as_slice() {
+        [] => "expected one that `run --save NAME` kept".to_owned(),
+        known => format!("available: {}", known.join(", ")),
+    };
     ensure!(
         file.is_file(),
-        "no baseline '{name}' in {BASELINES}; {}",
-        match names(BASELINES).as_slice() {
-            [] => "expected one that `run --save NAME` kept".to_owned(),
-            known => format!("available: {}", known.join(", ")),
-        }
+        "no baseline '{name}' in {BASELINES}; {expected}"
     );
     if let Some(new) = new {
         return Ok([file, new]);
@@ -254,6 +258,7 @@ fn names(folder: &str) -> Vec<String> {
     let listing = fs::read_dir(folder).into_iter().flatten().flatten();
     let names = listing.filter_map(|entry| entry.file_name().into_string().ok());
     let names = names.filter_map(|name| Some(name.strip_suffix(".json")?.to_owned()));
-    let names: BTreeSet<String> = names.collect();
-    names.into_iter().collect()
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
 }

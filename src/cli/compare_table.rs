@@ -128,14 +128,11 @@ impl CompareTable<'_> {
     /// The document for Markdown, or with a table for a terminal of some `room`.
     pub fn blocks(&self, all: bool, room: Option<usize>) -> Vec<Block> {
         let changes = &self.changes;
+        let (head, threshold) = (self.head(), text::percent(changes.threshold));
         let mut lines = vec![
             format!("OLD  {}", self.old.line),
             format!("NEW  {}", self.new.line),
-            format!(
-                "{}, threshold {}",
-                self.head(),
-                text::percent(changes.threshold)
-            ),
+            format!("{head}, threshold {threshold}"),
         ];
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
         lines.extend(changes.common_shift.map(shift_line));
@@ -365,15 +362,10 @@ fn work_line(work: &WorkChange) -> String {
         _ => [work.old, work.new],
     };
     let [old, new] = shown.map(number);
-    let much = match work.old != 0.0 {
-        true => format!(" ({})", change_of(work.new / work.old, None)),
-        false => String::new(),
-    };
-    format!(
-        "work changed: {}: {} {old} to {new}{much}",
-        name(&work.cell),
-        work.counter
-    )
+    let ratio = Some(work.new / work.old).filter(|_| work.old != 0.0);
+    let much = text::some(ratio, |ratio| format!(" ({})", change_of(ratio, None)));
+    let (name, counter) = (name(&work.cell), work.counter);
+    format!("work changed: {name}: {counter} {old} to {new}{much}")
 }
 
 /// Why a row is what it is, where the figures do not say it.

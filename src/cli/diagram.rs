@@ -277,6 +277,13 @@ pub struct Row {
     pub is_tied: bool,
 }
 
+impl Row {
+    /// The interval, or the value alone.
+    pub fn range(&self) -> [f64; 2] {
+        self.ends.unwrap_or([self.value; 2])
+    }
+}
+
 /// Rows from above to below over one axis with the line at `one`.
 pub fn rows(caption: String, axis: &Axis, one: Option<f64>, rows: &[Row]) -> Figure {
     let bottom = LINE * 1.5 * rows.len() as f64 + 8.0;

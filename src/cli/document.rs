@@ -36,10 +36,8 @@ fn markdown_table(table: &Table) -> String {
         let cells: Vec<String> = cells.iter().map(|cell| markdown(cell)).collect();
         format!("| {} |\n", cells.join(" | "))
     };
-    let rule = (0..table.header.len()).map(|column| match table.right.contains(&column) {
-        true => "---:|",
-        false => "---|",
-    });
+    let is_right = |column| usize::from(table.right.contains(&column));
+    let rule = (0..table.header.len()).map(|column| ["---|", "---:|"][is_right(column)]);
     let rule = format!("|{}\n", rule.collect::<String>());
     line(&table.header) + &rule + &table.rows.iter().map(line).collect::<String>()
 }

@@ -140,10 +140,8 @@ fn rotations(report: &DriftReport) -> Vec<Block> {
     let figures: [Errors; 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
         ("angular error in rad after", |d| d.angle_error_rad),
-        ("position error on an orbit after", |d| {
-            d.orbit_position_error
-        }),
-        ("radius error of an orbit after", |d| d.orbit_radius_error),
+        ("orbit position error after", |d| d.orbit_position_error),
+        ("orbit radius error after", |d| d.orbit_radius_error),
     ];
     let grid = |(title, error): Errors| {
         let drifts = report.rotation.iter();

@@ -95,11 +95,10 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
 /// Amount of work.
 fn work(input: &FunnelInput) -> String {
     let SampleGrid { width, height } = input.samples;
-    format!(
-        "{}, {} of {width}x{height} samples",
-        text::counted(input.scene.items.len(), "item"),
-        text::counted(input.most_views.min(input.path.cameras.len()), "view"),
-    )
+    let items = text::counted(input.scene.items.len(), "item");
+    let views = input.most_views.min(input.path.cameras.len());
+    let views = text::counted(views, "view");
+    format!("{items}, {views} of {width}x{height} samples")
 }
 
 /// Returns true if nothing visible is lost and nothing exact wrong.
@@ -307,14 +306,10 @@ fn cell(value: Option<&Value>) -> String {
 
 /// Items that each stage of the chain passes.
 fn passed(report: &FunnelReport) -> Figure {
-    let count = |mean: f64| match mean.fract() == 0.0 || mean >= 1000.0 {
-        true => text::count(mean.round() as usize),
-        false => text::significant(mean),
-    };
     let row = |name: &str, value: f64, unit: &str, note: String| Row {
         name: name.to_owned(),
         value,
-        label: format!("{name} {} {unit}", count(value)),
+        label: format!("{name} {} {unit}", funnel_table::count(value)),
         note,
         ..Row::default()
     };
@@ -323,12 +318,17 @@ fn passed(report: &FunnelReport) -> Figure {
     let stages = chosen.filter(|row| row.back_end.name != NONE).map(|stage| {
         let (name, errors) = (stage.back_end.stage.name(), &stage.errors);
         let by = stage.structure.as_deref().unwrap_or(stage.back_end.name);
-        let given = count(errors.input_count);
+        let given = funnel_table::count(errors.input_count);
         let note = format!("{name} by {by}: of {given} {}", stage.unit);
         row(name, errors.output_count, stage.unit, note)
     });
     let stages: Vec<Row> = [all].into_iter().chain(stages).collect();
-    let axis = Axis::log("", stages.iter().map(|row| row.value), 3.0, &count);
+    let axis = Axis::log(
+        "",
+        stages.iter().map(|row| row.value),
+        3.0,
+        &funnel_table::count,
+    );
     let caption = format!(
         "{}, {}: what each stage leaves per view (logarithmic)",
         report.scene, report.path

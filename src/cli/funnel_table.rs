@@ -50,9 +50,8 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     });
     let both = |row: &&StageRow| row.is_chosen && row.back_end.does_object_stage;
     if let Some(row) = report.stages.iter().find(both) {
-        let name = row.back_end.name;
-        let line =
-            format!("{name} searches a tree of its own: its time includes the object stage.");
+        let what = "searches a tree of its own: its time includes the object stage.";
+        let line = format!("{} {what}", row.back_end.name);
         blocks.extend([Block::line(""), Block::Line(line)]);
     }
     if all {
@@ -201,13 +200,13 @@ fn occluders(report: &FunnelReport) -> Table {
         add(place, row.box_count, row.volume_share, row.build_ns);
     }
     if let Some(row) = &report.solid_blocks {
-        let unclosed = match row.unclosed_sector_count {
-            0 => String::new(),
-            count => format!(
+        let unclosed = Some(row.unclosed_sector_count).filter(|count| *count > 0);
+        let unclosed = some(unclosed, |count| {
+            format!(
                 ": {} not closed or contradicting",
                 text::counted(count, "sector")
-            ),
-        };
+            )
+        });
         let place = format!("solid between the rooms of the map{unclosed}");
         add(place, row.box_count, None, row.build_ns);
     }
@@ -227,14 +226,11 @@ pub fn spread(processes: usize) -> String {
 
 /// Mark of an unproven back end.
 pub fn doubt(guarantee: Guarantee) -> &'static str {
-    match guarantee {
-        Guarantee::Unproven => "?",
-        _ => "",
-    }
+    ["", "?"][usize::from(guarantee == Guarantee::Unproven)]
 }
 
 /// A mean of counts.
-fn count(mean: f64) -> String {
+pub fn count(mean: f64) -> String {
     match mean {
         mean if mean >= 100.0 || mean.fract() == 0.0 => text::count(mean.round() as usize),
         mean => text::significant(mean),
@@ -254,12 +250,9 @@ fn fragment_table<'c>(tests: impl Iterator<Item = (&'c str, &'c FragmentCounts)>
 
 /// The reflected scene on the samples of a mirror, and on all.
 fn mirror(report: &FunnelReport) -> Table {
-    fragment_table(report.mirror.iter().flat_map(|mirror| {
-        [
-            ("z-test", &mirror.without_stencil),
-            ("stencil-test", &mirror.with_stencil),
-        ]
-    }))
+    let mirror = report.mirror.iter();
+    let without = mirror.clone().map(|row| ("z-test", &row.without_stencil));
+    fragment_table(without.chain(mirror.map(|row| ("stencil-test", &row.with_stencil))))
 }
 
 /// The tests of the fragment stage, if there are several to compare.

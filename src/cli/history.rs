@@ -14,13 +14,12 @@ const COMMIT: usize = 7;
 
 /// Commit, or the day of a run without one.
 fn name(report: &Report) -> String {
-    let (commit, at) = (&report.source.commit, &report.run.started_at);
-    let whole: String = match commit {
-        Some(commit) => commit.chars().take(COMMIT).collect(),
-        None => at.chars().take(10).collect(),
+    let (name, digits) = match &report.source.commit {
+        Some(commit) => (commit, COMMIT),
+        None => (&report.run.started_at, 10),
     };
-    let dirty = report.source.dirty == Some(true);
-    format!("{whole}{}", if dirty { "+" } else { "" })
+    let dirty = ["", "+"][usize::from(report.source.dirty == Some(true))];
+    name.chars().take(digits).collect::<String>() + dirty
 }
 
 /// The page; runs are sorted by their start.
@@ -76,11 +75,9 @@ pub fn page(mut reports: Vec<Report>) -> String {
             let point = |&(run, time): &(usize, &Metric)| Point {
                 at: [run as f64, time.value],
                 ends: ends(time.estimate()),
-                note: format!(
-                    "{structure}, {}: {}",
-                    name(&reports[run]),
-                    text::time_with(time)
-                ),
+                note: text::joined([structure, &name(&reports[run])])
+                    + ": "
+                    + &text::time_with(time),
                 ..Point::default()
             };
             let is_scan = cells.iter().any(|(_, cell)| cell.is_scan());

@@ -21,10 +21,8 @@ use crate::suite::SUITES;
 const COLUMNS: [&str; 6] = ["kind", "origin", "capabilities", "timed", "params", "unit"];
 
 pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
-    let topics = match args.topic {
-        Some(topic) => vec![topic],
-        None => ListTopic::value_variants().to_vec(),
-    };
+    let topics = ListTopic::value_variants().to_vec();
+    let topics = args.topic.map_or(topics, |topic| vec![topic]);
     let mut out = io::stdout().lock();
     let mut all = Map::new();
     for topic in topics {
@@ -50,11 +48,8 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     }
     if args.format == TableFormat::Json {
         // One topic is a plain array, all of them an object.
-        let value = match args.topic {
-            Some(_) => all.into_iter().next().map(|(_, v)| v).unwrap_or_default(),
-            None => Value::Object(all),
-        };
-        print_json(&value)?;
+        let one = all.values().next().filter(|_| args.topic.is_some());
+        print_json(&one.cloned().unwrap_or(Value::Object(all)))?;
     }
     Ok(Ending::Ok)
 }

@@ -85,20 +85,17 @@ use args::{Cli, Command};
 use command_args::SceneCommand;
 use shared_args::TableFormat;
 
-/// Exit code after Ctrl-C.
-const INTERRUPTED: u8 = 130;
-
-/// How a command ended that did not fail.
+/// How a command ended that did not fail, and its exit code.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ending {
-    /// Exit code 0.
-    Ok,
-    /// A structure answered wrongly: exit code 1.
-    WrongAnswer,
-    /// Slower than before, or no answer any more: exit code 3.
-    Regression,
-    /// Stopped by Ctrl-C: exit code 130.
-    Interrupted,
+    /// Nothing to complain of.
+    Ok = 0,
+    /// A structure answered wrongly.
+    WrongAnswer = 1,
+    /// Slower than before, or no answer any more.
+    Regression = 3,
+    /// Stopped by Ctrl-C.
+    Interrupted = 130,
 }
 
 impl Ending {
@@ -168,11 +165,8 @@ fn start(registry: Registry) -> ExitCode {
         tell_warnings();
     }
     match ending {
-        Ok(Ending::Ok) => ExitCode::SUCCESS,
-        Ok(Ending::WrongAnswer) => ExitCode::from(1),
-        Ok(Ending::Regression) => ExitCode::from(3),
-        Ok(Ending::Interrupted) => ExitCode::from(INTERRUPTED),
-        Err(error) if error.is::<Interrupted>() => ExitCode::from(INTERRUPTED),
+        Ok(ending) => ExitCode::from(ending as u8),
+        Err(error) if error.is::<Interrupted>() => ExitCode::from(Ending::Interrupted as u8),
         // A reader who left is no failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {
@@ -276,10 +270,9 @@ fn tell(line: &str) {
 fn load_scene(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
     let scene = crate::scene::load(source, options)?;
     if scene.skipped_items > 0 {
+        let (bad, name) = (text::counted(scene.skipped_items, "bad item"), &scene.name);
         tell(&format!(
-            "note: {} left out of {}; the other rows keep their ids",
-            text::counted(scene.skipped_items, "bad item"),
-            scene.name
+            "note: {bad} left out of {name}; the other rows keep their ids"
         ));
     }
     Ok(scene)
@@ -412,10 +405,10 @@ fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
         return io.kind() == io::ErrorKind::BrokenPipe
             || io.get_ref().is_some_and(|inner| is_broken_pipe(inner));
     }
-    let csv = error.downcast_ref::<csv::Error>();
-    csv.is_some_and(
-        |e| matches!(e.kind(), csv::ErrorKind::Io(io) if io.kind() == io::ErrorKind::BrokenPipe),
-    )
+    match error.downcast_ref::<csv::Error>().map(csv::Error::kind) {
+        Some(csv::ErrorKind::Io(io)) => is_broken_pipe(io),
+        _ => false,
+    }
 }
 
 /// Writes a whole text at once: clap's own writers panic on a closed pipe.

@@ -95,18 +95,16 @@ impl Plan<'_> {
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let far = all.len().saturating_sub(MOST_DRAWN);
         all.truncate(MOST_DRAWN);
-        let mut notes = Vec::new();
-        for (count, why) in [(apart, "on other storeys"), (far, "farther from the eye")] {
-            if count > 0 {
-                notes.push(format!("not drawn: {} {why}", text::counted(count, "item")));
-            }
-        }
+        let notes = [(apart, "on other storeys"), (far, "farther from the eye")].into_iter();
+        let notes = notes.filter(|(count, _)| *count > 0);
+        let notes =
+            notes.map(|(count, why)| format!("not drawn: {} {why}", text::counted(count, "item")));
         let drawn = all.into_iter().map(|(_, rect, class)| Drawn {
             rect,
             class,
             is_outlined: false,
         });
-        (drawn.collect(), notes)
+        (drawn.collect(), notes.collect())
     }
 
     /// Lowest and highest z of the rooms at the height of the eye.

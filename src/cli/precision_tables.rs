@@ -167,9 +167,7 @@ fn times_table(points: &[&CullingPoint]) -> Table {
         ("culling", |p| culling(p)),
         ("structure", |p| structure(p)),
         (">query", |p| time_plus_minus(p.time)),
-        (">B/item", |p| {
-            format!("{:.1}", p.errors.memory_bytes_per_item)
-        }),
+        (">B/item", |p| text::tenths(p.errors.memory_bytes_per_item)),
         ("status", |p| p.status.name().to_owned()),
     ];
     Table::with(points, columns)
@@ -190,9 +188,7 @@ fn front_table(p: &Precision) -> Table {
         (">query", |p| time_plus_minus(p.time)),
         (">FP %", |p| percent(p.errors.excess)),
         (">FN ppm", |p| text::share(p.errors.false_negative_ppm, 1e6)),
-        (">B/item", |p| {
-            format!("{:.1}", p.errors.memory_bytes_per_item)
-        }),
+        (">B/item", |p| text::tenths(p.errors.memory_bytes_per_item)),
         ("tie", |p| if p.is_tie { "tie" } else { "" }.to_owned()),
     ];
     let points = p.front.iter().map(|&i| &p.points[i]);
@@ -298,14 +294,10 @@ fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
         let label = short.unwrap_or(&label).to_owned();
         table.add_row([label].into_iter().chain(ppm));
     }
-    let sound = match sound.is_empty() {
-        true => String::new(),
-        false => format!(
-            "Nothing missed (below {} ppm): {}.",
-            significant(bound),
-            sound.join(", ")
-        ),
-    };
+    let sound = some(sound.first(), |_| {
+        let (bound, sound) = (significant(bound), sound.join(", "));
+        format!("Nothing missed (below {bound} ppm): {sound}.")
+    });
     (table, sound)
 }
 

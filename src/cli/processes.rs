@@ -233,10 +233,8 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
     }
     let last = words.lines().rev().find(|line| !line.trim().is_empty());
     // Hints on backtraces follow the message of a panic.
-    let mut panic = words
-        .lines()
-        .skip_while(|line| !line.contains(" panicked at "));
-    let last = panic.nth(1).or(last);
+    let is_before = |line: &&str| !line.contains(" panicked at ");
+    let last = words.lines().skip_while(is_before).nth(1).or(last);
     let last = last.map(|last| format!(": {last}")).unwrap_or_default();
     let reason = format!("ended while {step} ({status}){last}");
     Verdict::new(Status::Panicked, reason)
@@ -252,7 +250,7 @@ pub fn see_through(
     request: &Request,
     patience: Duration,
     keep: &mut dyn FnMut(Message) -> anyhow::Result<()>,
-    step: &dyn Fn(&str),
+    tell: &dyn Fn(&str),
 ) -> anyhow::Result<Ended> {
     let mut worker = Worker::start(program, request, patience)?;
     loop {
@@ -260,12 +258,9 @@ pub fn see_through(
             return Err(Interrupted.into());
         }
         match worker.listen(GLANCE)? {
-            Some(Ok(Message::Ready { .. })) => step("started"),
-            Some(Ok(Message::Doing {
-                structure,
-                step: doing,
-            })) => {
-                step(format!("{doing} {}", structure.unwrap_or_default()).trim_end());
+            Some(Ok(Message::Ready { .. })) => tell("started"),
+            Some(Ok(Message::Doing { structure, step })) => {
+                tell(format!("{step} {}", structure.unwrap_or_default()).trim_end());
             }
             Some(Ok(found)) => keep(found)?,
             Some(Err(ended)) => return Ok(ended),

@@ -95,10 +95,8 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
         } else if let Some(tip) = tip {
             expected.get_or_insert(format!("; {tip}"));
         } else if let Some(values) = values {
-            expected = Some(format!(
-                "; expected one of {}",
-                values.trim_end_matches(']')
-            ));
+            let values = values.trim_end_matches(']');
+            expected = Some(format!("; expected one of {values}"));
         } else if let Some(line) = line.strip_prefix("Usage: ") {
             usage = Some(line.to_owned());
         } else if !line.starts_with("For more information") && usage.is_none() {

@@ -145,13 +145,11 @@ fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
         }
         return Ok(eyes.collect());
     }
-    let bytes = read_file(file)?;
-    let points = read_points_csv(&bytes[..], &file.display().to_string())?.into_iter();
+    let points = read_points_csv(&read_file(file)?[..], &file.display().to_string())?.into_iter();
     Ok(points.map(|p| scene.sought(p)).collect())
 }
 
 fn boxes(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SoughtBox>> {
-    let bytes = read_file(file)?;
-    let boxes = read_sought_boxes_csv(&bytes[..], &file.display().to_string())?.into_iter();
-    Ok(boxes.map(|b| scene.sought_box(b)).collect())
+    let boxes = read_sought_boxes_csv(&read_file(file)?[..], &file.display().to_string())?;
+    Ok(boxes.into_iter().map(|b| scene.sought_box(b)).collect())
 }

@@ -156,11 +156,9 @@ impl<'a> Run<'a> {
         unread_is_fine(self.close(&report, save))?;
         if stopped {
             tell("interrupted: finished cells were saved; continue with --resume");
+            return Ok(Ending::Interrupted);
         }
-        Ok(match stopped {
-            true => Ending::Interrupted,
-            false => Ending::of(!report.has_failed()),
-        })
+        Ok(Ending::of(!report.has_failed()))
     }
 
     /// All processes of a scene.

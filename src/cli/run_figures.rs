@@ -30,8 +30,7 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
         .collect();
     let drawn: Vec<_> = all.iter().filter(|(_, (r, _))| is_drawn(*r)).collect();
     drawn.first()?;
-    let shown = |row: &&&(&ReportCell, Speedup)| row.1.1.unwrap_or([row.1.0; 2]);
-    let values = drawn.iter().flat_map(|row| shown(&row));
+    let values = drawn.iter().flat_map(|row| row.1.1.unwrap_or([row.1.0; 2]));
     let mut axis = Axis::log("", values.chain([1.0]), 1.2, &ratio_name);
     axis.ticks = axis.powers(2.0);
     let row = |(place, (cell, (ratio, ends))): (usize, &&(&ReportCell, Speedup))| {
@@ -122,13 +121,9 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         }
     }
     let mut figures = Vec::new();
-    let (about, each) = (
-        of(comparison),
-        match queries {
-            1 => String::new(),
-            _ => format!(", means of up to {queries} consecutive views"),
-        },
-    );
+    let several = Some(queries).filter(|queries| *queries > 1);
+    let means = |queries| format!(", means of up to {queries} consecutive views");
+    let (about, each) = (of(comparison), text::some(several, means));
     if !series.is_empty() {
         let points = series.iter().flat_map(|s| s.points.iter().map(|p| p.at[1]));
         let y = Axis::log("", points, 1.1, &text::time);
@@ -149,18 +144,15 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
             points: views.visible.iter().enumerate().map(point).collect(),
         };
         let y = Axis::linear("", 0.0..most as f64, &count);
-        let why = match figures.is_empty() {
-            true => "; single views are too short to be timed each",
-            false => "",
-        };
+        let short = "; single views are too short to be timed each";
+        let why = if figures.is_empty() { short } else { "" };
         let caption = format!("{about}: visible items along the path{why}");
         let mut diagram = Diagram::of(caption, [x(), y], Joined::Bare, vec![visible]);
         diagram.height = 120.0;
         figures.push(diagram.draw());
     }
     if !spread.is_empty() {
-        let ends = |row: &Row| row.ends.unwrap_or([row.value; 2]);
-        let values = spread.iter().flat_map(ends);
+        let values = spread.iter().flat_map(Row::range);
         let axis = Axis::log("", values, 1.1, &text::time);
         let caption = format!(
             "{about}: distribution over the views{each}; median, middle half, and 5 to 95 %"
@@ -175,35 +167,26 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
 /// `None` for a single test.
 pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     let first = comparisons.first()?;
-    let measured = |comparison: &&Comparison| {
-        let cells: Vec<Measured> = (comparison.sound())
-            .filter_map(|cell| {
-                let (time, error) = (cell.metrics.get("query_ns")?, cell.value("excess")?);
-                Some(Measured {
-                    structure: cell.structure.clone(),
-                    test: cell.test.clone(),
-                    point: Point {
-                        at: [time.value, error * 100.0],
-                        wide: ends(time.estimate()),
-                        note: format!(
-                            "{} {}: {}, {} % false positives",
-                            cell.structure,
-                            cell.test,
-                            text::time_within(time.estimate()),
-                            text::significant(error * 100.0)
-                        ),
-                        is_large: true,
-                        ..Point::default()
-                    },
-                })
-            })
-            .collect();
-        cells
+    let measured = |cell: &ReportCell| {
+        let (time, error) = (cell.metrics.get("query_ns")?, cell.value("excess")?);
+        let (structure, test) = (cell.structure.clone(), cell.test.clone());
+        let (within, extra) = (text::time_within(time.estimate()), error * 100.0);
+        let percent = text::significant(extra);
+        let point = Point {
+            at: [time.value, extra],
+            wide: ends(time.estimate()),
+            note: format!("{structure} {test}: {within}, {percent} % false positives"),
+            is_large: true,
+            ..Point::default()
+        };
+        Some(Measured {
+            structure,
+            test,
+            point,
+        })
     };
-    let mut points: Vec<Measured> = comparisons.iter().flat_map(measured).collect();
-    if comparisons.len() < 2 || points.is_empty() {
-        return None;
-    }
+    let cells = comparisons.iter().flat_map(|comparison| comparison.sound());
+    let mut points: Vec<Measured> = cells.filter_map(measured).collect();
     points.sort_by(|a, b| a.point.at[0].total_cmp(&b.point.at[0]));
     let against = Against {
         caption: format!("{}: error against run time, by test", of(first)),
@@ -212,7 +195,7 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
         none: 1e-4,
         points,
     };
-    Some(against.draw())
+    (comparisons.len() > 1 && !against.points.is_empty()).then(|| against.draw())
 }
 
 #[cfg(test)]

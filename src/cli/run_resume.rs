@@ -105,10 +105,9 @@ pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
 /// Continues a run.
 pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> {
     if stopped.lost > 0 {
+        let (run, parts) = (stopped.path.display(), text::counted(stopped.lost, "part"));
         tell(&format!(
-            "note: {}: samples.csv lacks samples; {} measured again",
-            stopped.path.display(),
-            text::counted(stopped.lost, "part")
+            "note: {run}: samples.csv lacks samples; {parts} measured again"
         ));
     }
     Ok(stopped.go_on(stream)?)

@@ -59,23 +59,22 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         let queries = text::counted(queries + 1, "query");
         format!("{}: {frames}, {queries} each", path.motion)
     });
-    let visible = comparison.of_any("cull_rate").map(|culled| 1.0 - culled);
     // Sets of a coarse test are larger than what is visible.
     let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);
-    let visible = visible.map(|returned| match excess {
-        None => format!("{} of the items are visible", share(returned)),
-        Some(excess) => format!(
-            "{} of the items are returned, about {} visible",
-            share(returned),
-            share(returned / (1.0 + excess))
-        ),
+    let visible = comparison.of_any("cull_rate").map(|culled| {
+        let returned = share(1.0 - culled);
+        let seen = excess.map(|excess| share((1.0 - culled) / (1.0 + excess)));
+        match seen {
+            None => format!("{returned} of the items are visible"),
+            Some(seen) => format!("{returned} of the items are returned, about {seen} visible"),
+        }
     });
-    let sources = text::by_source(comparison);
-    let sources = sources.map(|items| format!("{items} {}", text::BY_SOURCE));
-    let excess = match (text::false_positives(comparison), sources) {
-        (Some(share), None) => Some(format!("{share} false positives")),
-        (Some(share), Some(items)) => Some(format!("{share} false positives ({items})")),
-        (None, sources) => sources.map(|items| format!("false positives {items}")),
+    let sources = text::some(text::by_source(comparison), |items| {
+        format!(" ({items} by storage/planes/test)")
+    });
+    let excess = match text::false_positives(comparison) {
+        Some(share) => Some(format!("{share} false positives{sources}")),
+        None => (!sources.is_empty()).then(|| format!("false positives{sources}")),
     };
     let lens = path.lens.as_ref();
     let matrix = lens.and_then(|lens| lens.matrix.as_ref());

@@ -64,13 +64,10 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         ("bounds", format!("{low} to {high}")),
         ("origin", origin),
         ("axes", scene_facts::axes(&info)),
-        (
-            "regions",
-            format!("{}: {}", people(info.region_count), scene.regions.kind()),
-        ),
     ];
-    let at = rows.len() - 1;
-    rows.splice(at..at, figures.rows(&scene));
+    rows.extend(figures.rows(&scene));
+    let regions = (people(info.region_count), scene.regions.kind());
+    rows.push(("regions", format!("{}: {}", regions.0, regions.1)));
     match (&facts, &args.path) {
         (Some(facts), Some(path)) => {
             let views = text::counted(cameras.len(), "camera");
@@ -139,9 +136,9 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
         ));
     }
     if kept.origin != origin {
+        let new = kept.origin;
         tell(&format!(
-            "note: the file will be read with the origin {}, not {origin}",
-            kept.origin
+            "note: the file will be read with the origin {new}, not {origin}"
         ));
     }
     write(kept, out)

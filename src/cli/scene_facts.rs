@@ -199,12 +199,10 @@ impl SceneFacts {
 /// Counts per step of equal ratio; empty where all sizes are one.
 fn histogram(edges: &[f64]) -> Vec<SizeStep> {
     let above_zero = &edges[edges.partition_point(|edge| *edge <= 0.0)..];
-    let (Some(&least), Some(&most)) = (above_zero.first(), above_zero.last()) else {
-        return Vec::new();
+    let (least, most) = match *above_zero {
+        [least, .., most] if least < most => (least, most),
+        _ => return Vec::new(),
     };
-    if least == most {
-        return Vec::new();
-    }
     let end = |step: usize| match step {
         0 => least,
         STEPS => most,

@@ -53,10 +53,8 @@ impl Sheet {
     pub fn over(window: Rect) -> Sheet {
         let (middle, length) = (centre(window), longest(window));
         let least = middle.abs().max_element() * 1e-9;
-        let length = match length.is_finite() && length > least {
-            true => length,
-            false => least.max(1.0),
-        };
+        let is_sound = length.is_finite() && length > least;
+        let length = if is_sound { length } else { least.max(1.0) };
         let sides = (window[1] - window[0]).max(DVec2::splat(length / 3.0));
         let sides = 1.06 * sides.min(DVec2::splat(length));
         let scale = SIDE / sides.max_element();

@@ -15,6 +15,7 @@ use super::table::{Column, Table};
 use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Registry, StructureSpec};
 use crate::kernel::Kernel;
+use crate::report::grouped;
 use crate::stress::extremes::{Extremes, Tally};
 use crate::stress::{Name, Section, Status, Vector, built_in, read_vectors_file, replay};
 
@@ -72,10 +73,16 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         };
         let structures: Vec<StructureSpec> = structures.iter().map(by_kernel).collect();
         let mut found = Vec::new();
-        for vector in vectors.iter().take_while(|_| !interrupt::asked()) {
-            bar.set_message(text::plain(&vector.id.0));
-            add_vector(&mut found, vector, &structures);
-            bar.inc(1);
+        for (category, own) in grouped(vectors.iter().map(|v| (v.category(), v))) {
+            let mut section = Section::new(category);
+            for vector in own.into_iter().take_while(|_| !interrupt::asked()) {
+                bar.set_message(text::plain(&vector.id.0));
+                section.cases += 1;
+                section.boxes += vector.boxes().len() as u64;
+                section.rows.extend(replay(vector, &structures));
+                bar.inc(1);
+            }
+            found.extend((section.cases > 0).then_some(section));
         }
         if cases > 0 && !interrupt::asked() {
             let extremes = Extremes {
@@ -141,20 +148,6 @@ fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
     }
     sections.retain(|section| !section.rows.is_empty());
     sections
-}
-
-/// The rows of a vector, under its category.
-fn add_vector(sections: &mut Vec<Section>, vector: &Vector, structures: &[StructureSpec]) {
-    let rows = replay(vector, structures);
-    let place = sections.iter().position(|s| s.name == vector.category());
-    let place = place.unwrap_or_else(|| {
-        sections.push(Section::new(vector.category()));
-        sections.len() - 1
-    });
-    let section = &mut sections[place];
-    section.cases += 1;
-    section.boxes += vector.boxes().len() as u64;
-    section.rows.extend(rows);
 }
 
 /// All rows as one array, a row per line.

@@ -99,10 +99,7 @@ pub fn or_left_out(
     files: &[&Option<PathBuf>],
     ended: anyhow::Result<Ending>,
 ) -> anyhow::Result<Ending> {
-    let error = match ended {
-        Err(error) => error,
-        ended => return ended,
-    };
+    let Err(error) = ended else { return ended };
     let left_out = error.downcast::<LeftOut>()?;
     let LeftOut(scene) = &left_out;
     let document = json!({ "scene": scene, "status": Status::LeftOut, "reason": NO_ITEMS });

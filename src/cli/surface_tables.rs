@@ -228,13 +228,9 @@ fn measured(surface: &Surface, class: f64) -> String {
         return String::new();
     }
     let shares = || here().map(|place| place.share);
-    let least = shares().fold(f64::INFINITY, f64::min);
-    let most = shares().fold(0.0, f64::max);
-    format!(
-        " (measured: {} to {})",
-        text::percent(least),
-        text::percent(most)
-    )
+    let least = text::percent(shares().fold(f64::INFINITY, f64::min));
+    let most = text::percent(shares().fold(0.0, f64::max));
+    format!(" (measured: {least} to {most})")
 }
 
 /// A picture with a name that fits a file.

@@ -1,6 +1,7 @@
 //! A table as rows and columns, and its form on a terminal.
 
 use super::text::{plain, wrapped};
+use crate::report::{grouped, unique};
 
 /// Blanks between columns.
 const GAP: usize = 2;
@@ -54,27 +55,17 @@ impl Table {
     ///
     /// Names are in the order in which they first occur; cells are numbers.
     pub fn grid(title: &str, cells: impl IntoIterator<Item = [String; 3]>) -> Table {
-        let mut table = Table::new([title], &[]);
-        for [name, head, cell] in cells {
-            let column = table.header.iter().position(|own| *own == head);
-            let column = column.unwrap_or(table.header.len());
-            if column == table.header.len() {
-                table.header.push(head);
-            }
-            let row = table.rows.iter().position(|own| own[0] == name);
-            let row = row.unwrap_or(table.rows.len());
-            if row == table.rows.len() {
-                table.rows.push(vec![name]);
-            }
-            let row = &mut table.rows[row];
-            row.resize(row.len().max(column + 1), String::new());
-            debug_assert!(row[column].is_empty(), "two cells of one row and column");
-            row[column] = cell;
+        let cells: Vec<[String; 3]> = cells.into_iter().collect();
+        let heads = unique(cells.iter().map(|[_, head, _]| head.as_str()));
+        let mut table = Table::of_numbers([title].iter().chain(&heads).copied());
+        let rows = cells.iter().map(|[name, head, cell]| (name, (head, cell)));
+        for (name, own) in grouped(rows) {
+            let cell = |head: &&str| {
+                let cell = own.iter().find(|cell| cell.0 == head);
+                cell.map_or("", |cell| cell.1)
+            };
+            table.add_row([name.as_str()].into_iter().chain(heads.iter().map(cell)));
         }
-        let width = table.header.len();
-        let rows = table.rows.iter_mut();
-        rows.for_each(|row| row.resize(width, String::new()));
-        table.right = (1..width).collect();
         table
     }
 

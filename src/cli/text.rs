@@ -72,6 +72,11 @@ fn basis_of_times(report: &Report) -> String {
     format!("95 % intervals over {over}{few}{check}")
 }
 
+/// One digit behind the point.
+pub fn tenths(value: f64) -> String {
+    format!("{value:.1}")
+}
+
 /// Three significant digits without zeros at the end: 12.5, 9, 0.05.
 pub fn short(value: f64) -> String {
     let text = significant(value);
@@ -258,9 +263,6 @@ pub fn by_source(comparison: &Comparison) -> Option<String> {
     let sources = [errors.by_storage, errors.by_planes, errors.by_test()];
     others.then(|| sources.map(|items| items.to_string()).join("/"))
 }
-
-/// Meaning of the figures of [`by_source`].
-pub const BY_SOURCE: &str = "by storage/planes/test";
 
 /// A word as a shell takes it.
 pub fn quoted(word: &str) -> String {

@@ -27,20 +27,20 @@ fn number(
 }
 
 /// A whole number of a range.
-pub fn whole<N: FromStr + PartialOrd + Display>(
+pub fn whole<N: FromStr + PartialOrd + Display + Clone>(
     range: RangeInclusive<N>,
-) -> impl Fn(&str) -> Result<N, SpecError> + Clone
-where
-    RangeInclusive<N>: Clone,
-{
+) -> impl Fn(&str) -> Result<N, SpecError> + Clone {
     move |text| {
         let sound = text.parse().ok().filter(|n| range.contains(n));
         let (least, most) = (range.start(), range.end().to_string());
         // Twenty digits are no bound in practice.
-        match most == u64::MAX.to_string() {
-            true => expected(sound, format_args!("a whole number of at least {least}")),
-            false => expected(sound, format_args!("a whole number from {least} to {most}")),
-        }
+        expected(
+            sound,
+            match most == u64::MAX.to_string() {
+                true => format!("a whole number of at least {least}"),
+                false => format!("a whole number from {least} to {most}"),
+            },
+        )
     }
 }
 
@@ -109,9 +109,9 @@ pub fn baseline(name: &str) -> Result<String, SpecError> {
     let name = name.trim_end_matches(".json");
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
     let sound = name.chars().all(is_plain) && (1..=100).contains(&name.len());
-    let name = Some(name).filter(|name| sound && !name.starts_with(['.', '-']));
+    let name = (sound && !name.starts_with(['.', '-'])).then(|| name.to_owned());
     expected(
-        name.map(str::to_owned),
+        name,
         "a name of at most 100 letters, digits, '.', '_' and '-'",
     )
 }

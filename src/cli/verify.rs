@@ -198,16 +198,16 @@ fn workloads<'a>(
 
 /// Every test and arithmetic but the given one, as far as they go together.
 fn other_cullings(culling: &Culling) -> Vec<Culling> {
-    let pairs = TESTS
-        .iter()
-        .flat_map(|test| ARITHMETICS.iter().map(|row| (test.0, row.0)));
-    let all = pairs.map(|(test, arithmetic)| Culling {
-        test,
-        arithmetic,
-        ..*culling
-    });
-    all.filter(|other| other != culling && other.check().is_ok())
-        .collect()
+    let mut all = Vec::new();
+    for (test, ..) in TESTS {
+        all.extend(ARITHMETICS.map(|(arithmetic, ..)| Culling {
+            test,
+            arithmetic,
+            ..*culling
+        }));
+    }
+    all.retain(|other| other != culling && other.check().is_ok());
+    all
 }
 
 /// Returns true if the culling must not miss anything that a camera sees.
@@ -346,14 +346,16 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             };
             if let Err(Verdict { status, reason }) = found {
                 check.status = status.name();
-                check.difference = Some(format!(
-                    "{} volume, {}: {}\n  again: {} verify --cases 1 --seed {case_seed} --structure '{}' --kernel {}",
+                let (kind, items) = (
                     VOLUME_KINDS[case.kind],
                     text::counted(case.items.len(), "item"),
+                );
+                let (program, kernel) = (program::name(), spec.execution.kernel.name());
+                let again = format!("{program} verify --cases 1 --seed {case_seed}");
+                check.difference = Some(format!(
+                    "{kind} volume, {items}: {}\n  again: {again} --structure '{}' --kernel {kernel}",
                     reason.unwrap_or_default(),
-                    program::name(),
-                    spec.label,
-                    spec.execution.kernel.name()
+                    spec.label
                 ));
             }
         }

@@ -309,11 +309,7 @@ impl ViewData {
     /// Data without views, and the items in the order of the curve.
     pub fn of(scene: &Scene, path: &str) -> (ViewData, Vec<ItemId>) {
         // Few items may be far smaller than the scene.
-        let steps: u32 = if scene.items.len() > 20_000 {
-            1 << 16
-        } else {
-            1 << 20
-        };
+        let steps: u32 = 1 << [20, 16][usize::from(scene.items.len() > 20_000)];
         let bounds = match scene.items.is_empty() {
             true => Default::default(),
             false => [scene.bounds.min.as_dvec3(), scene.bounds.max.as_dvec3()],
@@ -407,10 +403,8 @@ fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
     };
     let [x, y, z, w] = matrix.rows().map(DVec4::from);
     let lowest = if matrix.is_from_zero() { 0.0 } else { -1.0 };
-    let [near, far] = match matrix.unprojected() {
-        Ok(unprojected) => unprojected.depths,
-        Err(_) => [lowest, 1.0],
-    };
+    let depths = matrix.unprojected().map(|found| found.depths);
+    let [near, far] = depths.unwrap_or([lowest, 1.0]);
     let z = (2.0 * z - (near + far) * w) / (far - near);
     DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
 }

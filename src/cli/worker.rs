@@ -82,10 +82,8 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
             here.tell(&Message::Times(times(registry, plan, &timing, &command)?));
         }
     }
-    match here.failed.into_inner() {
-        Some(error) => Err(error.into()),
-        None => Ok(()),
-    }
+    let failed = here.failed.into_inner();
+    failed.map_or(Ok(()), |error| Err(error.into()))
 }
 
 /// Times of one process of a study.
