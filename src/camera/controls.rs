@@ -6,7 +6,7 @@
 use glam::{DQuat, DVec3};
 
 use super::frame::{check_finite, unit};
-use super::{Camera, CameraError, Frame, Lens, LensKind, finite, require};
+use super::{Camera, CameraError, Frame, Lens, LensKind, Result, finite, require};
 
 /// Rotations between two corrections: a rotation drifts by about 2e-16, so
 /// the frame stays orthonormal to 1e-13 at no visible cost.
@@ -59,13 +59,7 @@ impl Frame {
     ///
     /// # Errors
     /// An axis of length zero, or a value that is not finite; the frame is unchanged.
-    pub fn orbit(
-        &mut self,
-        centre: DVec3,
-        axis: DVec3,
-        around: f64,
-        over: f64,
-    ) -> Result<(), CameraError> {
+    pub fn orbit(&mut self, centre: DVec3, axis: DVec3, around: f64, over: f64) -> Result<()> {
         require(
             axis.is_finite() && axis != DVec3::ZERO,
             || "the axis of the orbit is zero or not finite".to_owned(),
@@ -103,7 +97,7 @@ impl Camera {
     ///
     /// # Errors
     /// A factor that is not above zero, or a lens that would have no window.
-    pub fn zoom(&mut self, factor: f64) -> Result<(), CameraError> {
+    pub fn zoom(&mut self, factor: f64) -> Result<()> {
         let found = || format!("the zoom factor is {factor}");
         let is_sound = factor.is_finite() && factor > 0.0;
         require(is_sound, found, "a number above 0")?;

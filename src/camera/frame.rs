@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Camera, CameraError, require};
+use super::{Camera, CameraError, Result, require};
 use crate::arithmetic::exact::{self, ExactVector};
 
 /// Position and direction of a camera; the numbers as written count as exact.
@@ -58,7 +58,7 @@ impl Pose {
     ///
     /// # Errors
     /// The errors of [`look_at`].
-    pub(super) fn axes(&self) -> Result<[DVec3; 2], CameraError> {
+    pub(super) fn axes(&self) -> Result<[DVec3; 2]> {
         let (eye, name, towards, up) = match *self {
             Pose::LookAt { eye, look, up } => (eye, "look", look, up),
             Pose::Forward { eye, forward, up } => (eye, "forward", forward, up),
@@ -100,7 +100,7 @@ pub(super) fn unit(v: DVec3) -> DVec3 {
     scaled / scaled.length()
 }
 
-pub(super) fn check_finite(name: &str, v: DVec3) -> Result<(), CameraError> {
+pub(super) fn check_finite(name: &str, v: DVec3) -> Result<()> {
     for (axis, value) in ["x", "y", "z"].into_iter().zip(v.to_array()) {
         let found = || format!("{name} {axis} is {value}");
         require(value.is_finite(), found, "a finite number")?;
@@ -138,7 +138,7 @@ pub struct Frame {
 /// # Errors
 /// A value that is not finite, `eye == look`, `up` zero or parallel to the
 /// direction of view, or within 9e-16 rad of it.
-pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame, CameraError> {
+pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame> {
     Pose::LookAt { eye, look, up }.frame()
 }
 
@@ -161,7 +161,7 @@ impl Pose {
     ///
     /// # Errors
     /// The errors of [`look_at`] and [`Frame::looking_along`].
-    pub fn frame(&self) -> Result<Frame, CameraError> {
+    pub fn frame(&self) -> Result<Frame> {
         let [u, n] = self.axes()?;
         Ok(Frame::of_axes(*self, u, n))
     }
@@ -172,7 +172,7 @@ impl Frame {
     ///
     /// # Errors
     /// The errors of [`look_at`], but for `forward` zero.
-    pub fn looking_along(eye: DVec3, forward: DVec3, up: DVec3) -> Result<Frame, CameraError> {
+    pub fn looking_along(eye: DVec3, forward: DVec3, up: DVec3) -> Result<Frame> {
         Pose::Forward { eye, forward, up }.frame()
     }
 
@@ -277,7 +277,7 @@ mod tests {
         assert_eq!(far.forward(), DVec3::X);
     }
 
-    fn refused(frame: Result<Frame, CameraError>, what: &str) -> bool {
+    fn refused(frame: Result<Frame>, what: &str) -> bool {
         frame.is_err_and(|error| error.to_string().starts_with(what))
     }
 

@@ -4,8 +4,10 @@
 
 use glam::DVec3;
 
-use super::{Camera, CameraError, FARTHEST, Frame, MatrixConvention, Pose, ViewProjection};
-use super::{finite, require};
+use super::{
+    Camera, CameraError, FARTHEST, Frame, MatrixConvention, Pose, Result, ViewProjection, finite,
+    require,
+};
 
 /// Window, near and far plane of a camera. Lengths are world units.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -49,30 +51,20 @@ impl Lens {
     /// # Errors
     /// fov outside (0, 180), aspect or near not above 0, near >= far, a value
     /// that is not finite. A far plane beyond [`FARTHEST`] is an infinite one.
-    pub fn perspective(
-        fovy_deg: f64,
-        aspect: f64,
-        near: f64,
-        far: Option<f64>,
-    ) -> Result<Lens, CameraError> {
+    pub fn perspective(fovy_deg: f64, aspect: f64, near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::Perspective { fovy_deg, aspect }, near, far)
     }
 
     /// # Errors
     /// Height or aspect not above 0, near >= far, a value that is not finite.
-    pub fn orthographic(
-        height: f64,
-        aspect: f64,
-        near: f64,
-        far: f64,
-    ) -> Result<Lens, CameraError> {
+    pub fn orthographic(height: f64, aspect: f64, near: f64, far: f64) -> Result<Lens> {
         Lens::new(LensKind::Orthographic { height, aspect }, near, Some(far))
     }
 
     /// # Errors
     /// An empty window, near not above 0, near >= far, a value that is not
     /// finite.
-    pub fn off_axis(window: [f64; 4], near: f64, far: Option<f64>) -> Result<Lens, CameraError> {
+    pub fn off_axis(window: [f64; 4], near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::OffAxis { window }, near, far)
     }
 
@@ -80,7 +72,7 @@ impl Lens {
     ///
     /// # Errors
     /// Those of the kind's constructor; an orthographic lens without far plane; a matrix.
-    pub fn new(kind: LensKind, near: f64, far: Option<f64>) -> Result<Lens, CameraError> {
+    pub fn new(kind: LensKind, near: f64, far: Option<f64>) -> Result<Lens> {
         match kind {
             LensKind::Perspective { fovy_deg, aspect } => {
                 let found = || format!("the vertical field of view is {fovy_deg} degrees");
@@ -140,7 +132,7 @@ impl Lens {
     /// # Errors
     /// near >= far, no far plane for an orthographic lens, a value that is not
     /// finite; a matrix.
-    pub fn with_far(&self, far: Option<f64>) -> Result<Lens, CameraError> {
+    pub fn with_far(&self, far: Option<f64>) -> Result<Lens> {
         Lens::new(self.kind, self.near, far)
     }
 
@@ -205,13 +197,13 @@ fn slope(degrees: f64) -> f64 {
     }
 }
 
-fn check_aspect(aspect: f64) -> Result<(), CameraError> {
+fn check_aspect(aspect: f64) -> Result<()> {
     let sound = aspect > 0.0 && aspect.is_finite();
     let found = || format!("the aspect ratio is {aspect}");
     require(sound, found, "a number above 0")
 }
 
-fn check_window(name: &str, low: f64, high: f64) -> Result<(), CameraError> {
+fn check_window(name: &str, low: f64, high: f64) -> Result<()> {
     finite(name, low)?;
     finite(name, high)?;
     let found = || format!("the window is empty: {low} to {high} ({name})");
@@ -227,10 +219,7 @@ impl Camera {
     ///
     /// # Errors
     /// The errors of [`ViewProjection::new`].
-    pub fn of_matrix(
-        entries: [[f64; 4]; 4],
-        convention: MatrixConvention,
-    ) -> Result<Camera, CameraError> {
+    pub fn of_matrix(entries: [[f64; 4]; 4], convention: MatrixConvention) -> Result<Camera> {
         let matrix = ViewProjection::new(entries, convention)?;
         let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
         let forward = match matrix.is_parallel {
@@ -301,7 +290,7 @@ mod tests {
         assert!(Lens::perspective(60.0, 1.0, 1e39, Some(largest)).is_err());
     }
 
-    fn refused(lens: Result<Lens, CameraError>, what: &str) -> bool {
+    fn refused(lens: Result<Lens>, what: &str) -> bool {
         lens.is_err_and(|error| error.to_string().starts_with(what))
     }
 

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::{CameraError, Frame, Lens};
+use super::{CameraError, Frame, Lens, Result};
 use crate::arithmetic::rounding::round_up;
 use crate::geometry::{ConvexVolume, FrustumPlane, Plane};
 
@@ -154,7 +154,7 @@ fn reach(near: &[DVec3; 4], far: Option<&[DVec3; 4]>, of_scene: DVec3) -> DVec3 
 ///
 /// # Errors
 /// The largest sum there may be, if not.
-pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<(), CameraError> {
+pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<()> {
     let sums = volume.planes().iter().map(|p| largest_sum(p, reach));
     let largest = sums.fold(0.0, f64::max);
     match largest <= LARGEST_SUM {

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::CameraError;
+use super::{CameraError, Result};
 use crate::arithmetic::{Expansion, exact};
 use crate::geometry::{FrustumPlane, PlaneF64};
 
@@ -82,10 +82,7 @@ impl ViewProjection {
     /// # Errors
     /// An entry that is not finite, or neither zero nor of a size from 1e-60 to
     /// 1e60; a singular matrix; one whose clip volume is empty.
-    pub fn new(
-        entries: [[f64; 4]; 4],
-        convention: MatrixConvention,
-    ) -> Result<ViewProjection, CameraError> {
+    pub fn new(entries: [[f64; 4]; 4], convention: MatrixConvention) -> Result<ViewProjection> {
         for (&name, value) in MATRIX_ENTRIES.iter().zip(entries.concat()) {
             super::finite(name, value)?;
             super::require(

@@ -47,6 +47,9 @@ pub struct Camera {
     pub lens: Lens,
 }
 
+/// What makes a camera, or why it makes none.
+pub type Result<T, E = CameraError> = std::result::Result<T, E>;
+
 /// Numbers that make no camera, or a camera whose planes f32 cannot hold.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -88,18 +91,14 @@ impl CameraError {
 }
 
 /// Checks a rule of camera arguments; `found` is only formatted where it is broken.
-fn require(
-    holds: bool,
-    found: impl FnOnce() -> String,
-    expected: &'static str,
-) -> Result<(), CameraError> {
+fn require(holds: bool, found: impl FnOnce() -> String, expected: &'static str) -> Result<()> {
     match holds {
         true => Ok(()),
         false => Err(CameraError::invalid(found(), expected)),
     }
 }
 
-fn finite(name: &str, value: f64) -> Result<(), CameraError> {
+fn finite(name: &str, value: f64) -> Result<()> {
     let found = || format!("{name} is {value}");
     require(value.is_finite(), found, "a finite number")
 }

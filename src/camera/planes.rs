@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::margin::{LARGEST_SUM, Margin, TINY, check_sums, largest_sum};
 use super::projection::{double, single};
-use super::{Camera, CameraError, ClipSpace, Frame, Lens, LensKind, require};
+use super::{Camera, CameraError, ClipSpace, Frame, Lens, LensKind, Result, require};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume, VolumeError,
 };
@@ -93,11 +93,7 @@ impl Camera {
     /// method loses it); [`CameraError::Sums`] if a sum of the plane test could
     /// overflow within the surroundings' reach; [`CameraError::Invalid`] for an epsilon or a
     /// reach that is negative or NaN, or an infinite epsilon.
-    pub fn volume(
-        &self,
-        options: &PlaneOptions,
-        around: &Surroundings,
-    ) -> Result<ConvexVolume, CameraError> {
+    pub fn volume(&self, options: &PlaneOptions, around: &Surroundings) -> Result<ConvexVolume> {
         self.volume_with(&[], options, around)
     }
 
@@ -113,7 +109,7 @@ impl Camera {
         more: &[PlaneF64],
         options: &PlaneOptions,
         around: &Surroundings,
-    ) -> Result<ConvexVolume, CameraError> {
+    ) -> Result<ConvexVolume> {
         let of_scene = around.reach.as_dvec3();
         let zero = [around.origin];
         let named = self.derive(&zero, options.method)?;
@@ -128,7 +124,7 @@ impl Camera {
     ///
     /// # Errors
     /// [`CameraError::Volume`] if a plane does not even fit f64.
-    pub fn convex_volume_f64(&self, around: &Surroundings) -> Result<ConvexVolumeF64, CameraError> {
+    pub fn convex_volume_f64(&self, around: &Surroundings) -> Result<ConvexVolumeF64> {
         let planes = self.planes_f64(&[around.origin]).into_iter();
         let planes: Vec<PlaneF64> = planes.map(|(_, plane)| plane).collect();
         Ok(ConvexVolumeF64::from_planes(&planes)?)
@@ -160,7 +156,7 @@ impl Camera {
         more: &[PlaneF64],
         epsilon: f64,
         around: &Surroundings,
-    ) -> Result<RelativeVolume, CameraError> {
+    ) -> Result<RelativeVolume> {
         let local = self.frame.relative_to(around.origin);
         let eye = local.eye.as_vec3();
         let zero = eye.as_dvec3();
@@ -203,12 +199,7 @@ impl Camera {
         }
     }
 
-    fn margin(
-        &self,
-        zero: &[DVec3],
-        of_scene: DVec3,
-        options: &PlaneOptions,
-    ) -> Result<Margin, CameraError> {
+    fn margin(&self, zero: &[DVec3], of_scene: DVec3, options: &PlaneOptions) -> Result<Margin> {
         let frame = self.frame_about(zero);
         let c = options.epsilon;
         let are_sound = (0.0..f64::INFINITY).contains(&c) && of_scene.cmpge(DVec3::ZERO).all();
@@ -229,7 +220,7 @@ impl Camera {
         })
     }
 
-    fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes, CameraError> {
+    fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes> {
         use ClipSpace::{D3d, OpenGl, ReversedZ};
         let (frame, lens) = (&self.frame_about(zero), &self.lens);
         let is_matrix = matches!(lens.kind(), LensKind::Matrix(_));

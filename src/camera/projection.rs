@@ -24,7 +24,7 @@ pub enum ClipSpace {
 /// limit of its finite matrix. Only the cotangent is taken again: glam's sine and
 /// cosine are the platform's, and platforms round them differently.
 macro_rules! precision {
-    ($module:ident, $float:ty, $Vec:ident, $Vec4:ident, $Mat:ident, $glam:ident, $sin:path, $cos:path, $convert:expr, $narrow:expr) => {
+    ($module:ident, $float:ty, $Vec:ident, $Vec4:ident, $Mat:ident, $glam:ident, $sin:ident, $cos:ident) => {
         pub mod $module {
             use glam::$glam::rh::proj::{directx, opengl};
             use glam::{$Mat, $Vec, $Vec4};
@@ -56,14 +56,13 @@ macro_rules! precision {
                     LensKind::Perspective { fovy_deg, aspect } => {
                         let fovy = fovy_deg.to_radians() as $float;
                         let aspect = aspect as $float;
-                        let of = if is_gl {
-                            opengl::perspective
-                        } else {
-                            directx::perspective
+                        let of = match is_gl {
+                            true => opengl::perspective,
+                            false => directx::perspective,
                         };
                         let mut matrix = of(fovy, aspect, first, last);
                         let half = 0.5 * fovy;
-                        let cotangent = $cos(half) / $sin(half);
+                        let cotangent = libm::$cos(half) / libm::$sin(half);
                         matrix.x_axis.x = cotangent / aspect;
                         matrix.y_axis.y = cotangent;
                         matrix
@@ -93,7 +92,7 @@ macro_rules! precision {
             /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
             /// the last column, of the frame and the eye as this precision has them.
             pub fn view(frame: &Frame) -> $Mat {
-                let convert: fn(DVec3) -> $Vec = $convert;
+                let convert = |v: DVec3| $Vec::from(v.to_array().map(|x| x as $float));
                 let [u, v, n, e] = [frame.u(), frame.v(), frame.n(), frame.eye].map(convert);
                 $Mat::from_cols(
                     $Vec4::new(u.x, v.x, n.x, 0.0),
@@ -116,7 +115,7 @@ macro_rules! precision {
                     ClipSpace::D3d => (z, w - z),
                     ClipSpace::ReversedZ => (w - z, z),
                 };
-                let narrow: fn($Vec) -> Vec3 = $narrow;
+                let narrow = |v: $Vec| Vec3::from(v.to_array().map(|x| x as f32));
                 [w + x, w - x, w + y, w - y, near, far].map(|row| {
                     let normal = row.truncate();
                     let length = normal.length();
@@ -126,30 +125,8 @@ macro_rules! precision {
         }
     };
 }
-precision!(
-    single,
-    f32,
-    Vec3,
-    Vec4,
-    Mat4,
-    camera,
-    libm::sinf,
-    libm::cosf,
-    |v| v.as_vec3(),
-    |v| v
-);
-precision!(
-    double,
-    f64,
-    DVec3,
-    DVec4,
-    DMat4,
-    dcamera,
-    libm::sin,
-    libm::cos,
-    |v| v,
-    |v| v.as_vec3()
-);
+precision!(single, f32, Vec3, Vec4, Mat4, camera, sinf, cosf);
+precision!(double, f64, DVec3, DVec4, DMat4, dcamera, sin, cos);
 
 impl Frame {
     /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::matrix::{about, unprojected};
-use super::{Camera, CameraError, Lens, LensKind, Pose, ViewProjection, require};
+use super::{Camera, CameraError, Lens, LensKind, Pose, Result, ViewProjection, require};
 use crate::geometry::FrustumPlane;
 
 /// A view whose depth is a smaller share of its distance from the eye counts as
@@ -42,7 +42,7 @@ impl ViewProjection {
     ///
     /// # Errors
     /// A view that no lens holds, such as one with near and far plane in one place.
-    pub fn unprojected(&self) -> Result<Unprojected, CameraError> {
+    pub fn unprojected(&self) -> Result<Unprojected> {
         let depths = self.depths();
         let along = |row: usize| DVec3::from_slice(&self.rows[row]);
         let [x, y, z, w] = [0, 1, 2, 3].map(along);
@@ -110,7 +110,7 @@ impl ViewProjection {
     /// The lens of a matrix with an eye.
     ///
     /// `axes` are the rows of x and y, each with its axis of the frame.
-    fn perspective(&self, forward: DVec3, axes: [(DVec3, DVec3); 2]) -> Result<Lens, CameraError> {
+    fn perspective(&self, forward: DVec3, axes: [(DVec3, DVec3); 2]) -> Result<Lens> {
         let scale = DVec3::from_slice(&self.rows[3]).length();
         let [[left, right], [bottom, top]] = axes.map(|(row, axis)| {
             let edge = |clip: f64| (clip * scale - row.dot(forward)) / row.dot(axis);
@@ -150,7 +150,7 @@ impl Camera {
     /// # Errors
     /// A matrix whose image is sheared or whose near plane is oblique; an orthographic
     /// one that does not say which end is near.
-    pub fn unprojected(&self) -> Result<Camera, CameraError> {
+    pub fn unprojected(&self) -> Result<Camera> {
         let LensKind::Matrix(matrix) = self.lens.kind() else {
             return Ok(*self);
         };

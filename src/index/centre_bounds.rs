@@ -19,16 +19,9 @@ const MOST: f64 = 1e37;
 
 /// The centres of the boxes that hold `p`.
 pub fn of_point(p: Vec3, half: Vec3, scene: &Aabb) -> Aabb {
-    let size = scene
-        .reach()
-        .as_dvec3()
-        .max_element()
-        .max(p.as_dvec3().abs().max_element());
-    widened(
-        p.as_dvec3() - half.as_dvec3(),
-        p.as_dvec3() + half.as_dvec3(),
-        size,
-    )
+    let (p, half) = (p.as_dvec3(), half.as_dvec3());
+    let size = scene.reach().as_dvec3().max(p.abs()).max_element();
+    widened(p - half, p + half, size)
 }
 
 /// The centres of the boxes that no plane excludes.

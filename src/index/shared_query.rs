@@ -35,13 +35,8 @@ impl QueryThreads {
     /// # Errors
     /// A number out of range, or one that the system does not give.
     pub fn workers(self, structure: &'static str) -> Result<Option<Workers>, BuildError> {
-        check_range(
-            structure,
-            "threads",
-            self.0 as f64,
-            1.0,
-            MOST_THREADS as f64,
-        )?;
+        let most = MOST_THREADS as f64;
+        check_range(structure, "threads", self.0 as f64, 1.0, most)?;
         let refused = |error| BuildError::Refused {
             structure,
             reason: format!("{} threads: {error}", self.0),

@@ -8,7 +8,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::InputError;
+use super::{InputError, Result};
 
 /// Bytes of pipes, by their names.
 static PIPES: Mutex<BTreeMap<PathBuf, Arc<[u8]>>> = Mutex::new(BTreeMap::new());
@@ -43,7 +43,7 @@ fn is_stdin(path: &Path) -> bool {
 ///
 /// # Errors
 /// I/O errors, with the path.
-pub fn read_file(path: &Path) -> Result<Arc<[u8]>, InputError> {
+pub fn read_file(path: &Path) -> Result<Arc<[u8]>> {
     let io = InputError::io(path, "file");
     let mut pipes = PIPES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(bytes) = pipes.get(path) {
@@ -85,13 +85,13 @@ pub fn held_files() -> BTreeMap<String, String> {
     held.clone().unwrap_or_default()
 }
 
-fn expect_same(path: &Path, bytes: &[u8]) -> Result<(), InputError> {
+fn expect_same(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
     held.as_mut().map_or(Ok(()), |held| hold(held, path, bytes))
 }
 
 /// Keeps a file's digest, or compares it with the one that is kept.
-fn hold(held: &mut BTreeMap<String, String>, path: &Path, bytes: &[u8]) -> Result<(), InputError> {
+fn hold(held: &mut BTreeMap<String, String>, path: &Path, bytes: &[u8]) -> Result<()> {
     let digest = crate::shown::hex(&hmac_sha256::Hash::hash(bytes));
     let first = held
         .entry(path.display().to_string())
@@ -110,7 +110,7 @@ fn hold(held: &mut BTreeMap<String, String>, path: &Path, bytes: &[u8]) -> Resul
 ///
 /// # Errors
 /// The errors of [`read_file`].
-pub fn stand_in(source: &str, file: &Path) -> Result<(), InputError> {
+pub fn stand_in(source: &str, file: &Path) -> Result<()> {
     let bytes = read_file(file)?;
     let mut pipes = PIPES.lock().unwrap_or_else(PoisonError::into_inner);
     pipes.insert(PathBuf::from(source), bytes);

@@ -7,7 +7,7 @@ mod note;
 mod table;
 
 pub(crate) use error::gigabytes;
-pub use error::{InputError, bare};
+pub use error::{InputError, Result, bare};
 pub use file::{held_files, hold_files, is_readable, names_file, pipes, read_file, stand_in};
 pub(crate) use note::{note, note_counted, warn};
 pub use note::{tell_notes, tell_warnings};

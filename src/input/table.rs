@@ -6,7 +6,7 @@
 use std::collections::HashSet;
 use std::fmt::Display;
 
-use super::{InputError, finite, note};
+use super::{InputError, Result, finite, note};
 use crate::shown::{counted, first_of, shortened};
 use crate::spec::nearest;
 
@@ -44,7 +44,7 @@ impl<'b> TableReader<'b> {
     /// # Errors
     /// Text that is no UTF-8, an empty file, a column named twice, a quote that is never
     /// closed.
-    pub fn open(bytes: &'b [u8], file: &str, names: &[&str]) -> Result<Self, InputError> {
+    pub fn open(bytes: &'b [u8], file: &str, names: &[&str]) -> Result<Self> {
         let no_text = |at: usize, found: &str| {
             InputError::line(file, lines(&bytes[..at]) + 1, found, "UTF-8 text")
         };
@@ -123,7 +123,7 @@ impl<'b> TableReader<'b> {
     }
 
     /// The places of columns that must all be there.
-    pub fn columns<const N: usize>(&self, names: &[&str; N]) -> Result<[usize; N], InputError> {
+    pub fn columns<const N: usize>(&self, names: &[&str; N]) -> Result<[usize; N]> {
         let mut places = [0; N];
         for (place, name) in places.iter_mut().zip(names) {
             *place = self.column(name).ok_or_else(|| {
@@ -169,7 +169,7 @@ impl<'b> TableReader<'b> {
     }
 
     /// The next row, or what is wrong with it; `None` at the end of the file.
-    pub fn next_row(&mut self) -> Option<Result<Row<'_>, InputError>> {
+    pub fn next_row(&mut self) -> Option<Result<Row<'_>>> {
         let read = self.csv.read_record(&mut self.record);
         read.ok().filter(|is_there| *is_there)?;
         let start = self.record.position().map_or(0, csv::Position::byte);
@@ -207,7 +207,7 @@ impl Row<'_> {
     }
 
     /// A finite f64.
-    pub fn finite_number(&self, column: usize) -> Result<f64, InputError> {
+    pub fn finite_number(&self, column: usize) -> Result<f64> {
         finite(self.text(column)).map_err(|expected| {
             let (name, text) = (&self.header[column], shortened(self.text(column), 60));
             self.error(format_args!("{name} '{text}'"), expected)
@@ -276,7 +276,7 @@ fn lines(bytes: &[u8]) -> u64 {
 ///
 /// It is never closed, or the quote that closes it has text behind it and was meant to
 /// open another field.
-fn check_quotes(bytes: &[u8], delimiter: u8, file: &str) -> Result<(), InputError> {
+fn check_quotes(bytes: &[u8], delimiter: u8, file: &str) -> Result<()> {
     // A byte order mark, which the CSV reader drops.
     let mut begin = 3 * usize::from(bytes.starts_with(b"\xef\xbb\xbf"));
     let fault = |open: usize, found: String| {

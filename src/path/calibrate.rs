@@ -3,7 +3,7 @@
 use super::unfit;
 use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions, Surroundings};
 use crate::geometry::Aabb;
-use crate::input::InputError;
+use crate::input::Result;
 use crate::scene::Scene;
 
 /// Maximum numbers of items and cameras sampled per step of the search.
@@ -37,7 +37,7 @@ pub(super) fn for_visible_share(
     scene: &Scene,
     cameras: &[Camera],
     share: f64,
-) -> Result<f64, InputError> {
+) -> Result<f64> {
     if !(0.0..=1.0).contains(&share) {
         let reason = format!("visible={share}; expected a share from 0 to 1");
         return Err(unfit(path, reason));
@@ -46,7 +46,7 @@ pub(super) fn for_visible_share(
     let items = every_nth(&scene.items, MOST_ITEMS.max(needed));
     let sample = every_nth(cameras, most_cameras(items.len()));
     let around = scene.surroundings();
-    let visible = |scale: f64| -> Result<f64, InputError> {
+    let visible = |scale: f64| -> Result<f64> {
         let mut seen = 0;
         for camera in &sample {
             seen += count(camera, scale, &items, &around).map_err(|e| unfit(path, e))?;
@@ -94,11 +94,7 @@ pub(super) fn most_cameras(items: usize) -> usize {
 }
 
 /// The cameras with far scaled, and near where it is a thousandth of far.
-pub(super) fn scaled(
-    path: &str,
-    cameras: &[Camera],
-    scale: f64,
-) -> Result<Vec<Camera>, InputError> {
+pub(super) fn scaled(path: &str, cameras: &[Camera], scale: f64) -> Result<Vec<Camera>> {
     let scaled = cameras.iter().map(|camera| rescaled(camera, scale));
     scaled.collect::<Result<_, _>>().map_err(|e| unfit(path, e))
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Pose, Stage, thin, unfit};
 use crate::camera::Frame;
-use crate::input::{InputError, note};
+use crate::input::{Result, note};
 use crate::scene::{CameraPlace, PlaceView};
 use crate::shown::counted;
 use crate::spec::Spec;
@@ -14,7 +14,7 @@ use crate::spec::Spec;
 /// A circle about the scene: everything turns past.
 ///
 /// `radius` is in half diagonals, `height` (of the eye above the centre) in radii.
-pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let radius = spec.number_between("radius", 0.6, 0.0, 1e6)? * stage.radius();
     let height = spec.number("height", 0.35)? * radius;
     let pose = |turn: f64| {
@@ -27,7 +27,7 @@ pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputEr
 
 /// A closed flight through `waypoints` seeded points within the scene's middle: the
 /// coherent path of a game or a film camera.
-pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let count = spec.whole_of("waypoints", 8, 4..=10_000)? as usize;
     let mut rng = stage.rng();
     let (low, extent) = (stage.bounds.min, stage.extent());
@@ -72,7 +72,7 @@ fn spline(points: &[DVec3], at: f64) -> DVec3 {
 }
 
 /// A turn in place by the camera's own yaw: the eye rests, the view changes.
-pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     let eye = stage.centre().with_z(stage.flight_level(0.3));
     let level = Frame::looking_along(eye, DVec3::X, DVec3::Z);
     let mut frame = level.map_err(|error| unfit("spin", error))?;
@@ -89,7 +89,7 @@ pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError>
 ///
 /// The eye moves along the look, then rests while the field of view narrows. `power` is
 /// the magnification at the end.
-pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let power = spec.number_between("power", 8.0, 1.0, 1e6)?;
     let forward = DVec3::new(0.8, 0.5, -0.3).normalize();
     let from = stage.centre() - forward * stage.radius();
@@ -106,7 +106,7 @@ pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputErr
 }
 
 /// Unrelated views: the eye jumps, so nothing of the last frame helps.
-pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     let mut rng = stage.rng();
     let poses = (0..stage.count).map(|_| {
         let share = rng.point();
@@ -123,7 +123,7 @@ pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputEr
 /// The whole scene from outside: everything is visible, so the cost of the answer
 /// itself shows. Eyes on a Fibonacci spiral over the sphere, far enough away for any
 /// field of view above 30 degrees to take in the scene's bounding sphere.
-pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
     // 1/sin(15 degrees) = 3.86 radii.
     let distance = 4.0 * stage.radius();
@@ -141,7 +141,7 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputErr
 /// The scene's own camera places: things of Doom maps, cameras of glTF.
 ///
 /// Roll and lens are the file's, where it states them. `frames` of them at most.
-pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     if stage.scene.places.is_empty() {
         let wanted = "expected one with places, such as a Doom map";
         let found = format!(
@@ -171,7 +171,7 @@ pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
 }
 
 /// The camera that the animation of a scene's file moves, at even times.
-pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     let unfit = |reason: String| unfit("animation", reason);
     let animation = match stage.scene.animation.as_deref() {
         Some(Ok(animation)) => animation,

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, LensKind, Surroundings};
 use crate::geometry::Aabb;
-use crate::input::{InputError, names_file, read_file, warn};
+use crate::input::{InputError, Result, names_file, read_file, warn};
 use crate::scene::{self, PlaceView, Scene, SeededRng, UpAxis, WorldBox, memory};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
@@ -54,12 +54,7 @@ impl CameraPath {
     ///
     /// # Errors
     /// A share that no scale reaches.
-    pub fn seeing(
-        mut self,
-        scene: &Scene,
-        share: f64,
-        scale: Option<f64>,
-    ) -> Result<CameraPath, InputError> {
+    pub fn seeing(mut self, scene: &Scene, share: f64, scale: Option<f64>) -> Result<CameraPath> {
         let find = || calibrate::for_visible_share(&self.name, scene, &self.cameras, share);
         let scale = scale.map_or_else(find, Ok)?;
         self.cameras = calibrate::scaled(&self.name, &self.cameras, scale)?;
@@ -124,7 +119,7 @@ pub struct PathFamily {
     pub summary: &'static str,
     /// Parameters beyond [`PATH_PARAMS`], for the help.
     pub params: &'static str,
-    frames: fn(&Stage, &mut Spec) -> Result<Vec<Pose>, InputError>,
+    frames: fn(&Stage, &mut Spec) -> Result<Vec<Pose>>,
 }
 
 /// All generated families, in the order of the help.
@@ -242,11 +237,7 @@ impl Scene {
 ///
 /// # Errors
 /// One line that names what was found and what was expected.
-pub fn load(
-    source: &str,
-    scene: &Scene,
-    defaults: &LensDefaults,
-) -> Result<CameraPath, InputError> {
+pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<CameraPath> {
     load_scaled(source, scene, defaults, None)
 }
 
@@ -260,7 +251,7 @@ pub fn load_scaled(
     scene: &Scene,
     defaults: &LensDefaults,
     scale: Option<f64>,
-) -> Result<CameraPath, InputError> {
+) -> Result<CameraPath> {
     let path = read(source, scene, defaults, scale)?;
     path.warnings(scene).iter().for_each(|text| warn(text));
     defaults.note_unused(&path);
@@ -272,7 +263,7 @@ fn read(
     scene: &Scene,
     defaults: &LensDefaults,
     scale: Option<f64>,
-) -> Result<CameraPath, InputError> {
+) -> Result<CameraPath> {
     if names_file(source) {
         let bytes = read_file(Path::new(source))?;
         let rows = bytes.iter().filter(|byte| **byte == b'\n').count();
@@ -315,7 +306,7 @@ fn read(
 }
 
 /// Refuses more cameras than there is memory for.
-fn fits(source: &str, cameras: u64) -> Result<(), InputError> {
+fn fits(source: &str, cameras: u64) -> Result<()> {
     /// Bytes of a camera with its views and answers: 2,800 were measured.
     const PER_CAMERA: u64 = 3000;
     let label = format!("path '{source}', {cameras} cameras");
@@ -381,7 +372,7 @@ impl Optics {
         })
     }
 
-    fn cameras(&self, path: &str, up: UpAxis, poses: &[Pose]) -> Result<Vec<Camera>, InputError> {
+    fn cameras(&self, path: &str, up: UpAxis, poses: &[Pose]) -> Result<Vec<Camera>> {
         let camera = |pose: &Pose| -> Result<Camera, CameraError> {
             let own = pose.view.map(|view| view.up);
             let upward = own.unwrap_or_else(|| up_for(pose.forward));

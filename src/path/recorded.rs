@@ -7,7 +7,7 @@ use crate::camera::{
     Camera, CameraError, FARTHEST, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
     MatrixConvention, look_at,
 };
-use crate::input::{InputError, Row, TableReader, note};
+use crate::input::{InputError, Result, Row, TableReader, note};
 use crate::scene::{Scene, WorldBox, memory};
 
 /// Values for columns that a file does not have, and lenses of generated paths.
@@ -93,11 +93,7 @@ const FAR_IN_NEARS: f64 = 1000.0;
 /// The line of the first value that is no number or makes no camera, or of a time before
 /// the last one; a file without cameras; matrices without a convention, or beside an eye or a lens; both a
 /// place to look at and a direction.
-pub fn read_cameras_csv(
-    bytes: &[u8],
-    file: &str,
-    defaults: &LensDefaults,
-) -> Result<CameraPath, InputError> {
+pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Result<CameraPath> {
     let mut table = TableReader::open(bytes, file, &[&MATRIX_ENTRIES[..], &OF_EYES].concat())?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
     let read: CameraReader = if is_matrix {
@@ -141,7 +137,7 @@ pub fn read_cameras_csv(
 }
 
 /// Makes the camera of a row, from the columns of one kind of file.
-type CameraReader<'a> = Box<dyn Fn(&Row) -> Result<Result<Camera, CameraError>, InputError> + 'a>;
+type CameraReader<'a> = Box<dyn Fn(&Row) -> Result<Result<Camera, CameraError>> + 'a>;
 
 /// Bytes of a row in what callers make of it, such as views.
 const BESIDE: usize = 64;
@@ -151,8 +147,8 @@ fn rows<T>(
     table: &mut TableReader,
     file: &str,
     none: &str,
-    mut read: impl FnMut(&Row) -> Result<T, InputError>,
-) -> Result<Vec<T>, InputError> {
+    mut read: impl FnMut(&Row) -> Result<T>,
+) -> Result<Vec<T>> {
     let mut found: Vec<T> = Vec::new();
     while let Some(row) = table.next_row() {
         // How long a pipe is shows as it is read.
@@ -194,7 +190,7 @@ const SYNONYMS: [(&str, &str); 3] = [
 fn matrices<'a>(
     table: &TableReader,
     convention: Option<MatrixConvention>,
-) -> Result<CameraReader<'a>, InputError> {
+) -> Result<CameraReader<'a>> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
     if let Some(other) = OF_EYES.iter().find(|name| table.column(name).is_some()) {
         let found = format_args!("columns of a matrix and '{other}'");
@@ -214,10 +210,7 @@ fn matrices<'a>(
     }))
 }
 
-fn eyes<'a>(
-    table: &TableReader,
-    defaults: &'a LensDefaults,
-) -> Result<CameraReader<'a>, InputError> {
+fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraReader<'a>> {
     let vector = |name: &str| {
         let names = ["x", "y", "z"].map(|axis| format!("{name}_{axis}"));
         let has_any = names.iter().any(|name| table.column(name).is_some());
@@ -287,7 +280,7 @@ fn eyes<'a>(
 /// # Errors
 /// The line of the first value that is no finite number; a file without
 /// points.
-pub fn read_points_csv(bytes: &[u8], file: &str) -> Result<Vec<DVec3>, InputError> {
+pub fn read_points_csv(bytes: &[u8], file: &str) -> Result<Vec<DVec3>> {
     let mut table = TableReader::open(bytes, file, &["x", "y", "z"])?;
     let columns = table.columns(&["x", "y", "z"])?;
     let points = rows(&mut table, file, "no point", |row| point(row, columns))?;
@@ -295,7 +288,7 @@ pub fn read_points_csv(bytes: &[u8], file: &str) -> Result<Vec<DVec3>, InputErro
     Ok(points)
 }
 
-fn point(row: &Row, [x, y, z]: [usize; 3]) -> Result<DVec3, InputError> {
+fn point(row: &Row, [x, y, z]: [usize; 3]) -> Result<DVec3> {
     let of = |column| row.finite_number(column);
     Ok(DVec3::new(of(x)?, of(y)?, of(z)?))
 }
@@ -307,7 +300,7 @@ mod tests {
     use crate::scene::read_boxes_csv;
     use std::sync::Mutex;
 
-    fn read(text: &str) -> Result<CameraPath, InputError> {
+    fn read(text: &str) -> Result<CameraPath> {
         read_cameras_csv(text.as_bytes(), "c.csv", &LensDefaults::default())
     }
 

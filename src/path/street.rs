@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Pose, Stage};
 use crate::geometry::Aabb;
-use crate::input::InputError;
+use crate::input::Result;
 use crate::scene::{Regions, SeededRng};
 use crate::spec::Spec;
 
@@ -40,7 +40,7 @@ struct Span {
     is_ground: bool,
 }
 
-pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let height = spec.number_between("height", 1.7, 0.0, 1e6)?;
     let mut rng = stage.rng();
     let places = &stage.scene.places;

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{Pose, Stage, unfit};
-use crate::input::InputError;
+use crate::input::Result;
 use crate::scene::{Regions, SeededRng, Tiling, WadMap};
 use crate::spec::Spec;
 
@@ -32,7 +32,7 @@ struct Plan {
     walls: Vec<[DVec2; 2]>,
 }
 
-pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, InputError> {
+pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let (plan, natural) = match &stage.scene.regions {
         Regions::Tiling(tiling) => (Plan::of_rooms(stage, tiling), 1.7),
         Regions::Bsp(map) => (Plan::of_map(map), 41.0),

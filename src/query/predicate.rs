@@ -143,22 +143,28 @@ impl Predicate for Aabb {
     }
 }
 
-/// THE plane test in f32. Monotone because round-to-nearest is: see
-/// [`Plane::value_at`](crate::geometry::Plane::value_at).
-impl Predicate for ConvexVolume {
-    #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.mask()
-    }
-    #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.plane_of_bit(plane).excludes(bounds)
-    }
-    #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.plane_of_bit(plane).contains(bounds)
-    }
+/// THE plane test. Monotone because round-to-nearest is: see
+/// [`Plane::value_at`](crate::geometry::Plane::value_at). In f64 as well: promoting a box
+/// is exact.
+macro_rules! plane_test {
+    ($($Volume:ty),+) => {$(
+        impl Predicate for $Volume {
+            #[inline(always)]
+            fn mask(&self) -> PlaneMask {
+                self.mask()
+            }
+            #[inline(always)]
+            fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
+                self.plane_of_bit(plane).excludes(bounds)
+            }
+            #[inline(always)]
+            fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
+                self.plane_of_bit(plane).contains(bounds)
+            }
+        }
+    )+};
 }
+plane_test!(ConvexVolume, ConvexVolumeF64);
 
 /// The sphere test, on an index over [sphere cubes](crate::geometry::sphere_cube).
 /// Nodes get the plane test, items the plane test and the sphere test; monotone because
@@ -182,23 +188,6 @@ impl Predicate for Spheres {
     }
 }
 
-/// The plane test in f64. Monotone as in f32: promoting is exact, and every
-/// operation rounds to nearest.
-impl Predicate for ConvexVolumeF64 {
-    #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.mask()
-    }
-    #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.plane_of_bit(plane).excludes(bounds)
-    }
-    #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.plane_of_bit(plane).contains(bounds)
-    }
-}
-
 /// The plane test on boxes relative to the eye. Monotone because moving a box
 /// is ([`Aabb::relative_to`]): a box within another is moved to a box within
 /// the other one moved, and there the plane test is monotone.
@@ -209,13 +198,11 @@ impl Predicate for RelativeVolume {
     }
     #[inline(always)]
     fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        let planes = self.planes();
-        planes.plane_of_bit(plane).excludes(&self.moved(bounds))
+        Predicate::excludes(self.planes(), plane, &self.moved(bounds))
     }
     #[inline(always)]
     fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        let planes = self.planes();
-        planes.plane_of_bit(plane).contains(&self.moved(bounds))
+        Predicate::contains(self.planes(), plane, &self.moved(bounds))
     }
 }
 

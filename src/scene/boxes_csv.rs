@@ -7,7 +7,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::{Labels, Scene, WorldBox};
-use crate::input::{InputError, TableReader, note};
+use crate::input::{InputError, Result, TableReader, note};
 use crate::query::ItemId;
 use crate::shown::shortened;
 
@@ -22,7 +22,7 @@ const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"]
 ///
 /// # Errors
 /// A missing or wrong header; the first bad row with the number of all.
-pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<Scene, InputError> {
+pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<Scene> {
     let mut rows = read_rows(bytes, file, f64::from(f32::MAX))?;
     if let Some(first) = rows.first_bad.take().filter(|_| !skip_bad_items) {
         return Err(match rows.bad {
@@ -47,7 +47,7 @@ pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<
 ///
 /// # Errors
 /// A missing or wrong header, or the first bad row.
-pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>, InputError> {
+pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>> {
     let mut rows = read_rows(bytes, file, f64::MAX)?;
     rows.first_bad.take().map_or(Ok(()), Err)?;
     if rows.boxes.is_empty() {
@@ -85,7 +85,7 @@ impl Rows {
 }
 
 /// Reads all rows; bad is also a bound beyond `limit`.
-fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows, InputError> {
+fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let columns = table.columns(&BOUNDS)?;
     let others = table.header().iter().enumerate();
@@ -169,7 +169,7 @@ pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Scene, InputError> {
+    fn read(text: &str) -> Result<Scene> {
         read_boxes_csv(text.as_bytes(), "b.csv", false)
     }
 

@@ -7,7 +7,7 @@ use super::meshes::{ground, spheres};
 use super::rng::SeededRng;
 use super::rooms::World;
 use super::{Regions, Scene, Surfaces, families, rooms};
-use crate::input::InputError;
+use crate::input::Result;
 use crate::spec::{Spec, SpecError};
 
 /// The generator behind every seeded choice. Its stream is fixed by its
@@ -99,7 +99,7 @@ impl Family {
     ///
     /// # Errors
     /// A parameter that is unknown or out of range.
-    pub fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene, InputError> {
+    pub fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene> {
         let n = match self.build {
             Boxes(_) | Rooms(_) => spec.whole("n", COUNT, MOST)?,
             Mesh(_) => spec.count("n", COUNT, MOST)?,

@@ -8,7 +8,7 @@ use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
 use super::{LoadOptions, WorldBox};
 use crate::geometry::Aabb;
-use crate::input::{InputError, gigabytes};
+use crate::input::{InputError, Result, gigabytes};
 
 /// Bytes of an item in a scene: as indexes hold it, and as it was written.
 const HELD: u64 = (size_of::<Aabb>() + size_of::<WorldBox>()) as u64;
@@ -39,12 +39,7 @@ impl LoadOptions {
     ///
     /// # Errors
     /// The sizes needed and free.
-    pub fn check_fits(
-        &self,
-        scene: &str,
-        items: Option<u64>,
-        triangles: u64,
-    ) -> Result<(), InputError> {
+    pub fn check_fits(&self, scene: &str, items: Option<u64>, triangles: u64) -> Result<()> {
         let made = needed_by_items(items.unwrap_or(triangles / FEWEST), self.structures);
         let needed = made.saturating_add(triangles.saturating_mul(MESHED + self.per_triangle));
         let count = items.unwrap_or(0).max(triangles);
@@ -58,17 +53,12 @@ impl LoadOptions {
 ///
 /// # Errors
 /// The sizes needed and free.
-pub fn check_fits(scene: &str, needed: u64, structures: u64, count: u64) -> Result<(), InputError> {
+pub fn check_fits(scene: &str, needed: u64, structures: u64, count: u64) -> Result<()> {
     let available = (count > ANYWHERE).then(available_bytes).flatten();
     fits(scene, needed, structures, available)
 }
 
-fn fits(
-    scene: &str,
-    needed: u64,
-    structures: u64,
-    available: Option<u64>,
-) -> Result<(), InputError> {
+fn fits(scene: &str, needed: u64, structures: u64, available: Option<u64>) -> Result<()> {
     let Some(available) = available.filter(|available| needed > *available) else {
         return Ok(());
     };

@@ -35,7 +35,7 @@ use glam::{DVec3, Vec3};
 use crate::arithmetic::rounding::{sum_down, sum_up};
 
 use crate::geometry::{Aabb, PlaneTree};
-use crate::input::InputError;
+use crate::input::{InputError, Result};
 use crate::query::ItemId;
 
 pub(crate) use crate::shown::hex;
@@ -210,7 +210,7 @@ pub struct Scene {
     /// Camera places that the scene offers, for the path `places`.
     pub places: Vec<CameraPlace>,
     /// The camera that an animation of the file moves, or why it cannot be read.
-    pub animation: Option<Arc<Result<CameraAnimation, InputError>>>,
+    pub animation: Option<Arc<Result<CameraAnimation>>>,
     /// The partition that the scene's file brings, local coordinates.
     pub own_tree: Option<PlaneTree>,
     /// Items left out on request (`--skip-bad-items`).
@@ -238,17 +238,13 @@ impl Scene {
     ///
     /// # Errors
     /// The first box that is not finite, inverted or too large for f32.
-    pub fn from_boxes(name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene, InputError> {
+    pub fn from_boxes(name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene> {
         let origin = choose_origin(boxes.iter().copied());
         Scene::about(name, boxes, origin)
     }
 
     /// The same about a given origin.
-    pub fn about(
-        name: impl Into<String>,
-        boxes: &[WorldBox],
-        origin: DVec3,
-    ) -> Result<Scene, InputError> {
+    pub fn about(name: impl Into<String>, boxes: &[WorldBox], origin: DVec3) -> Result<Scene> {
         let name = name.into();
         let rounded = |b: &WorldBox| Aabb::rounded_outward(b.min, b.max, origin);
         let items: Vec<Aabb> = boxes.iter().map(rounded).collect();

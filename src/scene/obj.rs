@@ -12,7 +12,7 @@ use std::fmt::Display;
 use glam::DVec3;
 
 use super::{Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory};
-use crate::input::{InputError, finite, note};
+use crate::input::{InputError, Result, finite, note};
 use crate::shown::{counted, first_of, shortened};
 
 /// First words of lines whose meaning is known here.
@@ -42,12 +42,7 @@ pub fn is_obj(bytes: &[u8]) -> bool {
 /// # Errors
 /// The first line with numbers that are none, or with a vertex that is not there; a file
 /// without faces; a scene that does not fit into memory or into f32.
-pub fn read_obj(
-    bytes: &[u8],
-    file: &str,
-    name: &str,
-    options: &LoadOptions,
-) -> Result<Scene, InputError> {
+pub fn read_obj(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
     let size = bytes.len() as u64;
     let needed = size.saturating_mul(BYTES_PER_BYTE);
     memory::check_fits(name, needed, options.structures, size)?;
@@ -129,7 +124,7 @@ impl Obj<'_> {
         InputError::line(self.file, line, found, expected)
     }
 
-    fn line(&mut self, line: &[u8], number: u64) -> Result<(), InputError> {
+    fn line(&mut self, line: &[u8], number: u64) -> Result<()> {
         let mut words = words(line).take_while(|word| !word.starts_with(b"#"));
         let Some(word) = words.next() else {
             return Ok(());
@@ -165,7 +160,7 @@ impl Obj<'_> {
                     let next = next?;
                     Ok([first, std::mem::replace(&mut last, next), next])
                 });
-                let fan: Vec<[u32; 3]> = fan.collect::<Result<_, InputError>>()?;
+                let fan: Vec<[u32; 3]> = fan.collect::<Result<_>>()?;
                 if fan.is_empty() {
                     return Err(self.error(number, "2 corners", "three or more"));
                 }
@@ -193,7 +188,7 @@ impl Obj<'_> {
     }
 
     /// The point of `7`, `-1` or `7/3/2`.
-    fn corner(&self, word: &[u8], number: u64) -> Result<u32, InputError> {
+    fn corner(&self, word: &[u8], number: u64) -> Result<u32> {
         let own = word.split(|byte| *byte == b'/').next().unwrap_or_default();
         let index = std::str::from_utf8(own).ok();
         let index = index.and_then(|own| own.parse::<i64>().ok());
@@ -213,7 +208,7 @@ impl Obj<'_> {
         }
     }
 
-    fn into_scene(mut self, name: &str) -> Result<Scene, InputError> {
+    fn into_scene(mut self, name: &str) -> Result<Scene> {
         let end = self.corners.len();
         self.items.pop_if(|(_, first)| *first == end);
         self.items.push((String::new(), end));
@@ -275,7 +270,7 @@ l 1 2 3 4 # a line \\
 g last
 f 1 2 3 4";
 
-    fn read(text: &[u8]) -> Result<Scene, InputError> {
+    fn read(text: &[u8]) -> Result<Scene> {
         read_obj(text, "t.obj", "t", &LoadOptions::default())
     }
 

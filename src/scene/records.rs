@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use glam::{DVec2, Vec3};
 
-use crate::input::InputError;
+use crate::input::{InputError, Result};
 
 /// A table of a file.
 pub struct Table<'a> {
@@ -40,7 +40,7 @@ impl<'a> Table<'a> {
         name: &'static str,
         bytes: &'a [u8],
         entry: usize,
-    ) -> Result<Self, InputError> {
+    ) -> Result<Self> {
         let [offset, size] = [0, 4].map(|at| int_at(bytes, entry + at));
         let range = match size {
             0 => Some(entry..entry),
@@ -55,7 +55,7 @@ impl<'a> Table<'a> {
     }
 
     /// The same bytes as records of a size.
-    pub fn of_records(self, record: usize) -> Result<Self, InputError> {
+    pub fn of_records(self, record: usize) -> Result<Self> {
         let size = self.data.len();
         match size.is_multiple_of(record) {
             true => Ok(Table { record, ..self }),
@@ -97,7 +97,7 @@ impl<'a> Table<'a> {
     }
 
     /// A finite number of f32.
-    pub fn float(&self, i: usize, at: usize) -> Result<f32, InputError> {
+    pub fn float(&self, i: usize, at: usize) -> Result<f32> {
         let value = f32::from_bits(self.int(i, at) as u32);
         match value.is_finite() {
             true => Ok(value),
@@ -106,22 +106,22 @@ impl<'a> Table<'a> {
     }
 
     /// Three finite numbers of f32.
-    pub fn vector(&self, i: usize, at: usize) -> Result<Vec3, InputError> {
+    pub fn vector(&self, i: usize, at: usize) -> Result<Vec3> {
         let part = |part| self.float(i, at + part);
         Ok(Vec3::new(part(0)?, part(4)?, part(8)?))
     }
 
     /// A 16-bit field that counts records of another table.
-    pub fn index16(&self, i: usize, at: usize, of: &Table) -> Result<usize, InputError> {
+    pub fn index16(&self, i: usize, at: usize, of: &Table) -> Result<usize> {
         self.below(i, at, self.word(i, at).into(), of)
     }
 
     /// A 32-bit field that counts records of another table.
-    pub fn index(&self, i: usize, at: usize, of: &Table) -> Result<usize, InputError> {
+    pub fn index(&self, i: usize, at: usize, of: &Table) -> Result<usize> {
         self.below(i, at, self.int(i, at), of)
     }
 
-    fn below(&self, i: usize, at: usize, index: i32, of: &Table) -> Result<usize, InputError> {
+    fn below(&self, i: usize, at: usize, index: i32, of: &Table) -> Result<usize> {
         match usize::try_from(index) {
             Ok(known) if known < of.len() => Ok(known),
             _ => {
@@ -132,7 +132,7 @@ impl<'a> Table<'a> {
     }
 
     /// Two 32-bit fields, the first of some records of another table and their count.
-    pub fn range(&self, i: usize, at: usize, of: &Table) -> Result<Range<usize>, InputError> {
+    pub fn range(&self, i: usize, at: usize, of: &Table) -> Result<Range<usize>> {
         let [first, count] = [at, at + 4].map(|at| self.int(i, at));
         range_within(first, count, of.len()).ok_or_else(|| {
             let found = format!("{count} {} from {first} on in {} {i}", of.name, self.name);

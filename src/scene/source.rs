@@ -15,7 +15,7 @@ use super::{
     FAMILIES, Family, ItemKind, LoadOptions, MESHES, Regions, SAMPLES, Sample, Scene, WadMap,
     boxes_csv, map_names,
 };
-use crate::input::{InputError, is_readable, note, note_counted, read_file};
+use crate::input::{InputError, Result, is_readable, note, note_counted, read_file};
 use crate::shown::shortened;
 use crate::spec::{Spec, SpecError, nearest};
 
@@ -40,7 +40,7 @@ pub fn split_part(source: &str) -> (&str, Option<&str>) {
 ///
 /// # Errors
 /// A file that cannot be read, or a directory that is damaged.
-pub fn every_part(source: &str) -> Result<Vec<String>, InputError> {
+pub fn every_part(source: &str) -> Result<Vec<String>> {
     let (file, part) = split_part(source);
     let names = match part {
         Some("*") => part_names(&read_file(Path::new(file))?, file)?,
@@ -56,7 +56,7 @@ pub fn every_part(source: &str) -> Result<Vec<String>, InputError> {
 ///
 /// # Errors
 /// A directory that is damaged.
-pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
+pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     match (is_wad(bytes), is_zip(bytes)) {
         (true, _) => map_names(bytes, file),
         (_, true) => zip::scene_names(bytes, file),
@@ -69,7 +69,7 @@ pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
 ///
 /// # Errors
 /// One line that names what was found and what was expected.
-pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
+pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
     let mut scene = read(source, options)?;
     if options.items == ItemKind::Triangles {
         scene = scene.by_triangle(options)?;
@@ -94,7 +94,7 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     Ok(scene)
 }
 
-fn read(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
+fn read(source: &str, options: &LoadOptions) -> Result<Scene> {
     let (file, part) = split_part(source);
     if is_readable(Path::new(file)) {
         let bytes = read_file(Path::new(file))?;
@@ -126,7 +126,7 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
 ///
 /// # Errors
 /// A scene that would not fit.
-pub fn check_fits(source: &str, options: &LoadOptions) -> Result<(), InputError> {
+pub fn check_fits(source: &str, options: &LoadOptions) -> Result<()> {
     let Ok(spec) = Spec::parse_behind(MESH_PREFIX, source) else {
         return Ok(());
     };
@@ -142,7 +142,7 @@ fn check_generated(
     family: &Family,
     spec: &Spec,
     options: &LoadOptions,
-) -> Result<(), InputError> {
+) -> Result<()> {
     // The generator reports a count that is no number.
     let Ok(n) = spec.clone().whole("n", COUNT, MOST) else {
         return Ok(());
@@ -164,7 +164,7 @@ pub fn read_bytes(
     names: [&str; 2],
     map: Option<&str>,
     options: &LoadOptions,
-) -> Result<Scene, InputError> {
+) -> Result<Scene> {
     read_beside(bytes, names, map, options, &|uri| beside(names[0], uri))
 }
 
@@ -174,7 +174,7 @@ fn read_beside(
     map: Option<&str>,
     options: &LoadOptions,
     beside: Beside,
-) -> Result<Scene, InputError> {
+) -> Result<Scene> {
     refuse(bytes, file)?;
     if is_zip(bytes) {
         let archive = zip::open(bytes, file)?;
@@ -254,7 +254,7 @@ impl Sample {
     ///
     /// # Errors
     /// The file cannot be read; no sample of this build has that error.
-    pub fn load(&self) -> Result<Scene, InputError> {
+    pub fn load(&self) -> Result<Scene> {
         let names = [self.file, self.name];
         Ok(Scene {
             unit: Some(self.unit),
@@ -301,7 +301,7 @@ const FORMATS: [(&str, &[u8], &str, &str); 24] = [
 ///
 /// # Errors
 /// The name of the format, and what to give instead.
-pub fn refuse(bytes: &[u8], file: &str) -> Result<(), InputError> {
+pub fn refuse(bytes: &[u8], file: &str) -> Result<()> {
     let extension = Path::new(file).extension().unwrap_or_default();
     let is_named = |name: &str| extension.eq_ignore_ascii_case(name);
     let holds = |word: &[u8]| bytes.windows(word.len()).any(|window| window == word);

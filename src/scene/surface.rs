@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::{Labels, LoadOptions, Regions, Scene, WorldBox};
 use crate::geometry::Aabb;
-use crate::input::InputError;
+use crate::input::Result;
 use crate::query::ItemId;
 use crate::spec::SpecError;
 
@@ -248,7 +248,7 @@ impl Surfaces {
     ///
     /// # Errors
     /// An item without triangles, which has no box.
-    pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
+    pub fn into_scene(self, name: impl Into<String>) -> Result<Scene> {
         let boxes: Vec<_> = self.of_item.iter().map(|t| self.world_box(t)).collect();
         let scene = Scene::about(name, &boxes, self.origin)?;
         Ok(Scene {
@@ -289,7 +289,7 @@ impl Scene {
     ///
     /// # Errors
     /// A scene without triangles, or one that does not fit into memory.
-    pub fn by_triangle(self, options: &LoadOptions) -> Result<Scene, InputError> {
+    pub fn by_triangle(self, options: &LoadOptions) -> Result<Scene> {
         let Some(surfaces) = &self.surfaces else {
             return Err(SpecError::new(format_args!(
                 "{}: no triangles; expected a scene with them for --items triangles",

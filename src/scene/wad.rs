@@ -10,7 +10,7 @@ use super::disputes::{Dispute, Linedef, disputes};
 use super::lumps::Wad;
 use super::records::Table;
 use super::{CameraPlace, Labels, Regions, Scene, WorldBox};
-use crate::input::InputError;
+use crate::input::Result;
 
 /// Height of a player's eyes above the floor, in map units.
 const EYE_HEIGHT: f64 = 41.0;
@@ -55,7 +55,7 @@ pub struct Thing {
 /// The names of the maps in a WAD file, in file order.
 ///
 /// If several maps have the same name, only the last counts.
-pub fn map_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
+pub fn map_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     let wad = Wad::open(bytes, file)?;
     let names = wad.markers().into_iter().map(|(name, _)| name.to_owned());
     Ok(names.collect())
@@ -66,15 +66,15 @@ impl WadMap {
     ///
     /// # Errors
     /// The first thing that is wrong, by its byte.
-    pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap, InputError> {
+    pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap> {
         let wad = Wad::open(bytes, file)?;
         let of = wad.tables(map)?;
-        let vertex = |table: &Table, i: usize, at: usize| -> Result<[i32; 2], InputError> {
+        let vertex = |table: &Table, i: usize, at: usize| -> Result<[i32; 2]> {
             let v = table.index16(i, at, &of.vertices)?;
             Ok([0, 2].map(|at| of.vertices.short(v, at) as i32))
         };
         // The sector on a side of a line (0 right, 1 left), if there is one.
-        let sector_of = |line: usize, side: usize| -> Result<Option<u32>, InputError> {
+        let sector_of = |line: usize, side: usize| -> Result<Option<u32>> {
             let at = 10 + 2 * side;
             if of.lines.word(line, at) == u16::MAX {
                 return Ok(None);
@@ -82,7 +82,7 @@ impl WadMap {
             let side = of.lines.index16(line, at, &of.sides)?;
             Ok(Some(of.sides.index16(side, 28, &of.sectors)? as u32))
         };
-        let linedef = |i: usize| -> Result<Linedef, InputError> {
+        let linedef = |i: usize| -> Result<Linedef> {
             let sectors = [sector_of(i, 0)?, sector_of(i, 1)?];
             if sectors == [None; 2] {
                 let found = "a linedef without a side";
@@ -102,7 +102,7 @@ impl WadMap {
             vertex(&of.segs, i, 2)?;
             of.segs.index16(i, 6, &of.lines)?;
         }
-        let leaf_sector = |i: usize| -> Result<u32, InputError> {
+        let leaf_sector = |i: usize| -> Result<u32> {
             let (count, first) = (of.leaves.word(i, 0), of.leaves.index16(i, 2, &of.segs)?);
             if count == 0 || first + usize::from(count) > of.segs.len() {
                 let found = format!("a subsector of {count} segs from {first} on");
@@ -168,7 +168,7 @@ impl WadMap {
     }
 
     /// The map as a scene: linedefs first, then things, in lump order.
-    pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
+    pub fn into_scene(self, name: impl Into<String>) -> Result<Scene> {
         let lines = self.lines.iter().map(|line| self.line_box(line));
         let mut boxes: Vec<WorldBox> = lines.collect();
         let mut kinds = Labels::new("kind");

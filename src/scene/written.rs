@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use super::{Regions, Scene, WorldBox, bad_item};
 use crate::arithmetic::two_sum;
 use crate::geometry::{Aabb, ConvexVolume};
-use crate::input::InputError;
+use crate::input::Result;
 use crate::query::ItemId;
 
 /// The boxes as written, kept only where f32 holds one of them otherwise.
@@ -213,7 +213,7 @@ impl Scene {
     /// # Errors
     /// An item that lies beyond what the reader
     /// takes: the range of f32, in world coordinates.
-    pub fn settled(self) -> Result<Scene, InputError> {
+    pub fn settled(self) -> Result<Scene> {
         let most = f64::from(f32::MAX);
         let within = |v: DVec3| v.abs().cmple(DVec3::splat(most)).all();
         let boxes: Vec<WorldBox> = self.written().collect();

@@ -10,7 +10,7 @@ use miniz_oxide::inflate::decompress_to_vec_with_limit;
 use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive, crc32};
 
 use super::memory;
-use crate::input::InputError;
+use crate::input::{InputError, Result};
 use crate::shown::{counted, first_of, part_hint, plain, shortened};
 
 /// Endings of the names of scenes.
@@ -35,7 +35,7 @@ pub struct Entry<'w> {
 }
 
 /// Names of the entries of an archive that are scenes by their names, in its order.
-pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
+pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     let archive = open(bytes, file)?;
     let entries = entries(&archive, file)?.into_iter();
     let names = entries.map(|(name, _)| name);
@@ -52,7 +52,7 @@ pub fn unpack<'w>(
     entries: &[(String, ZipFileHeaderRecord)],
     file: &str,
     wanted: Option<&'w str>,
-) -> Result<Entry<'w>, InputError> {
+) -> Result<Entry<'w>> {
     let (name, record, map) = chosen(entries, file, wanted)?;
     let refused = |found: &dyn Display, expected: &str| {
         let place = format!("entry {}", shortened(name, 80));
@@ -96,7 +96,7 @@ pub fn unpack<'w>(
 
 pub type Archive<'a> = ZipSliceArchive<&'a [u8]>;
 
-pub fn open<'a>(bytes: &'a [u8], file: &str) -> Result<Archive<'a>, InputError> {
+pub fn open<'a>(bytes: &'a [u8], file: &str) -> Result<Archive<'a>> {
     ZipArchive::from_slice(bytes).map_err(|error| damaged(file, error))
 }
 
@@ -110,7 +110,7 @@ fn damaged(file: &str, error: rawzip::Error) -> InputError {
 pub fn entries<'a>(
     archive: &'a Archive,
     file: &str,
-) -> Result<Vec<(String, ZipFileHeaderRecord<'a>)>, InputError> {
+) -> Result<Vec<(String, ZipFileHeaderRecord<'a>)>> {
     let (mut all, mut records) = (Vec::new(), archive.entries());
     while let Some(record) = records.next_entry().map_err(|error| damaged(file, error))? {
         let path = record.file_path();
@@ -142,7 +142,7 @@ fn chosen<'e, 'r, 'w>(
     entries: &'e [(String, ZipFileHeaderRecord<'r>)],
     file: &str,
     wanted: Option<&'w str>,
-) -> Result<(&'e str, &'e ZipFileHeaderRecord<'r>, Option<&'w str>), InputError> {
+) -> Result<(&'e str, &'e ZipFileHeaderRecord<'r>, Option<&'w str>)> {
     let named = |wanted: &str| {
         let last = |is_it: &dyn Fn(&str) -> bool| entries.iter().rfind(|(name, _)| is_it(name));
         last(&|name| name == wanted).or_else(|| last(&|name| name.eq_ignore_ascii_case(wanted)))

@@ -46,21 +46,16 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     };
     for &least in sizes {
         // No plane across an axis separates centres with one coordinate on it.
-        for axis in axes
-            .into_iter()
-            .filter(|&k| centres.min[k] < centres.max[k])
-        {
+        let differ = |k: &usize| centres.min[*k] < centres.max[*k];
+        for axis in axes.into_iter().filter(differ) {
             let at = |r: &Record| r.bounds.centre()[axis];
             records
                 .select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id)));
             let middle = at(&records[half]);
             let below = records[..half].iter().filter(|r| at(r) < middle).count();
             let above = half + records[half..].iter().filter(|r| at(r) <= middle).count();
-            let nearest = if half - below <= above - half {
-                below
-            } else {
-                above
-            };
+            let is_below = half - below <= above - half;
+            let nearest = if is_below { below } else { above };
             // The other edge of the layer may be that of the group.
             let nearest = match nearest {
                 0 => above,

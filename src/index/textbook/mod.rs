@@ -150,25 +150,11 @@ impl Node {
         ControlFlow::Continue(())
     }
 
-    /// Adds the cells of a subtree, the node's own first.
-    fn add_cells<'a>(&'a self, level: u32, cells: &mut Vec<TreeCell<'a>>) {
-        cells.push(TreeCell {
-            level,
-            bounds: self.bounds,
-            half_space: self.half_space,
-            items: &self.ids,
-        });
+    /// Shows all nodes of a subtree with their levels, depth first.
+    fn each<'a>(&'a self, level: u32, show: &mut impl FnMut(&'a Node, u32)) {
+        show(self, level);
         for child in &self.children {
-            child.add_cells(level + 1, cells);
-        }
-    }
-
-    /// Adds the memory of a subtree to a sum.
-    fn add_memory(&self, sum: &mut MemoryUsage) {
-        sum.node_bytes += size_of::<Node>();
-        sum.item_bytes += size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]);
-        for child in &self.children {
-            child.add_memory(sum);
+            child.each(level + 1, show);
         }
     }
 }
@@ -209,7 +195,10 @@ impl<D: Division> RegionIndex for Textbook<D> {
     fn memory(&self) -> MemoryUsage {
         let mut sum = MemoryUsage::default();
         if let Some(root) = &self.root {
-            root.add_memory(&mut sum);
+            root.each(0, &mut |node, _| {
+                sum.node_bytes += size_of::<Node>();
+                sum.item_bytes += size_of_val(&node.boxes[..]) + size_of_val(&node.ids[..]);
+            });
         }
         sum
     }
@@ -217,7 +206,14 @@ impl<D: Division> RegionIndex for Textbook<D> {
     fn cells(&self) -> Vec<TreeCell<'_>> {
         let mut cells = Vec::new();
         if let Some(root) = &self.root {
-            root.add_cells(0, &mut cells);
+            root.each(0, &mut |node, level| {
+                cells.push(TreeCell {
+                    level,
+                    bounds: node.bounds,
+                    half_space: node.half_space,
+                    items: &node.ids,
+                });
+            });
         }
         cells
     }

@@ -94,7 +94,7 @@ fn columns_are_separated_by_what_separates_the_header() {
 
 /// The error of reading a table of three columns to its end.
 fn told(text: &[u8]) -> String {
-    let read = || -> Result<(), InputError> {
+    let read = || -> Result<()> {
         let mut table = TableReader::open(text, "t.csv", &NAMES)?;
         let columns = table.columns(&["x", "y", "z"])?;
         while let Some(row) = table.next_row() {

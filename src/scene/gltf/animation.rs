@@ -14,7 +14,7 @@ use gltf::json::validation::Checked;
 
 use super::Order;
 use super::file::File;
-use crate::input::InputError;
+use crate::input::Result;
 use crate::scene::{CameraPlace, PlaceView};
 use crate::shown::counted;
 
@@ -138,7 +138,7 @@ fn lens(camera: &Value) -> Option<PlaceView> {
 
 impl File<'_> {
     /// Lens of the camera of a node, if it states one.
-    pub fn lens_of(&self, node: usize) -> Result<Option<PlaceView>, InputError> {
+    pub fn lens_of(&self, node: usize) -> Result<Option<PlaceView>> {
         let Some(camera) = self.root.nodes[node].camera else {
             return Ok(None);
         };
@@ -148,7 +148,7 @@ impl File<'_> {
     }
 
     /// The first camera that an animation moves, by its first animation.
-    pub fn camera_animation(&self, order: &Order) -> Result<Option<CameraAnimation>, InputError> {
+    pub fn camera_animation(&self, order: &Order) -> Result<Option<CameraAnimation>> {
         let mut channels: HashMap<usize, Vec<(usize, usize, usize, &Channel)>> = HashMap::new();
         for (clip, animation) in self.root.animations.iter().enumerate() {
             for (number, channel) in animation.channels.iter().enumerate() {
@@ -195,13 +195,7 @@ impl File<'_> {
         }))
     }
 
-    fn track(
-        &self,
-        clip: usize,
-        channel: &Channel,
-        part: usize,
-        place: &str,
-    ) -> Result<Track, InputError> {
+    fn track(&self, clip: usize, channel: &Channel, part: usize, place: &str) -> Result<Track> {
         let samplers = &self.root.animations[clip].samplers;
         let sampler = self.get(samplers, channel.sampler, place)?;
         let width = if part == 1 { 4 } else { 3 };

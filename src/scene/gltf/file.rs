@@ -12,7 +12,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root, Value};
 use serde::Deserialize;
 
-use crate::input::{InputError, read_file};
+use crate::input::{InputError, Result, read_file};
 use crate::shown::{message, plain, shortened};
 
 /// JSON and binary chunk of a GLB of version 2; `None` if they are cut off.
@@ -62,10 +62,10 @@ pub struct Exact {
 }
 
 /// Reads a file that a scene names relative to itself.
-pub type Beside<'b> = &'b dyn Fn(&str) -> Result<Vec<u8>, InputError>;
+pub type Beside<'b> = &'b dyn Fn(&str) -> Result<Vec<u8>>;
 
 /// The file in the folder of a scene.
-pub fn beside(file: &str, name: &str) -> Result<Vec<u8>, InputError> {
+pub fn beside(file: &str, name: &str) -> Result<Vec<u8>> {
     let folder = Path::new(file).parent().unwrap_or(Path::new(""));
     let path = folder.join(name);
     match path.is_file() || !path.exists() {
@@ -103,7 +103,7 @@ pub struct File<'f> {
 }
 
 impl<'f> File<'f> {
-    pub fn open(bytes: &'f [u8], name: &'f str, beside: Beside) -> Result<File<'f>, InputError> {
+    pub fn open(bytes: &'f [u8], name: &'f str, beside: Beside) -> Result<File<'f>> {
         let error = |found: String| InputError::at(name, "JSON", found, "glTF 2.0");
         let (json, mut bin) = match bytes.starts_with(b"glTF") {
             true => glb(bytes).ok_or_else(|| {
@@ -150,7 +150,7 @@ impl<'f> File<'f> {
         Ok(file)
     }
 
-    fn linked(&self, buffer: usize, uri: &str, beside: Beside) -> Result<Vec<u8>, InputError> {
+    fn linked(&self, buffer: usize, uri: &str, beside: Beside) -> Result<Vec<u8>> {
         let error =
             |found: &str, expected| self.error(format!("buffers[{buffer}].uri"), found, expected);
         let (head, data) = uri.split_once(',').unwrap_or((uri, ""));
@@ -171,12 +171,7 @@ impl<'f> File<'f> {
         InputError::at(self.name, &place, found, expected)
     }
 
-    pub fn get<'s, T>(
-        &self,
-        all: &'s [T],
-        index: Index<T>,
-        place: &str,
-    ) -> Result<&'s T, InputError> {
+    pub fn get<'s, T>(&self, all: &'s [T], index: Index<T>, place: &str) -> Result<&'s T> {
         let index = index.value();
         all.get(index).ok_or_else(|| {
             let expected = format!("an index below {}", all.len());
@@ -185,12 +180,7 @@ impl<'f> File<'f> {
     }
 
     /// Vectors of an accessor, `width` numbers each.
-    pub fn vectors(
-        &self,
-        index: Index<Accessor>,
-        width: usize,
-        place: &str,
-    ) -> Result<Vec<DVec4>, InputError> {
+    pub fn vectors(&self, index: Index<Accessor>, width: usize, place: &str) -> Result<Vec<DVec4>> {
         let values = self.values(index, width, place)?;
         let values = values.map_err(|why| self.error(place.to_owned(), why, "plain accessors"))?;
         let vector = |numbers: &[f64]| {
@@ -208,7 +198,7 @@ impl<'f> File<'f> {
         index: Index<Accessor>,
         width: usize,
         place: &str,
-    ) -> Result<Result<Vec<f64>, String>, InputError> {
+    ) -> Result<Result<Vec<f64>, String>> {
         let accessor = self.get(&self.root.accessors, index, place)?;
         let place = format!("accessors[{}]", index.value());
         let (Some(kind), Checked::Valid(dimensions)) = (component(accessor), accessor.type_) else {

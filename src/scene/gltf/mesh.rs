@@ -8,7 +8,7 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::file::File;
-use crate::input::InputError;
+use crate::input::Result;
 use crate::scene::SurfaceKind;
 use crate::shown::shortened;
 
@@ -58,7 +58,7 @@ impl File<'_> {
         numbers.fold(0, u64::saturating_add)
     }
 
-    pub fn mesh(&self, index: usize) -> Result<Mesh, InputError> {
+    pub fn mesh(&self, index: usize) -> Result<Mesh> {
         let mesh = &self.root.meshes[index];
         let mut all = Ok(Triangles::default());
         for (place, primitive) in mesh.primitives.iter().enumerate() {
@@ -105,7 +105,7 @@ impl File<'_> {
         primitive: &Primitive,
         positions: Index<Accessor>,
         place: &str,
-    ) -> Result<Mesh, InputError> {
+    ) -> Result<Mesh> {
         let extensions = primitive.extensions.as_ref();
         let mut names = extensions.into_iter().flat_map(|e| e.others.keys());
         if let Some(name) = names.find(|name| name.contains("compression")) {

@@ -27,7 +27,7 @@ use self::mesh::{Mesh, Triangles, positions};
 use super::{
     CameraPlace, Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory,
 };
-use crate::input::{InputError, note};
+use crate::input::{Result, note};
 
 /// Bytes of a number of a mesh while it is read: in f64, and as a point or corner.
 const BYTES_PER_NUMBER: u64 = 20;
@@ -46,12 +46,7 @@ pub fn is_gltf(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// A file that is no glTF, or has what is not read; buffers that cannot be read or are too short.
-pub fn read_gltf(
-    bytes: &[u8],
-    file: &str,
-    name: &str,
-    options: &LoadOptions,
-) -> Result<Scene, InputError> {
+pub fn read_gltf(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
     read_beside(bytes, [file, name], options, &|uri| beside(file, uri))
 }
 
@@ -66,7 +61,7 @@ pub(super) fn read_beside(
     [file, name]: [&str; 2],
     options: &LoadOptions,
     beside: Beside,
-) -> Result<Scene, InputError> {
+) -> Result<Scene> {
     let file = File::open(bytes, file, beside)?;
     let (placed, places, order) = file.placed()?;
     file.note_unread(&placed, &order, places.len());
@@ -116,7 +111,7 @@ struct Placed {
 
 impl File<'_> {
     /// Nodes with a mesh, places of cameras, and all nodes, depth first.
-    fn placed(&self) -> Result<(Vec<Placed>, Vec<CameraPlace>, Order), InputError> {
+    fn placed(&self) -> Result<(Vec<Placed>, Vec<CameraPlace>, Order)> {
         let nodes = &self.root.nodes;
         let first = (!self.root.scenes.is_empty()).then(|| Index::new(0));
         let roots: Vec<usize> = match self.root.scene.or(first) {
@@ -165,7 +160,7 @@ impl File<'_> {
     }
 
     /// Transform of a node relative to its parent.
-    fn local(&self, index: usize) -> Result<DAffine3, InputError> {
+    fn local(&self, index: usize) -> Result<DAffine3> {
         let found = match <[f64; 16]>::deserialize(&self.exact.nodes[index]["matrix"]) {
             Ok(matrix) => {
                 let matrix = DMat4::from_cols_array(&matrix);
@@ -203,7 +198,7 @@ impl File<'_> {
     /// Instances of a node by EXT_mesh_gpu_instancing; the node itself without them.
     ///
     /// `before` items are placed already. Each instance has a byte in a buffer or more.
-    fn instances(&self, index: usize, before: usize) -> Result<Vec<DAffine3>, InputError> {
+    fn instances(&self, index: usize, before: usize) -> Result<Vec<DAffine3>> {
         let extensions = self.root.nodes[index].extensions.as_ref();
         let instancing = extensions.and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
         let Some(attributes) = instancing.map(|instancing| &instancing["attributes"]) else {
@@ -215,7 +210,7 @@ impl File<'_> {
         let accessors = all.filter_map(index);
         let accessors = accessors.map(|at| self.get(&self.root.accessors, at, &place));
         let counts = accessors.map(|accessor| Ok(accessor?.count.0));
-        let counts: Vec<u64> = counts.collect::<Result<_, InputError>>()?;
+        let counts: Vec<u64> = counts.collect::<Result<_>>()?;
         let [least, count] = [counts.iter().min(), counts.iter().max()].map(|c| *c.unwrap_or(&0));
         let bytes: usize = self.buffers.iter().map(|buffer| buffer.len()).sum();
         let most = MOST_ITEMS.saturating_sub(before).min(bytes) as u64;
@@ -244,7 +239,7 @@ impl File<'_> {
         meshes: &[Mesh],
         name: &str,
         options: &LoadOptions,
-    ) -> Result<Scene, InputError> {
+    ) -> Result<Scene> {
         let plain = |item: &Placed| meshes[item.mesh].as_ref().expect("plain meshes");
         let count = |of: fn(&Triangles) -> usize| placed.iter().map(|i| of(plain(i)) as u64).sum();
         let (triangles, points): (u64, u64) =
@@ -276,7 +271,7 @@ impl File<'_> {
     }
 
     /// World box of the bounds that the accessors of an item state.
-    fn bounds(&self, item: &Placed) -> Result<WorldBox, InputError> {
+    fn bounds(&self, item: &Placed) -> Result<WorldBox> {
         let mut all = WorldBox::union_of([]);
         let primitives = self.root.meshes[item.mesh].primitives.iter();
         for positions in primitives.filter_map(positions) {

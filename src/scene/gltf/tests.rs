@@ -49,7 +49,7 @@ fn file() -> Value {
     })
 }
 
-fn read(file: &Value) -> Result<Scene, InputError> {
+fn read(file: &Value) -> Result<Scene> {
     let text = file.to_string();
     assert!(is_gltf(text.as_bytes()));
     read_gltf(text.as_bytes(), "t.gltf", "t", &LoadOptions::default())

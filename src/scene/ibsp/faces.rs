@@ -5,7 +5,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::geometry::Aabb;
-use crate::input::InputError;
+use crate::input::Result;
 use crate::scene::bsp::clipped;
 use crate::scene::records::Table;
 
@@ -56,7 +56,7 @@ pub fn patch(points: &[Vec3], width: usize) -> Faces {
 ///
 /// # Errors
 /// Sides that are not.
-pub fn brush_box(brushes: &Table, brush: usize, sides: &[(Vec3, f32)]) -> Result<Aabb, InputError> {
+pub fn brush_box(brushes: &Table, brush: usize, sides: &[(Vec3, f32)]) -> Result<Aabb> {
     let mut bounds = Aabb::EMPTY;
     for axis in 0..3 {
         let pair = sides.get(2 * axis..2 * axis + 2);

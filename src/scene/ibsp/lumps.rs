@@ -1,6 +1,6 @@
 //! The lumps of an IBSP file: tables of 32-bit numbers. No byte is trusted.
 
-use crate::input::InputError;
+use crate::input::{InputError, Result};
 use crate::scene::records::Table;
 
 /// Names and sizes of the records of the lumps, in their order.
@@ -38,7 +38,7 @@ const OTHERS: [(&[u8], &str); 7] = [
 ///
 /// # Errors
 /// Another format, a lump beyond the file or one that is no whole number of records.
-pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'a>, InputError> {
+pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'a>> {
     let (name, record) = LUMPS[number];
     if !bytes.starts_with(b"IBSP\x2e\0\0\0") {
         let other = OTHERS.iter().find(|other| bytes.starts_with(other.0));

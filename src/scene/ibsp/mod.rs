@@ -20,7 +20,7 @@ use super::{
     CameraPlace, ItemKind, Labels, LoadOptions, Regions, Scene, SurfaceKind, Surfaces, WorldBox,
 };
 use crate::geometry::Aabb;
-use crate::input::{InputError, note_counted};
+use crate::input::{Result, note_counted};
 
 /// Height of a player's eyes above a spawn point, in map units.
 const EYE_HEIGHT: f64 = 26.0;
@@ -52,7 +52,7 @@ pub fn is_ibsp(bytes: &[u8]) -> bool {
 }
 
 impl QuakeMap {
-    fn read(bytes: &[u8], file: &str) -> Result<QuakeMap, InputError> {
+    fn read(bytes: &[u8], file: &str) -> Result<QuakeMap> {
         let lump = |number| lump(bytes, file, number);
         let (nodes, leaves, visibility) = (lump(3)?, lump(4)?, lump(16)?);
         let stated = |at| match visibility.len() {
@@ -129,12 +129,7 @@ fn kind_of(shaders: &Table, shader: usize, is_drawn: bool) -> SurfaceKind {
 ///
 /// # Errors
 /// The first value that is none of the format, by its byte.
-pub fn read_ibsp(
-    bytes: &[u8],
-    file: &str,
-    name: &str,
-    options: &LoadOptions,
-) -> Result<Scene, InputError> {
+pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
     let mut map = QuakeMap::read(bytes, file)?;
     let lump = |number| lump(bytes, file, number);
     let (surfaces, brushes, shaders) = (lump(13)?, lump(8)?, lump(1)?);
@@ -166,7 +161,7 @@ pub fn read_ibsp(
             let plane = sides.index(side, 0, &planes)?;
             Ok((planes.vector(plane, 0)?, planes.float(plane, 12)?))
         });
-        let of_brush = of_brush.collect::<Result<Vec<_>, InputError>>()?;
+        let of_brush = of_brush.collect::<Result<Vec<_>>>()?;
         let bounds = brush_box(&brushes, at, &of_brush)?;
         let kind = kind_of(&shaders, brushes.index(at, 8, &shaders)?, false);
         let label = match kind {
@@ -204,8 +199,8 @@ fn check_counts(
     [brushes, sides]: [&Table; 2],
     name: &str,
     options: &LoadOptions,
-) -> Result<(), InputError> {
-    let total = |table: &Table, at, of: &Table| -> Result<u64, InputError> {
+) -> Result<()> {
+    let total = |table: &Table, at, of: &Table| -> Result<u64> {
         let counts = (0..table.len()).map(|i| Ok(table.range(i, at, of)?.len() as u64));
         counts.sum()
     };
@@ -232,7 +227,7 @@ fn faces_of(
     surfaces: &Table,
     i: usize,
     [vertices, corners]: [&Table; 2],
-) -> Result<Option<Surface>, InputError> {
+) -> Result<Option<Surface>> {
     let of_vertex = |vertex| vertices.vector(vertex, 0);
     let points = surfaces.range(i, 12, vertices)?.map(of_vertex);
     let points = points.collect::<Result<Vec<Vec3>, _>>()?;

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::geometry::{Aabb, Plane, PlaneTree};
-use crate::input::InputError;
+use crate::input::Result;
 use crate::query::ItemId;
 use crate::scene::bsp::{BspChild, descend, plane_tree, side_of};
 use crate::scene::records::Table;
@@ -51,7 +51,7 @@ impl LeafTree {
         leaves: &Table,
         planes: &Table,
         clusters: Option<usize>,
-    ) -> Result<LeafTree, InputError> {
+    ) -> Result<LeafTree> {
         let reached = reached_leaves(nodes, leaves)?;
         let most = clusters.unwrap_or(usize::MAX).min(leaves.len());
         let mut tree = LeafTree {
@@ -120,7 +120,7 @@ impl LeafTree {
 ///
 /// # Errors
 /// Nodes that form no tree, or a very deep one.
-fn reached_leaves(nodes: &Table, leaves: &Table) -> Result<Vec<bool>, InputError> {
+fn reached_leaves(nodes: &Table, leaves: &Table) -> Result<Vec<bool>> {
     let error = |node, at, found: String| Err(nodes.error(node, at, found, "a BSP tree"));
     if nodes.len() == 0 {
         return error(0, 0, "no nodes".to_owned());

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use std::fmt::Display;
 
 use super::records::{Table, int_at};
-use crate::input::InputError;
+use crate::input::{InputError, Result};
 use crate::shown::{first_of, part_hint};
 
 /// The lumps of a map in their fixed order, that of UDMF first.
@@ -67,7 +67,7 @@ pub struct MapTables<'a> {
 impl<'a> Wad<'a> {
     /// Reads the directory. The place of a lump is checked when the lump is read:
     /// damage in another does not concern a map.
-    pub fn open(bytes: &'a [u8], file: &'a str) -> Result<Self, InputError> {
+    pub fn open(bytes: &'a [u8], file: &'a str) -> Result<Self> {
         let mut wad = Wad {
             file,
             bytes,
@@ -110,7 +110,7 @@ impl<'a> Wad<'a> {
     }
 
     /// The name of the wanted map, or of the only one, and the index of its marker.
-    fn marker(&self, map: Option<&str>) -> Result<(&str, usize), InputError> {
+    fn marker(&self, map: Option<&str>) -> Result<(&str, usize)> {
         let is_wanted = |name: &str| map.is_none_or(|map| name.eq_ignore_ascii_case(map));
         let maps = self.markers();
         let listed = || first_of(&maps.iter().map(|m| m.0).collect::<Vec<_>>(), MOST_NAMED);
@@ -141,7 +141,7 @@ impl<'a> Wad<'a> {
     ///
     /// A map's lumps are found by name behind its marker, up to the next marker or to
     /// the first that the order of a map's lumps does not allow; others are passed over.
-    pub fn tables(&self, map: Option<&str>) -> Result<MapTables<'_>, InputError> {
+    pub fn tables(&self, map: Option<&str>) -> Result<MapTables<'_>> {
         let (name, marker) = self.marker(map)?;
         let mut last = None;
         let is_own = |&at: &usize| {
@@ -158,7 +158,7 @@ impl<'a> Wad<'a> {
                 return Err(self.error(lump.entry, found, "Doom's map format"));
             }
         }
-        let table = |of: &'static str, record: usize| -> Result<Table<'_>, InputError> {
+        let table = |of: &'static str, record: usize| -> Result<Table<'_>> {
             let at = self.lumps[marker].entry;
             let table = match lump(of) {
                 Some(lump) => Table::of_entry(self.file, of, self.bytes, lump.entry)?,
@@ -206,7 +206,7 @@ impl<'a> Wad<'a> {
     }
 
     /// The number of lumps and the offset of the directory.
-    fn header(&self) -> Result<[usize; 2], InputError> {
+    fn header(&self) -> Result<[usize; 2]> {
         if self.bytes.len() < 12 {
             return Err(self.error(self.bytes.len(), "the end of the file", "a 12 byte header"));
         }
