@@ -60,9 +60,10 @@ impl Frame {
     /// # Errors
     /// An axis of length zero, or a value that is not finite; the frame is unchanged.
     pub fn orbit(&mut self, centre: DVec3, axis: DVec3, around: f64, over: f64) -> Result<()> {
+        let found = format_args!("the axis of the orbit is zero or not finite");
         require(
             axis.is_finite() && axis != DVec3::ZERO,
-            || "the axis of the orbit is zero or not finite".to_owned(),
+            found,
             "a direction",
         )?;
         check_finite("centre", centre)?;
@@ -98,9 +99,12 @@ impl Camera {
     /// # Errors
     /// A factor that is not above zero, or a lens that would have no window.
     pub fn zoom(&mut self, factor: f64) -> Result<()> {
-        let found = || format!("the zoom factor is {factor}");
-        let is_sound = factor.is_finite() && factor > 0.0;
-        require(is_sound, found, "a number above 0")?;
+        let found = format_args!("the zoom factor is {factor}");
+        require(
+            factor.is_finite() && factor > 0.0,
+            found,
+            "a number above 0",
+        )?;
         let kind = match *self.lens.kind() {
             LensKind::Perspective { fovy_deg, aspect } => {
                 let half = libm::tan(fovy_deg.to_radians() / 2.0) / factor;

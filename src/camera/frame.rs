@@ -84,11 +84,8 @@ impl Pose {
         let sine = length(&across) / (length(&forward) * length(&up));
         let n = -unit(exact::estimate(&forward));
         let u = exact::near_unit(across).ok_or_else(parallel)?;
-        require(
-            sine > PARALLEL,
-            || format!("up is {sine:e} rad from the direction of view or its opposite"),
-            "more than 8.9e-16",
-        )?;
+        let found = format_args!("up is {sine:e} rad from the direction of view or its opposite");
+        require(sine > PARALLEL, found, "more than 8.9e-16")?;
         Ok([unit(exact::estimate(&u)), n])
     }
 }
@@ -102,7 +99,7 @@ pub(super) fn unit(v: DVec3) -> DVec3 {
 
 pub(super) fn check_finite(name: &str, v: DVec3) -> Result<()> {
     for (axis, value) in ["x", "y", "z"].into_iter().zip(v.to_array()) {
-        let found = || format!("{name} {axis} is {value}");
+        let found = format_args!("{name} {axis} is {value}");
         require(value.is_finite(), found, "a finite number")?;
     }
     Ok(())
@@ -225,10 +222,8 @@ impl Frame {
     pub fn orthogonality_error(&self) -> f64 {
         let basis = DMat3::from_cols(self.u, self.v, self.n);
         let gram = basis.transpose() * basis - DMat3::IDENTITY;
-        gram.to_cols_array()
-            .into_iter()
-            .map(f64::abs)
-            .fold(0.0, f64::max)
+        let errors = gram.to_cols_array().map(f64::abs);
+        errors.into_iter().fold(0.0, f64::max)
     }
 
     /// One Newton step towards the nearest orthonormal frame (polar factor;

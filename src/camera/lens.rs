@@ -75,7 +75,7 @@ impl Lens {
     pub fn new(kind: LensKind, near: f64, far: Option<f64>) -> Result<Lens> {
         match kind {
             LensKind::Perspective { fovy_deg, aspect } => {
-                let found = || format!("the vertical field of view is {fovy_deg} degrees");
+                let found = format_args!("the vertical field of view is {fovy_deg} degrees");
                 require(fovy_deg > 0.0 && fovy_deg < 180.0, found, "0 < fov < 180")?;
                 check_aspect(aspect)?;
             }
@@ -93,20 +93,15 @@ impl Lens {
         }
         finite("near", near)?;
         let parallel = matches!(kind, LensKind::Orthographic { .. });
-        let (found, rule) = (
-            || format!("near is {near}"),
-            "near > 0 for a perspective lens",
-        );
-        require(parallel || near > 0.0, found, rule)?;
+        let rule = "near > 0 for a perspective lens";
+        require(parallel || near > 0.0, format_args!("near is {near}"), rule)?;
         if let Some(far) = far.or(parallel.then_some(f64::INFINITY)) {
             finite("far", far)?;
-            let found = || format!("near is {near} and far {far}");
+            let found = format_args!("near is {near} and far {far}");
             require(near < far, found, "near < far")?;
-            require(
-                !parallel || far <= FARTHEST,
-                || format!("far is {far:e}"),
-                "at most 1.7e38, half of what f32 holds, for an orthographic lens",
-            )?;
+            let (found, is_held) = (format_args!("far is {far:e}"), !parallel || far <= FARTHEST);
+            let rule = "at most 1.7e38, half of what f32 holds, for an orthographic lens";
+            require(is_held, found, rule)?;
         }
         let far = far.filter(|far| *far <= FARTHEST);
         Ok(Lens { kind, near, far })
@@ -199,14 +194,14 @@ fn slope(degrees: f64) -> f64 {
 
 fn check_aspect(aspect: f64) -> Result<()> {
     let sound = aspect > 0.0 && aspect.is_finite();
-    let found = || format!("the aspect ratio is {aspect}");
+    let found = format_args!("the aspect ratio is {aspect}");
     require(sound, found, "a number above 0")
 }
 
 fn check_window(name: &str, low: f64, high: f64) -> Result<()> {
     finite(name, low)?;
     finite(name, high)?;
-    let found = || format!("the window is empty: {low} to {high} ({name})");
+    let found = format_args!("the window is empty: {low} to {high} ({name})");
     require(low < high, found, "low < high")
 }
 

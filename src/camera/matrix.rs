@@ -85,11 +85,9 @@ impl ViewProjection {
     pub fn new(entries: [[f64; 4]; 4], convention: MatrixConvention) -> Result<ViewProjection> {
         for (&name, value) in MATRIX_ENTRIES.iter().zip(entries.concat()) {
             super::finite(name, value)?;
-            super::require(
-                value == 0.0 || SIZES.contains(&value.abs()),
-                || format!("the matrix has {name} = {value:e}"),
-                "0 or a size from 1e-60 to 1e60",
-            )?;
+            let found = format_args!("the matrix has {name} = {value:e}");
+            let is_sound = value == 0.0 || SIZES.contains(&value.abs());
+            super::require(is_sound, found, "0 or a size from 1e-60 to 1e60")?;
         }
         let mut matrix = ViewProjection {
             rows: convention.in_columns(entries),
@@ -106,14 +104,12 @@ impl ViewProjection {
         let eye;
         (eye, matrix.is_reversed) = eye_of(&inverse);
         matrix.is_parallel = eye.is_none();
-        let ahead = matrix
-            .clip_corners()
-            .map(|c| unprojected(&inverse, c)[3].sign());
-        super::require(
-            ahead.iter().any(|&sign| sign > 0),
-            || "the matrix sees nothing, no point has w > 0 within its clip volume".to_owned(),
-            "another sign or --matrix-convention",
-        )?;
+        let sign = |corner| unprojected(&inverse, corner)[3].sign();
+        let ahead = matrix.clip_corners().map(sign);
+        let found =
+            format_args!("the matrix sees nothing, no point has w > 0 within its clip volume");
+        let sees_any = ahead.iter().any(|&sign| sign > 0);
+        super::require(sees_any, found, "another sign or --matrix-convention")?;
         let centre = || matrix.axis().map(|[near, _]| near);
         matrix.eye = eye.or_else(centre).ok_or_else(|| {
             let found = "the matrix has its near plane at infinity";

@@ -17,6 +17,8 @@ pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surr
 pub use projection::ClipSpace;
 pub use unprojected::Unprojected;
 
+use std::fmt::Arguments;
+
 use crate::geometry::VolumeError;
 
 /// A frame (position and orientation) and a lens.
@@ -91,14 +93,14 @@ impl CameraError {
 }
 
 /// Checks a rule of camera arguments; `found` is only formatted where it is broken.
-fn require(holds: bool, found: impl FnOnce() -> String, expected: &'static str) -> Result<()> {
+fn require(holds: bool, found: Arguments<'_>, expected: &'static str) -> Result<()> {
     match holds {
         true => Ok(()),
-        false => Err(CameraError::invalid(found(), expected)),
+        false => Err(CameraError::invalid(found.to_string(), expected)),
     }
 }
 
 fn finite(name: &str, value: f64) -> Result<()> {
-    let found = || format!("{name} is {value}");
+    let found = format_args!("{name} is {value}");
     require(value.is_finite(), found, "a finite number")
 }

@@ -203,7 +203,7 @@ impl Camera {
         let frame = self.frame_about(zero);
         let c = options.epsilon;
         let are_sound = (0.0..f64::INFINITY).contains(&c) && of_scene.cmpge(DVec3::ZERO).all();
-        let found = || format!("epsilon is {c} and reach {of_scene}");
+        let found = format_args!("epsilon is {c} and reach {of_scene}");
         let rule = "numbers of at least 0, and a finite epsilon";
         require(are_sound, found, rule)?;
         if let largest @ f64::INFINITY = of_scene.element_sum() {

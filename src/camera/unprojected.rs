@@ -159,11 +159,9 @@ impl Camera {
             ("image of the matrix is sheared", found.shear),
             ("near plane of the matrix is oblique", found.tilt),
         ] {
-            require(
-                value <= STRAIGHT,
-                || format!("the {name} by {value:.1e}"),
-                "at most 1e-4 where rays are needed, or another --matrix-convention",
-            )?;
+            let found = format_args!("the {name} by {value:.1e}");
+            let rule = "at most 1e-4 where rays are needed, or another --matrix-convention";
+            require(value <= STRAIGHT, found, rule)?;
         }
         if matrix.is_from_zero() && self.may_be_reversed() {
             return Err(CameraError::invalid(

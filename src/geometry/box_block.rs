@@ -295,12 +295,12 @@ impl BoxBlocks {
         self.count == 0
     }
 
-    /// The box at an index below [`BoxBlocks::len`].
+    /// The box at an index below their number.
     pub fn get(&self, place: usize) -> Aabb {
         self.blocks[place / LANES].get(place % LANES)
     }
 
-    /// Replaces the box at an index below [`BoxBlocks::len`].
+    /// Replaces the box at an index below their number.
     #[inline(always)]
     pub fn set(&mut self, place: usize, b: &Aabb) {
         self.blocks[place / LANES].set(place % LANES, b);

@@ -158,18 +158,13 @@ pub trait BoxTested: Sized + Send + Sync {
     /// Its [`RegionIndex::INFO`].
     const ABOUT: Info;
     /// Its [`RegionIndex::Params`]: how it is updated.
-    type Params: Default + Clone + Serialize + DeserializeOwned;
+    type Params: Default + Serialize + DeserializeOwned;
 
     /// Builds it over all items that are not empty.
     ///
     /// # Errors
     /// If it cannot hold them.
-    fn of(items: Vec<Record>) -> Result<Self, BuildError>;
-
-    /// Takes the parameters after the build.
-    fn with(self, _params: Self::Params) -> Self {
-        self
-    }
+    fn of(items: Vec<Record>, params: &Self::Params) -> Result<Self, BuildError>;
 
     /// Its [`RegionIndex::refit`]; `None` if a rebuild is needed.
     fn follow(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> Option<()> {
@@ -184,7 +179,7 @@ pub trait BoxTested: Sized + Send + Sync {
         &self,
         test: &T,
         sink: &mut S,
-        recorder: &mut R,
+        tally: &Tally<'_, R>,
     ) -> ControlFlow<()>;
 }
 
@@ -193,7 +188,7 @@ impl<X: BoxTested> RegionIndex for X {
     type Params = X::Params;
 
     fn build(input: &Input<'_>, params: &X::Params) -> Result<Self, BuildError> {
-        Ok(X::of(Record::all(input.items)?)?.with(params.clone()))
+        X::of(Record::all(input.items)?, params)
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
@@ -207,15 +202,16 @@ impl<X: BoxTested> RegionIndex for X {
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         let (sink, recorder) = cx.parts();
+        let tally = &Tally::new(recorder);
         if Q::IS_POINT {
             return match volume.as_point() {
-                Some(p) => self.search(&Holding(p), sink, recorder),
+                Some(p) => self.search(&Holding(p), sink, tally),
                 None => ControlFlow::Continue(()),
             };
         }
         match volume.rows() {
-            Some(rows) => self.search(&AtOnce(rows), sink, recorder),
-            None => self.search::<dyn BoxTest, _, _>(&PlaneByPlane(volume), sink, recorder),
+            Some(rows) => self.search(&AtOnce(rows), sink, tally),
+            None => self.search::<dyn BoxTest, _, _>(&PlaneByPlane(volume), sink, tally),
         }
     }
 }

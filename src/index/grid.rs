@@ -140,7 +140,7 @@ impl BoxTested for UniformGrid {
     );
     type Params = NoParams;
 
-    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+    fn of(items: Vec<Record>, _: &NoParams) -> Result<Self, BuildError> {
         let centres = Aabb::of_points(items.iter().map(|item| item.bounds.centre()));
         let counts = match items.is_empty() {
             true => UVec3::ONE,
@@ -190,9 +190,8 @@ impl BoxTested for UniformGrid {
         &self,
         test: &T,
         sink: &mut S,
-        recorder: &mut R,
+        tally: &Tally<'_, R>,
     ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
         tally.node(test);
         if self.ids.is_empty() || test.rejects(&self.scene) {
             return ControlFlow::Continue(());
@@ -210,7 +209,7 @@ impl BoxTested for UniformGrid {
             for y in ys.clone() {
                 let row = self.row(y, z).start;
                 for cell in row + xs.start..row + xs.end {
-                    self.cell(cell, test, sink, &tally)?;
+                    self.cell(cell, test, sink, tally)?;
                 }
             }
         }

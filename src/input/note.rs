@@ -18,14 +18,7 @@ pub fn tell_notes(tell: fn(&str)) {
 
 /// One line about an input that is no error.
 pub(crate) fn note(text: &str) {
-    let note = format!("note: {text}");
-    listening(|listener| {
-        if let Some((tell, told, _)) = listener
-            && told.insert(note.clone())
-        {
-            tell(&note);
-        }
-    });
+    once(format!("note: {text}"), |(tell, ..), line| tell(&line));
 }
 
 /// A line for each count above zero of what it counts and what was done with it.
@@ -37,13 +30,8 @@ pub(crate) fn note_counted<const N: usize>(file: &str, rows: [(usize, &str, &str
 
 /// Holds one line about a doubtful input for [`tell_warnings`].
 pub(crate) fn warn(text: &str) {
-    let warning = format!("warning: {text}");
-    listening(|listener| {
-        if let Some((_, told, held)) = listener
-            && told.insert(warning.clone())
-        {
-            held.push(warning);
-        }
+    once(format!("warning: {text}"), |(.., held), line| {
+        held.push(line)
     });
 }
 
@@ -54,6 +42,17 @@ pub fn tell_warnings() {
     listening(|listener| {
         if let Some((tell, _, held)) = listener {
             mem::take(held).iter().for_each(|warning| tell(warning));
+        }
+    });
+}
+
+/// Does something with a line that is new to the listener.
+fn once(line: String, act: impl FnOnce(&mut Told, String)) {
+    listening(|listener| {
+        if let Some(told) = listener
+            && told.1.insert(line.clone())
+        {
+            act(told, line);
         }
     });
 }

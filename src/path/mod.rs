@@ -25,7 +25,7 @@ pub use facts::{CameraFacts, MatrixFacts, warnings};
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
 
 /// A named sequence of cameras.
-#[derive(Clone, Debug)]
+#[derive(Clone, Default, Debug)]
 pub struct CameraPath {
     /// The file or the spec, such as `orbit:frames=512`.
     pub name: String,
@@ -295,9 +295,7 @@ fn read(
     let path = CameraPath {
         name: source.to_owned(),
         cameras,
-        lines: Vec::new(),
-        times: Vec::new(),
-        lens_scale: None,
+        ..CameraPath::default()
     };
     match optics.visible {
         Some(share) => path.seeing(scene, share, scale),

@@ -43,7 +43,7 @@ impl BoxTested for PeerBevyStyle {
     .refits();
     type Params = NoParams;
 
-    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+    fn of(items: Vec<Record>, _: &NoParams) -> Result<Self, BuildError> {
         let entity = |item| Entity {
             item,
             layers: LAYER,
@@ -77,9 +77,8 @@ impl BoxTested for PeerBevyStyle {
         &self,
         test: &T,
         sink: &mut S,
-        recorder: &mut R,
+        tally: &Tally<'_, R>,
     ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
         for entity in &self.entities {
             if !entity.inherited_visibility || entity.layers & LAYER == 0 {
                 continue;

@@ -120,7 +120,7 @@ impl BoxTested for PeerBvh {
     .refits();
     type Params = NoParams;
 
-    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+    fn of(items: Vec<Record>, _: &NoParams) -> Result<Self, BuildError> {
         let scene = Aabb::union_of(items.iter().map(|item| &item.bounds));
         let shapes = items.into_iter().map(|item| Shape { item, node: 0 });
         let mut shapes: Vec<Shape> = shapes.collect();
@@ -148,7 +148,7 @@ impl BoxTested for PeerBvh {
             self.shapes[at].item.bounds = bounds;
         }
         if builds {
-            let built = Self::of(self.shapes.iter().map(|s| s.item).collect());
+            let built = Self::of(self.shapes.iter().map(|s| s.item).collect(), &NoParams {});
             return built.map(|built| *self = built).ok();
         }
         self.tree.update_shapes(&changed, &mut self.shapes);
@@ -167,13 +167,9 @@ impl BoxTested for PeerBvh {
         &self,
         test: &Q,
         sink: &mut S,
-        recorder: &mut R,
+        tally: &Tally<'_, R>,
     ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
-        let query = Query {
-            test,
-            tally: &tally,
-        };
+        let query = Query { test, tally };
         for shape in self.tree.traverse(&query, &self.shapes) {
             tally.count(|recorder| recorder.items_tested(1));
             if test.nodes_as_items() || test.admits(&shape.item.bounds) {

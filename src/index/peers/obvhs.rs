@@ -89,7 +89,7 @@ impl BoxTested for PeerObvhs {
     .refits();
     type Params = ObvhsParams;
 
-    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+    fn of(items: Vec<Record>, params: &ObvhsParams) -> Result<Self, BuildError> {
         if items.is_empty() {
             return Ok(PeerObvhs::default());
         }
@@ -107,12 +107,9 @@ impl BoxTested for PeerObvhs {
             },
             ids: bvh.primitive_indices.iter().map(|p| of(p).id).collect(),
             bvh,
+            update: params.update,
             ..PeerObvhs::default()
         })
-    }
-
-    fn with(self, ObvhsParams { update }: ObvhsParams) -> Self {
-        PeerObvhs { update, ..self }
     }
 
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
@@ -178,15 +175,14 @@ impl BoxTested for PeerObvhs {
         &self,
         test: &T,
         sink: &mut S,
-        recorder: &mut R,
+        tally: &Tally<'_, R>,
     ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
         let nodes = &self.bvh.nodes[..];
         let Some(root) = nodes.first() else {
             return ControlFlow::Continue(());
         };
         if root.is_leaf() {
-            return self.leaf(root, test, sink, &tally);
+            return self.leaf(root, test, sink, tally);
         }
         tally.node(test);
         if test.rejects(&bounds_of(root)) {
@@ -204,7 +200,7 @@ impl BoxTested for PeerObvhs {
                     }
                 }
                 if node.is_leaf() {
-                    self.leaf(node, test, sink, &tally)?;
+                    self.leaf(node, test, sink, tally)?;
                 } else {
                     open.push(node.first_index);
                 }

@@ -100,19 +100,15 @@ impl BoxTested for PeerParry3d {
     .refits();
     type Params = Parry3dParams;
 
-    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+    fn of(items: Vec<Record>, params: &Parry3dParams) -> Result<Self, BuildError> {
         refuse_narrow(Self::ABOUT.name, &items)?;
         let leaves: Vec<ParryAabb> = items.iter().map(|item| crate_box(&item.bounds)).collect();
         Ok(PeerParry3d {
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves),
             ids: items.iter().map(|item| item.id).collect(),
-            update: Parry3dUpdate::default(),
+            update: params.update,
             workspace: BvhWorkspace::default(),
         })
-    }
-
-    fn with(self, Parry3dParams { update }: Parry3dParams) -> Self {
-        PeerParry3d { update, ..self }
     }
 
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
@@ -159,9 +155,8 @@ impl BoxTested for PeerParry3d {
         &self,
         test: &T,
         sink: &mut S,
-        recorder: &mut R,
+        tally: &Tally<'_, R>,
     ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
         let mut flow = ControlFlow::Continue(());
         self.bvh.traverse_indexed(None, |node, at| {
             if let Some(place) = node.leaf_data() {

@@ -58,7 +58,7 @@ impl BoxTested for PeerRstar {
     .refits();
     type Params = NoParams;
 
-    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+    fn of(items: Vec<Record>, _: &NoParams) -> Result<Self, BuildError> {
         let tree = RTree::bulk_load(items.clone());
         Ok(PeerRstar { tree, items })
     }
@@ -100,9 +100,8 @@ impl BoxTested for PeerRstar {
         &self,
         test: &T,
         sink: &mut S,
-        recorder: &mut R,
+        tally: &Tally<'_, R>,
     ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
         let root = self.tree.root();
         tally.node(test);
         if root.children().is_empty() || test.rejects(&bounds_of(&root.envelope())) {

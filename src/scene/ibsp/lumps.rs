@@ -53,12 +53,8 @@ pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'
     let entry = 8 + 8 * number;
     if bytes.len() < entry + 8 {
         let expected = "a directory of 17 lumps";
-        return Err(InputError::byte(
-            file,
-            bytes.len(),
-            "the end of the file",
-            expected,
-        ));
+        let (end, found) = (bytes.len(), "the end of the file");
+        return Err(InputError::byte(file, end, found, expected));
     }
     Table::of_entry(file, name, bytes, entry)?.of_records(record)
 }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use self::faces::{PER_PATCH, brush, brush_box, patch};
+use self::faces::{Faces, PER_PATCH, brush, brush_box, patch};
 use self::lumps::lump;
 pub use self::tree::{LeafNode, LeafTree};
 use super::records::Table;
@@ -102,16 +102,13 @@ struct Items {
 }
 
 impl Items {
-    fn push(
-        &mut self,
-        label: &str,
-        kind: SurfaceKind,
-        bounds: &Aabb,
-        (points, triangles): &faces::Faces,
-    ) {
+    fn push(&mut self, label: &str, kind: SurfaceKind, bounds: &Aabb, faces: Option<&Faces>) {
         self.boxes.push(WorldBox::of(bounds, DVec3::ZERO));
         self.kinds.push(label);
-        self.surfaces.push(kind, false, points, triangles);
+        match faces {
+            Some((points, triangles)) => self.surfaces.push(kind, false, points, triangles),
+            None => self.surfaces.push_box(kind, false, bounds),
+        }
     }
 }
 
@@ -150,7 +147,8 @@ pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) ->
         let shader = surfaces.index(surface, 0, &shaders)?;
         match faces_of(&surfaces, surface, [&lump(10)?, &lump(11)?])? {
             Some((label, bounds, faces)) => {
-                items.push(label, kind_of(&shaders, shader, true), &bounds, &faces);
+                let kind = kind_of(&shaders, shader, true);
+                items.push(label, kind, &bounds, Some(&faces));
             }
             None => map.bare += 1,
         }
@@ -168,14 +166,7 @@ pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) ->
             SurfaceKind::Opaque => "brush",
             _ => "volume",
         };
-        match brush(&of_brush, &bounds) {
-            Some(faces) => items.push(label, kind, &bounds, &faces),
-            None => {
-                items.boxes.push(WorldBox::of(&bounds, DVec3::ZERO));
-                items.kinds.push(label);
-                items.surfaces.push_box(kind, false, &bounds);
-            }
-        }
+        items.push(label, kind, &bounds, brush(&of_brush, &bounds).as_ref());
     }
     // Coordinates are f32 in the file: no other origin.
     let scene = Scene::about(name, &items.boxes, DVec3::ZERO)?;
@@ -220,7 +211,7 @@ fn check_counts(
     options.check_fits(name, Some(items), triangles)
 }
 
-type Surface = (&'static str, Aabb, faces::Faces);
+type Surface = (&'static str, Aabb, Faces);
 
 /// Kind, box and triangles of a surface, if it has any.
 fn faces_of(
