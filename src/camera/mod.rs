@@ -49,7 +49,7 @@ pub struct Camera {
     pub lens: Lens,
 }
 
-/// What makes a camera, or why it makes none.
+/// A result about cameras.
 pub type Result<T, E = CameraError> = std::result::Result<T, E>;
 
 /// Numbers that make no camera, or a camera whose planes f32 cannot hold.

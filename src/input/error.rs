@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::shown::{expected_by, plain};
 use crate::spec::SpecError;
 
-/// What a user's input holds, or the error in it.
+/// A result of reading a user's input.
 pub type Result<T, E = InputError> = std::result::Result<T, E>;
 
 /// Error of reading or writing a file or a text, in one line.
