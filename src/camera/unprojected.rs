@@ -100,9 +100,8 @@ impl ViewProjection {
     /// `None` if that is at infinity.
     pub(super) fn axis(&self) -> Option<[DVec3; 2]> {
         let inverse = self.inverse()?;
-        let [near, far] = self
-            .depths()
-            .map(|z| unprojected(&inverse, [0.0, 0.0, z, 1.0]));
+        let of_depth = |z| unprojected(&inverse, [0.0, 0.0, z, 1.0]);
+        let [near, far] = self.depths().map(of_depth);
         let near = about(&near, &[])?;
         Some([near, about(&far, &[near])?])
     }

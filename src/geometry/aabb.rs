@@ -91,10 +91,8 @@ impl Aabb {
 
     /// The smallest box that holds all the non-empty boxes of `boxes`.
     pub fn union_of<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Aabb {
-        boxes
-            .into_iter()
-            .filter(|b| !b.is_empty())
-            .fold(Aabb::EMPTY, |all, b| all.union(b))
+        let filled = boxes.into_iter().filter(|b| !b.is_empty());
+        filled.fold(Aabb::EMPTY, |all, b| all.union(b))
     }
 
     /// The smallest box around points; empty without any.
@@ -167,11 +165,12 @@ impl Aabb {
     /// Corner `i` of eight: bit k of `i` picks `max` on axis k.
     pub fn corner(&self, i: usize) -> Vec3 {
         let pick = |axis: usize| {
-            if i >> axis & 1 == 1 {
-                self.max[axis]
+            let corner = if i >> axis & 1 == 1 {
+                self.max
             } else {
-                self.min[axis]
-            }
+                self.min
+            };
+            corner[axis]
         };
         Vec3::new(pick(0), pick(1), pick(2))
     }

@@ -195,9 +195,8 @@ impl ConvexVolume {
 
     /// The plane of that name, if the volume has one.
     pub fn plane(&self, name: FrustumPlane) -> Option<&Plane> {
-        let index = self.names[..self.count]
-            .iter()
-            .position(|&n| n == Some(name))?;
+        let mut names = self.names[..self.count].iter();
+        let index = names.position(|&n| n == Some(name))?;
         Some(&self.planes[index])
     }
 

@@ -147,9 +147,8 @@ impl Capabilities {
             (self.ranges, "ranges"),
             (self.threaded_build, "threaded-build"),
         ];
-        all.into_iter()
-            .filter_map(|(has, name)| has.then_some(name))
-            .collect()
+        let declared = all.into_iter().filter(|(is_declared, _)| *is_declared);
+        declared.map(|(_, name)| name).collect()
     }
 }
 

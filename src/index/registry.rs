@@ -207,17 +207,12 @@ impl Registry {
             let known = self.rows.iter().map(|row| row.info.name);
             return Err(SpecError::unknown("structure", spec.name(), known));
         };
-        let given: Map<String, Value> = spec
+        // Numbers and booleans as such, anything else as text.
+        let parsed = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
+        let given = spec
             .given()
-            .map(|(key, value)| {
-                // Numbers and booleans as such, anything else as text.
-                let parsed = serde_json::from_str(value);
-                (
-                    key.to_owned(),
-                    parsed.unwrap_or_else(|_| Value::from(value)),
-                )
-            })
-            .collect();
+            .map(|(key, text)| (key.to_owned(), parsed(text)));
+        let given: Map<String, Value> = given.collect();
         let params = (row.params)(&Value::Object(given)).map_err(SpecError::new)?;
         let has_given = spec.given().next().is_some();
         let spec = StructureSpec {

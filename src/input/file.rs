@@ -93,9 +93,8 @@ fn expect_same(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Keeps a file's digest, or compares it with the one that is kept.
 fn hold(held: &mut BTreeMap<String, String>, path: &Path, bytes: &[u8]) -> Result<()> {
     let digest = crate::shown::hex(&hmac_sha256::Hash::hash(bytes));
-    let first = held
-        .entry(path.display().to_string())
-        .or_insert_with(|| digest.clone());
+    let own = held.entry(path.display().to_string());
+    let first = own.or_insert_with(|| digest.clone());
     match *first == digest {
         true => Ok(()),
         false => Err(InputError::new(format_args!(
@@ -120,9 +119,8 @@ pub fn stand_in(source: &str, file: &Path) -> Result<()> {
 /// The pipes that were read, with their bytes.
 pub fn pipes() -> Vec<(String, Arc<[u8]>)> {
     let pipes = PIPES.lock().unwrap_or_else(PoisonError::into_inner);
-    let named = pipes
-        .iter()
-        .map(|(path, bytes)| (path.display().to_string(), bytes.clone()));
+    let named = pipes.iter();
+    let named = named.map(|(path, bytes)| (path.display().to_string(), bytes.clone()));
     named.collect()
 }
 

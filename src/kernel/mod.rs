@@ -74,9 +74,8 @@ impl Kernel {
 
     /// The kernels of this machine, [`Kernel::Portable`] first.
     pub fn available() -> impl Iterator<Item = Kernel> {
-        Kernel::ALL
-            .into_iter()
-            .filter(|kernel| kernel.is_available())
+        let all = Kernel::ALL.into_iter();
+        all.filter(|kernel| kernel.is_available())
     }
 
     /// The largest instruction set of this machine.

@@ -46,9 +46,8 @@ impl Oracle {
     pub fn of_camera(pose: &Pose, lens: &Lens, origin: DVec3) -> Option<Oracle> {
         if let LensKind::Matrix(matrix) = lens.kind() {
             let constraints = planes_of_matrix(matrix, origin);
-            return origin
-                .is_finite()
-                .then(|| Oracle::new(constraints, PRECISION));
+            let oracle = || Oracle::new(constraints, PRECISION);
+            return origin.is_finite().then(oracle);
         }
         let (eye, towards, up) = match *pose {
             Pose::LookAt { eye, look, up } => (eye, look, up),
@@ -86,10 +85,8 @@ impl View {
         let normal = normal.clone().map(|n| n.scaled(-exponent));
         let offset = offset.scaled(-exponent);
         // Each component is as large as the whole normal, as far as noise goes.
-        let size = normal
-            .iter()
-            .map(|n| n.estimate().abs())
-            .fold(0.0, f64::max);
+        let sizes = normal.iter().map(|n| n.estimate().abs());
+        let size = sizes.fold(0.0, f64::max);
         let normal = normal.map(|n| {
             let value = n.leading(p.terms());
             p.cleaned(Number { value, size })
@@ -97,23 +94,6 @@ impl View {
         let along = (0..3).map(|k| p.multiply(&normal[k], &Number::from(self.eye[k].clone())));
         let d = along.fold(Number::from(offset), |d, part| p.subtract(&d, &part));
         HalfSpace { normal, d }
-    }
-
-    /// The plane through the eye and an edge of the window at `offset` along
-    /// `axis`, `depth` ahead; `sign` is +1 for the lower edge.
-    fn side(
-        &self,
-        axis: &ExactVector,
-        offset: &Expansion,
-        depth: &Expansion,
-        sign: f64,
-    ) -> HalfSpace {
-        let sign = Expansion::from(sign);
-        let normal = [0, 1, 2].map(|k| {
-            let lean = &times(&axis[k], depth) + &times(&self.back[k], offset);
-            times(&sign, &lean)
-        });
-        self.half_space(&normal, &Expansion::ZERO)
     }
 }
 
@@ -138,13 +118,19 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
         }
     };
     let axes = [&view.u, &view.u, &view.v, &view.v];
+    // The lower edge of two looks along the axis.
     for ((axis, edge), sign) in axes.into_iter().zip(&edges).zip([1.0, -1.0, 1.0, -1.0]) {
+        let sign = number(sign);
         planes.push(if lens.is_orthographic() {
-            let sign = number(sign);
             let normal = axis.clone().map(|c| times(&sign, &c));
             view.half_space(&normal, &-&times(&sign, edge))
         } else {
-            view.side(axis, edge, &depth, sign)
+            // Through the eye and the edge.
+            let normal = [0, 1, 2].map(|k| {
+                let lean = &times(&axis[k], &depth) + &times(&view.back[k], edge);
+                times(&sign, &lean)
+            });
+            view.half_space(&normal, &Expansion::ZERO)
         });
     }
     let ahead = view.back.clone().map(|c| -&c);

@@ -107,10 +107,8 @@ pub(super) struct RoughSpaces {
 
 impl RoughSpaces {
     pub fn new(constraints: &[HalfSpace]) -> RoughSpaces {
-        let normals: Vec<Vector> = constraints
-            .iter()
-            .map(|c| [0, 1, 2].map(|k| Rough::of(c.normal[k].estimate())))
-            .collect();
+        let normal = |c: &HalfSpace| [0, 1, 2].map(|k| Rough::of(c.normal[k].estimate()));
+        let normals: Vec<Vector> = constraints.iter().map(normal).collect();
         let offsets = constraints.iter().map(|c| Rough::of(c.d.estimate()));
         let count = normals.len();
         let mut crosses = Vec::with_capacity(count * count);

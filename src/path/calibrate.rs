@@ -1,8 +1,7 @@
 //! Search for the far plane at which a given share of a sample is visible.
 
 use super::unfit;
-use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions, Surroundings};
-use crate::geometry::Aabb;
+use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions};
 use crate::input::Result;
 use crate::scene::Scene;
 
@@ -49,7 +48,10 @@ pub(super) fn for_visible_share(
     let visible = |scale: f64| -> Result<f64> {
         let mut seen = 0;
         for camera in &sample {
-            seen += count(camera, scale, &items, &around).map_err(|e| unfit(path, e))?;
+            let scaled = rescaled(camera, scale);
+            let volume = scaled.and_then(|c| c.volume(&PlaneOptions::default(), &around));
+            let volume = volume.map_err(|e| unfit(path, e))?;
+            seen += items.iter().filter(|b| volume.sees(b)).count();
         }
         Ok(seen as f64 / (items.len() * sample.len()).max(1) as f64)
     };
@@ -97,16 +99,6 @@ pub(super) fn most_cameras(items: usize) -> usize {
 pub(super) fn scaled(path: &str, cameras: &[Camera], scale: f64) -> Result<Vec<Camera>> {
     let scaled = cameras.iter().map(|camera| rescaled(camera, scale));
     scaled.collect::<Result<_, _>>().map_err(|e| unfit(path, e))
-}
-
-fn count(
-    camera: &Camera,
-    scale: f64,
-    items: &[Aabb],
-    around: &Surroundings,
-) -> Result<usize, CameraError> {
-    let volume = rescaled(camera, scale)?.volume(&PlaneOptions::default(), around)?;
-    Ok(items.iter().filter(|b| volume.sees(b)).count())
 }
 
 fn rescaled(camera: &Camera, scale: f64) -> Result<Camera, CameraError> {

@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 use super::volume::each_volume;
-use super::{AnyVolume, Containment, Predicate, QueryVolume, Recorder};
+use super::{AnyVolume, Predicate, QueryVolume, Recorder};
 use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows};
 use crate::kernel::Isa;
 
@@ -40,15 +40,6 @@ impl Predicate for Dispatched<'_> {
     #[inline(never)]
     fn drops(&self, plane: u32, item: &Aabb) -> bool {
         each_volume!(self.0, volume => Predicate::drops(volume, plane, item))
-    }
-    #[inline(never)]
-    fn classify<R: Recorder>(
-        &self,
-        bounds: &Aabb,
-        mask: PlaneMask,
-        recorder: &mut R,
-    ) -> (Containment, PlaneMask) {
-        each_volume!(self.0, volume => volume.classify(bounds, mask, recorder))
     }
     #[inline(never)]
     fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {

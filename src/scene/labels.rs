@@ -36,9 +36,8 @@ impl Labels {
 
     /// The label of an item; empty if it has none.
     pub fn get(&self, item: usize) -> &str {
-        self.of_item
-            .get(item)
-            .map_or("", |&number| &self.values[number as usize])
+        let number = self.of_item.get(item);
+        number.map_or("", |&number| &self.values[number as usize])
     }
 
     /// Each distinct label with its number of items, most frequent first.

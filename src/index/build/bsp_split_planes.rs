@@ -88,9 +88,8 @@ pub fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
     let width = centres.max - low;
     // Beyond f32's range, or no width at all: bins would be NaN.
     let scale = Vec3::splat(BINS as f32 * 0.999) / width;
-    let usable: Vec<usize> = (0..3)
-        .filter(|&k| scale[k].is_finite() && scale[k] > 0.0)
-        .collect();
+    let is_usable = |k: &usize| scale[*k].is_finite() && scale[*k] > 0.0;
+    let usable: Vec<usize> = (0..3).filter(is_usable).collect();
     let bin = |r: &Record, k: usize| {
         (((r.bounds.centre()[k] - low[k]) * scale[k]) as usize).min(BINS - 1)
     };

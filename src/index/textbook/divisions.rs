@@ -91,19 +91,16 @@ fn divided(
     let mut own = Vec::new();
     for record in records {
         // Closed bounds: on a face, the first of the cells that share it.
-        match below
-            .iter_mut()
-            .find(|(cell, _)| cell.contains(&record.bounds))
-        {
+        let mut cells = below.iter_mut();
+        match cells.find(|(cell, _)| cell.contains(&record.bounds)) {
             Some((_, items)) => items.push(record),
             None => own.push(record),
         }
     }
     let mut node = Node::with(bounds, &own);
     let some = below.into_iter().filter(|(_, items)| !items.is_empty());
-    node.children = some
-        .map(|(cell, items)| divided(cell, axes, items, params, level + 1))
-        .collect();
+    let children = some.map(|(cell, items)| divided(cell, axes, items, params, level + 1));
+    node.children = children.collect();
     node
 }
 
@@ -202,13 +199,11 @@ const JUDGES: usize = 512;
 fn planes_of(records: &[Record], boxes: usize) -> impl Iterator<Item = Plane> {
     let step = records.len().div_ceil(boxes).max(1);
     records.iter().step_by(step).flat_map(|r| {
+        let faces = Vec3::AXES.map(|n| [(n, r.bounds.min), (n, r.bounds.max)]);
         let diagonals = [Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
-        let faces = Vec3::AXES
-            .into_iter()
-            .flat_map(|n| [(n, r.bounds.min), (n, r.bounds.max)]);
-        let diagonals = diagonals.into_iter().map(|n| (n, r.bounds.centre()));
-        let through = |(normal, at)| Plane::through(at, normal);
-        faces.chain(diagonals).map(through).collect::<Vec<_>>()
+        let diagonals = diagonals.map(|n| (n, r.bounds.centre()));
+        let planes = [faces.as_flattened(), &diagonals].concat().into_iter();
+        planes.map(|(normal, at)| Plane::through(at, normal))
     })
 }
 

@@ -71,9 +71,8 @@ pub(super) fn read_beside(
     let numbers = numbers.fold(0, u64::saturating_add);
     let needed = numbers.saturating_mul(BYTES_PER_NUMBER);
     memory::check_fits(name, needed, options.structures, numbers)?;
-    let meshes: Vec<Mesh> = meshes
-        .map(|mesh| file.mesh(mesh))
-        .collect::<Result<_, _>>()?;
+    let meshes = meshes.map(|mesh| file.mesh(mesh));
+    let meshes: Vec<Mesh> = meshes.collect::<Result<_>>()?;
     let mut labels = Labels::new("name");
     let names = placed.iter().map(|item| &file.root.nodes[item.node].name);
     names.for_each(|name| labels.push(name.as_deref().unwrap_or_default()));
