@@ -223,7 +223,7 @@ fn rule_table(advice: &Advice) -> Table {
 /// Every structure, test and feature with its times.
 fn evidence(advice: &Advice) -> [Block; 8] {
     let columns: [Column<&Omission>; 2] = [
-        ("feature", |feature| feature.rule.feature.to_owned()),
+        ("feature", |feature| format!("  {}", feature.rule.feature)),
         ("why", |feature| {
             let is_otherwise = feature.confirmed == Some(false);
             feature.reason.clone() + ["", " (predicted otherwise)"][usize::from(is_otherwise)]

@@ -109,11 +109,9 @@ fn left_out(registry: &Registry, plan: &Plan) -> anyhow::Result<Option<String>> 
     let compared = plan.structures.iter();
     let compared: Vec<_> = compared.map(|s| s.label.split('@').next()).collect();
     let is_in = |name: &String| compared.contains(&Some(name));
-    let names = default.map(|spec| spec.label).filter(|name| !is_in(name));
-    let names: Vec<String> = names.collect();
-    let note = "not compared by default";
-    let names = (!names.is_empty()).then(|| names.join(", "));
-    Ok(names.map(|names| format!("{note}: {names} (--structure default takes all)")))
+    let names = text::joined(default.map(|spec| spec.label).filter(|name| !is_in(name)));
+    let (note, more) = ("not compared by default", "(--structure default takes all)");
+    Ok((!names.is_empty()).then(|| format!("{note}: {names} {more}")))
 }
 
 /// The program of a name, as in a shell: one without a folder is looked up in PATH.

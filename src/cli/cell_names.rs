@@ -20,19 +20,17 @@ pub fn short_structure(name: &str) -> String {
 ///
 /// At most `room` characters; the scene is cut first.
 pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String {
-    let mut rest = format!(" {}", short(&group.path));
-    if group.test != CullingTest::SixPlane.name() {
-        rest += &format!(" {}", group.test);
-    }
-    if group.cache != "warm" {
-        rest += &format!(" {}", group.cache);
-    }
-    if !group.motion.is_empty() {
-        rest += &format!(" {}", short(&group.motion));
-    }
-    for part in unusual(group) {
-        rest += &format!(" {part}");
-    }
+    let other = |text: &String, usual: &str| (text != usual).then(|| text.clone());
+    let test = other(&group.test, CullingTest::SixPlane.name());
+    let (cache, motion) = (other(&group.cache, "warm"), other(&group.motion, ""));
+    let parts = [
+        Some(short(&group.path)),
+        test,
+        cache,
+        motion.map(|motion| short(&motion)),
+    ];
+    let parts = parts.into_iter().flatten().chain(unusual(group));
+    let rest: String = parts.map(|part| format!(" {part}")).collect();
     let scene = short(&group.scene);
     if scene.chars().count() + rest.chars().count() <= room {
         return scene + &rest;

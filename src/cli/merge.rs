@@ -34,7 +34,7 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     let cells = text::counted(report.cells.len(), "cell");
     let shards = text::counted(args.runs.len(), "shard");
     let basis = format!("{cells} of {shards}; {}", text::conclusion(&report));
-    unread_is_fine(close(&basis, None, &args.out))?;
+    unread_is_fine(close(&basis, None, &args.out, None))?;
     Ok(Ending::of(!report.has_failed()))
 }
 

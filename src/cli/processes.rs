@@ -46,17 +46,15 @@ impl Ended {
     /// # Errors
     /// Any other end than that of the work.
     pub fn done(self) -> anyhow::Result<()> {
-        let (structure, verdict) = match self {
-            Ended::Done => return Ok(()),
+        match self {
+            Ended::Done => Ok(()),
             Ended::Failed(reason) => bail!("{reason}"),
-            Ended::Died(structure, verdict) => (structure, verdict),
-        };
-        let who = structure.map(|structure| format!("{structure}: "));
-        bail!(
-            "{}{}; expected one that finishes its work",
-            who.unwrap_or_default(),
-            verdict.reason.unwrap_or_default()
-        )
+            Ended::Died(structure, verdict) => {
+                let who = structure.map_or(String::new(), |structure| structure + ": ");
+                let why = verdict.reason.unwrap_or_default();
+                bail!("{who}{why}; expected one that finishes its work")
+            }
+        }
     }
 }
 

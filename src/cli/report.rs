@@ -79,21 +79,18 @@ fn page(report: &Report, folder: &Path) -> String {
 /// Writes the page and the pictures of a run into its folder.
 pub fn write_page(report: &Report, folder: &Path) -> anyhow::Result<()> {
     let pictures = surface_tables::pictures(report);
-    let named = pictures.iter().map(|p| (p.name.as_str(), p.svg.as_str()));
+    let named = pictures.iter().map(|p| (p.0.as_str(), p.1.as_str()));
     Ok(save_page(folder, &page(report, folder), named)?)
 }
 
 /// Meaning of the columns and labels that occur in tables.
 fn glossary(blocks: &[Block]) -> [Block; 2] {
-    let texts = blocks.iter().flat_map(|block| match block {
-        Block::Table(table) | Block::Heat(table) => {
-            [std::slice::from_ref(&table.header), &table.rows[..]]
-                .concat()
-                .concat()
-        }
-        _ => Vec::new(),
+    let tables = blocks.iter().filter_map(|block| match block {
+        Block::Table(table) | Block::Heat(table) => Some(table),
+        _ => None,
     });
-    let texts: BTreeSet<String> = texts.collect();
+    let rows = tables.flat_map(|table| table.rows.iter().chain([&table.header]));
+    let texts: BTreeSet<&String> = rows.flatten().collect();
     let is_of = |text: &str, name: &str| {
         text.split(", ").next() == Some(name) || name.contains('[') && text.contains(" [")
     };
@@ -142,10 +139,9 @@ fn declare(report: &mut Report, registry: &Registry) {
 fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
     let is_new = !folder.exists();
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let file = |picture: &Picture| folder.join(format!("{}.svg", picture.name));
-    let written = pictures
-        .iter()
-        .try_for_each(|picture| write_text(&file(picture), &picture.svg));
+    let file = |name: &str| folder.join(format!("{name}.svg"));
+    let mut all = pictures.iter();
+    let written = all.try_for_each(|(name, svg)| write_text(&file(name), svg));
     if written.is_err() && is_new {
         let _ = fs::remove_dir_all(folder);
     }
@@ -296,11 +292,12 @@ fn about(report: &Report) -> Vec<String> {
     lines
 }
 
-/// Shows the basis of a run, further lines, and its files.
+/// Shows the basis of a run, further lines, its files and another file.
 pub fn close(
     basis: &str,
     lines: impl IntoIterator<Item = String>,
     folder: &Path,
+    other: Option<String>,
 ) -> io::Result<()> {
     let mut out = text::terminal();
     writeln!(out, "\n{}", text::wrapped(basis, text::width()))?;
@@ -308,8 +305,9 @@ pub fn close(
         .into_iter()
         .try_for_each(|line| writeln!(out, "{line}"))?;
     writeln!(out, "report  {}", folder.join("report.html").display())?;
-    let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg";
-    writeln!(out, "        {others}")?;
+    let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg".to_owned();
+    let mut others = [others].into_iter().chain(other);
+    others.try_for_each(|line| writeln!(out, "        {line}"))?;
     out.flush()
 }
 

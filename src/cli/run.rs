@@ -292,10 +292,10 @@ impl<'a> Run<'a> {
         let warnings = warnings.map(|said| text::wrapped(&format!("warning: {said}"), width));
         let kept = save.map(|name| {
             let file = compare::baseline_file(name);
-            format!("kept    {}: compare --baseline {name}", file.display())
+            format!("{}: compare --baseline {name}", file.display())
         });
         let lines = warnings.chain(next(report, &self.stream.header.args, width));
-        close(&basis, lines.chain(kept), self.folder.path())
+        close(&basis, lines, self.folder.path(), kept)
     }
 }
 

@@ -69,12 +69,14 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
             Some(seen) => format!("{returned} of the items are returned, about {seen} visible"),
         }
     });
-    let sources = text::some(text::by_source(comparison), |items| {
-        format!(" ({items} by storage/planes/test)")
-    });
+    let sources = text::by_source(comparison);
+    let sources = sources.map(|items| format!("{items} by storage/planes/test"));
     let excess = match text::false_positives(comparison) {
-        Some(share) => Some(format!("{share} false positives{sources}")),
-        None => (!sources.is_empty()).then(|| format!("false positives{sources}")),
+        None => sources.map(|items| format!("false positives {items}")),
+        Some(share) => {
+            let sources = text::some(sources, |items| format!(" ({items})"));
+            Some(format!("{share} false positives{sources}"))
+        }
     };
     let lens = path.lens.as_ref();
     let matrix = lens.and_then(|lens| lens.matrix.as_ref());

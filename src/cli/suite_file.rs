@@ -39,14 +39,9 @@ struct Written {
 #[serde(deny_unknown_fields)]
 struct WrittenScene {
     scene: String,
-    #[serde(default = "default_paths")]
-    paths: Vec<String>,
+    paths: Option<Vec<String>>,
     #[serde(default)]
     cold: bool,
-}
-
-fn default_paths() -> Vec<String> {
-    vec![DEFAULT_PATH.to_owned()]
 }
 
 /// The suite of a name or a TOML file.
@@ -111,7 +106,8 @@ fn written(file: &str) -> Result<ChosenSuite, InputError> {
     let mut scenes = Vec::new();
     for row in suite.scenes {
         let parts = every_part(&row.scene)?.into_iter();
-        scenes.extend(parts.map(|source| planned(source, row.paths.clone(), row.cold)));
+        let paths = row.paths.unwrap_or_else(|| vec![DEFAULT_PATH.to_owned()]);
+        scenes.extend(parts.map(|source| planned(source, paths.clone(), row.cold)));
     }
     if scenes.is_empty() {
         let nothing = "no scenes; expected [[scenes]] with a scene and its paths";

@@ -233,20 +233,15 @@ fn measured(surface: &Surface, class: f64) -> String {
     format!(" (measured: {least} to {most})")
 }
 
-/// A picture with a name that fits a file.
-pub struct Picture {
-    pub name: String,
-    pub svg: String,
-}
+/// A name that fits a file, and a picture as SVG.
+pub type Picture = (String, String);
 
 /// A picture for each class of shares that has at least two sizes, and one for each
 /// scene and path that ranks anything.
 pub fn pictures(report: &Report) -> Vec<Picture> {
     let mut pictures: Vec<Picture> = Vec::new();
     let mut add = |words: [&str; 4], figure| {
-        let name = file_name(words, &pictures);
-        let svg = picture(&[figure], 1);
-        pictures.push(Picture { name, svg });
+        pictures.push((file_name(words, &pictures), picture(&[figure], 1)));
     };
     for surface in surfaces(comparisons(report)) {
         let Surface {
@@ -272,7 +267,7 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
 fn file_name(words: [&str; 4], taken: &[Picture]) -> String {
     let words = words.map(|word| word.chars().take(70).collect::<String>());
     let name: String = slug(&words.join("-")).chars().take(200).collect();
-    let is_free = |name: &String| taken.iter().all(|picture| picture.name != *name);
+    let is_free = |name: &String| taken.iter().all(|picture| picture.0 != *name);
     // Two worlds may look the same to a file system.
     let mut names = (1..).map(|n| match n {
         1 => name.clone(),
