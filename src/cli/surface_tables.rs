@@ -309,11 +309,11 @@ mod tests {
         for world in [&world, &format!("{world}y"), "a", "a-warm-t-2 %-2", "a"] {
             let name = file_name([world, "warm", "t", "2 %"], &pictures);
             assert!(
-                name.len() < 250 && pictures.iter().all(|p| p.name != name),
+                name.len() < 250 && pictures.iter().all(|p| p.0 != name),
                 "{name}"
             );
             let svg = String::new();
-            pictures.push(Picture { name, svg });
+            pictures.push((name, svg));
         }
     }
 }
