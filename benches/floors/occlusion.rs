@@ -33,7 +33,7 @@ impl Work for Project<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> LaneMask {
-        let (mut rects, mut all) = (Rects::NONE, 0);
+        let (mut rects, mut all) = (Rects::default(), 0);
         for block in self.0.level(0) {
             rects.project(isa, block, self.1);
             all ^= black_box(&rects).seen;
@@ -97,7 +97,7 @@ impl Work for Ask<'_> {
         let Ask(scene, view, asked) = self;
         for (index, block) in scene.level(0).iter().enumerate() {
             let admitted = block.admitted_by(isa, view.volume, view.volume.mask());
-            let mut rects = Rects::NONE;
+            let mut rects = Rects::default();
             rects.project(isa, block, view);
             let lanes = scene.lanes(0, index) & admitted & rects.seen & rects.flat;
             if lanes != 0 {

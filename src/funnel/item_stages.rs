@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use super::stage::{Chain, NONE, OCCLUSION_ROWS, OcclusionRow, StageKind, Step};
+use super::stage::{Chain, NONE, OCCLUSION_ROWS, StageKind, Step};
 use super::task::{FunnelKey, KeyedTask};
 use super::truth::{Truth, ViewCounts, count_items};
 use super::world::{View, World};
@@ -16,18 +16,15 @@ use crate::visibility::{SampleGrid, occlusion};
 pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 
 impl World<'_> {
-    /// A back end of a stage of whole items.
+    /// A back end of a stage of whole items, with an occlusion buffer of the given size.
     ///
     /// # Panics
     /// If there is no such back end.
-    pub fn run(&self, stage: StageKind, name: &str) -> Run<'_> {
+    pub fn run(&self, stage: StageKind, name: &str, buffer: SampleGrid) -> Run<'_> {
         match stage {
             StageKind::Region => self.run_region(name),
             StageKind::Object => self.run_object(name),
-            StageKind::Occlusion => {
-                let row = OCCLUSION_ROWS.iter().find(|row| row.name == name);
-                self.run_occlusion(row.expect("a row of the occlusion stage"), self.samples)
-            }
+            StageKind::Occlusion => self.run_occlusion(name, buffer),
             StageKind::Triangle | StageKind::Fragment => unreachable!("no stage of whole items"),
         }
     }
@@ -64,8 +61,9 @@ impl World<'_> {
         })
     }
 
-    /// A back end of the occlusion stage with a buffer of the given size.
-    pub fn run_occlusion(&self, row: &OcclusionRow, buffer: SampleGrid) -> Run<'_> {
+    fn run_occlusion(&self, name: &str, buffer: SampleGrid) -> Run<'_> {
+        let row = OCCLUSION_ROWS.iter().find(|row| row.name == name);
+        let row = row.expect("a row of the occlusion stage");
         let occlude = RefCell::new((row.build)(buffer, self.kernel));
         let occluders: Vec<_> = self.views().map(|view| self.occluders(view)).collect();
         Box::new(move |view, input, out| {
@@ -118,7 +116,7 @@ impl<'w> ItemStages<'w> {
             return;
         }
         self.run(before);
-        let run = self.world.run(*stage, name);
+        let run = self.world.run(*stage, name, self.world.samples);
         let output = self.world.views().map(|view| {
             let mut ids = Vec::new();
             run(view, self.items(before, view), &mut ids);
@@ -164,7 +162,7 @@ impl<'w> ItemStages<'w> {
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         self.left.iter().map(|(steps, _)| {
             let (stage, name) = steps.last().expect("at least one step");
-            let run = self.world.run(*stage, name);
+            let run = self.world.run(*stage, name, self.world.samples);
             let input = self.behind(&steps[..steps.len() - 1]);
             let ask: Ask = Box::new(move |view, out| {
                 run(view, input.map(|left| &left[view][..]), out);

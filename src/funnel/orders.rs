@@ -10,7 +10,6 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::error::LeftOutRow;
 use super::item_stages::ItemStages;
 use super::stage::Step;
 use super::task::{FunnelKey, KeyedTask};
@@ -68,27 +67,19 @@ struct Left {
     boxes: Solids,
     cut_outs: Option<fragment::Holes>,
     rays: Rays,
-    orders: Vec<Box<dyn DepthOrder>>,
+    orders: Vec<(&'static order::OrderRow, Box<dyn DepthOrder>)>,
 }
 
 /// Items that the chain leaves of every view, to be ordered.
 pub struct Orders {
-    rows: Vec<&'static order::OrderRow>,
     views: Vec<Left>,
     /// Drawn triangles of a scene whose items are no solid boxes.
     triangles: Option<Arc<Surfaces>>,
     samples: SampleGrid,
-    /// All orders, if too much would be drawn.
-    pub left_out: Option<LeftOutRow>,
 }
 
 impl Left {
-    fn of(
-        world: &World,
-        all: &Solids,
-        rays: &Rays,
-        (items, is_all): (&[ItemId], bool),
-    ) -> (Vec<&'static order::OrderRow>, Left) {
+    fn of(world: &World, all: &Solids, rays: &Rays, items: &[ItemId], is_all: bool) -> Left {
         let boxes = all.some(items);
         let triangles = world.shape.triangles().map(|surfaces| surfaces.some(items));
         let to_order = ToOrder {
@@ -99,53 +90,48 @@ impl Left {
         let wanted = ORDERS.iter();
         let wanted = wanted.filter(|row| is_all || SORTED.contains(&row.name));
         let built = wanted.filter_map(|row| Some((row, (row.build)(&to_order)?)));
-        let (rows, orders) = built.unzip();
-        let left = Left {
-            orders,
+        Left {
+            orders: built.collect(),
             rays: *rays,
             cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),
             items: items.to_vec(),
             boxes,
-        };
-        (rows, left)
+        }
     }
 
     fn sort(&self, order: usize, pieces: &mut Vec<Piece>) {
-        self.orders[order].order(&self.boxes, self.rays.camera(), pieces);
+        self.orders[order]
+            .1
+            .order(&self.boxes, self.rays.camera(), pieces);
     }
 }
 
 impl Orders {
     /// Orders of the items behind `steps`, all or [`SORTED`].
-    ///
-    /// None if `too_much` would be drawn.
-    pub fn new(
-        world: &World,
-        stages: &ItemStages,
-        steps: &[Step],
-        (is_all, too_much): (bool, Option<&String>),
-    ) -> Orders {
+    pub fn new(world: &World, stages: &ItemStages, steps: &[Step], is_all: bool) -> Orders {
         let all = match world.shape.boxes() {
             Some(solids) => Cow::Borrowed(solids),
             None => Cow::Owned(Solids::of(world.scene)),
         };
-        let drawn = world.views().filter(|_| too_much.is_none());
-        let views = drawn.map(|view| {
+        let views = world.views().map(|view| {
             let items = world.listed(stages.items(steps, view));
-            Left::of(world, &all, world.rays(view), (&items, is_all))
+            Left::of(world, &all, world.rays(view), &items, is_all)
         });
-        let (rows, views): (Vec<_>, Vec<Left>) = views.unzip();
         Orders {
-            rows: rows.into_iter().next().unwrap_or_default(),
-            views,
+            views: views.collect(),
             triangles: world.shape.triangles().cloned(),
             samples: world.samples,
-            left_out: too_much.map(|reason| LeftOutRow::new("orders", "all", reason)),
         }
     }
 
+    /// The rows, the same in every view.
+    fn rows(&self) -> impl Iterator<Item = &'static order::OrderRow> {
+        let orders = self.views.first().map(|left| &left.orders);
+        orders.into_iter().flatten().map(|(row, _)| *row)
+    }
+
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
-        self.rows.iter().enumerate().map(move |(order, row)| {
+        self.rows().enumerate().map(move |(order, row)| {
             let pieces = RefCell::new(Vec::new());
             let ask: Ask = Box::new(move |view, out| {
                 let pieces = &mut *pieces.borrow_mut();
@@ -161,12 +147,14 @@ impl Orders {
     /// # Errors
     /// Too many items behind each other.
     pub fn drawn(&self) -> Result<Vec<OrderRow>, TooManyPairs> {
-        let mut rows: Vec<OrderRow> = self.rows.iter().map(|row| OrderRow::new(row)).collect();
+        let mut rows: Vec<OrderRow> = self.rows().map(OrderRow::new).collect();
         // Processes that only time need no tree of the triangles.
         let index = self.triangles.as_deref().map(SurfaceIndex::build);
         for left in &self.views {
             let counts = self.counted(left, index.as_ref());
-            for ((row, order), (tally, errors)) in rows.iter_mut().zip(&left.orders).zip(counts) {
+            for ((row, (_, order)), (tally, errors)) in
+                rows.iter_mut().zip(&left.orders).zip(counts)
+            {
                 row.add(&tally, &errors?, self.views.len() as f64);
                 if let Some(reason) = order.exception(left.rays.camera()) {
                     *row.exceptions.entry(reason).or_default() += 1;
@@ -187,7 +175,7 @@ impl Orders {
         index: Option<&SurfaceIndex>,
     ) -> Vec<(Tally, Result<OrderErrors, TooManyPairs>)> {
         let (rays, samples, items) = (&left.rays, self.samples, &left.items);
-        let sorted = left.orders.iter().enumerate().map(|(index, order)| {
+        let sorted = left.orders.iter().enumerate().map(|(index, (_, order))| {
             let mut pieces = Vec::new();
             left.sort(index, &mut pieces);
             (&**order, pieces)

@@ -134,38 +134,37 @@ impl<'w> Picks<'w> {
                 (surfaces.triangles.len(), build)
             }
         };
-        let mut built = Vec::<(_, Rc<dyn Pick>)>::new();
         for row in BACK_ENDS {
             if row.name == "linear" && count > MOST_FOR_LOOP {
                 continue;
             }
-            let pick = build(row);
-            let pick = pick.map(Rc::from).and_then(|pick| {
+            let pick = build(row).map(Rc::from).and_then(|pick| {
                 if row.guarantee == Guarantee::Unproven {
                     self.try_out(row.name, &pick)?;
                 }
                 Ok(pick)
             });
-            match pick {
-                Ok(pick) => built.push(((row.name, row.summary, row.guarantee), pick)),
-                Err(reason) => (self.left_out).push(LeftOutRow::new("picks", row.name, reason)),
-            }
-        }
-        for (declared, pick) in built.iter().cloned() {
+            let pick: Rc<dyn Pick> = match pick {
+                Ok(pick) => pick,
+                Err(reason) => {
+                    (self.left_out).push(LeftOutRow::new("picks", row.name, reason));
+                    continue;
+                }
+            };
+            let declared = (row.name, row.summary, row.guarantee);
+            let (same, hits) = (pick.clone(), RefCell::new(Vec::new()));
             let first: Answer = Box::new(move |_, cursor, out| {
                 out.extend(pick.first(&cursor.ray).map(|hit| hit.item));
             });
-            self.add(PickQuestion::First, declared, first);
-        }
-        for (declared, pick) in built {
-            let hits = RefCell::new(Vec::new());
             let nearest: Answer = Box::new(move |_, cursor, out| {
                 let hits = &mut *hits.borrow_mut();
-                pick.nearest(&cursor.ray, NEAREST, hits);
+                same.nearest(&cursor.ray, NEAREST, hits);
                 out.extend(hits.iter().map(|hit| hit.item));
             });
+            self.add(PickQuestion::First, declared, first);
             self.add(PickQuestion::Nearest, declared, nearest);
         }
+        self.pickers.sort_by_key(|(row, _)| row.question);
     }
 
     /// Adds structures of the object stage, by the frusta of the cursors.

@@ -61,10 +61,10 @@ impl<'w> Study<'w> {
         let triangles = TriangleStage::new(world, &items, &steps);
         let culled = (&triangles, chain.of(StageKind::Triangle));
         let fragments = FragmentStage::new(world, &items, &steps, culled);
-        let ordered = (input.all, fragments.too_much.as_ref());
+        let is_ordered = input.all || input.sorted;
+        let is_ordered = is_ordered && fragments.too_much.is_none();
         Ok(Study {
-            orders: (input.all || input.sorted)
-                .then(|| Orders::new(world, &items, &steps, ordered)),
+            orders: is_ordered.then(|| Orders::new(world, &items, &steps, input.all)),
             picks: (input.all && input.picks).then(|| Picks::new(world)),
             world,
             chain,
@@ -185,10 +185,11 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
     let tested = study.fragments.tested(&study.items, &study.steps, &truth);
     rows.extend(tested.iter().map(|tested| study.test_row(tested)));
     let mut left_out = Vec::from_iter(left_out_of(input.scene));
-    let too_much = study.fragments.too_much.as_ref();
-    left_out.extend(too_much.map(|reason| LeftOutRow::new("stages", "fragment", reason)));
-    let orders = study.orders.iter();
-    left_out.extend(orders.flat_map(|orders| orders.left_out.clone()));
+    if let Some(reason) = &study.fragments.too_much {
+        left_out.push(LeftOutRow::new("stages", "fragment", reason));
+        let orders = (input.all || input.sorted).then_some("orders");
+        left_out.extend(orders.map(|orders| LeftOutRow::new(orders, "all", reason)));
+    }
     let mirror = input.mirror.map_or(Ok(None), |item| {
         mirrored(item, &world, &study.items, &study.steps)
     });

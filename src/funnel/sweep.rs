@@ -7,8 +7,8 @@
 use serde::Serialize;
 
 use super::error::StudyError;
-use super::item_stages::{ItemStages, Run};
-use super::stage::{BackEnd, Chain, NONE, OCCLUSION_ROWS, StageKind, Step};
+use super::item_stages::ItemStages;
+use super::stage::{BackEnd, Chain, NONE, StageKind, Step};
 use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, ViewCounts, count_items, visible};
@@ -45,16 +45,6 @@ pub struct SweepPoint {
 }
 
 impl SweepPoint {
-    fn new(back_end: BackEnd, buffer: Option<[u32; 2]>) -> SweepPoint {
-        SweepPoint {
-            back_end,
-            buffer,
-            errors: Errors::of(&[]),
-            time: None,
-            on_front: false,
-        }
-    }
-
     fn key(&self) -> FunnelKey {
         let BackEnd { stage, name, .. } = self.back_end;
         match self.buffer {
@@ -131,34 +121,33 @@ impl<'w> Swept<'w> {
 
     /// Every point without errors and times, with its task.
     fn points(&self) -> Vec<(SweepPoint, KeyedTask<'_>)> {
-        if let Some(triangles) = &self.triangles {
-            let rows = self.rows().map(|row| SweepPoint::new(row, None));
-            return rows.zip(triangles.tasks()).collect();
-        }
-        if self.stage == StageKind::Occlusion {
-            let rows = OCCLUSION_ROWS.iter();
-            let sized = rows.flat_map(|row| WIDTHS.map(|width| (row, width)));
-            let points = sized.map(|(row, width)| {
-                let grid = SampleGrid::new(width, (width * 9).div_ceil(16));
-                let size = Some([grid.width, grid.height]);
-                let point = SweepPoint::new(BackEnd::of(self.stage, row), size);
-                self.with_task(point, self.world.run_occlusion(row, grid))
-            });
-            return points.collect();
-        }
-        let points = self.rows().map(|row| {
-            let run = self.world.run(self.stage, row.name);
-            self.with_task(SweepPoint::new(row, None), run)
-        });
-        points.collect()
-    }
-
-    fn rows(&self) -> impl Iterator<Item = BackEnd> {
+        let sized = WIDTHS.map(|width| Some([width, (width * 9).div_ceil(16)]));
+        let sizes = match self.stage {
+            StageKind::Occlusion => &sized[..],
+            _ => &[None],
+        };
         let rows = self.world.rows(self.stage).into_iter();
-        rows.map(|(row, _)| row).filter(|row| row.name != NONE)
+        let rows = rows.map(|(row, _)| row).filter(|row| row.name != NONE);
+        let points = rows.flat_map(|row| sizes.iter().map(move |size| (row, *size)));
+        let points = points.map(|(back_end, buffer)| SweepPoint {
+            back_end,
+            buffer,
+            errors: Errors::of(&[]),
+            time: None,
+            on_front: false,
+        });
+        match &self.triangles {
+            Some(triangles) => points.zip(triangles.tasks()).collect(),
+            None => points.map(|point| self.with_task(point)).collect(),
+        }
     }
 
-    fn with_task<'s>(&'s self, point: SweepPoint, run: Run<'s>) -> (SweepPoint, KeyedTask<'s>) {
+    fn with_task(&self, point: SweepPoint) -> (SweepPoint, KeyedTask<'_>) {
+        let buffer = point
+            .buffer
+            .map(|[width, height]| SampleGrid::new(width, height));
+        let buffer = buffer.unwrap_or(self.world.samples);
+        let run = self.world.run(self.stage, point.back_end.name, buffer);
         let ask: Ask = Box::new(move |view, out| run(view, self.given(view), out));
         let task = (point.key(), ask);
         (point, task)

@@ -10,7 +10,7 @@ use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, time
 
 named! {
     /// A question about a cursor.
-    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
     pub enum PickQuestion {
         /// The first item along the ray.
         #[serde(rename = "first item")]

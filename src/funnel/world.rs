@@ -315,7 +315,7 @@ fn check_options(input: &FunnelInput) -> Result<(), StudyError> {
 fn regions(input: &FunnelInput) -> Result<Option<Regions>, StudyError> {
     let name = &input.scene.name;
     let refused = match (Regions::of(input.scene), input.claim) {
-        (Ok(mut regions), Some(claim)) => match regions.claim(claim) {
+        (Ok(mut regions), Some(claim)) => match regions.store(claim.clone(), Source::Claim) {
             true => return Ok(Some(regions)),
             false => format!(
                 "the potentially visible set has {} regions; expected the scene's {}",
@@ -368,13 +368,9 @@ impl Regions {
         Ok(regions)
     }
 
-    /// Adds a claimed table, in place of the map's own.
+    /// Adds a table, a claimed one in place of the map's own.
     ///
     /// False if it has another number of regions.
-    pub fn claim(&mut self, claim: &Arc<Pvs>) -> bool {
-        self.store(claim.clone(), Source::Claim)
-    }
-
     fn store(&mut self, pvs: Arc<Pvs>, source: Source) -> bool {
         let row = RegionRow::stored(source, self.graph.clone(), pvs);
         let fits = row.is_some();
@@ -437,12 +433,13 @@ mod tests {
             sorted: false,
         };
         let world = World::new(&scene, &input, &|_| ()).expect("a world");
+        let run = |stage, name| world.run(stage, name, world.samples);
         let mut found = 0;
         for view in world.views() {
             let (mut left, mut right, mut none) = (Vec::new(), Vec::new(), Vec::new());
-            world.run(StageKind::Region, "flood")(view, None, &mut left);
-            world.run(StageKind::Object, "linear")(view, Some(&left), &mut right);
-            world.run(StageKind::Object, "blind")(view, Some(&left), &mut none);
+            run(StageKind::Region, "flood")(view, None, &mut left);
+            run(StageKind::Object, "linear")(view, Some(&left), &mut right);
+            run(StageKind::Object, "blind")(view, Some(&left), &mut none);
             let sees = |id: &ItemId| world.views[view].volume.sees(&scene.items[*id as usize]);
             let wanted: Vec<ItemId> = left.iter().copied().filter(sees).collect();
             assert_eq!((right, none), (wanted.clone(), vec![]));

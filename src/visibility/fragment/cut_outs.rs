@@ -141,13 +141,13 @@ pub struct CutOuts {
 /// The text as typed.
 impl Display for CutOuts {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let CutOuts {
+        let (
             mask,
-            share,
-            tile,
-            seed,
-        } = self;
-        write!(f, "{}:share={share},tile={tile},seed={seed}", mask.name())
+            CutOuts {
+                share, tile, seed, ..
+            },
+        ) = (self.mask.name(), self);
+        write!(f, "{mask}:share={share},tile={tile},seed={seed}")
     }
 }
 

@@ -53,7 +53,11 @@ pub(super) struct Layer<A> {
 #[derive(Default)]
 pub(super) struct ErrorCount {
     wrong_samples: u64,
-    pairs: Pairs,
+    /// Pairs (nearer, deeper) that were drawn in the right and in the wrong order.
+    right: Vec<(ItemId, ItemId)>,
+    wrong: Vec<(ItemId, ItemId)>,
+    /// Number of pairs after the last sort.
+    sorted: usize,
     /// Items of the last sample in the order in which they were drawn, each with its
     /// place in the exact order of depths; items at the same depth share one.
     ranked: Vec<(ItemId, u32)>,
@@ -97,13 +101,18 @@ impl ErrorCount {
         for (i, a) in ranked.iter().enumerate() {
             for b in &ranked[i + 1..] {
                 match a.1.cmp(&b.1) {
-                    Ordering::Less => self.pairs.right.push((a.0, b.0)),
-                    Ordering::Greater => self.pairs.wrong.push((b.0, a.0)),
+                    Ordering::Less => self.right.push((a.0, b.0)),
+                    Ordering::Greater => self.wrong.push((b.0, a.0)),
                     Ordering::Equal => {}
                 }
             }
         }
-        self.pairs.settle();
+        // Drops duplicates, where there is much that is new.
+        if self.right.len() + self.wrong.len() > 2 * self.sorted + 1_000_000 {
+            sort_and_dedup(&mut self.right);
+            sort_and_dedup(&mut self.wrong);
+            self.sorted = self.right.len() + self.wrong.len();
+        }
     }
 
     /// The errors of all samples.
@@ -111,11 +120,7 @@ impl ErrorCount {
         if self.looked_at > MOST_PAIRS {
             return Err(TooManyPairs);
         }
-        let Pairs {
-            mut right,
-            mut wrong,
-            ..
-        } = self.pairs;
+        let (mut right, mut wrong) = (self.right, self.wrong);
         sort_and_dedup(&mut wrong);
         let wrong_pairs = wrong.len() as u64;
         right.append(&mut wrong);
@@ -130,26 +135,6 @@ impl ErrorCount {
             wrong_samples: self.wrong_samples,
             cyclic,
         })
-    }
-}
-
-/// Pairs (nearer, deeper) that were drawn in the right and in the wrong order.
-#[derive(Default)]
-struct Pairs {
-    right: Vec<(ItemId, ItemId)>,
-    wrong: Vec<(ItemId, ItemId)>,
-    /// Number of pairs after the last sort.
-    sorted: usize,
-}
-
-impl Pairs {
-    /// Drops duplicates, where there is much that is new.
-    fn settle(&mut self) {
-        if self.right.len() + self.wrong.len() > 2 * self.sorted + 1_000_000 {
-            sort_and_dedup(&mut self.right);
-            sort_and_dedup(&mut self.wrong);
-            self.sorted = self.right.len() + self.wrong.len();
-        }
     }
 }
 

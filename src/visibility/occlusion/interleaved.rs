@@ -135,7 +135,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             open: view.volume.mask(),
             drawn: 0,
         });
-        let mut rects = Rects::NONE;
+        let mut rects = Rects::default();
         let mut open = [0; LANES];
         // Survivors that something was drawn after; the others were tested against all of it.
         let mut early = 0;

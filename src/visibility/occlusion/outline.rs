@@ -51,7 +51,7 @@ pub enum Coverage {
 }
 
 /// A bound of the columns: `at + slope * row`, rounded inward.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Bound {
     at: f32,
     slope: f32,
@@ -103,14 +103,10 @@ impl Outline {
             }
         }
         let [columns, height] = view.padded;
-        let none = Bound {
-            at: 0.0,
-            slope: 0.0,
-        };
         let mut outline = Outline {
-            lower: [none; 8],
+            lower: Default::default(),
             lower_count: 0,
-            upper: [none; 8],
+            upper: Default::default(),
             upper_count: 0,
             height,
             rows: [0.0, height],

@@ -72,7 +72,7 @@ pub struct Candidate {
 }
 
 /// The rectangles of a block's boxes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub struct Rects {
     /// First columns, pixels.
@@ -94,18 +94,6 @@ pub struct Rects {
 }
 
 impl Rects {
-    /// Nothing yet.
-    pub const NONE: Rects = Rects {
-        x0: [0; LANES],
-        x1: [0; LANES],
-        y0: [0; LANES],
-        y1: [0; LANES],
-        nearness: [0.0; LANES],
-        depth: [0.0; LANES],
-        seen: 0,
-        flat: 0,
-    };
-
     /// One lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Rect {

@@ -19,10 +19,6 @@ const SLACK: f64 = 0.125;
 struct LeafGround(Arc<QuakeMap>);
 
 impl LeafGround {
-    fn node(&self, at: u32) -> &LeafNode {
-        &self.0.tree.nodes[at as usize]
-    }
-
     fn is_in_leaf(&self, b: &WorldBox, leaf: RegionId) -> bool {
         b.meets(&WorldBox::of(
             &self.0.tree.boxes[leaf as usize],
@@ -54,7 +50,7 @@ impl Ground for LeafGround {
                 }
                 BspChild::Leaf(_) => {}
                 BspChild::Node(node) => {
-                    let node = self.node(node);
+                    let node = &self.0.tree.nodes[node as usize];
                     let met = node.children.into_iter().zip(sides(node, b));
                     open.extend(met.filter_map(|(child, is_met)| is_met.then_some(child)));
                 }

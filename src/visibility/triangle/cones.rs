@@ -304,27 +304,17 @@ impl ConeBlock {
         }
         self.square[lane] = cone.square();
     }
-
-    /// Apex and axis, three rows each, and the square of the sine.
-    #[inline(always)]
-    fn rows<I: Isa>(&self, isa: I) -> [I::Floats; 7] {
-        // One by one: a closure would be compiled for the portable set.
-        [
-            isa.load(&self.apex[0]),
-            isa.load(&self.apex[1]),
-            isa.load(&self.apex[2]),
-            isa.load(&self.axis[0]),
-            isa.load(&self.axis[1]),
-            isa.load(&self.axis[2]),
-            isa.load(&self.square),
-        ]
-    }
 }
 
 /// The lanes that see none of their triangles. At the lowest: 21 operations.
 #[inline(always)]
 fn rejected<I: Isa>(isa: I, block: &ConeBlock, view: &Broadcast<I>) -> LaneMask {
-    let [x, y, z, a, b, c, square] = block.rows(isa);
+    // One by one: a closure would be compiled for the portable set.
+    let [x, y, z] = [&block.apex[0], &block.apex[1], &block.apex[2]];
+    let [x, y, z] = [isa.load(x), isa.load(y), isa.load(z)];
+    let [a, b, c] = [&block.axis[0], &block.axis[1], &block.axis[2]];
+    let [a, b, c] = [isa.load(a), isa.load(b), isa.load(c)];
+    let square = isa.load(&block.square);
     let [ex, ey, ez] = view.minus_eye;
     let [x, y, z] = match view.is_parallel {
         true => [ex, ey, ez],

@@ -38,8 +38,6 @@ const BAND: usize = 4;
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct SampleTruth {
-    /// Columns and rows.
-    pub grid: SampleGrid,
     /// The front item of each sample, row by row from the top left; the lowest of a
     /// tie, [`NO_ITEM`] where there is none.
     pub front: Vec<ItemId>,
@@ -92,7 +90,6 @@ impl SampleTruth {
         });
         let (visible, samples_of) = counted(&front, others.into_iter().flatten(), index.items());
         SampleTruth {
-            grid,
             front,
             visible,
             samples_of,

@@ -125,15 +125,11 @@ fn sorted(key: fn(&Camera, &WorldBox) -> f64) -> Box<dyn DepthOrder> {
     let order = move |solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>| {
         let boxes = solids.boxes.iter().zip(0..);
         let mut keyed: Vec<_> = boxes.map(|(b, item)| (key(camera, b), item)).collect();
-        sort(&mut keyed);
+        keyed.sort_unstable_by(|a: &(f64, ItemId), b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         pieces.clear();
         pieces.extend(keyed.into_iter().map(|(_, item)| Piece::whole(item)));
     };
     Box::new(order)
-}
-
-fn sort(keyed: &mut [(f64, ItemId)]) {
-    keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
 }
 
 fn distance(camera: &Camera, point: DVec3) -> f64 {

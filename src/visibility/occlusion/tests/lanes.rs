@@ -55,7 +55,7 @@ impl Work for Projected<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Vec<Rects> {
-        let mut rects = Rects::NONE;
+        let mut rects = Rects::default();
         let mut all = Vec::new();
         for block in self.0.occluders.level(0) {
             rects.project(isa, block, self.1);

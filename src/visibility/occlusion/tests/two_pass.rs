@@ -41,7 +41,7 @@ impl<B: OcclusionBuffer> Work for TwoPass<'_, B> {
         };
         let positions: Vec<usize> = (0..scene.len()).filter(is_given).collect();
         let mut candidates: Vec<Candidate> = Vec::new();
-        let mut rects = Rects::NONE;
+        let mut rects = Rects::default();
         for chunk in positions.chunks(LANES) {
             let mut block = BoxBlock::EMPTY;
             for (lane, &position) in chunk.iter().enumerate() {
