@@ -100,9 +100,7 @@ impl Left {
     }
 
     fn sort(&self, order: usize, pieces: &mut Vec<Piece>) {
-        self.orders[order]
-            .1
-            .order(&self.boxes, self.rays.camera(), pieces);
+        self.orders[order].1.order(self.rays.camera(), pieces);
     }
 }
 

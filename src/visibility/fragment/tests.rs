@@ -13,7 +13,7 @@ use crate::visibility::truth::{
     Along, Boxes, NO_ITEM, RayIndex, SampleTruth, SolidBox, SurfaceIndex, judge,
 };
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
-use order::{BspOrder, ORDERS, OrderRow};
+use order::{ORDERS, OrderRow, Partition, parted, parted_within};
 
 fn all(solids: &Solids) -> Vec<SolidBox> {
     Boxes::of(solids).all
@@ -124,7 +124,7 @@ fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
             seen += truth.visible.len();
             let mut pieces = Vec::new();
             for (row, order) in &orders {
-                order.order(&solids, &camera, &mut pieces);
+                order.order(&camera, &mut pieces);
                 let drawn = draw(&canvas, bodies(&solids, &pieces), &Tests::default());
                 assert_eq!(drawn.ids(), truth.front, "{name} {}", row.name);
                 assert_eq!(drawn.visible(&canvas), truth.visible, "{name} {}", row.name);
@@ -150,7 +150,7 @@ fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
         let canvas = Canvas::of(&rays, grid);
         let mut pieces = Vec::new();
         for (row, order) in orders(&solids) {
-            order.order(&solids, &camera, &mut pieces);
+            order.order(&camera, &mut pieces);
             let drawn = draw(&canvas, bodies(&solids, &pieces), &Tests::default());
             assert_eq!(
                 drawn.ids(),
@@ -185,11 +185,11 @@ fn apart(rng: &mut SeededRng, count: usize) -> Vec<WorldBox> {
 }
 
 /// How many parts the items were cut into.
-fn parts(tree: &BspOrder, solids: &Solids) -> usize {
+fn parts(tree: &Partition) -> usize {
     let frame = Frame::looking_along(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();
     let lens = Lens::perspective(70.0, 1.3, 0.5, None).unwrap();
     let mut pieces = Vec::new();
-    tree.order(solids, &Camera { frame, lens }, &mut pieces);
+    tree.order(&Camera { frame, lens }, &mut pieces);
     pieces.len()
 }
 
@@ -206,7 +206,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
             _ => judge::ties(&mut rng, 25),
         };
         let solids = judge::solids(&boxes);
-        cut += parts(&BspOrder::of(&solids), &solids) - boxes.len();
+        cut += parts(&parted(&solids)) - boxes.len();
         for lens in [
             Lens::perspective(70.0, 1.3, 0.5, None),
             Lens::orthographic(30.0, 1.3, -40.0, 80.0),
@@ -219,7 +219,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
             let canvas = Canvas::of(&rays, grid);
             let mut pieces = Vec::new();
             for (i, (row, order)) in orders(&solids).into_iter().enumerate() {
-                order.order(&solids, &camera, &mut pieces);
+                order.order(&camera, &mut pieces);
                 let (tally, errors) = drawn_in(&solids, &rays, grid, &*order, &pieces);
                 wrong[i] += errors.wrong;
                 pairs += errors.pairs;
@@ -289,7 +289,7 @@ fn overlaps_in_a_cycle_are_found_and_only_cutting_undoes_them() {
         let rays = Rays::of(&camera).unwrap();
         let errors = |name: &str| {
             let (order, mut pieces) = (of_boxes(name, &solids), Vec::new());
-            order.order(&solids, &camera, &mut pieces);
+            order.order(&camera, &mut pieces);
             drawn_in(&solids, &rays, SampleGrid::new(80, 80), &*order, &pieces).1
         };
         let (sorted, cut) = (errors("box-distance"), errors("bsp"));
@@ -321,8 +321,8 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
         cube([20.0, 0.0, 0.0], 11.000_000_1),
     ];
     let solids = judge::solids(&boxes);
-    let tree = BspOrder::of(&solids);
-    let count = parts(&tree, &solids);
+    let tree = parted(&solids);
+    let count = parts(&tree);
     assert!(count > 8 * boxes.len(), "the premise: many parts, {count}");
     let eye = DVec3::new(-12.868_988_890, 17.166_524_562, -18.450_470_565) + 1e5;
     let frame = Frame::looking_along(eye, DVec3::X, DVec3::Z).unwrap();
@@ -330,7 +330,7 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
     let camera = Camera { frame, lens };
     let (rays, grid) = (Rays::of(&camera).unwrap(), SampleGrid::new(32, 18));
     let mut pieces = Vec::new();
-    tree.order(&solids, &camera, &mut pieces);
+    tree.order(&camera, &mut pieces);
     let (_, errors) = drawn_in(&solids, &rays, grid, &tree, &pieces);
     assert_eq!((errors.wrong_samples, tree.exception(&camera)), (0, None));
     assert!(errors.pairs > 6, "the premise: they overlap in the image");
@@ -344,7 +344,7 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
     let frame = Frame::looking_along(eye.with_x(1e5 + 7.0), DVec3::Y, DVec3::Z).unwrap();
     let within = Camera { frame, lens };
     assert!(tree.exception(&within).unwrap().contains("plane"));
-    let tree = BspOrder::within(&solids, 2 * boxes.len());
+    let tree = parted_within(&solids, 2 * boxes.len());
     assert!(tree.exception(&camera).unwrap().contains("limit on cuts"));
 }
 
@@ -393,7 +393,7 @@ fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
                 let rays = Rays::of(&camera).unwrap();
                 let mut sorted = orders.each_ref().map(|order| {
                     let mut pieces = Vec::new();
-                    order.order(&boxes, &camera, &mut pieces);
+                    order.order(&camera, &mut pieces);
                     (&**order, pieces)
                 });
                 sorted[2].1.reverse();

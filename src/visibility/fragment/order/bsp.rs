@@ -14,8 +14,7 @@
 use glam::DVec3;
 
 use super::partition::{Held, Node, Partition};
-use super::{DepthOrder, Part, Piece, ToOrder};
-use crate::camera::Camera;
+use super::{DepthOrder, Part, ToOrder};
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
 
@@ -31,68 +30,60 @@ const MOST_PLANES: usize = 64;
 /// Cost of a cut, in boxes of imbalance.
 const COST_OF_CUT: usize = 8;
 
-/// The tree.
-pub struct BspOrder {
-    tree: Partition,
-    /// `true` if cutting ended early.
-    is_cut_short: bool,
-}
-
 /// Cuts boxes by planes; no order of triangles.
 pub fn order(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
-    let order = || Box::new(BspOrder::of(of.boxes)) as Box<dyn DepthOrder>;
+    let order = || Box::new(parted(of.boxes)) as Box<dyn DepthOrder>;
     of.surfaces.is_none().then(order)
 }
 
-impl BspOrder {
-    /// Builds the tree. O(n log^2 n) where few boxes are cut.
-    pub fn of(solids: &Solids) -> BspOrder {
-        BspOrder::within(solids, (solids.boxes.len() * MOST_PARTS).max(ROOM))
-    }
+/// Builds the tree. O(n log^2 n) where few boxes are cut.
+pub fn parted(solids: &Solids) -> Partition {
+    parted_within(solids, (solids.boxes.len() * MOST_PARTS).max(ROOM))
+}
 
-    /// The same, of at most `most` parts.
-    pub fn within(solids: &Solids, most: usize) -> BspOrder {
-        let part = |(b, item): (&WorldBox, u32)| Held {
-            item,
-            bounds: *b,
-            part: None,
-            is_behind_all: false,
+/// The same, of at most `most` parts.
+pub fn parted_within(solids: &Solids, most: usize) -> Partition {
+    let part = |(b, item): (&WorldBox, u32)| Held {
+        item,
+        bounds: *b,
+        part: None,
+        is_behind_all: false,
+    };
+    let all: Vec<Held> = solids.boxes.iter().zip(0..).map(part).collect();
+    let (mut tree, mut count, mut is_cut_short) = (Partition::default(), all.len(), false);
+    tree.leaves.push(Vec::new());
+    // Parts, and the leaf that they are if no plane divides them.
+    let mut open = vec![(0, all)];
+    let mut left = most.saturating_mul(MOST_PLANES);
+    while let Some((leaf, parts)) = open.pop() {
+        left = left.saturating_sub(parts.len());
+        let room = most.saturating_sub(count);
+        let found = (left > 0).then(|| plane(&parts, room)).flatten();
+        let Some((axis, at)) = found else {
+            is_cut_short |= plane(&parts, usize::MAX).is_some();
+            tree.leaves[leaf] = parts;
+            continue;
         };
-        let all: Vec<Held> = solids.boxes.iter().zip(0..).map(part).collect();
-        let (mut tree, mut count, mut is_cut_short) = (Partition::default(), all.len(), false);
-        tree.leaves.push(Vec::new());
-        // Parts, and the leaf that they are if no plane divides them.
-        let mut open = vec![(0, all)];
-        let mut left = most.saturating_mul(MOST_PLANES);
-        while let Some((leaf, parts)) = open.pop() {
-            left = left.saturating_sub(parts.len());
-            let room = most.saturating_sub(count);
-            let found = (left > 0).then(|| plane(&parts, room)).flatten();
-            let Some((axis, at)) = found else {
-                is_cut_short |= plane(&parts, usize::MAX).is_some();
-                tree.leaves[leaf] = parts;
-                continue;
-            };
-            count -= parts.len();
-            let node = tree.nodes.len() as u32;
-            match tree.nodes.get_mut(leaf / 2) {
-                None => tree.root = Some(node),
-                Some(above) => above.children[leaf % 2] = Some(node),
-            }
-            tree.nodes.push(Node {
-                normal: DVec3::AXES[axis],
-                d: -at,
-                children: [None; 2],
-            });
-            tree.leaves.resize_with(2 * tree.nodes.len(), Vec::new);
-            for (side, parts) in sides(parts, axis, at).into_iter().enumerate().rev() {
-                let parts = entered(parts, &solids.boxes);
-                count += parts.len();
-                open.push((2 * node as usize + side, parts));
-            }
+        count -= parts.len();
+        let node = tree.nodes.len() as u32;
+        match tree.nodes.get_mut(leaf / 2) {
+            None => tree.root = Some(node),
+            Some(above) => above.children[leaf % 2] = Some(node),
         }
-        BspOrder { tree, is_cut_short }
+        tree.nodes.push(Node {
+            normal: DVec3::AXES[axis],
+            d: -at,
+            children: [None; 2],
+        });
+        tree.leaves.resize_with(2 * tree.nodes.len(), Vec::new);
+        for (side, parts) in sides(parts, axis, at).into_iter().enumerate().rev() {
+            let parts = entered(parts, &solids.boxes);
+            count += parts.len();
+            open.push((2 * node as usize + side, parts));
+        }
     }
+    tree.is_cut_short = Some(is_cut_short);
+    tree
 }
 
 /// Parts above and below a plane; parts within the plane count as below.
@@ -167,25 +158,6 @@ fn plane(parts: &[Held], room: usize) -> Option<(usize, f64)> {
     best.map(|(_, axis, at)| (axis, at))
 }
 
-impl DepthOrder for BspOrder {
-    fn order(&self, _: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
-        self.tree.pieces(camera, pieces);
-    }
-
-    fn exception(&self, camera: &Camera) -> Option<&'static str> {
-        if self.is_cut_short {
-            return Some("the limit on cuts was reached before all items were separated");
-        }
-        let Camera { frame, lens } = camera;
-        let is_within = |node: &Node| match lens.is_orthographic() {
-            true => node.normal.dot(frame.forward()) == 0.0,
-            false => node.height(frame.eye) == 0.0,
-        };
-        let within = self.tree.nodes.iter().any(is_within);
-        within.then_some("rays may run within the plane of a face")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -199,10 +171,10 @@ mod tests {
             let boxes: Vec<_> = (0..count)
                 .map(|i| WorldBox::new(-half(i), half(i)))
                 .collect();
-            let tree = BspOrder::within(&judge::solids(&boxes), 8 * count);
-            let parts: usize = tree.tree.leaves.iter().map(Vec::len).sum();
+            let tree = parted_within(&judge::solids(&boxes), 8 * count);
+            let parts: usize = tree.leaves.iter().map(Vec::len).sum();
             assert!(parts < 8 * count);
-            assert_eq!(!tree.is_cut_short, is_whole, "{count}");
+            assert_eq!(tree.is_cut_short, Some(!is_whole), "{count}");
         }
     }
 }

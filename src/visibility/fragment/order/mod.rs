@@ -12,7 +12,8 @@ use crate::query::ItemId;
 use crate::scene::{Surfaces, WorldBox};
 use crate::visibility::{Guarantee, Row, Solids};
 
-pub use bsp::BspOrder;
+pub use bsp::{parted, parted_within};
+pub use partition::Partition;
 
 /// A row of the table of orders: prepares one for items, if it can order them.
 pub type OrderRow = Row<fn(&ToOrder) -> Option<Box<dyn DepthOrder>>>;
@@ -28,9 +29,9 @@ pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, bui
         Guarantee::Unproven, by_tree;
     "centre-distance", "sorted by the distance of the centre of each box",
         Guarantee::Unproven,
-        |_| Some(sorted(|camera, b| distance(camera, b.min / 2.0 + b.max / 2.0)));
+        |of| Some(sorted(of, |camera, b| distance(camera, b.min / 2.0 + b.max / 2.0)));
     "box-distance", "sorted by the distance of the nearest point of each box",
-        Guarantee::Unproven, |_| Some(sorted(nearest));
+        Guarantee::Unproven, |of| Some(sorted(of, nearest));
     "bsp", "planes through faces of boxes, which are cut where they cross: exact",
         Guarantee::Exact, bsp::order;
     // In a leaf of walls that surround it nothing hides a wall but what is no wall.
@@ -78,7 +79,7 @@ impl Piece {
 pub trait DepthOrder: Send + Sync {
     /// Replaces `pieces` by all items, from front to back as well as it can.
     /// Deterministic.
-    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>);
+    fn order(&self, camera: &Camera, pieces: &mut Vec<Piece>);
 
     /// Leaf of a point of a triangle; `None` if parts are no leaves.
     ///
@@ -95,17 +96,17 @@ pub trait DepthOrder: Send + Sync {
 
 impl<F> DepthOrder for F
 where
-    F: Fn(&Solids, &Camera, &mut Vec<Piece>) + Send + Sync,
+    F: Fn(&Camera, &mut Vec<Piece>) + Send + Sync,
 {
-    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
-        self(solids, camera, pieces);
+    fn order(&self, camera: &Camera, pieces: &mut Vec<Piece>) {
+        self(camera, pieces);
     }
 }
 
 /// The same list of items for every camera.
 fn fixed(items: impl Iterator<Item = ItemId>) -> Box<dyn DepthOrder> {
     let all: Vec<Piece> = items.map(Piece::whole).collect();
-    Box::new(move |_: &Solids, _: &Camera, pieces: &mut Vec<Piece>| pieces.clone_from(&all))
+    Box::new(move |_: &Camera, pieces: &mut Vec<Piece>| pieces.clone_from(&all))
 }
 
 /// Items in the order of their ids.
@@ -121,9 +122,10 @@ fn by_tree(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
 }
 
 /// Items sorted by a key of their boxes, then by id. O(n log n) per view.
-fn sorted(key: fn(&Camera, &WorldBox) -> f64) -> Box<dyn DepthOrder> {
-    let order = move |solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>| {
-        let boxes = solids.boxes.iter().zip(0..);
+fn sorted(of: &ToOrder, key: fn(&Camera, &WorldBox) -> f64) -> Box<dyn DepthOrder> {
+    let boxes = of.boxes.boxes.clone();
+    let order = move |camera: &Camera, pieces: &mut Vec<Piece>| {
+        let boxes = boxes.iter().zip(0..);
         let mut keyed: Vec<_> = boxes.map(|(b, item)| (key(camera, b), item)).collect();
         keyed.sort_unstable_by(|a: &(f64, ItemId), b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         pieces.clear();

@@ -16,7 +16,6 @@ use crate::camera::Camera;
 use crate::geometry::PlaneTree;
 use crate::query::ItemId;
 use crate::scene::{Surfaces, WorldBox};
-use crate::visibility::Solids;
 
 /// Distance within which points lie in a plane, per unit of the largest coordinate.
 ///
@@ -54,20 +53,23 @@ pub(super) struct Held {
     pub is_behind_all: bool,
 }
 
-/// A partition with the items in its leaves.
+/// A partition with the items in its leaves, which are drawn from front to back.
 #[derive(Default)]
-pub(super) struct Partition {
-    pub nodes: Vec<Node>,
-    pub root: Option<u32>,
+pub struct Partition {
+    pub(super) nodes: Vec<Node>,
+    pub(super) root: Option<u32>,
     /// World position of the zero of the planes.
-    pub origin: DVec3,
+    origin: DVec3,
     /// Index: twice the node above, plus its side. An undivided space is leaf 0.
-    pub leaves: Vec<Vec<Held>>,
+    pub(super) leaves: Vec<Vec<Held>>,
+    /// Distance within which points lie in a plane.
+    slack: f64,
+    /// If the order is declared exact: `true` if cutting ended early.
+    pub(super) is_cut_short: Option<bool>,
 }
 
-impl Partition {
-    /// Replaces `pieces` by the parts, leaf by leaf from front to back.
-    pub fn pieces(&self, camera: &Camera, pieces: &mut Vec<Piece>) {
+impl DepthOrder for Partition {
+    fn order(&self, camera: &Camera, pieces: &mut Vec<Piece>) {
         pieces.clear();
         let eye = camera.frame.eye - self.origin;
         let parallel = camera.lens.is_orthographic();
@@ -99,12 +101,35 @@ impl Partition {
             }));
         }
     }
-}
 
-/// The scene's own partition with the triangles of its items in the leaves.
-pub struct PartitionOrder {
-    tree: Partition,
-    slack: f64,
+    fn leaf(&self, at: DVec3, normal: DVec3) -> Option<u32> {
+        let (mut node, mut leaf) = (self.root, 0);
+        let normal = normal.normalize_or_zero();
+        while let Some(place) = node {
+            let plane = &self.nodes[place as usize];
+            let height = plane.height(at);
+            let along = plane.normal.dot(normal).abs();
+            let side = match height.abs() <= self.slack && along > 1.0 - 1e-6 {
+                true => plane.faced(normal),
+                false => usize::from(height < 0.0),
+            };
+            (node, leaf) = (plane.children[side], 2 * place + side as u32);
+        }
+        Some(leaf)
+    }
+
+    fn exception(&self, camera: &Camera) -> Option<&'static str> {
+        if self.is_cut_short? {
+            return Some("the limit on cuts was reached before all items were separated");
+        }
+        let Camera { frame, lens } = camera;
+        let is_within = |node: &Node| match lens.is_orthographic() {
+            true => node.normal.dot(frame.forward()) == 0.0,
+            false => node.height(frame.eye) == 0.0,
+        };
+        let within = self.nodes.iter().any(is_within);
+        within.then_some("rays may run within the plane of a face")
+    }
 }
 
 /// Part of a triangle in a leaf.
@@ -118,14 +143,14 @@ struct Fallen {
 
 /// Sorts the items of surfaces in a scene with a partition of its own.
 pub fn order(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
-    Some(Box::new(PartitionOrder::of(of.surfaces?, of.planes?)))
+    Some(Box::new(Partition::of(of.surfaces?, of.planes?)))
 }
 
-impl PartitionOrder {
-    /// Cuts every triangle by the planes that it meets.
+impl Partition {
+    /// The scene's own partition, which cuts every triangle by the planes that it meets.
     ///
     /// O(triangles * depth) where few are cut.
-    pub fn of(surfaces: &Surfaces, planes: &PlaneTree) -> PartitionOrder {
+    pub fn of(surfaces: &Surfaces, planes: &PlaneTree) -> Partition {
         let nodes = planes.nodes.iter().map(|node| {
             let normal = node.plane.normal.as_dvec3();
             let unit = 1.0 / normal.length();
@@ -137,14 +162,12 @@ impl PartitionOrder {
         });
         let corners = surfaces.points.iter().map(|p| p.abs().max_element());
         let reach = f64::from(corners.fold(0.0, f32::max));
-        let mut order = PartitionOrder {
-            tree: Partition {
-                nodes: nodes.collect(),
-                root: planes.root,
-                origin: surfaces.origin,
-                leaves: Vec::new(),
-            },
+        let mut order = Partition {
+            nodes: nodes.collect(),
+            root: planes.root,
+            origin: surfaces.origin,
             slack: reach * SLACK,
+            ..Partition::default()
         };
         let mut fallen: Vec<Vec<Fallen>> = Vec::new();
         fallen.resize_with(2 * planes.nodes.len().max(1), Vec::new);
@@ -164,7 +187,7 @@ impl PartitionOrder {
         }
         let leaves = fallen.iter().zip(0..);
         let held = leaves.map(|(all, leaf)| order.held(all, leaf));
-        order.tree.leaves = held.collect();
+        order.leaves = held.collect();
         order
     }
 
@@ -175,13 +198,13 @@ impl PartitionOrder {
         mut fallen: impl FnMut(usize, Vec<DVec3>),
     ) {
         // Parts of the triangle, each with the node that it is at and the leaf if that is none.
-        let mut open = vec![(corners.to_vec(), self.tree.root, 0)];
+        let mut open = vec![(corners.to_vec(), self.root, 0)];
         while let Some((polygon, node, leaf)) = open.pop() {
             let Some(at) = node else {
                 fallen(leaf, polygon);
                 continue;
             };
-            let node = &self.tree.nodes[at as usize];
+            let node = &self.nodes[at as usize];
             let heights: Vec<f64> = polygon.iter().map(|&p| node.height(p)).collect();
             let sides = match [1.0, -1.0].map(|sign| heights.iter().any(|h| sign * h > self.slack))
             {
@@ -207,7 +230,7 @@ impl PartitionOrder {
         };
         let parts = all.chunk_by(|a, b| a.item == b.item).map(|parts| {
             let corners = parts.iter().flat_map(|part| &part.polygon);
-            let corners = corners.map(|&p| p + self.tree.origin);
+            let corners = corners.map(|&p| p + self.origin);
             let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |bounds, p| {
                 (bounds.0.min(p), bounds.1.max(p))
             });
@@ -238,28 +261,6 @@ fn cut(polygon: &[DVec3], heights: &[f64], sign: f64) -> Vec<DVec3> {
     left
 }
 
-impl DepthOrder for PartitionOrder {
-    fn order(&self, _: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
-        self.tree.pieces(camera, pieces);
-    }
-
-    fn leaf(&self, at: DVec3, normal: DVec3) -> Option<u32> {
-        let (mut node, mut leaf) = (self.tree.root, 0);
-        let normal = normal.normalize_or_zero();
-        while let Some(place) = node {
-            let plane = &self.tree.nodes[place as usize];
-            let height = plane.height(at);
-            let along = plane.normal.dot(normal).abs();
-            let side = match height.abs() <= self.slack && along > 1.0 - 1e-6 {
-                true => plane.faced(normal),
-                false => usize::from(height < 0.0),
-            };
-            (node, leaf) = (plane.children[side], 2 * place + side as u32);
-        }
-        Some(leaf)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -280,20 +281,14 @@ mod tests {
             let triangles = [[0, 1, 2], [0, 2, 3]];
             surfaces.push(SurfaceKind::Opaque, two_sided, &wall, &triangles);
             surfaces.push_box(SurfaceKind::Opaque, false, &thing);
-            let order = PartitionOrder::of(&surfaces, &PlaneTree::default());
+            let order = Partition::of(&surfaces, &PlaneTree::default());
             let frame = Frame::looking_along(DVec3::new(5.0, -60.0, 0.0), DVec3::Y, DVec3::Z);
             let camera = Camera {
                 frame: frame.unwrap(),
                 lens: Lens::perspective(90.0, 1.0, 0.1, None).unwrap(),
             };
-            let nothing = Solids {
-                origin: DVec3::ZERO,
-                boxes: Vec::new(),
-                outer: Vec::new(),
-                inner: Vec::new(),
-            };
             let mut pieces = Vec::new();
-            order.order(&nothing, &camera, &mut pieces);
+            order.order(&camera, &mut pieces);
             pieces.iter().map(|piece| piece.item).collect::<Vec<_>>()
         };
         assert_eq!(order(false), [1, 0]);
