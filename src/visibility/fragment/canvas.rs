@@ -101,11 +101,6 @@ impl Screen {
         screen
     }
 
-    /// Columns and rows.
-    pub fn grid(&self) -> SampleGrid {
-        self.grid
-    }
-
     /// A rectangle that holds every sample whose ray meets the box; `None` if there
     /// is none for certain.
     pub fn rectangle(&self, b: &WorldBox) -> Option<Rectangle> {
@@ -254,7 +249,7 @@ impl<B: Body> Canvas<B> {
 
     /// Columns and rows.
     pub fn grid(&self) -> SampleGrid {
-        self.screen.grid()
+        self.screen.grid
     }
 
     /// The image, in which boxes and triangles can be placed.

@@ -64,7 +64,7 @@ impl Drawable for Facet {
     }
 
     fn is_in(order: &dyn DepthOrder, probe: &TriangleProbe, at: &Meeting) -> impl Fn(Part) -> bool {
-        let [a, b, c] = each(at.corners(), |p| p.as_dvec3());
+        let [a, b, c] = each(at.corners, |p| p.as_dvec3());
         let leaf = order.leaf(probe.local(at.depth), (b - a).cross(c - a));
         move |part| leaf.map(Part::InLeaf) == Some(part)
     }

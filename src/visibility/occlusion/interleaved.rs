@@ -130,7 +130,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         entries.push(Entry {
             rect: Rect::default(),
             block: 0,
-            level: (scene.height() - 1) as u16,
+            level: (scene.levels.len() - 1) as u16,
             near: true,
             open: view.volume.mask(),
             drawn: 0,

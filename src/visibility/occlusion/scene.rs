@@ -30,7 +30,7 @@ pub struct OccluderScene {
     /// World position of the zero of the boxes.
     pub(super) origin: DVec3,
     /// Level 0 holds the items' outer boxes; the last level is one block.
-    levels: Vec<Vec<BoxBlock>>,
+    pub(super) levels: Vec<Vec<BoxBlock>>,
     /// In tree order, as what hides.
     ids: Vec<ItemId>,
     /// All occluders, in tree order.
@@ -131,11 +131,6 @@ impl OccluderScene {
     pub fn item(&self, position: usize) -> Option<ItemId> {
         let id = self.ids[position];
         ((id as usize) < self.items).then_some(id)
-    }
-
-    /// Number of levels, at least one.
-    pub fn height(&self) -> usize {
-        self.levels.len()
     }
 
     /// The blocks of a level; level 0 holds the items.

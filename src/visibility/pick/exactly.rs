@@ -107,12 +107,12 @@ pub(super) fn kept<T>(sorted: &[T], count: usize, is_within: impl Fn(&T, &T) -> 
 impl<B: Body> Pick for BodyIndex<B> {
     fn first(&self, ray: &Ray) -> Option<Hit> {
         let found = self.front_of(ray);
-        hit::<B>((*found.front.first()?, found.meeting?), self.items())
+        hit::<B>((*found.front.first()?, found.meeting?), self.items)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
         let mut met = self.all_along(ray);
-        met.retain(|(item, _)| (*item as usize) < self.items());
+        met.retain(|(item, _)| (*item as usize) < self.items);
         nearest::<B>(&self.probe(ray), met, count, hits);
     }
 }

@@ -16,6 +16,7 @@ use super::exactly::kept;
 use super::{Hit, NotBuilt, Pick};
 use crate::geometry::Aabb;
 use crate::index::{caught, ploc, scale_for};
+use crate::kernel::each;
 use crate::query::ItemId;
 use crate::visibility::Ray;
 use crate::visibility::truth::{Bodies, Body, Facet, SolidBox};
@@ -32,12 +33,6 @@ pub(super) struct About {
 }
 
 impl About {
-    /// Coordinates relative to `zero` for the boxes of a scene.
-    pub fn of(zero: DVec3, boxes: &[Aabb]) -> About {
-        let scale = scale_for(boxes);
-        About { zero, scale }
-    }
-
     /// A box in these coordinates.
     pub fn scaled(&self, b: &Aabb) -> Aabb {
         Aabb::new(b.min * self.scale, b.max * self.scale)
@@ -54,40 +49,30 @@ impl About {
 /// A ray in local coordinates, rounded to f32.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RoundedRay {
-    origin: Vec3,
-    direction: Vec3,
+    /// The same ray as the crate takes it.
+    theirs: TheirRay,
     inverse: Vec3,
     near: f32,
-    pub far: f32,
+    far: f32,
 }
 
 impl RoundedRay {
     #[inline(always)]
     pub fn of(ray: &Ray, about: &About) -> RoundedRay {
         let scale = f64::from(about.scale);
+        let origin = ((ray.origin - about.zero) * scale).as_vec3();
         let direction = ray.direction.as_vec3();
+        let far = ((ray.far * scale) as f32).min(f32::MAX);
         let inverse = |d: f32| match d.abs() < LEAST {
             true => 1.0 / LEAST.copysign(d),
             false => 1.0 / d,
         };
         RoundedRay {
-            origin: ((ray.origin - about.zero) * scale).as_vec3(),
-            direction,
-            inverse: Vec3::new(
-                inverse(direction.x),
-                inverse(direction.y),
-                inverse(direction.z),
-            ),
+            theirs: TheirRay::new(origin.into(), direction.into(), 0.0, far.next_up()),
+            inverse: direction.map(inverse),
             near: (ray.near * scale) as f32,
-            far: ((ray.far * scale) as f32).min(f32::MAX),
+            far,
         }
-    }
-
-    /// The same ray as the crate takes it.
-    #[inline(always)]
-    pub fn theirs(&self) -> TheirRay {
-        let (origin, direction) = (self.origin.into(), self.direction.into());
-        TheirRay::new(origin, direction, 0.0, self.far.next_up())
     }
 }
 
@@ -112,10 +97,8 @@ impl Primitive for SolidBox {
 
     #[inline(always)]
     fn depth(b: &Aabb, ray: &RoundedRay, _: &TheirRay) -> f32 {
-        let (a, b) = (
-            (b.min - ray.origin) * ray.inverse,
-            (b.max - ray.origin) * ray.inverse,
-        );
+        let origin = Vec3::from(ray.theirs.origin);
+        let [a, b] = each([b.min, b.max], |p| (p - origin) * ray.inverse);
         let (enters, leaves) = (a.min(b).max_element(), a.max(b).min_element());
         match enters <= leaves && enters >= ray.near && enters <= ray.far {
             true => enters,
@@ -200,7 +183,8 @@ pub struct Obvhs<B: Primitive> {
 impl<B: Primitive> Obvhs<B> {
     /// Builds the tree; a panic of the crate is an error.
     pub fn boxed(all: &Bodies<B>) -> Result<Box<dyn Pick>, NotBuilt> {
-        let about = About::of(all.origin, &all.bounds);
+        let (zero, scale) = (all.origin, scale_for(&all.bounds));
+        let about = About { zero, scale };
         let boxes: Vec<Aabb> = all.bounds.iter().map(|b| about.scaled(b)).collect();
         let build = || {
             let binary = ploc::build(&boxes, ploc::ONE_A_LEAF);
@@ -234,7 +218,7 @@ impl<B: Primitive> Pick for Obvhs<B> {
         let entry = |ray: &TheirRay, place: usize| B::depth(&self.bodies[place], &rounded, ray);
         // The crate's walk begins at a root that an empty tree does not have.
         if !self.ids.is_empty() {
-            self.tree.ray_traverse(rounded.theirs(), &mut found, entry);
+            self.tree.ray_traverse(rounded.theirs, &mut found, entry);
         }
         let item = *self.ids.get(found.primitive_id as usize)?;
         ((item as usize) < self.items).then(|| self.about.hit(item, found.t))
@@ -251,7 +235,7 @@ impl<B: Primitive> Pick for Obvhs<B> {
             }
         };
         if !self.ids.is_empty() {
-            self.tree.ray_traverse_anyhit(rounded.theirs(), visit);
+            self.tree.ray_traverse_anyhit(rounded.theirs, visit);
         }
         if !B::IS_BOX {
             hits.sort_unstable_by(|a, b| a.item.cmp(&b.item).then(a.order(b)));

@@ -30,7 +30,7 @@ impl<B: Body> Pick for WideRay<B> {
         }
         let mut first = First::<B>::new(of.probe(ray), ray.far);
         of.walk(ray, &mut first);
-        first.hit(of.items())
+        first.hit(of.items)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
@@ -48,7 +48,7 @@ impl<B: Body> Pick for WideRay<B> {
             }),
             false => {
                 let mut found = SeveralAtOnce {
-                    items: of.items(),
+                    items: of.items,
                     probe: &probe,
                     lowest: Lowest::new(count, ray.far),
                     met: Vec::new(),
@@ -88,7 +88,7 @@ impl<B: Body> Work for SearchFirst<'_, B> {
             }
             None => of.walk_in_f64(ray, |body| first.offer(body)),
         }
-        first.hit(of.items())
+        first.hit(of.items)
     }
 }
 

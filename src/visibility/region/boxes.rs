@@ -25,11 +25,11 @@ impl Ground for Boxes {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let first = out.len();
         self.regions.meeting(b, |id| out.push(id));
-        let boxes = self.regions.boxes();
+        let boxes = &self.regions.boxes;
         let met: Vec<WorldBox> = out[first..].iter().map(|&id| boxes[id as usize]).collect();
         let inside = covers(&met, b);
         self.borders.meeting(b, |solid| {
-            let solid = &self.borders.boxes()[solid as usize];
+            let solid = &self.borders.boxes[solid as usize];
             self.regions.meeting(solid, |id| out.push(id));
         });
         inside
@@ -40,7 +40,7 @@ impl Ground for Boxes {
 fn is_within_one(boxes: &BoxGrid, item: &WorldBox) -> bool {
     let mut within = false;
     boxes.meeting(item, |id| {
-        let b = &boxes.boxes()[id as usize];
+        let b = &boxes.boxes[id as usize];
         within |= b.min.cmplt(item.min).all() && item.max.cmplt(b.max).all();
     });
     within

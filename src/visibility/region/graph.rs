@@ -72,11 +72,6 @@ impl RegionGraph {
         &self.exits[region as usize]
     }
 
-    /// Finder of the regions of a place.
-    pub fn ground(&self) -> &dyn Ground {
-        &*self.ground
-    }
-
     /// Replaces `homes` by the regions in which rays of the camera begin to see: all
     /// that are met by the box about the eye and the near window, as what is nearer
     /// than the near plane hides nothing. `false` if rays may begin in no region, or

@@ -12,7 +12,8 @@ use crate::scene::{Scene, WorldBox};
 /// A uniform grid of buckets over boxes.
 #[derive(Clone, Debug)]
 pub struct BoxGrid {
-    boxes: Vec<WorldBox>,
+    /// As they were given.
+    pub boxes: Vec<WorldBox>,
     low: DVec3,
     per_unit: DVec3,
     count: [usize; 3],
@@ -54,11 +55,6 @@ impl BoxGrid {
         }
         grid.buckets = lists;
         grid
-    }
-
-    /// The boxes, as they were given.
-    pub fn boxes(&self) -> &[WorldBox] {
-        &self.boxes
     }
 
     /// Calls `found` with each box that meets a box, closed; a box that lies in
@@ -163,7 +159,7 @@ impl RegionItems {
             let b = WorldBox::of(item, scene.origin);
             met.clear();
             grid.meeting(&b, |part| met.push(owners[part as usize]));
-            graph.ground().more_at(&b, &mut met);
+            graph.ground.more_at(&b, &mut met);
             met.sort_unstable();
             met.dedup();
             met.iter().for_each(|&owner| lists[owner as usize].push(id));
@@ -225,7 +221,7 @@ mod tests {
             let wanted = (0..).zip(&boxes).filter(|(_, o)| meets(o));
             assert_eq!(found, wanted.map(|(id, _)| id).collect::<Vec<u32>>());
         }
-        assert!(BoxGrid::new(Vec::new()).boxes().is_empty());
+        assert!(BoxGrid::new(Vec::new()).boxes.is_empty());
     }
 
     #[test]

@@ -148,7 +148,7 @@ impl Met {
     /// Clusters and bits of the triangles that some ray meets first.
     fn first(&self, rays: impl Iterator<Item = Ray>) -> Vec<(usize, u64)> {
         let meetings = rays.filter_map(|ray| self.index.front_of(&ray).meeting);
-        let places = meetings.flat_map(|meeting| &self.places[&key(meeting.corners())]);
+        let places = meetings.flat_map(|meeting| &self.places[&key(meeting.corners)]);
         places.copied().collect()
     }
 }

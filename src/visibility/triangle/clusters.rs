@@ -74,10 +74,7 @@ impl Clusters {
 
     /// One bit for each triangle of a cluster.
     pub fn word(&self, cluster: usize) -> u64 {
-        match self.triangles_of(cluster).len() {
-            MOST_TRIANGLES => u64::MAX,
-            count => (1 << count) - 1,
-        }
+        u64::MAX >> (MOST_TRIANGLES - self.triangles_of(cluster).len())
     }
 
     /// The one-sided clusters, with the corners of their triangles.

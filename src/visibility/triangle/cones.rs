@@ -87,11 +87,6 @@ impl Cone {
             sine: sine + SLACK,
         })
     }
-
-    /// k² as f32, rounded up.
-    pub fn square(&self) -> f32 {
-        round_up(self.sine * self.sine * (1.0 + COSINE))
-    }
 }
 
 /// The direction whose largest angle to the normals is least, nearly: the centre of
@@ -195,7 +190,7 @@ impl<const N: usize> TriangleCull for Cones<N> {
             kernel.run(Query {
                 all: self,
                 eye,
-                words: kept.blocks_mut(),
+                words: &mut kept.blocks,
             });
         }
     }
@@ -284,7 +279,7 @@ fn groups<const N: usize>(triangles: &[[Vec3; 3]]) -> [u64; N] {
 struct ConeBlock {
     apex: [[f32; LANES]; 3],
     axis: [[f32; LANES]; 3],
-    /// Infinite for a lane that is never rejected.
+    /// k², rounded up; infinite for a lane that is never rejected.
     square: [f32; LANES],
 }
 
@@ -302,7 +297,7 @@ impl ConeBlock {
             self.apex[k][lane] = cone.apex[k];
             self.axis[k][lane] = cone.axis[k];
         }
-        self.square[lane] = cone.square();
+        self.square[lane] = round_up(cone.sine * cone.sine * (1.0 + COSINE));
     }
 }
 

@@ -127,7 +127,7 @@ pub fn normal(corners: [Vec3; 3]) -> DVec3 {
 }
 
 /// The cross product of two edges, exactly.
-fn exact_normal(corners: [Vec3; 3]) -> ExactVector {
+pub fn exact_normal(corners: [Vec3; 3]) -> ExactVector {
     let [a, b, c] = corners.map(|p| p.as_dvec3());
     exact::cross(&exact::difference(b, a), &exact::difference(c, a))
 }

@@ -14,7 +14,7 @@ use crate::visibility::{Guarantee, Row};
 
 pub use clusters::{Clusters, MOST_TRIANGLES};
 pub use cones::{Cone, Cones, SafeCones};
-pub use exact::{Eye, faces, normal};
+pub use exact::{Eye, exact_normal, faces, normal};
 
 /// All back ends of this stage.
 pub const TRIANGLE_ROWS: &[TriangleRow] = rows! { TriangleRow { name, guarantee, summary, build }
@@ -80,13 +80,6 @@ impl Selection {
     /// Bits beyond the triangles of a cluster stay zero.
     pub fn words_mut(&mut self) -> &mut [u64] {
         &mut self.blocks.as_flattened_mut()[..self.clusters]
-    }
-
-    /// The words of sixteen clusters at a time.
-    ///
-    /// Those beyond the last cluster are zero and stay so.
-    fn blocks_mut(&mut self) -> &mut [[u64; LANES]] {
-        &mut self.blocks
     }
 
     /// How many triangles there are.

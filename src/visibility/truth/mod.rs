@@ -88,7 +88,7 @@ impl SampleTruth {
                 }
             }
         });
-        let (visible, samples_of) = counted(&front, others.into_iter().flatten(), index.items());
+        let (visible, samples_of) = counted(&front, others.into_iter().flatten(), index.items);
         SampleTruth {
             front,
             visible,

@@ -23,7 +23,8 @@ pub struct BodyIndex<B> {
     pub(in crate::visibility) tree: RayTree,
     /// In tree order.
     bodies: Vec<Padded<B>>,
-    items: usize,
+    /// Number of items, see [`Bodies::items`].
+    pub(in crate::visibility) items: usize,
     /// Instruction set of the queries.
     pub(in crate::visibility) kernel: Kernel,
 }
@@ -76,11 +77,6 @@ impl<B: Body> BodyIndex<B> {
             kernel,
             tree,
         }
-    }
-
-    /// Number of items, see [`Bodies::items`].
-    pub fn items(&self) -> usize {
-        self.items
     }
 
     /// Prepares a ray for exact tests against these bodies.

@@ -13,6 +13,7 @@ use crate::arithmetic::exact::{self, ExactVector};
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
 use crate::visibility::Ray;
+use crate::visibility::triangle::exact_normal;
 
 /// Unit of the error bounds, u = 2^-53.
 ///
@@ -42,26 +43,15 @@ pub struct Meeting {
     pub depth: f64,
     /// The true depth is within this of it; may be infinite.
     pub error: f64,
-    corners: [Vec3; 3],
+    /// The corners of the triangle, as it was given.
+    pub corners: [Vec3; 3],
 }
 
 impl Meeting {
-    /// The corners of the triangle, as it was given.
-    #[inline]
-    pub fn corners(&self) -> [Vec3; 3] {
-        self.corners
-    }
-
     /// No depth at which the ray meets it there is below this.
     #[inline]
     pub fn at_least(&self) -> f64 {
         self.depth - self.error
-    }
-
-    /// No depth at which the ray meets it there is above this.
-    #[inline]
-    pub fn at_most(&self) -> f64 {
-        self.depth + self.error
     }
 }
 
@@ -91,10 +81,10 @@ impl Along for TriangleProbe {
 
     #[inline]
     fn compare(&self, a: &Meeting, b: &Meeting) -> Ordering {
-        if a.at_most() < b.at_least() {
+        if Self::at_most(a) < b.at_least() {
             return Ordering::Less;
         }
-        if b.at_most() < a.at_least() {
+        if Self::at_most(b) < a.at_least() {
             return Ordering::Greater;
         }
         // Walls of two sides are twice in one plane, which the ray meets once.
@@ -111,7 +101,7 @@ impl Along for TriangleProbe {
 
     #[inline(always)]
     fn at_most(at: &Meeting) -> f64 {
-        at.at_most()
+        at.depth + at.error
     }
 }
 
@@ -185,13 +175,14 @@ impl TriangleProbe {
             corners,
         };
         let (near, far) = (self.ray.near, self.ray.far);
-        if meeting.at_least() > limit || meeting.at_least() > far || meeting.at_most() < near {
+        if meeting.at_least() > limit || meeting.at_least() > far || Self::at_most(&meeting) < near
+        {
             return None;
         }
         if meeting.at_least() < near && self.compare_with(&meeting, near).is_lt() {
             return None;
         }
-        if meeting.at_most() > far && self.compare_with(&meeting, far).is_gt() {
+        if Self::at_most(&meeting) > far && self.compare_with(&meeting, far).is_gt() {
             return None;
         }
         Some(meeting)
@@ -220,7 +211,7 @@ impl TriangleProbe {
     /// Returns `true` if the ray's line meets the closed triangle on a visible side.
     #[cold]
     fn pierces(&self, corners: [Vec3; 3], two_sided: bool) -> bool {
-        let d = self.direction();
+        let d = exact::vector(self.ray.direction);
         let about = corners.map(|corner| self.about(corner));
         let volume =
             |i: usize, j: usize| exact::dot(&d, &exact::cross(&about[i], &about[j])).sign();
@@ -235,19 +226,13 @@ impl TriangleProbe {
 
     /// The depth as a fraction, A . N over d . N, the latter made positive.
     fn fraction(&self, corners: [Vec3; 3]) -> (Expansion, Expansion) {
-        let [a, b, c] = corners;
-        let minus = |p: Vec3| exact::difference(p.as_dvec3(), a.as_dvec3());
-        let normal = exact::cross(&minus(b), &minus(c));
-        let above = exact::dot(&self.about(a), &normal);
-        let below = exact::dot(&self.direction(), &normal);
+        let normal = exact_normal(corners);
+        let above = exact::dot(&self.about(corners[0]), &normal);
+        let below = exact::dot(&exact::vector(self.ray.direction), &normal);
         match below.sign() {
             -1 => (-&above, -&below),
             _ => (above, below),
         }
-    }
-
-    fn direction(&self) -> ExactVector {
-        exact::vector(self.ray.direction)
     }
 
     /// A scene-local point about the ray's origin.

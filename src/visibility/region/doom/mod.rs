@@ -110,11 +110,6 @@ impl DoomMap {
     pub fn reject(&self) -> Option<Pvs> {
         Pvs::from_reject(&self.file.reject, self.sectors.len())
     }
-
-    /// Places about which its linedefs disagree, by the sectors that they have there.
-    pub fn disputes(&self) -> &[Dispute] {
-        self.file.disputes()
-    }
 }
 
 /// The height, seen from above, of a strip of the map that lists its linedefs.
@@ -206,7 +201,7 @@ impl DoomMap {
     /// # Errors
     /// A place about which the linedefs disagree: what is open to what is not known then.
     pub fn graph(self: &Arc<Self>) -> Result<RegionGraph, Dispute> {
-        if let Some(dispute) = self.disputes().first() {
+        if let Some(dispute) = self.file.disputes().first() {
             return Err(*dispute);
         }
         let opening = |line: &Linedef| {

@@ -326,7 +326,7 @@ mod tests {
         let sides = (0..4).map(|k| line([pillar[k], pillar[(k + 1) % 4]], [Some(0), None]));
         map.lines.extend(sides);
         let map = map_of(map.lines, map.sectors);
-        assert!(map.disputes().is_empty() && map.unclosed().is_empty());
+        assert!(map.file.disputes().is_empty() && map.unclosed().is_empty());
         assert!(!map.solid_boxes([-8.0, 120.0]).is_empty());
     }
 
@@ -341,7 +341,7 @@ mod tests {
             let mut rng = SeededRng::new(3);
             let is_open = |at| {
                 graph
-                    .ground()
+                    .ground
                     .regions_at(&WorldBox::new(at, at), &mut Vec::new())
             };
             let mut open = 0;

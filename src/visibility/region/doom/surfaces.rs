@@ -97,7 +97,11 @@ impl DoomMap {
     ///
     /// `None` if its linedefs do not close or disagree with others about a part of it.
     pub(super) fn triangles(&self, sector: RegionId) -> Option<Vec<[Point; 3]>> {
-        let mut disputed = self.disputes().iter().flat_map(|dispute| dispute.sectors);
+        let mut disputed = self
+            .file
+            .disputes()
+            .iter()
+            .flat_map(|dispute| dispute.sectors);
         match disputed.any(|of| of == Some(sector)) {
             true => None,
             false => triangles(&self.outline(sector)),

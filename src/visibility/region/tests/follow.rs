@@ -75,7 +75,7 @@ pub fn sectors(map: &DoomMap, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) 
     let (start, mut met) = (ray.at(ray.near), Vec::new());
     // The sector of the point itself comes behind those of linedefs that are near it.
     graph
-        .ground()
+        .ground
         .regions_at(&WorldBox::new(start, start), &mut met);
     let Some(mut sector) = met.pop() else {
         return;
