@@ -16,7 +16,7 @@ use crate::visibility::{SampleGrid, occlusion};
 pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 
 impl World<'_> {
-    /// A back end of a stage of whole items, with an occlusion buffer of the given size.
+    /// A back end of a stage of whole items, with an occlusion buffer of this size.
     ///
     /// # Panics
     /// If there is no such back end.

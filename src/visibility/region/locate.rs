@@ -12,7 +12,7 @@ use crate::scene::{Scene, WorldBox};
 /// A uniform grid of buckets over boxes.
 #[derive(Clone, Debug)]
 pub struct BoxGrid {
-    /// As they were given.
+    /// The boxes, as they were given.
     pub boxes: Vec<WorldBox>,
     low: DVec3,
     per_unit: DVec3,

@@ -147,7 +147,7 @@ pub fn order(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
 }
 
 impl Partition {
-    /// The scene's own partition, which cuts every triangle by the planes that it meets.
+    /// The scene's own partition: cuts every triangle by the planes that it meets.
     ///
     /// O(triangles * depth) where few are cut.
     pub fn of(surfaces: &Surfaces, planes: &PlaneTree) -> Partition {
