@@ -115,14 +115,11 @@ impl<'a> Case<'a> {
     ///
     /// The largest of all cameras and planes, in depths of the view.
     pub fn margin(&self, around: &Surroundings) -> f64 {
-        let bare = PlaneOptions {
-            epsilon: 0.0,
-            ..PlaneOptions::default()
-        };
+        let options = PlaneOptions::default();
         let cameras = self.workload.cameras.iter().enumerate();
         let margins = cameras.filter_map(|(index, camera)| {
-            let moved = camera.volume(&PlaneOptions::default(), around).ok()?;
-            let derived = camera.volume(&bare, around).ok()?;
+            let moved = camera.volume(&options, around).ok()?;
+            let derived = camera.volume(&options.without_epsilon(), around).ok()?;
             let planes = moved.planes().iter().zip(derived.planes());
             let apart = planes.map(|(a, b)| f64::from(a.d) - f64::from(b.d));
             Some(apart.fold(0.0, f64::max) / self.depth(index))

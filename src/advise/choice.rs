@@ -8,7 +8,8 @@ use serde::Serialize;
 use super::omission::{TIE, is_longer};
 use super::options::{SCAN, TREE};
 use super::trials::{Answered, Trials};
-use crate::culling::{Culling, CullingTest, TESTS};
+use crate::camera::PlaneOptions;
+use crate::culling::{Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::BuildError;
 use crate::measure::{Metric, OverProcesses, ReportCell};
 use crate::statistics::{ALPHA, Estimate, Rate, flat, rate, ratio, shows_less_in_sum};
@@ -245,10 +246,7 @@ pub struct TestRow {
 pub(super) fn enter_tests(trials: &mut Trials) -> Result<Vec<(CullingTest, usize)>, BuildError> {
     let mut entered = Vec::with_capacity(TESTS.len());
     for (test, ..) in TESTS {
-        let culling = Culling {
-            test,
-            ..Culling::default()
-        };
+        let culling = Culling::new(test, Arithmetic::F32, PlaneOptions::default());
         if let Ok(views) = trials.case.views_by(&culling) {
             let index = trials.case.tree_for(test)?;
             entered.push((test, trials.index(index, views)));

@@ -53,6 +53,14 @@ impl Default for PlaneOptions {
     }
 }
 
+impl PlaneOptions {
+    /// The same derivation; the planes stay as they come.
+    pub fn without_epsilon(mut self) -> PlaneOptions {
+        self.epsilon = 0.0;
+        self
+    }
+}
+
 /// Origin and extent of a scene, which planes are rounded and moved for.
 ///
 /// Computed once per scene, so that all structures are queried with the same planes.

@@ -116,6 +116,15 @@ impl CameraView {
 }
 
 impl Culling {
+    /// A test in these numbers with planes derived so.
+    pub fn new(test: CullingTest, arithmetic: Arithmetic, planes: PlaneOptions) -> Culling {
+        Culling {
+            test,
+            arithmetic,
+            planes,
+        }
+    }
+
     /// The view of a camera in a scene's local coordinates; the same view
     /// serves every structure. O(m^3) for the m planes of the lens, a few
     /// microseconds for `exact`.

@@ -142,10 +142,8 @@ impl Schedule {
     ) {
         let every: Vec<u32> = self.tasks.iter().map(|task| task.every).collect();
         for (task, key) in self.tasks.iter_mut().zip(keys) {
-            let alike = keys
-                .iter()
-                .zip(&every)
-                .filter(|(other, _)| name(other) == name(key));
+            let alike = keys.iter().zip(&every);
+            let alike = alike.filter(|(other, _)| name(other) == name(key));
             task.every = alike.map(|(_, every)| *every).min().unwrap_or(task.every);
         }
     }

@@ -131,36 +131,32 @@ pub fn timed(
     for round in 0..schedule.rounds {
         let takes_part = |task: usize| round % schedule.tasks[task].every == 0;
         let batch = |task: usize| schedule.tasks[task].batch as usize;
-        if let Some(cold) = &mut cold {
-            for first in 0..schedule.cameras.len() {
-                cold.sweep_over_caches();
-                // The first task after the sweep finds the view cold as well:
-                // a new order for each camera.
-                for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
-                    if turn(task) {
-                        return None;
-                    }
-                    let out = &mut cold.outs[task];
-                    // Batched points come once a round.
-                    if first % batch(task) == 0 {
-                        // The sweep has emptied the caches of the clock's code, too.
-                        timer.clock = Stopwatch::empty_lap(tasks[task].all_threads);
-                        timer.guarded(task, |t| t.time(task, round, first, batch(task), out));
-                    }
-                }
-            }
-        } else {
+        // The first task after a sweep finds the view cold as well: a new order for each
+        // camera.
+        for first in 0..cold.as_ref().map_or(1, |_| schedule.cameras.len()) {
+            cold.iter_mut().for_each(Cold::sweep_over_caches);
             for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
                 if turn(task) {
                     return None;
                 }
-                timer.guarded(task, |timer| {
-                    warm_up(&tasks[task], &schedule.cameras, batch(task), &mut out);
-                    timer.clock = Stopwatch::empty_lap(tasks[task].all_threads);
-                    for first in (0..schedule.cameras.len()).step_by(batch(task)) {
-                        timer.time(task, round, first, batch(task), &mut out);
-                    }
-                });
+                let (all_threads, batch) = (tasks[task].all_threads, batch(task));
+                let Some(cold) = &mut cold else {
+                    timer.guarded(task, |timer| {
+                        warm_up(&tasks[task], &schedule.cameras, batch, &mut out);
+                        timer.clock = Stopwatch::empty_lap(all_threads);
+                        for first in (0..schedule.cameras.len()).step_by(batch) {
+                            timer.time(task, round, first, batch, &mut out);
+                        }
+                    });
+                    continue;
+                };
+                // Batched points come once a round.
+                if first % batch == 0 {
+                    // The sweep has emptied the caches of the clock's code, too.
+                    timer.clock = Stopwatch::empty_lap(all_threads);
+                    let out = &mut cold.outs[task];
+                    timer.guarded(task, |t| t.time(task, round, first, batch, out));
+                }
             }
         }
     }

@@ -92,29 +92,20 @@ pub struct PrecisionInput<'a> {
 /// derivation of the planes for the six-plane test.
 fn cullings() -> Vec<Culling> {
     let standard = PlaneOptions::default();
-    let bare = PlaneOptions {
-        epsilon: 0.0,
-        ..standard
-    };
+    let bare = standard.without_epsilon();
     let mut all = Vec::new();
     for (test, ..) in TESTS {
         for (arithmetic, ..) in ARITHMETICS {
             let options = [bare, standard].into_iter();
             // f64 has no epsilon.
             let options = options.take(if arithmetic == Arithmetic::F64 { 1 } else { 2 });
-            all.extend(options.map(|planes| Culling {
-                test,
-                arithmetic,
-                planes,
-            }));
+            all.extend(options.map(|planes| Culling::new(test, arithmetic, planes)));
         }
     }
     let others = PLANE_METHODS.into_iter().map(|(method, ..)| method);
     let others = others.filter(|method| *method != standard.method);
-    all.extend(others.map(|method| Culling {
-        planes: PlaneOptions { method, ..bare },
-        ..Culling::default()
-    }));
+    let others = others.map(|method| PlaneOptions { method, ..bare });
+    all.extend(others.map(|planes| Culling::new(CullingTest::SixPlane, Arithmetic::F32, planes)));
     all.retain(|culling| culling.check().is_ok());
     all
 }

@@ -155,18 +155,9 @@ fn strewn(rng: &mut SeededRng, camera: &Camera, ratio: f64) -> Vec<Aabb> {
 fn views(camera: &Camera) -> Result<[CameraView; TESTS.len()], CullingError> {
     let around = Surroundings::default();
     let moved = PlaneOptions::default();
-    let bare = PlaneOptions {
-        epsilon: 0.0,
-        ..moved
-    };
-    let of = |test, arithmetic, planes| {
-        let culling = Culling {
-            test,
-            arithmetic,
-            planes,
-        };
-        culling.view(camera, &around)
-    };
+    let bare = moved.without_epsilon();
+    let of =
+        |test, arithmetic, planes| Culling::new(test, arithmetic, planes).view(camera, &around);
     let in_f32 = |test| of(test, Arithmetic::F32, bare);
     let wide = camera.convex_volume_f64(&around)?;
     let faces = wide.planes();

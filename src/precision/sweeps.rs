@@ -11,7 +11,7 @@ use super::judged::{Names, counts_or_null};
 use crate::camera::{
     Camera, CameraError, Frame, Lens, LensKind, PLANE_METHODS, PlaneOptions, Pose, Surroundings,
 };
-use crate::culling::{Arithmetic, CameraView, Culling, CullingError};
+use crate::culling::{Arithmetic, CameraView, Culling, CullingError, CullingTest};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
@@ -93,12 +93,11 @@ fn tests() -> Vec<SweptTest> {
     };
     let epsilon = 0.0;
     let bare = |arithmetic, method| {
-        let culling = Culling {
-            arithmetic,
-            planes: PlaneOptions { method, epsilon },
-            ..Culling::default()
-        };
-        with(culling, false)
+        let planes = PlaneOptions { method, epsilon };
+        with(
+            Culling::new(CullingTest::SixPlane, arithmetic, planes),
+            false,
+        )
     };
     let method = PlaneOptions::default().method;
     let defaults = [false, true].map(|is_plain| with(Culling::default(), is_plain));

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use super::sheet::{Built, ORACLE, Sheet, slack};
 use super::{Level, Name, Names, Row, Said, Status, Vector, VectorBox, VectorCamera};
 use crate::camera::{CameraError, PlaneOptions, Surroundings};
-use crate::culling::{Culling, CullingError, CullingTest, TESTS};
+use crate::culling::{Arithmetic, Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::oracle::Oracle;
@@ -128,11 +128,7 @@ impl Replay<'_> {
                 CullingTest::Sphere => &cubes[..],
                 _ => boxes,
             };
-            let culling = Culling {
-                test,
-                planes: self.planes,
-                ..Culling::default()
-            };
+            let culling = Culling::new(test, Arithmetic::F32, self.planes);
             let camera = camera.clone();
             let view = camera.and_then(|camera| culling.view(&camera, &around));
             let declared = match (vector.camera_error(), &view) {

@@ -134,10 +134,8 @@ fn volume(rng: &mut SeededRng, kind: usize, scale: f64, items: &[Aabb]) -> Optio
 /// Planes whose x is sheared along y and z.
 pub fn sheared(planes: &[Plane], [a, b]: [f32; 2]) -> Vec<Plane> {
     let shear = |n: Vec3| Vec3::new(n.x, n.y + a * n.x, n.z + b * n.x);
-    planes
-        .iter()
-        .map(|p| Plane::new(shear(p.normal), p.d))
-        .collect()
+    let planes = planes.iter();
+    planes.map(|p| Plane::new(shear(p.normal), p.d)).collect()
 }
 
 /// Planes near the middle of the scene, facing it more often than not; some
@@ -151,12 +149,8 @@ fn planes(rng: &mut SeededRng, count: usize, scale: f64) -> Option<ConvexVolume>
             _ => rng.normal3().as_vec3(),
         };
         let through = grid_point(rng, scale);
-        let facing = if normal.dot(through) > 0.0 && rng.unit() < 0.8 {
-            -normal
-        } else {
-            normal
-        };
-        Plane::through(through, facing)
+        let is_turned = normal.dot(through) > 0.0 && rng.unit() < 0.8;
+        Plane::through(through, if is_turned { -normal } else { normal })
     });
     ConvexVolume::from_planes(&planes.collect::<Vec<_>>()).ok()
 }
@@ -169,11 +163,8 @@ fn camera_volume(
 ) -> Option<ConvexVolume> {
     let eye = grid_point(rng, scale).as_dvec3();
     let axis = [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3)];
-    let forward = if rng.unit() < 0.3 {
-        axis
-    } else {
-        rng.normal3()
-    };
+    let is_along = rng.unit() < 0.3;
+    let forward = if is_along { axis } else { rng.normal3() };
     let frame = Frame::looking_along(eye, forward, rng.normal3()).ok()?;
     let near = scale * rng.between(0.001, 1.0);
     let far = near + scale * rng.between(0.1, 16.0);
@@ -204,8 +195,9 @@ fn cube(x: f32, y: f32, z: f32, half: f32) -> Aabb {
 
 fn row(count: u16, scale: f32) -> Vec<Aabb> {
     let at = |i| f32::from(i) * scale;
-    let boxes = (0..count).map(|i| cube(at(i), 0.0, 0.0, 0.4 * scale));
-    boxes.collect()
+    (0..count)
+        .map(|i| cube(at(i), 0.0, 0.0, 0.4 * scale))
+        .collect()
 }
 
 /// The scenes with their names: nothing, points, coincident and nested boxes,

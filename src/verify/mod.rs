@@ -79,20 +79,13 @@ pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyVolume<'v>>) -> Strin
     let Some((index, value)) = lowest else {
         return format!("{bounds}: the volume has no plane");
     };
-    let plane = volume.planes()[index];
+    let (plane, label) = (volume.planes()[index], volume.plane_label(index));
+    let ([x, y, z], d) = (plane.normal.to_array(), plane.d);
+    let highest = plane.value_at(plane.n_vertex(b));
+    let not = if value < 0.0 { "not " } else { "" };
     format!(
-        "{bounds}: {} ({}, {}, {}, {}) has the lowest p-vertex value {value:e} (n-vertex {:e}), so the box is {}",
-        volume.plane_label(index),
-        plane.normal.x,
-        plane.normal.y,
-        plane.normal.z,
-        plane.d,
-        plane.value_at(plane.n_vertex(b)),
-        if value < 0.0 {
-            "not visible"
-        } else {
-            "visible"
-        }
+        "{bounds}: {label} ({x}, {y}, {z}, {d}) has the lowest p-vertex value {value:e} \
+         (n-vertex {highest:e}), so the box is {not}visible"
     )
 }
 

@@ -9,6 +9,7 @@ use super::super::choice::TestChoice;
 use super::super::omission::{Decision, LeftOutIf};
 use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
+use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, CameraView, Culling, CullingTest};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, FrustumPlane, LANES, LaneMask, PlaneMask};
 use crate::index::{DynIndex, FrustumQuery, Input, Query, RegionIndex, Wide};
@@ -51,11 +52,9 @@ pub(super) fn needless_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
         Sides::same(&case.spec.label, BASE, on_tree),
         Sides::same(&case.scan.label, kept, left_out),
     ];
-    Ok(Draft::new(
-        sides,
-        Finding::new(share, LEAST_NEEDLESS, reason)
-            .noted(format!("scene is inside {:.0} % of them", share * 100.0)),
-    ))
+    let finding = Finding::new(share, LEAST_NEEDLESS, reason)
+        .noted(format!("scene is inside {:.0} % of them", share * 100.0));
+    Ok(Draft::new(sides, finding))
 }
 
 /// The volume without planes that contain the bounds: whatever lies within the
@@ -81,10 +80,8 @@ const COUNTED: usize = 64;
 pub(super) fn plane_masks(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let kernel = case.spec.execution.kernel;
-    let tree = Rc::new(Wide::build(
-        &Input::new(&case.scene().items),
-        &Default::default(),
-    )?);
+    let input = Input::new(&case.scene().items);
+    let tree = Rc::new(Wide::build(&input, &Default::default())?);
     let volumes: Rc<[ConvexVolume]> = case.volumes().cloned().collect();
     let step = volumes.len().div_ceil(COUNTED).max(1);
     let (mut with, mut without) = (QueryCost::default(), QueryCost::default());
@@ -172,11 +169,9 @@ impl QueryVolume for Unmasked<'_> {
         let (kept, words) = self.0.sorted_lanes(isa, block, mask);
         let inside = isa.zeros(words);
         let mut open = [mask; LANES];
-        for (lane, open) in open.iter_mut().enumerate() {
-            if inside >> lane & 1 == 1 {
-                *open = 0;
-            }
-        }
+        let lanes = open.iter_mut().enumerate();
+        let inside = lanes.filter(|(lane, _)| inside >> lane & 1 == 1);
+        inside.for_each(|(_, open)| *open = 0);
         (kept, isa.words(&open))
     }
 }
@@ -187,18 +182,16 @@ impl QueryVolume for Unmasked<'_> {
 /// seen.
 pub(super) fn six_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
-    let exact = Culling {
-        test: CullingTest::Exact,
-        ..Culling::default()
-    };
+    let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
     let sides = against_base(trials, &exact)?;
     let draw_ns = case.options.draw_ns;
     let predicted = predicted_excess(case);
     Ok(Draft::concluded(vec![sides], move |facts| {
         let check = &facts.checks[0];
         let Some(more) = check.more_false_positives() else {
+            let saving = facts.saving();
             return Finding {
-                saving: facts.saving(),
+                saving,
                 ..Finding::default()
             };
         };
@@ -226,9 +219,8 @@ pub(super) fn six_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
 ///
 /// The statistic is then a prediction.
 fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
-    let predicted = finding
-        .compared
-        .and_then(|both| LeftOutIf::AtMost.holds(both));
+    let compared = finding.compared;
+    let predicted = compared.and_then(|both| LeftOutIf::AtMost.holds(both));
     let (Some(predicted), Some(taken)) = (predicted, choice.name) else {
         return finding;
     };
@@ -259,9 +251,8 @@ fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
 /// of the views: docs/NUMERICS.md.
 fn predicted_excess(case: &Case) -> f64 {
     let items = &case.scene().items;
-    let squares = items
-        .iter()
-        .map(|item| item.min.as_dvec3().distance_squared(item.max.as_dvec3()) / 3.0);
+    let squared = |b: &Aabb| b.min.as_dvec3().distance_squared(b.max.as_dvec3()) / 3.0;
+    let squares = items.iter().map(squared);
     let square = squares.sum::<f64>() / items.len() as f64;
     let cameras = case.workload.cameras.len();
     let depth = (0..cameras).map(|frame| case.depth(frame)).sum::<f64>() / cameras as f64;
@@ -282,19 +273,19 @@ fn against_base(trials: &mut Trials, culling: &Culling) -> Result<Sides, Unfit> 
 /// margin that is mostly far too thin to hold an item.
 pub(super) fn f64_kernel(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
-    let in_f64 = Culling {
-        arithmetic: Arithmetic::F64,
-        ..Culling::default()
-    };
+    let in_f64 = Culling::new(
+        CullingTest::SixPlane,
+        Arithmetic::F64,
+        PlaneOptions::default(),
+    );
     let (margin, tolerance) = (case.margin(&case.workload.around), case.options.tolerance);
     let reason = format!(
         "f32 planes are moved outward by up to {margin:.1e} of the depth; {tolerance:.0e} are tolerated"
     );
     let sides = against_base(trials, &in_f64)?;
-    Ok(Draft::new(
-        vec![sides],
-        Finding::new(margin, tolerance, reason).noted(format!("f32 errs by {margin:.0e} of depth")),
-    ))
+    let note = format!("f32 errs by {margin:.0e} of depth");
+    let finding = Finding::new(margin, tolerance, reason).noted(note);
+    Ok(Draft::new(vec![sides], finding))
 }
 
 /// An origin of the scene's own.
@@ -308,12 +299,9 @@ pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
         return Err(not_applicable("a motion that leaves the scene"));
     }
     let is_moved = scene.origin != DVec3::ZERO;
-    let elsewhere = if is_moved {
-        DVec3::ZERO
-    } else {
-        let bounds = scene.world_bounds();
-        bounds.min / 2.0 + bounds.max / 2.0
-    };
+    let bounds = scene.world_bounds();
+    let centre = bounds.min / 2.0 + bounds.max / 2.0;
+    let elsewhere = if is_moved { DVec3::ZERO } else { centre };
     let other = part_of(scene, elsewhere, scene.items.len()).map_err(not_applicable)?;
     let workload = Workload::new(&other, case.path, &Culling::default());
     let views = workload.map_err(not_applicable)?.views;

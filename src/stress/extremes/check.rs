@@ -242,11 +242,7 @@ impl Case {
                     Arithmetic::F32 => test_name.to_owned(),
                     _ => format!("{test_name} {arithmetic_name}"),
                 };
-                let culling = Culling {
-                    test,
-                    arithmetic,
-                    planes: self.planes,
-                };
+                let culling = Culling::new(test, arithmetic, self.planes);
                 let (items, built) = match test {
                     CullingTest::Sphere => &spheres,
                     _ => &boxes,
@@ -303,16 +299,8 @@ impl Case {
         found: &mut Findings,
     ) {
         let view = |test| {
-            let planes = PlaneOptions {
-                epsilon: 0.0,
-                ..self.planes
-            };
-            let culling = Culling {
-                test,
-                planes,
-                ..Culling::default()
-            };
-            culling.view(&self.camera, &self.around)
+            let planes = self.planes.without_epsilon();
+            Culling::new(test, Arithmetic::F32, planes).view(&self.camera, &self.around)
         };
         let Ok(six) = view(CullingTest::SixPlane) else {
             return;
