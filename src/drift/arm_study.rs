@@ -244,8 +244,8 @@ pub fn conclude(
     }
     let rule = format!("an error within {tolerance:e}");
     let choice = recommended(&candidates, tolerance, &rule);
-    let is_taken = |point: &&ArmPoint| choice.name.as_ref() == Some(&point.label());
-    let taken = points.iter().find(is_taken);
+    let mut points = points.iter();
+    let taken = points.find(|point| choice.name.as_ref() == Some(&point.label()));
     Some(ArmChoice {
         setting,
         method: taken.map(|point| point.method),

@@ -10,8 +10,7 @@ mod rotation;
 
 use serde::Serialize;
 
-pub use arm::Method as ArmMethod;
-pub use arm::{ARMS, ArmKind};
+pub use arm::{ARMS, ArmKind, Method as ArmMethod};
 pub use arm_study::{ArmChoice, ArmOptions, ArmPoint, StabilityLimit};
 pub use frames::Turn;
 pub use rated::Recommendation;
@@ -133,8 +132,9 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
         begin(method.name);
         let drifts = periods.iter().map(|period| method.drift(period));
         report.rotation.extend(drifts);
-        let turns = TURNS.map(|turns| method.turn_drift(turns));
-        report.one_degree_turns.extend(turns);
+        report
+            .one_degree_turns
+            .extend(TURNS.map(|turns| method.turn_drift(turns)));
     }
     let mut points = Vec::new();
     for setting in arm_study::settings(&options.arm) {
@@ -210,11 +210,9 @@ impl DriftReport {
 pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
     let protocol = Protocol {
         rounds: [5, 5],
-        task_ns: 0.0,
         cameras: QUERIES,
-        cold: false,
         seed: 1,
-        cache_bytes: 0,
+        ..Protocol::default()
     };
     let methods = METHODS.iter().filter(|method| names.contains(&method.name));
     let tasks: Vec<TimedTask> = methods.clone().map(|m| walking(m.walk)).collect();

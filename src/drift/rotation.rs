@@ -55,10 +55,8 @@ pub const METHODS: &[Method] = rows! { Method { name, summary, sums_angles, walk
 /// Steps that figures are the maxima of: a period between two corrections of those
 /// methods that correct now and then. The moment after one says nothing of what a
 /// camera is off by.
-pub const PERIOD: u64 = (CORRECT_EVERY as u64).div_ceil(ROTATIONS);
-
-/// Rotations of a step: yaw, pitch and roll.
-const ROTATIONS: u64 = 3;
+/// A step has three rotations: yaw, pitch and roll.
+pub const PERIOD: u64 = (CORRECT_EVERY as u64).div_ceil(3);
 
 /// Distance from the centre of an orbit to the eye.
 pub const ORBIT_RADIUS: f64 = 10.0;
@@ -101,8 +99,8 @@ pub struct TurnDrift {
 /// Frames that methods ought to have in the [`PERIOD`] up to a number of steps.
 pub struct Period {
     steps: Vec<u64>,
-    turns: Vec<Matrix>,
-    angles: Vec<Matrix>,
+    /// By turns, and by sums of angles.
+    exact: [Vec<Matrix>; 2],
 }
 
 impl Period {
@@ -113,9 +111,9 @@ impl Period {
             turns = turns.times(&step);
             turns.clone()
         };
+        let turns = steps.clone().map(turn).collect();
         Period {
-            turns: steps.clone().map(turn).collect(),
-            angles: steps.clone().map(turned).collect(),
+            exact: [turns, steps.clone().map(turned).collect()],
             steps: steps.collect(),
         }
     }
@@ -124,10 +122,7 @@ impl Period {
 impl Method {
     /// Largest errors of a period.
     pub fn drift(&self, period: &Period) -> RotationDrift {
-        let exact = match self.sums_angles {
-            true => &period.angles,
-            false => &period.turns,
-        };
+        let exact = &period.exact[usize::from(self.sums_angles)];
         let walked = (self.walk)(&STEADY, &period.steps).into_iter().zip(exact);
         let all = walked.map(|(axes, exact)| errors(axes, exact));
         let [orthogonality_error, angle_error_rad, position, radius] =

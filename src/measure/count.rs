@@ -129,7 +129,7 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
     }
     for (counted, subject) in all.iter_mut().zip(subjects) {
         if let (true, Ok(built)) = (counted.is_ok(), &subject.built) {
-            counted.verdict = batch_verdict(workload, built);
+            counted.verdict = compare_batch(workload, built).err().unwrap_or_default();
             if subject.spec.info().kind != Kind::Scan {
                 note_scan(counted, workload.items.len());
             }
@@ -140,21 +140,19 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
 
 /// Compares the answers of one batch of all points with the answers of each point
 /// alone, which were compared with the reference.
-fn batch_verdict(workload: &Workload, subject: &Built) -> Verdict {
+fn compare_batch(workload: &Workload, subject: &Built) -> Result<(), Verdict> {
     let (mut many, mut alone) = (Located::default(), Vec::new());
     let index = subject.regions();
-    if let Err(panicked) = guarded(|| index.query_many(&workload.points, &mut many)) {
-        return panicked;
-    }
+    guarded(|| index.query_many(&workload.points, &mut many))?;
     for (n, &p) in workload.points.iter().enumerate() {
         alone.clear();
         index.locate(p, &mut alone);
         if many.len() != workload.points.len() || many.of(n) != alone {
             let reason = format!("point {n} has another answer in a batch than alone");
-            return Verdict::new(Status::Wrong, reason);
+            return Err(Verdict::new(Status::Wrong, reason));
         }
     }
-    Verdict::ok()
+    Ok(())
 }
 
 /// Difference of the answers of a workload from the truth at camera level.

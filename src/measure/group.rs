@@ -85,10 +85,13 @@ pub fn measure_part(
     let (mut entries, judged, answers) = match answered {
         None => count(workload, subjects, notice),
         Some(known) => {
-            let entry = |subject| Entry {
-                subject,
-                part: SubjectPart::of(subject, compare_digests(subject, workload, known, notice)),
-                counted: None,
+            let entry = |subject| {
+                let differs = compare_digests(subject, workload, known, notice).err();
+                Entry {
+                    subject,
+                    part: SubjectPart::of(subject, differs.unwrap_or_default()),
+                    counted: None,
+                }
             };
             let answers = [known.visible.clone(), known.located.clone()];
             (subjects.iter().map(entry).collect(), None, answers)
@@ -303,11 +306,8 @@ fn compare_digests(
     workload: &Workload,
     known: &Known,
     notice: Notice,
-) -> Verdict {
-    let built = match &subject.built {
-        Ok(built) => built,
-        Err(verdict) => return verdict.clone(),
-    };
+) -> Result<(), Verdict> {
+    let built = subject.built.as_ref().map_err(Verdict::clone)?;
     notice(Some(&subject.label()), "comparing answers");
     let (cameras, points) = (workload.views.len(), workload.points.len());
     if (known.visible.len(), known.located.len()) != (cameras, points) {
@@ -317,7 +317,7 @@ fn compare_digests(
             known.visible.len(),
             known.located.len()
         );
-        return Verdict::new(Status::Wrong, reason);
+        return Err(Verdict::new(Status::Wrong, reason));
     }
     let mut out = Vec::new();
     for pass in Pass::ALL {
@@ -325,9 +325,7 @@ fn compare_digests(
         for &n in planned.iter().flat_map(|plan| &plan.schedule.cameras) {
             let (n, wanted) = (n as usize, answers[n as usize]);
             out.clear();
-            if let Err(panicked) = guarded(|| built.answer(workload, pass, n, &mut out)) {
-                return panicked;
-            }
+            guarded(|| built.answer(workload, pass, n, &mut out))?;
             let found = Answer::of(&out);
             if found != wanted {
                 let reason = format!(
@@ -339,11 +337,11 @@ fn compare_digests(
                     wanted.count,
                     wanted.digest
                 );
-                return Verdict::new(Status::Wrong, reason);
+                return Err(Verdict::new(Status::Wrong, reason));
             }
         }
     }
-    Verdict::ok()
+    Ok(())
 }
 
 /// Metrics of the count pass by name, means per query.

@@ -15,7 +15,7 @@ use crate::scene::SeededRng;
 use crate::statistics::median;
 
 /// Limits that a schedule is made within: rounds, time, cameras, cache state.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct Protocol {
     /// Rounds of a task, at least and at most.
     pub rounds: [usize; 2],

@@ -205,7 +205,7 @@ impl<'a> Built<'a> {
             }
             Way::Region(indexes, numbers) => {
                 let index = indexes.map(Indexes::regions);
-                self.queries.answer(numbers, index, camera, out);
+                self.queries.answer((numbers, index), camera, out);
             }
         }
     }

@@ -52,6 +52,9 @@ pub struct RegionErrors {
     pub worst_false: f64,
 }
 
+/// The numbers, and the index that is searched; without one every region is looked at.
+pub(super) type By<'i> = (RegionNumbers, Option<&'i dyn DynIndex>);
+
 /// The points of every camera.
 pub(super) struct RegionQueries<'a> {
     scene: &'a Scene,
@@ -110,17 +113,10 @@ impl RegionQueries<'_> {
         }
     }
 
-    /// Appends what the numbers find for a point: by an index, or by a look at every
-    /// region.
-    fn find(
-        &self,
-        numbers: RegionNumbers,
-        index: Option<&dyn DynIndex>,
-        p: &Sought,
-        out: &mut Vec<ItemId>,
-    ) {
+    /// Appends the regions that are found for a point.
+    fn find(&self, by: By, p: &Sought, out: &mut Vec<ItemId>) {
         let scene = self.scene;
-        match (numbers, index) {
+        match by {
             (RegionNumbers::F32, Some(index)) => index.locate(p.local, out),
             (RegionNumbers::F32, None) => out.extend(scene.regions.holding(p.local, &scene.items)),
             (RegionNumbers::Checked, Some(index)) => {
@@ -147,15 +143,9 @@ impl RegionQueries<'_> {
     }
 
     /// Appends the regions of all points of a camera.
-    pub fn answer(
-        &self,
-        numbers: RegionNumbers,
-        index: Option<&dyn DynIndex>,
-        camera: usize,
-        out: &mut Vec<ItemId>,
-    ) {
+    pub fn answer(&self, by: By, camera: usize, out: &mut Vec<ItemId>) {
         for p in &self.by_camera[camera] {
-            self.find(numbers, index, p, out);
+            self.find(by, p, out);
         }
     }
 
@@ -163,16 +153,11 @@ impl RegionQueries<'_> {
     ///
     /// A slot is the id of the region plus the number of regions times the index of the
     /// point.
-    fn slots(
-        &self,
-        numbers: RegionNumbers,
-        index: Option<&dyn DynIndex>,
-        camera: usize,
-    ) -> Vec<ItemId> {
+    fn slots(&self, by: By, camera: usize) -> Vec<ItemId> {
         let mut slots = Vec::new();
         for (n, p) in (0..).zip(&self.by_camera[camera]) {
             let first = slots.len();
-            self.find(numbers, index, p, &mut slots);
+            self.find(by, p, &mut slots);
             let regions = self.boxes.len() as ItemId;
             slots[first..].iter_mut().for_each(|id| *id += n * regions);
         }
@@ -183,18 +168,17 @@ impl RegionQueries<'_> {
     /// Tests that an index returns the answers of the same numbers by a scan.
     pub fn agree(&self, judged: &RegionJudged, index: Option<&dyn DynIndex>) -> bool {
         let answers = (0..).zip(&judged.answers);
-        let mut found = answers.map(|(n, own)| self.slots(judged.numbers, index, n) == *own);
+        let mut found = answers.map(|(n, own)| self.slots((judged.numbers, index), n) == *own);
         found.all(|is_same| is_same)
     }
 
     /// Answers in every kind of numbers, judged by the exact one. O(points * regions).
     pub fn judged(&self) -> Vec<RegionJudged> {
         let cameras = || 0..self.by_camera.len();
-        let truth = cameras().map(|n| self.slots(RegionNumbers::Exact, None, n));
-        let truth: Vec<Vec<ItemId>> = truth.collect();
+        let by_scan = |numbers| cameras().map(move |n| self.slots((numbers, None), n));
+        let truth: Vec<Vec<ItemId>> = by_scan(RegionNumbers::Exact).collect();
         let of = |numbers| {
-            let answers = cameras().map(|n| self.slots(numbers, None, n));
-            let answers: Vec<Vec<ItemId>> = answers.collect();
+            let answers: Vec<Vec<ItemId>> = by_scan(numbers).collect();
             let errors = cameras().map(|n| self.errors(n, &answers[n], &truth[n]));
             RegionJudged {
                 numbers,

@@ -291,14 +291,13 @@ fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Option<Logs> {
         return None;
     }
     let side = |side: usize| -> Vec<f64> {
-        let own = logs[side].iter().enumerate();
-        own.filter_map(|(process, ln)| {
+        let relative = logs[side].iter().enumerate().filter_map(|(process, ln)| {
             let others: Vec<f64> = others.iter().map(|o| o[side][process]).collect();
             Some(ln - median(&others)?)
-        })
-        .collect()
+        });
+        relative.collect()
     };
-    Some([side(0), side(1)])
+    Some([0, 1].map(side))
 }
 
 fn why_unmeasured(old: Option<f64>, new: Option<f64>) -> String {
@@ -333,11 +332,10 @@ fn common_shift(pairs: &[Pair], metric: &'static str) -> Option<CommonShift> {
     let all = || groups.iter().flat_map(|group| &group.1);
     let counts = [0, 1].map(|side| all().map(|logs| logs[side].len()).max().unwrap_or(0));
     let is_whole = |logs: &&Logs| [0, 1].iter().all(|&s| logs[s].len() == counts[s]);
-    let whole: Vec<Vec<&Logs>> = groups
+    let whole = groups
         .iter()
-        .map(|group| group.1.iter().filter(is_whole).collect::<Vec<_>>())
-        .filter(|cells| !cells.is_empty())
-        .collect();
+        .map(|group| group.1.iter().filter(is_whole).collect());
+    let whole: Vec<Vec<&Logs>> = whole.filter(|cells: &Vec<_>| !cells.is_empty()).collect();
     let of = |side: usize| -> Vec<f64> {
         let process = |process: usize| -> f64 {
             let medians = whole.iter().filter_map(|cells| {

@@ -24,16 +24,14 @@ use crate::statistics::median;
 /// # Errors
 /// I/O errors, a file that is not a report, or another schema version.
 pub fn read_report(path: &Path) -> Result<Report, InputError> {
-    let stream = path.join(STREAM);
-    if !path.is_dir() || !stream.is_file() {
-        return read_json(match path.is_dir() {
-            true => path.join(REPORT),
-            false => path.to_owned(),
-        });
+    if !path.is_dir() {
+        return read_json(path.to_owned());
     }
+    let stream = path.join(STREAM);
     // An unfinished report may lack results that the stream has.
     match read_json(path.join(REPORT)) {
         Ok(report) if report.run.finished_at.is_some() => Ok(report),
+        read if !stream.is_file() => read,
         _ => Ok(read_stream(&stream)?.0.report()),
     }
 }

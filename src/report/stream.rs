@@ -311,9 +311,8 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
         ));
     }
     let twins = report.noise.twins.iter();
-    let holds: Vec<bool> = twins.filter_map(super::TwinEntry::holds_one).collect();
-    let all = holds.len();
-    let missed = holds.iter().filter(|holds| !**holds).count();
+    let holds = twins.filter_map(super::TwinEntry::holds_one);
+    let (all, missed) = (holds.clone().count(), holds.filter(|holds| !holds).count());
     // One in twenty misses by chance; this many of `all` are no chance.
     if missed > 1 + all / 8 {
         warnings.push(format!(

@@ -48,8 +48,9 @@ pub fn world_of(scene: &str) -> String {
     let Some((name, parameters)) = scene.rsplit_once(':') else {
         return scene.to_owned();
     };
-    let parameters = parameters.split(',');
-    let others = parameters.filter(|pair| !pair.trim_start().starts_with("n="));
+    let others = parameters
+        .split(',')
+        .filter(|pair| !pair.trim_start().starts_with("n="));
     let others: Vec<&str> = others.collect();
     match others.is_empty() {
         true => name.to_owned(),
@@ -94,10 +95,8 @@ pub fn surfaces(comparisons: Vec<Comparison<'_>>) -> Vec<Surface<'_>> {
     };
     let mut all: Vec<Surface> = grouped(places).into_iter().map(surface).collect();
     for surface in &mut all {
-        surface.places.sort_by(|a, b| {
-            let by_share = || a.share.total_cmp(&b.share);
-            a.items.cmp(&b.items).then_with(by_share)
-        });
+        surface.places.sort_by(|a, b| a.share.total_cmp(&b.share));
+        surface.places.sort_by_key(|place| place.items);
     }
     all
 }
@@ -203,10 +202,8 @@ impl Surface<'_> {
         let mut places = self.places.iter().filter(here);
         let place = places.find(|place| place.cell(structure).is_some());
         let rank = |name: &str| place?.cell(name)?.rank;
-        match (rank(structure), rank(YARDSTICK)) {
-            (Some(own), Some(linear)) => own < linear,
-            _ => false,
-        }
+        let both = rank(structure).zip(rank(YARDSTICK));
+        both.is_some_and(|(own, linear)| own < linear)
     }
 }
 
@@ -254,13 +251,16 @@ pub fn growths(report: &Report) -> Vec<Growth<'_>> {
 
 /// Gives every cell of a series its `growth_exponent`.
 pub(super) fn enter_growths(report: &mut Report) {
-    let of_cells = |growth: Growth| (growth.cells, growth.exponent);
-    let found: Vec<(Vec<usize>, Estimate)> = growths(report).into_iter().map(of_cells).collect();
-    for (cells, exponent) in found {
-        for cell in cells {
-            let metrics = &mut report.cells[cell].metrics;
-            metrics.insert("growth_exponent".to_owned(), Metric::of(exponent, "1"));
-        }
+    let of_cells = |growth: Growth| {
+        growth
+            .cells
+            .into_iter()
+            .map(move |cell| (cell, growth.exponent))
+    };
+    let found: Vec<(usize, Estimate)> = growths(report).into_iter().flat_map(of_cells).collect();
+    for (cell, exponent) in found {
+        let metrics = &mut report.cells[cell].metrics;
+        metrics.insert("growth_exponent".to_owned(), Metric::of(exponent, "1"));
     }
 }
 

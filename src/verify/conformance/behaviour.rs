@@ -18,23 +18,18 @@ use crate::threads::Pool;
 /// `visible` returns exactly `{ i : view.sees(items[i]) }` for every kind of
 /// [`QueryVolume`], over the items and over the cubes of their spheres.
 pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
+    // Queries with every kind of view of some of the volumes.
+    let some = |step, most| {
+        move |asked: &mut Questions, index: &mut T| {
+            let cubes = cubes(asked);
+            let of_cubes: [T; 2] = [build(&cubes)?, build_of_spheres(&cubes)?];
+            views_are_right(asked, index, &of_cubes, step, most)
+        }
+    };
     // Every kind of plane set, not each of them at each of its places.
-    each(edges(), |asked, index: &mut T| {
-        check(asked, index, 5, usize::MAX)
-    })?;
-    each(cases(SEEDS), |asked, index: &mut T| {
-        check(asked, index, 1, 1)
-    })?;
-    each(generated_scenes(500)?, |asked, index: &mut T| {
-        check(asked, index, 1, 3)
-    })
-}
-
-/// Queries with every kind of view of some of the volumes.
-fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize) -> Outcome {
-    let cubes = cubes(asked);
-    let of_cubes: [T; 2] = [build(&cubes)?, build_of_spheres(&cubes)?];
-    views_are_right(asked, index, &of_cubes, step, most)
+    each(edges(), some(5, usize::MAX))?;
+    each(cases(SEEDS), some(1, 1))?;
+    each(generated_scenes(500)?, some(1, 3))
 }
 
 fn cubes(asked: &Questions) -> Vec<Aabb> {
@@ -55,8 +50,8 @@ fn views_are_right<T: RegionIndex>(
 ) -> Outcome {
     let (items, cubes) = (&asked.items, cubes(asked));
     for volume in asked.volumes.iter().step_by(step).take(most) {
-        let wide =
-            ConvexVolumeF64::from_planes(&finer(volume)).map_err(|error| error.to_string())?;
+        let wide = ConvexVolumeF64::from_planes(&finer(volume));
+        let wide = wide.map_err(|error| error.to_string())?;
         right("planes", index, items, volume)?;
         let spheres = Spheres::new(volume);
         for index in of_cubes {
