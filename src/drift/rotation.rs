@@ -99,7 +99,7 @@ pub struct TurnDrift {
 /// Frames that methods ought to have in the [`PERIOD`] up to a number of steps.
 pub struct Period {
     steps: Vec<u64>,
-    /// By turns, and by sums of angles.
+    /// Frames after turns, and after sums of angles.
     exact: [Vec<Matrix>; 2],
 }
 

@@ -52,7 +52,7 @@ pub struct RegionErrors {
     pub worst_false: f64,
 }
 
-/// The numbers, and the index that is searched; without one every region is looked at.
+/// Numbers and index of a search; without an index it looks at every region.
 pub(super) type By<'i> = (RegionNumbers, Option<&'i dyn DynIndex>);
 
 /// The points of every camera.
