@@ -437,11 +437,8 @@ fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecE
 
 /// z, or y for a camera that looks straight up or down.
 fn up_for(forward: DVec3) -> DVec3 {
-    if forward.x.abs() + forward.y.abs() > 1e-6 * forward.z.abs() {
-        DVec3::Z
-    } else {
-        DVec3::Y
-    }
+    let has_level = forward.x.abs() + forward.y.abs() > 1e-6 * forward.z.abs();
+    if has_level { DVec3::Z } else { DVec3::Y }
 }
 
 #[cfg(test)]

@@ -96,10 +96,9 @@ const FAR_IN_NEARS: f64 = 1000.0;
 pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Result<CameraPath> {
     let mut table = TableReader::open(bytes, file, &[&MATRIX_ENTRIES[..], &OF_EYES].concat())?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
-    let read: CameraReader = if is_matrix {
-        matrices(&table, defaults.matrix)?
-    } else {
-        eyes(&table, defaults)?
+    let read: CameraReader = match is_matrix {
+        true => matrices(&table, defaults.matrix)?,
+        false => eyes(&table, defaults)?,
     };
     let (clock, mut last, mut times) = (table.column("time_s"), f64::NEG_INFINITY, Vec::new());
     let (lines, cameras): (Vec<u64>, Vec<Camera>) = rows(&mut table, file, "no camera", |row| {

@@ -105,10 +105,9 @@ pub fn city(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
             0.0,
         );
         let low = cell * pitch + DVec3::new(corner, corner, 0.0);
-        if rng.unit() < BUILDINGS {
-            building(low, block, -corner, rng)
-        } else {
-            furniture(low, block, street, rng)
+        match rng.unit() < BUILDINGS {
+            true => building(low, block, -corner, rng),
+            false => furniture(low, block, street, rng),
         }
     });
     Ok(boxes.collect())
@@ -133,10 +132,9 @@ fn building(block_low: DVec3, block: f64, half_city: f64, rng: &mut SeededRng) -
 fn furniture(block_low: DVec3, block: f64, street: f64, rng: &mut SeededRng) -> WorldBox {
     let along = rng.between(0.0, block + street);
     let across = block + rng.unit() * street;
-    let place = if rng.unit() < 0.5 {
-        DVec3::new(along, across, 0.0)
-    } else {
-        DVec3::new(across, along, 0.0)
+    let place = match rng.unit() < 0.5 {
+        true => DVec3::new(along, across, 0.0),
+        false => DVec3::new(across, along, 0.0),
     };
     let size = match rng.below(4) {
         0 => DVec3::new(0.2, 0.2, 5.0),

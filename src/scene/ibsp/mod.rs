@@ -254,7 +254,7 @@ fn faces_of(
     // They turn right, seen from the front.
     let triangles = order.chunks_exact(3).map(|c| [c[0], c[2], c[1]]);
     let triangles: Vec<[u32; 3]> = triangles.collect();
-    Ok((!triangles.is_empty()).then(|| (label, bounds, (points, triangles))))
+    Ok((!triangles.is_empty()).then_some((label, bounds, (points, triangles))))
 }
 
 /// The places where players begin, looking as they do.

@@ -109,10 +109,9 @@ pub fn forest(triangles: usize, seed: u64) -> Surfaces {
         let width = ground.width();
         let (x, y) = (rng.unit() * width, rng.unit() * width);
         let base = on_ground(&ground, x, y);
-        let (kind, shape) = if rng.unit() < TREES {
-            (SurfaceKind::Opaque, tree(base, &mut rng))
-        } else {
-            (SurfaceKind::CutOut, bush(base, &mut rng))
+        let (kind, shape) = match rng.unit() < TREES {
+            true => (SurfaceKind::Opaque, tree(base, &mut rng)),
+            false => (SurfaceKind::CutOut, bush(base, &mut rng)),
         };
         let two_sided = kind == SurfaceKind::CutOut;
         surfaces.push(kind, two_sided, &shape.points, &shape.triangles);
