@@ -31,9 +31,6 @@ pub struct StructureChoice {
     /// `true` if the one to take is a scan.
     #[serde(skip)]
     pub is_scan: bool,
-    /// `true` if scans and others were timed.
-    #[serde(skip)]
-    pub(super) is_open: bool,
     /// `true` if a scan and another structure tie.
     #[serde(skip)]
     pub(super) is_mixed: bool,
@@ -115,17 +112,12 @@ impl StructureChoice {
         let mut first_located = first(Some("locate_ns")).map(|cell| cell.structure.clone());
         let mut first = first(None).map(|cell| cell.structure.clone());
         let [name, ties]: [Vec<String>; 2] = [first.by_ref().take(1).collect(), first.collect()];
-        let is = |is_scan| move |row: &StructureRow| row.is_scan == is_scan;
         let is_tied =
             |row: &&StructureRow| [&name, &ties].iter().any(|n| n.contains(&row.structure));
-        let tied = rows.iter().filter(is_tied);
-        let has_both = |rows: &[&StructureRow]| {
-            [false, true].map(|kind| rows.iter().any(|row| is(kind)(row))) == [true; 2]
-        };
+        let tied = |is_scan| (rows.iter().filter(is_tied)).any(|row| row.is_scan == is_scan);
         StructureChoice {
             is_scan: matches!(rows.first(), Some(row) if row.is_scan && row.ns().is_some()),
-            is_open: has_both(&alone(&rows).collect::<Vec<_>>()),
-            is_mixed: has_both(&tied.collect::<Vec<_>>()),
+            is_mixed: tied(false) && tied(true),
             name: name.into_iter().next(),
             ties,
             region_search: first_located.next(),
@@ -142,6 +134,15 @@ impl StructureChoice {
             let own = alone(&self.rows).find(|row| row.is_scan == is_scan);
             own.map_or(otherwise, |row| &row.structure).to_owned()
         })
+    }
+
+    /// Times of the fastest tree or grid and of the fastest scan, if both were timed.
+    ///
+    /// Of a frame of moving items, or of a query of a still scene, ns.
+    pub(super) fn tree_and_scan_ns(&self) -> Option<[f64; 2]> {
+        let [tree, scan] =
+            [false, true].map(|kind| alone(&self.rows).find(|row| row.is_scan == kind)?.ns());
+        Some([tree?, scan?])
     }
 
     /// Labels of the structure that is taken and of those that may replace it.

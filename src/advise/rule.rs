@@ -89,8 +89,8 @@ pub struct Finding {
     pub is_tie: Option<bool>,
     /// Assumption or error that decides, in at most 30 characters.
     pub note: String,
-    /// Prediction that replaces that of the statistic.
-    pub predicted: Option<bool>,
+    /// Measured side that replaces the prediction.
+    pub measured: Option<bool>,
     pub confirmed: Option<bool>,
     /// Decision that replaces that of rule and clock.
     pub decision: Option<Decision>,
@@ -197,7 +197,7 @@ impl Rule {
         let predicted = finding
             .compared
             .and_then(|both| self.left_out_if.holds(both));
-        let predicted = finding.predicted.or(predicted);
+        let agrees = finding.measured.zip(predicted).map(|(a, b)| a == b);
         let [statistic, threshold] = [0, 1].map(|i| finding.compared.map(|both| both[i]));
         let first = checks.first();
         let timed = first.map(|check| [check.kept_ns, check.left_out_ns]);
@@ -224,13 +224,13 @@ impl Rule {
             predicted,
             saving: finding.saving,
             decision: Decision::NotApplicable,
-            confirmed: finding.confirmed,
+            confirmed: finding.confirmed.or(agrees),
             reason: finding.reason,
             checks,
             is_tie: finding.is_tie.unwrap_or(is_tie),
         };
-        if let Some(predicted) = predicted {
-            omission.decide(predicted);
+        if let Some(leaves_out) = finding.measured.or(predicted) {
+            omission.decide(leaves_out);
         }
         omission.decision = finding.decision.unwrap_or(omission.decision);
         omission

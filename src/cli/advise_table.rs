@@ -50,7 +50,7 @@ pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
             rule.checks.iter().any(Check::is_wrong)
         }),
         (
-            "Estimated otherwise; the measured times decide: ",
+            "Estimated otherwise; the measurement decides: ",
             &|rule| rule.confirmed == Some(false) && !rule.is_chosen && no(rule).is_none(),
         ),
     ];
@@ -121,7 +121,8 @@ fn in_motion(advice: &Advice) -> Option<String> {
     let others = bracketed(longer.chain(ruled_out), "; ");
     Some(format!(
         "In motion, {} of the items and {} per frame: {policy}{}{others}. A frame takes {}, of which \
-         the update {}; the worst one {}. The rules below are weighed on the still scene.",
+         the update {}; the worst one {}. The rules below, except that of the index, are weighed on the \
+         still scene.",
         share(motion.share_moved),
         text::counted(motion.views, "query"),
         ties(&motion.policy_ties),

@@ -42,6 +42,15 @@ fn advice_on_moving_items_has_the_rows_of_a_run() {
         let parts = number(row, "update_ns") + number(row, "query_ns");
         assert!(parts <= number(row, "frame_ns") * 1.001, "{row}");
     }
+    // The index saves what a frame by the best tree takes less than one by the best scan.
+    let alone = rows.iter().filter(|row| !label(row).contains("threads="));
+    let best = |is_scan| {
+        let mut own = (alone.clone()).filter(|row| label(row).starts_with("linear") == is_scan);
+        number(own.next().expect("a row"), "frame_ns")
+    };
+    let saving = number(rule(moving(), "no-index"), "saving");
+    let wanted = 1.0 - best(true) / best(false);
+    assert!((saving - wanted).abs() < 1e-9, "{saving} {wanted}");
     let motion = &moving()["motion"];
     assert_eq!(
         (number(motion, "share_moved"), number(motion, "views")),

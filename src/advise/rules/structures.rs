@@ -34,11 +34,14 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
         let reason = format!(
             "{scan} is faster than {tree} up to {crossing:.0} items, of parts of {least:.0} to {all:.0} items"
         );
+        // Follows the structure taken, wherever there was a choice.
+        let costs = taken.tree_and_scan_ns();
+        let saving = costs.map(|[tree, scan]| 1.0 - scan / tree);
         Finding {
-            saving: facts.saving(),
-            // Follows the structure taken, wherever there was a choice.
-            decision: taken.is_open.then_some(Decision::of(taken.is_scan)),
-            is_tie: taken.is_mixed.then_some(true),
+            saving: saving.or(facts.saving()),
+            cost_ns: costs,
+            decision: costs.map(|_| Decision::of(taken.is_scan)),
+            is_tie: costs.map(|_| taken.is_mixed),
             note: match crossing {
                 0.0 => format!("no scan wins from {least:.0} items on"),
                 _ => format!("a scan wins up to {crossing:.0} items"),
@@ -142,14 +145,14 @@ pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
 }
 
 /// Drift of an f32 frame per step, radians: docs/NUMERICS.md.
-const DRIFT: f64 = 2e-8;
+const DRIFT: f64 = 5e-8;
 /// "Much less than the tolerance" is this share of it.
 const MUCH_LESS: f64 = 0.1;
 const METHODS: [&str; 2] = ["f32", "f32-polar-100"];
 
 /// Correcting a camera's frame.
 ///
-/// Axes in f32 that are turned and never straightened drift by some 2e-8 a step. A frame
+/// Axes in f32 that are turned and never straightened drift by some 5e-8 a step. A frame
 /// that is built for each camera, or takes few steps, does not need it. Checked by walking.
 pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
     let tolerance = trials.case.options.tolerance;
@@ -161,13 +164,11 @@ pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
     let [kept_error, left_out_error] = [kept, left_out]
         .map(|error| error.map_or("lost".to_owned(), |error| format!("{error:.1e}")));
     let compared = [steps as f64 * DRIFT, tolerance * MUCH_LESS];
-    // A walk outweighs the estimate.
-    let predicted = left_out.map(|error| error <= tolerance);
+    let walked = left_out.is_some_and(|error| error <= tolerance);
     let mut draft = Draft::concluded(Vec::new(), move |facts| {
         let mut finding = Finding {
             compared: Some(compared),
-            predicted,
-            confirmed: predicted.map(|walked| (compared[0] <= compared[1]) == walked),
+            measured: Some(walked),
             ..Finding::default()
         };
         let ([left_out_ns, kept_ns], Some(ratio)) = (facts.once_ns, &facts.once_ratio) else {
