@@ -321,7 +321,7 @@ fn check_table(features: &[Omission]) -> Table {
                 false => some(check.ratio, text::within),
             }
         }),
-        (">false positives %, both", |(rule, check)| {
+        (">false pos. %, both", |(rule, check)| {
             let mut both = [check.kept_excess, check.left_out_excess];
             if rule.rule.is_saving {
                 both.reverse();

@@ -125,18 +125,18 @@ pub const OF_QUERIES: [Figure; 11] = [
     }),
 ];
 
-/// Figures of frames by priority, before the first two of queries.
+/// Figures of frames, before the first two of queries.
 ///
-/// A summary of a motion has the first five.
+/// A summary of a motion has the first four and `x after 100`.
 pub const OF_FRAMES: [Figure; 9] = [
     ("returned in excess", "fat_excess", text::percent),
     ("worst", "worst_frame_ns", text::time),
     ("update", "update_ns", text::time),
     ("query", "query_ns", text::time),
-    ("x after 100", "ageing_100", text::significant),
     ("further query", "further_query_ns", text::time),
     ("x after 1", "ageing_1", text::significant),
     ("x after 10", "ageing_10", text::significant),
+    ("x after 100", "ageing_100", text::significant),
     ("x after 1000", "ageing_1000", text::significant),
 ];
 
@@ -145,10 +145,18 @@ pub const OF_FRAMES: [Figure; 9] = [
 /// In full with intervals, lower bounds and every figure.
 pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) -> Table {
     let (time, figures, brief) = match comparison.about().path.motion.is_empty() {
-        true => ("time per query", OF_QUERIES.to_vec(), 2),
-        false => ("time per frame", [&OF_FRAMES, &OF_QUERIES[..2]].concat(), 5),
+        true => (
+            "time per query",
+            OF_QUERIES.to_vec(),
+            OF_QUERIES[..2].to_vec(),
+        ),
+        false => (
+            "time per frame",
+            [&OF_FRAMES, &OF_QUERIES[..2]].concat(),
+            [&OF_FRAMES[..4], &OF_FRAMES[7..8]].concat(),
+        ),
     };
-    let figures = if is_full { &figures } else { &figures[..brief] };
+    let figures = if is_full { figures } else { brief };
     let peer = comparison.fastest_peer().filter(|_| is_full);
     let of_base = text::some(base, |base| format!("vs {}", text::plain(base)));
     let head = ["structure", "rank", time, &of_base].into_iter();

@@ -24,6 +24,8 @@ const COUNTERS: [(&str, &str); 4] = [
 struct Pair<'r> {
     own: &'r ReportCell,
     other: &'r ReportCell,
+    /// Half of the interval of ln(own time / other time); 0 without one.
+    margin: f64,
 }
 
 /// Shows a table and a sentence for each cache state and culling test.
@@ -64,7 +66,11 @@ fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, St
     let mut others = comparison.sound().filter(|cell| !is_own(cell));
     let other = others.next();
     let other = other.ok_or_else(|| "No other structure has a time.".to_owned())?;
-    Ok(Pair { own, other })
+    let ends = comparison
+        .speedup(&other.structure, own)
+        .and_then(|found| found.1);
+    let margin = ends.map_or(0.0, |[lower, upper]| (upper / lower).ln() / 2.0);
+    Ok(Pair { own, other, margin })
 }
 
 impl Pair<'_> {
@@ -82,7 +88,7 @@ impl Pair<'_> {
         };
         let others = if time < 1.0 { " of the others" } else { "" };
         let (own, other) = (&self.own.structure, &self.other.structure);
-        let parts = parts(tests, per_test);
+        let parts = parts(tests, per_test, self.margin);
         let Some(frame) = self.ratio(frame_ns) else {
             return format!(
                 "{own} takes {} the time of {other}, the best{others}: {parts}.",
@@ -124,11 +130,12 @@ fn ns_per_test(cell: &ReportCell) -> Option<f64> {
     Some(query_ns(cell)? / tests(cell)?)
 }
 
-/// The two factors of a time, and which of them decides.
-fn parts(tests: f64, per_test: f64) -> String {
-    let decides = match tests.ln().abs() > per_test.ln().abs() {
-        true => "the number of tests decides",
-        false => "the time per test decides",
+/// The two factors of a time, and which of them decides if the times tell them apart.
+fn parts(tests: f64, per_test: f64, margin: f64) -> String {
+    let decides = match tests.ln().abs() - per_test.ln().abs() {
+        more if more.abs() <= margin => "both count alike",
+        more if more > 0.0 => "the number of tests decides",
+        _ => "the time per test decides",
     };
     format!(
         "it tests {} as many nodes and items, and a test takes {} as long, so {decides}",
@@ -183,6 +190,8 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
         let names = [shortened(label, 28), shortened(&pair.other.structure, 24)];
         table.add_row(names.into_iter().chain(figures));
     }
+    let margins = pairs.iter().flatten().map(|pair| pair.margin);
+    let margin = margins.sum::<f64>() / ratios[0].len() as f64;
     let means = ratios.each_ref().map(|all| geometric_mean(all));
     let failed = pairs.iter().find_map(|pair| pair.as_ref().err());
     let sentence = match means {
@@ -192,7 +201,7 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
             some(geometric_mean(&frames), |_| {
                 format!(" of the frames, and {} in queries", times(time))
             }),
-            parts(tests, per_test)
+            parts(tests, per_test, margin)
         ),
         _ => failed.cloned().unwrap_or_default(),
     };
@@ -206,11 +215,13 @@ mod tests {
     #[test]
     fn the_larger_factor_decides() {
         assert_eq!(
-            parts(4.0, 0.5),
+            parts(4.0, 0.5, 0.1),
             "it tests 4.00 x as many nodes and items, and a test takes 0.500 x as long, so the \
              number of tests decides"
         );
-        assert!(parts(1.1, 3.0).ends_with("so the time per test decides"));
-        assert!(parts(0.2, 3.0).ends_with("so the number of tests decides"));
+        assert!(parts(1.32, 1.35, 0.1).ends_with("so both count alike"));
+        assert!(parts(1.32, 1.35, 0.0).ends_with("so the time per test decides"));
+        assert!(parts(1.1, 3.0, 0.1).ends_with("so the time per test decides"));
+        assert!(parts(0.2, 3.0, 0.1).ends_with("so the number of tests decides"));
     }
 }

@@ -96,15 +96,25 @@ pub fn time_within(ns: Estimate) -> String {
     time(ns.value) + &interval([ns.lower, ns.upper], unit(ns.value).0)
 }
 
-/// A time with a margin on both sides: "1.30±0.38 us".
+/// A time with its uncertainty: "1.3±0.4 us", "8.12 [0.5, 48] us".
 pub fn time_plus_minus(ns: Option<Estimate>) -> String {
     some(ns, |ns| {
         let (size, name) = unit(ns.value);
-        let of = |end: Option<f64>| Some((end? - ns.value).abs() / size);
-        let margin = of(ns.lower).zip(of(ns.upper));
-        let margin = margin.map(|(a, b)| f64::max(a, b));
-        format!("{} {name}", plus_minus(ns.value / size, margin))
+        format!("{} {name}", with_ends(ns.per(size)))
     })
+}
+
+/// A value with a margin where both ends of its interval are near, else with the interval.
+fn with_ends(found: Estimate) -> String {
+    let ends = found.lower.zip(found.upper);
+    let is_near = |end: f64| found.value == 0.0 || (end / found.value).ln().abs() < 0.5;
+    match ends {
+        Some((lower, upper)) if !(is_near(lower) && is_near(upper)) => within(found),
+        _ => {
+            let margin = |(lower, upper)| f64::max(found.value - lower, upper - found.value);
+            plus_minus(found.value, ends.map(margin))
+        }
+    }
 }
 
 /// A value with a margin, to the digit that the margin leaves.
@@ -152,14 +162,19 @@ pub fn time_with(metric: &Metric) -> String {
     time(metric.value) + &uncertainty(metric, unit(metric.value).0)
 }
 
-/// A rate per `units` with half of its 95 % interval; nothing if there is none.
+/// A rate per `units` with its 95 % interval; nothing if there is none.
 pub fn rate(rate: Option<Rate>, units: f64) -> String {
     some(rate.map(|rate| rate.per(units)), |rate| {
-        plus_minus(rate.value, rate.upper.map(|upper| upper - rate.value))
+        let (value, lower, upper) = (rate.value, rate.lower, rate.upper);
+        with_ends(Estimate {
+            value,
+            lower,
+            upper,
+        })
     })
 }
 
-/// A share of `whole`, which it does not exceed, with half of its 95 % interval.
+/// A share of `whole`, which it does not exceed, with its 95 % interval.
 pub fn share(found: Option<Rate>, whole: f64) -> String {
     let within = |found: Rate| Rate {
         upper: found.upper.map(|upper| upper.min(whole)),
@@ -251,8 +266,7 @@ pub fn basis(comparison: &Comparison) -> String {
 /// False positives of the truly visible items: "0.08±0.03 %".
 pub fn false_positives(comparison: &Comparison) -> Option<String> {
     let share = comparison.metric_of_any("excess")?;
-    let margin = share.upper.map(|upper| (upper - share.value) * 100.0);
-    Some(format!("{} %", plus_minus(share.value * 100.0, margin)))
+    Some(format!("{} %", with_ends(share.estimate().per(0.01))))
 }
 
 /// Sources of false positives, as items of all judged cameras: "12/0/80". Nothing
@@ -323,7 +337,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_has_the_larger_half_of_its_interval() {
+    fn a_time_has_the_larger_half_of_its_interval_or_both_ends() {
         let shown = |[lower, upper]: [Option<f64>; 2]| {
             let value = 1301.0;
             time_plus_minus(Some(Estimate {
@@ -333,6 +347,8 @@ mod tests {
             }))
         };
         assert_eq!(shown([Some(1201.0), Some(1681.0)]), "1.3±0.4 us");
+        assert_eq!(shown([Some(0.0), Some(2601.0)]), "1.30 [0.00, 2.60] us");
+        assert_eq!(shown([Some(1201.0), Some(9000.0)]), "1.30 [1.20, 9.00] us");
         assert_eq!(shown([Some(1300.0), None]), "1.30 us");
         assert_eq!(time_plus_minus(None), "");
     }

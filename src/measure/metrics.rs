@@ -108,9 +108,9 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "further_query_ns", "ns", Of::Time(TaskKind::Further), "thread CPU time of a query after the first one of a frame; as query_ns";
     "worst_frame_ns", "ns", Of::WorstFrame, "slowest frame: median of each frame over rounds and processes, then the maximum over the frames, at least frame_ns; absent below three readings per frame, where an interruption would be the worst frame";
     "ageing_1", "1", Of::Log(|s| s.ageing_ln.get(&1).copied()), "time per query after 1 frame / time per query on a fresh build of the same boxes";
-    "ageing_10", "1", Of::Log(|s| s.ageing_ln.get(&10).copied()), "as ageing_1, after 10 frames";
-    "ageing_100", "1", Of::Log(|s| s.ageing_ln.get(&100).copied()), "as ageing_1, after 100 frames";
-    "ageing_1000", "1", Of::Log(|s| s.ageing_ln.get(&1000).copied()), "as ageing_1, after 1,000 frames";
+    "ageing_10", "1", Of::Log(|s| s.ageing_ln.get(&10).copied()), "time per query after 10 frames / time per query on a fresh build of the same boxes";
+    "ageing_100", "1", Of::Log(|s| s.ageing_ln.get(&100).copied()), "time per query after 100 frames / time per query on a fresh build of the same boxes";
+    "ageing_1000", "1", Of::Log(|s| s.ageing_ln.get(&1000).copied()), "time per query after 1,000 frames / time per query on a fresh build of the same boxes";
     "memory_after_bytes_per_item", "bytes", Of::Bytes(|s| s.memory_after_bytes), "as memory_bytes_per_item, after the last frame";
     "views_ns", "ns", Of::Time(TaskKind::Views), "CPU time of all threads per view where they share the views of all timed cameras; as query_ns";
 };

@@ -458,6 +458,9 @@ fn the_advice_fits_eighty_columns_and_the_evidence_is_asked_for() {
         !all.contains('\u{1b}') && all.contains("\nTake structure "),
         "{all}"
     );
+    // A row is a line, however wide.
+    let is_cut = |line: &str| line.starts_with(['[', '/']) || line.starts_with("extras");
+    assert!(!all.lines().any(is_cut), "{all}");
     for feature in ["plane masks", "index", "portals", "basis correction"] {
         assert!(all.contains(&format!("\n  {feature} ")), "{feature}: {all}");
     }

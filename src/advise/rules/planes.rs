@@ -16,7 +16,7 @@ use crate::index::{DynIndex, FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::measure::Workload;
 use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume};
-use crate::shown::{counted, significant};
+use crate::shown::{count, counted, significant};
 
 /// Share of the planes below which the saving is lost in noise.
 const LEAST_NEEDLESS: f64 = 0.01;
@@ -92,8 +92,9 @@ pub(super) fn plane_masks(trials: &mut Trials) -> Result<Draft, Unfit> {
     let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
     let mut finding = Finding::none("no plane is ever tested".to_owned());
     if all > 0 {
-        let reason = format!("{fewer} plane tests with masks, {all} without");
         let saved = 1.0 - fewer as f64 / all as f64;
+        let [fewer, all] = [fewer, all].map(|tests| count(tests as usize));
+        let reason = format!("{fewer} plane tests with masks, {all} without");
         finding = Finding::new(saved, LEAST_SAVED, reason)
             .noted(format!("save {:.0} % of plane tests", saved * 100.0));
     }

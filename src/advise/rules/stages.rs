@@ -9,6 +9,7 @@ use super::super::rule::{Draft, Finding, Unfit};
 use super::super::trials::Trials;
 use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE, StageKind};
 use crate::index::StructureSpec;
+use crate::shown::significant;
 use crate::visibility::SampleGrid;
 
 /// Most views, and most items of all of them.
@@ -119,10 +120,12 @@ fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
     let share = removed / without;
     let pays = (testing / (cost_ns * without)).max(0.0);
     let reason = format!(
-        "{removed:.1} of {without:.1} {one}s a view are removed ({:.1} %), which saves {} ns each{}",
+        "{} of {} {one}s a view are removed ({:.1} %), which saves {} ns each{}",
+        significant(removed),
+        significant(without),
         share * 100.0,
         (cost_ns * 1e3).round() / 1e3,
-        told(&|ns| format!("; pays above {ns:.1} ns per {one}"))
+        told(&|ns| format!("; pays above {} ns per {one}", significant(ns)))
     );
     let note = format!(
         "{} ns/{}{}",
@@ -131,11 +134,7 @@ fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
         told(&|ns| format!(", pays from {ns:.*}", if ns < 10.0 { 2 } else { 0 }))
     );
     let check = Check {
-        on: format!(
-            "{} {}, the others as in funnel",
-            gain.stage.name(),
-            gain.back_end
-        ),
+        on: format!("{} {}, as in funnel", gain.stage.name(), gain.back_end),
         kept_ns,
         left_out_ns,
         ratio: gain.ratio,

@@ -7,7 +7,7 @@ use super::super::rule::{Draft, Finding, Unfit, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::drift::rotations;
 use crate::measure::{Stopwatch, input_of, move_share};
-use crate::shown::{counted, significant};
+use crate::shown::{count, counted, significant};
 use crate::statistics::Estimate;
 
 /// The index itself: below some number of items a scan is as fast.
@@ -32,7 +32,10 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
         };
         let least = change.map_or(all, |change| change.measured[0]);
         let reason = format!(
-            "{scan} is faster than {tree} up to {crossing:.0} items, of parts of {least:.0} to {all:.0} items"
+            "{scan} is faster than {tree} up to {} items, of parts of {} to {} items",
+            count(crossing as usize),
+            count(least as usize),
+            count(all as usize)
         );
         // Follows the structure taken, wherever there was a choice.
         let costs = taken.tree_and_scan_ns();
