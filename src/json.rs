@@ -65,7 +65,10 @@ pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
             line: good.iter().filter(|byte| **byte == b'\n').count() + 1,
             column: good.iter().rev().take_while(|byte| **byte != b'\n').count() + 1,
             path: String::new(),
-            found: format!("byte {:#04x}, which is no UTF-8", bad.first().unwrap_or(&0)),
+            found: match bytes.starts_with(b"\x1f\x8b") {
+                true => "gzip, which has to be unpacked first".to_owned(),
+                false => format!("byte {:#04x}, which is no UTF-8", bad.first().unwrap_or(&0)),
+            },
             expected: None,
         }
     })?;

@@ -48,7 +48,8 @@
 //! - [`oracle`]: the exact verdict about a box and a volume or camera
 //! - [`index`]: the contract [`index::RegionIndex`], queries ([`index::FrustumQuery`]),
 //!   the structures, and the [`index::Registry`] that yours joins
-//! - [`scene`]: generated and real worlds, and the regions in them; [`path`]: camera paths
+//! - [`scene`]: generated and real worlds, and the regions in them; [`path`]: camera paths;
+//!   [`motion`]: items that move between frames
 //! - [`verify`]: the reference answer, and how others differ from it
 //! - [`measure`]: count, verify, time; [`statistics`] turns times into figures
 //! - [`report`]: the files that other tools read; [`suite`]: named sets of scenes and paths

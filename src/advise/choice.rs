@@ -138,7 +138,7 @@ impl StructureChoice {
 
     /// Times of the fastest tree or grid and of the fastest scan, if both were timed.
     ///
-    /// Of a frame of moving items, or of a query of a still scene, ns.
+    /// Per frame of moving items, or per query of a still scene, ns.
     pub(super) fn tree_and_scan_ns(&self) -> Option<[f64; 2]> {
         let [tree, scan] =
             [false, true].map(|kind| alone(&self.rows).find(|row| row.is_scan == kind)?.ns());

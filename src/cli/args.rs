@@ -55,7 +55,7 @@ pub enum Command {
     Compare(CompareArgs),
     /// Run frustum queries: the visible items per structure and camera
     Query(QueryArgs),
-    /// Run region searches: the regions that contain each point
+    /// Find the regions that contain points, or the items that overlap boxes
     Locate(LocateArgs),
     /// Cross-check all structures against the reference scan
     Verify(VerifyArgs),

@@ -92,7 +92,14 @@ fn rows(
     Ok(match topic {
         ListTopic::Structures => {
             let row = |info: &Info| {
-                let params = registry.structure(info.name)?.params;
+                let mut params = registry.structure(info.name)?.params;
+                // One thread, the default, is in no label.
+                if registry
+                    .structure(&format!("{}:threads=2", info.name))
+                    .is_ok()
+                {
+                    params["threads"] = 1.into();
+                }
                 Ok(json!({
                     "name": info.name,
                     "kind": info.kind.name(),

@@ -219,6 +219,9 @@ fn standing(all: usize, overall: &Overall) -> String {
     let (Some(base), Some(best)) = (overall.base, ranked.next()) else {
         return "No structure has times everywhere, so there are no means.".to_owned();
     };
+    if let [one] = &overall.standings[..] {
+        return format!("{} is the only structure.", one.structure);
+    }
     let tied: Vec<&Mean> = ranked.clone().take_while(|s| s.ties_with(best)).collect();
     let next = ranked.nth(tied.len());
     let lead = best.speedup.unwrap_or(1.0);

@@ -130,7 +130,9 @@ fn ns_per_test(cell: &ReportCell) -> Option<f64> {
     Some(query_ns(cell)? / tests(cell)?)
 }
 
-/// The two factors of a time, and which of them decides if the times tell them apart.
+/// The two factors of a time, and which of them decides.
+///
+/// Neither does where they differ by less than the interval of the time.
 fn parts(tests: f64, per_test: f64, margin: f64) -> String {
     let decides = match tests.ln().abs() - per_test.ln().abs() {
         more if more.abs() <= margin => "both count alike",

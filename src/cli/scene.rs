@@ -95,7 +95,10 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     }
     for labels in &scene.labels {
         let counts = labels.histogram();
-        let one = |(label, count): &(_, usize)| format!("{label} {}", text::count(*count));
+        let one = |(label, count): &(&str, usize)| {
+            let label = if label.is_empty() { "(none)" } else { label };
+            format!("{label} {}", text::count(*count))
+        };
         let shown: Vec<String> = counts.iter().take(8).map(one).collect();
         let mut shown = shown.join(", ");
         if counts.len() > 8 {

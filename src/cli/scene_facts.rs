@@ -130,7 +130,13 @@ impl SceneFacts {
         let length = |value: f64| length(value, scene.unit);
         let count = scene.items.len();
         let three = |values: [f64; 3]| values.map(length).join(", ");
-        let extent = ("extent", self.extent.map(length).join(" x "));
+        let [x, y, z] = self.extent.map(length);
+        let unit = z.find(' ').map_or("", |at| &z[at..]);
+        let (x, y) = match [&x, &y].map(|own| own.strip_suffix(unit)) {
+            [Some(x), Some(y)] => (x, y),
+            _ => (&*x, &*y),
+        };
+        let extent = ("extent", format!("{x} x {y} x {z}"));
         if count == 0 {
             return vec![extent, ("sizes", "no items".to_owned())];
         }

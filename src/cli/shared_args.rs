@@ -124,7 +124,7 @@ pub struct KernelArgs {
     /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
     #[arg(long = "kernel", value_name = "NAME", value_parser = values::kernel)]
     pub name: Option<Kernel>,
-    /// Threads per build; query and locate divide cameras and points among them. With a
+    /// Threads per build (of query and locate also for cameras and points). With a
     /// list, such as 1,2,4, structures with the parameter 'threads' are entered for each
     #[arg(long, value_name = "N,..", default_value = "1", value_delimiter = ',',
         value_parser = values::whole(1..=MOST_THREADS))]
@@ -239,8 +239,8 @@ pub struct LensArgs {
     /// Width / height for cameras without one
     #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero)]
     pub aspect: f64,
-    /// Near plane for cameras without one [default: a thousandth of far; of recorded
-    /// cameras, of twice the scene's diagonal where that is less]
+    /// Near plane for cameras without one [default: far / 1000, for recorded cameras
+    /// at most twice the scene's diagonal / 1000]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf; beyond 1.7e38 counts as inf [default:
@@ -279,16 +279,17 @@ impl LensArgs {
 /// Derivation of planes, numbers of the culling test, and its execution.
 #[derive(Args, Debug)]
 pub struct CullingArgs {
-    /// Derivation of the planes: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32,
-    /// gh-d3d-f64, gh-revz-f32, gh-revz-f64
+    /// Derivation of the planes: frame, frame-f32, or by Gribb and Hartmann (gh)
+    /// from a matrix of OpenGL (gl), D3D (d3d) or reversed z (revz): gh-gl-f32,
+    /// gh-gl-f64, gh-d3d-f32, gh-d3d-f64, gh-revz-f32, gh-revz-f64
     #[arg(long, value_name = "METHOD", default_value = "frame", value_parser = values::choice("plane method", &PLANE_METHODS))]
     pub planes: PlaneMethod,
-    /// Factor c of the conservative epsilon; 0 leaves the planes as derived
+    /// Planes move outward by C roundings of f32; 0 leaves them as derived
     /// [default: 8; 0 with f64, which has no margin]
     // With the largest one everything is visible.
     #[arg(long, value_name = "C", value_parser = values::within(0.0..=1e9))]
     pub epsilon: Option<f64>,
-    /// Number format of the culling test: f32, f64, f32-relative
+    /// Numbers of the culling test: f32, f64, or f32-relative (f32 about the eye)
     #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::choice("arithmetic", &ARITHMETICS))]
     pub arithmetic: Arithmetic,
     #[command(flatten)]

@@ -104,7 +104,7 @@ pub fn time_plus_minus(ns: Option<Estimate>) -> String {
     })
 }
 
-/// A value with a margin where both ends of its interval are near, else with the interval.
+/// A value with a margin, or with its interval where an end is far.
 fn with_ends(found: Estimate) -> String {
     let ends = found.lower.zip(found.upper);
     let is_near = |end: f64| found.value == 0.0 || (end / found.value).ln().abs() < 0.5;

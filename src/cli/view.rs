@@ -189,12 +189,11 @@ fn conclusion(data: &ViewData, totals: [usize; FATES], agree: bool) -> String {
         }
     };
     let (parts, returned) = (parts.join(", "), mean(returned));
-    let (views, items) = (
-        text::counted(views, "view"),
-        text::counted(data.items, "item"),
-    );
+    let (views, items) = (text::counted(views, "view"), text::count(data.items));
     let path = &data.path;
-    format!("{views} of {path}: {returned} of {items} returned per view, {parts}. {structures}")
+    format!(
+        "{views} of {path}: {returned} of {items} items returned per view, {parts}. {structures}"
+    )
 }
 
 /// Digits of packed numbers, safe in JSON and HTML.

@@ -235,8 +235,9 @@ impl RegionIndex for Linear {
             );
         }
         let blocks = self.boxes.blocks().len();
-        // Counted queries are not shared: one recorder, one thread.
+        // Counted queries are not shared: one recorder, one thread. Nor is a single part.
         if size_of::<C::Recorder>() == 0
+            && blocks > BLOCKS_PER_CALL
             && let Some(workers) = &self.workers
         {
             let work = SharedScan { scan: self, volume };

@@ -260,5 +260,6 @@ mod tests {
             assert!(refused(text.as_bytes()).contains(wanted), "{text}");
         }
         assert!(refused(&[0xFF; 9]).contains("UTF-8"));
+        assert!(refused(b"\x1f\x8b\x08").contains("gzip, which has to be unpacked first"));
     }
 }

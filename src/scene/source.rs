@@ -270,7 +270,7 @@ const PACKED: &str = "the file that is compressed in it";
 const PICTURE: &str = "boxes CSV, glTF, OBJ, a Doom WAD or a Quake III map";
 
 /// Name, beginning (none: told by the extension alone), extension, and what to do.
-const FORMATS: [(&str, &[u8], &str, &str); 24] = [
+const FORMATS: [(&str, &[u8], &str, &str); 26] = [
     ("STL", b"", "stl", MESH),
     ("PLY", b"ply\n", "ply", MESH),
     ("PLY", b"ply\r", "ply", MESH),
@@ -293,6 +293,13 @@ const FORMATS: [(&str, &[u8], &str, &str); 24] = [
     ("PNG", b"\x89PNG", "png", PICTURE),
     ("JPEG", b"\xff\xd8\xff", "jpg", PICTURE),
     ("Cube 2 map", b"", "ogz", MESH),
+    ("Quake PACK", b"PACK", "pak", "a Quake III map from a pk3"),
+    (
+        "AAS (bot paths)",
+        b"EAAS",
+        "aas",
+        "the BSP map that it belongs to",
+    ),
     ("gzip", b"\x1f\x8b", "gz", PACKED),
     ("Zstandard", b"\x28\xb5\x2f\xfd", "zst", PACKED),
 ];
@@ -391,7 +398,7 @@ mod tests {
         let mut binary_stl = vec![0; 84 + 50];
         binary_stl[80] = 1;
         let tiles = br#" {"asset":{"version":"1.1"},"geometricError":500,"root":{}}"#;
-        let cases: [(&[u8], &str, &str); 9] = [
+        let cases: [(&[u8], &str, &str); 11] = [
             (b"solid cube\nfacet normal 0 0 1\n", "a", "STL"),
             (&binary_stl, "a", "STL"),
             (b"ply\nformat ascii 1.0\n", "a.csv", "PLY"),
@@ -401,6 +408,8 @@ mod tests {
             (tiles, "tileset.json", "3D Tiles"),
             (b"[1, 2]", "a.json", "JSON without the 'asset' of glTF"),
             (b"BLENDER-v300", "a", "Blender"),
+            (b"PACK\x0c\0\0\0", "a", "Quake PACK"),
+            (b"EAAS\x05\0\0\0", "a", "AAS (bot paths)"),
         ];
         for (bytes, file, name) in cases {
             let error = refuse(bytes, file).unwrap_err().to_string();

@@ -65,7 +65,7 @@ fn scenes_are_described_with_three_digits() {
         "(-143, -143, 0) to (145, 143, 39.9)\n",
         "min 1 m, median 4.2 m, p99 ",
         ", max 39.9 m\n",
-        "extent   288 m x 286 m x 39.9 m\n",
+        "extent   288 x 286 x 39.9 m\n",
     ] {
         assert!(told.contains(part), "{told}");
     }
