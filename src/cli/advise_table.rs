@@ -49,10 +49,9 @@ pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
         ("WRONG: answers with and without differ: ", &|rule| {
             rule.checks.iter().any(Check::is_wrong)
         }),
-        (
-            "Estimated otherwise; the measurement decides: ",
-            &|rule| rule.confirmed == Some(false) && !rule.is_chosen && no(rule).is_none(),
-        ),
+        ("Estimated otherwise; the measurement decides: ", &|rule| {
+            rule.confirmed == Some(false) && !rule.is_chosen && no(rule).is_none()
+        }),
     ];
     for (what, is_in) in lines {
         let named = advice.omissions.iter().filter(|rule| is_in(rule));
