@@ -347,7 +347,7 @@ mod tests {
             }))
         };
         assert_eq!(shown([Some(1201.0), Some(1681.0)]), "1.3±0.4 us");
-        assert_eq!(shown([Some(0.0), Some(2601.0)]), "1.30 [0.00, 2.60] us");
+        assert_eq!(shown([Some(0.0), Some(2601.0)]), "1.30 [0, 2.60] us");
         assert_eq!(shown([Some(1201.0), Some(9000.0)]), "1.30 [1.20, 9.00] us");
         assert_eq!(shown([Some(1300.0), None]), "1.30 us");
         assert_eq!(time_plus_minus(None), "");

@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(dear.decision, Decision::Keep);
         assert_eq!(dear.statistic, Some(0.8));
         assert!((dear.threshold.unwrap() - 200.0 / 255.0).abs() < 1e-12);
-        for part in ["40.0 of 50.0 things", "above 5.0 ns per thing"] {
+        for part in ["40.0 of 50.0 things", "above 5.00 ns per thing"] {
             assert!(dear.reason.contains(part), "{}", dear.reason);
         }
         let cheap = settled([10.0, 50.0], 3.0, 4.9);
