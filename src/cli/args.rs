@@ -394,7 +394,7 @@ pub struct StressArgs {
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
-    /// Cases of each generated extreme, 0 for none [default: 66, ten million boxes; 0
+    /// Cases of each generated extreme, 0 for none [default: 66: ten million boxes; 0
     /// with --vectors]
     #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX))]
     #[arg(default_value_t = DEFAULT_CASES, hide_default_value = true)]

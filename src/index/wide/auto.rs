@@ -366,7 +366,7 @@ impl Auto {
 impl RegionIndex for Auto {
     const INFO: Info = Info::new(
         "auto",
-        "a tree or a scan, and its updates, by counted work",
+        "use=wide, moving or linear, and update=refit or rebuild, by counted work",
         Kind::Tree,
         Origin::Ours,
     )
