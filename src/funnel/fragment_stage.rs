@@ -24,21 +24,7 @@ use crate::visibility::truth::{Facet, SolidBox};
 use crate::visibility::{Rays, Solids};
 
 /// Samples and fragments of a test, means per view.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct FragmentCounts {
-    /// Samples whose rays are tested, those that mark a stencil among them.
-    pub asked_count: f64,
-    /// Samples that the stencil excludes.
-    pub kept_out_count: f64,
-    /// Samples that meet an item; of meshes and maps, a triangle.
-    pub fragment_count: f64,
-    /// Fragments that the alpha-test drops.
-    pub clear_count: f64,
-    /// Other fragments that pass the z-test when they come.
-    pub shaded_count: f64,
-    /// Samples that something opaque covers.
-    pub covered_count: f64,
-}
+pub type FragmentCounts = Tally<f64>;
 
 impl FragmentCounts {
     /// All of them, in the order of the fields.
@@ -58,12 +44,12 @@ impl FragmentCounts {
         let views = tallies.len() as f64;
         let mean = |of: fn(&Tally) -> u64| tallies.iter().map(of).sum::<u64>() as f64 / views;
         (!tallies.is_empty()).then(|| FragmentCounts {
-            asked_count: mean(|tally| tally.asked),
-            kept_out_count: mean(|tally| tally.kept_out),
-            fragment_count: mean(|tally| tally.fragments),
-            clear_count: mean(|tally| tally.clear),
-            shaded_count: mean(|tally| tally.passed),
-            covered_count: mean(|tally| tally.covered),
+            asked_count: mean(|tally| tally.asked_count),
+            kept_out_count: mean(|tally| tally.kept_out_count),
+            fragment_count: mean(|tally| tally.fragment_count),
+            clear_count: mean(|tally| tally.clear_count),
+            shaded_count: mean(|tally| tally.shaded_count),
+            covered_count: mean(|tally| tally.covered_count),
         })
     }
 }
@@ -266,7 +252,7 @@ impl Boxes {
                 drawn.draw(canvas, room.near.iter().copied(), &tests);
                 // Samples that see a portal before everything that is drawn already.
                 let stencil = drawn.stencil(canvas, &room.portals);
-                drawn.tally.asked += stencil.tested;
+                drawn.tally.asked_count += stencil.tested;
                 let stencil = Some(&stencil);
                 let beyond = room.beyond.iter().copied();
                 drawn.draw(canvas, beyond, &Tests { stencil, ..tests });
@@ -364,7 +350,7 @@ pub fn mirrored(
         };
         let mut seen = draw(&reflected, bodies(solids, &others), &tests);
         let all = draw(&reflected, bodies(solids, &others), &Tests::default());
-        seen.tally.asked += stencil.tested;
+        seen.tally.asked_count += stencil.tested;
         let [own, other] = [&seen, &all].map(|drawn| drawn.ids());
         let marks = (0..own.len()).filter(|&sample| stencil.marked[sample]);
         wrong += marks.filter(|&sample| own[sample] != other[sample]).count() as u64;

@@ -215,9 +215,9 @@ impl OrderRow {
     /// Adds one of `views` views to the means.
     fn add(&mut self, tally: &Tally, errors: &OrderErrors, views: f64) {
         for (mean, count) in [
-            (&mut self.fragment_count, tally.fragments),
-            (&mut self.shaded_count, tally.passed),
-            (&mut self.covered_count, tally.covered),
+            (&mut self.fragment_count, tally.fragment_count),
+            (&mut self.shaded_count, tally.shaded_count),
+            (&mut self.covered_count, tally.covered_count),
             (&mut self.pair_count, errors.pairs),
             (&mut self.wrong_pair_count, errors.wrong),
             (&mut self.wrong_sample_count, errors.wrong_samples),

@@ -183,24 +183,20 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
 }
 
 fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> impl Iterator<Item = BackEnd> {
-    let exact = Guarantee::SampleExact;
-    let z = match has_cut_outs {
-        true => (
-            [Z, "the nearest fragment, holes or not"],
-            Guarantee::Unproven,
-        ),
-        false => ([Z, "the nearest fragment of each sample, exactly"], exact),
+    let (exact, unproven) = (Guarantee::SampleExact, Guarantee::Unproven);
+    let (z, of_z) = match has_cut_outs {
+        true => ("the nearest fragment, holes or not", unproven),
+        false => ("the nearest fragment of each sample, exactly", exact),
     };
-    let alpha = ([ALPHA, "the nearest opaque fragment"], exact);
     let beyond = "the same, but beyond the eye's room only at samples that see its portals";
     let has_rooms = matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty());
     let rows = [
-        (true, z),
-        (has_cut_outs, alpha),
-        (has_rooms, ([STENCIL, beyond], exact)),
+        (true, [Z, z], of_z),
+        (has_cut_outs, [ALPHA, "the nearest opaque fragment"], exact),
+        (has_rooms, [STENCIL, beyond], exact),
     ];
-    let there = rows.into_iter().filter(|(is_there, _)| *is_there);
-    there.map(|(_, (declared, guarantee))| BackEnd::new(StageKind::Fragment, declared, guarantee))
+    let there = rows.into_iter().filter(|(is_there, ..)| *is_there);
+    there.map(|(_, declared, guarantee)| BackEnd::new(StageKind::Fragment, declared, guarantee))
 }
 
 /// Default test of the fragment stage.

@@ -215,7 +215,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
     }
     let z = tested.iter().find(|tested| tested.back_end.name == Z);
     let tallies = z.iter().flat_map(|z| &z.tallies);
-    let covered: Vec<u64> = tallies.map(|tally| tally.covered).collect();
+    let covered: Vec<u64> = tallies.map(|tally| tally.covered_count).collect();
     let bounds = input
         .all
         .then(|| bounds(&world, &study.triangles, &covered));

@@ -57,22 +57,6 @@ pub struct Screen {
     eye_off: f64,
 }
 
-/// Bounds of what was placed so far.
-struct Extent {
-    low: [f64; 2],
-    high: [f64; 2],
-}
-
-impl Extent {
-    fn add(&mut self, place: [f64; 2], pad: f64) {
-        for (axis, at) in place.into_iter().enumerate() {
-            let pad = pad * (1.0 + at.abs());
-            self.low[axis] = self.low[axis].min(at - pad);
-            self.high[axis] = self.high[axis].max(at + pad);
-        }
-    }
-}
-
 impl Screen {
     /// The image of a camera.
     pub fn of(rays: &Rays, grid: SampleGrid) -> Screen {
@@ -143,9 +127,13 @@ impl Screen {
         corners: &[[f64; 4]; N],
         is_edge: impl Fn(usize, usize) -> bool,
     ) -> Option<Rectangle> {
-        let mut extent = Extent {
-            low: [f64::INFINITY; 2],
-            high: [f64::NEG_INFINITY; 2],
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let mut add = |place: [f64; 2], pad: f64| {
+            for (axis, at) in place.into_iter().enumerate() {
+                let pad = pad * (1.0 + at.abs());
+                low[axis] = low[axis].min(at - pad);
+                high[axis] = high[axis].max(at + pad);
+            }
         };
         let least = corners.iter().map(|c| c[2] - c[3] * ROUNDED);
         if least.fold(f64::INFINITY, f64::min) > self.far {
@@ -154,15 +142,15 @@ impl Screen {
         if self.parallel {
             corners
                 .iter()
-                .for_each(|&[x, y, _, size]| extent.add([x, y], size * ROUNDED + AXES));
-            return self.cells(&extent);
+                .for_each(|&[x, y, _, size]| add([x, y], size * ROUNDED + AXES));
+            return self.cells(low, high);
         }
         if corners.iter().all(|c| c[2] + c[3] * ROUNDED < self.near) {
             return None;
         }
         for (i, &[x, y, w, size]) in corners.iter().enumerate() {
             if w >= self.near {
-                extent.add([x / w, y / w], size / w * ROUNDED + AXES);
+                add([x / w, y / w], size / w * ROUNDED + AXES);
                 continue;
             }
             for (to, &[to_x, to_y, to_w, to_size]) in corners.iter().enumerate() {
@@ -171,20 +159,17 @@ impl Screen {
                     continue;
                 }
                 if to_w - w < size * LEVEL {
-                    return self.cells(&Extent {
-                        low: [f64::NEG_INFINITY; 2],
-                        high: [f64::INFINITY; 2],
-                    });
+                    return self.cells([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
                 }
                 let part = (self.near - w) / (to_w - w);
                 let at = |a: f64, b: f64| (a + (b - a) * part) / self.near;
-                extent.add([at(x, to_x), at(y, to_y)], size / self.near * CUT + AXES);
+                add([at(x, to_x), at(y, to_y)], size / self.near * CUT + AXES);
             }
         }
-        self.cells(&extent)
+        self.cells(low, high)
     }
 
-    fn cells(&self, extent: &Extent) -> Option<Rectangle> {
+    fn cells(&self, low: [f64; 2], high: [f64; 2]) -> Option<Rectangle> {
         let [left, right, bottom, top] = self.window;
         let cells = |low: f64, high: f64, from: f64, to: f64, count: u32| {
             let n = f64::from(count);
@@ -196,8 +181,8 @@ impl Screen {
             first..last as u32
         };
         let SampleGrid { width, height } = self.grid;
-        let columns = cells(extent.low[0], extent.high[0], left, right, width);
-        let rows = cells(extent.low[1], extent.high[1], top, bottom, height);
+        let columns = cells(low[0], high[0], left, right, width);
+        let rows = cells(low[1], high[1], top, bottom, height);
         (!columns.is_empty() && !rows.is_empty()).then_some(Rectangle { columns, rows })
     }
 }

@@ -4,7 +4,6 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use glam::DVec3;
 use serde::Serialize;
 
 use crate::query::ItemId;
@@ -99,29 +98,13 @@ impl Holes {
             return true;
         };
         let place = (probe.ray().at(at.depth) - b.min) / surface.tile;
-        let [u, v] = match face_axis(b, probe, at) {
+        let [u, v] = match at.axis {
             0 => [place.y, place.z],
             1 => [place.x, place.z],
             _ => [place.x, place.y],
         };
         surface.mask.opaque(u, v)
     }
-}
-
-/// The axis that the entered face is perpendicular to: its plane is the one that is
-/// crossed, and of two such the one nearer to where the ray is.
-fn face_axis(b: &WorldBox, probe: &Probe, at: &Crossing) -> usize {
-    let ray = probe.ray();
-    let place = ray.at(at.depth);
-    let side = |axis: usize| match ray.direction[axis] > 0.0 {
-        true => b.min[axis],
-        false => b.max[axis],
-    };
-    let off = DVec3::from([0, 1, 2].map(|axis| (place[axis] - side(axis)).abs()));
-    let crossed = (0..3).filter(|&axis| ray.direction[axis] != 0.0 && side(axis) == at.plane);
-    crossed
-        .min_by(|&a, &b| off[a].total_cmp(&off[b]))
-        .unwrap_or(0)
 }
 
 /// A seeded share of the items of a scene, cut out by one mask.
@@ -205,6 +188,8 @@ pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> 
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     #[test]
@@ -236,7 +221,7 @@ mod tests {
             far: f64::INFINITY,
         });
         let at = probe.enter(&b, f64::INFINITY).unwrap();
-        assert_eq!(face_axis(&b, &probe, &at), 0);
+        assert_eq!(at.axis, 0);
         let mut surfaces = Holes::default();
         let mut opaque = |tile: f64| {
             let mask = Mask::Fence;

@@ -2,6 +2,8 @@
 //!
 //! Counts the fragments that each test lets through.
 
+use serde::Serialize;
+
 use super::canvas::{Canvas, Rectangle, Stencil};
 use super::cut_outs::Holes;
 use super::order::{DepthOrder, Part};
@@ -70,23 +72,21 @@ impl Drawable for Facet {
     }
 }
 
-/// Counts of a drawn list.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-#[non_exhaustive]
-pub struct Tally {
-    /// Samples whose rays were tested.
-    pub asked: u64,
-    /// Samples that the stencil kept from a test.
-    pub kept_out: u64,
-    /// Fragments: samples that met a body.
-    pub fragments: u64,
-    /// Fragments that the alpha-test dropped.
-    pub clear: u64,
-    /// Other fragments that passed the z-test when they came: with early z, the shaded
-    /// ones.
-    pub passed: u64,
+/// Counts of a drawn list; of means per view, with a fraction.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize)]
+pub struct Tally<N = u64> {
+    /// Samples whose rays are tested, those that mark a stencil among them.
+    pub asked_count: N,
+    /// Samples that the stencil excludes.
+    pub kept_out_count: N,
+    /// Fragments: samples that meet an item; of meshes and maps, a triangle.
+    pub fragment_count: N,
+    /// Fragments that the alpha-test drops.
+    pub clear_count: N,
+    /// Other fragments that pass the z-test when they come: with early z, the shaded ones.
+    pub shaded_count: N,
     /// Samples that something opaque covers.
-    pub covered: u64,
+    pub covered_count: N,
 }
 
 /// A body at a sample whose ray meets it.
@@ -158,10 +158,10 @@ impl<B: Drawable> Drawn<B> {
                 let Some(at) = body.meet(probe, probe.ray().far) else {
                     return;
                 };
-                self.tally.fragments += 1;
+                self.tally.fragment_count += 1;
                 let mut holes = tests.surfaces.iter();
                 if !holes.all(|holes| body.is_opaque(holes, probe, &at)) {
-                    self.tally.clear += 1;
+                    self.tally.clear_count += 1;
                     return;
                 }
                 let is_before = |(front, _): (B::At, _)| probe.compare(&at, &front).is_le();
@@ -169,15 +169,15 @@ impl<B: Drawable> Drawn<B> {
                     true => self.test(probe, Fragment { sample, item, at }),
                     false => self.front(sample).is_none_or(is_before),
                 };
-                self.tally.passed += u64::from(passes);
+                self.tally.shaded_count += u64::from(passes);
                 if passes && !body.hides() && self.before.last() != Some(&item) {
                     self.before.push(item);
                 }
             });
-            self.tally.asked += tested;
-            self.tally.kept_out += kept_out;
+            self.tally.asked_count += tested;
+            self.tally.kept_out_count += kept_out;
         }
-        self.tally.covered = self.front.iter().flatten().count() as u64;
+        self.tally.covered_count = self.front.iter().flatten().count() as u64;
     }
 
     /// Draws the fragment, if it passes: its sample is empty, or holds an item that is
@@ -309,7 +309,7 @@ mod tests {
             drawn.draw_triangles(&canvas, surfaces, &triangles);
             assert_eq!(drawn.ids(), truth.front, "{turn} {surfaces:?}");
             assert_eq!(drawn.visible(&canvas), truth.visible, "{turn} {surfaces:?}");
-            assert!(drawn.tally.passed >= drawn.tally.covered);
+            assert!(drawn.tally.shaded_count >= drawn.tally.covered_count);
             triangles.reverse();
         }
         truth.visible.len()

@@ -237,8 +237,8 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
                 Some(Layer { when, item, at })
             }));
             errors.sample(&mut layers, |a, b| probe.compare(a, b));
-            tally.fragments += fragments;
-            tally.covered += u64::from(!layers.is_empty());
+            tally.fragment_count += fragments;
+            tally.covered_count += u64::from(!layers.is_empty());
             // The z-test: nearer than all before, of a tie the lower id.
             let mut front: Option<&Layer<B::At>> = None;
             for layer in &layers {
@@ -247,7 +247,7 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
                     order.then(layer.item.cmp(&front.item)).is_lt()
                 });
                 if passes {
-                    tally.passed += 1;
+                    tally.shaded_count += 1;
                     front = Some(layer);
                 }
             }

@@ -128,7 +128,7 @@ fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
                 let drawn = draw(&canvas, bodies(&solids, &pieces), &Tests::default());
                 assert_eq!(drawn.ids(), truth.front, "{name} {}", row.name);
                 assert_eq!(drawn.visible(&canvas), truth.visible, "{name} {}", row.name);
-                assert!(drawn.tally.passed >= drawn.tally.covered);
+                assert!(drawn.tally.shaded_count >= drawn.tally.covered_count);
             }
         }
     }
@@ -249,10 +249,10 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
                 if row.guarantee == Guarantee::Exact {
                     assert_eq!(errors.wrong_samples, 0);
                     // Each item once at a sample, in however many parts it comes.
-                    assert_eq!(fragments, whole.tally.fragments);
-                    assert_eq!(tally.fragments, fragments);
+                    assert_eq!(fragments, whole.tally.fragment_count);
+                    assert_eq!(tally.fragment_count, fragments);
                     // From front to back nothing is shaded twice, but for ties.
-                    assert!(tally.passed <= tally.covered + ties as u64);
+                    assert!(tally.shaded_count <= tally.covered_count + ties as u64);
                 }
             }
         }
@@ -339,7 +339,7 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
     let whole = draw(&canvas, all(&solids), &Tests::default());
     let of_piece = |piece| entered(&canvas, &solids, piece).len() as u64;
     let fragments: u64 = pieces.iter().map(of_piece).sum();
-    assert_eq!(fragments, whole.tally.fragments);
+    assert_eq!(fragments, whole.tally.fragment_count);
     // The eye in the plane of a face, and more parts than there is room for.
     let frame = Frame::looking_along(eye.with_x(1e5 + 7.0), DVec3::Y, DVec3::Z).unwrap();
     let within = Camera { frame, lens };
@@ -400,12 +400,12 @@ fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
                 let counts = draw_orders(&rays, GRID, &index, &items, &|_, _, _| true, &sorted);
                 for ((tally, errors), counted) in counts.iter().zip(&mut counted) {
                     let errors = errors.as_ref().unwrap();
-                    let again = tally.passed - tally.covered;
+                    let again = tally.shaded_count - tally.covered_count;
                     for (sum, count) in counted.iter_mut().zip([errors.pairs, errors.wrong, again])
                     {
                         *sum += count;
                     }
-                    assert_eq!(tally.covered, counts[0].0.covered);
+                    assert_eq!(tally.covered_count, counts[0].0.covered_count);
                 }
             }
         }

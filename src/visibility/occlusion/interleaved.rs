@@ -28,7 +28,8 @@ const DEFAULT_DRAWN_PART: u32 = 65_536;
 pub struct Interleaved<B> {
     buffer: B,
     kernel: Kernel,
-    drawn_part: u32,
+    /// Survivors are drawn that may cover at least the image's pixels divided by this.
+    pub(super) drawn_part: u32,
     /// The [`key`]s of blocks and their places among the entries.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     entries: Vec<Entry>,
@@ -69,13 +70,6 @@ impl<B: OcclusionBuffer> Interleaved<B> {
             entries: Vec::new(),
             survivors: Vec::new(),
         }
-    }
-
-    /// Draws survivors that may cover at least the image's pixels divided by `part`.
-    #[cfg(test)]
-    pub fn drawing_from(mut self, part: u32) -> Self {
-        self.drawn_part = part.max(1);
-        self
     }
 
     /// Appends the items that no plane of the view's volume excludes, that some ray

@@ -137,10 +137,9 @@ const MOST_BINARY: usize = 500;
 const MOST_WIDE: usize = 32;
 
 fn refuse_deep(levels: usize, most: usize) -> Result<(), NotBuilt> {
-    let name = NAME;
     match levels > most {
         true => Err(NotBuilt(format!(
-            "the tree of '{name}' has {levels} levels; expected at most {most}"
+            "the tree of '{NAME}' has {levels} levels; expected at most {most}"
         ))),
         false => Ok(()),
     }

@@ -28,7 +28,8 @@ pub struct Crossing {
     pub depth: f64,
     /// The bound of the box that is crossed there, world coordinate.
     pub plane: f64,
-    axis: usize,
+    /// The axis that the plane is across.
+    pub axis: usize,
 }
 
 /// A ray prepared for exact tests against boxes.

@@ -6,6 +6,7 @@
 //! volume hierarchies") until it has sixteen parts.
 
 use std::hint::black_box;
+use std::mem::swap;
 use std::ops::Range;
 
 use glam::{DVec3, Vec3};
@@ -100,15 +101,12 @@ impl RayTree {
                 });
                 // The nearest so far is kept out of the stack.
                 if let Some(mut next) = nodes.next() {
-                    let first = open.len();
-                    for other in nodes {
-                        let (low, high) = if other.0 < next.0 {
-                            (other, next)
-                        } else {
-                            (next, other)
-                        };
-                        next = low;
-                        open.push_sorted(first, high);
+                    let first = open.used;
+                    for mut other in nodes {
+                        if other.0 < next.0 {
+                            swap(&mut other, &mut next);
+                        }
+                        open.push_sorted(first, other);
                     }
                     if next.0 <= found.bound() {
                         at = Child(next.1);
@@ -189,11 +187,6 @@ impl Open {
             used: 0,
             far: Vec::new(),
         }
-    }
-
-    #[inline(always)]
-    fn len(&self) -> usize {
-        self.used
     }
 
     /// Adds a node to those from `first` on, which are sorted.

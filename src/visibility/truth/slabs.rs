@@ -110,11 +110,9 @@ impl Slabs {
         };
         for axis in 0..3 {
             let along = ray.direction[axis];
-            let moves = along.abs() >= LEAST_ALONG;
-            let inverse = if moves {
-                (1.0 / along) as f32
-            } else {
-                INVERSE_OF_NONE
+            let (inverse, least_slack) = match along.abs() >= LEAST_ALONG {
+                true => ((1.0 / along) as f32, 0.0),
+                false => (INVERSE_OF_NONE, SLACK_OF_NONE),
             };
             if inverse < 0.0 {
                 slabs.first[axis] = axis + 3;
@@ -123,11 +121,7 @@ impl Slabs {
             let i = f64::from(inverse);
             let size = 6.0 * f64::from(reach[axis]) + 4.0 * start[axis].abs() + LEAST_ALONG;
             let slack = size * i.abs() * (f64::from(f32::EPSILON) / 2.0);
-            let slack = if moves {
-                slack
-            } else {
-                slack.max(SLACK_OF_NONE)
-            };
+            let slack = slack.max(least_slack);
             let centre = -start[axis] * i;
             slabs.inverse[axis] = inverse;
             slabs.low[axis] = (centre - slack) as f32;

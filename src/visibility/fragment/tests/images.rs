@@ -22,7 +22,7 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
             stencil: None,
         };
         let drawn = draw(&canvas, all(&solids), &tests);
-        clear += drawn.tally.clear;
+        clear += drawn.tally.clear_count;
         let solid = draw(&canvas, all(&solids), &Tests::default());
         let opaque =
             |body: &SolidBox, probe: &_, at: &_| surfaces.opaque(body.item, &body.b, probe, at);
@@ -106,8 +106,8 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     }
     assert!(behind > 3, "the premise: {behind}");
     let (with, without) = (masked.tally, open.tally);
-    assert_eq!(with.asked + with.kept_out, without.asked);
-    assert!(with.fragments > 0 && with.fragments * 4 < without.fragments);
+    assert_eq!(with.asked_count + with.kept_out_count, without.asked_count);
+    assert!(with.fragment_count > 0 && with.fragment_count * 4 < without.fragment_count);
 }
 
 /// A mirror shows the same as reflected boxes behind it.

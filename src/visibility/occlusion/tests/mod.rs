@@ -37,7 +37,8 @@ fn kept<B: OcclusionBuffer>(ready: &Ready, view: &View, kernel: Kernel) -> [Vec<
         view,
         items: &ready.in_view(view.volume),
     };
-    let mut culler = Interleaved::new(B::new(view.grid), kernel).drawing_from(u32::MAX);
+    let mut culler = Interleaved::new(B::new(view.grid), kernel);
+    culler.drawn_part = u32::MAX;
     let mut interleaved = Vec::new();
     culler.cull(&ready.occluders, view, &mut interleaved);
     let mut both = [two_passes.kept(kernel), interleaved];
