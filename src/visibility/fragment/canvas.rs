@@ -258,9 +258,7 @@ impl<B: Body> Canvas<B> {
         mut visit: impl FnMut(usize, &B::Probe),
     ) -> [u64; 2] {
         let [mut tested, mut kept_out] = [0; 2];
-        let Some(Rectangle { columns, rows }) = rectangle else {
-            return [tested, kept_out];
-        };
+        let Rectangle { columns, rows } = rectangle.unwrap_or_default();
         for row in rows {
             for column in columns.clone() {
                 let sample = (row * self.grid().width + column) as usize;

@@ -58,19 +58,10 @@ pub struct Surface {
 #[derive(Clone, Default, Debug)]
 pub struct Holes {
     /// Surface of each item; the items beyond its end are solid.
-    of_item: Vec<Option<Surface>>,
+    pub of_item: Vec<Option<Surface>>,
 }
 
 impl Holes {
-    /// Cuts an item out.
-    pub fn set(&mut self, item: ItemId, surface: Surface) {
-        let item = item as usize;
-        if self.of_item.len() <= item {
-            self.of_item.resize(item + 1, None);
-        }
-        self.of_item[item] = Some(surface);
-    }
-
     /// The cut-outs among some of the items, renumbered in this order.
     pub fn some(&self, items: &[ItemId]) -> Holes {
         let of_item = items.iter().map(|&item| self.of(item).copied());
@@ -166,14 +157,15 @@ impl CutOuts {
     ///
     /// They are the same items whatever the mask.
     pub fn holes(&self, items: usize, may_be: impl Fn(ItemId) -> bool) -> Holes {
-        let (mut rng, mut holes) = (SeededRng::new(self.seed), Holes::default());
+        let mut rng = SeededRng::new(self.seed);
         let CutOuts { mask, tile, .. } = *self;
-        for item in 0..items as ItemId {
-            if rng.unit() < self.share && may_be(item) {
-                holes.set(item, Surface { mask, tile });
-            }
+        let is_cut = |item| rng.unit() < self.share && may_be(item);
+        let all = (0..items as ItemId).map(is_cut);
+        Holes {
+            of_item: all
+                .map(|cut| cut.then_some(Surface { mask, tile }))
+                .collect(),
         }
-        holes
     }
 }
 
@@ -222,10 +214,12 @@ mod tests {
         });
         let at = probe.enter(&b, f64::INFINITY).unwrap();
         assert_eq!(at.axis, 0);
-        let mut surfaces = Holes::default();
+        let mut surfaces = Holes {
+            of_item: vec![None; 4],
+        };
         let mut opaque = |tile: f64| {
             let mask = Mask::Fence;
-            surfaces.set(3, Surface { mask, tile });
+            surfaces.of_item[3] = Some(Surface { mask, tile });
             surfaces.opaque(3, &b, &probe, &at)
         };
         // It enters at y = 1, z = 0: (2, 1) from the corner.

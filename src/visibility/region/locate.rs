@@ -119,18 +119,13 @@ pub fn without(b: &WorldBox, other: &WorldBox) -> Vec<WorldBox> {
     }
     let (mut left, mut parts) = (*b, Vec::new());
     for axis in 0..3 {
-        if left.min[axis] < other.min[axis] {
-            let mut below = left;
-            below.max[axis] = other.min[axis];
-            left.min[axis] = other.min[axis];
-            parts.push(below);
+        let [low, high] = [left.min[axis], left.max[axis]];
+        let [from, to] = [low.max(other.min[axis]), high.min(other.max[axis])];
+        for [start, end] in [[low, from], [to, high]] {
+            (left.min[axis], left.max[axis]) = (start, end);
+            parts.extend((start < end).then_some(left));
         }
-        if left.max[axis] > other.max[axis] {
-            let mut above = left;
-            above.min[axis] = other.max[axis];
-            left.max[axis] = other.max[axis];
-            parts.push(above);
-        }
+        (left.min[axis], left.max[axis]) = (from, to);
     }
     parts
 }

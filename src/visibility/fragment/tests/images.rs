@@ -7,12 +7,11 @@ use crate::visibility::Ray;
 fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
     let solids = Solids::of(&load("city:n=400", &Default::default()).unwrap());
     let index = RayIndex::build(&solids);
-    let mut surfaces = Holes::default();
-    for item in 0..solids.boxes.len() as ItemId {
-        if let Some(&mask) = [Mask::Fence, Mask::Foliage].get(item as usize % 3) {
-            surfaces.set(item, Surface { mask, tile: 4.0 });
-        }
-    }
+    let mask = |item: usize| [Mask::Fence, Mask::Foliage].get(item % 3).copied();
+    let surface = |item| mask(item).map(|mask| Surface { mask, tile: 4.0 });
+    let surfaces = Holes {
+        of_item: (0..solids.boxes.len()).map(surface).collect(),
+    };
     let (mut through, mut clear) = (0, 0);
     for camera in cameras(&solids, 6) {
         let rays = Rays::of(&camera).unwrap();
