@@ -83,7 +83,7 @@ pub struct Tally<N = u64> {
     pub fragment_count: N,
     /// Fragments that the alpha-test drops.
     pub clear_count: N,
-    /// Other fragments that pass the z-test when they come: with early z, the shaded ones.
+    /// Other fragments that pass the z-test when they come: shaded with early z.
     pub shaded_count: N,
     /// Samples that something opaque covers.
     pub covered_count: N,
