@@ -366,7 +366,8 @@ impl Auto {
 impl RegionIndex for Auto {
     const INFO: Info = Info::new(
         "auto",
-        "use=wide, moving or linear, and update=refit or rebuild, by counted work",
+        "a tree or a scan, and its updates, by counted work; use=wide, moving or linear \
+         and update=refit or rebuild force them",
         Kind::Tree,
         Origin::Ours,
     )
