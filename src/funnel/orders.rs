@@ -35,7 +35,8 @@ pub struct OrderRow {
     pub name: &'static str,
     /// One line about it.
     pub summary: &'static str,
-    /// Samples that meet an item, holes or not, counted for each item.
+    /// Samples that meet an item, counted for each: a box with or without holes, or
+    /// opaque triangles. Clear ones and cut-outs hide nothing, so no order saves any.
     pub fragment_count: f64,
     /// Fragments that pass the z-test when they come, and are shaded.
     pub shaded_count: f64,

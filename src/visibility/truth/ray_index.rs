@@ -132,12 +132,14 @@ impl<B: Body> BodyIndex<B> {
         tests
     }
 
-    /// Every meeting of a ray with a body from near to far, in no order.
+    /// Every meeting of a ray with a body that hides, from near to far, in no order.
     pub fn all_along(&self, ray: &Ray) -> Vec<(ItemId, B::At)> {
         let probe = self.probe(ray);
         let mut met = Vec::new();
         self.walk(ray, &mut |body: &B| {
-            met.extend(body.meet(&probe, ray.far).map(|at| (body.item(), at)));
+            if body.hides() {
+                met.extend(body.meet(&probe, ray.far).map(|at| (body.item(), at)));
+            }
             ray.far
         });
         met
