@@ -103,19 +103,18 @@ fn work(input: &FunnelInput) -> String {
 
 /// Returns true if nothing visible is lost and nothing exact wrong.
 ///
-/// Stages behind an unproven one of the chain miss what that has lost.
+/// Behind an unproven stage of the chain, items that the lost ones hid are seen.
 fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) -> bool {
     use Guarantee::{Exact, SampleExact, Unproven};
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Unproven;
     let chosen = stages.iter().filter(|row| row.is_chosen);
     let unproven = chosen.filter(is_unproven);
     let first = unproven.map(|row| row.back_end.stage).min();
-    let mut judged = stages
-        .iter()
-        .filter(|row| !is_unproven(row) && first.is_none_or(|first| row.back_end.stage <= first));
+    let mut judged = stages.iter().filter(|row| !is_unproven(row));
     let keeps_too_much = |row: &StageRow| {
         matches!(row.back_end.guarantee, Exact | SampleExact)
             && row.errors.false_positive_count > 0.0
+            && first.is_none_or(|first| row.back_end.stage <= first)
     };
     let mut orders = orders.iter().filter(|row| row.exceptions.is_empty());
     let mut picks = picks.iter();
@@ -404,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_promise_counts_unless_an_unproven_stage_came_before() {
+    fn a_broken_promise_counts_behind_an_unproven_stage_too() {
         use Guarantee::{Conservative, Unproven};
         let region = |guarantee, lost| row(StageKind::Region, guarantee, lost);
         let occlusion = |guarantee, lost| row(StageKind::Occlusion, guarantee, lost);
@@ -418,13 +417,18 @@ mod tests {
             region(Conservative, 1.0),
             occlusion(Unproven, 2.0)
         ]));
-        // What the region stage has lost, the next one cannot return.
-        assert!(keeps([region(Unproven, 1.0), occlusion(Conservative, 1.0)]));
-        let other = StageRow {
-            is_chosen: false,
-            ..region(Unproven, 1.0)
-        };
-        assert!(!keeps([other, occlusion(Conservative, 1.0)]));
+        assert!(keeps([region(Unproven, 1.0), occlusion(Conservative, 0.0)]));
+        assert!(!keeps([region(Unproven, 1.0), occlusion(Conservative, 1.0)]));
+        // Items that the lost ones hid are seen.
+        for (is_chosen, keeps_its_word) in [(true, true), (false, false)] {
+            let other = StageRow {
+                is_chosen,
+                ..region(Unproven, 1.0)
+            };
+            let mut exact = row(StageKind::Fragment, Guarantee::SampleExact, 0.0);
+            exact.errors.false_positive_count = 1.0;
+            assert_eq!(keeps([other, exact]), keeps_its_word);
+        }
     }
 
     #[test]

@@ -273,10 +273,11 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
             "Of {} {} remain to be drawn and {} are in front at some sample, per view.",
             counted(report.items, "item"),
             significant(last.errors.output_count),
-            significant(last.errors.truth_count)
+            significant(report.stages[0].errors.truth_count)
         )
     });
-    let gains = report.gains.iter().filter_map(of_gain);
+    let gains = report.gains.iter();
+    let gains = gains.filter_map(|gain| of_gain(gain, &report.stages));
     let told: Vec<String> = last.into_iter().chain(gains).collect();
     let mut sentences = vec![told.join(" ")];
     sentences.extend(report.stages.iter().filter_map(StageRow::loss));
@@ -286,14 +287,27 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     sentences
 }
 
-/// A sentence on a stage.
+/// A sentence on a stage; lost visible items are no savings.
 ///
 /// None on the depth test, which costs a GPU next to nothing.
-fn of_gain(gain: &Gain) -> Option<String> {
+fn of_gain(gain: &Gain, stages: &[StageRow]) -> Option<String> {
+    if gain.stage == StageKind::Fragment {
+        return None;
+    }
     let what = format!("{} ({})", gain.stage.name(), gain.back_end);
     let unit = gain.unit.trim_end_matches('s');
+    let mut chosen = stages.iter().filter(|row| row.is_chosen);
+    let own = chosen.find(|row| row.back_end.stage == gain.stage);
+    let errors = own.map(|row| &row.errors);
+    if let Some(errors) = errors.filter(|errors| errors.false_negative_count > 0.0) {
+        return Some(format!(
+            "{what} removes {} {} per view, {} of them visible.",
+            significant(errors.input_count - errors.output_count),
+            gain.unit,
+            significant(errors.false_negative_count)
+        ));
+    }
     Some(match gain.break_even {
-        _ if gain.stage == StageKind::Fragment => return None,
         None if gain.removed() > 0.0 => return None,
         None => format!("{what} is not needed: it removes nothing that the other stages leave."),
         Some(Estimate { value: 0.0, .. }) => format!("Use {what}: it saves time as well."),
@@ -316,12 +330,13 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     let (stencil, with) = test(STENCIL)?;
     let (other, without) = test(default_test(report.cut_outs.is_some()))?;
     Some(format!(
-        "fragment {} tests {} samples per view instead of {} ({:.1} % fewer) and leaves {} items as \
-         {} does.",
+        "fragment {} tests {} samples per view instead of {} ({:.1} % {}) and leaves {} items as {} \
+         does.",
         stencil.back_end.name,
         significant(with),
         significant(without),
-        (1.0 - with / without) * 100.0,
+        (1.0 - with / without).abs() * 100.0,
+        if with > without { "more" } else { "fewer" },
         match stencil.errors.output_count == other.errors.output_count {
             true => "as many",
             false => "not as many",
@@ -362,7 +377,7 @@ mod tests {
 
     #[test]
     fn noise_makes_no_advice_unconditional() {
-        let advice = |value, lower, upper| {
+        let gain = |value, lower, upper| {
             let mut gain = Gain::new(
                 StageKind::Region,
                 ("portals", "items"),
@@ -374,14 +389,38 @@ mod tests {
                 lower: Some(lower),
                 upper: Some(upper),
             });
-            of_gain(&gain).expect("a sentence")
+            gain
         };
+        let advice = |value, lower, upper| of_gain(&gain(value, lower, upper), &[]).expect("one");
         let wanted = "Use region (portals) if drawing one item takes more than 350 ns";
         assert_eq!(
             advice(350.0, 0.0, 734.0),
             format!("{wanted} (0 to 734 ns).")
         );
         assert_eq!(advice(350.0, 300.0, 734.0), format!("{wanted}."));
+        let lossy = |stage, false_negative_count| {
+            let named = ["portals", ""];
+            let errors = Errors {
+                input_count: 9.0,
+                output_count: 3.0,
+                false_negative_count,
+                ..Errors::of(&[])
+            };
+            let back_end = BackEnd::new(stage, named, crate::visibility::Guarantee::Unproven);
+            StageRow {
+                is_chosen: true,
+                ..StageRow::new(back_end, "portals", &Chain::empty(), errors)
+            }
+        };
+        let own = lossy(StageKind::Region, 5.0);
+        assert_eq!(
+            of_gain(&gain(350.0, 300.0, 734.0), &[own]).expect("one"),
+            "region (portals) removes 6.00 items per view, 5.00 of them visible."
+        );
+        // The loss of another stage is not its own.
+        let other = lossy(StageKind::Occlusion, 5.0);
+        let own = of_gain(&gain(350.0, 300.0, 734.0), &[other]);
+        assert_eq!(own.expect("one"), format!("{wanted}."));
         assert!(advice(0.0, 0.0, 9.0).ends_with("saves time as well."));
     }
 }

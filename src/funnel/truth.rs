@@ -131,13 +131,13 @@ pub struct ViewCounts {
     pub output: u64,
     /// Candidates that are not visible.
     pub hidden: u64,
-    /// Visible items.
+    /// Visible candidates.
     pub truth: u64,
     /// Returned, though not visible.
     pub false_positives: u64,
-    /// Visible, and not returned.
+    /// Visible candidates that are not returned.
     pub false_negatives: u64,
-    /// Samples whose front item is not returned.
+    /// Samples whose front item is one of them.
     pub missing_samples: u64,
     /// The most of them of one item.
     pub worst_missing_samples: u64,
@@ -161,13 +161,14 @@ pub fn count_items(
         input,
         hidden: input - given,
         output: output.len() as u64,
-        truth: visible.len() as u64,
+        truth: given,
         ..ViewCounts::default()
     };
     for &(item, samples) in visible {
         let samples = u64::from(samples);
         counts.samples += samples;
-        if output.binary_search(&item).is_err() {
+        // A loss counts at the stage that drops the item, not at those behind it.
+        if is_given(&item) && output.binary_search(&item).is_err() {
             counts.false_negatives += 1;
             counts.missing_samples += samples;
             counts.worst_missing_samples = counts.worst_missing_samples.max(samples);
@@ -184,17 +185,17 @@ pub struct Errors {
     pub input_count: f64,
     /// Returned candidates.
     pub output_count: f64,
-    /// Visible ones.
+    /// Visible ones among them.
     pub truth_count: f64,
     /// Returned, though not visible.
     pub false_positive_count: f64,
-    /// Visible, and not returned.
+    /// Visible candidates that are not returned.
     pub false_negative_count: f64,
     /// False positives / visible, by view.
     pub excess: Option<Rate>,
     /// False negatives / visible, by view.
     pub missing: Option<Rate>,
-    /// Share of the samples whose front item is missing, by view.
+    /// Share of the samples whose front item the stage drops, by view.
     pub image_error: Option<Rate>,
     /// Most samples that one missing item is in front at.
     pub worst_missing_samples: u64,
@@ -239,14 +240,18 @@ mod tests {
     #[test]
     fn errors_are_counted_by_item_and_by_sample() {
         let visible = [(2, 10), (5, 1), (9, 4)];
-        let counts = count_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 3, 9], &visible);
+        let counts = count_items(None, 12, &[1, 2, 3, 9], &visible);
         assert_eq!((counts.false_positives, counts.false_negatives), (2, 1));
         assert_eq!(
             (counts.missing_samples, counts.worst_missing_samples),
             (1, 1)
         );
         assert_eq!((counts.samples, counts.truth), (15, 3));
-        assert_eq!((counts.input, counts.hidden), (5, 3));
+        // The loss of a stage before is not counted again.
+        let counts = count_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 9], &visible);
+        assert_eq!((counts.input, counts.hidden, counts.truth), (5, 3, 2));
+        assert_eq!((counts.false_positives, counts.false_negatives), (1, 0));
+        assert_eq!((counts.samples, counts.missing_samples), (15, 0));
         assert_eq!(count_items(None, 12, &[], &visible).false_negatives, 3);
         assert_eq!(count_items(None, 12, &[1, 4], &[]).false_positives, 2);
     }

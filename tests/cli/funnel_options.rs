@@ -69,3 +69,29 @@ fn more_boxes_inside_meshes_hide_more_and_lose_nothing() {
     let help = works(Path::new("."), "funnel --help");
     assert!(help.contains(&format!("[default: {BOXES}]")), "{help}");
 }
+
+/// A table without pairs shows the eye's own room alone: later stages lose nothing more.
+#[test]
+fn the_loss_of_a_table_is_charged_to_its_stage_alone() {
+    let table: &[u8] = br#"{"regions": 12, "sees": []}"#;
+    let folder = folder(&[("p.json", table)]);
+    let line = "funnel --scene rooms:n=400 --path walk:frames=4 --samples 64x36 --processes 1 \
+                --pvs p.json --region stored-pvs --no-picks --format json";
+    let report = json(&works(folder.path(), line));
+    let rows = array(&report, "stages").iter();
+    let chosen: Vec<_> = rows.filter(|row| row["is_chosen"] == true).collect();
+    let of = |row: &Value, name| number(row, &format!("{name}_count"));
+    let lost = of(chosen[0], "false_negative");
+    assert!(lost > 0.0, "the premise: {lost}");
+    let visible = of(chosen[0], "truth");
+    for row in &chosen[1..] {
+        assert_eq!(of(row, "false_negative"), 0.0, "{row}");
+        if row["unit"] == "items" {
+            assert_eq!(of(row, "truth"), visible - lost, "{row}");
+        }
+    }
+    let told = report["conclusions"].to_string();
+    assert!(told.contains("of them visible") && !told.contains("Use region"), "{told}");
+    let seen = format!("{visible:.2}");
+    assert!(told.contains(&format!("and {seen} are in front")), "{told}");
+}

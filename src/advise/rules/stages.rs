@@ -95,7 +95,7 @@ fn finding(
     let large = SHADED.samples() as f64 / SAMPLES.samples() as f64;
     Ok(match stage {
         StageKind::Triangle => weigh(own, "triangle", 1.0, options.draw_ns / of_item),
-        StageKind::Fragment => weigh(own, "shaded fragment", large, options.shade_ns),
+        StageKind::Fragment => weigh(own, "opaque fragment", large, options.shade_ns),
         _ => weigh(own, "item", 1.0, options.draw_ns),
     })
 }
@@ -130,8 +130,8 @@ fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
     let note = format!(
         "{} ns/{}{}",
         (cost_ns * 1e1).round() / 1e1,
-        one.trim_start_matches("shaded "),
-        told(&|ns| format!(", pays from {ns:.*}", if ns < 10.0 { 2 } else { 0 }))
+        one.trim_start_matches("opaque "),
+        told(&|ns| format!(", pays from {}", significant(ns)))
     );
     let check = Check {
         on: format!("{} {}, as in funnel", gain.stage.name(), gain.back_end),
@@ -177,6 +177,9 @@ mod tests {
         for part in ["40.0 of 50.0 things", "above 5.00 ns per thing"] {
             assert!(dear.reason.contains(part), "{}", dear.reason);
         }
+        // A cost that is not 0 is not shown as 0.
+        let little = settled([0.0, 1e6], 1.1, 1.0);
+        assert_eq!(little.note, "1 ns/thing, pays from 0.0000100");
         let cheap = settled([10.0, 50.0], 3.0, 4.9);
         assert_eq!(cheap.decision, Decision::LeaveOut);
         // It costs 300 + 49 with and 100 + 245 without.
