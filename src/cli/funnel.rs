@@ -19,7 +19,7 @@ use super::processes::Timing;
 use super::shared_args::{StudyArgs, TableFormat};
 use super::sheet::Class;
 use super::study::{Setting, Study};
-use super::{Ending, expect_folder, expect_places, funnel_table, print, text, write_text};
+use super::{Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_text};
 use crate::funnel::{
     self, Chain, Fate, FunnelInput, FunnelPlan, FunnelReport, NONE, OrderRow, PickRow, StageKind,
     StageRow,
@@ -49,6 +49,17 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 1, &args.study.spread)?;
     let input = stages.input(args)?;
+    let claimed = args.pvs.is_some() && stages.chain.of(StageKind::Region) != "stored-pvs";
+    for (option, is_given, to_see) in [
+        ("--pvs", claimed, " or --region stored-pvs"),
+        ("--no-picks", args.no_picks, ""),
+    ] {
+        if is_given && !input.all {
+            tell(&format!(
+                "note: {option} has no effect; expected --all{to_see} with it"
+            ));
+        }
+    }
     let is_begun = Cell::new(false);
     let begin = |step: &str| {
         // Refusals come before the first step.
@@ -418,7 +429,10 @@ mod tests {
             occlusion(Unproven, 2.0)
         ]));
         assert!(keeps([region(Unproven, 1.0), occlusion(Conservative, 0.0)]));
-        assert!(!keeps([region(Unproven, 1.0), occlusion(Conservative, 1.0)]));
+        assert!(!keeps([
+            region(Unproven, 1.0),
+            occlusion(Conservative, 1.0)
+        ]));
         // Items that the lost ones hid are seen.
         for (is_chosen, keeps_its_word) in [(true, true), (false, false)] {
             let other = StageRow {

@@ -58,10 +58,14 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     }
     let [low, high, origin] = [figures.bounds_min, figures.bounds_max, info.origin]
         .map(|v| format!("({})", v.map(text::short).join(", ")));
+    let bounds = match info.total_count {
+        0 => "none".to_owned(),
+        _ => format!("{low} to {high}"),
+    };
     let mut rows = vec![
         ("scene", text::plain(&info.name)),
         ("items", people(info.total_count)),
-        ("bounds", format!("{low} to {high}")),
+        ("bounds", bounds),
         ("origin", origin),
         ("axes", scene_facts::axes(&info)),
     ];
@@ -106,7 +110,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         }
         rows.push(("label", text::plain(&format!("{}: {shown}", labels.column))));
     }
-    rows.push(("SHA-256", info.digest));
+    rows.push(("SHA-256", format!("{} (of the boxes)", info.digest)));
     let row = |(name, value): (&str, String)| [name.to_owned(), value];
     let rows: Vec<_> = rows.into_iter().map(row).collect();
     write!(io::stdout(), "{}", text::entries(&rows, text::width()))?;

@@ -138,7 +138,7 @@ impl SceneFacts {
         };
         let extent = ("extent", format!("{x} x {y} x {z}"));
         if count == 0 {
-            return vec![extent, ("sizes", "no items".to_owned())];
+            return vec![("sizes", "no items".to_owned())];
         }
         let sizes = [
             self.size_min,

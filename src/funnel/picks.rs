@@ -15,6 +15,7 @@ use super::world::{Shape, World};
 use crate::index::caught;
 use crate::measure::Ask;
 use crate::query::ItemId;
+use crate::shown::{count, counted};
 use crate::statistics::{Estimate, flat};
 use crate::visibility::pick::{BACK_ENDS, BackEnd, CursorRectangle, NotBuilt, Pick};
 use crate::visibility::truth::{Boxes, Facets, RayIndex, SurfaceIndex};
@@ -122,20 +123,21 @@ impl<'w> Picks<'w> {
     /// Adds back ends along rays: rows of the first item, then of the nearest.
     fn add_rays(&mut self) {
         let world = self.world;
-        let (count, build): (usize, Build) = match &world.shape {
+        let ((bodies, one), build): (_, Build) = match &world.shape {
             Shape::Boxes(solids) => {
                 let boxes = Boxes::of(solids);
                 let build: Build = Box::new(move |row| (row.build.boxes)(&boxes, world.kernel));
-                (solids.boxes.len(), build)
+                ((solids.boxes.len(), "item"), build)
             }
             Shape::Triangles(surfaces) => {
                 let facets = Facets::solid(surfaces, world.items());
                 let build: Build = Box::new(move |row| (row.build.facets)(&facets, world.kernel));
-                (surfaces.triangles.len(), build)
+                ((surfaces.triangles.len(), "triangle"), build)
             }
         };
         for row in BACK_ENDS {
-            if row.name == "linear" && count > MOST_FOR_LOOP {
+            if row.name == "linear" && bodies > MOST_FOR_LOOP {
+                self.left_out.push(too_many(bodies, one, "for each ray"));
                 continue;
             }
             let pick = build(row).map(Rc::from).and_then(|pick| {
@@ -172,6 +174,8 @@ impl<'w> Picks<'w> {
         let world = self.world;
         for (label, index) in &world.structures {
             if label == "linear" && world.items() > MOST_FOR_LOOP {
+                let row = too_many(world.items(), "item", "for each cursor's frustum");
+                self.left_out.push(row);
                 continue;
             }
             let around = world.scene.surroundings();
@@ -255,6 +259,13 @@ impl<'w> Picks<'w> {
             in_planes,
         }
     }
+}
+
+/// The plain loop as left out.
+fn too_many(bodies: usize, one: &str, when: &str) -> LeftOutRow {
+    let (found, most) = (counted(bodies, one), count(MOST_FOR_LOOP));
+    let reason = format!("{found} to test {when}; expected at most {most}");
+    LeftOutRow::new("picks", "linear", reason)
 }
 
 fn nearest(pick: &dyn Pick, ray: &Ray, count: usize) -> Vec<ItemId> {

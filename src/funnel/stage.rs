@@ -6,6 +6,7 @@ use super::error::LeftOutRow;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Regions, Scene};
+use crate::shown::{count, counted};
 use crate::visibility::occlusion::{
     Interleaved, MaskedCentre, MaskedInner, OccluderScene, OcclusionBuffer, View,
 };
@@ -151,12 +152,20 @@ const ALPHA: &str = "alpha-test";
 pub const STENCIL: &str = "stencil-test";
 
 /// The region stage as left out, if the sectors of a map do not divide the plane.
+///
+/// Else the map's REJECT table, if it is too short.
 pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
     let Regions::Bsp(map) = &scene.regions else {
         return None;
     };
-    let dispute = map.disputes().first();
-    dispute.map(|dispute| LeftOutRow::new("stages", "region", dispute))
+    if let Some(dispute) = map.disputes().first() {
+        return Some(LeftOutRow::new("stages", "region", dispute));
+    }
+    let (bytes, sectors) = (map.reject.len(), map.sectors.len());
+    let least = sectors.saturating_mul(sectors).div_ceil(8);
+    let (found, of) = (counted(bytes, "byte"), counted(sectors, "sector"));
+    let reason = format!("REJECT of {found} for {of}, expected {}", count(least));
+    (bytes < least).then(|| LeftOutRow::new("stages", "reject", reason))
 }
 
 /// Back ends of a stage that a scene can have, without structures.

@@ -14,6 +14,7 @@ use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, visible};
 use super::world::{FunnelInput, World};
+use crate::input::warn;
 use crate::measure::{ProcessTimes, Verdict};
 use crate::scene::available_bytes;
 use crate::visibility::{Level, SampleGrid};
@@ -177,6 +178,10 @@ pub struct Prepared {
 pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, StudyError> {
     fits(input.samples, available_bytes())?;
     let world = World::new(input.scene, input, begin)?;
+    let mut warnings = input.path.warnings(input.scene);
+    let rounded = world.rounded();
+    rounded.iter().for_each(|text| warn(text));
+    warnings.extend(rounded);
     begin("truth");
     let truth = visible(&world, 0, input.execution.threads)?;
     begin("every stage, compared with the truth");
@@ -250,7 +255,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
         left_out,
         bounds,
         conclusions: Vec::new(),
-        warnings: input.path.warnings(input.scene),
+        warnings,
         plan_view: PlanView::of(&world, &study.items, input.chain, &truth),
     };
     let mut tasks = study.tasks();

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::error::{StudyError, check_memory};
-use super::stage::{BackEnd, Chain, NONE, StageKind, back_ends};
+use super::stage::{BackEnd, Chain, NONE, StageKind, back_ends, left_out_of};
 use crate::camera::{CameraError, PlaneOptions};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
@@ -13,7 +13,8 @@ use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::{self, Dispute, ItemShape, LoadOptions, Scene, Surfaces};
+use crate::scene::{self, Dispute, ItemShape, LoadOptions, Scene, Surfaces, WorldBox};
+use crate::shown::{counted, significant};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
@@ -26,6 +27,9 @@ use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_
 ///
 /// 730 were measured of boxes with one structure.
 const BYTES_PER_ITEM: u64 = 750;
+
+/// Share of an item's longest edge by which f32 may move its corners without a warning.
+const MOST_MOVED: f64 = 1.0 / 64.0;
 
 /// Scene, path and options of a study.
 #[derive(Clone, Copy)]
@@ -206,6 +210,27 @@ impl<'a> World<'a> {
         self.hiders.from_eye(self.hiders.is_open(rays, is_inside))
     }
 
+    /// A warning about items in view that f32 moves by much of their longest edge.
+    pub fn rounded(&self) -> Option<String> {
+        let surfaces = self.scene.surfaces.as_ref()?;
+        let share = |(item, b): (usize, WorldBox)| {
+            let own = WorldBox::of(&surfaces.bounds(item), surfaces.origin);
+            let moved = (own.min - b.min).abs().max((own.max - b.max).abs());
+            let share = moved.max_element() / (b.max - b.min).max_element();
+            let is_seen = |view: &View| view.volume.sees(&self.scene.items[item]);
+            (share > MOST_MOVED && self.views.iter().any(is_seen)).then_some(share)
+        };
+        let shares: Vec<f64> = self.scene.written().enumerate().filter_map(share).collect();
+        let most = shares.iter().copied().reduce(f64::max)?;
+        Some(format!(
+            "{}: f32 moves corners of {} in view by up to {} % of the longest edge: visible items may \
+             count as hidden; expected a smaller extent",
+            self.scene.name,
+            counted(shares.len(), "item"),
+            significant(most * 100.0)
+        ))
+    }
+
     /// Back ends of a stage that the scene can have, without structures.
     pub fn back_ends(&self, stage: StageKind) -> Vec<BackEnd> {
         back_ends(stage, self.scene, self.cut_outs.is_some())
@@ -274,8 +299,10 @@ fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), Stu
         let name = input.chain.of(stage);
         if !known.iter().any(|(_, known)| known == name) {
             let known: Vec<String> = known.into_iter().map(|(_, name)| name).collect();
+            let why = left_out_of(input.scene).filter(|row| row.name == name);
+            let why = why.map_or(String::new(), |row| format!(" ({})", row.reason));
             return Err(StudyError::Refused(format!(
-                "{} '{name}' needs what the scene does not have; expected one of {}",
+                "{} '{name}' needs what the scene does not have{why}; expected one of {}",
                 stage.name(),
                 known.join(", ")
             )));

@@ -91,7 +91,10 @@ fn the_loss_of_a_table_is_charged_to_its_stage_alone() {
         }
     }
     let told = report["conclusions"].to_string();
-    assert!(told.contains("of them visible") && !told.contains("Use region"), "{told}");
+    assert!(
+        told.contains("of them visible") && !told.contains("Use region"),
+        "{told}"
+    );
     let seen = format!("{visible:.2}");
     assert!(told.contains(&format!("and {seen} are in front")), "{told}");
 }

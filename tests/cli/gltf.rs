@@ -297,7 +297,11 @@ fn an_order_of_glass_saves_nothing() {
             let row = rows.iter().find(|row| row["name"] == name);
             number(row.expect("an order"), "shaded_count")
         });
-        assert_eq!([listed, sorted], [shaded, shaded / 2.0], "material {material}");
+        assert_eq!(
+            [listed, sorted],
+            [shaded, shaded / 2.0],
+            "material {material}"
+        );
     }
 }
 
