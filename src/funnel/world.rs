@@ -28,7 +28,7 @@ use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_
 /// 730 were measured of boxes with one structure.
 const BYTES_PER_ITEM: u64 = 750;
 
-/// Share of an item's longest edge by which f32 may move its corners without a warning.
+/// Most that f32 may move corners without a warning, of an item's longest edge.
 const MOST_MOVED: f64 = 1.0 / 64.0;
 
 /// Scene, path and options of a study.

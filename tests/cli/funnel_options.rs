@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use cullbench::visibility::inscribed::BOXES;
 use serde_json::Value;
 
+use super::FULL_CAMERA;
 use super::funnel::row;
 use super::process::*;
 
@@ -70,7 +71,7 @@ fn more_boxes_inside_meshes_hide_more_and_lose_nothing() {
     assert!(help.contains(&format!("[default: {BOXES}]")), "{help}");
 }
 
-/// A table without pairs shows the eye's own room alone: later stages lose nothing more.
+/// Its pairs are none: each eye sees its own room, and later stages lose no more.
 #[test]
 fn the_loss_of_a_table_is_charged_to_its_stage_alone() {
     let table: &[u8] = br#"{"regions": 12, "sees": []}"#;
@@ -97,4 +98,63 @@ fn the_loss_of_a_table_is_charged_to_its_stage_alone() {
     );
     let seen = format!("{visible:.2}");
     assert!(told.contains(&format!("and {seen} are in front")), "{told}");
+}
+
+/// Small things at both ends of a large scene, and the same without the far end.
+#[test]
+fn items_that_f32_moves_by_much_of_their_size_are_warned_of() {
+    let thing = |x: f64, from: usize| {
+        let corners =
+            [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3]].map(|[y, z]| format!("v {x} {y} {z}\n"));
+        let [a, b, c] = [from, from + 1, from + 2];
+        format!(
+            "o thing{from}\n{}f {a} {b} {c}\nf {a} {c} {b}\n",
+            corners.concat()
+        )
+    };
+    let flat = |x: f64, from| thing(x, from).replace(" -0.3 0.3", " -0.2 0.3");
+    let near = flat(1e6, 1) + &thing(1e6 + 0.03, 4);
+    let far = near.clone() + &thing(-1e6, 7);
+    let (x, line) = (
+        1e6 - 3.0,
+        "funnel --scene S --path c.csv --samples 48x32 --processes 1 \
+                                 --no-picks --format json",
+    );
+    let camera = format!("{FULL_CAMERA}\n{x},0,0,1e6,0,0,0,0,1,60,1.5,0.1,100\n");
+    let files = [("near.obj", &near), ("far.obj", &far), ("c.csv", &camera)];
+    let folder = folder(&files.map(|(name, text)| (name, text.as_bytes())));
+    for (scene, is_warned) in [("near.obj", false), ("far.obj", true)] {
+        let done = cullbench(folder.path(), &line.replace('S', scene));
+        let told = json(&done.out)["warnings"].to_string();
+        let words = "f32 moves corners of";
+        assert_eq!(told.contains(words), is_warned, "{scene}: {told}");
+        assert_eq!(done.err.contains(words), is_warned, "{scene}: {}", done.err);
+    }
+}
+
+/// What is given for nothing is noted, what is missing has a reason.
+#[test]
+fn unused_options_and_large_loops_are_named() {
+    let table: &[u8] = br#"{"regions": 12, "sees": []}"#;
+    let folder = folder(&[("p.json", table)]);
+    let line = "funnel --scene rooms:n=400 --path walk:frames=1 --samples 16x9 --processes 1 \
+                --pvs p.json --no-picks";
+    let told = cullbench(folder.path(), line).err;
+    for option in ["--pvs", "--no-picks"] {
+        assert!(
+            told.contains(&format!("note: {option} has no effect")),
+            "{told}"
+        );
+    }
+    let line = "funnel --scene city:n=20001 --path street:frames=1 --samples 16x9 --processes 1 \
+                --format json";
+    let report = json(&works(Path::new("."), line));
+    let rows = array(&report, "left_out").iter();
+    let loops: Vec<_> = rows.filter(|row| row["name"] == "linear").collect();
+    assert_eq!(loops.len(), 2, "{loops:?}");
+    let reason = loops[0]["reason"].as_str().unwrap();
+    assert_eq!(
+        reason,
+        "20,001 items to test for each ray; expected at most 20,000"
+    );
 }

@@ -276,7 +276,7 @@ fn a_material_is_that_of_its_primitive_at_every_stage() {
     }
 }
 
-/// Panes of glass one behind the other hide nothing: no order of them saves a fragment.
+/// Panes one behind the other hide nothing, so no order of them saves a fragment.
 #[test]
 fn an_order_of_glass_saves_nothing() {
     let camera = format!("{FULL_CAMERA}\n0,0.1,0.2,10,0.1,0.2,0,1,0,60,1.5,0.1,100\n");
