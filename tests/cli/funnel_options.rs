@@ -132,7 +132,7 @@ fn items_that_f32_moves_by_much_of_their_size_are_warned_of() {
     }
 }
 
-/// What is given for nothing is noted, what is missing has a reason.
+/// Notes of options without effect, and the reason of a missing loop.
 #[test]
 fn unused_options_and_large_loops_are_named() {
     let table: &[u8] = br#"{"regions": 12, "sees": []}"#;
