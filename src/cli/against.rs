@@ -22,7 +22,7 @@ use super::study::progress;
 use super::{run_plan, text};
 use crate::index::Registry;
 use crate::input;
-use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Share};
+use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Schedule, Share};
 use crate::report::{Basis, Changes, ReportCell, WORK, changes};
 use crate::scene;
 use crate::statistics::resolved;
@@ -228,13 +228,18 @@ impl Duel<'_> {
                 let timed = changes.rows.iter().filter(|row| row.pairs_ln_ns.is_some());
                 let judged: Vec<_> = timed.map(|row| row.judgement).collect();
                 if resolved(&judged, self.args.threshold) || pairs == most {
-                    let mut known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
-                    let query = known.find_map(|known| Some(&known.query.as_ref()?.schedule));
+                    let known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
+                    let plans = known.filter_map(|known| Some(&known.query.as_ref()?.schedule));
+                    let range = |of: fn(&Schedule) -> usize| {
+                        let all = || plans.clone().map(of);
+                        let ends = (all().min().unwrap_or(0), all().max().unwrap_or(0));
+                        text::range(ends, |most| most.to_string())
+                    };
                     let head = format!(
                         "{} × {} rounds × {} cameras in {:.0} s",
                         text::counted(pairs, "pair"),
-                        query.map_or(0, |schedule| schedule.rounds),
-                        query.map_or(0, |schedule| schedule.cameras.len()),
+                        range(|plan| plan.rounds as usize),
+                        range(|plan| plan.cameras.len()),
                         started.elapsed().as_secs_f64()
                     );
                     return Ok((changes, head));

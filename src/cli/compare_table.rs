@@ -54,7 +54,8 @@ impl CompareTable<'_> {
 
     /// The ending and its name in JSON.
     fn verdict(&self) -> (Ending, &'static str) {
-        let is_undecided = self.changes.count(Outcome::Inconclusive) > 0;
+        let is_undecided =
+            self.changes.count(Outcome::Inconclusive) > 0 || self.changes.proven_shift().is_some();
         match (self.changes.is_wrong(), self.changes.is_regression()) {
             (true, _) => (Ending::WrongAnswer, "wrong_answer"),
             (false, true) => (Ending::Regression, "regression"),
@@ -71,6 +72,13 @@ impl CompareTable<'_> {
             "ok" => "no regression".to_owned(),
             other => other.replace('_', " "),
         };
+        let shift = text::some(self.changes.proven_shift(), |shift| {
+            let (metric, much) = (shift.metric, change_of(shift.ratio, None));
+            format!(
+                " among the structures; {metric} as a whole changed by {much}, which is not \
+                 judged here (use compare --against)"
+            )
+        });
         let worst = self.changes.rows.first();
         let worst = worst.filter(|_| self.ending() != Ending::Ok);
         let worst = worst.filter(|row| row.outcome < Outcome::Different);
@@ -81,7 +89,7 @@ impl CompareTable<'_> {
             });
             format!("; worst: {}{change}", name(&row.cell))
         });
-        format!("{verdict}: {}{worst}", self.counts_line())
+        format!("{verdict}{shift}: {}{worst}", self.counts_line())
     }
 
     /// Prints the comparison in the chosen format.
@@ -201,10 +209,13 @@ impl CompareTable<'_> {
             Some(usize::MAX) => usize::MAX,
             _ => 54_usize.saturating_sub(structure.unwrap_or(0) + metric.unwrap_or(0)),
         };
-        let groups = unique(self.changes.rows.iter().map(|row| &row.cell.group));
+        let changes = &self.changes;
+        let groups = unique(changes.rows.iter().map(|row| &row.cell.group));
         let short = |group: &&GroupKey| place(group, left, short);
         let full = |group: &&GroupKey| place(group, usize::MAX, plain);
         let places = distinct(&groups, short, full);
+        // Beside a common shift a verdict is no more than a place among the others.
+        let than = text::some(changes.proven_shift(), |_| " than the others".to_owned());
         for row in rows {
             let at = groups.iter().position(|group| **group == row.cell.group);
             let place = text::some(at, |at| places[at].clone());
@@ -230,7 +241,11 @@ impl CompareTable<'_> {
                     (Basis::Pairs, [pairs, _]) => pairs.to_string(),
                     (Basis::Reports, [old, new]) => format!("{old} vs {new}"),
                 },
-                row.outcome.name().replace('_', " "),
+                row.outcome.name().replace('_', " ")
+                    + match row.outcome {
+                        Outcome::Slower | Outcome::Faster => &than,
+                        _ => "",
+                    },
                 text::some(room.is_none().then_some(row), |row| reason(row)),
             ];
             table.add_row(places.into_iter().chain(figures));
@@ -288,7 +303,7 @@ impl CompareTable<'_> {
         let cells = text::counted(undecided, "inconclusive cell");
         let more = self.changes.more_pairs();
         let mut rows = self.changes.rows.iter();
-        let lacks_others = rows.any(|row| row.reason.as_deref() == Some(FEW_OTHERS));
+        let lacks_others = rows.any(|row| row.reason.iter().any(|why| why.contains(FEW_OTHERS)));
         let judged = self.changes.rows.iter().filter_map(|row| row.judgement);
         let mut undecided = judged.filter(|found| found.change == Change::Inconclusive);
         let is_hopeless = |found: Judgement| found.lower.is_some() && found.more_pairs.is_none();
@@ -308,7 +323,7 @@ impl CompareTable<'_> {
             (Basis::Reports, _) => {
                 let runs = match more {
                     None if lacks_others => {
-                        "runs (run --structure) with the same four structures or more".to_owned()
+                        "runs of ten processes with the same four structures or more".to_owned()
                     }
                     Some(more) if more <= MOST_MORE => {
                         let more = text::counted(more, "more process");

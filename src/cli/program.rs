@@ -98,7 +98,10 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
             let values = values.trim_end_matches(']');
             expected = Some(format!("; expected one of {values}"));
         } else if let Some(line) = line.strip_prefix("Usage: ") {
-            usage = Some(line.to_owned());
+            // What may be left out may not go with the rest.
+            let words = line.split(' ');
+            let words = words.filter(|word| !word.starts_with('[') || *word == "[OPTIONS]");
+            usage = Some(words.collect::<Vec<_>>().join(" "));
         } else if !line.starts_with("For more information") && usage.is_none() {
             missing.push(line.to_owned());
         }

@@ -13,8 +13,8 @@ use super::document::{Block, to_html, to_markdown, to_terminal};
 use super::surface_tables::Picture;
 use super::table::Table;
 use super::{
-    Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_table,
-    surface_tables, tell, text, write_text,
+    Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_plan,
+    run_table, surface_tables, tell, text, write_text,
 };
 use crate::index::Registry;
 use crate::measure::{BOUNDS, METRICS};
@@ -34,7 +34,9 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     expect_folder("--svg", args.svg.as_deref())?;
     if let Some(path) = &args.history {
         let reports = args.reports.iter().map(|path| read_report(path));
-        write_text(path, &history::page(reports.collect::<Result<_, _>>()?))?;
+        let reports = reports.collect::<Result<Vec<_>, _>>()?;
+        run_plan::each_once("run", reports.iter().map(|report| &report.run.id))?;
+        write_text(path, &history::page(reports))?;
         return Ok(Ending::Ok);
     }
     let [path] = &args.reports[..] else {

@@ -46,7 +46,9 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     check_why(args, &plan)?;
     plan.check_inputs()?;
     if plan.plan.scenes.is_empty() {
-        bail!("nothing to do: this shard has no scene; expected at most as many shards as paths");
+        bail!(
+            "nothing to do: this shard has no scene; expected a shard per scene and path at most"
+        );
     }
     interrupt::from_now_on_finish();
     let machine = Machine::capture().by(args.what.culling.kernel.execution()?.kernel);

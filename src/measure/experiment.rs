@@ -170,7 +170,7 @@ impl Plan {
 
     /// Shard `i` of `n` (from 1), a smaller plan: every n-th pair of scene and path.
     ///
-    /// Structures, cache states and tests of a pair stay together.
+    /// Structures, cache states, motions and tests of a pair stay together.
     ///
     /// # Panics
     /// Zero shards.

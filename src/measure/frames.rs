@@ -6,14 +6,14 @@
 //! every set is compared with the reference scan, in later rounds every size.
 
 use super::clock::Stopwatch;
-use super::group::{GroupPlan, counts, measure_part, task_part};
+use super::group::{GroupPlan, counts, measure_part, structure_of, task_part};
 use super::key::TaskKey;
 use super::moving::{Frames, Laps, Moving, ageing, replay, times_of};
 use super::process_result::{Known, Part, SubjectPart, TaskSamples};
 use super::schedule::Orders;
 use super::{
-    Counted, KeyedSchedule, Notice, Protocol, Sample, Schedule, Status, Subject, TIMING, TaskKind,
-    TaskPlan, Timed, Verdict, Workload, guarded,
+    Answer, Counted, KeyedSchedule, Notice, Protocol, Sample, Schedule, Status, Subject, TIMING,
+    TaskKind, TaskPlan, Timed, Verdict, Workload, guarded,
 };
 use crate::index::{StructureSpec, UpdatePolicy};
 use crate::motion::Motion;
@@ -35,7 +35,8 @@ struct Entry<'a> {
     part: SubjectPart,
     /// CPU time of one replay in the count pass, ns.
     replay_ns: f64,
-    rounds: Vec<Vec<Laps>>,
+    /// Times and number of returned items of each frame.
+    rounds: Vec<Vec<(Laps, u64)>>,
 }
 
 /// Measures a group in this process: queries of a still scene, or frames; `None` if
@@ -104,7 +105,12 @@ fn measure_frames(
             let tail_of = (key.1 == TaskKind::Frame).then_some(1);
             tasks.push(task_part(key, &timed, &planned.schedule, tail_of));
             let is_kept = [TaskKind::Frame, TaskKind::Update].contains(&key.1);
-            let kept = timed.ok().filter(|_| is_kept).unwrap_or_default();
+            let mut kept = timed.ok().filter(|_| is_kept).unwrap_or_default();
+            // Checks go by the right answers; fat bounds return more.
+            let frames = entry.rounds.iter().flatten();
+            for (sample, (_, returned)) in kept.samples.iter_mut().zip(frames) {
+                sample.returned = *returned;
+            }
             samples.push((key.0.clone(), key.1, kept.samples));
         }
     }
@@ -140,9 +146,10 @@ fn measure_frames(
     Some((part, samples))
 }
 
-/// False for a structure that is built again in every frame.
+/// False for a structure that is built again in every frame or in every n-th.
 fn ages(spec: &StructureSpec) -> bool {
-    spec.info().capabilities.refits && spec.policy != UpdatePolicy::Rebuild
+    spec.info().capabilities.refits
+        && !matches!(spec.policy, UpdatePolicy::Rebuild | UpdatePolicy::Every(_))
 }
 
 impl Entry<'_> {
@@ -154,7 +161,7 @@ impl Entry<'_> {
     fn count(&mut self, frames: &Frames, stop: &dyn Fn() -> bool) -> Result<(), Verdict> {
         let mut moving = Moving::build(frames, &self.subject.spec)?;
         let (mut out, mut cost) = (Vec::new(), QueryCost::default());
-        let mut false_positives = 0;
+        let mut answers = Vec::new();
         self.replay_ns = 0.0;
         let all_threads = self.subject.spec.is_threaded();
         for frame in 0.. {
@@ -174,7 +181,7 @@ impl Entry<'_> {
                 moving.index.query(view.as_any(), &mut out);
                 self.replay_ns += watch.lap().cpu_ns;
                 frames.check(&moving, query, &out)?;
-                false_positives += out.len() as u64 - frames.right[query].count;
+                answers.push(Answer::of(&out));
             }
             if self.replay_ns > PATIENCE_NS {
                 let reason = format!("{frame} frames took longer than {} s", PATIENCE_NS / 1e9);
@@ -182,14 +189,15 @@ impl Entry<'_> {
             }
         }
         let counted = Counted {
-            answers: [frames.right.clone(), Vec::new()],
+            answers: [answers, Vec::new()],
             costs: [cost, QueryCost::default()],
             ..Counted::default()
         };
         let mut counts = counts(&counted, frames.workload.scene.items.len());
         if let UpdatePolicy::Fat(_) = self.subject.spec.policy {
-            let visible = frames.right.iter().map(|answer| answer.count).sum::<u64>();
-            let excess = false_positives as f64 / (visible as f64).max(1.0);
+            let total = |all: &[Answer]| all.iter().map(|a| a.count).sum::<u64>() as f64;
+            let visible = total(&frames.right);
+            let excess = (total(&counted.answers[0]) - visible) / visible.max(1.0);
             counts.insert("fat_excess".to_owned(), excess);
         }
         self.part.counts = counts;
@@ -213,8 +221,8 @@ impl Entry<'_> {
         let mut timed = Timed::default();
         for (round, laps) in (0..).zip(&self.rounds) {
             let frames = (0..).zip(frames.right.chunks(views)).zip(laps);
-            timed.samples.extend(frames.map(|((frame, answers), laps)| {
-                let [cpu_ns, wall_ns] = times_of(laps, kind, workload);
+            timed.samples.extend(frames.map(|((frame, answers), own)| {
+                let [cpu_ns, wall_ns] = times_of(&own.0, kind, workload);
                 Sample {
                     round,
                     frame,
@@ -247,16 +255,15 @@ fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSch
             )
         })
     });
-    let (keys, tasks) = tasks.unzip();
-    KeyedSchedule {
-        keys,
-        schedule: Schedule {
-            cameras: (0..frames.right.len() as u32).collect(),
-            rounds: rounds as u32,
-            cold: false,
-            tasks,
-        },
-    }
+    let (keys, tasks): (Vec<TaskKey>, _) = tasks.unzip();
+    let mut schedule = Schedule {
+        cameras: (0..frames.right.len() as u32).collect(),
+        rounds: rounds as u32,
+        cold: false,
+        tasks,
+    };
+    schedule.share_rounds(&keys, |(label, kind)| (structure_of(label, &[]), *kind));
+    KeyedSchedule { keys, schedule }
 }
 
 /// Replays the motion by the schedule; `None` if stopped.

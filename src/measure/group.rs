@@ -166,7 +166,7 @@ pub fn measure_part(
 }
 
 /// Label of the structure that has this task, `#twin` removed; `None` for a bound.
-fn structure_of<'l>(label: &'l str, bounds: &[String]) -> Option<&'l str> {
+pub(super) fn structure_of<'l>(label: &'l str, bounds: &[String]) -> Option<&'l str> {
     let is_bound = bounds.iter().any(|bound| bound == label);
     (!is_bound).then(|| label.strip_suffix(TWIN).unwrap_or(label))
 }

@@ -106,7 +106,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "fat_excess", "1", Of::Count, "items that enlarged bounds (--update fat=M) return in excess / items that exact bounds return";
     "update_ns", "ns", Of::Time(TaskKind::Update), "CPU time of the update of a frame, mean over the frames; as query_ns";
     "further_query_ns", "ns", Of::Time(TaskKind::Further), "thread CPU time of a query after the first one of a frame; as query_ns";
-    "worst_frame_ns", "ns", Of::WorstFrame, "slowest frame: median of each frame over rounds and processes, then the maximum over the frames, at least frame_ns; absent below three readings per frame, where an interruption would be the worst frame";
+    "worst_frame_ns", "ns", Of::WorstFrame, "slowest frame: median over processes of the median of each frame over rounds, then the maximum over the frames, at least frame_ns; absent below three readings per frame, where an interruption would be the worst frame";
     "ageing_1", "1", Of::Log(|s| s.ageing_ln.get(&1).copied()), "time per query after 1 frame / time per query on a fresh build of the same boxes";
     "ageing_10", "1", Of::Log(|s| s.ageing_ln.get(&10).copied()), "time per query after 10 frames / time per query on a fresh build of the same boxes";
     "ageing_100", "1", Of::Log(|s| s.ageing_ln.get(&100).copied()), "time per query after 100 frames / time per query on a fresh build of the same boxes";

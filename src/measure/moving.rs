@@ -270,13 +270,13 @@ pub(super) fn times_of(laps: &Laps, kind: TaskKind, workload: &Workload) -> [f64
     })
 }
 
-/// Times every frame of one replay; `Ok(None)` if stopped.
+/// Times and number of returned items of each frame of one replay; `Ok(None)` if stopped.
 pub(super) fn replay(
     spec: &StructureSpec,
     frames: &Frames,
     compares_sets: bool,
     stop: &dyn Fn() -> bool,
-) -> Result<Option<Vec<Laps>>, Verdict> {
+) -> Result<Option<Vec<(Laps, u64)>>, Verdict> {
     let mut moving = Moving::build(frames, spec)?;
     let mut outs = vec![Vec::new(); frames.workload.views_per_frame];
     let mut all = Vec::with_capacity(frames.motion.frames());
@@ -304,7 +304,8 @@ pub(super) fn replay(
             moving.index.query(view.as_any(), out);
         }
         let further = (outs.len() > 1).then(|| watch.lap().less(clock));
-        all.push([updated, first, further.unwrap_or_default()]);
+        let returned = outs.iter().map(|out| out.len() as u64).sum();
+        all.push(([updated, first, further.unwrap_or_default()], returned));
         for ((query, _), out) in frames.views(frame).zip(&outs) {
             let right = frames.right.get(query);
             let is_right = right.is_some_and(|r| r.count == out.len() as u64);

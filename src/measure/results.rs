@@ -233,8 +233,10 @@ impl<'p> MergedParts<'p> {
         let moving = "query_ns_p95, locate_ns: not measured of items that move";
         let untimed = "query_ns: no time in some process";
         let unsearched = "locate_ns: this suite times frustum queries only";
+        let rebuilt = "ageing_10: not measured with rebuilds, after which it begins anew";
         let reasons = [
             (moves, moving),
+            (moves && label.contains("@every="), rebuilt),
             (has_few_readings, &few),
             (is_untimed(TaskKind::Query), untimed),
             (is_large, &large),
@@ -319,7 +321,8 @@ impl<'p> MergedParts<'p> {
             Of::Time(task) => self.ns(label, task),
             Of::TimePerVisible => {
                 let ns = self.ns(label, TaskKind::Query)?;
-                Some(ns.per(self.visible_when_timed()?))
+                let excess = counted("fat_excess").map_or(0.0, |excess| excess.value);
+                Some(ns.per(self.visible_when_timed()? * (1.0 + excess)))
             }
             Of::Wall(task) => {
                 let tasks = self.tasks(label, task);

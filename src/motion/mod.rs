@@ -170,12 +170,13 @@ impl Motion {
         // Without the last frame if it lacks cameras.
         let complete = (path.times.len() / views).max(1);
         let (paced, late) = recorded.at(path.times.iter().step_by(views).take(complete));
-        let spare = path.times.len().saturating_sub(complete * views);
+        let (count, spare) = (path.times.len(), path.times.len() % views);
         if spare > 0 {
-            let all = counted(path.times.len(), "camera");
+            let all = counted(count, "camera");
+            let fate = ["are not used", "take turns"][usize::from(count < views)];
             note(&format!(
                 "{name}: the last {spare} of {all} of '{path_name}' fill no frame of {views} views and \
-                 are not used"
+                 {fate}"
             ));
         }
         if late > 0 {

@@ -9,7 +9,7 @@ use super::{CameraPath, LensDefaults};
 use crate::camera::{Camera, FARTHEST, Frame, Lens, LensKind, PlaneOptions, ViewProjection};
 use crate::input::note;
 use crate::scene::{Scene, UpAxis};
-use crate::shown::counted;
+use crate::shown::{counted, significant};
 
 /// Lenses of all cameras. Pairs are the least and the largest value.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
@@ -304,10 +304,11 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     let far: Vec<f64> = cameras.iter().filter_map(outside).collect();
     let farthest = far.iter().copied().reduce(f64::max)?;
     Some(format!(
-        "{} more than {FAR_OUTSIDE} scene diagonals outside of {}, up to {farthest:.3e}; expected \
-         the scene's unit and axes",
+        "{} more than {FAR_OUTSIDE} scene diagonals outside of {} as loaded, up to {}; expected the \
+         scene's unit and axes",
         share(far.len(), cameras),
-        scene.name
+        scene.name,
+        significant(farthest)
     ))
 }
 
@@ -329,6 +330,10 @@ fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {
             (some, all) if some < cameras.len() => format!("{some} of {all}"),
             (_, all) => all,
         };
-        format!("nothing of {} is visible in any of {views}", scene.name)
+        // Items may come into view once they move.
+        format!(
+            "nothing of {} as loaded is visible in any of {views}",
+            scene.name
+        )
     })
 }

@@ -286,8 +286,9 @@ fn of_a_large_scene_some_views_are_tested_for_items() {
     for Camera { frame, .. } in &mut cameras {
         *frame = Frame::looking_along(frame.eye, -frame.forward(), frame.v()).unwrap();
     }
-    let nothing =
-        |views: &str| format!("p: nothing of uniform:n=100000 is visible in any of {views}");
+    let nothing = |views: &str| {
+        format!("p: nothing of uniform:n=100000 as loaded is visible in any of {views}")
+    };
     let told = |cameras: &[Camera]| warnings(&scene, "p", cameras);
     assert_eq!(told(&cameras), [nothing("125 of 250 views")]);
     assert_eq!(told(&cameras[..200]), [nothing("200 views")]);

@@ -313,10 +313,11 @@ fn why_unmeasured(old: Option<f64>, new: Option<f64>) -> String {
 }
 
 fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
-    if processes[0].min(processes[1]) < LEAST_PROCESSES {
-        return Some("under three processes on a side".to_owned());
-    }
-    (!has_others).then(|| FEW_OTHERS.to_owned())
+    let is_short = processes[0].min(processes[1]) < LEAST_PROCESSES;
+    let few = is_short.then_some("under three processes on a side");
+    let whys = few.into_iter().chain((!has_others).then_some(FEW_OTHERS));
+    let whys: Vec<&str> = whys.collect();
+    (!whys.is_empty()).then(|| whys.join(", "))
 }
 
 /// Per process, the mean over the groups of the median over the structures;

@@ -240,6 +240,14 @@ impl Changes {
         rows.filter(|row| row.outcome == outcome).count()
     }
 
+    /// The common shift, if its interval lies beyond the threshold.
+    pub fn proven_shift(&self) -> Option<CommonShift> {
+        let most = 1.0 + self.threshold;
+        let is_faster = |upper: f64| upper * most < 1.0;
+        let is_beyond = |s: &CommonShift| s.lower > Some(most) || s.upper.is_some_and(is_faster);
+        self.common_shift.filter(is_beyond)
+    }
+
     /// Returns true if NEW holds a wrong answer, with or without a partner in OLD.
     pub fn is_wrong(&self) -> bool {
         let paired = self.rows.iter().map(|row| row.new_status);

@@ -144,7 +144,8 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         (
             "compare --against scene.csv --metric build_ms",
-            "'--metric <LIST>' | cannot be used with | '--against <BINARY>' | expected",
+            "'--metric <LIST>' | cannot be used with | '--against <BINARY>' | expected cullbench \
+             compare --against <BINARY>",
         ),
         (
             "advise --scene scene.csv --path orbit --draw-ns x",

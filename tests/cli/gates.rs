@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::compare::{COMPARE, bvh, cells, compare, last_line, row_with, scale, with_change};
+use super::compare::{self, COMPARE, bvh, cells, compare, last_line, row_with, scale, with_change};
 use super::process::*;
 
 /// The bvh on the orbit with this many times the planes tested.
@@ -114,6 +114,33 @@ fn inconclusive_fails_where_it_shall() {
         done.contains("<summary>cullbench: no regression: 0 slower"),
         "{done}"
     );
+}
+
+#[test]
+fn a_shift_of_most_structures_is_no_bare_verdict() {
+    let most = with_change(|new| {
+        let all = cells(new).iter_mut();
+        let trees = all.filter(|cell| cell["structure"] != "linear");
+        trees.for_each(|cell| scale(cell, "query_ns", 1.5));
+    });
+    let text = compare(most.path(), "", 0);
+    assert_eq!(compare::rows(&text, "faster than the others"), 2, "{text}");
+    let verdict = "among the structures; query_ns as a whole changed by +50.0 %, which is not \
+        judged here (use compare --against): 0 slower, 0 inconclusive, 2 faster, 8 same of 10";
+    let wanted = format!("No regression {verdict}");
+    assert!(unwrapped(&text).contains(&wanted), "{text}");
+    for (options, word, code) in [
+        ("", "no regression", 0),
+        ("--fail-inconclusive", "inconclusive", 3),
+    ] {
+        let text = compare(most.path(), &format!("{options} --markdown"), code);
+        let wanted = format!("<summary>cullbench: {word} {verdict}");
+        assert!(text.contains(&wanted), "{text}");
+    }
+    let one = with_change(|new| scale(bvh(new), "query_ns", 0.5));
+    let text = compare(one.path(), "--fail-inconclusive", 0);
+    assert_eq!(compare::rows(&text, "faster"), 1, "{text}");
+    assert!(text.contains("No regression: "), "{text}");
 }
 
 const RUN: &str = "run --scene uniform:n=50 --path orbit:frames=4 --structure linear,bvh \

@@ -288,11 +288,11 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
         ),
         (
             "far.csv",
-            "far.csv: 1 of 1 camera more than 3 scene diagonals outside of z.csv",
+            "far.csv: 1 of 1 camera more than 3 scene diagonals outside of z.csv as loaded, up to",
         ),
         (
             "away.csv",
-            "away.csv: nothing of z.csv is visible in any of 1 view",
+            "away.csv: nothing of z.csv as loaded is visible in any of 1 view",
         ),
         (
             "sheared.csv --matrix-convention column-gl",

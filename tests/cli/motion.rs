@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use serde_json::Value;
+
 use super::process::*;
 use super::runs::{cells, report};
 use super::{BOXES, EYE_LOOK};
@@ -132,6 +134,10 @@ fn times_and_cameras_that_are_not_used_are_said() {
     };
     let folder = folder(&[
         ("scene.csv", format!("{BOXES}\n0,0,0,1,1,1\n").as_bytes()),
+        (
+            "one.csv",
+            format!("{EYE_LOOK},time_s\n-9,0.5,0.5,0,0.5,0.5,0\n").as_bytes(),
+        ),
         ("all.csv", cameras(["0", "1", "2"]).as_bytes()),
         ("some.csv", cameras(["0", "", "2"]).as_bytes()),
         (
@@ -142,6 +148,10 @@ fn times_and_cameras_that_are_not_used_are_said() {
     let run =
         "run --scene scene.csv --structure linear --processes 1 --motion motion.csv --views 2";
     for (path, wanted) in [
+        (
+            "one",
+            "the last 1 of 1 camera of 'one.csv' fill no frame of 2 views and take turns",
+        ),
         (
             "all",
             "the last 1 of 3 cameras of 'all.csv' fill no frame of 2",
@@ -214,6 +224,9 @@ fn a_motion_is_an_axis_of_a_run() {
         &format!("{PLAN} --path spin:frames=4 --shard 2/2 --out b"),
     );
     works(folder.path(), "merge a b --out both");
+    let none = cullbench(folder.path(), &format!("{PLAN} --shard 2/2 --out none"));
+    let wanted = "this shard has no scene; expected a shard per scene and path at most";
+    assert_refused(&none, wanted, "none");
     assert_eq!(cells(&report(&at("both"))).len(), 16);
 
     let same = works(folder.path(), "compare r r --format json");
@@ -316,11 +329,31 @@ fn motions_that_cannot_be_measured_are_refused() {
 fn fat_bounds_are_not_said_to_return_the_sets_of_the_scan() {
     let folder = folder(&[]);
     let line = "run --scene city:n=300 --path orbit:frames=4 --structure linear,wide --no-bounds \
-                --motion drift:share=0.5,frames=6 --processes 1 --update";
+                --motion drift:share=0.5,frames=6 --processes 1 --out r --update";
     for (update, says) in [("fat=1", false), ("refit,fat=1", true)] {
         let told = unwrapped(&works(folder.path(), &format!("{line} {update}")));
         assert_eq!(told.contains("All structures returned"), says, "{told}");
         assert!(told.contains("fat bounds return more"), "{told}");
+        let whole = json(&fs::read_to_string(folder.path().join("r/report.json")).expect("there"));
+        let value = |cell: &Value, name: &str| cell["metrics"][name]["value"].as_f64();
+        let all = cells(&whole)
+            .iter()
+            .filter(|cell| value(cell, "fat_excess").is_some());
+        for cell in all.clone() {
+            let name = cell["structure"].as_str().expect("a name");
+            let samples = fs::read_to_string(folder.path().join("r/samples.csv")).expect("there");
+            let frames = rows(&samples).into_iter().filter(|row| {
+                row["structure"] == name && row["task"] == "frame" && row["round"] == "0"
+            });
+            let returned: Vec<f64> = frames.map(|row| row["returned"].parse().unwrap()).collect();
+            let mean = returned.iter().sum::<f64>() / returned.len() as f64;
+            assert_eq!(value(cell, "visible_count"), Some(mean), "{cell}");
+            let per = value(cell, "query_ns").unwrap() / mean;
+            let found = value(cell, "ns_per_visible").unwrap();
+            assert!((found / per - 1.0).abs() < 1e-9, "{cell}");
+            assert!(value(cell, "fat_excess") > Some(0.0));
+        }
+        assert_eq!(all.count(), 2);
         assert_eq!(
             told.contains("no structure with exact bounds"),
             !says,

@@ -145,6 +145,7 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     let report =
         json(&fs::read_to_string(folder.path().join("old/report.json")).expect("a report"));
     let mut new = report.clone();
+    new["run"]["id"] = json!("another");
     new["run"]["started_at"] = json!("2999-01-01T00:00:00Z");
     new["source"]["commit"] = json!("fedcba9876543210");
     new["source"]["dirty"] = json!(false);
@@ -156,6 +157,8 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     }
     fs::write(folder.path().join("new.json"), new.to_string()).expect("writable");
     works(folder.path(), "report new.json old --history page.html");
+    let twice = cullbench(folder.path(), "report old old --history twice.html");
+    assert_refused(&twice, "run | is named twice; expected each once", "twice");
     let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
     assert_well_formed(&page);
     assert!(page.contains("of 2 runs, 2 of 2 times took longer and 0 took less time"));

@@ -117,6 +117,45 @@ fn frames_are_measured_as_one_thing_and_in_parts() {
 }
 
 #[test]
+fn a_twin_gets_the_rounds_of_its_original() {
+    let scene = scene::load("city:n=300", &Default::default()).unwrap();
+    let way = path::load("orbit:frames=7", &scene, &Default::default()).unwrap();
+    let motion = Motion::load("drift:frames=3", &scene).unwrap();
+    let workload = Workload::moving(&scene, &way, &Culling::default(), Some(motion), 1).unwrap();
+    let motion = workload.motion.as_ref().unwrap();
+    let frames = Frames::new(&workload, motion, None, &|| false).unwrap();
+    let test = CullingTest::SixPlane;
+    let subjects = [("linear", false), ("wide", false), ("wide", true)].map(|(name, is_twin)| {
+        Subject::build(StructureSpec::parse(name).unwrap(), is_twin, &scene, test)
+    });
+    // An interruption doubled the time of one replay.
+    let times = [8e5, 4e5, 2e5];
+    let entries = subjects
+        .iter()
+        .zip(times)
+        .map(|(subject, replay_ns)| Entry {
+            subject,
+            part: SubjectPart::of(subject, Verdict::ok()),
+            replay_ns,
+            rounds: Vec::new(),
+        });
+    let protocol = Protocol {
+        rounds: [2, 40],
+        task_ns: 1.6e6,
+        cameras: 8,
+        cold: false,
+        seed: 1,
+        cache_bytes: 0,
+    };
+    let planned = schedule(&entries.collect::<Vec<_>>(), &frames, &protocol);
+    let every = |label: &str| {
+        let at = planned.keys.iter().position(|key| key.0 == label).unwrap();
+        planned.schedule.tasks[at].every
+    };
+    assert_eq!(["linear", "wide", "wide#twin"].map(every), [4, 1, 1]);
+}
+
+#[test]
 fn spheres_move_as_cubes() {
     let specs = Registry::builtin().structures("linear,bvh").unwrap();
     let part = part(
@@ -205,5 +244,9 @@ fn policies_are_right_and_fat_bounds_say_what_they_cost() {
         assert!(cells[..3].iter().all(|cell| cell.rank.is_some()));
         assert_eq!((extra(0), cells[3].rank), (None, None));
         assert!(extra(3) > Some(0.0));
+        // The tenth frame of every=5 has a new build.
+        let aged = |n: usize, frame| cells[n].value(&format!("ageing_{frame}")).is_some();
+        assert_eq!([0, 1, 2].map(|n| aged(n, 10)), [true, false, false]);
+        assert!(aged(0, 1) && !aged(2, 1));
     }
 }

@@ -97,6 +97,19 @@ fn one_process_and_few_others_are_inconclusive() {
         assert!(b.reason.as_ref().unwrap().contains("under three processes"));
         assert!(!found.is_regression());
     }
+    // Both reasons hold: more processes alone would not decide.
+    let [mut old, mut new] = [all(1, 1.0), all(1, 1.0)];
+    for report in [&mut old, &mut new] {
+        report.cells.truncate(3);
+    }
+    let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
+    let both = format!("under three processes on a side, {FEW_OTHERS}");
+    assert!(
+        found
+            .rows
+            .iter()
+            .all(|row| row.reason.as_ref() == Some(&both))
+    );
     // Two of three structures: which of them moved is not known.
     let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
     new.cells[1] = timed("b", 500.0, 10, 1.0);
