@@ -270,7 +270,7 @@ pub(super) fn times_of(laps: &Laps, kind: TaskKind, workload: &Workload) -> [f64
     })
 }
 
-/// Times and number of returned items of each frame of one replay; `Ok(None)` if stopped.
+/// Times and returned items of each frame of a replay; `Ok(None)` if stopped.
 pub(super) fn replay(
     spec: &StructureSpec,
     frames: &Frames,

@@ -233,7 +233,7 @@ impl<'p> MergedParts<'p> {
         let moving = "query_ns_p95, locate_ns: not measured of items that move";
         let untimed = "query_ns: no time in some process";
         let unsearched = "locate_ns: this suite times frustum queries only";
-        let rebuilt = "ageing_10: not measured with rebuilds, after which it begins anew";
+        let rebuilt = "ageing_10: not measured with rebuilds, after which it begins again";
         let reasons = [
             (moves, moving),
             (moves && label.contains("@every="), rebuilt),

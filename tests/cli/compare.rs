@@ -96,7 +96,8 @@ pub fn compare(folder: &Path, options: &str, code: i32) -> String {
 /// Counts of the last sentence: "1 slower, .. of 10 cells".
 pub fn last_line(text: &str) -> String {
     let text = unwrapped(text.trim_end());
-    let (_, counts) = text.rsplit_once("egression: ").unwrap_or(("", &text));
+    let (_, verdict) = text.rsplit_once("egression").unwrap_or(("", &text));
+    let (_, counts) = verdict.split_once(": ").unwrap_or(("", verdict));
     counts
         .split("; worst")
         .next()
