@@ -110,8 +110,7 @@ impl Beside {
             here,
             changed: Vec::new(),
         };
-        let mut wanted = vec![(None, 0.0)];
-        wanted.truncate(usize::from(!beside.policies.is_empty()));
+        let mut wanted = vec![(None, 0.0); usize::from(!beside.policies.is_empty())];
         // A choice needs two.
         let axes = AXES.into_iter().zip(here);
         for ((axis, values), here) in axes.filter(|_| beside.contenders.len() > 1) {
@@ -132,13 +131,11 @@ impl Beside {
                 known: None,
             };
             // No such workload: a share that the cameras do not reach, a recorded motion.
-            let Some((reached, part)) = changed.measured(input, &beside) else {
-                continue;
-            };
-            changed.known.clone_from(&part.known);
-            changed.reached = reached;
-            beside.changed.push(changed);
-            parts.push(part);
+            if let Some((reached, part)) = changed.measured(input, &beside) {
+                (changed.reached, changed.known) = (reached, part.known.clone());
+                beside.changed.push(changed);
+                parts.push(part);
+            }
         }
         (beside, parts)
     }

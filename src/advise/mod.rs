@@ -264,12 +264,11 @@ impl<'c> Entered<'c> {
         let mut rules = Vec::with_capacity(RULES.len());
         for rule in RULES {
             progress(rule.name);
-            let draft = match (rule.prepare)(&mut trials) {
+            rules.push(match (rule.prepare)(&mut trials) {
                 Err(Unfit::Failed(error)) => return Err(error),
-                Err(Unfit::NotApplicable(reason)) => Err(reason),
-                Ok(draft) => Ok(draft),
-            };
-            rules.push((rule, draft));
+                Err(Unfit::NotApplicable(reason)) => (rule, Err(reason)),
+                Ok(draft) => (rule, Ok(draft)),
+            });
         }
         Ok(Entered {
             tests: choice::enter_tests(&mut trials)?,

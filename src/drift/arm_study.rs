@@ -37,7 +37,7 @@ fn is_stable(method: &Method, zeta: f64, h: f64) -> bool {
         stop: f64::INFINITY,
     };
     let column = |start| (method.step)(&arm, &Line::default(), 0.0, start, h);
-    let ([a, c], [b, d]) = (column([1.0, 0.0]), column([0.0, 1.0]));
+    let [[a, c], [b, d]] = [[1.0, 0.0], [0.0, 1.0]].map(column);
     let (trace, determinant) = (a + d, a * d - b * c);
     trace.abs() <= 1.0 + determinant + SLACK && determinant <= 1.0 + SLACK
 }

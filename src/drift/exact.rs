@@ -60,10 +60,9 @@ impl Matrix {
         let (sin, cos) = sin_cos_degrees(degrees);
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut turn = Matrix::identity();
-        turn.0[next][next] = cos.clone();
-        turn.0[last][last] = cos;
         turn.0[last][next] = -&sin;
         turn.0[next][last] = sin;
+        (turn.0[next][next], turn.0[last][last]) = (cos.clone(), cos);
         turn
     }
 

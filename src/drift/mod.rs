@@ -132,9 +132,8 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
         begin(method.name);
         let drifts = periods.iter().map(|period| method.drift(period));
         report.rotation.extend(drifts);
-        report
-            .one_degree_turns
-            .extend(TURNS.map(|turns| method.turn_drift(turns)));
+        let turns = TURNS.map(|turns| method.turn_drift(turns));
+        report.one_degree_turns.extend(turns);
     }
     let mut points = Vec::new();
     for setting in arm_study::settings(&options.arm) {

@@ -216,9 +216,8 @@ impl Sheet<'_> {
         })
         .map_err(|text| format!("panicked: {text}"))?;
         if plain != counted {
-            return Err(format!(
-                "counting changes the answer: {plain:?}, {counted:?}"
-            ));
+            let both = format!("{plain:?}, {counted:?}");
+            return Err(format!("counting changes the answer: {both}"));
         }
         let name = |id: u32| match (self.items.get(id as usize), self.names.get(id as usize)) {
             (Some(b), Some(name)) => keep(b).then(|| name.clone()),

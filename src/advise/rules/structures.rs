@@ -98,9 +98,8 @@ pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
     let scene = case.scene();
     if case.workload.motion.is_some() {
-        return Err(not_applicable(
-            "the frames of the motion decide on rebuilds",
-        ));
+        let why = "the frames of the motion decide on rebuilds";
+        return Err(not_applicable(why));
     }
     let mut items = scene.items.clone();
     let moved = move_share(&mut items, case.options.moved);

@@ -172,11 +172,8 @@ pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     let best = index.visible(volume);
     let is_same = best == plain || sorted(best.clone()) == sorted(plain.to_vec());
     ensure(is_same, || {
-        let (best, kernel) = (best.len(), Kernel::best().name());
-        format!(
-            "{kind}: {best} ids by {kernel}, other {} by portable",
-            plain.len()
-        )
+        let (best, kernel, plain) = (best.len(), Kernel::best().name(), plain.len());
+        format!("{kind}: {best} ids by {kernel}, other {plain} by portable")
     })?;
     let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
     let _ = ask(index, volume, &mut ids, &mut cost);
