@@ -17,8 +17,9 @@ use serde::{Deserialize, Serialize};
 pub use change::{Axis, Beside, Change};
 pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
 pub use motion::{MotionChoice, policy_of};
-pub use omission::{Check, Omission};
+pub use omission::Check;
 pub use options::{AdviseInput, AdviseOptions};
+pub use rule::Omission;
 
 use crate::culling::CullingTest;
 use crate::funnel::{self, FunnelPlan, StudyError};

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::change::Change;
 use super::choice::{StructureChoice, TestChoice};
-use super::omission::{By, Check, Decision, LeftOutIf, Omission, is_longer};
+use super::omission::{By, Check, Decision, LeftOutIf, is_longer};
 use super::trials::{Answered, Sides, Trials};
 use crate::funnel::{FunnelReport, StudyError};
 use crate::measure::OverProcesses;
@@ -234,6 +234,82 @@ impl Rule {
         }
         omission.decision = finding.decision.unwrap_or(omission.decision);
         omission
+    }
+}
+
+/// A feature that may be left out, with the decision.
+#[derive(Clone, Debug, Serialize)]
+pub struct Omission {
+    /// Its rule: names of feature and statistic.
+    #[serde(flatten)]
+    pub rule: &'static Rule,
+    /// Time kept and left out, with all that follows from it, ns.
+    #[serde(skip)]
+    pub cost_ns: Option<[f64; 2]>,
+    /// Assumption or error that decides, in a few words.
+    #[serde(skip)]
+    pub note: String,
+    /// `true` if the choice of the structure or test decides, not the clock.
+    #[serde(skip)]
+    pub is_chosen: bool,
+    /// Null where the rule does not apply to this scene.
+    pub statistic: Option<f64>,
+    /// Null without a statistic.
+    pub threshold: Option<f64>,
+    /// `true` if statistic and threshold leave out.
+    pub predicted: Option<bool>,
+    /// Share of the time that leaving it out saves; negative where it costs.
+    pub saving: Option<f64>,
+    /// Decision from statistic, clock and answers.
+    pub decision: Decision,
+    /// `true` if the measurement agrees with the rule.
+    ///
+    /// The clock, or for the axes beyond six planes the test that is taken. Null for a tie,
+    /// and where neither decides.
+    pub confirmed: Option<bool>,
+    /// The decision in a sentence.
+    pub reason: String,
+    /// Measurements with and without the feature; the first one decides.
+    pub checks: Vec<Check>,
+    /// `true` if the processes do not tell the costs with and without it apart.
+    #[serde(rename = "tie")]
+    pub is_tie: bool,
+}
+
+impl Omission {
+    /// Returns `true` if the feature is needed; `None` where the rule does not apply.
+    pub fn is_needed(&self) -> Option<bool> {
+        match self.decision {
+            Decision::LeaveOut => Some(self.rule.is_saving),
+            Decision::Keep => Some(!self.rule.is_saving),
+            Decision::NotApplicable => None,
+        }
+    }
+
+    /// Time with and without the feature, with all that follows from it, ns.
+    pub fn sides_ns(&self) -> [f64; 2] {
+        let mut sides = self.cost_ns.unwrap_or([f64::NAN; 2]);
+        if self.rule.is_saving {
+            sides.reverse();
+        }
+        sides
+    }
+
+    /// Decides by the clock or the rule; a side that misses more is never taken.
+    pub(super) fn decide(&mut self, predicted: bool) {
+        let mut leave_out = predicted;
+        if let Some(check) = self.checks.first() {
+            if self.rule.by == By::Time {
+                self.confirmed = check.pays.map(|pays| pays == predicted);
+                leave_out = check.pays.unwrap_or(predicted);
+            }
+            if check.loses() || check.is_wrong() {
+                leave_out = false;
+                self.reason += "; without it, something visible would be missed";
+                self.note = "without, items are missed".to_owned();
+            }
+        }
+        self.decision = Decision::of(leave_out);
     }
 }
 

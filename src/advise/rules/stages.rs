@@ -152,8 +152,8 @@ fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::omission::{By, Decision, LeftOutIf, Omission};
-    use super::super::super::rule::some_rule;
+    use super::super::super::omission::{By, Decision, LeftOutIf};
+    use super::super::super::rule::{Omission, some_rule};
     use super::*;
     use crate::statistics::Estimate;
 
