@@ -1,4 +1,4 @@
-//! What an omission is decided by: both sides as measured, and the decision.
+//! Decisions of omissions: both sides as measured, and their judge.
 
 use serde::Serialize;
 
