@@ -462,7 +462,7 @@ fn the_advice_fits_eighty_columns_and_the_evidence_is_asked_for() {
     let is_cut = |line: &str| line.starts_with(['[', '/']) || line.starts_with("extras");
     assert!(!all.lines().any(is_cut), "{all}");
     for feature in ["plane masks", "index", "portals", "basis correction"] {
-        assert!(all.contains(&format!("\n{feature} ")), "{feature}: {all}");
+        assert!(all.contains(&format!("\n  {feature} ")), "{feature}: {all}");
     }
     // One vocabulary: needed or not, with and without.
     for word in ["leave out", "left out", "keep", "kept"] {
