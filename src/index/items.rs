@@ -144,6 +144,11 @@ impl Dirty {
         Dirty(vec![0; nodes.div_ceil(64)])
     }
 
+    /// Makes it a set of as many nodes, more than now.
+    pub fn lengthen(&mut self, nodes: usize) {
+        self.0.resize(nodes.div_ceil(64), 0);
+    }
+
     /// Adds a node; returns whether it is new.
     #[inline(always)]
     pub fn mark(&mut self, node: usize) -> bool {

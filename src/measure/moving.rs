@@ -282,6 +282,10 @@ pub(super) fn replay(
     let mut all = Vec::with_capacity(frames.motion.frames());
     let all_threads = spec.is_threaded();
     let clock = Stopwatch::empty_lap(all_threads);
+    // Memory of answers and traversals is no part of the first frame.
+    for ((_, view), out) in frames.views(0).zip(&mut outs) {
+        moving.index.query(view.as_any(), out);
+    }
     for frame in 0.. {
         if !moving.take_moves() {
             break;

@@ -37,6 +37,9 @@ const GROWTH: f32 = 0.25;
 /// The same of a region for the centres of its movers.
 const REGION_GROWTH: f32 = 0.125;
 
+/// Leaves of movers / those that are added when all are in use: no update is much slower.
+const MORE: usize = 16;
+
 /// Leaves of movers from which on a region is crowded.
 const CROWDED: usize = 32;
 
@@ -145,9 +148,11 @@ impl Moving {
         let parts = if leaves < 1024 { 8 } else { 32 };
         self.finest = (span / parts).max(1);
         let first_free = leaves.div_ceil(self.finest);
-        let count = first_free + first_free / 8 + 1;
+        // Leaves that are added later are in the order of space only among themselves.
+        let count = 2 * first_free + 1;
         let new = Wide::unfilled(&vec![ABSENT; count * LANES]);
         let before = std::mem::replace(&mut self.movers, new);
+        self.movers.blocks.reserve(2 * leaves + count);
         self.changed = self.movers.untouched();
         self.regions.clear();
         self.leaves = vec![MoverLeaf::default(); count];
@@ -363,15 +368,11 @@ impl Moving {
     fn free_leaf(&mut self, region: usize) -> usize {
         if self.free_leaves.is_empty() {
             let count = self.leaves.len();
-            let more = count + count.div_ceil(2);
-            let mut ids = self.movers.ids.to_vec();
-            ids.resize(more * LANES, ABSENT);
-            let smaller = std::mem::replace(&mut self.movers, Wide::unfilled(&ids));
-            self.movers.blocks[..count].copy_from_slice(&smaller.blocks[..count]);
+            let more = count + count.div_ceil(MORE);
+            self.movers.lengthen(more);
+            self.changed.lengthen(more);
             self.leaves.resize(more, MoverLeaf::default());
             self.free_leaves.extend(count as u32..more as u32);
-            self.changed = self.movers.untouched();
-            (0..count).for_each(|leaf| _ = self.changed.mark(leaf));
         }
         let regular = self.region_of.len().div_ceil(self.finest);
         let own = self.regions[region].first / self.finest;

@@ -1,7 +1,8 @@
 //! Refit of the wide tree: lanes of moved items, then the blocks above them.
 
 use super::Wide;
-use crate::geometry::{Aabb, LANES, LaneMask};
+use super::levels::Level;
+use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask};
 use crate::index::items::{ABSENT, Dirty};
 use crate::query::ItemId;
 
@@ -41,6 +42,29 @@ impl Wide {
     /// No leaf, for [`Wide::fit_above`].
     pub(super) fn untouched(&self) -> Dirty {
         Dirty::none(self.levels.first().map_or(0, |leaves| leaves.blocks))
+    }
+
+    /// Appends vacant leaves, in place as far as there is room.
+    pub(super) fn lengthen(&mut self, leaves: usize) {
+        let (held, top) = (self.ids.len(), self.top());
+        (held..leaves * LANES).for_each(|_| self.ids.push(ABSENT));
+        self.vacant += self.ids.len() - held;
+        self.occupied.resize(leaves, 0);
+        let before = std::mem::replace(&mut self.levels, Level::over(self.ids.len()));
+        let blocks = self.levels.last().map_or(0, Level::end);
+        self.blocks.resize(blocks, BoxBlock::EMPTY);
+        // The highest first: each moves on over those above it.
+        for (k, level) in self.levels.iter().enumerate().rev() {
+            let mut end = level.first;
+            if let Some(old) = before.get(k) {
+                self.blocks.copy_within(old.first..old.end(), end);
+                end += old.blocks;
+            }
+            self.blocks[end..level.end()].fill(BoxBlock::EMPTY);
+        }
+        if self.levels.len() > before.len() {
+            self.blocks[blocks - 1].set(0, &top);
+        }
     }
 
     /// Sets the item of a lane; no item with the id [`ABSENT`].
@@ -102,6 +126,32 @@ mod tests {
         let mut near = || (rng.next_u32() % 997) as f32;
         let low = Vec3::new(near(), near(), near());
         Aabb::new(low, low + Vec3::splat(near() / 50.0))
+    }
+
+    #[test]
+    fn a_longer_tree_has_the_blocks_of_one_that_was_built_longer() {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(4);
+        for (count, leaves) in [(32_usize, 4), (250, 16), (250, 17), (5000, 400)] {
+            let items: Vec<Aabb> = (0..count).map(|_| cube(&mut rng)).collect();
+            let mut ids: Vec<ItemId> = (0..count as u32).collect();
+            ids.resize(count.next_multiple_of(LANES), ABSENT);
+            let place = |tree: &mut Wide| {
+                let mut changed = tree.untouched();
+                for (at, item) in items.iter().enumerate() {
+                    tree.put(at, at as u32, item);
+                    changed.mark(at / LANES);
+                }
+                tree.fit_above(changed);
+            };
+            let mut longer = Wide::unfilled(&vec![ABSENT; ids.len()]);
+            place(&mut longer);
+            longer.lengthen(leaves);
+            let mut whole = Wide::unfilled(&vec![ABSENT; leaves * LANES]);
+            place(&mut whole);
+            assert!(longer.same_as(&whole), "{count} items, {leaves} leaves");
+            assert_eq!(longer.vacant, whole.vacant);
+            assert_eq!(longer.occupied, whole.occupied);
+        }
     }
 
     #[test]
