@@ -37,7 +37,7 @@ const GROWTH: f32 = 0.25;
 /// The same of a region for the centres of its movers.
 const REGION_GROWTH: f32 = 0.125;
 
-/// Leaves of movers / those that are added when all are in use: no update is much slower.
+/// Leaves of movers / those added when all are in use, which no update feels.
 const MORE: usize = 16;
 
 /// Leaves of movers from which on a region is crowded.
