@@ -1,9 +1,12 @@
 //! Quake III maps, and archives with scenes in them.
 
+use std::sync::Arc;
+
+use cullbench::camera::{Camera, Frame, Lens};
 use cullbench::index::{Input, Registry};
-use cullbench::scene::{LoadOptions, Regions, part_names, read_bytes, read_ibsp};
-use cullbench::visibility::Ray;
-use cullbench::visibility::region::{IdSet, Pvs, RegionGraph};
+use cullbench::scene::{CameraPlace, LoadOptions, Regions, part_names, read_bytes, read_ibsp};
+use cullbench::visibility::Rays;
+use cullbench::visibility::region::{Pvs, RegionGraph, RegionRow, Scratch};
 
 use crate::read;
 
@@ -28,7 +31,6 @@ pub fn ibsp(bytes: &[u8]) {
     let boxes = Input::new(scene.regions.boxes(&scene.items)).own_tree(scene.own_tree.as_ref());
     let index = read(structures[0].build(boxes));
     let graph = RegionGraph::of_quake(map);
-    let mut seen = IdSet::default();
     for place in &scene.places {
         let sought = scene.sought(place.eye);
         let wanted = scene.holding(&sought);
@@ -37,19 +39,31 @@ pub fn ibsp(bytes: &[u8]) {
             scene.search(&sought, &mut found, |p, out| index.locate(p, out));
             assert_eq!(found, wanted);
         }
-        let ray = Ray {
-            origin: place.eye,
-            direction: place.forward,
-            near: 0.0,
-            far: f64::INFINITY,
-        };
-        if graph.len() <= MOST {
-            seen.clear(graph.len());
-            graph.ground().follow(&graph, &ray, &mut seen);
-        }
     }
     if graph.len() <= MOST {
         assert!(Pvs::of_quake(map).is_none_or(|pvs| pvs.len() == graph.len()));
+        see_through(graph, &scene.places);
+    }
+}
+
+/// Finds what each place sees of the regions, by every search.
+pub fn see_through(graph: RegionGraph, places: &[CameraPlace]) {
+    let graph = Arc::new(graph);
+    let rows = RegionRow::searches(&graph);
+    let (mut scratch, mut found) = (Scratch::default(), Vec::new());
+    let lens = Lens::perspective(60.0, 1.5, 1.0, None).expect("a lens");
+    for place in places {
+        let up = place.forward.any_orthogonal_vector();
+        let Ok(frame) = Frame::looking_along(place.eye, place.forward, up) else {
+            continue;
+        };
+        let Ok(rays) = Rays::of(&Camera { frame, lens }) else {
+            continue;
+        };
+        for row in &rows {
+            row.from_eye(&rays, &mut scratch, &mut found);
+            assert!(found.is_sorted() && found.iter().all(|&id| (id as usize) < graph.len()));
+        }
     }
 }
 

@@ -5,7 +5,6 @@ use std::sync::LazyLock;
 use cullbench::index::Registry;
 use cullbench::scene::{FAMILIES, MESHES, Scene};
 use cullbench::spec::{Spec, nearest, parse_number};
-use cullbench::suite::Suite;
 use cullbench::visibility::fragment::CutOuts;
 use cullbench::{path, scene};
 
@@ -23,7 +22,6 @@ pub fn specs(bytes: &[u8]) {
     };
     // Files are read by other readers.
     for line in text.lines().filter(|line| !line.contains(['/', '\\'])) {
-        Suite::named(line);
         nearest(line, ["linear", "bvh"]);
         read(CutOuts::parse(line));
         structures(line);

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use cullbench::scene::{Scene, WadMap, map_names};
-use cullbench::visibility::Ray;
-use cullbench::visibility::region::IdSet;
 use cullbench::visibility::region::doom::DoomMap;
 
+use crate::maps::see_through as see_through_regions;
 use crate::read;
 
 /// Most linedefs, and most sectors: searches of larger maps take seconds.
@@ -35,18 +34,7 @@ fn see_through(map: Arc<DoomMap>, scene: &Scene) {
     let surfaces = map.surfaces(scene);
     assert_eq!(surfaces.items(), scene.items.len() + map.sectors.len());
     map.solid_boxes([-512.0, 512.0]);
-    let Ok(graph) = map.graph() else {
-        return;
-    };
-    let mut seen = IdSet::default();
-    for place in &scene.places {
-        let ray = Ray {
-            origin: place.eye,
-            direction: place.forward,
-            near: 0.0,
-            far: f64::INFINITY,
-        };
-        seen.clear(graph.len());
-        graph.ground().follow(&graph, &ray, &mut seen);
+    if let Ok(graph) = map.graph() {
+        see_through_regions(graph, &scene.places);
     }
 }
