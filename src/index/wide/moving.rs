@@ -152,7 +152,6 @@ impl Moving {
         let count = 2 * first_free + 1;
         let new = Wide::unfilled(&vec![ABSENT; count * LANES]);
         let before = std::mem::replace(&mut self.movers, new);
-        self.movers.blocks.reserve(2 * leaves + count);
         self.changed = self.movers.untouched();
         self.regions.clear();
         self.leaves = vec![MoverLeaf::default(); count];
