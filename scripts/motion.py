@@ -37,7 +37,7 @@ def measure(program):
             out = Path(folder) / "run"
             command = [program, "run", "--structure", "linear," + ",".join(OTHERS), "--no-bounds",
                        "--path", "flythrough:frames=24,visible=2%", "--views", str(views),
-                       "--processes", "1", "--out", str(out)]
+                       "--processes", "3", "--out", str(out)]
             for scene in SCENES:
                 command += ["--scene", scene]
             for motion in MOTIONS:
