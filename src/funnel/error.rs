@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::index::BuildError;
-use crate::input::{InputError, gigabytes};
+use crate::input::InputError;
 use crate::measure::WorkloadError;
-use crate::scene::available_bytes;
+use crate::scene::memory::{available_bytes, fits_into};
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::Rectangle;
 
@@ -18,35 +18,18 @@ pub enum StudyError {
     /// A camera has no frustum.
     #[error(transparent)]
     View(#[from] WorkloadError),
-    /// A motion, or the scene's file, read a second time.
+    /// Too little free memory, a motion, or the scene's file, read a second time.
     #[error(transparent)]
     Input(#[from] InputError),
     /// Options, cameras and scene that do not fit each other or the plan.
-    ///
-    /// Or too little free memory.
     #[error("{0}")]
     Refused(String),
 }
 
 /// Refuses a step that needs more memory than is free.
 pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), StudyError> {
-    check_fits([step, "fewer items or views"], needed, available_bytes())
-}
-
-/// Refuses what needs more memory than is available; unknown memory is no reason.
-pub fn check_fits(
-    [what, expected]: [&str; 2],
-    needed: u64,
-    available: Option<u64>,
-) -> Result<(), StudyError> {
-    match available.filter(|available| needed > *available) {
-        Some(available) => Err(StudyError::Refused(format!(
-            "{what}: about {} needed, {} are free; expected {expected}",
-            gigabytes(needed),
-            gigabytes(available)
-        ))),
-        None => Ok(()),
-    }
+    let told = [step, "", "fewer items or views"];
+    Ok(fits_into(available_bytes(), told, needed)?)
 }
 
 /// A row that is left out of a section of the report.

@@ -3,7 +3,7 @@
 //! All are compared with the truth, then timed side by side in one or more processes.
 
 use super::bounds::{bounds, covered_key};
-use super::error::{LeftOutRow, StudyError, check_fits, check_memory};
+use super::error::{LeftOutRow, StudyError, check_memory};
 use super::fragment_stage::{FragmentCounts, FragmentStage, Tested, mirrored};
 use super::item_stages::{ItemStages, PlanView};
 use super::orders::{OrderRow, Orders, SORTED};
@@ -14,9 +14,9 @@ use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, visible};
 use super::world::{FunnelInput, World};
-use crate::input::warn;
+use crate::input::{InputError, warn};
 use crate::measure::{ProcessTimes, Verdict};
-use crate::scene::available_bytes;
+use crate::scene::memory::{available_bytes, fits_into};
 use crate::visibility::{Level, SampleGrid};
 
 /// Bytes per sample of a view: rays, depths and ties of two images.
@@ -31,11 +31,11 @@ const BYTES_PER_SAMPLE: u64 = 450;
 const BYTES_PER_LEFT: f64 = 1600.0;
 
 /// Refuses images that need more memory than is available.
-fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), StudyError> {
+fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), InputError> {
     let SampleGrid { width, height } = grid;
     let needed = u64::from(width) * u64::from(height) * BYTES_PER_SAMPLE;
     let images = format!("--samples {width}x{height}");
-    check_fits([&images, "fewer samples"], needed, available)
+    fits_into(available, [&images, "", "fewer samples"], needed)
 }
 
 /// Everything that is timed, on the items that the chain leaves.
@@ -325,7 +325,7 @@ mod tests {
         let refused = fits(large, Some(8_000_000_000)).unwrap_err().to_string();
         assert_eq!(
             refused,
-            "--samples 16384x8192: about 60.4 GB needed, 8.0 GB are free; expected fewer samples"
+            "--samples 16384x8192: needs about 60.4 GB, 8.0 GB are free; expected fewer samples"
         );
         assert!(fits(large, Some(61_000_000_000)).is_ok() && fits(large, None).is_ok());
         assert!(fits(SampleGrid::new(320, 180), Some(1)).is_err());

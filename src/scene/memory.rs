@@ -59,18 +59,29 @@ pub fn check_fits(scene: &str, needed: u64, structures: u64, count: u64) -> Resu
 }
 
 fn fits(scene: &str, needed: u64, structures: u64, available: Option<u64>) -> Result<()> {
-    let Some(available) = available.filter(|available| needed > *available) else {
-        return Ok(());
-    };
     let (held, or_fewer) = match structures {
         0 => (String::new(), ""),
         1 => (" with 1 structure".to_owned(), ""),
         more => (format!(" with {more} structures"), " or fewer structures"),
     };
-    let (needed, free) = (gigabytes(needed), gigabytes(available));
-    Err(InputError::new(format_args!(
-        "{scene}: needs about {needed}{held}, {free} are free; expected a smaller input{or_fewer}"
-    )))
+    let expected = format!("a smaller input{or_fewer}");
+    fits_into(available, [scene, &held, &expected], needed)
+}
+
+/// Refuses what needs more memory than is available; unknown memory is no reason.
+pub(crate) fn fits_into(
+    available: Option<u64>,
+    [what, held, expected]: [&str; 3],
+    needed: u64,
+) -> Result<()> {
+    match available.filter(|available| needed > *available) {
+        None => Ok(()),
+        Some(free) => Err(InputError::new(format_args!(
+            "{what}: needs about {}{held}, {} are free; expected {expected}",
+            gigabytes(needed),
+            gigabytes(free)
+        ))),
+    }
 }
 
 /// Bytes that the system, the control groups and the limits of this process leave.
