@@ -61,11 +61,8 @@ impl Frame {
     /// An axis of length zero, or a value that is not finite; the frame is unchanged.
     pub fn orbit(&mut self, centre: DVec3, axis: DVec3, around: f64, over: f64) -> Result<()> {
         let found = format_args!("the axis of the orbit is zero or not finite");
-        require(
-            axis.is_finite() && axis != DVec3::ZERO,
-            found,
-            "a direction",
-        )?;
+        let is_direction = axis.is_finite() && axis != DVec3::ZERO;
+        require(is_direction, found, "a direction")?;
         check_finite("centre", centre)?;
         finite("the angle around", around)?;
         finite("the angle over", over)?;
@@ -100,11 +97,8 @@ impl Camera {
     /// A factor that is not above zero, or a lens that would have no window.
     pub fn zoom(&mut self, factor: f64) -> Result<()> {
         let found = format_args!("the zoom factor is {factor}");
-        require(
-            factor.is_finite() && factor > 0.0,
-            found,
-            "a number above 0",
-        )?;
+        let is_sound = factor.is_finite() && factor > 0.0;
+        require(is_sound, found, "a number above 0")?;
         let kind = match *self.lens.kind() {
             LensKind::Perspective { fovy_deg, aspect } => {
                 let half = libm::tan(fovy_deg.to_radians() / 2.0) / factor;

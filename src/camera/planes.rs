@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::margin::{LARGEST_SUM, Margin, TINY, check_sums, largest_sum};
 use super::projection::{double, single};
-use super::{Camera, CameraError, ClipSpace, Frame, Lens, LensKind, Result, require};
+use super::{Camera, CameraError, ClipSpace, Frame, LensKind, Result, require};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume, VolumeError,
 };
@@ -203,7 +203,7 @@ impl Camera {
     fn planes_f64(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, PlaneF64)> {
         match self.lens.kind() {
             LensKind::Matrix(matrix) => matrix.planes_about(zero),
-            _ => from_frame_f64(&self.frame_about(zero), &self.lens),
+            _ => double::from_frame(&self.frame_about(zero), &self.lens),
         }
     }
 
@@ -243,7 +243,7 @@ impl Camera {
                     "--planes frame, which takes these, or cameras by eye and lens",
                 ));
             }
-            PlaneMethod::FrameF32 => return Ok(from_frame_f32(frame, lens)),
+            PlaneMethod::FrameF32 => return Ok(single::from_frame(frame, lens)),
             PlaneMethod::GhGlF32 => single::planes(frame, lens, OpenGl),
             PlaneMethod::GhGlF64 => double::planes(frame, lens, OpenGl),
             PlaneMethod::GhD3dF32 => single::planes(frame, lens, D3d),
@@ -278,43 +278,3 @@ fn gathered(
 }
 
 type NamedPlanes = Vec<(FrustumPlane, Plane)>;
-
-/// The side planes pass through the eye along the window's edges (or, for an
-/// orthographic lens, stand beside it); near and far face each other.
-macro_rules! planes_from_frame {
-    ($name:ident, $float:ty, $vec:ty, $convert:expr, $plane:ty) => {
-        fn $name(frame: &Frame, lens: &Lens) -> Vec<(FrustumPlane, $plane)> {
-            let convert: fn(DVec3) -> $vec = $convert;
-            let (u, v, n) = (convert(frame.u()), convert(frame.v()), convert(frame.n()));
-            let eye = convert(frame.eye);
-            let [left, right, bottom, top] = lens.window().map(|edge| edge as $float);
-            let to_plane = <$plane>::new;
-            // The edge at `edge` along `axis`, seen from its inner side.
-            let side = |axis: $vec, edge: $float| {
-                if lens.is_orthographic() {
-                    return to_plane(axis, -axis.dot(eye) - edge);
-                }
-                let normal = (axis + n * edge) / (1.0 + edge * edge).sqrt();
-                to_plane(normal, -normal.dot(eye))
-            };
-            let mut planes = vec![
-                (FrustumPlane::Left, side(u, left)),
-                (FrustumPlane::Right, side(-u, -right)),
-                (FrustumPlane::Bottom, side(v, bottom)),
-                (FrustumPlane::Top, side(-v, -top)),
-                (
-                    FrustumPlane::Near,
-                    to_plane(-n, n.dot(eye) - lens.near() as $float),
-                ),
-            ];
-            if let Some(far) = lens.far() {
-                let far = to_plane(n, far as $float - n.dot(eye));
-                planes.push((FrustumPlane::Far, far));
-            }
-            planes
-        }
-    };
-}
-
-planes_from_frame!(from_frame_f64, f64, DVec3, |v| v, PlaneF64);
-planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane);

@@ -1,12 +1,12 @@
-//! Matrices through glam: the projections of OpenGL, of D3D and Vulkan, and
-//! with reversed Z, in f32 and f64, and the planes that Gribb and Hartmann
-//! read off them. The default path never needs a matrix; this file exists so
-//! that its error can be measured against the frame-derived planes.
+//! Planes of a view volume in f32 and f64: from the frame, and from matrices through
+//! glam: the projections of OpenGL, of D3D and Vulkan, and with reversed Z, off which
+//! Gribb and Hartmann read planes. The default path needs no matrix; they exist so that
+//! their error can be measured against the planes of the frame.
 
 use glam::{DMat4, DVec3, Vec3};
 
 use super::{Frame, Lens, LensKind};
-use crate::geometry::Plane;
+use crate::geometry::{FrustumPlane, Plane, PlaneF64};
 
 /// Depths that a projection maps near and far to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -24,7 +24,7 @@ pub enum ClipSpace {
 /// limit of its finite matrix. Only the cotangent is taken again: glam's sine and
 /// cosine are the platform's, and platforms round them differently.
 macro_rules! precision {
-    ($module:ident, $float:ty, $Vec:ident, $Vec4:ident, $Mat:ident, $glam:ident, $sin:ident, $cos:ident) => {
+    ($module:ident, $float:ty, $Vec:ident, $Vec4:ident, $Mat:ident, $Plane:ident, $glam:ident, $sin:ident, $cos:ident) => {
         pub mod $module {
             use glam::$glam::rh::proj::{directx, opengl};
             use glam::{$Mat, $Vec, $Vec4};
@@ -89,11 +89,44 @@ macro_rules! precision {
                 matrix
             }
 
+            /// Axes and eye as this precision has them.
+            fn rounded(frame: &Frame) -> [$Vec; 4] {
+                let convert = |v: DVec3| $Vec::from(v.to_array().map(|x| x as $float));
+                [frame.u(), frame.v(), frame.n(), frame.eye].map(convert)
+            }
+
+            /// The side planes pass through the eye along the window's edges (or, for an
+            /// orthographic lens, stand beside it); near and far face each other.
+            pub fn from_frame(frame: &Frame, lens: &Lens) -> Vec<(FrustumPlane, $Plane)> {
+                let [u, v, n, eye] = rounded(frame);
+                let [left, right, bottom, top] = lens.window().map(|edge| edge as $float);
+                // The edge at `edge` along `axis`, seen from its inner side.
+                let side = |axis: $Vec, edge: $float| {
+                    if lens.is_orthographic() {
+                        return $Plane::new(axis, -axis.dot(eye) - edge);
+                    }
+                    let normal = (axis + n * edge) / (1.0 + edge * edge).sqrt();
+                    $Plane::new(normal, -normal.dot(eye))
+                };
+                let near = $Plane::new(-n, n.dot(eye) - lens.near() as $float);
+                let mut planes = vec![
+                    (FrustumPlane::Left, side(u, left)),
+                    (FrustumPlane::Right, side(-u, -right)),
+                    (FrustumPlane::Bottom, side(v, bottom)),
+                    (FrustumPlane::Top, side(-v, -top)),
+                    (FrustumPlane::Near, near),
+                ];
+                planes.extend(lens.far().map(|far| {
+                    let far = $Plane::new(n, far as $float - n.dot(eye));
+                    (FrustumPlane::Far, far)
+                }));
+                planes
+            }
+
             /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
             /// the last column, of the frame and the eye as this precision has them.
             pub fn view(frame: &Frame) -> $Mat {
-                let convert = |v: DVec3| $Vec::from(v.to_array().map(|x| x as $float));
-                let [u, v, n, e] = [frame.u(), frame.v(), frame.n(), frame.eye].map(convert);
+                let [u, v, n, e] = rounded(frame);
                 $Mat::from_cols(
                     $Vec4::new(u.x, v.x, n.x, 0.0),
                     $Vec4::new(u.y, v.y, n.y, 0.0),
@@ -125,8 +158,10 @@ macro_rules! precision {
         }
     };
 }
-precision!(single, f32, Vec3, Vec4, Mat4, camera, sinf, cosf);
-precision!(double, f64, DVec3, DVec4, DMat4, dcamera, sin, cos);
+precision!(single, f32, Vec3, Vec4, Mat4, Plane, camera, sinf, cosf);
+precision!(
+    double, f64, DVec3, DVec4, DMat4, PlaneF64, dcamera, sin, cos
+);
 
 impl Frame {
     /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
