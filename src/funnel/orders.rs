@@ -29,7 +29,7 @@ use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 pub const SORTED: [&str; 2] = ["none", "box-distance"];
 
 /// A depth order over all views. Counts are means per view.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct OrderRow {
     /// Name in the table of orders.
     pub name: &'static str,
@@ -199,17 +199,8 @@ impl OrderRow {
         OrderRow {
             name: row.name,
             summary: row.summary,
-            fragment_count: 0.0,
-            shaded_count: 0.0,
-            covered_count: 0.0,
-            overdraw: None,
-            pair_count: 0.0,
-            wrong_pair_count: 0.0,
-            wrong_sample_count: 0.0,
-            cyclic_count: 0.0,
             guarantee: row.guarantee,
-            exceptions: BTreeMap::new(),
-            time: None,
+            ..OrderRow::default()
         }
     }
 

@@ -76,12 +76,9 @@ impl FunnelReport {
     /// Returns `true` for a task of the chain or of the chain without a stage.
     pub(super) fn needs(&self, key: &FunnelKey) -> bool {
         let mut chosen = self.stages.iter().filter(|row| row.is_chosen);
-        let mut of_gains = self
-            .gains
-            .iter()
-            .flat_map(|gain| gain.tasks.iter().flatten());
+        let mut of_gains = self.gains.iter().flat_map(|gain| &gain.tasks);
         chosen.any(|row| row.key(&self.chain).as_ref() == Some(key))
-            || of_gains.any(|own| own == key)
+            || of_gains.any(|tasks| tasks.contains(key))
     }
 }
 

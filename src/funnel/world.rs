@@ -344,11 +344,10 @@ fn regions(input: &FunnelInput) -> Result<Option<Regions>, StudyError> {
     let refused = match (Regions::of(input.scene), input.claim) {
         (Ok(mut regions), Some(claim)) => match regions.store(claim.clone(), Source::Claim) {
             true => return Ok(Some(regions)),
-            false => format!(
-                "the potentially visible set has {} regions; expected the scene's {}",
-                claim.len(),
-                regions.graph.len()
-            ),
+            false => {
+                let (own, all) = (claim.len(), regions.graph.len());
+                format!("the potentially visible set has {own} regions; expected the scene's {all}")
+            }
         },
         (regions, None) => return Ok(regions.ok()),
         (Err(None), _) => format!("'{name}' has no rooms or sectors; expected some for --pvs"),

@@ -155,14 +155,9 @@ const FAR_OUTSIDE: f64 = 3.0;
 
 /// One line for each kind of doubt about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
-    let found = [
-        rolled(scene, cameras),
-        unstraight(cameras),
-        mirrored(cameras),
-        far_outside(scene, cameras),
-        blind(scene, cameras),
-    ];
-    let found = found.into_iter().flatten();
+    let doubts: [fn(&Scene, &[Camera]) -> Option<String>; 5] =
+        [rolled, unstraight, mirrored, far_outside, blind];
+    let found = doubts.iter().filter_map(|doubt| doubt(scene, cameras));
     found.map(|doubt| format!("{path}: {doubt}")).collect()
 }
 
@@ -210,7 +205,7 @@ fn share(part: usize, cameras: &[Camera]) -> String {
 }
 
 /// Orthographic matrices of which the near end is not certain.
-fn mirrored(cameras: &[Camera]) -> Option<String> {
+fn mirrored(_: &Scene, cameras: &[Camera]) -> Option<String> {
     // Depths from 0 are refused where it matters.
     let is_doubtful = |camera: &&Camera| camera.may_be_reversed() && camera.unprojected().is_ok();
     let count = cameras.iter().filter(is_doubtful).count();
@@ -266,7 +261,7 @@ fn rolled_up(up: UpAxis, camera: &Camera) -> Option<DVec3> {
 }
 
 /// Matrices that are no camera's, and those whose transposes are.
-fn unstraight(cameras: &[Camera]) -> Option<String> {
+fn unstraight(_: &Scene, cameras: &[Camera]) -> Option<String> {
     let matrices = cameras.iter().filter_map(|c| match c.lens.kind() {
         LensKind::Matrix(matrix) if !matrix.is_straight() => Some(matrix),
         _ => None,

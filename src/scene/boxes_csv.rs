@@ -59,6 +59,7 @@ pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>> 
 }
 
 /// Content of a file, with its errors.
+#[derive(Default)]
 struct Rows {
     boxes: Vec<WorldBox>,
     /// Data row of each box.
@@ -92,7 +93,7 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
     let others = others.filter(|(i, _)| !columns.contains(i));
     let labels = others.map(|(i, name)| (i, Labels::new(name)));
     let mut labels: Vec<(usize, Labels)> = labels.collect();
-    let (mut boxes, mut kept, mut first_bad, mut bad) = (Vec::new(), Vec::new(), None, 0);
+    let mut rows = Rows::default();
     while let Some(row) = table.next_row() {
         let checked = row.and_then(|row| {
             let mut bounds = [0.0; 6];
@@ -121,22 +122,17 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
         });
         match checked {
             Ok(b) => {
-                kept.push((boxes.len() + bad) as ItemId);
-                boxes.push(b);
+                rows.kept.push((rows.boxes.len() + rows.bad) as ItemId);
+                rows.boxes.push(b);
             }
             Err(error) => {
-                bad += 1;
-                first_bad.get_or_insert(error);
+                rows.bad += 1;
+                rows.first_bad.get_or_insert(error);
             }
         }
     }
-    Ok(Rows {
-        boxes,
-        kept,
-        labels: labels.into_iter().map(|(_, label)| label).collect(),
-        first_bad,
-        bad,
-    })
+    rows.labels = labels.into_iter().map(|(_, label)| label).collect();
+    Ok(rows)
 }
 
 /// Writes a scene's boxes as they were written, in world coordinates, with its

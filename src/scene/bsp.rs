@@ -250,14 +250,11 @@ fn planar_bounds(polygon: &[DVec2]) -> Aabb {
         let beyond = Vec3::splat(f32::from(i16::MAX) * 2.0);
         return Aabb::new(beyond, beyond);
     };
-    let bounds = polygon
+    let (low, high) = polygon
         .iter()
         .fold((first, first), |(low, high), &p| (low.min(p), high.max(p)));
-    Aabb::rounded_outward(
-        (bounds.0 - CELL_MARGIN).extend(0.0),
-        (bounds.1 + CELL_MARGIN).extend(0.0),
-        DVec3::ZERO,
-    )
+    let (low, high) = (low - CELL_MARGIN, high + CELL_MARGIN);
+    Aabb::rounded_outward(low.extend(0.0), high.extend(0.0), DVec3::ZERO)
 }
 
 #[cfg(test)]

@@ -99,11 +99,8 @@ pub fn city(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let (block, street, corner) = (grid.block, grid.street, grid.corner);
     let pitch = block + street;
     let boxes = (0..n).map(|_| {
-        let cell = DVec3::new(
-            rng.below(grid.blocks) as f64,
-            rng.below(grid.blocks) as f64,
-            0.0,
-        );
+        let mut along = || rng.below(grid.blocks) as f64;
+        let cell = DVec3::new(along(), along(), 0.0);
         let low = cell * pitch + DVec3::new(corner, corner, 0.0);
         match rng.unit() < BUILDINGS {
             true => building(low, block, -corner, rng),
@@ -120,12 +117,8 @@ fn building(block_low: DVec3, block: f64, half_city: f64, rng: &mut SeededRng) -
     let centre = block_low + (cell + DVec3::new(0.5, 0.5, 0.0)) * plot;
     let downtown = 1.0 - (centre.x.abs().max(centre.y.abs()) / half_city).min(1.0);
     let floors = 2.0 + 4.0 * rng.unit() + 40.0 * downtown * downtown * rng.unit();
-    let size = DVec3::new(
-        rng.between(0.5, 0.95) * plot,
-        rng.between(0.5, 0.95) * plot,
-        3.0 * floors,
-    );
-    WorldBox::standing(centre, size)
+    let mut edge = || rng.between(0.5, 0.95) * plot;
+    WorldBox::standing(centre, DVec3::new(edge(), edge(), 3.0 * floors))
 }
 
 /// A lamp, bin, sign or car on the street that borders the block.

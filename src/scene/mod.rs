@@ -41,6 +41,8 @@ use crate::query::ItemId;
 pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
 pub use bsp::BspChild;
+#[cfg(feature = "cli")]
+pub(crate) use bsp::clipped;
 pub use disputes::{Dispute, Linedef};
 pub(crate) use families::CityGrid;
 pub(crate) use generate::COUNT;
@@ -312,10 +314,8 @@ impl Scene {
 /// coordinates stay round.
 fn choose_origin(boxes: impl Iterator<Item = WorldBox>) -> DVec3 {
     let finite = boxes.filter(|b| b.min.is_finite() && b.max.is_finite());
-    let WorldBox {
-        min: low,
-        max: high,
-    } = WorldBox::union_of(finite);
+    let bounds = WorldBox::union_of(finite);
+    let (low, high) = (bounds.min, bounds.max);
     let axis = |k: usize| {
         let (width, centre) = (high[k] - low[k], low[k] / 2.0 + high[k] / 2.0);
         // An empty scene's width is -inf and its centre NaN.

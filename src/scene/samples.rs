@@ -32,24 +32,20 @@ pub const NOTICE: &str = concat!(
     include_str!("../../datasets/freedm_LICENSE.txt")
 );
 
-macro_rules! samples {
-    ($($name:literal $file:literal $unit:literal $licence:literal, $summary:literal;)+) => {
-        rows! { Sample { name, file, unit, licence, summary, bytes }
-            $($name, $file, $unit, $licence, $summary, include_bytes!(concat!("../../datasets/", $file));)+
-        }
-    };
-}
-
 /// All of them, in the order of the quick suite.
-pub static SAMPLES: &[Sample] = samples! {
-    "freedm-map12" "freedm_map12.wad" "map units" "BSD-3-Clause",
-        "small Doom deathmatch map: linedefs and things, 87 BSP leaves as regions";
-    "freedm-map20" "freedm_map20.wad" "map units" "BSD-3-Clause",
-        "large Doom deathmatch map, 825 BSP leaves as regions";
-    "helsinki" "helsinki_boxes.csv" "m" "ODbL-1.0, (c) OpenStreetMap contributors",
-        "11,065 objects of central Helsinki in metres";
-    "us-counties" "us_counties_boxes.csv" "degrees" "ISC",
-        "3,510 flat county boxes in degrees, sizes 1 : 10,000";
+pub static SAMPLES: &[Sample] = rows! { Sample { name, licence, unit, summary, file, bytes }
+    "freedm-map12", "BSD-3-Clause", "map units",
+        "small Doom deathmatch map: linedefs and things, 87 BSP leaves as regions",
+        "freedm_map12.wad", include_bytes!("../../datasets/freedm_map12.wad");
+    "freedm-map20", "BSD-3-Clause", "map units",
+        "large Doom deathmatch map, 825 BSP leaves as regions",
+        "freedm_map20.wad", include_bytes!("../../datasets/freedm_map20.wad");
+    "helsinki", "ODbL-1.0, (c) OpenStreetMap contributors", "m",
+        "11,065 objects of central Helsinki in metres",
+        "helsinki_boxes.csv", include_bytes!("../../datasets/helsinki_boxes.csv");
+    "us-counties", "ISC", "degrees",
+        "3,510 flat county boxes in degrees, sizes 1 : 10,000",
+        "us_counties_boxes.csv", include_bytes!("../../datasets/us_counties_boxes.csv");
 };
 
 impl Sample {

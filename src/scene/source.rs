@@ -85,10 +85,9 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
         return Err(SpecError::new(expected).into());
     }
     if let Some(up) = options.up.filter(|up| *up != scene.up) {
-        let (name, own) = (&scene.name, scene.up.name());
+        let (name, own, up) = (&scene.name, scene.up.name(), up.name());
         note(&format!(
-            "{name}: {own} is up by its format; --up {} is for boxes CSV and OBJ",
-            up.name()
+            "{name}: {own} is up by its format; --up {up} is for boxes CSV and OBJ"
         ));
     }
     Ok(scene)
@@ -267,6 +266,7 @@ const MESH: &str = "glTF or OBJ exported from it, or its boxes as CSV (docs/CAPT
 const POINTS: &str = "its objects as boxes CSV (docs/CAPTURE.md)";
 const TILES: &str = "its tiles as glTF, or their boxes as CSV (docs/CAPTURE.md)";
 const PACKED: &str = "the file that is compressed in it";
+const OWN_MAP: &str = "the BSP map that it belongs to";
 const PICTURE: &str = "boxes CSV, glTF, OBJ, a Doom WAD or a Quake III map";
 
 /// Name, beginning (none: told by the extension alone), extension, and what to do.
@@ -294,12 +294,7 @@ const FORMATS: [(&str, &[u8], &str, &str); 26] = [
     ("JPEG", b"\xff\xd8\xff", "jpg", PICTURE),
     ("Cube 2 map", b"", "ogz", MESH),
     ("Quake PACK", b"PACK", "pak", "a Quake III map from a pk3"),
-    (
-        "AAS (bot paths)",
-        b"EAAS",
-        "aas",
-        "the BSP map that it belongs to",
-    ),
+    ("AAS (bot paths)", b"EAAS", "aas", OWN_MAP),
     ("gzip", b"\x1f\x8b", "gz", PACKED),
     ("Zstandard", b"\x28\xb5\x2f\xfd", "zst", PACKED),
 ];

@@ -29,7 +29,7 @@ mod tests_extremes;
 
 named! {
     /// Guarantee that a back end declares of its answers and that tests check.
-    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize)]
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug, Serialize)]
     #[serde(rename_all = "kebab-case")]
     #[non_exhaustive]
     pub enum Guarantee {
@@ -40,6 +40,7 @@ named! {
         /// The set that the rays of a sample grid see.
         SampleExact = "sample-exact",
         /// Nothing: visible items may be missing.
+        #[default]
         Unproven = "unproven",
     }
 }

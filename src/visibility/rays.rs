@@ -58,7 +58,6 @@ pub struct Rays {
     camera: Camera,
     /// Left, right, bottom, top: slopes, or offsets of an orthographic lens.
     window: [f64; 4],
-    far: f64,
 }
 
 impl Rays {
@@ -68,11 +67,8 @@ impl Rays {
     /// Those of [`Camera::unprojected`].
     pub fn of(camera: &Camera) -> Result<Rays, CameraError> {
         let camera = camera.unprojected()?;
-        Ok(Rays {
-            camera,
-            window: camera.lens.window(),
-            far: camera.lens.far().unwrap_or(f64::INFINITY),
-        })
+        let window = camera.lens.window();
+        Ok(Rays { camera, window })
     }
 
     /// The camera that they are of, with an eye and a lens.
@@ -94,16 +90,16 @@ impl Rays {
         let up = top + (bottom - top) * y;
         let frame = &self.camera.frame;
         let aside = frame.u() * across + frame.v() * up;
-        let (near, far) = (self.camera.lens.near(), self.far);
-        let (origin, direction) = match self.camera.lens.is_orthographic() {
+        let lens = &self.camera.lens;
+        let (origin, direction) = match lens.is_orthographic() {
             true => (frame.eye + aside, frame.forward()),
             false => (frame.eye, aside + frame.forward()),
         };
         Ray {
             origin,
             direction,
-            near,
-            far,
+            near: lens.near(),
+            far: lens.far().unwrap_or(f64::INFINITY),
         }
     }
 

@@ -165,8 +165,8 @@ impl File<'_> {
                 let matrix = DMat4::from_cols_array(&matrix);
                 let last = matrix.row(3);
                 if last.is_finite() && !last.abs_diff_eq(DVec4::W, 1e-6) {
-                    let (place, found) = ("matrix", format!("a last row of {last}"));
-                    let place = format!("nodes[{index}].{place}");
+                    let place = format!("nodes[{index}].matrix");
+                    let found = format!("a last row of {last}");
                     return Err(self.error(place, found, "[0, 0, 0, 1]"));
                 }
                 DAffine3::from_mat4(matrix)
@@ -177,11 +177,8 @@ impl File<'_> {
             return Ok(found);
         }
         let (place, found) = (format!("nodes[{index}]"), "a transform that is not finite");
-        Err(self.error(
-            place,
-            found,
-            "finite numbers and a rotation that is not zero",
-        ))
+        let expected = "finite numbers and a rotation that is not zero";
+        Err(self.error(place, found, expected))
     }
 
     /// The parts of the transform of a node that it states.

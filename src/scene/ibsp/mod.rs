@@ -94,24 +94,6 @@ impl QuakeMap {
     }
 }
 
-/// The items of a map while they are read.
-struct Items {
-    boxes: Vec<WorldBox>,
-    kinds: Labels,
-    surfaces: Surfaces,
-}
-
-impl Items {
-    fn push(&mut self, label: &str, kind: SurfaceKind, bounds: &Aabb, faces: Option<&Faces>) {
-        self.boxes.push(WorldBox::of(bounds, DVec3::ZERO));
-        self.kinds.push(label);
-        match faces {
-            Some((points, triangles)) => self.surfaces.push(kind, false, points, triangles),
-            None => self.surfaces.push_box(kind, false, bounds),
-        }
-    }
-}
-
 /// Effect of a shader on light.
 fn kind_of(shaders: &Table, shader: usize, is_drawn: bool) -> SurfaceKind {
     let [flags, contents] = [64, 68].map(|at| shaders.int(shader, at));
@@ -130,17 +112,16 @@ pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) ->
     let mut map = QuakeMap::read(bytes, file)?;
     let lump = |number| lump(bytes, file, number);
     let (surfaces, brushes, shaders) = (lump(13)?, lump(8)?, lump(1)?);
-    check_counts(
-        &surfaces,
-        [&lump(10)?, &lump(11)?],
-        [&brushes, &lump(9)?],
-        name,
-        options,
-    )?;
-    let mut items = Items {
-        boxes: Vec::new(),
-        kinds: Labels::new("kind"),
-        surfaces: Surfaces::about(DVec3::ZERO),
+    check_counts(lump, name, options)?;
+    let (mut boxes, mut kinds) = (Vec::new(), Labels::new("kind"));
+    let mut all = Surfaces::about(DVec3::ZERO);
+    let mut push = |label, kind, bounds: &Aabb, faces: Option<&Faces>| {
+        boxes.push(WorldBox::of(bounds, DVec3::ZERO));
+        kinds.push(label);
+        match faces {
+            Some((points, triangles)) => all.push(kind, false, points, triangles),
+            None => all.push_box(kind, false, bounds),
+        }
     };
     let all_but = |other| move |_: &usize| options.items != other;
     for surface in (0..surfaces.len()).filter(all_but(ItemKind::Brushes)) {
@@ -148,7 +129,7 @@ pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) ->
         match faces_of(&surfaces, surface, [&lump(10)?, &lump(11)?])? {
             Some((label, bounds, faces)) => {
                 let kind = kind_of(&shaders, shader, true);
-                items.push(label, kind, &bounds, Some(&faces));
+                push(label, kind, &bounds, Some(&faces));
             }
             None => map.bare += 1,
         }
@@ -166,16 +147,16 @@ pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) ->
             SurfaceKind::Opaque => "brush",
             _ => "volume",
         };
-        items.push(label, kind, &bounds, brush(&of_brush, &bounds).as_ref());
+        push(label, kind, &bounds, brush(&of_brush, &bounds).as_ref());
     }
     // Coordinates are f32 in the file: no other origin.
-    let scene = Scene::about(name, &items.boxes, DVec3::ZERO)?;
+    let scene = Scene::about(name, &boxes, DVec3::ZERO)?;
     Ok(Scene {
         unit: Some("map units"),
-        surfaces: Some(Arc::new(items.surfaces)),
+        surfaces: Some(Arc::new(all)),
         own_tree: Some(map.tree.plane_tree()),
         regions: Regions::Leaves(Arc::new(map)),
-        labels: vec![items.kinds],
+        labels: vec![kinds],
         places: places(&String::from_utf8_lossy(lump(0)?.data), file),
         ..scene
     })
@@ -184,22 +165,19 @@ pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) ->
 /// Refuses a map whose surfaces or brushes share their parts.
 ///
 /// It would be much larger in memory than in the file.
-fn check_counts(
-    surfaces: &Table,
-    [vertices, corners]: [&Table; 2],
-    [brushes, sides]: [&Table; 2],
+fn check_counts<'a>(
+    lump: impl Fn(usize) -> Result<Table<'a>>,
     name: &str,
     options: &LoadOptions,
 ) -> Result<()> {
+    let (surfaces, vertices, corners) = (lump(13)?, lump(10)?, lump(11)?);
+    let (brushes, sides) = (lump(8)?, lump(9)?);
     let total = |table: &Table, at, of: &Table| -> Result<u64> {
         let counts = (0..table.len()).map(|i| Ok(table.range(i, at, of)?.len() as u64));
         counts.sum()
     };
-    let (points, ends) = (
-        total(surfaces, 12, vertices)?,
-        total(surfaces, 20, corners)?,
-    );
-    let faces = total(brushes, 0, sides)?;
+    let points = total(&surfaces, 12, &vertices)?;
+    let (ends, faces) = (total(&surfaces, 20, &corners)?, total(&brushes, 0, &sides)?);
     let most = [1, MOST_CORNERS].map(|each| each * vertices.len() as u64);
     let most = [most[0], most[1], sides.len() as u64];
     if points > most[0] || ends > most[1] || faces > most[2] {

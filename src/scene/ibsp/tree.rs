@@ -27,7 +27,7 @@ pub struct LeafNode {
 }
 
 /// A tree whose open leaves are the regions of a map.
-#[derive(Clone, Debug)]
+#[derive(Clone, Default, Debug)]
 pub struct LeafTree {
     /// The root is the first.
     pub nodes: Vec<LeafNode>,
@@ -54,11 +54,7 @@ impl LeafTree {
     ) -> Result<LeafTree> {
         let reached = reached_leaves(nodes, leaves)?;
         let most = clusters.unwrap_or(usize::MAX).min(leaves.len());
-        let mut tree = LeafTree {
-            nodes: Vec::with_capacity(nodes.len()),
-            boxes: Vec::new(),
-            clusters: Vec::new(),
-        };
+        let mut tree = LeafTree::default();
         let mut children = vec![BspChild::Solid; leaves.len()];
         for leaf in (0..leaves.len()).filter(|&leaf| reached[leaf]) {
             let cluster = leaves.int(leaf, 0);

@@ -115,13 +115,12 @@ pub struct CutOuts {
 /// The text as typed.
 impl Display for CutOuts {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let (
-            mask,
-            CutOuts {
-                share, tile, seed, ..
-            },
-        ) = (self.mask.name(), self);
-        write!(f, "{mask}:share={share},tile={tile},seed={seed}")
+        let (mask, share) = (self.mask.name(), self.share);
+        write!(
+            f,
+            "{mask}:share={share},tile={},seed={}",
+            self.tile, self.seed
+        )
     }
 }
 

@@ -179,9 +179,8 @@ fn height_over(triangles: &[[Vec3; 3]]) -> Option<Aabb> {
     for (side, parts) in sides.iter_mut().enumerate() {
         parts.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let along = 1 - side / 2;
-        let end = parts
-            .iter()
-            .try_fold(low[along], |end, part| (part[0] == end).then_some(part[1]));
+        let joined = |end, part: &[f32; 2]| (part[0] == end).then_some(part[1]);
+        let end = parts.iter().try_fold(low[along], joined);
         if end != Some(high[along]) {
             return None;
         }

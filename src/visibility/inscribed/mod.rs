@@ -271,11 +271,7 @@ pub fn turn(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> i32 {
         return if side > 0.0 { 1 } else { -1 };
     }
     let minus = |p: f64, q: f64| &Expansion::from(p) - &Expansion::from(q);
-    let (left, right) = (
-        &minus(bx, ax) * &minus(cy, ay),
-        &minus(by, ay) * &minus(cx, ax),
-    );
-    (&left - &right).sign()
+    (&(&minus(bx, ax) * &minus(cy, ay)) - &(&minus(by, ay) * &minus(cx, ax))).sign()
 }
 
 /// How often a closed surface winds around a point in the box: crossings of a ray
@@ -310,11 +306,7 @@ fn winding(part: &[[Vec3; 3]], inner: &Aabb) -> Option<i32> {
             // Upward the ray leaves through a triangle that faces up, if it is above:
             // the point then is behind it.
             let is_in_front = faces(&eye, [a, b, c]);
-            turns += match (some_left, is_in_front) {
-                (true, false) => 1,
-                (false, true) => -1,
-                _ => 0,
-            };
+            turns += i32::from(some_left) - i32::from(is_in_front);
         }
         Some(turns)
     })

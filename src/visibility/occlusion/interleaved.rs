@@ -109,13 +109,8 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         }
         let pixels = view.grid.width * view.grid.height;
         let least_area = (pixels / state.drawn_part).max(1);
-        let Interleaved {
-            buffer,
-            queue,
-            entries,
-            survivors,
-            ..
-        } = state;
+        let (buffer, queue) = (&mut state.buffer, &mut state.queue);
+        let (entries, survivors) = (&mut state.entries, &mut state.survivors);
         buffer.clear();
         survivors.clear();
         queue.clear();

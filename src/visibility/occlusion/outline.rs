@@ -127,12 +127,7 @@ impl Outline {
 
     fn add_perspective(&mut self, low: DVec3, high: DVec3, view: &View) {
         let side = |axis: usize| low[axis].max(0.0) + high[axis].min(0.0);
-        let Mirrored {
-            toward,
-            near,
-            far,
-            along,
-        } = Mirrored::of(low, high, view, side);
+        let (toward, near, far, along) = mirrored(low, high, view, side);
         let zero = view.far_from_zero;
         for i in (0..3).filter(|&i| toward[i]) {
             let (n, g) = (near[i], &along[i]);
@@ -165,12 +160,7 @@ impl Outline {
 
     fn add_parallel(&mut self, low: DVec3, high: DVec3, view: &View) {
         let f = view.forward.abs();
-        let Mirrored {
-            toward,
-            near,
-            far,
-            along: beside,
-        } = Mirrored::of(low, high, view, |axis| view.forward[axis]);
+        let (toward, near, far, beside) = mirrored(low, high, view, |axis| view.forward[axis]);
         let zero = view.far_from_zero + view.reach;
         // Rays that run along a slab are in it all the way or not at all.
         for j in (0..3).filter(|&j| !toward[j]) {
@@ -258,17 +248,11 @@ impl Outline {
     pub fn within(&mut self, rect: &Rect) {
         let tile = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
         let [left, right] = self.columns_within;
-        let (x0, x1) = (
-            f64::from(rect.x0) - tile[0],
-            f64::from(rect.x1) + 1.0 + tile[0],
-        );
-        self.columns_within = [left.max(x0), right.min(x1)];
+        let (x0, x1) = (f64::from(rect.x0), f64::from(rect.x1) + 1.0);
+        self.columns_within = [left.max(x0 - tile[0]), right.min(x1 + tile[0])];
         let [top, bottom] = self.rows;
-        let (y0, y1) = (
-            f64::from(rect.y0) - tile[1],
-            f64::from(rect.y1) + 1.0 + tile[1],
-        );
-        self.rows = [top.max(y0), bottom.min(y1)];
+        let (y0, y1) = (f64::from(rect.y0), f64::from(rect.y1) + 1.0);
+        self.rows = [top.max(y0 - tile[1]), bottom.min(y1 + tile[1])];
     }
 
     /// First row and the one behind the last that may have columns.
@@ -331,39 +315,30 @@ impl Outline {
     }
 }
 
-/// A box with axes mirrored so that its near bounds are those that rays enter by.
-struct Mirrored {
-    /// `true` for axes of which a face is turned to the eye.
-    toward: [bool; 3],
-    near: [f64; 3],
-    far: [f64; 3],
-    along: [Linear; 3],
-}
-
-impl Mirrored {
-    /// Mirrors the axes of which `side` is below zero.
-    ///
-    /// No face of an axis whose `side` is zero is turned to the eye.
-    #[inline(always)]
-    fn of(low: DVec3, high: DVec3, view: &View, side: impl Fn(usize) -> f64) -> Mirrored {
-        let mut mirrored = Mirrored {
-            toward: [false; 3],
-            near: [0.0; 3],
-            far: [0.0; 3],
-            along: view.rays,
-        };
-        for axis in 0..3 {
-            let side = side(axis);
-            if side > 0.0 {
-                (mirrored.near[axis], mirrored.far[axis]) = (low[axis], high[axis]);
-            } else if side < 0.0 {
-                (mirrored.near[axis], mirrored.far[axis]) = (-high[axis], -low[axis]);
-                mirrored.along[axis] = mirrored.along[axis].times(-1.0);
-            }
-            mirrored.toward[axis] = side != 0.0;
+/// Axes of which a face is turned to the eye; near and far bounds, and rays along axes.
+///
+/// Axes of which `side` is below zero are mirrored, so that rays enter by the near
+/// bounds. No face of an axis whose `side` is zero is turned to the eye.
+#[inline(always)]
+fn mirrored(
+    low: DVec3,
+    high: DVec3,
+    view: &View,
+    side: impl Fn(usize) -> f64,
+) -> ([bool; 3], [f64; 3], [f64; 3], [Linear; 3]) {
+    let (mut toward, mut along) = ([false; 3], view.rays);
+    let (mut near, mut far) = ([0.0; 3], [0.0; 3]);
+    for axis in 0..3 {
+        let side = side(axis);
+        if side > 0.0 {
+            (near[axis], far[axis]) = (low[axis], high[axis]);
+        } else if side < 0.0 {
+            (near[axis], far[axis]) = (-high[axis], -low[axis]);
+            along[axis] = along[axis].times(-1.0);
         }
-        mirrored
+        toward[axis] = side != 0.0;
     }
+    (toward, near, far, along)
 }
 
 /// The nearness of an outline in f32.

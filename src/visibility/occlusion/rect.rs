@@ -245,10 +245,8 @@ impl<I: Isa> AboutEye<I> {
     #[inline(always)]
     fn of(isa: I, block: &BoxBlock, p: &Projection) -> Self {
         let minus = isa.splat(-1.0);
-        let [lower, upper] = [
-            block.corner_rows(BoxCorner([false; 3])),
-            block.corner_rows(BoxCorner([true; 3])),
-        ];
+        let corner = |high| block.corner_rows(BoxCorner([high; 3]));
+        let (lower, upper) = (corner(false), corner(true));
         let mut bounds = [[isa.splat(0.0); 2]; 3];
         let mut minus_size = isa.splat(-p.far_from_zero);
         for (axis, bounds) in bounds.iter_mut().enumerate() {

@@ -146,10 +146,11 @@ impl<'v> View<'v> {
             c: corner[axis],
         };
         let lines = [linear(0), linear(1), linear(2)];
-        let padded = [
-            padded(grid.width, TILE_WIDTH),
-            padded(grid.height, TILE_HEIGHT),
+        let tiles = [
+            (grid.width as usize, TILE_WIDTH),
+            (grid.height as usize, TILE_HEIGHT),
         ];
+        let padded = tiles.map(|(size, tile)| (size.div_ceil(tile) * tile) as f64);
         let reach = |l: &Linear| l.x.abs() * padded[0] + l.y.abs() * padded[1] + l.c.abs();
         let reach: f64 = lines.iter().map(reach).sum();
         let eye = frame.eye - scene.origin;
@@ -205,10 +206,6 @@ impl<'v> View<'v> {
 /// ray's reach, the truth's own rays by as much, and a sum of three products adds
 /// 2^-51 of their sizes: less than 2^-47 in all.
 pub const MARGIN: f64 = 1.0 / (1u64 << 44) as f64;
-
-fn padded(size: u32, tile: usize) -> f64 {
-    ((size as usize).div_ceil(tile) * tile) as f64
-}
 
 /// The bounds of the pyramid from the eye to the near window, moved outward.
 fn before_near(rays: &Rays, near: f64, eye: DVec3, far_from_zero: f64) -> [DVec3; 2] {

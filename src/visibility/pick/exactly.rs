@@ -132,12 +132,9 @@ impl<B: Body> Pick for Linear<B> {
     /// O(n), and sorting what the ray meets.
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
         let probe = B::probe(ray, self.0.origin);
-        let counted = self
-            .0
-            .all
-            .iter()
-            .filter(|body| (body.item() as usize) < self.0.items);
-        let met = counted.filter_map(|body| Some((body.item(), body.meet(&probe, ray.far)?)));
+        let counted = |body: &&B| (body.item() as usize) < self.0.items;
+        let met = self.0.all.iter().filter(counted);
+        let met = met.filter_map(|body| Some((body.item(), body.meet(&probe, ray.far)?)));
         nearest::<B>(&probe, met.collect(), count, hits);
     }
 }

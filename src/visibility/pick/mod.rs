@@ -125,10 +125,8 @@ impl CursorRectangle {
     /// The rectangle that reaches `half` pixels to each side of a cursor at
     /// (`x`, `y`), in pixels of an image of that size.
     pub fn around([x, y]: [f64; 2], half: f64, [width, height]: [f64; 2]) -> CursorRectangle {
-        CursorRectangle {
-            min: [(x - half) / width, (y - half) / height],
-            max: [(x + half) / width, (y + half) / height],
-        }
+        let [min, max] = [-half, half].map(|by| [(x + by) / width, (y + by) / height]);
+        CursorRectangle { min, max }
     }
 
     /// The camera that sees what the rays through the rectangle see: the same eye
@@ -141,12 +139,8 @@ impl CursorRectangle {
         let [left, right, bottom, top] = rays.window();
         let across = |x: f64| left + (right - left) * x;
         let up = |y: f64| top + (bottom - top) * y;
-        let window = [
-            across(self.min[0]),
-            across(self.max[0]),
-            up(self.max[1]),
-            up(self.min[1]),
-        ];
+        let ([left, top], [right, bottom]) = (self.min, self.max);
+        let window = [across(left), across(right), up(bottom), up(top)];
         let (near, far) = (camera.lens.near(), camera.lens.far());
         let mut frame = camera.frame;
         let lens = match camera.lens.is_orthographic() {

@@ -168,12 +168,7 @@ impl<B: Body> Work for SearchNearest<'_, B> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Vec<(u32, B::At)> {
-        let SearchNearest {
-            of,
-            ray,
-            probe,
-            count,
-        } = self;
+        let (of, ray, probe) = (self.of, self.ray, self.probe);
         let meet = |body: &B| Some((body.item(), body.meet(probe, ray.far)?));
         let Some(slabs) = of.tree.slabs(ray) else {
             let mut met = Vec::new();
@@ -181,7 +176,7 @@ impl<B: Body> Work for SearchNearest<'_, B> {
             return met;
         };
         let mut found = Several {
-            lowest: Lowest::new(count, slabs.far()),
+            lowest: Lowest::new(self.count, slabs.far()),
             all: Vec::new(),
         };
         of.tree.search(isa, &slabs, &mut found);

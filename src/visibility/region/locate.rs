@@ -24,28 +24,20 @@ pub struct BoxGrid {
 impl BoxGrid {
     /// About as many buckets as boxes. O(n + entries).
     pub fn new(boxes: Vec<WorldBox>) -> BoxGrid {
-        let WorldBox {
-            min: low,
-            max: high,
-        } = WorldBox::union_of(boxes.iter().copied());
-        let size = (high - low).max(DVec3::ZERO);
+        let WorldBox { min: low, max } = WorldBox::union_of(boxes.iter().copied());
+        let size = (max - low).max(DVec3::ZERO);
         // Cubes: the edge that gives one bucket for each box.
         let solid = size.max(DVec3::splat(size.max_element() * 1e-3));
         let volume = solid.x * solid.y * solid.z;
         let edge = libm::cbrt(volume / boxes.len().max(1) as f64);
-        let cells = |k: usize| match solid[k] / edge {
-            cells if cells >= 1.0 => (cells as usize).min(1024),
-            _ => 1,
-        };
-        let count = [cells(0), cells(1), cells(2)];
-        let per = |k: usize| match size[k] {
-            size if size > 0.0 => count[k] as f64 / size,
-            _ => 0.0,
-        };
+        let count = (solid / edge)
+            .to_array()
+            .map(|cells| (cells as usize).clamp(1, 1024));
         let mut grid = BoxGrid {
             boxes,
             low,
-            per_unit: DVec3::new(per(0), per(1), per(2)),
+            // Infinite along a width of 0, where all boxes lie in the first cell.
+            per_unit: DVec3::from(count.map(|cells| cells as f64)) / size,
             count,
             buckets: Vec::new(),
         };

@@ -241,18 +241,18 @@ impl Work for Read<'_> {
 ///
 /// The farthest directions first, then each to the nearest mean (Lloyd 1982).
 fn groups<const N: usize>(triangles: &[[Vec3; 3]]) -> [u64; N] {
-    let normals: Vec<DVec3> = triangles
-        .iter()
-        .map(|corners| normal(*corners).normalize_or_zero())
-        .collect();
+    let unit = |corners: &[Vec3; 3]| normal(*corners).normalize_or_zero();
+    let normals: Vec<DVec3> = triangles.iter().map(unit).collect();
     let mut means = [normals.iter().sum::<DVec3>().normalize_or_zero(); N];
     for k in 0..N {
         let known = &means[..k.max(1)];
         let nearest = |n: &DVec3| known.iter().map(|m| m.dot(*n)).fold(-2.0, f64::max);
-        let farthest = normals
+        let by_nearest = |a: &DVec3, b: &DVec3| nearest(a).total_cmp(&nearest(b));
+        means[k] = normals
             .iter()
-            .min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
-        means[k] = farthest.copied().unwrap_or(DVec3::Z);
+            .copied()
+            .min_by(by_nearest)
+            .unwrap_or(DVec3::Z);
     }
     let mut words = [0u64; N];
     for _ in 0..ROUNDS {

@@ -84,10 +84,8 @@ impl Selection {
 
     /// How many triangles there are.
     pub fn triangles(&self) -> usize {
-        self.words()
-            .iter()
-            .map(|word| word.count_ones() as usize)
-            .sum()
+        let counts = self.words().iter().map(|word| word.count_ones() as usize);
+        counts.sum()
     }
 
     /// How many of these triangles are not in another selection.

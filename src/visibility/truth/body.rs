@@ -165,11 +165,9 @@ impl Facets {
             own.map(move |triangle| Facet::of(surfaces, item, triangle))
         };
         let all: Vec<Facet> = (0..surfaces.items()).flat_map(of_item).collect();
+        let bounds = all.iter().map(|facet| Aabb::of_points(facet.corners));
         Bodies {
-            bounds: all
-                .iter()
-                .map(|facet| Aabb::of_points(facet.corners))
-                .collect(),
+            bounds: bounds.collect(),
             all,
             origin: surfaces.origin,
             items: surfaces.items(),

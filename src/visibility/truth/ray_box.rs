@@ -173,10 +173,10 @@ impl Probe {
     /// The last entry into the slabs of a box, exactly; `None` without a direction.
     #[cold]
     fn latest_entry(&self, b: &WorldBox) -> Option<Crossing> {
-        let entries = self
-            .crossed()
-            .map(|axis| self.crossing(axis, self.entered(b, axis)));
-        entries.reduce(|a, b| if self.compare(&b, &a).is_gt() { b } else { a })
+        let entry = |axis| self.crossing(axis, self.entered(b, axis));
+        self.crossed()
+            .map(entry)
+            .reduce(|a, b| if self.compare(&b, &a).is_gt() { b } else { a })
     }
 
     /// Returns `true` if the ray leaves a slab before it enters the last one.

@@ -131,11 +131,7 @@ impl TriangleProbe {
     /// `None` as well if the ray certainly meets it beyond `limit`.
     #[inline(always)]
     pub fn meet(&self, corners: [Vec3; 3], two_sided: bool, limit: f64) -> Option<Meeting> {
-        let (a, b, c) = (
-            corners[0].as_dvec3(),
-            corners[1].as_dvec3(),
-            corners[2].as_dvec3(),
-        );
+        let [a, b, c] = each(corners, |p: Vec3| p.as_dvec3());
         let direction = self.ray.direction;
         let (u, v, at) = (b - a, c - a, a + self.shift);
         let normal = u.cross(v);

@@ -15,7 +15,7 @@ use super::{DepthOrder, Part, Piece, ToOrder, nearest};
 use crate::camera::Camera;
 use crate::geometry::PlaneTree;
 use crate::query::ItemId;
-use crate::scene::{Surfaces, WorldBox};
+use crate::scene::{Surfaces, WorldBox, clipped};
 
 /// Distance within which points lie in a plane, per unit of the largest coordinate.
 ///
@@ -213,7 +213,7 @@ impl Partition {
             };
             for side in (0..2).filter(|&side| sides[side]) {
                 let polygon = match sides[1 - side] {
-                    true => cut(&polygon, &heights, [1.0, -1.0][side]),
+                    true => clipped(&polygon, |p| [1.0, -1.0][side] * node.height(p)),
                     false => polygon.clone(),
                 };
                 open.push((polygon, node.children[side], 2 * at as usize + side));
@@ -243,22 +243,6 @@ impl Partition {
         });
         parts.collect()
     }
-}
-
-/// Part of a polygon on one side of a plane: `sign` times the height is at least 0.
-fn cut(polygon: &[DVec3], heights: &[f64], sign: f64) -> Vec<DVec3> {
-    let mut left = Vec::with_capacity(polygon.len() + 1);
-    for (i, &p) in polygon.iter().enumerate() {
-        let next = (i + 1) % polygon.len();
-        let (here, there) = (sign * heights[i], sign * heights[next]);
-        if here >= 0.0 {
-            left.push(p);
-        }
-        if (here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0) {
-            left.push(p + (polygon[next] - p) * (here / (here - there)));
-        }
-    }
-    left
 }
 
 #[cfg(test)]

@@ -84,12 +84,9 @@ impl DoomMap {
             true => [-HIGHEST, HIGHEST],
             false => sector.heights,
         });
-        let lines = file
-            .lines
-            .iter()
-            .filter(|line| line.ends[0] != line.ends[1]);
+        let has_length = |line: &&Linedef| line.ends[0] != line.ends[1];
         DoomMap {
-            lines: lines.copied().collect(),
+            lines: file.lines.iter().filter(has_length).copied().collect(),
             sectors: sectors.collect(),
             file: file.clone(),
         }
@@ -182,13 +179,8 @@ fn meets(line: &Linedef, b: &WorldBox) -> bool {
     }
     let d = to - from;
     let side = |x: f64, y: f64| d.x * (y - from.y) - d.y * (x - from.x);
-    let corners = [
-        (low.x, low.y),
-        (high.x, low.y),
-        (low.x, high.y),
-        (high.x, high.y),
-    ];
-    let sides = corners.map(|(x, y)| side(x, y));
+    let sides = [low.x, high.x].map(|x| [low.y, high.y].map(|y| side(x, y)));
+    let sides = sides.as_flattened();
     // Rounding of the side is below this: |d| and distances are below 2^18.
     let slack = 1e-9;
     sides.iter().any(|s| *s <= slack) && sides.iter().any(|s| *s >= -slack)
@@ -211,12 +203,8 @@ impl DoomMap {
                 return None;
             };
             let [from, to] = line.ends.map(plan);
-            let corners = [
-                from.extend(low),
-                to.extend(low),
-                to.extend(high),
-                from.extend(high),
-            ];
+            let corners = [(from, low), (to, low), (to, high), (from, high)];
+            let corners = corners.map(|(at, z)| at.extend(z));
             (front != behind).then_some(Opening {
                 sides: [front, behind],
                 corners,

@@ -110,11 +110,8 @@ impl Plan {
     /// Opens the cells that have a point inside a triangle.
     fn open(&mut self, triangle: [Point; 3], [floor, ceiling]: [f64; 2]) {
         let [columns, rows] = [0, 1].map(|axis| {
-            let along = triangle.map(|corner| corner[axis]);
-            let (low, high) = (
-                along[0].min(along[1]).min(along[2]),
-                along[0].max(along[1]).max(along[2]),
-            );
+            let [a, b, c] = triangle.map(|corner| corner[axis]);
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
             let lines = &self.lines[axis];
             let first = lines.partition_point(|&line| line <= low).saturating_sub(1);
             let end = lines.partition_point(|&line| line < high);

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::super::id_set::RegionId;
 use super::DoomMap;
-use crate::scene::{Linedef, Scene, SurfaceKind, Surfaces};
+use crate::scene::{Dispute, Linedef, Scene, SurfaceKind, Surfaces};
 
 /// The triangles of a scene's items, if they are no solid boxes.
 ///
@@ -97,12 +97,8 @@ impl DoomMap {
     ///
     /// `None` if its linedefs do not close or disagree with others about a part of it.
     pub(super) fn triangles(&self, sector: RegionId) -> Option<Vec<[Point; 3]>> {
-        let mut disputed = self
-            .file
-            .disputes()
-            .iter()
-            .flat_map(|dispute| dispute.sectors);
-        match disputed.any(|of| of == Some(sector)) {
+        let is_of = |dispute: &Dispute| dispute.sectors.contains(&Some(sector));
+        match self.file.disputes().iter().any(is_of) {
             true => None,
             false => triangles(&self.outline(sector)),
         }
@@ -228,10 +224,8 @@ pub fn parted([from, to]: [Point; 2], points: &[Point]) -> Vec<[Point; 2]> {
     let away = |p: Point| [0, 1].map(|k| (p[k] - from[k]).abs()).iter().sum::<i32>();
     let within =
         |p: &Point| (0..2).all(|k| (from[k].min(to[k])..=from[k].max(to[k])).contains(&p[k]));
-    let on = points
-        .iter()
-        .copied()
-        .filter(|p| within(p) && turn(from, to, *p) == 0);
+    let on = |p: &&Point| within(p) && turn(from, to, **p) == 0;
+    let on = points.iter().filter(on).copied();
     let mut stops: Vec<Point> = on.chain([from, to]).collect();
     stops.sort_unstable_by_key(|&p| away(p));
     stops.dedup();
