@@ -1,5 +1,6 @@
-//! Planes of a view volume in f32 and f64: from the frame, and from matrices through
-//! glam: the projections of OpenGL, of D3D and Vulkan, and with reversed Z, off which
+//! Planes of a view volume in f32 and f64, from the frame and from matrices.
+//!
+//! Matrices come through glam: the projections of OpenGL, of D3D and Vulkan, and with reversed Z, off which
 //! Gribb and Hartmann read planes. The default path needs no matrix; they exist so that
 //! their error can be measured against the planes of the frame.
 

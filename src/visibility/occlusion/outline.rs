@@ -315,7 +315,7 @@ impl Outline {
     }
 }
 
-/// Axes of which a face is turned to the eye; near and far bounds, and rays along axes.
+/// Axes of which a face is turned to the eye, near and far bounds, rays along axes.
 ///
 /// Axes of which `side` is below zero are mirrored, so that rays enter by the near
 /// bounds. No face of an axis whose `side` is zero is turned to the eye.
