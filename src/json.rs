@@ -117,10 +117,8 @@ pub fn told(error: &serde_json::Error) -> (String, Option<String>) {
         }
         Category::Data => {}
     }
-    let cut = [", expected ", ", there are "]
-        .into_iter()
-        .find_map(|between| said.rsplit_once(between));
-    match cut {
+    let mut cuts = [", expected ", ", there are "].into_iter();
+    match cuts.find_map(|between| said.rsplit_once(between)) {
         Some((there, wanted)) => (found(there), Some(expected(wanted))),
         None => (found(said), None),
     }

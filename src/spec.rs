@@ -9,6 +9,9 @@ use std::ops::RangeInclusive;
 
 use crate::shown::plain;
 
+#[cfg(feature = "cli")]
+pub(crate) mod values;
+
 /// A name with its parameters, as typed.
 ///
 /// ```

@@ -158,10 +158,13 @@ impl Beside {
     /// The group of each workload, from the count pass and all processes.
     pub(super) fn groups(&self, counted: Vec<Part>, processes: &[ProcessTimes]) -> Vec<Group> {
         let groups = counted.into_iter().enumerate().map(|(n, counted)| {
-            let timed = processes
-                .iter()
-                .filter_map(|times| times.parts.get(n).cloned());
-            Group::of(&[counted].into_iter().chain(timed).collect::<Vec<_>>())
+            let mut parts = vec![counted];
+            parts.extend(
+                processes
+                    .iter()
+                    .filter_map(|times| times.parts.get(n).cloned()),
+            );
+            Group::of(&parts)
         });
         groups.collect()
     }
@@ -247,13 +250,12 @@ impl Changed {
         }
         let culling = Culling::default();
         let workload = Workload::moving(scene, &path, &culling, motion, input.views).ok()?;
-        let labels = beside.contenders.iter();
         let further = beside.policies.iter().filter(|_| self.axis.is_none());
-        let specs = labels
-            .chain(further)
-            .map(|label| planned(input.structures, label));
-        let build = |spec| Subject::build(spec, false, scene, CullingTest::SixPlane);
-        let subjects: Vec<Subject> = specs.map(build).collect();
+        let build = |label: &String| {
+            let spec = planned(input.structures, label);
+            Subject::build(spec, false, scene, CullingTest::SixPlane)
+        };
+        let subjects: Vec<_> = beside.contenders.iter().chain(further).map(build).collect();
         let plan = GroupPlan {
             scene: &SceneInfo::of(scene),
             path: PathInfo::of(&path.name, &workload, false),

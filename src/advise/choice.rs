@@ -3,7 +3,8 @@
 //! A structure is chosen by measured cells, a test by its time and the cost of drawing its
 //! false positives.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
+use serde_json::json;
 
 use super::omission::{TIE, is_longer};
 use super::options::{SCAN, TREE};
@@ -11,7 +12,7 @@ use super::trials::{Answered, Trials};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::BuildError;
-use crate::measure::{Metric, OverProcesses, ReportCell};
+use crate::measure::{OverProcesses, ReportCell};
 use crate::statistics::{ALPHA, Estimate, Rate, flat, rate, ratio, shows_less_in_sum};
 use crate::verify::ErrorCount;
 
@@ -27,7 +28,8 @@ pub struct StructureChoice {
     /// Others that the processes do not tell from it.
     pub region_search_ties: Vec<String>,
     /// Fastest first; what failed comes last.
-    pub rows: Vec<StructureRow>,
+    #[serde(serialize_with = "rows")]
+    pub rows: Vec<ReportCell>,
     /// `true` if the one to take is a scan.
     #[serde(skip)]
     pub is_scan: bool,
@@ -36,87 +38,45 @@ pub struct StructureChoice {
     pub(super) is_mixed: bool,
 }
 
-/// A structure as measured.
-#[derive(Clone, Debug, Serialize)]
-pub struct StructureRow {
-    /// Label of the structure.
-    pub structure: String,
-    /// How building, counting and timing ended.
-    pub status: &'static str,
-    /// Why, where the status is not ok.
-    pub reason: Option<String>,
-    /// CPU time per frustum query, ns.
-    #[serde(flatten, serialize_with = "flat::query_ns")]
-    pub query_ns: Option<Estimate>,
-    /// Time of `linear` / time of this; above 1 is faster.
-    pub speedup: Option<f64>,
-    /// Time of one build, ms.
-    pub build_ms: Option<f64>,
-    /// Memory of nodes and items / number of items.
-    pub memory_bytes_per_item: Option<f64>,
-    /// Queries after which the build is repaid against `linear`.
-    pub break_even_queries: Option<f64>,
-    /// CPU time per region search, ns.
-    pub locate_ns: Option<f64>,
-    /// CPU time per frame of the motion, ns.
-    ///
-    /// The query is then the first one of a frame.
-    #[serde(flatten, serialize_with = "flat::frame_ns")]
-    pub frame_ns: Option<Estimate>,
-    /// CPU time of the update of a frame, ns.
-    pub update_ns: Option<f64>,
-    /// The slowest frame, ns.
-    pub worst_frame_ns: Option<f64>,
-    #[serde(skip)]
-    pub(super) is_failure: bool,
-    #[serde(skip)]
-    pub(super) is_scan: bool,
-    /// `true` if threads share a query.
-    #[serde(skip)]
-    is_shared: bool,
+/// Metrics of a structure in the advice.
+const METRICS: &str = "query_ns speedup build_ms memory_bytes_per_item break_even_queries \
+     locate_ns frame_ns update_ns worst_frame_ns";
+
+/// Structures as measured, each with its metrics; null where one was not measured.
+pub(super) fn rows<S: Serializer>(cells: &[ReportCell], out: S) -> Result<S::Ok, S::Error> {
+    out.collect_seq(cells.iter().map(|cell| {
+        let (name, status, reason) = (&cell.structure, cell.status.name(), &cell.reason);
+        let mut row = json!({ "structure": name, "status": status, "reason": reason });
+        for metric in METRICS.split_whitespace() {
+            row[metric] = json!(cell.value(metric));
+        }
+        for metric in ["query_ns", "frame_ns"] {
+            let found = cell.metrics.get(metric);
+            row[format!("{metric}_lower")] = json!(found.and_then(|found| found.lower));
+            row[format!("{metric}_upper")] = json!(found.and_then(|found| found.upper));
+        }
+        row
+    }))
 }
 
-impl StructureRow {
-    pub(super) fn of(cell: &ReportCell) -> StructureRow {
-        StructureRow {
-            structure: cell.structure.clone(),
-            status: cell.status.name(),
-            reason: cell.reason.clone(),
-            query_ns: cell.metrics.get("query_ns").map(Metric::estimate),
-            frame_ns: cell.metrics.get("frame_ns").map(Metric::estimate),
-            update_ns: cell.value("update_ns"),
-            worst_frame_ns: cell.value("worst_frame_ns"),
-            speedup: cell.value("speedup"),
-            build_ms: cell.value("build_ms"),
-            memory_bytes_per_item: cell.value("memory_bytes_per_item"),
-            break_even_queries: cell.value("break_even_queries"),
-            locate_ns: cell.value("locate_ns"),
-            is_failure: cell.status.is_failure(),
-            is_scan: cell.is_scan(),
-            is_shared: cell.params["threads"].as_u64() > Some(1),
-        }
-    }
-
-    /// CPU time per frame, or per frustum query of a still scene, ns.
-    pub fn ns(&self) -> Option<f64> {
-        Some(self.frame_ns.or(self.query_ns)?.value)
-    }
+/// CPU time per frame, or per frustum query of a still scene, ns.
+pub fn ns(cell: &ReportCell) -> Option<f64> {
+    Some(cell.time()?.value)
 }
 
 impl StructureChoice {
     /// From what a run measures of all structures on one scene and path.
     pub(super) fn of(cells: &[ReportCell]) -> StructureChoice {
-        let mut rows: Vec<StructureRow> = cells.iter().map(StructureRow::of).collect();
-        rows.sort_by(|a, b| or_last(a.ns()).total_cmp(&or_last(b.ns())));
+        let mut rows = cells.to_vec();
+        rows.sort_by(|a, b| or_last(ns(a)).total_cmp(&or_last(ns(b))));
         let first = |metric| fastest(cells, metric).into_iter();
         let mut first_located = first(Some("locate_ns")).map(|cell| cell.structure.clone());
         let mut first = first(None).map(|cell| cell.structure.clone());
         let [name, ties]: [Vec<String>; 2] = [first.by_ref().take(1).collect(), first.collect()];
-        let is_tied =
-            |row: &&StructureRow| [&name, &ties].iter().any(|n| n.contains(&row.structure));
-        let tied = |is_scan| (rows.iter().filter(is_tied)).any(|row| row.is_scan == is_scan);
+        let is_tied = |row: &&ReportCell| [&name, &ties].iter().any(|n| n.contains(&row.structure));
+        let tied = |is_scan| (rows.iter().filter(is_tied)).any(|row| row.is_scan() == is_scan);
         StructureChoice {
-            is_scan: matches!(rows.first(), Some(row) if row.is_scan && row.ns().is_some()),
+            is_scan: matches!(rows.first(), Some(row) if row.is_scan() && ns(row).is_some()),
             is_mixed: tied(false) && tied(true),
             name: name.into_iter().next(),
             ties,
@@ -126,12 +86,16 @@ impl StructureChoice {
         }
     }
 
+    fn fastest(&self, is_scan: bool) -> Option<&ReportCell> {
+        alone(&self.rows).find(|row| row.is_scan() == is_scan)
+    }
+
     /// Labels of the fastest tree or grid and of the fastest scan, for the rules.
     ///
     /// Without any, `wide` and `linear`.
     pub(super) fn tree_and_scan(&self) -> [String; 2] {
         [(false, TREE), (true, SCAN)].map(|(is_scan, otherwise)| {
-            let own = alone(&self.rows).find(|row| row.is_scan == is_scan);
+            let own = self.fastest(is_scan);
             own.map_or(otherwise, |row| &row.structure).to_owned()
         })
     }
@@ -140,8 +104,7 @@ impl StructureChoice {
     ///
     /// Per frame of moving items, or per query of a still scene, ns.
     pub(super) fn tree_and_scan_ns(&self) -> Option<[f64; 2]> {
-        let [tree, scan] =
-            [false, true].map(|kind| alone(&self.rows).find(|row| row.is_scan == kind)?.ns());
+        let [tree, scan] = [false, true].map(|is_scan| ns(self.fastest(is_scan)?));
         Some([tree?, scan?])
     }
 
@@ -150,8 +113,7 @@ impl StructureChoice {
     /// In another workload: the fastest tree and scan, of a motion the three fastest too.
     pub(super) fn contenders(&self, moves: bool) -> Vec<String> {
         let first = alone(&self.rows).take(if moves { 3 } else { 1 });
-        let of_kind =
-            [false, true].map(|is_scan| alone(&self.rows).find(|row| row.is_scan == is_scan));
+        let of_kind = [false, true].map(|is_scan| self.fastest(is_scan));
         let mut labels: Vec<String> = Vec::new();
         for row in first.chain(of_kind.into_iter().flatten()) {
             if !labels.contains(&row.structure) {
@@ -163,9 +125,9 @@ impl StructureChoice {
 }
 
 /// Rows with a time on one thread.
-fn alone(rows: &[StructureRow]) -> impl Iterator<Item = &StructureRow> {
-    rows.iter()
-        .filter(|row| row.ns().is_some() && !row.is_shared)
+fn alone(rows: &[ReportCell]) -> impl Iterator<Item = &ReportCell> {
+    let is_shared = |row: &ReportCell| row.params["threads"].as_u64() > Some(1);
+    (rows.iter()).filter(move |row| ns(row).is_some() && !is_shared(row))
 }
 
 /// Time of a structure / time of another one.
@@ -353,24 +315,19 @@ mod tests {
         }
     }
 
-    fn structure(structure: &str, query_ns: Option<f64>) -> StructureRow {
-        StructureRow {
-            structure: structure.to_owned(),
-            status: "ok",
-            reason: None,
-            query_ns: query_ns.map(Estimate::exact),
-            speedup: None,
-            build_ms: None,
-            memory_bytes_per_item: None,
-            break_even_queries: None,
-            locate_ns: None,
-            frame_ns: None,
-            update_ns: None,
-            worst_frame_ns: None,
-            is_failure: false,
-            is_scan: false,
-            is_shared: false,
-        }
+    fn structure(structure: &str, kind: &str, threads: u64) -> ReportCell {
+        let cell = json!({
+            "scene": { "name": "s", "total_count": 1, "region_count": 0,
+                "origin": [0.0, 0.0, 0.0], "bounds_min": [0.0, 0.0, 0.0],
+                "bounds_max": [1.0, 1.0, 1.0], "skipped_items": 0, "digest": "d" },
+            "path": { "name": "p", "camera_count": 8, "cache": "warm", "planes": "frame",
+                "epsilon": 8.0, "arithmetic": "f32" },
+            "structure": structure, "kind": kind, "params": { "threads": threads },
+            "test": "six-plane", "status": "ok", "reason": null, "error": null,
+            "left_out": [], "samples_ref": null,
+            "metrics": { "query_ns": { "value": 1.0, "unit": "ns" } },
+        });
+        serde_json::from_value(cell).unwrap()
     }
 
     #[test]
@@ -426,15 +383,16 @@ mod tests {
     fn scans_are_told_from_trees() {
         let mut choice = StructureChoice::of(&[]);
         assert_eq!(choice.tree_and_scan(), ["wide", "linear"]);
-        let row = |name: &str, is_scan| StructureRow {
-            is_scan,
-            ..structure(name, Some(1.0))
-        };
-        let shared = StructureRow {
-            is_shared: true,
-            ..row("linear:threads=2", true)
-        };
-        choice.rows = vec![shared, row("linear-scalar", true), row("octree", false)];
+        choice.rows = vec![
+            structure("linear:threads=2", "scan", 2),
+            structure("linear-scalar", "scan", 1),
+            structure("octree", "tree", 1),
+        ];
+        let rows = serde_json::to_value(&choice).unwrap()["rows"].clone();
+        assert_eq!(
+            (&rows[1]["query_ns"], &rows[1]["build_ms"]),
+            (&json!(1.0), &json!(null))
+        );
         assert_eq!(choice.tree_and_scan(), ["octree", "linear-scalar"]);
         assert_eq!(choice.contenders(false), ["linear-scalar", "octree"]);
         // A plan names what was found, also what the list does not hold.

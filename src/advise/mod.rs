@@ -15,7 +15,7 @@ mod trials;
 use serde::{Deserialize, Serialize};
 
 pub use change::{Axis, Beside, Change};
-pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
+pub use choice::{StructureChoice, TestChoice, TestRow, ns};
 pub use motion::{MotionChoice, policy_of};
 pub use omission::Check;
 pub use options::{AdviseInput, AdviseOptions};
@@ -76,7 +76,7 @@ impl Advice {
     pub fn found_wrong_answers(&self) -> bool {
         let structures = self.structure.rows.iter();
         let omissions = self.omissions.iter().flat_map(|o| &o.checks);
-        structures.into_iter().any(|row| row.is_failure)
+        structures.into_iter().any(|row| row.status.is_failure())
             || omissions.into_iter().any(Check::is_wrong)
     }
 }
@@ -98,9 +98,7 @@ pub struct TrialPlan {
 pub struct Prepared {
     /// Tasks and schedule for all processes.
     pub plan: TrialPlan,
-    tests: Vec<(CullingTest, usize)>,
-    rules: Vec<(&'static Rule, Result<Draft, String>)>,
-    twin: usize,
+    entered: Entered,
     answered: Answered,
     /// Cells of the run's tasks, and counts of the workloads beside.
     cells: Vec<ReportCell>,
@@ -135,14 +133,15 @@ pub fn prepare(
     let labels = [contenders, policies.unwrap_or_default()];
     let (beside, counted) = Beside::plan(input, labels, here, progress);
     let case = Case::new(input, &workload, &structures)?;
-    let mut entered = Entered::new(&case, progress)?;
+    let mut trials = Trials::new(&case);
+    let mut entered = enter(&mut trials, progress)?;
     progress("answers, checked");
-    let answered = entered.trials.answered();
+    let answered = trials.answered();
     let drafts = entered.rules.iter_mut().flat_map(|(_, draft)| draft);
     for sides in drafts.flat_map(|draft| &mut draft.sides) {
-        entered.trials.compare(sides);
+        trials.compare(sides);
     }
-    let tasks = entered.trials.tasks(&answered.counts);
+    let tasks = trials.tasks(&answered.counts);
     let stages = Stages::of(input, &structures[0]);
     let funnel = funnel::prepare(&stages.input(input), progress).map_err(|error| error.to_string());
     Ok(Prepared {
@@ -158,9 +157,7 @@ pub fn prepare(
         motion,
         cells,
         counted,
-        tests: entered.tests,
-        rules: entered.rules,
-        twin: entered.twin,
+        entered,
         answered,
     })
 }
@@ -172,8 +169,9 @@ pub fn prepare(
 pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, StudyError> {
     let workload = input.workload()?;
     let case = Case::new(input, &workload, &plan.structures)?;
-    let entered = Entered::new(&case, &|_| ())?;
-    let (found, planned) = (entered.trials.len(), plan.expected.len());
+    let mut trials = Trials::new(&case);
+    enter(&mut trials, &|_| ())?;
+    let (found, planned) = (trials.len(), plan.expected.len());
     let cameras = plan.expected.iter().map(Vec::len);
     if found != planned || cameras.min() != Some(input.path.cameras.len()) {
         return Err(StudyError::Refused(format!(
@@ -181,8 +179,8 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, Study
              on the way"
         )));
     }
-    let once_ns = entered.trials.once_ns.clone();
-    let tasks = entered.trials.tasks(&plan.expected);
+    let once_ns = trials.once_ns.clone();
+    let tasks = trials.tasks(&plan.expected);
     let mut times = ProcessTimes {
         once_ns,
         parts: plan.beside.times(input)?,
@@ -202,7 +200,13 @@ impl Prepared {
         let AdviseInput { scene, path, .. } = *input;
         let (times, answered) = (OverProcesses::of(processes), &self.answered);
         let ([tree, _], beside) = (self.plan.structures, &self.plan.beside);
-        let test = TestChoice::of(tree, input.options.draw_ns, &self.tests, answered, &times);
+        let test = TestChoice::of(
+            tree,
+            input.options.draw_ns,
+            &self.entered.tests,
+            answered,
+            &times,
+        );
         let groups = beside.groups(self.counted, processes);
         // Under further policies the first one is the workload itself.
         let here = groups.first().filter(|_| beside.has_policies());
@@ -225,10 +229,14 @@ impl Prepared {
             changes: &changes,
             funnel: &funnel,
         };
-        let settled = self.rules.into_iter().map(|(rule, draft)| match draft {
-            Ok(draft) => rule.settled(draft, answered, &times, choices()),
-            Err(reason) => rule.not_applicable(reason),
-        });
+        let settled = self
+            .entered
+            .rules
+            .into_iter()
+            .map(|(rule, draft)| match draft {
+                Ok(draft) => rule.settled(draft, answered, &times, choices()),
+                Err(reason) => rule.not_applicable(reason),
+            });
         Advice {
             scene: scene.name.clone(),
             path: path.name.clone(),
@@ -237,13 +245,11 @@ impl Prepared {
             cameras: path.cameras.len(),
             options: *input.options,
             processes: processes.len(),
-            twin: times.ratio(self.twin, BASE),
+            twin: times.ratio(self.entered.twin, BASE),
             omissions: settled.collect(),
             test,
             warnings: path.warnings(scene),
-            motion: self
-                .motion
-                .map(|motion| motion.chosen(&self.structure, here)),
+            motion: (self.motion).map(|motion| motion.chosen(&self.structure, here)),
             structure: self.structure,
             threads: SharedWork::of(&self.cells),
             changes,
@@ -252,30 +258,25 @@ impl Prepared {
 }
 
 /// All tasks, in the order in which every process enters them.
-struct Entered<'c> {
-    trials: Trials<'c>,
+struct Entered {
     tests: Vec<(CullingTest, usize)>,
     rules: Vec<(&'static Rule, Result<Draft, String>)>,
     twin: usize,
 }
 
-impl<'c> Entered<'c> {
-    fn new(case: &'c Case<'c>, progress: &dyn Fn(&str)) -> Result<Self, StudyError> {
-        let mut trials = Trials::new(case);
-        let mut rules = Vec::with_capacity(RULES.len());
-        for rule in RULES {
-            progress(rule.name);
-            rules.push(match (rule.prepare)(&mut trials) {
-                Err(Unfit::Failed(error)) => return Err(error),
-                Err(Unfit::NotApplicable(reason)) => (rule, Err(reason)),
-                Ok(draft) => (rule, Ok(draft)),
-            });
-        }
-        Ok(Entered {
-            tests: choice::enter_tests(&mut trials)?,
-            twin: trials.add_base(),
-            trials,
-            rules,
-        })
+fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<Entered, StudyError> {
+    let mut rules = Vec::with_capacity(RULES.len());
+    for rule in RULES {
+        progress(rule.name);
+        rules.push(match (rule.prepare)(trials) {
+            Err(Unfit::Failed(error)) => return Err(error),
+            Err(Unfit::NotApplicable(reason)) => (rule, Err(reason)),
+            Ok(draft) => (rule, Ok(draft)),
+        });
     }
+    Ok(Entered {
+        tests: choice::enter_tests(trials)?,
+        twin: trials.add_base(),
+        rules,
+    })
 }

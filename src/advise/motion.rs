@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::choice::{StructureChoice, StructureRow};
+use super::choice::{StructureChoice, ns, rows};
 use super::options::AdviseInput;
 use crate::index::UpdatePolicy;
 use crate::measure::ReportCell;
@@ -31,7 +31,8 @@ pub struct MotionChoice {
     /// Others that the processes do not tell from it.
     pub policy_ties: Vec<String>,
     /// Measured policies of the structure, fastest first.
-    pub policies: Vec<StructureRow>,
+    #[serde(serialize_with = "rows")]
+    pub policies: Vec<ReportCell>,
     /// Policies that are not measured, each with the time of its builds per frame, ns.
     pub ruled_out: Vec<(String, f64)>,
     /// `false` if the structure is built again in every frame.
@@ -65,8 +66,8 @@ impl MotionChoice {
             let (Some(spec), Some(row)) = (spec, structure.rows.first()) else {
                 continue;
             };
-            let builds = row.build_ms.unwrap_or(0.0) * 1e6 / frames;
-            match builds > RULED_OUT * row.ns().unwrap_or(f64::INFINITY) {
+            let builds = row.value("build_ms").unwrap_or(0.0) * 1e6 / frames;
+            match builds > RULED_OUT * ns(row).unwrap_or(f64::INFINITY) {
                 true => ruled_out.push((policy.to_string(), builds)),
                 false => measured.push(format!("{}@{policy}", spec.label)),
             }

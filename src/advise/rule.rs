@@ -174,16 +174,12 @@ impl Rule {
         choices: Facts,
     ) -> Omission {
         let sides = draft.sides.into_iter();
-        let once_ns = |n| {
-            draft
-                .once
-                .map_or(f64::NAN, |first| times.once_ns(first + n))
-        };
-        let once_ratio = |first| times.once_ratio(first + 1, first);
+        let once = draft.once;
+        let once_ns = |n| once.map_or(f64::NAN, |first| times.once_ns(first + n));
         let facts = Facts {
             checks: sides.map(|sides| sides.check(answered, times)).collect(),
             once_ns: [0, 1].map(once_ns),
-            once_ratio: draft.once.and_then(once_ratio),
+            once_ratio: once.and_then(|first| times.once_ratio(first + 1, first)),
             ..choices
         };
         let mut finding = (draft.conclude)(&facts);
@@ -194,11 +190,10 @@ impl Rule {
 
     /// Weighs statistic, clock and answers.
     pub fn omission(&'static self, finding: Finding, checks: Vec<Check>) -> Omission {
-        let predicted = finding
-            .compared
-            .and_then(|both| self.left_out_if.holds(both));
+        let compared = finding.compared;
+        let predicted = compared.and_then(|both| self.left_out_if.holds(both));
         let agrees = finding.measured.zip(predicted).map(|(a, b)| a == b);
-        let [statistic, threshold] = [0, 1].map(|i| finding.compared.map(|both| both[i]));
+        let [statistic, threshold] = [0, 1].map(|i| compared.map(|both| both[i]));
         let first = checks.first();
         let timed = first.map(|check| [check.kept_ns, check.left_out_ns]);
         let cost_ns = finding.cost_ns.or(timed);

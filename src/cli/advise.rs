@@ -1,13 +1,15 @@
 //! `cullbench advise`: the structure, the culling test and the work to leave out
 //! for a scene and path, with the evidence. The library measures and weighs it.
 
+use anyhow::Result;
+
 use super::advise_table::blocks;
 use super::args::AdviseArgs;
 use super::document::show;
 use super::processes::{Job, Message, Timing};
 use super::study::{Setting, Study};
 use super::{Ending, print, tell, text};
-use crate::advise::{self, AdviseInput, AdviseOptions, TrialPlan};
+use crate::advise::{self, AdviseInput};
 use crate::index::Registry;
 use crate::measure::{Effort, Group, Part, Plan, ProcessTimes, Share, cameras_within};
 use crate::report::Experiment;
@@ -20,10 +22,9 @@ const ROUNDS: [usize; 2] = [5, 25];
 /// Effort of `run --scene`.
 const EFFORT: Effort = SUITES[0].effort;
 
-pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> {
-    let options = options(args);
+pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
     let (setting, all) = setting(registry, args, None)?;
-    let input = input(args, &setting, &options);
+    let input = input(args, &setting);
     if setting.path.cameras.len() < all {
         let (used, all) = (setting.path.cameras.len(), text::counted(all, "camera"));
         let used = text::count(used);
@@ -31,7 +32,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
             "note: the rules look at {used} of {all}, evenly spread"
         ));
     }
-    input.check()?;
+    input.workload()?;
     let processes = args.study.spread.processes;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, processes.into(), &args.study.spread)?;
@@ -69,7 +70,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
 }
 
 /// The plan of a run of the scene and path: a structure has the same times there.
-pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
+pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
     let study = &args.study;
     let structures = study.kernel.structures(registry, &study.structure)?;
     let alone = Experiment::new(&study.scene).path(&study.path);
@@ -97,7 +98,7 @@ fn setting(
     registry: &Registry,
     args: &AdviseArgs,
     timing: Option<&Timing>,
-) -> anyhow::Result<(Setting, usize)> {
+) -> Result<(Setting, usize)> {
     let study = &args.study;
     let held = |structures| study.lens.scene_args.options(structures);
     let mut setting = Setting::load(registry, study, ROUNDS, timing, held)?;
@@ -108,44 +109,22 @@ fn setting(
     Ok((setting, all))
 }
 
-fn input<'s>(
-    args: &'s AdviseArgs,
-    setting: &'s Setting,
-    options: &'s AdviseOptions,
-) -> AdviseInput<'s> {
+fn input<'s>(args: &'s AdviseArgs, setting: &'s Setting) -> AdviseInput<'s> {
     AdviseInput {
         scene: &setting.scene,
         path: &setting.path,
         structures: &setting.structures,
         motion: args.moves.motion.first().map(String::as_str),
         views: args.moves.views,
-        options,
+        options: &args.options,
         protocol: &setting.protocol,
     }
 }
 
 /// Times the trials in one process.
-pub fn time(
-    registry: &Registry,
-    args: &AdviseArgs,
-    trials: &TrialPlan,
-    timing: &Timing,
-) -> anyhow::Result<ProcessTimes> {
+pub fn time(registry: &Registry, args: &AdviseArgs, timing: &Timing) -> Result<ProcessTimes> {
     let (setting, _) = setting(registry, args, Some(timing))?;
-    Ok(advise::time(
-        &input(args, &setting, &options(args)),
-        trials,
-    )?)
-}
-
-fn options(args: &AdviseArgs) -> AdviseOptions {
-    AdviseOptions {
-        draw_ns: args.draw_ns,
-        shade_ns: args.shade_ns,
-        tolerance: args.tolerance,
-        moved: args.moved,
-        queries_per_update: args.queries_per_update,
-    }
+    Ok(advise::time(&input(args, &setting), &timing.plan()?)?)
 }
 
 #[cfg(test)]

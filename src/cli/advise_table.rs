@@ -5,20 +5,18 @@ use super::run_verdict::{gains, times};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time, time_within};
 use crate::advise::{
-    Advice, Axis, Check, Omission, StructureChoice, StructureRow, TestChoice, TestRow, policy_of,
+    Advice, Axis, Check, Omission, StructureChoice, TestChoice, TestRow, ns, policy_of,
 };
-use crate::measure::YARDSTICK;
+use crate::measure::{ReportCell, YARDSTICK};
 use crate::statistics::Estimate;
 
 /// The advice, with the evidence if it is wanted, for `width` characters.
 pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
     let items = text::counted(advice.items, "item");
     let cameras = text::counted(advice.cameras, "camera");
+    let (scene, path) = (&advice.scene, &advice.path);
     let mut blocks = vec![
-        Block::Line(format!(
-            "{}: {items}; {}: {cameras}",
-            advice.scene, advice.path
-        )),
+        Block::Line(format!("{scene}: {items}; {path}: {cameras}")),
         Block::Line(text::over(advice.processes, advice.twin.as_ref())),
     ];
     if all_columns {
@@ -74,21 +72,21 @@ fn taken(advice: &Advice) -> String {
     };
     let row = choice.rows.iter().find(|row| row.structure == *name);
     let next = choice.rows.iter().find(|row| {
-        row.query_ns.is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
+        ns(row).is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
     });
     let faster = next.and_then(|next| {
-        let times = times(next.ns()? / row?.ns()?);
+        let times = times(ns(next)? / ns(row?)?);
         Some(format!("{times} {}, the next", next.structure))
     });
     let is_next = next.is_some_and(|next| next.structure == YARDSTICK);
-    let linear = row.and_then(|row| row.speedup);
+    let linear = row.and_then(|row| row.value("speedup"));
     let linear = linear.filter(|_| !choice.is_scan && !is_next);
     let linear = linear.map(|speedup| format!("{} linear", times(speedup)));
     let figures = bracketed(linear.into_iter().chain(faster), ", ");
     let test = some(advice.test.name, |test| {
         format!(", test {test}{}", ties(&advice.test.ties))
     });
-    let repaid = row.and_then(|row| row.break_even_queries);
+    let repaid = row.and_then(|row| row.value("break_even_queries"));
     let repaid = some(repaid.filter(|n| *n > 0.0), |n| {
         let queries = text::counted(n as usize, "query");
         format!(" Its build is repaid after {queries}.")
@@ -97,10 +95,8 @@ fn taken(advice: &Advice) -> String {
         let ties = ties(&choice.region_search_ties);
         format!(" For region search: {name}{ties}.")
     });
-    format!(
-        "Take structure {name}{figures}{}{test}.{repaid}{search}",
-        ties(&choice.ties)
-    )
+    let ties = ties(&choice.ties);
+    format!("Take structure {name}{figures}{ties}{test}.{repaid}{search}")
 }
 
 /// Policy to update by, with the times of a frame.
@@ -108,9 +104,9 @@ fn in_motion(advice: &Advice) -> Option<String> {
     let motion = advice.motion.as_ref()?;
     let policy = motion.policy.as_ref()?;
     let (row, others) = motion.policies.split_first()?;
-    let frame = row.ns()?;
+    let frame = ns(row)?;
     let longer = others.iter().filter_map(|row| {
-        let (policy, longer) = (policy_of(&row.structure), times(row.ns()? / frame));
+        let (policy, longer) = (policy_of(&row.structure), times(ns(row)? / frame));
         Some(format!("{policy} takes {longer} as long"))
     });
     let ruled_out = motion.ruled_out.iter().map(|(policy, builds)| {
@@ -122,12 +118,12 @@ fn in_motion(advice: &Advice) -> Option<String> {
         "In motion, {} of the items and {} per frame: {policy}{}{others}. A frame takes {}, of which \
          the update {}; the worst one {}. The rules below, except that of the index, are weighed on the \
          still scene.",
-        share(motion.share_moved),
+        text::short_percent(motion.share_moved),
         text::counted(motion.views, "query"),
         ties(&motion.policy_ties),
         text::time(frame),
-        some(row.update_ns, text::time),
-        row.worst_frame_ns.map_or("unknown".to_owned(), text::time),
+        some(row.value("update_ns"), text::time),
+        (row.value("worst_frame_ns")).map_or("unknown".to_owned(), text::time),
     ))
 }
 
@@ -142,17 +138,15 @@ fn changes(advice: &Advice) -> Vec<String> {
             Axis::Items => ("number of items", |items| {
                 text::count(items.round() as usize)
             }),
-            Axis::ShareInView => ("share in view", share),
-            Axis::ShareMoved => ("share moved", share),
+            Axis::ShareInView => ("share in view", text::short_percent),
+            Axis::ShareMoved => ("share moved", text::short_percent),
         };
         let turns = [("below", &change.below), ("above", &change.above)];
         let turns = turns.into_iter().filter_map(|(side, turn)| {
             let turn = turn.as_ref()?;
             let [at, lower, upper] = [turn.at, turn.lower, turn.upper].map(show);
-            Some(format!(
-                "{side} {at} ({lower} to {upper}) {}",
-                turn.structure
-            ))
+            let structure = &turn.structure;
+            Some(format!("{side} {at} ({lower} to {upper}) {structure}"))
         });
         let [low, high] = change.measured.map(show);
         let turns = text::joined(turns);
@@ -163,11 +157,6 @@ fn changes(advice: &Advice) -> Vec<String> {
         });
     }
     told
-}
-
-/// A share in percent, with three digits.
-fn share(share: f64) -> String {
-    format!("{} %", text::short(share * 100.0))
 }
 
 /// Reason for which a feature is neither needed nor not needed.
@@ -192,20 +181,16 @@ fn rule_table(advice: &Advice) -> Table {
                 table.add_row([title, "with", "without", ratio, ""]);
             }
             let [with, without] = rule.sides_ns();
-            let (more, less) = if needed {
-                (without, with)
+            let ratio = if needed {
+                without / with
             } else {
-                (with, without)
+                with / without
             };
-            let ratio = more / less;
             let finite = |x: f64| Some(x).filter(|x| x.is_finite());
             let shown = |ns| some(finite(ns), text::time);
             let is_decided = rule.is_chosen && ratio < 1.0;
-            let note = if is_decided {
-                "the choice above decides"
-            } else {
-                &rule.note
-            };
+            let decided = is_decided.then_some("the choice above decides");
+            let note = decided.unwrap_or(&rule.note);
             let ratio = match rule.is_tie {
                 true => "tie".to_owned(),
                 false => some(finite(ratio), times),
@@ -229,10 +214,8 @@ fn evidence(advice: &Advice) -> [Block; 8] {
             feature.reason.clone() + ["", " (predicted otherwise)"][usize::from(is_otherwise)]
         }),
     ];
-    let tests = format!(
-        "Culling tests on {}, with {} ns to draw an item that cannot be seen:",
-        advice.test.structure, advice.options.draw_ns
-    );
+    let (on, ns) = (&advice.test.structure, advice.options.draw_ns);
+    let tests = format!("Culling tests on {on}, with {ns} ns to draw an item that cannot be seen:");
     let note = "The statistic decides; where both sides answer the same, the clock does if a \
                 paired test over the processes tells them apart.";
     [
@@ -259,28 +242,37 @@ fn bracketed(texts: impl Iterator<Item = String>, between: &str) -> String {
     some(texts.first(), |_| format!(" ({})", texts.join(between)))
 }
 
+fn within(cell: &ReportCell, metric: &str) -> String {
+    some(cell.metrics.get(metric), |ns| time_within(ns.estimate()))
+}
+
 fn structure_table(choice: &StructureChoice) -> Table {
-    let columns: &[Column<&StructureRow>] = &[
+    let columns: &[Column<&ReportCell>] = &[
         ("structure", |r| r.structure.clone()),
-        (">query [95 % interval]", |r| some(r.query_ns, time_within)),
-        (">speed-up", |r| some(r.speedup, significant)),
-        (">build", |r| some(r.build_ms, |ms| time(ms * 1e6))),
-        (">B/item", |r| some(r.memory_bytes_per_item, text::tenths)),
-        (">break-even queries", |r| {
-            some(r.break_even_queries, |n| text::count(n as usize))
+        (">query [95 % interval]", |r| within(r, "query_ns")),
+        (">speed-up", |r| some(r.value("speedup"), significant)),
+        (">build", |r| some(r.value("build_ms"), |ms| time(ms * 1e6))),
+        (">B/item", |r| {
+            some(r.value("memory_bytes_per_item"), text::tenths)
         }),
-        (">locate", |r| some(r.locate_ns, time)),
-        (">frame", |r| some(r.frame_ns, time_within)),
-        (">update", |r| some(r.update_ns, time)),
-        (">worst frame", |r| some(r.worst_frame_ns, time)),
-        ("status", |r| r.status.to_owned()),
+        (">break-even queries", |r| {
+            some(r.value("break_even_queries"), |n| text::count(n as usize))
+        }),
+        (">locate", |r| some(r.value("locate_ns"), time)),
+        (">frame", |r| within(r, "frame_ns")),
+        (">update", |r| some(r.value("update_ns"), time)),
+        (">worst frame", |r| some(r.value("worst_frame_ns"), time)),
+        ("status", |r| r.status.name().to_owned()),
     ];
     Table::with(&choice.rows, columns).without_empty_columns()
 }
 
 fn test_table(choice: &TestChoice) -> Table {
-    let columns: &[Column<(&str, &TestRow)>] = &[
-        ("", |(mark, _)| (*mark).to_owned()),
+    let columns: &[Column<(&TestChoice, &TestRow)>] = &[
+        ("", |(choice, r)| {
+            let is_taken = choice.name == Some(r.test);
+            ["", "*"][usize::from(is_taken)].to_owned()
+        }),
         ("test", |(_, r)| r.test.to_owned()),
         (">query [95 % interval]", |(_, r)| {
             some(r.query_ns, time_within)
@@ -294,14 +286,7 @@ fn test_table(choice: &TestChoice) -> Table {
         }),
         (">query and drawing", |(_, r)| some(r.total_ns, time)),
     ];
-    let mark = |row: &TestRow| {
-        if choice.name == Some(row.test) {
-            "*"
-        } else {
-            ""
-        }
-    };
-    Table::with(choice.rows.iter().map(|row| (mark(row), row)), columns)
+    Table::with(choice.rows.iter().map(|row| (choice, row)), columns)
 }
 
 /// Every measurement with and without a feature.
@@ -345,8 +330,7 @@ fn check_table(features: &[Omission]) -> Table {
             .to_owned()
         }),
     ];
-    let checks = features
-        .iter()
-        .flat_map(|rule| rule.checks.iter().map(move |check| (rule, check)));
+    let rules = features.iter();
+    let checks = rules.flat_map(|rule| rule.checks.iter().map(move |check| (rule, check)));
     Table::with(checks, columns)
 }

@@ -3,7 +3,6 @@
 //! of every cell is known to within the threshold. The statistics are those of
 //! [`changes`]; here are the options and how the pairs are run.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
@@ -317,10 +316,8 @@ impl Duel<'_> {
         });
         Share {
             process,
-            wanted: vec![true; groups.len()],
             known: known.collect(),
-            failed: BTreeMap::new(),
-            plan_only: false,
+            ..Share::first(groups.len())
         }
     }
 
@@ -355,9 +352,8 @@ impl Duel<'_> {
             workers[side] = Some(Worker::start(&self.programs[side], &request, patience)?);
         }
         let mut turn = 0;
-        workers[1 - begins]
-            .iter()
-            .for_each(|other| other.hold(true));
+        let other = workers[1 - begins].iter();
+        other.for_each(|other| other.hold(true));
         while workers.iter().any(Option::is_some) {
             if interrupt::asked() {
                 return Err(Interrupted.into());

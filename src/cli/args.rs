@@ -4,8 +4,10 @@
 
 use std::path::PathBuf;
 
-use crate::drift::{ARMS, ArmKind};
+use crate::advise::AdviseOptions;
+use crate::drift::DriftOptions;
 use crate::funnel::StageKind;
+use crate::spec::{SpecError, values};
 use crate::stress::extremes::DEFAULT_CASES;
 use clap::builder::ArgPredicate;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -15,7 +17,7 @@ use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, MotionArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs,
     TableFormat, WhatArgs,
 };
-use super::{program, text, values};
+use super::{program, text};
 
 /// The default path of a stage: those behind the frustum have work there.
 const STREET: &str = "street:frames=32";
@@ -277,6 +279,12 @@ pub struct VerifyArgs {
     pub culling: CullingArgs,
 }
 
+/// A stage of the funnel whose error and time can be swept.
+fn stage(name: &str) -> Result<StageKind, SpecError> {
+    let swept = [StageKind::Region, StageKind::Occlusion, StageKind::Triangle];
+    values::choice("stage", &swept.map(|stage| (stage, stage.name(), "")))(name)
+}
+
 #[derive(Args, Debug)]
 #[command(mut_arg("path", |arg| arg.default_value_if("stage", ArgPredicate::IsPresent, STREET)))]
 pub struct PrecisionArgs {
@@ -300,7 +308,7 @@ pub struct PrecisionArgs {
     /// Study another stage of the funnel instead of the object stage: occlusion (sizes
     /// of its buffer), region (portals) or triangle (cones). The first structure runs
     /// the object stage; the default path is street
-    #[arg(long, value_name = "STAGE", value_parser = values::stage, conflicts_with_all = ["cubes", "all", "html", "svg"])]
+    #[arg(long, value_name = "STAGE", value_parser = stage, conflicts_with_all = ["cubes", "all", "html", "svg"])]
     pub stage: Option<StageKind>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
@@ -313,22 +321,8 @@ pub struct AdviseArgs {
     pub study: StudyArgs,
     #[command(flatten)]
     pub moves: MotionArgs,
-    /// Cost of drawing an item that is not visible, ns
-    #[arg(long, value_name = "NS", default_value_t = 1000.0, value_parser = values::at_least_zero)]
-    pub draw_ns: f64,
-    /// Cost of shading a fragment, ns (1 shades an image of 1920 x 1080 in 2 ms)
-    #[arg(long, value_name = "NS", default_value_t = 1.0, value_parser = values::at_least_zero)]
-    pub shade_ns: f64,
-    /// Largest acceptable error: of planes relative to the depth of the view, of a
-    /// camera basis in radians
-    #[arg(long, value_name = "SHARE", default_value_t = 1e-5, value_parser = values::above_zero)]
-    pub tolerance: f64,
-    /// Share of the items that move between two updates
-    #[arg(long, value_name = "SHARE", default_value = "1%", value_parser = values::share)]
-    pub moved: f64,
-    /// Queries between two updates
-    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = values::at_least_zero)]
-    pub queries_per_update: f64,
+    #[command(flatten)]
+    pub options: AdviseOptions,
     /// Show the evidence too: every structure, test and rule with its times
     #[arg(long)]
     pub all_columns: bool,
@@ -338,39 +332,8 @@ pub struct AdviseArgs {
 
 #[derive(Args, Debug)]
 pub struct DriftArgs {
-    /// Number of steps; errors are shown at 1e3, 1e4, ... and at the last one
-    #[arg(long, value_name = "N", default_value = "1e6", value_parser = values::steps)]
-    pub steps: u64,
-    /// Largest error after all steps of a method to recommend for camera bases
-    #[arg(long, value_name = "RAD", default_value_t = 1e-6, value_parser = values::above_zero)]
-    pub tolerance: f64,
-    /// Spring arms to study: linear, collision (stiffens when stretched, has a stop)
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        default_value = "linear,collision"
-    )]
-    #[arg(value_parser = values::choice("arm", &ARMS))]
-    pub arm: Vec<ArmKind>,
-    /// Stiffnesses of the spring arms, k in 1/s^2, critically damped
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        default_value = "1e2,1e4,1e6"
-    )]
-    #[arg(value_parser = values::within(0.01..=1e8))]
-    pub stiffness: Vec<f64>,
-    /// Frames per second of the spring arms
-    #[arg(long, value_name = "N", default_value_t = 60, value_parser = values::whole(1u32..=1000))]
-    pub rate: u32,
-    /// Simulated time over which the largest error of a spring arm is taken
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = values::within(1.0..=1e3))]
-    pub seconds: f64,
-    /// Largest position error of a spring arm to recommend; the target swings by 1
-    #[arg(long, value_name = "ERROR", default_value_t = 1e-3, value_parser = values::above_zero)]
-    pub arm_tolerance: f64,
+    #[command(flatten)]
+    pub options: DriftOptions,
     /// Show every table: errors by number of steps, orders, limits of stability
     #[arg(long)]
     pub all: bool,

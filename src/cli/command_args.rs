@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 
+use super::program;
 use super::shared_args::{CullingArgs, LensArgs, SceneArgs, StudyArgs, TableFormat, WhatArgs};
-use super::{program, values};
 use crate::query::ItemId;
+use crate::report::JUDGED_METRICS;
+use crate::spec::{SpecError, values};
 use crate::suite::DEFAULT_PATH;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
@@ -37,12 +39,22 @@ pub struct ViewArgs {
     #[arg(long, default_value = "six-plane")]
     pub test: String,
     /// Columns and rows of samples that find hidden items, e.g. 320x180 [default: none]
-    #[arg(long, value_name = "WxH", value_parser = values::samples)]
+    #[arg(long, value_name = "WxH", value_parser = samples)]
     pub samples: Option<SampleGrid>,
     #[command(flatten)]
     pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
+}
+
+/// Columns and rows of an image, `320x180`.
+fn samples(text: &str) -> Result<SampleGrid, SpecError> {
+    const MOST: u32 = 16_384;
+    let side = |text: &str| text.trim().parse().ok().filter(|n| (1..=MOST).contains(n));
+    let sides = text.split_once(['x', 'X']);
+    let grid = sides.and_then(|(width, height)| Some(SampleGrid::new(side(width)?, side(height)?)));
+    let what = format_args!("columns x rows such as 320x180, each from 1 to {MOST}");
+    values::expected(grid, what)
 }
 
 const FUNNEL_HELP: &str = include_str!("assets/help/funnel.txt");
@@ -60,7 +72,7 @@ pub struct FunnelArgs {
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = values::whole(1..=u32::MAX))]
     pub frames: u32,
     /// Columns and rows of samples
-    #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]
+    #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = samples)]
     pub samples: SampleGrid,
     /// Cut holes into a share of the items: fence or foliage, e.g.
     /// fence:share=0.2,tile=1,seed=1
@@ -200,6 +212,13 @@ pub struct SceneDrawArgs {
     pub lens: LensArgs,
 }
 
+/// A metric that runs are compared by.
+fn metric(name: &str) -> Result<&'static str, SpecError> {
+    let known = JUDGED_METRICS.iter().copied();
+    let metric = known.clone().find(|metric| *metric == name.trim());
+    metric.ok_or_else(|| SpecError::unknown("metric", name, known))
+}
+
 const COMPARE_HELP: &str = include_str!("assets/help/compare.txt");
 
 /// Measure of a regression; an answer that is not given any more is one by each.
@@ -237,7 +256,7 @@ pub struct CompareArgs {
     pub threshold: f64,
     /// Metrics to compare: query_ns, locate_ns, locate_batched_ns, build_ms, frame_ns,
     /// update_ns; may be repeated [default: query_ns, and frame_ns of motions]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::metric)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = metric)]
     #[arg(conflicts_with = "against")]
     pub metric: Vec<&'static str>,
     /// Measure of a regression

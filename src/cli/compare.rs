@@ -113,19 +113,12 @@ fn processes(report: &Report) -> String {
 
 fn side(report: &Report) -> Side {
     let (run, source) = (&report.run, &report.source);
-    let commit: String = source
-        .commit
-        .as_deref()
-        .unwrap_or("unknown")
-        .chars()
-        .take(12)
-        .collect();
+    let commit = source.commit.as_deref().unwrap_or("unknown");
+    let commit: String = commit.chars().take(12).collect();
     let cells = text::counted(report.cells.len(), "cell");
+    let (id, version) = (&run.id, &source.version);
     Side {
-        line: format!(
-            "{}, version {}, commit {commit}, {cells}",
-            run.id, source.version
-        ),
+        line: format!("{id}, version {version}, commit {commit}, {cells}"),
         json: json!({
             "id": run.id,
             "started_at": run.started_at,
@@ -177,7 +170,7 @@ fn show(table: &CompareTable) -> anyhow::Result<Ending> {
         write_text(file, &to_page("compare", 1, changes, blocks))?;
     }
     shown?;
-    Ok(table.ending())
+    Ok(table.verdict().0)
 }
 
 /// The changes with intervals, the worst first.

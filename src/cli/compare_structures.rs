@@ -85,10 +85,8 @@ pub fn ask_all(
         for spec in structures {
             let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
             let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
-            let built = only
-                .take()
-                .map_or_else(|| spec.build(input_of(scene, boxes)), Ok);
-            let index = match built {
+            let build = || spec.build(input_of(scene, boxes));
+            let index = match only.take().map_or_else(build, Ok) {
                 Ok(index) => index,
                 // One of many: the others' answers are worth having.
                 Err(error @ (BuildError::Refused { .. } | BuildError::OutOfMemory { .. }))

@@ -47,13 +47,8 @@ pub struct CompareTable<'a> {
 }
 
 impl CompareTable<'_> {
-    /// 1 for a wrong answer, otherwise 3 for a regression.
-    pub fn ending(&self) -> Ending {
-        self.verdict().0
-    }
-
-    /// The ending and its name in JSON.
-    fn verdict(&self) -> (Ending, &'static str) {
+    /// 1 for a wrong answer, otherwise 3 for a regression; and its name in JSON.
+    pub fn verdict(&self) -> (Ending, &'static str) {
         let is_undecided =
             self.changes.count(Outcome::Inconclusive) > 0 || self.changes.proven_shift().is_some();
         match (self.changes.is_wrong(), self.changes.is_regression()) {
@@ -80,7 +75,7 @@ impl CompareTable<'_> {
             )
         });
         let worst = self.changes.rows.first();
-        let worst = worst.filter(|_| self.ending() != Ending::Ok);
+        let worst = worst.filter(|_| self.verdict().0 != Ending::Ok);
         let worst = worst.filter(|row| row.outcome < Outcome::Different);
         let worst = text::some(worst, |row| {
             let ratio = row.ratio().filter(|ratio| ratio.is_finite());

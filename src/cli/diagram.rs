@@ -69,12 +69,7 @@ pub struct Diagram<'d> {
 
 impl<'d> Diagram<'d> {
     /// A diagram of the usual height with neither front nor levels.
-    pub fn of(
-        caption: String,
-        axes: [Axis<'d>; 2],
-        joined: Joined,
-        series: Vec<Series>,
-    ) -> Diagram<'d> {
+    pub fn of(caption: String, axes: [Axis<'d>; 2], joined: Joined, series: Vec<Series>) -> Self {
         Diagram {
             caption,
             axes,
@@ -133,11 +128,8 @@ impl<'d> Diagram<'d> {
         let height = bottom + 2.5 * LINE;
         let mut legend = (String::new(), 0.0);
         if is_apart {
-            parts.extend(
-                named
-                    .iter()
-                    .map(|name| format!("<g class=\"level\">{name}</g>\n")),
-            );
+            let level = |name| format!("<g class=\"level\">{name}</g>\n");
+            parts.extend(named.iter().map(level));
             legend = self.legend(&classes, height);
         }
         parts += &format!(
@@ -160,10 +152,8 @@ impl<'d> Diagram<'d> {
 
     /// Lines through places, as one shape that is stretched to the width.
     fn curve(&self, class: &str, places: &[[f64; 2]]) -> String {
-        let points = places
-            .iter()
-            .map(|[x, y]| format!("{:.0},{y:.0} ", 10.0 * x));
-        let height = self.height;
+        let point = |[x, y]: &[f64; 2]| format!("{:.0},{y:.0} ", 10.0 * x);
+        let (points, height) = (places.iter().map(point), self.height);
         format!(
             "<svg viewBox=\"0 0 1000 {height}\" preserveAspectRatio=\"none\" width=\"100%\" \
              height=\"{height}\"><polyline class=\"{class}\" points=\"{}\"/></svg>",
@@ -223,9 +213,8 @@ impl<'d> Diagram<'d> {
             free = placed[i] - LINE;
         }
         let named = ends.into_iter().zip(placed);
-        named
-            .map(|((name, end), at)| (shortened(&name, NAME), end, at))
-            .collect()
+        let named = named.map(|((name, end), at)| (shortened(&name, NAME), end, at));
+        named.collect()
     }
 
     /// Marks with names below the plot, for pictures; a page has its filter.

@@ -128,7 +128,7 @@ pub fn to_terminal(blocks: &[Block], width: usize) -> String {
 /// Shows the document on standard output.
 pub fn show(blocks: &[Block]) -> io::Result<()> {
     let text = to_terminal(blocks, text::width());
-    text::terminal().write_all(text.as_bytes())
+    io::stdout().lock().write_all(text.as_bytes())
 }
 
 /// A page of what a terminal shows, with figures after its conclusions.

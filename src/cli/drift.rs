@@ -11,10 +11,10 @@ use super::table::{Column, Table};
 use super::text::{self, some, time_plus_minus};
 use super::{Ending, expect_places, print, write_text};
 use crate::drift::{
-    self, ARMS, ArmChoice, ArmKind, ArmOptions, ArmPoint, ArmReport, DriftOptions, DriftReport,
-    ORBIT_RADIUS, Rated, Recommendation, RotationDrift, StabilityLimit,
+    self, ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, DriftReport, ORBIT_RADIUS, Rated,
+    Recommendation, RotationDrift, StabilityLimit,
 };
-use crate::measure::{ProcessTimes, Protocol, Schedule};
+use crate::measure::{ProcessTimes, Protocol};
 use crate::report::grouped;
 
 /// Rounds of what is timed, if one process has them all.
@@ -23,21 +23,18 @@ const ROUNDS: [usize; 2] = [5, 15];
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
     expect_places(&outputs, &[""; 0])?;
-    let options = options(args);
-    let jobs = drift::jobs(&options);
+    let options = &args.options;
+    let jobs = drift::jobs(options);
     let study = Study::new(String::new(), jobs as u64, &args.spread)?;
+    let (steps, seconds) = (options.steps as f64, options.arms.seconds);
     let work = text::counted(jobs, "study");
-    let steps = options.steps as f64;
-    let seconds = options.arm.seconds;
-    study.announce(
-        &format!("{work}, up to {steps:e} steps or {seconds} s each"),
-        "about half a minute",
-    );
-    let mut report = drift::prepare(&options, |job| {
+    let work = format!("{work}, up to {steps:e} steps or {seconds} s each");
+    study.announce(&work, "about half a minute");
+    let mut report = drift::prepare(options, |job| {
         study.begin(job);
         study.advance();
     });
-    let schedule = drift::plan(&options, &protocol(args, 0));
+    let schedule = drift::plan(options, &protocol(args, 0));
     let times = study.times("everything, timed", None, &schedule)?;
     report.conclude(&times, schedule.rounds);
     print(args.format, &report, || show(&blocks(&report, args.all)))?;
@@ -52,32 +49,14 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-fn options(args: &DriftArgs) -> DriftOptions {
-    let mut stiffnesses = args.stiffness.clone();
-    stiffnesses.sort_by(f64::total_cmp);
-    stiffnesses.dedup();
-    let mut arms = ArmKind::ALL.to_vec();
-    arms.retain(|kind| args.arm.contains(kind));
-    DriftOptions {
-        steps: args.steps,
-        tolerance_rad: args.tolerance,
-        arm: ArmOptions {
-            arms,
-            stiffnesses,
-            rate_hz: args.rate,
-            seconds: args.seconds,
-            tolerance: args.arm_tolerance,
-        },
-    }
-}
-
 fn protocol(args: &DriftArgs, process: u32) -> Protocol {
     args.spread.protocol(ROUNDS, process, usize::MAX)
 }
 
 /// Times everything in one process.
-pub fn time(args: &DriftArgs, plan: &Schedule, timing: &Timing) -> ProcessTimes {
-    drift::time(&options(args), plan, &protocol(args, timing.process))
+pub fn time(args: &DriftArgs, timing: &Timing) -> anyhow::Result<ProcessTimes> {
+    let (plan, protocol) = (timing.plan()?, protocol(args, timing.process));
+    Ok(drift::time(&args.options, &plan, &protocol))
 }
 
 /// A number of steps.
@@ -98,15 +77,11 @@ fn scientific(value: f64) -> String {
 /// With `all` the errors after each number of steps too.
 fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
     let [yaw, pitch, roll] = report.turn_per_step;
-    let times = match report.processes {
-        ..3 => "times without intervals (--processes 10 gives them)",
-        _ => "times with 95 % intervals",
-    };
     let (steps, rounds) = (steps(report.steps), text::counted(report.rounds, "round"));
-    let processes = text::counted(report.processes, "process");
+    let over = text::over(report.processes, None);
     let mut blocks = vec![
         Block::line(format!(
-            "Camera updates after {steps} steps: {processes}, {rounds} in each; {times}."
+            "Camera updates after {steps} steps; {over}; {rounds} in each."
         )),
         Block::heading(format!(
             "Camera bases turned by yaw {yaw}, pitch {pitch} and roll {roll} degrees per step"
@@ -277,11 +252,8 @@ fn within(points: &[&ArmPoint], tolerance: f64) -> String {
 /// "1.98 2.00".
 fn orders(points: &[&ArmPoint]) -> String {
     let orders = points.iter().filter_map(|p| p.observed_order);
-    orders
-        .map(|order| format!("{order:.1} "))
-        .collect::<String>()
-        .trim_end()
-        .to_owned()
+    let orders: Vec<String> = orders.map(|order| format!("{order:.1}")).collect();
+    orders.join(" ")
 }
 
 fn stability(limits: &[StabilityLimit]) -> Table {

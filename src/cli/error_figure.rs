@@ -18,19 +18,17 @@ pub struct Measured {
 }
 
 /// Error against run time.
-pub struct Against<'a> {
+pub struct Against {
     pub caption: String,
     /// Titles of time and error.
-    pub axes: [&'a str; 2],
-    /// Text of a time.
-    pub shown: &'a dyn Fn(f64) -> String,
+    pub axes: [&'static str; 2],
     /// Position of no error at all: a logarithmic axis has no zero.
     pub none: f64,
     /// Fastest first.
     pub points: Vec<Measured>,
 }
 
-impl Against<'_> {
+impl Against {
     /// Those of the front that are better the longer they take: the others are on it
     /// for their memory or for what they do not miss.
     fn front(&self) -> Vec<[f64; 2]> {
@@ -92,7 +90,7 @@ impl Against<'_> {
         y.ticks = y.powers(10.0);
         y.ticks.retain(|tick| *tick > self.none * 5.0);
         y.ticks.push(self.none);
-        let x = Axis::log(self.axes[0], places().map(|p| p.at[0]), 1.5, self.shown);
+        let x = Axis::log(self.axes[0], places().map(|p| p.at[0]), 1.5, &text::time);
         let (caption, error, rest) = (&self.caption, self.axes[1], left_out(beyond));
         let caption = format!("{caption}; up: {error}. Large: on the line of least error{rest}");
         Diagram {

@@ -37,12 +37,10 @@ pub fn ends(value: Estimate) -> Option<[f64; 2]> {
 
 /// Note in a caption on points that are not drawn.
 pub fn left_out(count: usize) -> String {
+    let points = text::counted(count, "point");
     match count {
         0 => String::new(),
-        _ => format!(
-            " ({} beyond the axis left out)",
-            text::counted(count, "point")
-        ),
+        _ => format!(" ({points} beyond the axis left out)"),
     }
 }
 

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use super::command_args::FunnelArgs;
@@ -21,8 +21,7 @@ use super::sheet::Class;
 use super::study::{Setting, Study};
 use super::{Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_text};
 use crate::funnel::{
-    self, Chain, Fate, FunnelInput, FunnelPlan, FunnelReport, NONE, OrderRow, PickRow, StageKind,
-    StageRow,
+    self, Chain, Fate, FunnelInput, FunnelReport, NONE, OrderRow, PickRow, StageKind, StageRow,
 };
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
@@ -36,7 +35,7 @@ use crate::visibility::{Guarantee, SampleGrid};
 /// Rounds of a stage, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
 
-pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> {
+pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
     let mut inputs = vec![Path::new(&args.study.scene), args.study.path.as_ref()];
     inputs.extend(args.pvs.as_deref());
@@ -135,11 +134,7 @@ fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) 
 }
 
 /// The back ends that were named, and those that suit the scene.
-fn chain(
-    args: &FunnelArgs,
-    scene: &Scene,
-    structures: &[StructureSpec],
-) -> Result<Chain, SpecError> {
+fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Result<Chain> {
     let object = structures.first().map_or(funnel::NONE, |spec| &spec.label);
     let typed = [
         (StageKind::Region, &args.region),
@@ -155,13 +150,11 @@ fn chain(
                 let stage = stage.name();
                 if let [_] = known[..] {
                     let nothing = nothing_for_it(scene);
-                    return Err(SpecError::new(format_args!(
-                        "--{stage} is '{name}'; expected none: {nothing}"
-                    )));
+                    bail!("--{stage} is '{name}'; expected none: {nothing}");
                 }
                 let names = known.iter().map(|row| row.name);
                 let what = format!("back end of the {stage} stage");
-                return Err(SpecError::unknown(&what, name, names));
+                return Err(SpecError::unknown(&what, name, names).into());
             }
             chain = chain.with(stage, name);
         }
@@ -178,7 +171,7 @@ pub fn nothing_for_it(scene: &Scene) -> String {
 }
 
 /// The claim of what is seen from each region that a file holds.
-fn claim(file: Option<&Path>) -> anyhow::Result<Option<Arc<Pvs>>> {
+fn claim(file: Option<&Path>) -> Result<Option<Arc<Pvs>>> {
     let Some(file) = file else { return Ok(None) };
     let bytes = read_file(file)?;
     let pvs = Pvs::from_json(&bytes).with_context(|| file.display().to_string())?;
@@ -193,11 +186,7 @@ struct Stages {
 }
 
 impl Stages {
-    fn of(
-        registry: &Registry,
-        args: &FunnelArgs,
-        timing: Option<&Timing>,
-    ) -> anyhow::Result<Stages> {
+    fn of(registry: &Registry, args: &FunnelArgs, timing: Option<&Timing>) -> Result<Self> {
         let held = |structures| LoadOptions {
             per_triangle: funnel::BYTES_PER_TRIANGLE,
             ..args.study.lens.scene_args.options(structures + 2)
@@ -210,7 +199,7 @@ impl Stages {
         })
     }
 
-    fn input<'s>(&'s self, args: &'s FunnelArgs) -> anyhow::Result<FunnelInput<'s>> {
+    fn input<'s>(&'s self, args: &'s FunnelArgs) -> Result<FunnelInput<'s>> {
         let (setting, chain, study) = (&self.setting, &self.chain, &args.study);
         let plain = plain_input(setting, chain, args.frames, args.samples, study)?;
         Ok(FunnelInput {
@@ -235,7 +224,7 @@ pub fn plain_input<'s>(
     frames: u32,
     samples: SampleGrid,
     args: &StudyArgs,
-) -> anyhow::Result<FunnelInput<'s>> {
+) -> Result<FunnelInput<'s>> {
     Ok(FunnelInput {
         scene: &setting.scene,
         path: &setting.path,
@@ -257,14 +246,9 @@ pub fn plain_input<'s>(
 }
 
 /// Times every stage in one process.
-pub fn time(
-    registry: &Registry,
-    args: &FunnelArgs,
-    plan: &FunnelPlan,
-    timing: &Timing,
-) -> anyhow::Result<ProcessTimes> {
+pub fn time(registry: &Registry, args: &FunnelArgs, timing: &Timing) -> Result<ProcessTimes> {
     let stages = Stages::of(registry, args, Some(timing))?;
-    Ok(funnel::time(&stages.input(args)?, plan)?)
+    Ok(funnel::time(&stages.input(args)?, &timing.plan()?)?)
 }
 
 /// Tables of the report, each a list of rows or a single row, with their fields.
@@ -273,7 +257,7 @@ pub fn time(
 const TABLES: &str = include_str!("assets/funnel_tables.txt");
 
 /// Writes all tables; numbers as they are, lists as their lengths.
-pub fn write(report: &FunnelReport, folder: &Path) -> anyhow::Result<()> {
+pub fn write(report: &FunnelReport, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let tables = serde_json::to_value(report)?;
     for (table, fields) in TABLES.lines().filter_map(|line| line.split_once(": ")) {
@@ -333,16 +317,10 @@ fn passed(report: &FunnelReport) -> Figure {
         row(name, errors.output_count, stage.unit, note)
     });
     let stages: Vec<Row> = [all].into_iter().chain(stages).collect();
-    let axis = Axis::log(
-        "",
-        stages.iter().map(|row| row.value),
-        3.0,
-        &funnel_table::count,
-    );
-    let caption = format!(
-        "{}, {}: what each stage leaves per view (logarithmic)",
-        report.scene, report.path
-    );
+    let values = stages.iter().map(|row| row.value);
+    let axis = Axis::log("", values, 3.0, &funnel_table::count);
+    let (scene, path) = (&report.scene, &report.path);
+    let caption = format!("{scene}, {path}: what each stage leaves per view (logarithmic)");
     rows(caption, &axis, None, &stages)
 }
 

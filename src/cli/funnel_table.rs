@@ -20,10 +20,8 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
             format!("; --frames {} takes all", report.cameras),
         ],
     };
-    let (items, times) = (
-        text::counted(report.items, "item"),
-        spread(report.processes),
-    );
+    let items = text::counted(report.items, "item");
+    let times = text::over(report.processes, None);
     let [width, height] = report.samples;
     let mut blocks = vec![
         Block::Heading(1, format!("Funnel of {}, {}", report.scene, report.path)),
@@ -211,17 +209,6 @@ fn occluders(report: &FunnelReport) -> Table {
         add(place, row.box_count, None, row.build_ns);
     }
     table
-}
-
-/// Basis of the times.
-pub fn spread(processes: usize) -> String {
-    match processes {
-        0..3 => text::over(processes, None),
-        _ => format!(
-            "times over {}, with 95 % intervals",
-            text::counted(processes, "process")
-        ),
-    }
 }
 
 /// Mark of an unproven back end.

@@ -132,10 +132,8 @@ fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<Strin
         let differ = differ.join(", ");
         format!(" They differ in the {differ}: not all of a change is the program's own.")
     });
-    let (runs, times) = (
-        text::counted(reports.len(), "run"),
-        text::counted(compared, "time"),
-    );
+    let runs = text::counted(reports.len(), "run");
+    let times = text::counted(compared, "time");
     let (longer, less) = (slower.len(), faster.len());
     let changed = listed(slower) + &listed(faster);
     format!(

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use anyhow::Result;
 use clap::ValueEnum;
 use serde_json::{Map, Value, json};
 
@@ -20,7 +21,7 @@ use crate::suite::SUITES;
 /// Further columns of rows, in the order of the tables.
 const COLUMNS: [&str; 6] = ["kind", "origin", "capabilities", "timed", "params", "unit"];
 
-pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
+pub fn list(registry: &Registry, args: &ListArgs) -> Result<Ending> {
     let topics = ListTopic::value_variants().to_vec();
     let topics = args.topic.map_or(topics, |topic| vec![topic]);
     let mut out = io::stdout().lock();
@@ -85,10 +86,7 @@ fn row(name: &str, column: &str, value: &str, summary: &str) -> Value {
 }
 
 /// Name of a topic, a note on it, and its rows.
-fn rows(
-    registry: &Registry,
-    topic: ListTopic,
-) -> anyhow::Result<(&'static str, String, Vec<Value>)> {
+fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, Vec<Value>)> {
     Ok(match topic {
         ListTopic::Structures => {
             let row = |info: &Info| {
@@ -114,7 +112,7 @@ fn rows(
             let note = "Parameters follow the name: bvh:leaf=4,preset=medium\nLists of \
                         structures: all, default (those timed by default) or names separated by \
                         commas";
-            let rows = rows.collect::<anyhow::Result<_>>()?;
+            let rows = rows.collect::<Result<_>>()?;
             ("structures", note.to_owned(), rows)
         }
         ListTopic::Scenes => {
@@ -147,9 +145,8 @@ fn rows(
             ("scenes", note, rows.collect())
         }
         ListTopic::Paths => {
-            let rows = PATHS
-                .iter()
-                .map(|p| row(p.name, "params", p.params, p.summary));
+            let rows = PATHS.iter();
+            let rows = rows.map(|p| row(p.name, "params", p.params, p.summary));
             let note = format!(
                 "Parameters of every path: {PATH_PARAMS}.\nA path is also a file: a cameras CSV (eye_x.. and look_x.. or forward_x.., or matrices m00..m33)."
             );
@@ -161,9 +158,8 @@ fn rows(
             ("tests", String::new(), rows.collect())
         }
         ListTopic::Metrics => {
-            let rows = METRICS
-                .iter()
-                .map(|m| row(m.name, "unit", m.unit, m.summary));
+            let rows = METRICS.iter();
+            let rows = rows.map(|m| row(m.name, "unit", m.unit, m.summary));
             let bounds = entries(BOUNDS.iter().map(|b| [b.name, b.summary]));
             let note = format!("Lower bounds in reports and tables (no structures):\n{bounds}");
             ("metrics", note, rows.collect())
@@ -183,7 +179,7 @@ fn rows(
     })
 }
 
-pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
+pub fn env(args: &EnvArgs) -> Result<Ending> {
     let facts = json!({
         "machine": Machine::capture(),
         "toolchain": Toolchain::capture(),
@@ -210,10 +206,11 @@ fn plain(value: &Value) -> String {
         Value::String(text) => text.clone(),
         Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(" "),
         Value::Object(fields) => {
-            let fields = fields
-                .iter()
-                .map(|(name, value)| format!("{name}={}", plain(value)));
-            format!("({})", fields.collect::<Vec<_>>().join(", "))
+            let field = |(name, value)| format!("{name}={}", plain(value));
+            format!(
+                "({})",
+                fields.iter().map(field).collect::<Vec<_>>().join(", ")
+            )
         }
         other => other.to_string(),
     }

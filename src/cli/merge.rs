@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::args::MergeArgs;
-use super::report::{close, show, write_page};
+use super::document::show;
+use super::report::{close, shown, write_page};
 use super::run_resume::same_recorded;
 use super::{Ending, expect_folder, interrupt, tell, text, unread_is_fine};
 use crate::report::{Stream, merge as join, read_stream};
@@ -30,7 +31,7 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     }
     let report = merged.stream.report();
     write_page(&report, &args.out)?;
-    unread_is_fine(show(&report, false))?;
+    unread_is_fine(show(&shown(&report, false, text::width())))?;
     let cells = text::counted(report.cells.len(), "cell");
     let shards = text::counted(args.runs.len(), "shard");
     let basis = format!("{cells} of {shards}; {}", text::conclusion(&report));

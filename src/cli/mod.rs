@@ -58,7 +58,6 @@ mod table;
 #[cfg(test)]
 mod tests_same_truth;
 mod text;
-mod values;
 mod verify;
 mod verify_table;
 mod view;
@@ -76,7 +75,7 @@ use crate::input::{InputError, hold_files, tell_notes, tell_warnings};
 use crate::report::{folder_of, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene, split_part};
 use crate::shown::expected_by;
-use anyhow::ensure;
+use anyhow::{Result, ensure};
 use clap::{CommandFactory, Parser};
 use interrupt::Interrupted;
 use serde::Serialize;
@@ -193,12 +192,12 @@ fn refused(error: &clap::Error) -> ExitCode {
 }
 
 /// Runs a command.
-fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
+fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
     match command {
         Command::List(args) => list::list(registry, &args),
         Command::Run(args) => run::run(registry, &args),
         Command::Merge(args) => merge::merge(&args),
-        Command::Report(args) => report::report(registry, &args),
+        Command::Report(args) => report::report(&args),
         Command::Compare(args) => compare::compare(registry, &args),
         Command::Query(args) => query::query(registry, &args),
         Command::Locate(args) => query::locate(registry, &args),
@@ -267,7 +266,7 @@ fn tell(line: &str) {
 }
 
 /// Loads a scene, with a note on bad items.
-fn load_scene(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
+fn load_scene(source: &str, options: &LoadOptions) -> Result<Scene> {
     let scene = crate::scene::load(source, options)?;
     if scene.skipped_items > 0 {
         let (bad, name) = (text::counted(scene.skipped_items, "bad item"), &scene.name);
@@ -280,10 +279,7 @@ fn load_scene(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
 
 /// Checks before the work that outputs can be written, and that none is an input or
 /// another output. Inputs may be specs and names, or parts of files.
-fn expect_places(
-    outputs: &[(&str, &Option<PathBuf>)],
-    inputs: &[impl AsRef<Path>],
-) -> anyhow::Result<()> {
+fn expect_places(outputs: &[(&str, &Option<PathBuf>)], inputs: &[impl AsRef<Path>]) -> Result<()> {
     // The file system's own name, also of a file that does not exist yet.
     let known = |file: &Path| -> Option<PathBuf> {
         let place = folder_of(file).canonicalize().ok()?.join(file.file_name()?);
@@ -327,7 +323,7 @@ fn expect_places(
     Ok(())
 }
 
-fn expect_named(option: &str, place: &Path, what: &str) -> anyhow::Result<()> {
+fn expect_named(option: &str, place: &Path, what: &str) -> Result<()> {
     ensure!(
         place != Path::new("-"),
         "{option} is '-'; expected a {what}, such as './-'"
@@ -336,7 +332,7 @@ fn expect_named(option: &str, place: &Path, what: &str) -> anyhow::Result<()> {
 }
 
 /// Checks that a folder is writable, or that one of this name can be made.
-fn expect_folder(option: &str, folder: Option<&Path>) -> anyhow::Result<()> {
+fn expect_folder(option: &str, folder: Option<&Path>) -> Result<()> {
     let Some(folder) = folder else { return Ok(()) };
     expect_named(option, folder, "folder")?;
     ensure!(
@@ -412,7 +408,7 @@ fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
 }
 
 /// Writes a whole text at once: clap's own writers panic on a closed pipe.
-fn print_all(text: &[u8]) -> anyhow::Result<Ending> {
+fn print_all(text: &[u8]) -> Result<Ending> {
     io::stdout().write_all(text)?;
     Ok(Ending::Ok)
 }

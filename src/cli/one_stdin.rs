@@ -15,9 +15,8 @@ pub fn one_stdin(command: &Command) -> anyhow::Result<()> {
     let words = words.replace("=-\n", "\n-\n");
     let words: Vec<&str> = words.lines().collect();
     let outputs = ["-o", "--out", "--svg", "--html", "--csv", "--markdown"];
-    let inputs = words
-        .windows(2)
-        .filter(|pair| pair[1] == "-" && !outputs.contains(&pair[0]));
+    let is_input = |pair: &&[&str]| pair[1] == "-" && !outputs.contains(&pair[0]);
+    let inputs = words.windows(2).filter(is_input);
     let output = match command {
         Command::Scene(SceneCommand::Convert(args)) => args.output.as_deref(),
         _ => None,

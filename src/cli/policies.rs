@@ -1,24 +1,22 @@
 //! Structures under the update policies of `--update`.
 
+use anyhow::ensure;
+
 use crate::index::{StructureSpec, UpdatePolicy};
-use crate::spec::SpecError;
 
 /// The structures under each policy of a comma-separated list, `wide@every=10`.
 ///
 /// Labels stay as they are under [`UpdatePolicy::Refit`]. A structure that does not
 /// refit is built again in any case: it appears once beside fat bounds.
-pub fn under_policies(
-    list: &str,
-    specs: &[StructureSpec],
-) -> Result<Vec<StructureSpec>, SpecError> {
+pub fn under_policies(list: &str, specs: &[StructureSpec]) -> anyhow::Result<Vec<StructureSpec>> {
     let mut policies: Vec<UpdatePolicy> = Vec::new();
     for text in list.split(',').map(str::trim) {
         let policy = text.parse()?;
-        if policies.contains(&policy) {
-            return Err(SpecError::new(format_args!(
-                "--update '{text}' is named twice; expected each once"
-            )));
-        }
+        let is_new = !policies.contains(&policy);
+        ensure!(
+            is_new,
+            "--update '{text}' is named twice; expected each once"
+        );
         policies.push(policy);
     }
     let mut all = Vec::new();

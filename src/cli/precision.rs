@@ -2,7 +2,7 @@
 //! sweeps over item size and ill-conditioned cameras behind it. How it is shown is
 //! in `precision_tables` and `precision_conclusions`.
 
-use anyhow::bail;
+use anyhow::{Result, bail};
 
 use super::args::PrecisionArgs;
 use super::document::{Block, show, to_page};
@@ -16,10 +16,10 @@ use super::text::{self, significant, some, time_plus_minus};
 use super::{
     Ending, expect_places, funnel_table, precision_conclusions, precision_tables, print, write_text,
 };
-use crate::funnel::{self, Chain, FunnelPlan, NONE, StageKind, StageSweep, SweepPoint};
+use crate::funnel::{self, Chain, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
 use crate::measure::ProcessTimes;
-use crate::precision::{self, PointPlan, PrecisionInput, SWEEPS, size_sweep, sweep};
+use crate::precision::{self, PrecisionInput, SWEEPS, size_sweep, sweep};
 use crate::scene::LoadOptions;
 use crate::visibility::{Guarantee, SampleGrid};
 
@@ -29,7 +29,7 @@ const ROUNDS: [usize; 2] = [5, 15];
 const CUBES_PER_CAMERA: usize = 10_000;
 const SWEEP_CAMERAS: usize = 200;
 
-pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<Ending> {
+pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
     expect_places(&outputs, &[&args.study.scene, &args.study.path])?;
     if let Some(stage) = args.stage {
@@ -100,11 +100,7 @@ fn blocks(outcome: &precision_tables::Outcome, all: bool, room: usize) -> Vec<Bl
 }
 
 /// The inputs of the command itself, or of a worker.
-fn setting(
-    registry: &Registry,
-    args: &PrecisionArgs,
-    timing: Option<&Timing>,
-) -> anyhow::Result<Setting> {
+fn setting(registry: &Registry, args: &PrecisionArgs, timing: Option<&Timing>) -> Result<Setting> {
     let held = |structures| args.study.lens.scene_args.options(2 * structures);
     Setting::load(registry, &args.study, ROUNDS, timing, held)
 }
@@ -120,14 +116,14 @@ fn input<'s>(args: &PrecisionArgs, setting: &'s Setting) -> PrecisionInput<'s> {
 }
 
 /// Times all points in one process.
-pub fn time(
-    registry: &Registry,
-    args: &PrecisionArgs,
-    plan: &PointPlan,
-    timing: &Timing,
-) -> anyhow::Result<ProcessTimes> {
+pub fn time(registry: &Registry, args: &PrecisionArgs, timing: &Timing) -> Result<ProcessTimes> {
+    if let Some(stage) = args.stage {
+        let (setting, chain) = stage_setting(registry, args, Some(timing))?;
+        let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
+        return Ok(funnel::time_sweep(&input, stage, &timing.plan()?)?);
+    }
     let setting = setting(registry, args, Some(timing))?;
-    Ok(precision::time(&input(args, &setting), plan)?)
+    Ok(precision::time(&input(args, &setting), &timing.plan()?)?)
 }
 
 /// Rounds of a point, if one process has them all.
@@ -140,7 +136,7 @@ fn stage_setting(
     registry: &Registry,
     args: &PrecisionArgs,
     timing: Option<&Timing>,
-) -> anyhow::Result<(Setting, Chain)> {
+) -> Result<(Setting, Chain)> {
     let held = |_| LoadOptions {
         per_triangle: funnel::BYTES_PER_TRIANGLE,
         ..args.study.lens.scene_args.options(3)
@@ -153,11 +149,7 @@ fn stage_setting(
     Ok((setting, chain))
 }
 
-fn sweep_stage(
-    registry: &Registry,
-    args: &PrecisionArgs,
-    stage: StageKind,
-) -> anyhow::Result<Ending> {
+fn sweep_stage(registry: &Registry, args: &PrecisionArgs, stage: StageKind) -> Result<Ending> {
     let (setting, chain) = stage_setting(registry, args, None)?;
     let scene = &setting.scene;
     let known = funnel::back_ends(stage, scene, false);
@@ -182,19 +174,6 @@ fn sweep_stage(
     Ok(Ending::of(!sweep.points.iter().any(is_broken)))
 }
 
-/// Times all points in one process.
-pub fn time_stage(
-    registry: &Registry,
-    args: &PrecisionArgs,
-    stage: StageKind,
-    plan: &FunnelPlan,
-    timing: &Timing,
-) -> anyhow::Result<ProcessTimes> {
-    let (setting, chain) = stage_setting(registry, args, Some(timing))?;
-    let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
-    Ok(funnel::time_sweep(&input, stage, plan)?)
-}
-
 /// The points of a stage, and the number of those that dropped visible items.
 fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
     let (scene, path, stage) = (&sweep.scene, &sweep.path, sweep.stage.name());
@@ -204,10 +183,8 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
         0 => "the exact side of each triangle".to_owned(),
         rays => format!("{rays} random rays each and {width} x {height} samples"),
     };
-    let basis = format!(
-        "{views} against {by}; {}.",
-        funnel_table::spread(sweep.processes)
-    );
+    let over = text::over(sweep.processes, None);
+    let basis = format!("{views} against {by}; {over}.");
     let columns: &[Column<&SweepPoint>] = &[
         ("by", |p| {
             let doubt = funnel_table::doubt(p.back_end.guarantee);

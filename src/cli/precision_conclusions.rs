@@ -13,11 +13,13 @@ use crate::statistics::Rate;
 pub fn conclusions(outcome: &Outcome) -> Vec<String> {
     let p = &outcome.precision;
     let (sizes, sweeps) = (of_sizes(&outcome.size_sweep), of_sweeps(&outcome.sweeps));
-    let others = [of_storage(p), of_regions(p), sizes, sweeps];
-    of_points(p)
-        .into_iter()
-        .chain(others.into_iter().flatten())
-        .collect()
+    let mut told = of_points(p);
+    told.extend(
+        [of_storage(p), of_regions(p), sizes, sweeps]
+            .into_iter()
+            .flatten(),
+    );
+    told
 }
 
 /// No visible item missed, a margin that is proven (docs/NUMERICS.md), and a time.
@@ -83,10 +85,8 @@ fn of_storage(p: &Precision) -> Option<String> {
     let least = p.points.iter().filter(is_safe);
     let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
     let (name, bytes) = (named(least), text::significant(memory(&least)));
-    let (extra, time) = (
-        percent(least.errors.excess),
-        text::some(least.query_ns(), text::time),
-    );
+    let extra = percent(least.errors.excess);
+    let time = text::some(least.query_ns(), text::time);
     Some(format!(
         "Least memory: {name} at {bytes} B/item, false positives {extra} %, {time}."
     ))
@@ -139,10 +139,8 @@ fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
         let worst = own.max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
         let (value, numbers) = (swept(worst.value), numbers(&worst.names));
         let lost = Some(lost(worst).round() as usize).filter(|_| lost(worst) > 0.0)?;
-        Some(format!(
-            "{name} {value} ({numbers}, {} ppm)",
-            text::count(lost)
-        ))
+        let lost = text::count(lost);
+        Some(format!("{name} {value} ({numbers}, {lost} ppm)"))
     });
     let worst: Vec<String> = worst.collect();
     let others = match worst.is_empty() {
@@ -202,20 +200,14 @@ pub fn figures(precision: &Precision) -> Vec<Figure> {
     let queries = Against {
         caption: format!("{about}: error against run time; dashed: misses visible items"),
         axes: ["time per query", "false positives, % of visible"],
-        shown: &text::time,
         none: 1e-4,
         points: precision.points.iter().filter_map(of).collect(),
     };
     let regions = Against {
         caption: format!("{about}: region search; dashed: misses regions"),
         axes: ["time per point", "points with a wrong answer, %"],
-        shown: &text::time,
         none: 1e-2,
-        points: precision
-            .region_points
-            .iter()
-            .filter_map(of_region)
-            .collect(),
+        points: (precision.region_points.iter().filter_map(of_region)).collect(),
     };
     let all = [queries, regions];
     let drawn = all.into_iter().filter(|one| !one.points.is_empty());

@@ -11,7 +11,6 @@ use crate::precision::{
 };
 use crate::report::grouped;
 use crate::statistics::Rate;
-use crate::verify::ErrorCount;
 
 /// A structure with a culling.
 pub type CullingPoint = Point<CullingErrors>;
@@ -37,14 +36,10 @@ pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
     let visible = p.points.iter().find_map(|point| point.errors.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
     let items = text::counted(p.items, "item");
-    let (cameras, rounds) = (
-        text::counted(p.cameras, "camera"),
-        text::counted(p.rounds, "round"),
-    );
-    let (visible, over) = (
-        text::count(visible as usize),
-        text::over(p.processes, p.twin.as_ref()),
-    );
+    let cameras = text::counted(p.cameras, "camera");
+    let rounds = text::counted(p.rounds, "round");
+    let visible = text::count(visible as usize);
+    let over = text::over(p.processes, p.twin.as_ref());
     let head = format!(
         "{}: {items}; {}: {cameras}, {visible} visible in all; {over}; {rounds} in each",
         p.scene, p.path
@@ -143,17 +138,11 @@ pub fn percent(rate: Option<Rate>) -> String {
     text::rate(rate, 100.0)
 }
 
-/// False positives by source: storage, planes and test.
-fn by_source(errors: &ErrorCount) -> String {
-    let (storage, planes, test) = (errors.by_storage, errors.by_planes, errors.by_test());
-    format!("{storage}/{planes}/{test}")
-}
-
 fn errors_table(points: &[&CullingPoint]) -> Table {
     let columns: &[Column<&&CullingPoint>] = &[
         ("culling", |p| culling(p)),
         (">FP %", |p| percent(p.errors.excess)),
-        (">by source", |p| some(p.errors.counts.as_ref(), by_source)),
+        (">by source", |p| some(p.errors.counts, text::sources)),
         (">FN ppm", |p| text::share(p.errors.false_negative_ppm, 1e6)),
         (">px", |p| some(p.errors.worst_miss_px, significant)),
         (">flicker %", |p| percent(p.errors.flicker)),

@@ -10,6 +10,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail, ensure};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tempfile::NamedTempFile;
@@ -360,9 +361,8 @@ impl Workers {
 pub fn processors() -> Vec<usize> {
     #[cfg(target_os = "linux")]
     if let Ok(set) = rustix::thread::sched_getaffinity(None) {
-        return (0..rustix::thread::CpuSet::MAX_CPU)
-            .filter(|&cpu| set.is_set(cpu))
-            .collect();
+        let all = 0..rustix::thread::CpuSet::MAX_CPU;
+        return all.filter(|&cpu| set.is_set(cpu)).collect();
     }
     Vec::new()
 }
@@ -421,11 +421,21 @@ pub enum Job {
 }
 
 /// Parameters of a process beside its plan.
-#[derive(Clone, Copy, Serialize, Deserialize)]
+#[derive(Clone, Default, Serialize, Deserialize)]
 pub struct Timing {
     pub process: u32,
     /// Scale of the lens of a path with a given visible share.
     pub lens_scale: Option<f64>,
+    /// The plan, in a worker.
+    #[serde(skip)]
+    pub plan: Value,
+}
+
+impl Timing {
+    /// The plan of a study.
+    pub fn plan<P: DeserializeOwned>(&self) -> serde_json::Result<P> {
+        P::deserialize(&self.plan)
+    }
 }
 
 /// A line from a worker.

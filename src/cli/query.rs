@@ -16,7 +16,6 @@ use crate::motion::Motion;
 use crate::path::{self, read_points_csv};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
-use crate::spec::SpecError;
 
 /// Points that are the camera places of the scene.
 const PLACES: &str = "places";
@@ -93,9 +92,9 @@ pub fn frustum(
 pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     let scene = load_scene(&args.scene, &args.scene_args.options(1))?;
-    let what = match args.sought.points {
-        Some(_) => "point",
-        None => "box",
+    let (what, items) = match args.sought.points {
+        Some(_) => ("point", scene.regions.boxes(&scene.items)),
+        None => ("box", &scene.items[..]),
     };
     let columns: [Column<Row>; 6] = [
         (what, &|row| json!(row.question)),
@@ -110,10 +109,6 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
         (_, Some(file)) => (Vec::new(), boxes(&scene, file)?),
         // The argument parser refuses that.
         (None, None) => return Ok(Ending::Ok),
-    };
-    let items: &[Aabb] = match args.sought.points {
-        Some(_) => scene.regions.boxes(&scene.items),
-        None => &scene.items,
     };
     let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
         if let Some(p) = points.get(n) {
@@ -136,13 +131,13 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
 
 fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
     if file == Path::new(PLACES) && !is_readable(file) {
+        anyhow::ensure!(
+            !scene.places.is_empty(),
+            "--points {PLACES}: scene '{}' has no camera places; expected a points CSV, or a scene \
+             with places, such as a map",
+            scene.name
+        );
         let eyes = scene.places.iter().map(|place| scene.sought(place.eye));
-        if scene.places.is_empty() {
-            let place =
-                "no camera places; expected a points CSV, or a scene with places, such as a map";
-            let error = format_args!("--points {PLACES}: scene '{}' has {place}", scene.name);
-            return Err(SpecError::new(error).into());
-        }
         return Ok(eyes.collect());
     }
     let points = read_points_csv(&read_file(file)?[..], &file.display().to_string())?.into_iter();

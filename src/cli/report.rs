@@ -9,21 +9,20 @@ use std::path::Path;
 use anyhow::{Context, bail};
 
 use super::args::ReportArgs;
-use super::document::{Block, to_html, to_markdown, to_terminal};
+use super::document::{Block, to_html, to_markdown};
 use super::surface_tables::Picture;
 use super::table::Table;
 use super::{
     Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_plan,
     run_table, surface_tables, tell, text, write_text,
 };
-use crate::index::Registry;
 use crate::measure::{BOUNDS, METRICS};
 use crate::report::{
     Comparison, Overall, Report, Views, comparisons, folder_of, grouped, read_report, save_page,
     views,
 };
 
-pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
+pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
     let outputs = [
         ("--markdown", &args.markdown),
         ("--html", &args.html),
@@ -40,13 +39,10 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         return Ok(Ending::Ok);
     }
     let [path] = &args.reports[..] else {
-        bail!(
-            "{} reports; expected one, or --history FILE",
-            args.reports.len()
-        );
+        let count = args.reports.len();
+        bail!("{count} reports; expected one, or --history FILE");
     };
-    let mut report = read_report(path)?;
-    declare(&mut report, registry);
+    let report = read_report(path)?;
     if let Some(path) = &args.markdown {
         write_text(path, &to_markdown(&blocks(&report, &BTreeMap::new())))?;
     }
@@ -125,18 +121,6 @@ const MEANINGS: [&str; 6] = [
     "status | ok: the answers are right; anything else has its reason under Statuses",
 ];
 
-/// Older reports do not say what their structures are: the registry does, where
-/// it has one of the very same name.
-fn declare(report: &mut Report, registry: &Registry) {
-    for cell in &mut report.cells {
-        let name = cell.structure.split(':').next().unwrap_or_default();
-        if let (None, Some(row)) = (cell.kind, registry.named(name)) {
-            cell.kind = Some(row.info.kind);
-            cell.origin = Some(row.info.origin.owned());
-        }
-    }
-}
-
 /// All of them, or no folder that was not there before.
 fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
     let is_new = !folder.exists();
@@ -150,14 +134,8 @@ fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
     Ok(written?)
 }
 
-/// Shows tables and conclusions of each cache state and culling test.
-pub fn show(report: &Report, all_columns: bool) -> io::Result<()> {
-    let mut out = text::terminal();
-    out.write_all(shown(report, all_columns, text::width()).as_bytes())?;
-    out.flush()
-}
-
-fn shown(report: &Report, all_columns: bool, width: usize) -> String {
+/// Tables and conclusions of each cache state and culling test.
+pub fn shown(report: &Report, all_columns: bool, width: usize) -> Vec<Block> {
     let all = comparisons(report);
     let mut blocks = Vec::new();
     if all_columns {
@@ -183,7 +161,7 @@ fn shown(report: &Report, all_columns: bool, width: usize) -> String {
     }
     // A world of one size has its ranked tables; that is the surface.
     blocks.extend(surface_tables::blocks(report, 2));
-    to_terminal(&blocks, width)
+    blocks
 }
 
 fn title(report: &Report) -> String {
@@ -265,22 +243,18 @@ fn known(text: &Option<String>) -> &str {
 fn about(report: &Report) -> Vec<String> {
     let (run, machine) = (&report.run, &report.machine);
     let suite = run.suite.as_deref().unwrap_or("chosen by hand");
+    let (start, seed) = (&run.started_at, run.seed);
     let unfinished = ["", "; not finished"][usize::from(run.finished_at.is_none())];
     let is_dirty = report.source.dirty == Some(true);
     let dirty = ["", " with a dirty working tree"][usize::from(is_dirty)];
     let (cpu, kernel) = (known(&machine.cpu), known(&machine.kernel));
-    let (cores, isa) = (
-        text::counted(machine.cores, "core"),
-        &machine.instruction_set,
-    );
+    let cores = text::counted(machine.cores, "core");
+    let isa = &machine.instruction_set;
     let (built, commit) = (&report.toolchain, known(&report.source.commit));
     let (rustc, profile) = (known(&built.rustc), known(&built.profile));
     let (flags, features) = (&built.flags, built.features.join(","));
     let mut lines = vec![
-        format!(
-            "{}, suite: {suite}, seed {}{unfinished}.",
-            run.started_at, run.seed
-        ),
+        format!("{start}, suite: {suite}, seed {seed}{unfinished}."),
         format!("Command: {}", run.command),
         format!("Machine: {cpu}, {cores}, kernel {kernel}, instruction set {isa}."),
         format!(
@@ -301,28 +275,25 @@ pub fn close(
     folder: &Path,
     other: Option<String>,
 ) -> io::Result<()> {
-    let mut out = text::terminal();
-    writeln!(out, "\n{}", text::wrapped(basis, text::width()))?;
-    lines
-        .into_iter()
-        .try_for_each(|line| writeln!(out, "{line}"))?;
-    writeln!(out, "report  {}", folder.join("report.html").display())?;
+    let mut told = vec![String::new(), text::wrapped(basis, text::width())];
+    told.extend(lines);
+    told.push(format!("report  {}", folder.join("report.html").display()));
     let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg".to_owned();
-    let mut others = [others].into_iter().chain(other);
-    others.try_for_each(|line| writeln!(out, "        {line}"))?;
-    out.flush()
+    let others = [others].into_iter().chain(other);
+    told.extend(others.map(|line| format!("        {line}")));
+    text::print(&told)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::document::to_terminal;
     use super::*;
-    use crate::report::read_report;
 
     #[test]
     fn the_quick_suite_fits_sixty_lines() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/results/reference/report.json");
         let report = read_report(file.as_ref()).unwrap();
-        let told = shown(&report, false, 80);
+        let told = to_terminal(&shown(&report, false, 80), 80);
         // Basis, warnings, files and the next command are below.
         assert!((20..=48).contains(&told.lines().count()), "{told}");
         assert!(

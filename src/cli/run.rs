@@ -6,13 +6,14 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, Result, bail};
 use indicatif::ProgressBar;
 
 use super::args::RunArgs;
+use super::document::show;
 use super::interrupt::Interrupted;
 use super::processes::{Ended, Job, Message, Workers};
-use super::report::{close, show, write_page};
+use super::report::{close, shown, write_page};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{TypedOptions, create, go_on, resume};
 use super::study::progress;
@@ -25,7 +26,7 @@ use crate::measure::{
 use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_report, utc};
 use crate::suite::DEFAULT_PATH;
 
-pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
+pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
     if args.plan {
         return print_plan(registry, args);
     }
@@ -57,7 +58,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
 }
 
 /// Refuses the explanation of a structure that is not measured.
-fn check_why(args: &RunArgs, plan: &RunPlan) -> anyhow::Result<()> {
+fn check_why(args: &RunArgs, plan: &RunPlan) -> Result<()> {
     let labels = plan.plan.structures.iter().map(|spec| spec.label.as_str());
     let labels: Vec<&str> = labels.collect();
     let is_there = |why: &String| labels.iter().any(|label| run_why::is_named(label, why));
@@ -69,7 +70,7 @@ fn check_why(args: &RunArgs, plan: &RunPlan) -> anyhow::Result<()> {
 }
 
 /// The cells as JSON lines, nothing measured.
-fn print_plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
+fn print_plan(registry: &Registry, args: &RunArgs) -> Result<Ending> {
     let plan = plan(registry, args)?;
     plan.check_files()?;
     let mut out = io::stdout().lock();
@@ -92,22 +93,14 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(
-        args: &'a RunArgs,
-        plan: RunPlan,
-        folder: RunFolder,
-        stream: Stream,
-    ) -> anyhow::Result<Self> {
+    fn new(args: &'a RunArgs, plan: RunPlan, folder: RunFolder, stream: Stream) -> Result<Self> {
         let groups = plan.plan.groups().len() as u64;
+        let patience = Duration::from_secs(args.what.timeout);
         Ok(Run {
             bar: progress(groups * u64::from(plan.plan.effort.processes), ""),
             // Files in the run's folder: what a killed run leaves is taken away by
             // the next.
-            workers: Workers::new(
-                stream.header.args.clone(),
-                Duration::from_secs(args.what.timeout),
-                folder.path(),
-            )?,
+            workers: Workers::new(stream.header.args.clone(), patience, folder.path())?,
             started: Instant::now(),
             args,
             plan,
@@ -117,7 +110,7 @@ impl<'a> Run<'a> {
     }
 
     /// Measures all scenes; keeps a finished run as the baseline that the options name.
-    fn all(mut self) -> anyhow::Result<Ending> {
+    fn all(mut self) -> Result<Ending> {
         let mut scenes = 0..self.plan.plan.scenes.len();
         let measured = scenes.try_for_each(|scene| self.scene(scene));
         self.bar.finish_and_clear();
@@ -144,10 +137,10 @@ impl<'a> Run<'a> {
             return Err(error);
         }
         // Tables before files: where a file cannot be written, what was measured is seen.
-        let why = |structure: &String| run_why::show(&report, structure);
-        let shown = show(&report, self.args.all_columns);
-        let shown = shown.and_then(|()| self.args.why.as_ref().map_or(Ok(()), why));
-        let shown = unread_is_fine(shown);
+        let mut blocks = shown(&report, self.args.all_columns, text::width());
+        let why = self.args.why.iter();
+        blocks.extend(why.flat_map(|structure| run_why::blocks(&report, structure)));
+        let shown = unread_is_fine(show(&blocks));
         save_report(self.folder.path(), &report)?;
         write_page(&report, self.folder.path())?;
         let save = self.args.save.as_deref().filter(|_| !stopped);
@@ -164,7 +157,7 @@ impl<'a> Run<'a> {
     }
 
     /// All processes of a scene.
-    fn scene(&mut self, scene: usize) -> anyhow::Result<()> {
+    fn scene(&mut self, scene: usize) -> Result<()> {
         let planned = self.plan.plan.scenes[scene].clone();
         let groups = self.plan.plan.groups_of(&planned).into_iter();
         let keys = groups.map(|group| self.plan.plan.key(&planned, &group));
@@ -221,7 +214,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn worker(&mut self, scene: usize, share: Share) -> anyhow::Result<Ended> {
+    fn worker(&mut self, scene: usize, share: Share) -> Result<Ended> {
         let process = share.process;
         let job = Job::Scene {
             scene,
@@ -252,7 +245,7 @@ impl<'a> Run<'a> {
         keys: &[GroupKey],
         process: u32,
         verdict: &Verdict,
-    ) -> anyhow::Result<()> {
+    ) -> Result<()> {
         for key in keys {
             if self.stream.has(key, process) {
                 continue;

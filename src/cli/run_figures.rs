@@ -25,9 +25,8 @@ pub fn of(comparison: &Comparison) -> String {
 /// The fastest is on top. Lines join the dots of one rank.
 pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     let sound = comparison.sound();
-    let all: Vec<(&ReportCell, Speedup)> = sound
-        .filter_map(|cell| Some((cell, comparison.speedup(base, cell)?)))
-        .collect();
+    let all = sound.filter_map(|cell| Some((cell, comparison.speedup(base, cell)?)));
+    let all: Vec<(&ReportCell, Speedup)> = all.collect();
     let drawn: Vec<_> = all.iter().filter(|(_, (r, _))| is_drawn(*r)).collect();
     drawn.first()?;
     let values = drawn.iter().flat_map(|row| row.1.1.unwrap_or([row.1.0; 2]));
@@ -191,7 +190,6 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     let against = Against {
         caption: format!("{}: error against run time, by test", of(first)),
         axes: ["time per query", "false positives, % of visible"],
-        shown: &text::time,
         none: 1e-4,
         points,
     };

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use super::args::RunArgs;
 use super::shared_args::WhatArgs;
@@ -18,7 +18,6 @@ use crate::motion::Motion;
 use crate::path::{self, LensDefaults};
 use crate::report::{KeptPart, Stream};
 use crate::scene::{self, FETCHED, Scene, every_part, split_part};
-use crate::spec::SpecError;
 use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES};
 
 /// A plan with where it comes from.
@@ -35,7 +34,7 @@ pub struct RunPlan {
 }
 
 /// The plan that arguments stand for; scenes and paths are not looked at yet.
-pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
+pub fn plan(registry: &Registry, args: &RunArgs) -> Result<RunPlan> {
     let mut planned = plan_of(registry, &args.what, SUITES[0].name, None)?;
     if let Some(processes) = args.processes {
         planned.plan.effort.processes = processes;
@@ -55,7 +54,7 @@ pub fn plan_of(
     args: &WhatArgs,
     default_suite: &str,
     default_structures: Option<&str>,
-) -> anyhow::Result<RunPlan> {
+) -> Result<RunPlan> {
     let suite = suite_file::suite(args.suite.as_deref().unwrap_or(default_suite))?;
     let structures = match args.structure.is_empty() {
         // A file that states them means them.
@@ -101,22 +100,16 @@ pub fn plan_of(
 }
 
 /// "2/4": the second of four shares.
-fn shard(text: &str) -> Result<(usize, usize), SpecError> {
+fn shard(text: &str) -> Result<(usize, usize)> {
     let numbers = text.split_once('/');
     let numbers = numbers.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    match numbers {
-        Some((i, n)) if 1 <= i && i <= n => Ok((i, n)),
-        _ => Err(SpecError::new(format_args!(
-            "--shard is '{text}'; expected i/n with i from 1 to n, such as 2/4"
-        ))),
-    }
+    let sound = numbers.filter(|&(i, n)| 1 <= i && i <= n);
+    let expected = "expected i/n with i from 1 to n, such as 2/4";
+    sound.with_context(|| format!("--shard is '{text}'; {expected}"))
 }
 
 /// Refuses a name that comes twice: a cell is found by its names.
-pub fn each_once(
-    what: &str,
-    names: impl IntoIterator<Item = impl AsRef<str>>,
-) -> anyhow::Result<()> {
+pub fn each_once(what: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> Result<()> {
     let mut seen = BTreeSet::new();
     for name in names {
         let name = name.as_ref();
@@ -129,7 +122,7 @@ pub fn each_once(
 }
 
 /// Motions are named once and measured with warm caches.
-fn check_motions(plan: &Plan, suite: &str) -> anyhow::Result<()> {
+fn check_motions(plan: &Plan, suite: &str) -> Result<()> {
     each_once("motion", &plan.motions)?;
     let mut scenes = plan.scenes.iter();
     if !plan.motions.is_empty() && scenes.any(|scene| scene.caches.contains(&true)) {
@@ -143,7 +136,7 @@ fn check_motions(plan: &Plan, suite: &str) -> anyhow::Result<()> {
 impl RunPlan {
     /// Reads every input: a mistake in the last file should not show after an
     /// hour. A suite as it comes is known to be sound.
-    pub fn check_inputs(&self) -> anyhow::Result<()> {
+    pub fn check_inputs(&self) -> Result<()> {
         self.check_files()?;
         for scene in &self.plan.scenes {
             scene::check_fits(&scene.source, &self.plan.load)?;
@@ -152,7 +145,7 @@ impl RunPlan {
     }
 
     /// Refuses a file that is not there; of a suite's file the error names the suite.
-    pub fn check_files(&self) -> anyhow::Result<()> {
+    pub fn check_files(&self) -> Result<()> {
         let scenes = self.plan.scenes.iter();
         let sources = scenes.flat_map(|scene| scene.paths.iter().chain([&scene.source]));
         for source in sources.chain(&self.plan.motions) {
@@ -171,7 +164,7 @@ impl RunPlan {
 
     /// Checks that the plan of a run that was begun is still the same, and so are its
     /// files.
-    pub fn check_goes_on(&self, begun: &Stream) -> anyhow::Result<()> {
+    pub fn check_goes_on(&self, begun: &Stream) -> Result<()> {
         let structures = self.plan.structures.iter().map(|s| &s.label);
         if self.plan.groups() != begun.header.groups || !structures.eq(&begun.header.structures) {
             bail!("holds the run of another plan; expected the recorded one: begin a new run");
@@ -200,7 +193,7 @@ impl RunPlan {
     }
 
     /// Loads every scene and then every path of it, with a look at each.
-    fn check_scenes(&self, look: Look) -> anyhow::Result<()> {
+    fn check_scenes(&self, look: Look) -> Result<()> {
         let plain = Culling::default();
         let is_plain = |culling: &Culling| {
             (culling.arithmetic, culling.planes) == (plain.arithmetic, plain.planes)
@@ -233,7 +226,7 @@ impl RunPlan {
 }
 
 /// Told of a scene, and then of each of its workloads with the name of the path.
-type Look<'l> = &'l dyn Fn(&Scene, Option<(&str, &Workload)>) -> anyhow::Result<()>;
+type Look<'l> = &'l dyn Fn(&Scene, Option<(&str, &Workload)>) -> Result<()>;
 
 /// Refuses what a run was begun with if it is another now.
 pub fn same_digest(
@@ -241,7 +234,7 @@ pub fn same_digest(
     name: &str,
     before: Option<String>,
     now: impl Fn() -> String,
-) -> anyhow::Result<()> {
+) -> Result<()> {
     let short = |digest: &str| digest.chars().take(12).collect::<String>();
     let Some(before) = before else {
         return Ok(());
@@ -268,9 +261,8 @@ fn scenes(args: &WhatArgs, suite: &ChosenSuite) -> Result<Vec<PlannedScene>, Inp
         let named = args.scene.iter().map(|source| every_part(source));
         let named: Vec<_> = named.collect::<Result<_, _>>()?;
         let named = named.iter().flatten();
-        return Ok(named
-            .map(|source| scene(source, &[DEFAULT_PATH], args.cold))
-            .collect());
+        let named = named.map(|source| scene(source, &[DEFAULT_PATH], args.cold));
+        return Ok(named.collect());
     }
     let mut scenes = suite.scenes.clone();
     for row in &mut scenes {

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, Parser};
 
@@ -22,11 +22,7 @@ use crate::report::{
 use crate::scene;
 
 /// Makes the folder of a new run.
-pub fn create(
-    args: &RunArgs,
-    plan: &RunPlan,
-    machine: Machine,
-) -> anyhow::Result<(RunFolder, Stream)> {
+pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFolder, Stream)> {
     let clock = SystemTime::now();
     let now = utc(clock);
     if clock != dated(clock) {
@@ -55,22 +51,17 @@ pub fn create(
     let groups = header.whole().iter();
     let names = groups.flat_map(|key| [&key.path, &key.motion]);
     let names: BTreeSet<&String> = names.chain(&args.what.suite).collect();
-    let digests = names
-        .into_iter()
-        .map(|name| (name.clone(), digest(Path::new(name))));
-    header.files = digests
-        .filter_map(|(name, digest)| Some((name, digest?)))
-        .collect();
+    let digest = |name: &String| Some((name.clone(), digest(Path::new(name))?));
+    header.files = names.into_iter().filter_map(digest).collect();
     let folder = RunFolder::create(&path, &header)?;
     Ok((folder, Stream::of(header)))
 }
 
 /// The arguments behind the program's name, to be read again by a worker.
-pub fn typed_args() -> anyhow::Result<Vec<String>> {
+pub fn typed_args() -> Result<Vec<String>> {
     let typed = std::env::args_os().skip(1).map(OsString::into_string);
-    typed
-        .collect::<Result<_, _>>()
-        .map_err(|bad| anyhow::anyhow!("argument {bad:?} is no UTF-8; expected text"))
+    let typed: Result<_, _> = typed.collect();
+    typed.map_err(|bad| anyhow::anyhow!("argument {bad:?} is no UTF-8; expected text"))
 }
 
 /// SHA-256 of the program that runs; `None` if it cannot be read.
@@ -85,7 +76,7 @@ fn digest(file: &Path) -> Option<String> {
 }
 
 /// Opens the run to continue, with its options; writes nothing.
-pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
+pub fn resume(args: &RunArgs) -> Result<(StoppedRun, Stream, RunArgs)> {
     let path = match &args.out {
         Some(path) => path.clone(),
         None => newest_unfinished(Path::new("results"))?,
@@ -103,7 +94,7 @@ pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
 }
 
 /// Continues a run.
-pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> {
+pub fn go_on(stopped: StoppedRun, stream: &Stream) -> Result<RunFolder> {
     if stopped.lost > 0 {
         let (run, parts) = (stopped.path.display(), text::counted(stopped.lost, "part"));
         tell(&format!(
@@ -117,7 +108,7 @@ pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> 
 const NOT_OF_THE_PLAN: [&str; 6] = ["resume", "out", "timeout", "save", "all_columns", "why"];
 
 /// The recorded options, if those typed now say nothing else.
-fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
+fn same_options(recorded: &[String]) -> Result<RunArgs> {
     let before = TypedOptions::recorded(recorded)?;
     let now = TypedOptions::of("run", "run", std::env::args_os())?;
     for (id, name, _) in now.typed() {
@@ -146,7 +137,7 @@ const NO_RUN: &str = "no run was recorded there; expected the folder of a run";
 
 /// Checks that two runs were begun with the same options, apart from folder and
 /// shard.
-pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
+pub fn same_recorded(one: &[String], other: &[String]) -> Result<()> {
     let (one, other) = (TypedOptions::recorded(one)?, TypedOptions::recorded(other)?);
     for (id, name, _) in &one.all {
         let is_free = id == "shard" || NOT_OF_THE_PLAN.contains(&id.as_str());
@@ -178,7 +169,7 @@ pub struct TypedOptions {
 
 impl TypedOptions {
     /// The options of a run that was begun.
-    pub fn recorded(args: &[String]) -> anyhow::Result<TypedOptions> {
+    pub fn recorded(args: &[String]) -> Result<TypedOptions> {
         TypedOptions::of("run", "run", first().chain(args.to_vec()))
     }
 
@@ -187,7 +178,7 @@ impl TypedOptions {
         command: &str,
         owner: &str,
         line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
-    ) -> anyhow::Result<TypedOptions> {
+    ) -> Result<TypedOptions> {
         let mut cli = Cli::command();
         let matches = cli.try_get_matches_from_mut(line).map_err(one_line)?;
         let matches = matches.subcommand_matches(command).cloned();
@@ -236,7 +227,7 @@ impl TypedOptions {
 }
 
 /// Times of another machine or program do not belong into one report.
-fn same_place(header: &Header, begun: &RunArgs) -> anyhow::Result<()> {
+fn same_place(header: &Header, begun: &RunArgs) -> Result<()> {
     let here = Header {
         schema_version: SCHEMA_VERSION,
         machine: Machine::capture().by(begun.what.culling.kernel.execution()?.kernel),
@@ -266,7 +257,7 @@ pub fn newest_run(results: &Path, of: impl Fn(&Path) -> Option<RunInfo>) -> Opti
     runs.max().map(|(.., path)| path)
 }
 
-fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
+fn newest_unfinished(results: &Path) -> Result<PathBuf> {
     let found = newest_run(results, |path| {
         // Killed at the very end, a run lacks nothing but its report.
         let report = read_report(&path.join("report.json"));

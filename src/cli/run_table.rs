@@ -62,8 +62,8 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     // Sets of a coarse test are larger than what is visible.
     let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);
     let visible = comparison.of_any("cull_rate").map(|culled| {
-        let returned = share(1.0 - culled);
-        let seen = excess.map(|excess| share((1.0 - culled) / (1.0 + excess)));
+        let returned = text::short_percent(1.0 - culled);
+        let seen = excess.map(|excess| text::short_percent((1.0 - culled) / (1.0 + excess)));
         match seen {
             None => format!("{returned} of the items are visible"),
             Some(seen) => format!("{returned} of the items are returned, about {seen} visible"),
@@ -95,14 +95,6 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         text::joined(visible.into_iter().chain(excess)),
     ];
     lines.into_iter().filter(|line| !line.is_empty()).collect()
-}
-
-/// A share in percent with three digits, never rounded up to 100.
-fn share(share: f64) -> String {
-    match share {
-        0.99..1.0 => text::percent(share),
-        _ => format!("{} %", text::significant(share * 100.0)),
-    }
 }
 
 /// A column of single figures: head, metric and form.

@@ -2,8 +2,7 @@
 //!
 //! Their two ratios multiply to the ratio of the times.
 
-use std::io::{self, Write};
-
+use super::document::Block;
 use super::run_table::{groups, labels};
 use super::run_verdict::times;
 use super::table::Table;
@@ -28,10 +27,9 @@ struct Pair<'r> {
     margin: f64,
 }
 
-/// Shows a table and a sentence for each cache state and culling test.
-pub fn show(report: &Report, structure: &str) -> io::Result<()> {
-    let all = comparisons(report);
-    let (mut out, width) = (text::terminal(), text::width());
+/// A table and a sentence for each cache state and culling test.
+pub fn blocks(report: &Report, structure: &str) -> Vec<Block> {
+    let (all, mut blocks) = (comparisons(report), Vec::new());
     for group in groups(&all) {
         let pairs = group.iter().map(|comparison| pair(comparison, structure));
         let pairs: Vec<Result<Pair, String>> = pairs.collect();
@@ -40,11 +38,11 @@ pub fn show(report: &Report, structure: &str) -> io::Result<()> {
             _ => of_many(&labels(&group), &pairs, structure),
         };
         if !table.rows.is_empty() {
-            writeln!(out, "\n{}", table.fitted(width))?;
+            blocks.extend([Block::Table(table), Block::line("")]);
         }
-        writeln!(out, "{}", text::wrapped(&text::plain(&sentence), width))?;
+        blocks.push(Block::Line(sentence));
     }
-    out.flush()
+    blocks
 }
 
 /// Returns true for a structure by its label, or by its name without parameters.
@@ -66,9 +64,8 @@ fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, St
     let mut others = comparison.sound().filter(|cell| !is_own(cell));
     let other = others.next();
     let other = other.ok_or_else(|| "No other structure has a time.".to_owned())?;
-    let ends = comparison
-        .speedup(&other.structure, own)
-        .and_then(|found| found.1);
+    let speedup = comparison.speedup(&other.structure, own);
+    let ends = speedup.and_then(|found| found.1);
     let margin = ends.map_or(0.0, |[lower, upper]| (upper / lower).ln() / 2.0);
     Ok(Pair { own, other, margin })
 }
@@ -88,19 +85,14 @@ impl Pair<'_> {
         };
         let others = if time < 1.0 { " of the others" } else { "" };
         let (own, other) = (&self.own.structure, &self.other.structure);
-        let parts = parts(tests, per_test, self.margin);
-        let Some(frame) = self.ratio(frame_ns) else {
-            return format!(
-                "{own} takes {} the time of {other}, the best{others}: {parts}.",
-                times(time)
-            );
+        let (parts, time) = (parts(tests, per_test, self.margin), times(time));
+        let Some(frame) = self.ratio(frame_ns).map(times) else {
+            return format!("{own} takes {time} the time of {other}, the best{others}: {parts}.");
         };
+        let update = some(self.ratio(update_ns), times);
         format!(
-            "A frame by {own} takes {} the time of one by {other}: {} in updates and {} in \
-             queries, where {parts}.",
-            times(frame),
-            some(self.ratio(update_ns), times),
-            times(time)
+            "A frame by {own} takes {frame} the time of one by {other}: {update} in updates and \
+             {time} in queries, where {parts}."
         )
     }
 }
@@ -139,10 +131,9 @@ fn parts(tests: f64, per_test: f64, margin: f64) -> String {
         more if more > 0.0 => "the number of tests decides",
         _ => "the time per test decides",
     };
+    let (tests, long) = (times(tests), times(per_test));
     format!(
-        "it tests {} as many nodes and items, and a test takes {} as long, so {decides}",
-        times(tests),
-        times(per_test)
+        "it tests {tests} as many nodes and items, and a test takes {long} as long, so {decides}"
     )
 }
 

@@ -4,6 +4,7 @@
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
+use anyhow::bail;
 use serde_json::{Value, json};
 
 use super::command_args::{SceneConvertArgs, SceneGenerateArgs, SceneInfoArgs};
@@ -14,7 +15,6 @@ use crate::measure::SceneInfo;
 use crate::path::{self, CameraFacts};
 use crate::report::write_atomically;
 use crate::scene::{Regions, Scene, UpAxis, write_boxes_csv};
-use crate::spec::SpecError;
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
@@ -159,15 +159,13 @@ fn expect_other<'f>(out: Option<&'f Path>, scene: &str) -> anyhow::Result<Option
 }
 
 /// Refuses another extension; a file without one gets boxes too.
-fn expect_csv(out: Option<&Path>) -> Result<(), SpecError> {
+fn expect_csv(out: Option<&Path>) -> anyhow::Result<()> {
     let named = out.and_then(|out| Some((out.display(), out.extension()?)));
-    let Some((out, extension)) = named.filter(|(_, e)| !e.eq_ignore_ascii_case("csv")) else {
-        return Ok(());
-    };
-    let extension = extension.display();
-    Err(SpecError::new(format_args!(
-        "{out}: a scene cannot be written as '.{extension}'; expected .csv, or --to csv"
-    )))
+    if let Some((out, extension)) = named.filter(|(_, e)| !e.eq_ignore_ascii_case("csv")) {
+        let extension = extension.display();
+        bail!("{out}: a scene cannot be written as '.{extension}'; expected .csv, or --to csv");
+    }
+    Ok(())
 }
 
 /// Parts of a scene that a boxes file cannot hold.
@@ -184,10 +182,8 @@ fn left_behind(scene: &Scene) -> Vec<String> {
     ];
     let counts = counts.into_iter().filter(|(count, _)| *count > 0);
     let counts = counts.map(|(count, what)| text::counted(count, what));
-    let own_tree = || "the map's own tree".to_owned();
-    counts
-        .chain(scene.own_tree.is_some().then(own_tree))
-        .collect()
+    let own_tree = (scene.own_tree.iter()).map(|_| "the map's own tree".to_owned());
+    counts.chain(own_tree).collect()
 }
 
 fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {

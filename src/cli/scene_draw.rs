@@ -2,6 +2,7 @@
 //!
 //! With a camera, both in the colours of a query's verdicts.
 
+use anyhow::bail;
 use glam::Vec3;
 
 use super::command_args::SceneDrawArgs;
@@ -15,7 +16,6 @@ use crate::measure::input_of;
 use crate::path;
 use crate::query::Containment;
 use crate::scene::Scene;
-use crate::spec::SpecError;
 
 /// Items of a scene without a camera.
 const ITEMS: &[Class] = rows! { Class { colour, words, is_key }
@@ -69,7 +69,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
             let (frame, last) = (args.frame, path.cameras.len().saturating_sub(1));
             let Some(camera) = path.cameras.get(frame) else {
                 let cameras = format!("0 to {last}, the cameras of {}", path.name);
-                anyhow::bail!("--frame is {frame}; expected {cameras}");
+                bail!("--frame is {frame}; expected {cameras}");
             };
             caption.push(format!("camera {frame} of {}", path.name));
             Some(*camera)
@@ -139,7 +139,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
 }
 
 /// A structure that has cells.
-fn divided(registry: &Registry, text: &str) -> Result<StructureSpec, SpecError> {
+fn divided(registry: &Registry, text: &str) -> anyhow::Result<StructureSpec> {
     let spec = registry.structure(text)?;
     // More boxes than the largest block holds.
     let cube = |i: u8| Aabb::around(Vec3::splat(i.into()), Vec3::splat(0.25));
@@ -154,11 +154,8 @@ fn divided(registry: &Registry, text: &str) -> Result<StructureSpec, SpecError> 
     }
     let rows = registry.rows().iter().filter(has_cells);
     let names: Vec<_> = rows.map(|row| row.info.name).collect();
-    Err(SpecError::new(format_args!(
-        "structure '{}' has no cells to draw; expected one of {}",
-        spec.info().name,
-        names.join(", ")
-    )))
+    let (name, names) = (spec.info().name, names.join(", "));
+    bail!("structure '{name}' has no cells to draw; expected one of {names}")
 }
 
 /// Class of each item by what a query did with it.

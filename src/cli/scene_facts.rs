@@ -140,13 +140,9 @@ impl SceneFacts {
         if count == 0 {
             return vec![("sizes", "no items".to_owned())];
         }
-        let sizes = [
-            self.size_min,
-            self.size_median,
-            self.size_p99,
-            self.size_max,
-        ];
-        let [least, median, p99, most] = sizes.map(|size| text::some(size, length));
+        let size = |size| text::some(size, length);
+        let [least, median] = [self.size_min, self.size_median].map(size);
+        let [p99, most] = [self.size_p99, self.size_max].map(size);
         let sizes = format!("longest edge min {least}, median {median}, p99 {p99}, max {most}");
         let axes = ["x", "y", "z"].into_iter().zip(self.flat_counts);
         let flat = axes.filter(|(_, flat)| *flat > 0).map(|(axis, flat)| {
@@ -170,10 +166,9 @@ impl SceneFacts {
             0 => "no two items have the same bounds".to_owned(),
             copies => format!("{} with the bounds of an item before them", people(copies)),
         };
+        let [loss, step] = [self.f32_loss, self.f32_step_unmoved].map(three);
         let loss = format!(
-            "bounds grow by at most {} (x, y, z); f32 steps in world coordinates are {}",
-            three(self.f32_loss),
-            three(self.f32_step_unmoved)
+            "bounds grow by at most {loss} (x, y, z); f32 steps in world coordinates are {step}"
         );
         let mut rows = vec![extent, ("sizes", sizes)];
         rows.extend(self.bars(length).map(|bars| ("", bars)));

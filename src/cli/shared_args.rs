@@ -3,7 +3,6 @@
 //! Scenes, lenses, culling tests, instruction sets, and the processes of a study.
 
 use super::policies::under_policies;
-use super::values;
 use crate::camera::{
     DEFAULT_EPSILON, MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod, PlaneOptions,
 };
@@ -13,9 +12,10 @@ use crate::kernel::Kernel;
 use crate::measure::{Machine, Plan, Protocol};
 use crate::path::LensDefaults;
 use crate::scene::{ITEM_KINDS, ItemKind, LoadOptions, UP_AXES, UpAxis};
-use crate::spec::SpecError;
+use crate::spec::{SpecError, values};
 use crate::suite::DEFAULT_PATH;
 use crate::threads::MOST_THREADS;
+use anyhow::{bail, ensure};
 use clap::{Args, ValueEnum};
 
 #[derive(Args, Debug)]
@@ -108,7 +108,7 @@ pub struct MotionArgs {
 
 impl MotionArgs {
     /// Enters motions, queries per frame and policies into a plan.
-    pub fn enter(&self, plan: &mut Plan) -> Result<(), SpecError> {
+    pub fn enter(&self, plan: &mut Plan) -> anyhow::Result<()> {
         plan.motions.clone_from(&self.motion);
         plan.views_per_frame = self.views;
         if let Some(list) = &self.update {
@@ -122,13 +122,18 @@ impl MotionArgs {
 #[derive(Args, Debug)]
 pub struct KernelArgs {
     /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
-    #[arg(long = "kernel", value_name = "NAME", value_parser = values::kernel)]
+    #[arg(long = "kernel", value_name = "NAME", value_parser = kernel)]
     pub name: Option<Kernel>,
     /// Threads per build (of query and locate also for cameras and points). With a
     /// list, such as 1,2,4, structures with the parameter 'threads' are entered for each
     #[arg(long, value_name = "N,..", default_value = "1", value_delimiter = ',',
         value_parser = values::whole(1..=MOST_THREADS))]
     pub threads: Vec<usize>,
+}
+
+fn kernel(name: &str) -> Result<Kernel, SpecError> {
+    let known = Kernel::ALL.map(|kernel| (kernel, kernel.name(), ""));
+    values::choice("kernel", &known)(name)
 }
 
 impl KernelArgs {
@@ -257,13 +262,12 @@ pub struct LensArgs {
 }
 
 impl LensArgs {
-    pub fn defaults(&self) -> Result<LensDefaults, SpecError> {
-        if let (Some(near), Some(far)) = (self.near, self.far)
-            && near >= far
-        {
-            return Err(SpecError::new(format_args!(
+    pub fn defaults(&self) -> anyhow::Result<LensDefaults> {
+        if let (Some(near), Some(far)) = (self.near, self.far) {
+            ensure!(
+                near < far,
                 "--near is {near} and --far {far}; expected near < far"
-            )));
+            );
         }
         Ok(LensDefaults {
             matrix: self.matrix_convention,
@@ -298,11 +302,9 @@ pub struct CullingArgs {
 
 impl CullingArgs {
     /// The culling test of that name, with the other settings from the options.
-    pub fn culling(&self, test: &str) -> Result<Culling, SpecError> {
+    pub fn culling(&self, test: &str) -> anyhow::Result<Culling> {
         if let (Some(c), Arithmetic::F64) = (self.epsilon.filter(|&c| c > 0.0), self.arithmetic) {
-            return Err(SpecError::new(format_args!(
-                "--epsilon is {c} with --arithmetic f64, which has none; expected 0, or f32"
-            )));
+            bail!("--epsilon is {c} with --arithmetic f64, which has none; expected 0, or f32");
         }
         Ok(Culling {
             test: values::choice("test", &TESTS)(test)?,

@@ -3,21 +3,20 @@
 //! failed in full, or all rows as JSON.
 
 use std::collections::BTreeSet;
-use std::io::{self, Write};
+use std::io;
 use std::time::Instant;
 
 use anyhow::bail;
 use indicatif::ProgressBar;
 
 use super::args::StressArgs;
-use super::shared_args::TableFormat;
 use super::table::{Column, Table};
-use super::{Ending, interrupt, tell, text, unread_is_fine};
+use super::{Ending, interrupt, print, tell, text};
 use crate::index::{Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::report::grouped;
 use crate::stress::extremes::{Extremes, Tally};
-use crate::stress::{Name, Section, Status, Vector, built_in, read_vectors_file, replay};
+use crate::stress::{Name, Row, Section, Status, Vector, built_in, read_vectors_file, replay};
 
 pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
@@ -112,25 +111,21 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         let files = text::joined(files);
         bail!("{files}: nothing to check; expected planes, a camera or points in a vector");
     }
-    unread_is_fine(match args.format {
-        TableFormat::Json => json(&sections),
-        TableFormat::Table => {
-            let names: Vec<&str> = others().map(Kernel::name).collect();
-            let note = match by_others {
-                0 => String::new(),
-                count => format!("; {} more by {}", text::count(count), names.join(" and ")),
-            };
-            table(&sections, started.elapsed().as_secs_f64(), &note)
-        }
+    let rows: Vec<&Row> = sections.iter().flat_map(|section| &section.rows).collect();
+    print(args.format, &rows, || {
+        let names: Vec<&str> = others().map(Kernel::name).collect();
+        let note = match by_others {
+            0 => String::new(),
+            count => format!("; {} more by {}", text::count(count), names.join(" and ")),
+        };
+        table(&sections, started.elapsed().as_secs_f64(), &note)
     })?;
     if interrupted {
         tell("interrupted: only the cases shown were checked");
     }
     let has_failed = |section: &Section| section.count(Status::Fail) > 0;
-    Ok(Ending::of_checks(
-        !sections.iter().any(has_failed),
-        interrupted,
-    ))
+    let is_right = !sections.iter().any(has_failed);
+    Ok(Ending::of_checks(is_right, interrupted))
 }
 
 /// Cases of each extreme by another instruction set than the chosen one.
@@ -150,23 +145,7 @@ fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
     sections
 }
 
-/// All rows as one array, a row per line.
-fn json(sections: &[Section]) -> io::Result<()> {
-    let mut out = io::BufWriter::new(io::stdout().lock());
-    let mut before = "[\n";
-    for row in sections.iter().flat_map(|section| &section.rows) {
-        write!(out, "{before}{}", serde_json::to_string(row)?)?;
-        before = ",\n";
-    }
-    if before == "[\n" {
-        write!(out, "[")?;
-    }
-    writeln!(out, "\n]")?;
-    out.flush()
-}
-
 fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
-    let mut out = text::terminal();
     let columns: &[Column<&Section>] = &[
         ("category", |s| s.name.clone()),
         (">cases", |s| text::count(s.cases as usize)),
@@ -177,17 +156,14 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         (">failed", |s| text::count(s.count(Status::Fail))),
     ];
     let width = text::width();
-    writeln!(out, "{}", Table::with(sections, columns).fitted(width))?;
+    let mut told = vec![Table::with(sections, columns).fitted(width)];
     let rows = || sections.iter().flat_map(|section| &section.rows);
     for row in rows().filter(|row| row.status == Status::Fail) {
         let (id, level) = (text::plain(&row.id), row.level.name());
         let by = text::some(row.kernel, |kernel| format!(" by {kernel}"));
-        writeln!(
-            out,
-            "{id}, {level} level, {}, {}{by}:",
-            row.structure, row.test
-        )?;
-        writeln!(out, "  expected {}\n  got {}", row.expected, row.got)?;
+        let (structure, test) = (&row.structure, &row.test);
+        told.push(format!("{id}, {level} level, {structure}, {test}{by}:"));
+        told.push(format!("  expected {}\n  got {}", row.expected, row.got));
     }
     let mut tally = Tally::default();
     sections.iter().for_each(|section| tally += section.tally);
@@ -205,7 +181,7 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
             text::count(tally.lost_bare as usize),
             text::count(tally.refused as usize),
         );
-        writeln!(out, "{}\n", text::wrapped(&line, width))?;
+        told.push(text::wrapped(&line, width) + "\n");
     }
     let count = |status| text::count(rows().filter(|row| row.status == status).count());
     let [passed, refused, failed] = [Status::Pass, Status::Refused, Status::Fail].map(count);
@@ -214,5 +190,6 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         "{checks} in {seconds:.1} s: {passed} passed, {refused} refused as they must be, {failed} \
          failed{note}"
     );
-    writeln!(out, "{}", text::wrapped(&line, width))
+    told.push(text::wrapped(&line, width));
+    text::print(&told)
 }

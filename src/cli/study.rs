@@ -78,11 +78,8 @@ impl Setting {
     pub fn note_solid(&self, format: TableFormat) {
         let scene = &self.scene;
         let is_file = is_readable(Path::new(split_part(&scene.name).0));
-        if format == TableFormat::Table
-            && is_file
-            && scene.surfaces.is_none()
-            && scene.own_tree.is_none()
-        {
+        let is_boxes = scene.surfaces.is_none() && scene.own_tree.is_none();
+        if format == TableFormat::Table && is_file && is_boxes {
             tell("warning: items count as solid boxes; the meshes in them may hide less");
         }
     }
@@ -149,10 +146,8 @@ impl Study {
     /// Prints the amount of work and how long the defaults take, on a terminal only.
     pub fn announce(&self, work: &str, by_default: &str) {
         let times = text::counted(self.processes as usize, "process");
-        let line = format!(
-            "at work: {}{work}, timed in {times}; the defaults take {by_default}",
-            self.about
-        );
+        let work = format!("{}{work}, timed in {times}", self.about);
+        let line = format!("at work: {work}; the defaults take {by_default}");
         self.bar.suspend(tell_warnings);
         if !self.bar.is_hidden() {
             self.bar.suspend(|| tell(&line));
@@ -194,6 +189,7 @@ impl Study {
             let timing = Timing {
                 process,
                 lens_scale,
+                ..Timing::default()
             };
             let told = |_: &str| {
                 self.bar.set_position(self.before + u64::from(process));

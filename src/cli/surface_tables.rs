@@ -11,14 +11,6 @@ use crate::report::{
     Crossing, Growth, Overall, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
 };
 
-/// A class of shares: "0.1 %", "100 %".
-fn share(share: f64) -> String {
-    // At most two digits by its making; the rest is rounding.
-    let rounded = format!("{:.6}", share * 100.0);
-    let plain = rounded.trim_end_matches('0').trim_end_matches('.');
-    format!("{plain} %")
-}
-
 fn title(surface: &Surface) -> String {
     format!("{}, {}, {}", surface.world, surface.cache, surface.test)
 }
@@ -32,7 +24,7 @@ fn winners(surface: &Surface) -> Table {
             let here = |p: &&Place| p.items == size && p.class == *class;
             let told = surface.places.iter().filter(here).map(winner);
             let told = told.collect::<Vec<_>>().join("; ");
-            [text::count(size), share(*class), told]
+            [text::count(size), text::short_percent(*class), told]
         })
     });
     Table::grid("items \\ visible", cells)
@@ -64,7 +56,7 @@ fn crossings(surface: &Surface) -> Option<Table> {
                 Some(Crossing::At(items)) => format!("~ {}", text::count(two_digits(items))),
                 Some(Crossing::Above(items)) => format!("> {}", text::count(items)),
             };
-            [structure.to_owned(), share(*class), told]
+            [structure.to_owned(), text::short_percent(*class), told]
         })
     });
     let mut table = Table::grid("faster than linear from", cells);
@@ -164,14 +156,11 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
             let here = |place: &&Place| place.class == class && place.items == items;
             let mut cells = (surface.places.iter().filter(here)).filter_map(|p| p.cell(name));
             let metric = cells.next().and_then(|cell| cell.metrics.get("query_ns"));
+            let time = text::some(metric, |ns| text::time_within(ns.estimate()));
             Point {
                 at: [items as f64, ns],
                 ends: metric.and_then(|metric| ends(metric.estimate())),
-                note: format!(
-                    "{name}, {}: {}",
-                    text::count(items),
-                    text::some(metric, |ns| text::time_within(ns.estimate()))
-                ),
+                note: format!("{name}, {}: {time}", text::count(items)),
                 ..Point::default()
             }
         };
@@ -207,7 +196,8 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     sizes.dedup();
     let size = |items: f64| text::count(items.round() as usize);
     let figure = |(class, series, beyond)| {
-        let (shown, title, measured) = (share(class), title(surface), measured(surface, class));
+        let (shown, title) = (text::short_percent(class), title(surface));
+        let measured = measured(surface, class);
         let caption = format!(
             "{title}: mean time per query against items, {shown} visible{measured}{}",
             left_out(beyond)
@@ -247,9 +237,9 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
         let Surface {
             world, cache, test, ..
         } = &surface;
-        growth(&surface)
-            .into_iter()
-            .for_each(|(shown, figure)| add([world, cache, test, &shown], figure));
+        for (shown, figure) in growth(&surface) {
+            add([world, cache, test, &shown], figure);
+        }
     }
     for comparison in &comparisons(report) {
         let about = comparison.about();
@@ -291,7 +281,7 @@ mod tests {
     fn shares_and_interpolated_sizes_are_rounded() {
         let shares = [0.001, 0.02, 0.2, 1.0, 0.0005];
         assert_eq!(
-            shares.map(share),
+            shares.map(text::short_percent),
             ["0.1 %", "2 %", "20 %", "100 %", "0.05 %"]
         );
         assert_eq!([1234.0, 7.2, 98_765.0].map(two_digits), [1200, 7, 99_000]);

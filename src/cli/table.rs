@@ -187,9 +187,8 @@ impl Table {
         for row in &self.rows {
             let text: Vec<char> = wrapped(&plain(&row[last]), room).chars().collect();
             // A word may be longer than a line.
-            let lines = text
-                .split(|c| *c == '\n')
-                .flat_map(|line| line.chunks(room));
+            let lines = text.split(|c| *c == '\n');
+            let lines = lines.flat_map(|line| line.chunks(room));
             let lines: Vec<String> = lines.map(String::from_iter).collect();
             for n in 0..lines.len().max(1) {
                 let own = |cell: &String| if n == 0 { cell.clone() } else { String::new() };

@@ -1,12 +1,13 @@
 //! Figures as text.
 
-use std::io::{self, StdoutLock, Write};
+use std::io::{self, Write};
 use std::iter::repeat;
 
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
 pub use crate::shown::{count, counted, first_of, lines, message, plain, significant, time, unit};
 use crate::statistics::{Estimate, Rate};
+use crate::verify::ErrorCount;
 
 /// A figure as text; nothing if there is none.
 pub fn some<T>(value: Option<T>, show: impl FnOnce(T) -> String) -> String {
@@ -234,13 +235,13 @@ pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
     }
 }
 
-/// Basis of the times of a study, with the ratio of a thing that was measured
-/// twice: "10 processes (measured twice: 1.00 [0.99, 1.01] times as long)".
+/// Basis of the times of a study, with the ratio of a thing that was measured twice.
 pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     let count = counted(processes, "process");
-    match twin.filter(|twin| twin.lower.is_some()) {
-        Some(twin) => format!("{count} (measured twice: {} times as long)", within(*twin)),
-        None => format!("{count}: times without intervals, no ties (--processes 10 gives both)"),
+    let twice = |twin: &Estimate| format!(" (measured twice: {} times as long)", within(*twin));
+    match processes {
+        0..3 => format!("{count}: times without intervals, no ties (--processes 10 gives both)"),
+        _ => format!("{count}, times with 95 % intervals{}", some(twin, twice)),
     }
 }
 
@@ -274,8 +275,13 @@ pub fn false_positives(comparison: &Comparison) -> Option<String> {
 pub fn by_source(comparison: &Comparison) -> Option<String> {
     let errors = &comparison.judged()?.errors;
     let others = errors.by_storage > 0 || errors.by_planes > 0;
+    others.then(|| sources(*errors))
+}
+
+/// False positives by storage, planes and test: "12/0/80".
+pub fn sources(errors: ErrorCount) -> String {
     let sources = [errors.by_storage, errors.by_planes, errors.by_test()];
-    others.then(|| sources.map(|items| items.to_string()).join("/"))
+    sources.map(|items| items.to_string()).join("/")
 }
 
 /// A word as a shell takes it.
@@ -304,6 +310,14 @@ pub fn percent(share: f64) -> String {
     format!("{rounded} %")
 }
 
+/// A share in percent with up to three digits, never rounded up to 100: "0.1 %".
+pub fn short_percent(share: f64) -> String {
+    match share {
+        0.99..1.0 => percent(share),
+        _ => format!("{} %", short(share * 100.0)),
+    }
+}
+
 /// Columns of the terminal behind standard output; 80 of anything else.
 pub fn width() -> usize {
     let size = console::Term::stdout().size_checked();
@@ -311,26 +325,11 @@ pub fn width() -> usize {
     columns.filter(|columns| *columns > 0).unwrap_or(80)
 }
 
-/// Standard output for people, without control characters from outside.
-pub fn terminal() -> Terminal<StdoutLock<'static>> {
-    Terminal(io::stdout().lock())
+/// Prints text for people, without control characters from outside.
+pub fn print(parts: &[String]) -> io::Result<()> {
+    let text = lines(&parts.join("\n")) + "\n";
+    io::stdout().lock().write_all(text.as_bytes())
 }
-
-/// Text on its way to a terminal.
-pub struct Terminal<W>(W);
-
-impl<W: Write> Write for Terminal<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let text = String::from_utf8_lossy(bytes);
-        self.0.write_all(lines(&text).as_bytes())?;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::table::Table;
@@ -420,9 +419,7 @@ mod tests {
         table.add_row(["two\nlines\u{202e}"]);
         let shown = table.bare();
         assert!(shown.contains("a\\u{1b}b") && shown.contains("two lines\\u{202e}"));
-        let mut out = Terminal(Vec::new());
-        write!(out, "\u{1b}[2J\n{}\n", 7.0).unwrap();
-        assert_eq!(out.0, b"\\u{1b}[2J\n7\n");
+        assert_eq!(lines("\u{1b}[2J\n7\n"), "\\u{1b}[2J\n7\n");
     }
 
     #[test]

@@ -151,10 +151,8 @@ fn reproduce(scene: &str, path: &str) -> anyhow::Result<String> {
     let own = ["scene", "path", "cases", "seed", "format"];
     let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
     let others = typed.words(|name| !own.contains(&name));
-    let others: String = others
-        .iter()
-        .map(|word| format!(" {}", text::quoted(word)))
-        .collect();
+    let others = others.iter().map(|word| format!(" {}", text::quoted(word)));
+    let others: String = others.collect();
     let (program, scene, path) = (program::name(), text::quoted(scene), text::quoted(path));
     Ok(format!(
         "{program} verify --scene {scene} --path {path}{others}"
@@ -169,10 +167,8 @@ fn workloads<'a>(
     culling: &Culling,
 ) -> anyhow::Result<Vec<(String, Workload<'a>)>> {
     let around = scene.surroundings();
-    let mut all = vec![(
-        format!("{} perspective", culling.arithmetic.name()),
-        Workload::new(scene, cameras, culling)?,
-    )];
+    let first = format!("{} perspective", culling.arithmetic.name());
+    let mut all = vec![(first, Workload::new(scene, cameras, culling)?)];
     // The first kind is the camera itself.
     let none = cameras.clone().at_most(0);
     for kind in &VOLUME_KINDS[1..] {
@@ -219,7 +215,7 @@ fn is_safe(culling: &Culling) -> bool {
 
 /// Checks the reference's answers, which all structures that agreed share, against
 /// the oracle, for some of the cameras; points on their faces where the planes are safe.
-pub(super) fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
+pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
     let mut errors = judge(workload, MOST_JUDGED).errors;
     let or_points = match is_safe(&workload.culling) {
         true => {
@@ -290,12 +286,7 @@ impl Check {
     }
 }
 
-pub(super) fn check(
-    workload: &Workload,
-    subjects: &[Subject],
-    kind: &str,
-    again: &str,
-) -> Vec<Check> {
+pub fn check(workload: &Workload, subjects: &[Subject], kind: &str, again: &str) -> Vec<Check> {
     let counted = count_pass(workload, subjects, &|_, _| ());
     let scene = workload.scene;
     let questions = workload.views.len() * scene.items.len()
@@ -346,10 +337,8 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             };
             if let Err(Verdict { status, reason }) = found {
                 check.status = status.name();
-                let (kind, items) = (
-                    VOLUME_KINDS[case.kind],
-                    text::counted(case.items.len(), "item"),
-                );
+                let kind = VOLUME_KINDS[case.kind];
+                let items = text::counted(case.items.len(), "item");
                 let (program, kernel) = (program::name(), spec.execution.kernel.name());
                 let again = format!("{program} verify --cases 1 --seed {case_seed}");
                 check.difference = Some(format!(

@@ -2,7 +2,7 @@
 //!
 //! A row per structure, the first differences, and the comparison in a sentence.
 
-use std::io::{self, Write};
+use std::io;
 
 use serde::Serialize;
 
@@ -44,7 +44,6 @@ pub(super) struct Outcome {
 }
 
 pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
-    let mut out = text::terminal();
     let width = text::width();
     let all = outcome.checks.iter();
     let all = grouped(all.map(|check| (check.structure.as_str(), check)));
@@ -69,17 +68,17 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
         }),
     ];
     let table = Table::with(all.iter().map(|(_, own)| own), columns);
-    writeln!(out, "{}", table.fitted(width))?;
+    let mut told = vec![table.fitted(width)];
     for check in &outcome.checks {
         if let Some(difference) = &check.difference {
             let (structure, scene, path) = (&check.structure, &check.scene, &check.path);
             let about = text::plain(&format!("{structure} on {scene}, {path}"));
-            writeln!(out, "{about}:\n  {difference}")?;
+            told.push(format!("{about}:\n  {difference}"));
         }
     }
     let own = all.iter().map(|(_, own)| own);
     let differ = own.filter(|own| own.iter().any(|check| check.difference.is_some()));
-    let of = text::counted(all.len(), "structure");
+    let (of, checks) = (text::counted(all.len(), "structure"), outcome.checks.len());
     let reference = "the reference scan";
     let checked = format!(
         "{}: {} in {:.1} s ({:.1} million/s), {}",
@@ -95,17 +94,14 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
         outcome.verdicts as f64 / outcome.seconds / 1e6,
         match outcome.mismatches {
             0 => "no mismatches".to_owned(),
-            failed => format!(
-                "{failed} of {} checks failed (structure x path)",
-                outcome.checks.len()
-            ),
+            failed => format!("{failed} of {checks} checks failed (structure x path)"),
         }
     );
-    writeln!(out, "{}", text::wrapped(&checked, width))?;
+    told.push(text::wrapped(&checked, width));
     if !outcome.against_cameras {
         let doubt = "Planes without the full margin may drop visible items: a few cameras were \
                      checked, points on their faces were not.";
-        writeln!(out, "{}", text::wrapped(doubt, width))?;
+        told.push(text::wrapped(doubt, width));
     }
-    Ok(())
+    text::print(&told)
 }

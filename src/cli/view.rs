@@ -71,9 +71,8 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let questions = ("camera", views);
     let agree = ask_all(&structures, &scene, boxes, questions, true, ask, &mut each)?;
     let threads = args.culling.kernel.execution()?.threads;
-    let surfaces = args
-        .samples
-        .map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
+    let samples = args.samples;
+    let surfaces = samples.map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
     let mut totals = [0; FATES];
     for (view, answer) in answers.iter().enumerate() {
         let camera = &cameras.cameras[view];
@@ -94,7 +93,6 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
             .push(Frame::of(index, camera, scene.origin, &fates));
     }
     bar.finish_and_clear();
-    let samples = args.samples;
     data.samples = samples.map(|grid| format!("{}x{}", grid.width, grid.height));
     let told = conclusion(&data, totals, agree);
     let facts = CameraFacts::of(&cameras.cameras);
@@ -103,10 +101,8 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let matrix = text::some(facts.matrix.as_ref(), |matrix| {
         format!("; matrices: {}", scene_facts::matrices(matrix))
     });
-    let about = format!(
-        "Scene: {axes}. Lens: {lens}{matrix}. Test: {}.",
-        culling.test.name()
-    );
+    let test = culling.test.name();
+    let about = format!("Scene: {axes}. Lens: {lens}{matrix}. Test: {test}.");
     let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
     let body = format!(
         "<main class=\"view\"><h1>cullbench view {}, {}</h1>\n<p>{}</p>\n{}<p>{}</p>\n</main>\n\
@@ -356,10 +352,8 @@ impl ViewData {
             frames: Vec::new(),
             structures: Vec::new(),
         };
-        (
-            data,
-            order.into_iter().map(|(_, item)| item as ItemId).collect(),
-        )
+        let order = order.into_iter().map(|(_, item)| item as ItemId);
+        (data, order.collect())
     }
 
     /// Adds the tests of a structure in its next view.

@@ -13,7 +13,6 @@ use anyhow::bail;
 use clap::Parser;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use serde_json::{Value, from_value};
 
 use super::Ending;
 use super::args::{Cli, Command};
@@ -75,11 +74,12 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
             }
             here.scene(&plan, scene, &share, samples)?;
         }
-        Job::Times(plan, timing) => {
+        Job::Times(plan, mut timing) => {
+            timing.plan = plan;
             stay_on(request.cpu);
             here.at.set(None, TIMING);
             here.tell(&here.at.message());
-            here.tell(&Message::Times(times(registry, plan, &timing, &command)?));
+            here.tell(&Message::Times(times(registry, &command, &timing)?));
         }
     }
     let failed = here.failed.into_inner();
@@ -87,20 +87,12 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
 }
 
 /// Times of one process of a study.
-fn times(
-    registry: &Registry,
-    plan: Value,
-    timing: &Timing,
-    command: &Command,
-) -> anyhow::Result<ProcessTimes> {
+fn times(registry: &Registry, command: &Command, timing: &Timing) -> anyhow::Result<ProcessTimes> {
     match command {
-        Command::Advise(args) => advise::time(registry, args, &from_value(plan)?, timing),
-        Command::Precision(args) => match args.stage {
-            Some(stage) => precision::time_stage(registry, args, stage, &from_value(plan)?, timing),
-            None => precision::time(registry, args, &from_value(plan)?, timing),
-        },
-        Command::Funnel(args) => funnel::time(registry, args, &from_value(plan)?, timing),
-        Command::Drift(args) => Ok(drift::time(args, &from_value(plan)?, timing)),
+        Command::Advise(args) => advise::time(registry, args, timing),
+        Command::Precision(args) => precision::time(registry, args, timing),
+        Command::Funnel(args) => funnel::time(registry, args, timing),
+        Command::Drift(args) => drift::time(args, timing),
         _ => bail!(OTHER),
     }
 }

@@ -381,11 +381,11 @@ mod tests {
 
     fn points(arm: ArmKind, stiffness: f64, seconds: f64) -> Vec<ArmPoint> {
         let options = ArmOptions {
-            arms: vec![arm],
-            stiffnesses: vec![stiffness],
-            rate_hz: 60,
+            arm: vec![arm],
+            stiffness: vec![stiffness],
+            rate: 60,
             seconds,
-            tolerance: 1e-3,
+            arm_tolerance: 1e-3,
         };
         errors(settings(&options)[0], options.seconds)
     }

@@ -4,13 +4,15 @@
 
 use std::hint::black_box;
 
+use clap::Args;
 use serde::Serialize;
 
-use super::arm::{Arm, ArmKind, Chase, Line, METHODS, Method, State, rk4, rk4_of_sine};
+use super::arm::{ARMS, Arm, ArmKind, Chase, Line, METHODS, Method, State, rk4, rk4_of_sine};
 use super::exact::larger;
 use super::frames::task;
 use super::rated::{Recommendation, recommended};
 use crate::measure::{OverProcesses, TimedTask};
+use crate::spec::values;
 use crate::statistics::{Estimate, flat};
 
 /// Steps per frame that each method is tried with.
@@ -84,19 +86,26 @@ pub fn limits() -> Vec<StabilityLimit> {
     METHODS.iter().flat_map(of).collect()
 }
 
-/// Scope of the study.
-#[derive(Clone, Debug)]
+/// Scope of the study: every kind of arm with every stiffness.
+#[derive(Args, Debug)]
 pub struct ArmOptions {
-    /// Kinds of arm, each with every stiffness.
-    pub arms: Vec<ArmKind>,
-    /// k in 1/s^2.
-    pub stiffnesses: Vec<f64>,
-    /// Frames per second.
-    pub rate_hz: u32,
-    /// Simulated time that errors are the maxima of.
+    /// Spring arms to study: linear, collision (stiffens when stretched, has a stop)
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(default_value = "linear,collision", value_parser = values::choice("arm", &ARMS))]
+    pub arm: Vec<ArmKind>,
+    /// Stiffnesses of the spring arms, k in 1/s^2, critically damped
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(default_value = "1e2,1e4,1e6", value_parser = values::within(0.01..=1e8))]
+    pub stiffness: Vec<f64>,
+    /// Frames per second of the spring arms
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = values::whole(1u32..=1000))]
+    pub rate: u32,
+    /// Simulated time over which the largest error of a spring arm is taken
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = values::within(1.0..=1e3))]
     pub seconds: f64,
-    /// Largest position error of a recommended method.
-    pub tolerance: f64,
+    /// Largest position error of a spring arm to recommend; the target swings by 1
+    #[arg(long, value_name = "ERROR", default_value_t = 1e-3, value_parser = values::above_zero)]
+    pub arm_tolerance: f64,
 }
 
 /// An arm at a frame rate.
@@ -152,12 +161,16 @@ pub struct ArmChoice {
     pub choice: Recommendation,
 }
 
-/// Every arm with every stiffness.
+/// Every arm with every stiffness, once each and in order.
 pub fn settings(options: &ArmOptions) -> Vec<Setting> {
-    let rate_hz = f64::from(options.rate_hz);
+    let rate_hz = f64::from(options.rate);
+    let mut stiffnesses = options.stiffness.clone();
+    stiffnesses.sort_by(f64::total_cmp);
+    stiffnesses.dedup();
     let mut all = Vec::new();
-    for &arm in &options.arms {
-        all.extend(options.stiffnesses.iter().map(|&stiffness| Setting {
+    let is_studied = |arm: &ArmKind| options.arm.contains(arm);
+    for arm in ArmKind::ALL.into_iter().filter(is_studied) {
+        all.extend(stiffnesses.iter().map(|&stiffness| Setting {
             arm,
             stiffness,
             rate_hz,

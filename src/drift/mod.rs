@@ -8,6 +8,7 @@ mod frames;
 mod rated;
 mod rotation;
 
+use clap::Args;
 use serde::Serialize;
 
 pub use arm::{ARMS, ArmKind, Method as ArmMethod};
@@ -19,26 +20,38 @@ pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 use crate::measure::{
     OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed_rounds, timed_to_end,
 };
+use crate::spec::{SpecError, parse_number, values};
 use crate::statistics::{Estimate, flat};
 use frames::{QUERIES, QUERY_STEPS, STEADY, walking};
 use rated::recommended;
 use rotation::{METHODS, Period, TOOLKIT};
 
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
-pub const MOST_STEPS: u64 = 1_000_000_000;
+const MOST_STEPS: f64 = 1e9;
+
+/// `1e7` or `10M`.
+fn steps(text: &str) -> Result<u64, SpecError> {
+    let steps = parse_number(text)
+        .filter(|_| !text.trim_end().ends_with('%'))
+        .filter(|n| n.fract() == 0.0 && (1.0..=MOST_STEPS).contains(n));
+    let what = format_args!("a whole number from 1 to {MOST_STEPS:e}");
+    values::expected(steps, what).map(|steps| steps as u64)
+}
 
 /// Numbers of whole turns to measure, in steps of one degree.
 const TURNS: [u64; 2] = [1, 1000];
 
 /// Scope of the study.
-#[derive(Clone, Debug)]
+#[derive(Args, Debug)]
 pub struct DriftOptions {
-    /// Up to how many steps.
+    /// Number of steps; errors are shown at 1e3, 1e4, ... and at the last one
+    #[arg(long, value_name = "N", default_value = "1e6", value_parser = steps)]
     pub steps: u64,
-    /// Largest angle (radians) and orthogonality of a recommended method after them.
-    pub tolerance_rad: f64,
-    /// Which spring arms are studied.
-    pub arm: ArmOptions,
+    /// Largest error after all steps of a method to recommend for camera bases
+    #[arg(long, value_name = "RAD", default_value_t = 1e-6, value_parser = values::above_zero)]
+    pub tolerance: f64,
+    #[command(flatten)]
+    pub arms: ArmOptions,
 }
 
 /// The study of spring arms.
@@ -105,7 +118,7 @@ pub struct DriftReport {
 
 /// Number of jobs that [`prepare`] reports to `progress`.
 pub fn jobs(options: &DriftOptions) -> usize {
-    METHODS.len() + arm_study::settings(&options.arm).len()
+    METHODS.len() + arm_study::settings(&options.arms).len()
 }
 
 /// Powers of ten from a thousand on, and the most steps themselves.
@@ -123,7 +136,7 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
     let periods: Vec<Period> = looks.map(Period::new).collect();
     let mut report = DriftReport {
         steps: options.steps,
-        tolerance_rad: options.tolerance_rad,
+        tolerance_rad: options.tolerance,
         turn_per_step: STEADY,
         period_steps: PERIOD,
         ..DriftReport::default()
@@ -136,14 +149,14 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
         report.one_degree_turns.extend(turns);
     }
     let mut points = Vec::new();
-    for setting in arm_study::settings(&options.arm) {
+    for setting in arm_study::settings(&options.arms) {
         let (arm, k) = (setting.arm.name(), setting.stiffness);
         begin(&format!("{arm} arm, k = {k:e}"));
-        points.extend(arm_study::errors(setting, options.arm.seconds));
+        points.extend(arm_study::errors(setting, options.arms.seconds));
     }
     report.arm = ArmReport {
-        seconds: options.arm.seconds,
-        tolerance: options.arm.tolerance,
+        seconds: options.arms.seconds,
+        tolerance: options.arms.arm_tolerance,
         methods: arm::METHODS,
         points,
         stability: arm_study::limits(),
@@ -155,7 +168,7 @@ pub fn prepare(options: &DriftOptions, begin: impl Fn(&str)) -> DriftReport {
 /// All timed tasks: bases, then arms.
 fn tasks(options: &DriftOptions) -> Vec<TimedTask<'static>> {
     let frames = METHODS.iter().map(|method| walking(method.walk));
-    let settings = arm_study::settings(&options.arm).into_iter();
+    let settings = arm_study::settings(&options.arms).into_iter();
     let arms = settings.flat_map(arm_study::tasks);
     frames.chain(arms).collect()
 }

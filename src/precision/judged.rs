@@ -102,22 +102,15 @@ impl Shots {
 
     /// O(cameras * items) verdicts of some 50 ns. A frame always makes a pose.
     pub fn truths(&self, scene: &Scene) -> Truths {
-        let of = |cameras: &[Camera]| {
+        [&self.cameras, &self.neighbours].map(|cameras| {
             let truths = cameras.iter().filter_map(|c| Truth::of_scene(c, scene));
             truths.collect()
-        };
-        Truths {
-            cameras: of(&self.cameras),
-            neighbours: of(&self.neighbours),
-        }
+        })
     }
 }
 
-/// The truth about each camera and its neighbour.
-pub(super) struct Truths {
-    cameras: Vec<Truth>,
-    neighbours: Vec<Truth>,
-}
+/// The truth about each camera, and about each neighbour.
+pub(super) type Truths = [Vec<Truth>; 2];
 
 /// Errors of the answer to one camera.
 #[derive(Clone, Copy, Default)]
@@ -170,12 +163,12 @@ impl Judged {
         for camera in &shots.cameras {
             self.views.push(view_of(camera)?);
         }
-        let Some(truths) = truths else {
+        let Some([truths, beside]) = truths else {
             return Ok(());
         };
-        for (i, (camera, truth)) in shots.cameras.iter().zip(&truths.cameras).enumerate() {
+        for (i, (camera, truth)) in shots.cameras.iter().zip(truths).enumerate() {
             let own = answer(&self.views[i]);
-            let pair = shots.neighbours.get(i).zip(truths.neighbours.get(i));
+            let pair = shots.neighbours.get(i).zip(beside.get(i));
             let flicker = pair.and_then(|(neighbour, then)| {
                 let answer_then = answer(&view_of(neighbour).ok()?);
                 Some(flicker(items.len(), [truth, then], [&own, &answer_then]))

@@ -87,23 +87,22 @@ struct SweptTest {
 /// The f32 default, with a plain frame as well; f64, f32 about the eye and every
 /// derivation without epsilon.
 fn tests() -> Vec<SweptTest> {
-    let with = |culling, has_plain_frame| SweptTest {
-        culling,
-        has_plain_frame,
-    };
-    let epsilon = 0.0;
     let bare = |arithmetic, method| {
-        let planes = PlaneOptions { method, epsilon };
-        with(
-            Culling::new(CullingTest::SixPlane, arithmetic, planes),
-            false,
-        )
+        let planes = PlaneOptions {
+            method,
+            epsilon: 0.0,
+        };
+        Culling::new(CullingTest::SixPlane, arithmetic, planes)
     };
     let method = PlaneOptions::default().method;
-    let defaults = [false, true].map(|is_plain| with(Culling::default(), is_plain));
     let arithmetics = [Arithmetic::F64, Arithmetic::F32Relative].map(|a| bare(a, method));
     let methods = PLANE_METHODS.map(|(method, ..)| bare(Arithmetic::F32, method));
-    [&defaults[..], &arithmetics, &methods].concat()
+    let all = [&[Culling::default(); 2][..], &arithmetics, &methods].concat();
+    let tests = all.into_iter().enumerate().map(|(n, culling)| SweptTest {
+        culling,
+        has_plain_frame: n == 1,
+    });
+    tests.collect()
 }
 
 impl SweptTest {

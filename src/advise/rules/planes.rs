@@ -190,9 +190,8 @@ pub(super) fn six_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
     Ok(Draft::concluded(vec![sides], move |facts| {
         let check = &facts.checks[0];
         let Some(more) = check.more_false_positives() else {
-            let saving = facts.saving();
             return Finding {
-                saving,
+                saving: facts.saving(),
                 ..Finding::default()
             };
         };
@@ -274,11 +273,8 @@ fn against_base(trials: &mut Trials, culling: &Culling) -> Result<Sides, Unfit> 
 /// margin that is mostly far too thin to hold an item.
 pub(super) fn f64_kernel(trials: &mut Trials) -> Result<Draft, Unfit> {
     let case = trials.case;
-    let in_f64 = Culling::new(
-        CullingTest::SixPlane,
-        Arithmetic::F64,
-        PlaneOptions::default(),
-    );
+    let planes = PlaneOptions::default();
+    let in_f64 = Culling::new(CullingTest::SixPlane, Arithmetic::F64, planes);
     let (margin, tolerance) = (case.margin(&case.workload.around), case.options.tolerance);
     let reason = format!(
         "f32 planes are moved outward by up to {margin:.1e} of the depth; {tolerance:.0e} are tolerated"

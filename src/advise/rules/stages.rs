@@ -111,9 +111,8 @@ fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
     }
     let removed = without - with;
     let left_out_ns = gain.without_ns.unwrap_or(f64::NAN);
-    let kept_ns = gain
-        .ratio
-        .map_or(f64::NAN, |ratio| ratio.value * left_out_ns);
+    let ratio = gain.ratio.map_or(f64::NAN, |ratio| ratio.value);
+    let kept_ns = ratio * left_out_ns;
     let testing = kept_ns - left_out_ns;
     let from = (testing > 0.0 && removed > 0.0).then_some(testing / removed);
     let told = |show: &dyn Fn(f64) -> String| from.map_or_else(String::new, show);

@@ -1,18 +1,14 @@
-//! Parsers of option values. Their errors state what was expected;
-//! [`usage`](super::usage) adds the option and the value.
+//! Parsers of option values. Their errors state what was expected; the command line
+//! adds the option and the value.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use crate::drift::MOST_STEPS;
-use crate::funnel::StageKind;
-use crate::kernel::Kernel;
-use crate::report::JUDGED_METRICS;
-use crate::spec::{SpecError, parse_number};
-use crate::visibility::SampleGrid;
+use super::{SpecError, parse_number};
 
-fn expected<T>(value: Option<T>, what: impl Display) -> Result<T, SpecError> {
+/// The value, or an error about what was expected.
+pub fn expected<T>(value: Option<T>, what: impl Display) -> Result<T, SpecError> {
     value.ok_or_else(|| SpecError::new(format_args!("expected {what}")))
 }
 
@@ -97,13 +93,6 @@ pub fn threshold(typed: &str) -> Result<f64, SpecError> {
     expected(share.filter(|share| *share >= 0.0), what).map(f64::abs)
 }
 
-/// A metric that runs are compared by.
-pub fn metric(name: &str) -> Result<&'static str, SpecError> {
-    let mut known = JUDGED_METRICS.iter().copied();
-    let metric = known.find(|metric| *metric == name.trim());
-    metric.ok_or_else(|| SpecError::unknown("metric", name, JUDGED_METRICS.iter().copied()))
-}
-
 /// Name of a baseline, which becomes the name of a file.
 pub fn baseline(name: &str) -> Result<String, SpecError> {
     let name = name.trim_end_matches(".json");
@@ -114,36 +103,6 @@ pub fn baseline(name: &str) -> Result<String, SpecError> {
         name,
         "a name of at most 100 letters, digits, '.', '_' and '-'",
     )
-}
-
-/// `1e7` or `10M`.
-pub fn steps(text: &str) -> Result<u64, SpecError> {
-    let steps = parse_number(text)
-        .filter(|_| !text.trim_end().ends_with('%'))
-        .filter(|n| n.fract() == 0.0 && (1.0..=MOST_STEPS as f64).contains(n));
-    let what = format_args!("a whole number from 1 to {MOST_STEPS:e}");
-    expected(steps, what).map(|steps| steps as u64)
-}
-
-/// A stage of the funnel whose error and time can be swept.
-pub fn stage(name: &str) -> Result<StageKind, SpecError> {
-    let swept = [StageKind::Region, StageKind::Occlusion, StageKind::Triangle];
-    choice("stage", &swept.map(|stage| (stage, stage.name(), "")))(name)
-}
-
-/// Columns and rows of an image, `320x180`.
-pub fn samples(text: &str) -> Result<SampleGrid, SpecError> {
-    const MOST: u32 = 16_384;
-    let side = |text: &str| text.trim().parse().ok().filter(|n| (1..=MOST).contains(n));
-    let sides = text.split_once(['x', 'X']);
-    let grid = sides.and_then(|(width, height)| Some(SampleGrid::new(side(width)?, side(height)?)));
-    let what = format_args!("columns x rows such as 320x180, each from 1 to {MOST}");
-    expected(grid, what)
-}
-
-pub fn kernel(name: &str) -> Result<Kernel, SpecError> {
-    let known = Kernel::ALL.map(|kernel| (kernel, kernel.name(), ""));
-    choice("kernel", &known)(name)
 }
 
 /// The value of that name, of a table of values, names and summaries.
