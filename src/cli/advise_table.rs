@@ -25,7 +25,8 @@ pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
     blocks.push(Block::line(""));
     let failed = advice.structure.rows.iter();
     let failed = failed.filter_map(|row| Some((row, row.reason.as_ref()?)));
-    let failed = failed.map(|(row, why)| format!("{}: {}: {why}", row.structure, row.status));
+    let failed =
+        failed.map(|(row, why)| format!("{}: {}: {why}", row.structure, row.status.name()));
     let threads = gains(&advice.threads).map(|gains| format!("Threads: {gains}"));
     let more = [in_motion(advice), threads].into_iter().flatten();
     let told = failed.chain([taken(advice)]);
