@@ -56,10 +56,10 @@ pub struct AdviseInput<'a> {
 }
 
 impl<'a> AdviseInput<'a> {
-    /// The queries; refuses a scene without items, a path without cameras, an unfit motion.
+    /// The queries of the path.
     ///
     /// # Errors
-    /// [`StudyError`].
+    /// A scene without items, a path without cameras, an unfit motion.
     pub fn workload(&self) -> Result<Workload<'a>, StudyError> {
         let (scene, path) = (self.scene, self.path);
         for (kind, name, things, count) in [

@@ -235,7 +235,7 @@ pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
     }
 }
 
-/// Basis of the times of a study, with the ratio of a thing that was measured twice.
+/// Basis of the times of a study, with the ratio of what was measured twice.
 pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     let count = counted(processes, "process");
     let twice = |twin: &Estimate| format!(" (measured twice: {} times as long)", within(*twin));
