@@ -218,14 +218,6 @@ impl Frame {
         }
     }
 
-    /// Largest deviation of u, v, n from an orthonormal basis.
-    pub fn orthogonality_error(&self) -> f64 {
-        let basis = DMat3::from_cols(self.u, self.v, self.n);
-        let gram = basis.transpose() * basis - DMat3::IDENTITY;
-        let errors = gram.to_cols_array().map(f64::abs);
-        errors.into_iter().fold(0.0, f64::max)
-    }
-
     /// One Newton step towards the nearest orthonormal frame (polar factor;
     /// Higham 1986, "Computing the polar decomposition", eq. 3.1 in its
     /// inverse-free form): X(3I - X^T X)/2.
@@ -243,6 +235,14 @@ mod tests {
     use super::*;
 
     impl Frame {
+        /// Largest deviation of u, v, n from an orthonormal basis.
+        pub fn orthogonality_error(&self) -> f64 {
+            let basis = DMat3::from_cols(self.u, self.v, self.n);
+            let gram = basis.transpose() * basis - DMat3::IDENTITY;
+            let errors = gram.to_cols_array().map(f64::abs);
+            errors.into_iter().fold(0.0, f64::max)
+        }
+
         /// This frame with the axes of another but its own pose as written.
         ///
         /// Wrong on purpose, for tests of what notices it.

@@ -121,7 +121,7 @@ impl Camera {
         let of_scene = around.reach.as_dvec3();
         let zero = [around.origin];
         let named = self.derive(&zero, options.method)?;
-        let margin = self.margin(&zero, of_scene, options)?;
+        let margin = self.margin(&zero, of_scene, options.epsilon, options.method)?;
         let moved = |name, plane: &Plane| margin.moved(name, plane, 0.0);
         let volume = gathered(&named, more, options.epsilon, of_scene, moved)?;
         check_sums(&volume, of_scene)?;
@@ -178,11 +178,7 @@ impl Camera {
             Vec3::ZERO if self.lens.far().is_some() => DVec3::ZERO,
             _ => reach + zero.abs(),
         };
-        let options = PlaneOptions {
-            epsilon,
-            ..PlaneOptions::default()
-        };
-        let margin = self.margin(&about, of_scene, &options)?;
+        let margin = self.margin(&about, of_scene, epsilon, PlaneMethod::Frame)?;
         let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
         let slack = of_eye + margin.reach.element_sum() * TINY;
         let moved = |name, plane: &Plane| margin.moved(name, plane, slack);
@@ -207,9 +203,8 @@ impl Camera {
         }
     }
 
-    fn margin(&self, zero: &[DVec3], of_scene: DVec3, options: &PlaneOptions) -> Result<Margin> {
+    fn margin(&self, zero: &[DVec3], of_scene: DVec3, c: f64, by: PlaneMethod) -> Result<Margin> {
         let frame = self.frame_about(zero);
-        let c = options.epsilon;
         let are_sound = (0.0..f64::INFINITY).contains(&c) && of_scene.cmpge(DVec3::ZERO).all();
         let found = format_args!("epsilon is {c} and reach {of_scene}");
         let rule = "numbers of at least 0, and a finite epsilon";
@@ -222,7 +217,7 @@ impl Camera {
                 Margin::of_matrix(matrix.corners_about(zero), frame.eye, of_scene, c)
             }
             _ => {
-                let of_frame = options.method == PlaneMethod::Frame;
+                let of_frame = by == PlaneMethod::Frame;
                 Margin::new(&frame, &self.lens, of_scene, c, of_frame)
             }
         })

@@ -40,11 +40,6 @@ fn origin_of(scene: &Scene, camera: &Camera) -> DVec3 {
     }
 }
 
-/// The eye of a camera about the origin of its view's triangles.
-fn eye(scene: &Scene, camera: &Camera) -> Eye {
-    Eye::of(camera, origin_of(scene, camera))
-}
-
 /// Clusters and the compared back ends over them.
 struct Built {
     clusters: Arc<Clusters>,
@@ -101,7 +96,7 @@ impl TriangleStage {
                 true => Selection::of_items(&built.clusters, items.iter().copied()),
                 false => Selection::all(&built.clusters),
             };
-            let eye = eye(world.scene, camera);
+            let eye = Eye::of(camera, origin_of(world.scene, camera));
             Faces {
                 truth: facing(&built.clusters, &eye, &given),
                 given,
@@ -221,7 +216,7 @@ mod tests {
             let camera = Camera { frame, lens };
             let wanted: usize = boxes.iter().map(|b| seen(b, eye)).sum();
             let surfaces = Surfaces::of_boxes_about(eye, boxes.iter());
-            let about_eye = super::eye(&scene, &camera);
+            let about_eye = Eye::of(&camera, super::origin_of(&scene, &camera));
             let clusters = Arc::new(Clusters::of(Arc::new(surfaces), MOST_TRIANGLES));
             let truth = facing(&clusters, &about_eye, &Selection::all(&clusters));
             assert_eq!(truth.triangles(), wanted, "{round} {boxes:?} {eye}");

@@ -82,10 +82,10 @@ impl<Q: QueryVolume> BoxTest for PlaneByPlane<'_, Q> {
         false
     }
     fn rejects(&self, node: &Aabb) -> bool {
-        Bits(self.0.mask()).any(|plane| self.0.excludes(plane, node))
+        Bits(self.0.mask().into()).any(|plane| self.0.excludes(plane, node))
     }
     fn accepts(&self, node: &Aabb) -> bool {
-        Bits(self.0.mask()).all(|plane| self.0.contains(plane, node))
+        Bits(self.0.mask().into()).all(|plane| self.0.contains(plane, node))
     }
     fn admits(&self, item: &Aabb) -> bool {
         self.0.admits(item, self.0.mask(), &mut NoRecorder)

@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use super::BuildError;
 use crate::geometry::{Aabb, LANES};
 use crate::kernel::prefetch;
-use crate::query::ItemId;
+use crate::query::{Bits, ItemId};
 
 /// Ids of all non-empty items, ascending, after a check of all bounds.
 ///
@@ -166,30 +166,8 @@ impl Dirty {
     /// Nodes of a word, ascending; none of a word that does not exist.
     #[inline(always)]
     pub fn of_word(&self, word: usize) -> impl DoubleEndedIterator<Item = usize> + use<> {
-        Ones(self.0.get(word).copied().unwrap_or(0)).map(move |bit| word * 64 + bit)
-    }
-}
-
-/// Indices of the bits of a word.
-struct Ones(u64);
-
-impl Iterator for Ones {
-    type Item = usize;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        let bit = (self.0 != 0).then(|| self.0.trailing_zeros() as usize)?;
-        self.0 &= self.0 - 1;
-        Some(bit)
-    }
-}
-
-impl DoubleEndedIterator for Ones {
-    #[inline(always)]
-    fn next_back(&mut self) -> Option<usize> {
-        let bit = self.0.checked_ilog2()? as usize;
-        self.0 &= !(1 << bit);
-        Some(bit)
+        let bits = Bits(self.0.get(word).copied().unwrap_or(0));
+        bits.map(move |bit| word * 64 + bit as usize)
     }
 }
 

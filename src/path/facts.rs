@@ -70,15 +70,13 @@ impl CameraFacts {
     /// The facts of both; matrices of the first.
     pub fn with(self, other: CameraFacts) -> CameraFacts {
         let both = |a, b| range([a, b].into_iter().flatten().flatten());
-        let fars = |facts: &CameraFacts| facts.far.map(|far| far.unwrap_or(f64::INFINITY));
-        let [least, most] = [fars(&self), fars(&other)];
-        let far = range([least, most].into_iter().flatten());
+        let fars = self.far.into_iter().chain(other.far);
         CameraFacts {
             fovy_deg: both(self.fovy_deg, other.fovy_deg),
             ortho_height: both(self.ortho_height, other.ortho_height),
             aspect: both(self.aspect, other.aspect),
             near: both(self.near, other.near),
-            far: finite(far),
+            far: finite(range(fars.map(|far| far.unwrap_or(f64::INFINITY)))),
             matrix: self.matrix,
         }
     }

@@ -96,7 +96,7 @@ fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<
             let is_beyond = has_ground && first.is_none();
             let stand = Stand {
                 eye: DVec3::new(column.x, column.y, ground + height),
-                rise: ground - column.foot(),
+                rise: ground - first.map_or(column.low, |span| span.bottom),
                 is_on_top: ground > first.map_or(column.low, |span| span.top),
             };
             ((is_off_mesh, is_beyond), stand)
@@ -211,11 +211,6 @@ impl Column {
             ground = ground.max(span.top);
         }
         ground
-    }
-
-    /// The bottom of the lowest item, or the floor; after [`Column::ground`].
-    fn foot(&self) -> f64 {
-        self.spans.first().map_or(self.low, |span| span.bottom)
     }
 }
 

@@ -63,7 +63,7 @@ pub trait Predicate: Sized + Sync {
         recorder: &mut R,
     ) -> (Containment, PlaneMask) {
         let mut undecided = mask;
-        for plane in Bits(mask) {
+        for plane in Bits(mask.into()) {
             recorder.planes_tested(Self::planes_open(1 << plane));
             if self.excludes(plane, bounds) {
                 return (Containment::Outside, mask);
@@ -85,7 +85,7 @@ pub trait Predicate: Sized + Sync {
     /// not tested.
     #[inline(always)]
     fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {
-        for plane in Bits(mask) {
+        for plane in Bits(mask.into()) {
             recorder.planes_tested(Self::planes_open(1 << plane));
             if self.drops(plane, item) {
                 return false;
@@ -207,19 +207,25 @@ impl Predicate for RelativeVolume {
 }
 
 /// The bits that are set, lowest first.
-pub(crate) struct Bits(pub PlaneMask);
+pub(crate) struct Bits(pub u64);
 
 impl Iterator for Bits {
     type Item = u32;
 
     #[inline(always)]
     fn next(&mut self) -> Option<u32> {
-        if self.0 == 0 {
-            return None;
-        }
-        let index = self.0.trailing_zeros();
+        let bit = (self.0 != 0).then(|| self.0.trailing_zeros())?;
         self.0 &= self.0 - 1;
-        Some(index)
+        Some(bit)
+    }
+}
+
+impl DoubleEndedIterator for Bits {
+    #[inline(always)]
+    fn next_back(&mut self) -> Option<u32> {
+        let bit = self.0.checked_ilog2()?;
+        self.0 &= !(1 << bit);
+        Some(bit)
     }
 }
 

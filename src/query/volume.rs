@@ -216,7 +216,7 @@ impl QueryVolume for ConvexVolume {
         block.sorted_by(isa, self, mask)
     }
     fn rows(&self) -> Option<PlaneRows> {
-        PlaneRows::collect(Bits(self.mask()).map(|plane| self.plane_of_bit(plane)))
+        PlaneRows::collect(Bits(self.mask().into()).map(|plane| self.plane_of_bit(plane)))
     }
 }
 
@@ -264,7 +264,7 @@ impl QueryVolume for ConvexVolumeF64 {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         let planes =
-            Bits(mask).map(|plane| (self.plane_of_bit(plane), self.p_vertex_of_bit(plane)));
+            Bits(mask.into()).map(|plane| (self.plane_of_bit(plane), self.p_vertex_of_bit(plane)));
         block.admitted_by_wide(planes)
     }
 }
@@ -383,7 +383,7 @@ mod tests {
     fn check<V: QueryVolume>(view: &V, items: &[Aabb]) -> Result<(), TestCaseError> {
         let node = Aabb::union_of(items);
         let mask = view.mask();
-        for plane in Bits(mask) {
+        for plane in Bits(mask.into()) {
             for item in items {
                 prop_assert!(!view.excludes(plane, &node) || view.drops(plane, item));
                 prop_assert!(!view.contains(plane, &node) || !view.drops(plane, item));

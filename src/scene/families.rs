@@ -22,12 +22,16 @@ pub fn uniform(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let side = spec.number_between("side", 1000.0, 0.0, f64::INFINITY)?;
     let fitting = 0.2 * side / libm::cbrt(n.max(1) as f64);
     let size = spec.number_between("size", fitting, 0.0, f64::INFINITY)?;
+    Ok(scattered(n, rng, DVec3::splat(side), size))
+}
+
+/// Boxes of this mean edge whose centres lie anywhere in a block.
+fn scattered(n: usize, rng: &mut SeededRng, block: DVec3, size: f64) -> Vec<WorldBox> {
     let boxes = (0..n).map(|_| {
-        let centre = rng.point() * side;
-        let edges = (rng.point() + 0.5) * size;
-        WorldBox::around(centre, edges)
+        let centre = rng.point() * block;
+        WorldBox::around(centre, (rng.point() + 0.5) * size)
     });
-    Ok(boxes.collect())
+    boxes.collect()
 }
 
 /// Gaussian clusters of uneven weight: dense spots in mostly empty space, as in
@@ -259,11 +263,7 @@ pub fn corridor(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let length = spec.number_between("length", 1000.0 * width, 0.0, f64::INFINITY)?;
     let block = DVec3::new(length, width, width);
     let size = 0.2 * libm::cbrt(length / n.max(1) as f64 * width * width);
-    let boxes = (0..n).map(|_| {
-        let centre = rng.point() * block;
-        WorldBox::around(centre, (rng.point() + 0.5) * size)
-    });
-    Ok(boxes.collect())
+    Ok(scattered(n, rng, block, size))
 }
 
 /// Rectangles of the plane z = 0 that tile a square.

@@ -136,13 +136,6 @@ impl Scene {
         (0..count).filter(|&id| self.holds(id, p.world)).collect()
     }
 
-    /// Reference answer of a search by a box: an exact test of every item. Ascending
-    /// ids.
-    pub fn overlapping(&self, sought: &SoughtBox) -> Vec<ItemId> {
-        let all = 0..self.items.len() as ItemId;
-        all.filter(|&id| self.overlaps(id, &sought.world)).collect()
-    }
-
     /// Tests whether a region that is a box holds a point of the world.
     fn holds(&self, id: ItemId, p: DVec3) -> bool {
         let boxes = self.regions.boxes(&self.items);
@@ -262,7 +255,9 @@ mod tests {
         let found = |min: f64, max: f64| {
             let by = WorldBox::new(DVec3::splat(min), DVec3::splat(max));
             let sought = scene.sought_box(by);
-            let found = scene.overlapping(&sought).len();
+            let mut found = vec![0];
+            scene.refine_overlapping(&sought, &mut found);
+            let found = found.len();
             // What the planes admit may be too much, never too little.
             assert!(scene.items.iter().filter(|b| sought.volume.sees(b)).count() >= found);
             found

@@ -101,7 +101,9 @@ fn every_structure_finds_what_overlaps_a_box_as_written() {
             };
             let wanted = boxes.iter().zip(0..).filter(|(b, _)| overlaps(b));
             let wanted: Vec<ItemId> = wanted.map(|(_, id)| id).collect();
-            assert_eq!(scene.overlapping(&sought), wanted);
+            let mut all: Vec<ItemId> = (0..boxes.len() as ItemId).collect();
+            scene.refine_overlapping(&sought, &mut all);
+            assert_eq!(all, wanted);
             visible += wanted.len();
             for index in &indexes {
                 let mut found = Vec::new();

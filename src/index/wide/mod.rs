@@ -270,7 +270,7 @@ impl Wide {
     // Not inlined, so that the loops of a query keep their registers.
     #[inline(never)]
     fn root_verdict<Q: QueryVolume>(&self, volume: &Q) -> Containment {
-        let open = Bits(volume.mask()).find(|&plane| !volume.contains(plane, &self.root));
+        let open = Bits(volume.mask().into()).find(|&plane| !volume.contains(plane, &self.root));
         match open {
             _ if self.vacant == self.ids.len() => Containment::Outside,
             None => Containment::Inside,

@@ -3,26 +3,21 @@
 use crate::input::{InputError, Result};
 use crate::scene::records::Table;
 
-/// Names and sizes of the records of the lumps, in their order.
-const LUMPS: [(&str, usize); 17] = [
-    ("entities", 1),
-    ("shaders", 72),
-    ("planes", 16),
-    ("nodes", 36),
-    ("leafs", 48),
-    ("leafsurfaces", 4),
-    ("leafbrushes", 4),
-    ("models", 40),
-    ("brushes", 12),
-    ("brushsides", 8),
-    ("drawverts", 44),
-    ("drawindexes", 4),
-    ("fogs", 72),
-    ("surfaces", 104),
-    ("lightmaps", 1),
-    ("lightgrid", 1),
-    ("visibility", 1),
+/// Numbers, names and sizes of the records of the lumps that are read.
+const LUMPS: [(usize, &str, usize); 11] = [
+    (0, "entities", 1),
+    (1, "shaders", 72),
+    (2, "planes", 16),
+    (3, "nodes", 36),
+    (4, "leafs", 48),
+    (8, "brushes", 12),
+    (9, "brushsides", 8),
+    (10, "drawverts", 44),
+    (11, "drawindexes", 4),
+    (13, "surfaces", 104),
+    (16, "visibility", 1),
 ];
+
 /// Formats of other engines, by magic and version.
 const OTHERS: [(&[u8], &str); 7] = [
     (b"IBSP\x26", "Quake II"),
@@ -39,7 +34,8 @@ const OTHERS: [(&[u8], &str); 7] = [
 /// # Errors
 /// Another format, a lump beyond the file or one that is no whole number of records.
 pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'a>> {
-    let (name, record) = LUMPS[number];
+    let row = LUMPS.iter().find(|row| row.0 == number);
+    let &(_, name, record) = row.expect("a lump that is read");
     if !bytes.starts_with(b"IBSP\x2e\0\0\0") {
         let other = OTHERS.iter().find(|other| bytes.starts_with(other.0));
         let start = bytes.get(..8).unwrap_or(bytes).escape_ascii();

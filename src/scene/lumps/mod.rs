@@ -78,7 +78,15 @@ impl<'a> Wad<'a> {
             let found = format!("'{}'", magic.escape_ascii());
             return Err(wad.error(0, found, "the magic IWAD or PWAD"));
         }
-        let [count, directory] = wad.header()?;
+        if bytes.len() < 12 {
+            return Err(wad.error(bytes.len(), "the end of the file", "a 12 byte header"));
+        }
+        let int = |at: usize| {
+            let value = int_at(bytes, at);
+            let expected = "a count or offset of at least 0";
+            usize::try_from(value).map_err(|_| wad.error(at, value.to_string(), expected))
+        };
+        let (count, directory) = (int(4)?, int(8)?);
         for i in 0..count {
             let at = directory + i * 16;
             let Some(entry) = bytes.get(at..at + 16) else {
@@ -203,19 +211,6 @@ impl<'a> Wad<'a> {
             sectors: table("SECTORS", 26)?,
             reject: table("REJECT", 1)?.data,
         })
-    }
-
-    /// The number of lumps and the offset of the directory.
-    fn header(&self) -> Result<[usize; 2]> {
-        if self.bytes.len() < 12 {
-            return Err(self.error(self.bytes.len(), "the end of the file", "a 12 byte header"));
-        }
-        let int = |at: usize| {
-            let value = int_at(self.bytes, at);
-            let expected = "a count or offset of at least 0";
-            usize::try_from(value).map_err(|_| self.error(at, value.to_string(), expected))
-        };
-        Ok([int(4)?, int(8)?])
     }
 
     fn error(&self, offset: usize, found: impl Display, expected: impl Display) -> InputError {

@@ -85,11 +85,6 @@ pub fn terrain(triangles: usize, seed: u64) -> Surfaces {
     surfaces
 }
 
-/// A place on the ground.
-pub fn on_ground(ground: &Ground, x: f64, y: f64) -> Vec3 {
-    DVec3::new(x, y, ground.altitude(x, y)).as_vec3()
-}
-
 /// Share of the triangles that are ground.
 const GROUND: f64 = 0.3;
 /// Share of the plants that are trees.
@@ -108,7 +103,7 @@ pub fn forest(triangles: usize, seed: u64) -> Surfaces {
     while surfaces.triangles.len() < triangles {
         let width = ground.width();
         let (x, y) = (rng.unit() * width, rng.unit() * width);
-        let base = on_ground(&ground, x, y);
+        let base = DVec3::new(x, y, ground.altitude(x, y)).as_vec3();
         let (kind, shape) = match rng.unit() < TREES {
             true => (SurfaceKind::Opaque, tree(base, &mut rng)),
             false => (SurfaceKind::CutOut, bush(base, &mut rng)),

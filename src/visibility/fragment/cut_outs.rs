@@ -64,10 +64,8 @@ pub struct Holes {
 impl Holes {
     /// The cut-outs among some of the items, renumbered in this order.
     pub fn some(&self, items: &[ItemId]) -> Holes {
-        let of_item = items.iter().map(|&item| self.of(item).copied());
-        Holes {
-            of_item: of_item.collect(),
-        }
+        let of_item = items.iter().map(|&item| self.of(item).copied()).collect();
+        Holes { of_item }
     }
 
     /// Number of cut-outs.
@@ -158,13 +156,10 @@ impl CutOuts {
     pub fn holes(&self, items: usize, may_be: impl Fn(ItemId) -> bool) -> Holes {
         let mut rng = SeededRng::new(self.seed);
         let CutOuts { mask, tile, .. } = *self;
-        let is_cut = |item| rng.unit() < self.share && may_be(item);
-        let all = (0..items as ItemId).map(is_cut);
-        Holes {
-            of_item: all
-                .map(|cut| cut.then_some(Surface { mask, tile }))
-                .collect(),
-        }
+        let mut is_cut = |item| rng.unit() < self.share && may_be(item);
+        let surface = |item| is_cut(item).then_some(Surface { mask, tile });
+        let of_item = (0..items as ItemId).map(surface).collect();
+        Holes { of_item }
     }
 }
 

@@ -133,12 +133,6 @@ impl OccluderScene {
         ((id as usize) < self.items).then_some(id)
     }
 
-    /// The blocks of a level; level 0 holds the items.
-    #[inline(always)]
-    pub fn level(&self, level: usize) -> &[BoxBlock] {
-        &self.levels[level]
-    }
-
     /// The lanes of a block that hold a box.
     #[inline(always)]
     pub fn lanes(&self, level: usize, block: usize) -> LaneMask {

@@ -36,16 +36,6 @@ impl Ground for Boxes {
     }
 }
 
-/// Tests for an item strictly within one box: it closes no border.
-fn is_within_one(boxes: &BoxGrid, item: &WorldBox) -> bool {
-    let mut within = false;
-    boxes.meeting(item, |id| {
-        let b = &boxes.boxes[id as usize];
-        within |= b.min.cmplt(item.min).all() && item.max.cmplt(b.max).all();
-    });
-    within
-}
-
 impl RegionGraph {
     /// Regions that are boxes themselves.
     pub fn of_boxes(boxes: Vec<WorldBox>, openings: Vec<Opening>) -> RegionGraph {
@@ -77,11 +67,19 @@ impl RegionGraph {
         Some(graph)
     }
 
-    /// Tests, by item, for a possible border between regions; furniture is none.
+    /// Tests, by item, for a possible border between regions; furniture, which is
+    /// strictly within one box, is none.
     pub fn borders(&self, scene: &Scene) -> Vec<bool> {
         let boxes = BoxGrid::new(self.parts.concat());
-        let closes = |item: &Aabb| !is_within_one(&boxes, &WorldBox::of(item, scene.origin));
-        scene.items.iter().map(closes).collect()
+        let is_border = |item: &Aabb| {
+            let (item, mut is_within) = (WorldBox::of(item, scene.origin), false);
+            boxes.meeting(&item, |id| {
+                let b = &boxes.boxes[id as usize];
+                is_within |= b.min.cmplt(item.min).all() && item.max.cmplt(b.max).all();
+            });
+            !is_within
+        };
+        scene.items.iter().map(is_border).collect()
     }
 
     /// The rooms of a tiling about an origin.

@@ -1,5 +1,7 @@
 //! Ids of regions, and sets of ids.
 
+use crate::query::Bits;
+
 /// Id of a region: its index in the graph.
 pub type RegionId = u32;
 
@@ -33,11 +35,7 @@ impl IdSet {
     pub fn list(&self, out: &mut Vec<u32>) {
         out.clear();
         for (first, &word) in (0u32..).step_by(64).zip(&self.words) {
-            let mut rest = word;
-            while rest != 0 {
-                out.push(first + rest.trailing_zeros());
-                rest &= rest - 1;
-            }
+            out.extend(Bits(word).map(|bit| first + bit));
         }
     }
 }

@@ -10,6 +10,7 @@ mod per_triangle;
 use std::sync::Arc;
 
 use crate::kernel::{Kernel, LANES};
+use crate::query::Bits;
 use crate::visibility::{Guarantee, Row};
 
 pub use clusters::{Clusters, MOST_TRIANGLES};
@@ -98,11 +99,8 @@ impl Selection {
     #[inline(always)]
     pub fn retain(&mut self, mut keep: impl FnMut(usize, usize) -> bool) {
         for (cluster, word) in self.words_mut().iter_mut().enumerate() {
-            let mut left = *word;
-            while left != 0 {
-                let bit = left.trailing_zeros() as usize;
-                left &= left - 1;
-                if !keep(cluster, bit) {
+            for bit in Bits(*word) {
+                if !keep(cluster, bit as usize) {
                     *word &= !(1 << bit);
                 }
             }

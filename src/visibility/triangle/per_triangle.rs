@@ -16,6 +16,7 @@ use super::exact::{Eye, normal};
 use super::{Selection, TriangleCull, facing};
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
+use crate::query::Bits;
 
 /// Error per unit of the way: see above.
 const ERROR: f32 = 8.0 / (1u32 << 24) as f32;
@@ -133,14 +134,9 @@ impl Work for Query<'_> {
 
 /// Those of some triangles of a cluster that the eye is in front of.
 #[cold]
-fn in_doubt(clusters: &Clusters, cluster: usize, mut left: u64, eye: &Eye) -> u64 {
-    let mut front = 0;
-    while left != 0 {
-        let bit = left.trailing_zeros();
-        left &= left - 1;
-        front |= u64::from(clusters.is_seen(eye, cluster, bit as usize)) << bit;
-    }
-    front
+fn in_doubt(clusters: &Clusters, cluster: usize, left: u64, eye: &Eye) -> u64 {
+    let is_seen = |bit: u32| u64::from(clusters.is_seen(eye, cluster, bit as usize)) << bit;
+    Bits(left).fold(0, |front, bit| front | is_seen(bit))
 }
 
 /// The eye in all lanes.

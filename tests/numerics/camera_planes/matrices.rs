@@ -102,7 +102,9 @@ fn an_up_vector_nearly_along_the_view_neither_tilts_the_view_nor_loses_u() {
                 (frame.u() - u).length(),
                 (frame.v() - n.cross(u)).length(),
                 (frame.n() - n).length(),
-                frame.orthogonality_error(),
+                frame.u().dot(frame.v()).abs(),
+                frame.v().dot(frame.n()).abs(),
+                frame.n().dot(frame.u()).abs(),
             ];
             assert!(
                 wrong.iter().all(|&w| w < 1e-14),

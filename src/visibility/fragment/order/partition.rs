@@ -230,13 +230,10 @@ impl Partition {
         };
         let parts = all.chunk_by(|a, b| a.item == b.item).map(|parts| {
             let corners = parts.iter().flat_map(|part| &part.polygon);
-            let corners = corners.map(|&p| p + self.origin);
-            let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |bounds, p| {
-                (bounds.0.min(p), bounds.1.max(p))
-            });
+            let corners = corners.map(|&p| WorldBox::at(p + self.origin));
             Held {
                 item: parts[0].item,
-                bounds: WorldBox::new(min, max),
+                bounds: WorldBox::union_of(corners),
                 part: Some(Part::InLeaf(leaf)),
                 is_behind_all: all.len() <= MOST_COMPARED && parts.iter().all(is_before),
             }
