@@ -217,10 +217,8 @@ impl Camera {
     pub fn of_matrix(entries: [[f64; 4]; 4], convention: MatrixConvention) -> Result<Camera> {
         let matrix = ViewProjection::new(entries, convention)?;
         let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
-        let forward = match matrix.is_parallel {
-            true => matrix.axis().map_or(forward, |[_, ahead]| ahead),
-            false => forward,
-        };
+        let axis = matrix.is_parallel.then(|| matrix.axis()).flatten();
+        let forward = axis.map_or(forward, |[_, ahead]| ahead);
         let eye = matrix.eye;
         // Visibility does not depend on the camera basis, so any up vector will do.
         let with = |up: DVec3| Pose::Forward { eye, forward, up }.frame();

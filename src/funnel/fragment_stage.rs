@@ -331,7 +331,7 @@ pub fn mirrored(
     let (mut views, mut marked, mut shown, mut wrong) = (0, 0, 0, 0);
     for view in world.views() {
         let rays = world.rays(view);
-        let Some(face) = face_towards(rays.camera(), own, axis) else {
+        let Some(face) = face_towards(&rays.camera, own, axis) else {
             with.push(Default::default());
             without.push(Default::default());
             continue;

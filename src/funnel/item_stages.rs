@@ -217,7 +217,7 @@ impl PlanView {
         let items = (0..).take(world.scene.items.len());
         let fates = items.map(|item| fate(item, &left, is_visible(item)));
         PlanView {
-            camera: Some(*view.rays.camera()),
+            camera: Some(view.rays.camera),
             fates: fates.collect(),
         }
     }

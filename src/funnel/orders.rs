@@ -101,7 +101,7 @@ impl Left {
     }
 
     fn sort(&self, order: usize, pieces: &mut Vec<Piece>) {
-        self.orders[order].1.order(self.rays.camera(), pieces);
+        self.orders[order].1.order(&self.rays.camera, pieces);
     }
 }
 
@@ -155,7 +155,7 @@ impl Orders {
                 rows.iter_mut().zip(&left.orders).zip(counts)
             {
                 row.add(&tally, &errors?, self.views.len() as f64);
-                if let Some(reason) = order.exception(left.rays.camera()) {
+                if let Some(reason) = order.exception(&left.rays.camera) {
                     *row.exceptions.entry(reason).or_default() += 1;
                 }
             }

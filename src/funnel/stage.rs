@@ -195,14 +195,19 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
 
 fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> impl Iterator<Item = BackEnd> {
     let (exact, unproven) = (Guarantee::SampleExact, Guarantee::Unproven);
-    let (z, of_z) = match has_cut_outs {
-        true => ("the nearest fragment, holes or not", unproven),
-        false => ("the nearest fragment of each sample, exactly", exact),
-    };
     let beyond = "the same, but beyond the eye's room only at samples that see its portals";
     let has_rooms = matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty());
     let rows = [
-        (true, [Z, z], of_z),
+        (
+            !has_cut_outs,
+            [Z, "the nearest fragment of each sample, exactly"],
+            exact,
+        ),
+        (
+            has_cut_outs,
+            [Z, "the nearest fragment, holes or not"],
+            unproven,
+        ),
         (has_cut_outs, [ALPHA, "the nearest opaque fragment"], exact),
         (has_rooms, [STENCIL, beyond], exact),
     ];

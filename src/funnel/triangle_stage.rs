@@ -86,7 +86,7 @@ impl TriangleStage {
         };
         let views = world.views().map(|view| {
             let items = world.listed(stages.items(steps, view));
-            let camera = world.rays(view).camera();
+            let camera = &world.rays(view).camera;
             let built = whole.clone().unwrap_or_else(|solids| {
                 let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
                 let origin = origin_of(world.scene, camera);

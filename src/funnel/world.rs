@@ -280,7 +280,7 @@ fn views(input: &FunnelInput) -> Result<Vec<View>, StudyError> {
         };
         let rays = Rays::of(&all[index]).map_err(refused)?;
         // Planes and rays of the same numbers, also where a matrix has others.
-        let volume = rays.camera().volume(&PlaneOptions::default(), &around);
+        let volume = rays.camera.volume(&PlaneOptions::default(), &around);
         let volume = volume.map_err(refused)?;
         Ok(View {
             camera: index,

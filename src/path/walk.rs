@@ -55,10 +55,8 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
         let next = lengths.partition_point(|&l| l <= length).min(way.len() - 1);
         let from = next.saturating_sub(1);
         let step = lengths[next] - lengths[from];
-        let share = match step > 0.0 {
-            true => (length - lengths[from]) / step,
-            false => 0.0,
-        };
+        // No number where both are one point: either will do.
+        let share = (length - lengths[from]) / step;
         way[from].lerp(way[next], share.min(1.0))
     };
     // Towards the point that is a few steps ahead.

@@ -54,10 +54,14 @@ impl Ray {
 
 /// All rays of a camera.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Rays {
-    camera: Camera,
-    /// Left, right, bottom, top: slopes, or offsets of an orthographic lens.
-    window: [f64; 4],
+    /// The camera that they are of, with an eye and a lens.
+    pub camera: Camera,
+    /// Left, right, bottom and top of the image.
+    ///
+    /// Slopes per unit of depth, or offsets of an orthographic lens, world units.
+    pub window: [f64; 4],
 }
 
 impl Rays {
@@ -69,17 +73,6 @@ impl Rays {
         let camera = camera.unprojected()?;
         let window = camera.lens.window();
         Ok(Rays { camera, window })
-    }
-
-    /// The camera that they are of, with an eye and a lens.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
-    /// Left, right, bottom and top of the image: slopes per unit of depth, or
-    /// offsets of an orthographic lens, world units.
-    pub fn window(&self) -> [f64; 4] {
-        self.window
     }
 
     /// The ray through a place in the image: (0, 0) is its upper left corner,

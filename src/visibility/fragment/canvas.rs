@@ -60,12 +60,12 @@ pub struct Screen {
 impl Screen {
     /// The image of a camera.
     pub fn of(rays: &Rays, grid: SampleGrid) -> Screen {
-        let camera = rays.camera();
+        let camera = &rays.camera;
         let (frame, lens) = (&camera.frame, &camera.lens);
         let (near, far) = (lens.near(), lens.far().unwrap_or(f64::INFINITY));
         Screen {
             grid,
-            window: rays.window(),
+            window: rays.window,
             eye: frame.eye,
             axes: [frame.u(), frame.v(), frame.forward()],
             near: near - near.abs() * 1e-9,

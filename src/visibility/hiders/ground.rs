@@ -113,13 +113,13 @@ impl Ground {
     /// From above all of it hills hide little, and boxes all over the image displace other
     /// occluders.
     pub fn rises_above(&self, rays: &Rays) -> bool {
-        let eye = self.up.to_z_up(rays.camera().frame.eye).z - self.origin.z;
+        let eye = self.up.to_z_up(rays.camera.frame.eye).z - self.origin.z;
         eye < f64::from(self.bounds.max.z)
     }
 
     /// Returns `true` if all rays are above the ground at the near plane. O(t).
     pub fn is_below(&self, rays: &Rays) -> bool {
-        let camera = rays.camera();
+        let camera = &rays.camera;
         let near = match camera.lens.is_orthographic() {
             true => camera.lens.near(),
             false => camera.lens.near().max(0.0),

@@ -130,10 +130,10 @@ impl<'v> View<'v> {
         scene: &OccluderScene,
         grid: SampleGrid,
     ) -> View<'v> {
-        let camera = rays.camera();
+        let camera = &rays.camera;
         let frame = &camera.frame;
         let parallel = camera.lens.is_orthographic();
-        let [left, right, bottom, top] = rays.window();
+        let [left, right, bottom, top] = rays.window;
         let (width, height) = (f64::from(grid.width), f64::from(grid.height));
         let (u, v, forward) = (frame.u(), frame.v(), frame.forward());
         let corner = u * left + v * top;
@@ -209,8 +209,8 @@ pub const MARGIN: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// The bounds of the pyramid from the eye to the near window, moved outward.
 fn before_near(rays: &Rays, near: f64, eye: DVec3, far_from_zero: f64) -> [DVec3; 2] {
-    let frame = &rays.camera().frame;
-    let [left, right, bottom, top] = rays.window();
+    let frame = &rays.camera.frame;
+    let [left, right, bottom, top] = rays.window;
     let (mut low, mut high) = (eye, eye);
     for (x, y) in [(left, bottom), (right, bottom), (left, top), (right, top)] {
         let corner = eye + (frame.u() * x + frame.v() * y + frame.forward()) * near;
@@ -242,8 +242,8 @@ impl Projection {
         grid: SampleGrid,
         parallel: bool,
     ) -> Projection {
-        let frame = &rays.camera().frame;
-        let [left, right, bottom, top] = rays.window();
+        let frame = &rays.camera.frame;
+        let [left, right, bottom, top] = rays.window;
         let (width, height) = (f64::from(grid.width), f64::from(grid.height));
         let (per_x, per_y) = (width / (right - left), height / (bottom - top));
         let (u, v, f) = (frame.u(), frame.v(), frame.forward());
@@ -257,7 +257,7 @@ impl Projection {
         let local = eye.as_vec3();
         let rest = (eye - local.as_dvec3()).as_vec3();
         let u_f64 = f64::from(U);
-        let base = rays.camera().lens.far().unwrap_or(0.0);
+        let base = rays.camera.lens.far().unwrap_or(0.0);
         // 10 u: derived in `rect`.
         let factor = |row: DVec3, size: f64| match parallel {
             true => (10.0 * u_f64 * row.length()) as f32,

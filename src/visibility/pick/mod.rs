@@ -135,8 +135,8 @@ impl CursorRectangle {
     /// # Errors
     /// An empty rectangle; one that f64 cannot tell from a point.
     pub fn camera(&self, rays: &Rays) -> Result<Camera, CameraError> {
-        let camera = rays.camera();
-        let [left, right, bottom, top] = rays.window();
+        let camera = &rays.camera;
+        let [left, right, bottom, top] = rays.window;
         let across = |x: f64| left + (right - left) * x;
         let up = |y: f64| top + (bottom - top) * y;
         let ([left, top], [right, bottom]) = (self.min, self.max);

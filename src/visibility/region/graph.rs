@@ -78,11 +78,11 @@ impl RegionGraph {
     /// the lens is orthographic.
     pub fn homes(&self, rays: &Rays, homes: &mut Vec<RegionId>) -> bool {
         homes.clear();
-        let lens = &rays.camera().lens;
+        let lens = &rays.camera.lens;
         if lens.is_orthographic() {
             return false;
         }
-        let eye = rays.camera().frame.eye;
+        let eye = rays.camera.frame.eye;
         let (mut low, mut high) = (eye, eye);
         for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
             let corner = rays.through(x, y).at(lens.near());

@@ -23,7 +23,7 @@ mod view;
 pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
 pub use id_set::{IdSet, RegionId};
 pub use locate::{RegionItems, without};
-pub use row::{BACK_ENDS, BackEnd, Pvs, PvsError, RegionRow, Scratch, Source};
+pub use row::{BACK_ENDS, BackEnd, Pvs, RegionRow, Scratch, Source};
 
 #[cfg(test)]
 pub use tests::leads_through;

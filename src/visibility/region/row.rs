@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::graph::RegionGraph;
 use super::id_set::{IdSet, RegionId};
 use super::search::{Flood, PortalClip, PortalRect, Search};
+use crate::input::{InputError, Result};
 use crate::json::from_json;
 use crate::kernel::extend;
 use crate::scene::{Regions, Scene};
@@ -23,11 +24,6 @@ pub struct Pvs {
     /// Ascending.
     rows: Box<[Box<[RegionId]>]>,
 }
-
-/// Reason for which bytes are no potentially visible set, in a line.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct PvsError(String);
 
 const FORM: &str = "{\"regions\": COUNT, \"sees\": [[FROM, TO], ...]}";
 
@@ -61,21 +57,24 @@ impl Pvs {
     ///
     /// # Errors
     /// Other JSON, or a region that is not there.
-    pub fn from_json(text: impl AsRef<[u8]>) -> Result<Pvs, PvsError> {
+    pub fn from_json(text: impl AsRef<[u8]>) -> Result<Pvs> {
         let written: Written = from_json(text.as_ref()).map_err(|error| {
             let (place, expected) = (error.place(), error.expected_of(FORM));
-            PvsError(format!("{place}: {}; expected {expected}", error.found))
+            InputError::new(format_args!(
+                "{place}: {}; expected {expected}",
+                error.found
+            ))
         })?;
         let regions = written.regions;
         if regions > MOST_REGIONS {
-            let message = format!("{regions} regions; expected at most {MOST_REGIONS}");
-            return Err(PvsError(message));
+            let found = format_args!("{regions} regions; expected at most {MOST_REGIONS}");
+            return Err(InputError::new(found));
         }
         let mut rows = vec![Vec::new(); regions];
         for (pair, [from, to]) in written.sees.into_iter().enumerate() {
             let region = from.max(to);
             if region as usize >= regions {
-                return Err(PvsError(format!(
+                return Err(InputError::new(format_args!(
                     "pair {pair}: region {region} is out of range; expected less than {regions}"
                 )));
             }

@@ -75,9 +75,9 @@ pub struct Polygon {
 impl View {
     /// The half-spaces of a camera whose rays share an eye: not orthographic.
     pub fn of(rays: &Rays) -> View {
-        let camera = rays.camera();
+        let camera = &rays.camera;
         let frame = &camera.frame;
-        let window @ [left, right, bottom, top] = rays.window();
+        let window @ [left, right, bottom, top] = rays.window;
         let side = |number: u32, x: f64, y: f64, z: f64| HalfSpace {
             normal: DVec3::new(x, y, z),
             bound: size(DVec3::new(x, y, z)),
