@@ -44,11 +44,7 @@ pub struct LeftOutRow {
 }
 
 impl LeftOutRow {
-    pub(super) fn new(
-        section: &'static str,
-        name: &'static str,
-        reason: impl ToString,
-    ) -> LeftOutRow {
+    pub(super) fn new([section, name]: [&'static str; 2], reason: impl ToString) -> LeftOutRow {
         LeftOutRow {
             section,
             name,

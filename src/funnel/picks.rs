@@ -149,7 +149,7 @@ impl<'w> Picks<'w> {
             let pick: Rc<dyn Pick> = match pick {
                 Ok(pick) => pick,
                 Err(reason) => {
-                    (self.left_out).push(LeftOutRow::new("picks", row.name, reason));
+                    (self.left_out).push(LeftOutRow::new(["picks", row.name], reason));
                     continue;
                 }
             };
@@ -265,7 +265,7 @@ impl<'w> Picks<'w> {
 fn too_many(bodies: usize, one: &str, when: &str) -> LeftOutRow {
     let (found, most) = (counted(bodies, one), count(MOST_FOR_LOOP));
     let reason = format!("{found} to test {when}; expected at most {most}");
-    LeftOutRow::new("picks", "linear", reason)
+    LeftOutRow::new(["picks", "linear"], reason)
 }
 
 fn nearest(pick: &dyn Pick, ray: &Ray, count: usize) -> Vec<ItemId> {

@@ -191,22 +191,22 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
     rows.extend(tested.iter().map(|tested| study.test_row(tested)));
     let mut left_out = Vec::from_iter(left_out_of(input.scene));
     if let Some(reason) = &study.fragments.too_much {
-        left_out.push(LeftOutRow::new("stages", "fragment", reason));
+        left_out.push(LeftOutRow::new(["stages", "fragment"], reason));
         let orders = (input.all || input.sorted).then_some("orders");
-        left_out.extend(orders.map(|orders| LeftOutRow::new(orders, "all", reason)));
+        left_out.extend(orders.map(|orders| LeftOutRow::new([orders, "all"], reason)));
     }
     let mirror = input.mirror.map_or(Ok(None), |item| {
         mirrored(item, &world, &study.items, &study.steps)
     });
     let mirror = mirror.unwrap_or_else(|reason| {
-        left_out.push(LeftOutRow::new("mirror", "all", reason));
+        left_out.push(LeftOutRow::new(["mirror", "all"], reason));
         None
     });
     let mut orders = Vec::new();
     if let Some(all) = &study.orders {
         begin("every order, drawn");
         orders = all.drawn().unwrap_or_else(|reason| {
-            left_out.push(LeftOutRow::new("orders", "all", reason));
+            left_out.push(LeftOutRow::new(["orders", "all"], reason));
             Vec::new()
         });
     }
@@ -216,7 +216,10 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
         picks = all.compared();
         left_out.extend_from_slice(&all.left_out);
     } else if input.all {
-        left_out.push(LeftOutRow::new("picks", "all", "not asked for: --no-picks"));
+        left_out.push(LeftOutRow::new(
+            ["picks", "all"],
+            "not asked for: --no-picks",
+        ));
     }
     let z = tested.iter().find(|tested| tested.back_end.name == Z);
     let tallies = z.iter().flat_map(|z| &z.tallies);

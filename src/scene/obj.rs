@@ -149,22 +149,14 @@ impl Obj<'_> {
                 self.points.push(point.into());
             }
             b"f" => {
-                let mut corners = words.map(|word| self.corner(word, number));
-                let two = [corners.next(), corners.next()];
-                let [Some(first), Some(second)] = two else {
-                    let found = counted(two.iter().flatten().count(), "corner");
+                let corners = words.map(|word| self.corner(word, number));
+                let corners: Vec<u32> = corners.collect::<Result<_>>()?;
+                if corners.len() < 3 {
+                    let found = counted(corners.len(), "corner");
                     return Err(self.error(number, found, "three or more"));
-                };
-                let (first, mut last) = (first?, second?);
-                let fan = corners.map(|next| {
-                    let next = next?;
-                    Ok([first, std::mem::replace(&mut last, next), next])
-                });
-                let fan: Vec<[u32; 3]> = fan.collect::<Result<_>>()?;
-                if fan.is_empty() {
-                    return Err(self.error(number, "2 corners", "three or more"));
                 }
-                self.corners.extend(fan);
+                let rim = corners[1..].windows(2);
+                (self.corners).extend(rim.map(|pair| [corners[0], pair[0], pair[1]]));
             }
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;

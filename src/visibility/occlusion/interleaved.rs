@@ -76,12 +76,7 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     /// of the image may meet and that are not hidden; the nearest come first,
     /// roughly.
     pub fn cull(&mut self, scene: &OccluderScene, view: &View, out: &mut Vec<ItemId>) -> CullStats {
-        self.kernel.run(Walk {
-            state: self,
-            scene,
-            view,
-            out,
-        })
+        self.kernel.run(Walk(self, scene, view, out))
     }
 
     /// The buffer as the last view left it.
@@ -90,19 +85,19 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     }
 }
 
-struct Walk<'a, B> {
-    state: &'a mut Interleaved<B>,
-    scene: &'a OccluderScene,
-    view: &'a View<'a>,
-    out: &'a mut Vec<ItemId>,
-}
+struct Walk<'a, B>(
+    &'a mut Interleaved<B>,
+    &'a OccluderScene,
+    &'a View<'a>,
+    &'a mut Vec<ItemId>,
+);
 
 impl<B: OcclusionBuffer> Work for Walk<'_, B> {
     type Output = CullStats;
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> CullStats {
-        let (state, scene, view) = (self.state, self.scene, self.view);
+        let Walk(state, scene, view, out) = self;
         let mut stats = CullStats::default();
         if scene.len() == 0 {
             return stats;
@@ -209,12 +204,12 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             let hidden = buffer.hides_lanes(isa, &rects, asked);
             for (lane, survivor) in sixteen.iter().enumerate() {
                 if hidden >> lane & 1 == 0 {
-                    self.out.extend(scene.item(survivor.position as usize));
+                    out.extend(scene.item(survivor.position as usize));
                 }
             }
         }
         for survivor in late {
-            self.out.extend(scene.item(survivor.position as usize));
+            out.extend(scene.item(survivor.position as usize));
         }
         stats
     }

@@ -30,7 +30,7 @@ pub struct OccluderScene {
     /// World position of the zero of the boxes.
     pub(super) origin: DVec3,
     /// Level 0 holds the items' outer boxes; the last level is one block.
-    pub(super) levels: Vec<Vec<BoxBlock>>,
+    pub levels: Vec<Vec<BoxBlock>>,
     /// In tree order, as what hides.
     ids: Vec<ItemId>,
     /// All occluders, in tree order.

@@ -40,12 +40,7 @@ impl<B: Body> Pick for WideRay<B> {
         }
         let probe = of.probe(ray);
         let met = match B::IS_BOX {
-            true => of.kernel.run(SearchNearest {
-                of,
-                ray,
-                probe: &probe,
-                count,
-            }),
+            true => of.kernel.run(SearchNearest(of, ray, &probe, count)),
             false => {
                 let mut found = SeveralAtOnce {
                     items: of.items,
@@ -156,19 +151,14 @@ impl Candidates for Foremost {
 }
 
 /// The boxes among which the nearest are.
-struct SearchNearest<'a, B: Body> {
-    of: &'a BodyIndex<B>,
-    ray: &'a Ray,
-    probe: &'a B::Probe,
-    count: usize,
-}
+struct SearchNearest<'a, B: Body>(&'a BodyIndex<B>, &'a Ray, &'a B::Probe, usize);
 
 impl<B: Body> Work for SearchNearest<'_, B> {
     type Output = Vec<(u32, B::At)>;
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Vec<(u32, B::At)> {
-        let (of, ray, probe) = (self.of, self.ray, self.probe);
+        let SearchNearest(of, ray, probe, count) = self;
         let meet = |body: &B| Some((body.item(), body.meet(probe, ray.far)?));
         let Some(slabs) = of.tree.slabs(ray) else {
             let mut met = Vec::new();
@@ -176,7 +166,7 @@ impl<B: Body> Work for SearchNearest<'_, B> {
             return met;
         };
         let mut found = Several {
-            lowest: Lowest::new(self.count, slabs.far()),
+            lowest: Lowest::new(count, slabs.far()),
             all: Vec::new(),
         };
         of.tree.search(isa, &slabs, &mut found);

@@ -187,33 +187,26 @@ impl<const N: usize> TriangleCull for Cones<N> {
     fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
         // From farther away the test could overflow.
         if eye.nearest.abs().max_element() < FAR {
-            kernel.run(Query {
-                all: self,
-                eye,
-                words: &mut kept.blocks,
-            });
+            kernel.run(Query(self, eye, &mut kept.blocks));
         }
     }
 }
 
-struct Query<'a, const N: usize> {
-    all: &'a Cones<N>,
-    eye: &'a Eye,
-    words: &'a mut [[u64; LANES]],
-}
+struct Query<'a, const N: usize>(&'a Cones<N>, &'a Eye, &'a mut [[u64; LANES]]);
 
 impl<const N: usize> Work for Query<'_, N> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let view = Broadcast::of(isa, self.eye);
-        for (i, words) in self.words.iter_mut().enumerate() {
-            for (n, block) in self.all.cones[i].iter().enumerate() {
+        let Query(all, eye, words) = self;
+        let view = Broadcast::of(isa, eye);
+        for (i, words) in words.iter_mut().enumerate() {
+            for (n, block) in all.cones[i].iter().enumerate() {
                 let gone = rejected(isa, block, &view);
                 match N {
                     1 => clear(words, gone, &[u64::MAX; LANES]),
-                    _ => clear(words, gone, &self.all.triangles[i][n]),
+                    _ => clear(words, gone, &all.triangles[i][n]),
                 }
             }
         }

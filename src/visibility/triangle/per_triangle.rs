@@ -89,43 +89,36 @@ impl PerTriangle {
 impl TriangleCull for PerTriangle {
     fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
         match self.is_near && eye.nearest.abs().max_element() < FAR {
-            true => kernel.run(Query {
-                all: self,
-                eye,
-                kept,
-            }),
+            true => kernel.run(Query(self, eye, kept)),
             false => *kept = facing(&self.clusters, eye, kept),
         }
     }
 }
 
-struct Query<'a> {
-    all: &'a PerTriangle,
-    eye: &'a Eye,
-    kept: &'a mut Selection,
-}
+struct Query<'a>(&'a PerTriangle, &'a Eye, &'a mut Selection);
 
 impl Work for Query<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let eye = Lanes::of(isa, self.eye);
-        let PerTriangle { starts, planes, .. } = self.all;
-        for (cluster, word) in self.kept.words_mut().iter_mut().enumerate() {
+        let Query(all, eye, kept) = self;
+        let lanes = Lanes::of(isa, eye);
+        let PerTriangle { starts, planes, .. } = all;
+        for (cluster, word) in kept.words_mut().iter_mut().enumerate() {
             let rows = &planes[starts[cluster] as usize..starts[cluster + 1] as usize];
             if *word == 0 || rows.is_empty() {
                 continue;
             }
             let (mut front, mut doubt) = (0, 0);
             for (row, planes) in rows.iter().enumerate() {
-                let [sure, unsure] = sides(isa, planes, &eye);
+                let [sure, unsure] = sides(isa, planes, &lanes);
                 front |= sure << (LANES * row);
                 doubt |= unsure << (LANES * row);
             }
             let left = *word & doubt;
             if left != 0 {
-                front |= in_doubt(&self.all.clusters, cluster, left, self.eye);
+                front |= in_doubt(&all.clusters, cluster, left, eye);
             }
             *word &= front;
         }

@@ -102,11 +102,7 @@ impl<B: Body> BodyIndex<B> {
     #[inline]
     pub fn walk<V: Visit<B>>(&self, ray: &Ray, visitor: &mut V) {
         if !self.tree.is_passed_by(ray) {
-            self.kernel.run(Walk {
-                of: self,
-                ray,
-                visitor,
-            });
+            self.kernel.run(Walk(self, ray, visitor));
         }
     }
 
@@ -159,18 +155,14 @@ impl<B, F: FnMut(&B) -> f64> Visit<B> for F {
     }
 }
 
-struct Walk<'a, B, V> {
-    of: &'a BodyIndex<B>,
-    ray: &'a Ray,
-    visitor: &'a mut V,
-}
+struct Walk<'a, B, V>(&'a BodyIndex<B>, &'a Ray, &'a mut V);
 
 impl<B: Body, V: Visit<B>> Work for Walk<'_, B, V> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let Walk { of, ray, visitor } = self;
+        let Walk(of, ray, visitor) = self;
         let Some(slabs) = of.tree.slabs(ray) else {
             return of.walk_in_f64(ray, |body| {
                 visitor.visit(body);
