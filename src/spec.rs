@@ -226,9 +226,9 @@ impl Spec {
     }
 
     fn bad(&self, key: &str, found: &str, expected: &str) -> SpecError {
+        let name = &self.name;
         SpecError(format!(
-            "in '{}': {key} is '{found}'; expected {expected}",
-            self.name
+            "in '{name}': {key} is '{found}'; expected {expected}"
         ))
     }
 }

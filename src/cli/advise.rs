@@ -23,15 +23,8 @@ const ROUNDS: [usize; 2] = [5, 25];
 const EFFORT: Effort = SUITES[0].effort;
 
 pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
-    let (setting, all) = setting(registry, args, None)?;
+    let setting = setting(registry, args, None)?;
     let input = input(args, &setting);
-    if setting.path.cameras.len() < all {
-        let (used, all) = (setting.path.cameras.len(), text::counted(all, "camera"));
-        let used = text::count(used);
-        tell(&format!(
-            "note: the rules look at {used} of {all}, evenly spread"
-        ));
-    }
     input.workload()?;
     let processes = args.study.spread.processes;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
@@ -92,21 +85,22 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
     Ok(plan)
 }
 
-/// The inputs of the command itself or of a worker, and the cameras of the whole
-/// path.
-fn setting(
-    registry: &Registry,
-    args: &AdviseArgs,
-    timing: Option<&Timing>,
-) -> Result<(Setting, usize)> {
+/// The inputs of the command, which tells what is left out, or of a worker.
+fn setting(registry: &Registry, args: &AdviseArgs, timing: Option<&Timing>) -> Result<Setting> {
     let study = &args.study;
     let held = |structures| study.lens.scene_args.options(structures);
     let mut setting = Setting::load(registry, study, ROUNDS, timing, held)?;
     setting.structures = plan(registry, args)?.structures;
-    let all = setting.path.cameras.len();
+    let all = text::counted(setting.path.cameras.len(), "camera");
+    if setting.path.cameras.len() > MOST_CAMERAS && timing.is_none() {
+        let used = text::count(MOST_CAMERAS);
+        tell(&format!(
+            "note: the rules look at {used} of {all}, evenly spread"
+        ));
+    }
     setting.path = setting.path.at_most(MOST_CAMERAS);
     setting.protocol.cameras = cameras_within(EFFORT.pass_ns, setting.scene.items.len());
-    Ok((setting, all))
+    Ok(setting)
 }
 
 fn input<'s>(args: &'s AdviseArgs, setting: &'s Setting) -> AdviseInput<'s> {
@@ -123,7 +117,7 @@ fn input<'s>(args: &'s AdviseArgs, setting: &'s Setting) -> AdviseInput<'s> {
 
 /// Times the trials in one process.
 pub fn time(registry: &Registry, args: &AdviseArgs, timing: &Timing) -> Result<ProcessTimes> {
-    let (setting, _) = setting(registry, args, Some(timing))?;
+    let setting = setting(registry, args, Some(timing))?;
     Ok(advise::time(&input(args, &setting), &timing.plan()?)?)
 }
 

@@ -91,10 +91,10 @@ impl CompareTable<'_> {
     pub fn print(&self) -> io::Result<()> {
         let args = self.args;
         let text = match (args.markdown, args.format) {
-            (true, _) => folded(
-                &format!("{}: {}", program::name(), self.summary()),
-                &to_markdown(&self.blocks(args.all, None)),
-            ),
+            (true, _) => {
+                let line = format!("{}: {}", program::name(), self.summary());
+                folded(&line, &to_markdown(&self.blocks(args.all, None)))
+            }
             (false, TableFormat::Table) => {
                 let width = text::width();
                 let room = if args.all { usize::MAX } else { width };

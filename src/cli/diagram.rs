@@ -99,11 +99,8 @@ impl<'d> Diagram<'d> {
             let (name, y) = ((y_axis.shown)(tick), self.y(tick));
             left = left.max(name.chars().count());
             parts += &line("grid", [0.0, 100.0], [y, y]);
-            parts += &format!(
-                "<text class=\"y\" x=\"0\" dx=\"-8\" y=\"{:.1}\">{}</text>\n",
-                y + 4.0,
-                html(&name)
-            );
+            let (y, name) = (y + 4.0, html(&name));
+            parts += &format!("<text class=\"y\" x=\"0\" dx=\"-8\" y=\"{y:.1}\">{name}</text>\n");
         }
         parts += &x_axis.across(None, bottom);
         let mut coloured = 0;
@@ -186,10 +183,8 @@ impl<'d> Diagram<'d> {
                 shapes += &mark(series.look, kind, *place, &point.note);
             }
         }
-        format!(
-            "<g class=\"s {class}\" data-s=\"{0}\"><title>{0}</title>{shapes}{name}</g>\n",
-            html(&series.name)
-        )
+        let of = html(&series.name);
+        format!("<g class=\"s {class}\" data-s=\"{of}\"><title>{of}</title>{shapes}{name}</g>\n")
     }
 
     /// Names beside the plot with the ends of their lines, and heights a line apart.
@@ -236,11 +231,9 @@ impl<'d> Diagram<'d> {
 
 /// A name beside the plot, with a line that leads to it.
 fn beside(name: &str, end: [f64; 2], at: f64) -> String {
-    format!(
-        "{}<text x=\"100%\" dx=\"8\" y=\"{at:.1}\">{}</text>",
-        line("lead", [end[0], 100.0], [end[1], at - 4.0]),
-        html(name)
-    )
+    let lead = line("lead", [end[0], 100.0], [end[1], at - 4.0]);
+    let name = html(name);
+    format!("{lead}<text x=\"100%\" dx=\"8\" y=\"{at:.1}\">{name}</text>")
 }
 
 /// Width of the plot on the narrowest page, px.

@@ -69,8 +69,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     };
     let prepared = funnel::prepare(&input, &begin)?;
     study.advance();
-    let lens_scale = stages.setting.path.lens_scale;
-    let times = study.times("every stage, timed", lens_scale, &prepared.plan)?;
+    let path = &stages.setting.path;
+    let times = study.times("every stage, timed", path.lens_scale, &prepared.plan)?;
     if let Some(verdict) = funnel::failure(&times) {
         let reason = verdict.reason.as_deref().unwrap_or("no reason");
         bail!("a stage failed when it was timed: {reason}");

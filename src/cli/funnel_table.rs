@@ -200,10 +200,8 @@ fn occluders(report: &FunnelReport) -> Table {
     if let Some(row) = &report.solid_blocks {
         let unclosed = Some(row.unclosed_sector_count).filter(|count| *count > 0);
         let unclosed = some(unclosed, |count| {
-            format!(
-                ": {} not closed or contradicting",
-                text::counted(count, "sector")
-            )
+            let sectors = text::counted(count, "sector");
+            format!(": {sectors} not closed or contradicting")
         });
         let place = format!("solid between the rooms of the map{unclosed}");
         add(place, row.box_count, None, row.build_ns);

@@ -30,7 +30,6 @@ mod list;
 mod merge;
 mod one_stdin;
 mod plan;
-mod policies;
 mod precision;
 mod precision_conclusions;
 mod precision_tables;

@@ -71,15 +71,14 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
         let room = if args.all { usize::MAX } else { text::width() };
         show(&blocks(&outcome, args.all, room))
     });
+    let figures = precision_conclusions::figures(&outcome.precision);
     if let Some(file) = &args.svg {
-        let figures = precision_conclusions::figures(&outcome.precision);
         write_text(file, &picture(&figures, 1))?;
     }
     if let Some(file) = &args.html {
-        let figures = precision_conclusions::figures(&outcome.precision).into_iter();
         let title = format!("precision {}, {}", args.study.scene, args.study.path);
         let blocks = blocks(&outcome, true, usize::MAX);
-        let figures = figures.map(Block::Figure);
+        let figures = figures.into_iter().map(Block::Figure);
         write_text(file, &to_page(&title, usize::MAX, figures, blocks))?;
     }
     shown?;

@@ -149,11 +149,8 @@ fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
     };
     (!rows.is_empty()).then(|| {
         let names: Vec<&str> = SWEEPS.iter().map(|sweep| sweep.1).collect();
-        format!(
-            "Over {} the default (six planes, f32 c=8) misses {}; {others}.",
-            names.join(", "),
-            text::counted(missed as usize, "item")
-        )
+        let (names, missed) = (names.join(", "), text::counted(missed as usize, "item"));
+        format!("Over {names} the default (six planes, f32 c=8) misses {missed}; {others}.")
     })
 }
 

@@ -55,13 +55,10 @@ pub fn plan_of(
     default_suite: &str,
     default_structures: Option<&str>,
 ) -> Result<RunPlan> {
-    let suite = suite_file::suite(args.suite.as_deref().unwrap_or(default_suite))?;
-    let structures = match args.structure.is_empty() {
-        // A file that states them means them.
-        true => match default_structures.filter(|_| !suite.states_structures) {
-            Some(default) => default.to_owned(),
-            None => suite.structures.clone(),
-        },
+    let suite = args.suite.as_deref().unwrap_or(default_suite);
+    let suite = suite_file::suite(suite, default_structures)?;
+    let names = match args.structure.is_empty() {
+        true => suite.structures.clone(),
         false => args.structure.join(","),
     };
     let tests = || args.test.iter().flat_map(|tests| tests.split(','));
@@ -69,7 +66,6 @@ pub fn plan_of(
     let cullings: Vec<Culling> = cullings.collect::<Result<_, _>>()?;
     cullings.iter().try_for_each(Culling::check)?;
     each_once("test", tests())?;
-    let names = structures;
     let structures = args.culling.kernel.structures(registry, &names)?;
     let mut plan = Plan {
         scenes: scenes(args, &suite)?,
@@ -250,39 +246,35 @@ pub fn same_digest(
 }
 
 fn scenes(args: &WhatArgs, suite: &ChosenSuite) -> Result<Vec<PlannedScene>, InputError> {
-    let scene = |source: &str, paths: &[&str], cold: bool| {
-        let paths = match args.path.is_empty() {
-            true => paths.iter().map(|&p| p.to_owned()).collect(),
-            false => args.path.clone(),
-        };
-        planned(source.to_owned(), paths, cold)
+    let planned = |source: String, paths: &[&str]| {
+        let paths = paths.iter().map(|&path| path.to_owned());
+        planned(source, paths.collect(), false)
     };
-    if !args.scene.is_empty() {
-        let named = args.scene.iter().map(|source| every_part(source));
-        let named: Vec<_> = named.collect::<Result<_, _>>()?;
-        let named = named.iter().flatten();
-        let named = named.map(|source| scene(source, &[DEFAULT_PATH], args.cold));
-        return Ok(named.collect());
-    }
     let mut scenes = suite.scenes.clone();
-    for row in &mut scenes {
-        if !args.path.is_empty() {
-            row.paths.clone_from(&args.path);
+    if !args.scene.is_empty() {
+        scenes.clear();
+        for source in &args.scene {
+            let parts = every_part(source)?.into_iter();
+            scenes.extend(parts.map(|source| planned(source, &[DEFAULT_PATH])));
         }
-        if args.cold {
-            row.caches = vec![false, true];
-        }
-    }
-    if suite.name == REAL {
+    } else if suite.name == REAL {
         let (there, missing): (Vec<_>, Vec<_>) = FETCHED.iter().partition(|row| row.is_there());
         let fetched = there.iter().flat_map(|row| row.scenes());
-        scenes.extend(fetched.map(|source| scene(&source, REAL_PATHS, args.cold)));
+        scenes.extend(fetched.map(|source| planned(source, REAL_PATHS)));
         if !missing.is_empty() {
             let names: Vec<&str> = missing.iter().map(|row| row.name.as_str()).collect();
             let names = names.join(" ");
             note(&format!(
                 "left out, as not fetched: {names}; to fetch them: scripts/fetch.py {names}"
             ));
+        }
+    }
+    for row in &mut scenes {
+        if !args.path.is_empty() {
+            row.paths.clone_from(&args.path);
+        }
+        if args.cold {
+            row.caches = vec![false, true];
         }
     }
     Ok(scenes)

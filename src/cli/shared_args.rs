@@ -2,12 +2,11 @@
 //!
 //! Scenes, lenses, culling tests, instruction sets, and the processes of a study.
 
-use super::policies::under_policies;
 use crate::camera::{
     DEFAULT_EPSILON, MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod, PlaneOptions,
 };
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, TESTS};
-use crate::index::{Execution, Registry, StructureSpec};
+use crate::index::{Execution, Registry, StructureSpec, UpdatePolicy};
 use crate::kernel::Kernel;
 use crate::measure::{Machine, Plan, Protocol};
 use crate::path::LensDefaults;
@@ -15,7 +14,7 @@ use crate::scene::{ITEM_KINDS, ItemKind, LoadOptions, UP_AXES, UpAxis};
 use crate::spec::{SpecError, values};
 use crate::suite::DEFAULT_PATH;
 use crate::threads::MOST_THREADS;
-use anyhow::{bail, ensure};
+use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
 
 #[derive(Args, Debug)]
@@ -108,7 +107,7 @@ pub struct MotionArgs {
 
 impl MotionArgs {
     /// Enters motions, queries per frame and policies into a plan.
-    pub fn enter(&self, plan: &mut Plan) -> anyhow::Result<()> {
+    pub fn enter(&self, plan: &mut Plan) -> Result<()> {
         plan.motions.clone_from(&self.motion);
         plan.views_per_frame = self.views;
         if let Some(list) = &self.update {
@@ -116,6 +115,41 @@ impl MotionArgs {
         }
         Ok(())
     }
+}
+
+/// The structures under each policy of a comma-separated list, `wide@every=10`.
+///
+/// Labels stay as they are under [`UpdatePolicy::Refit`]. A structure that does not
+/// refit is built again in any case: it appears once beside fat bounds.
+fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSpec>> {
+    let mut policies: Vec<UpdatePolicy> = Vec::new();
+    for text in list.split(',').map(str::trim) {
+        let policy = text.parse()?;
+        let is_new = !policies.contains(&policy);
+        ensure!(
+            is_new,
+            "--update '{text}' is named twice; expected each once"
+        );
+        policies.push(policy);
+    }
+    let mut all = Vec::new();
+    for spec in specs {
+        let refits = spec.info().capabilities.refits;
+        let mut has_rebuilt = false;
+        for &policy in &policies {
+            let mut own = spec.clone();
+            own.policy = policy;
+            match policy {
+                UpdatePolicy::Fat(_) => own.label += &format!("@{policy}"),
+                _ if !refits && has_rebuilt => continue,
+                _ if !refits => (own.policy, has_rebuilt) = (UpdatePolicy::Refit, true),
+                UpdatePolicy::Refit => (),
+                _ => own.label += &format!("@{policy}"),
+            }
+            all.push(own);
+        }
+    }
+    Ok(all)
 }
 
 /// Instruction set and threads; answers do not depend on them.
@@ -138,11 +172,7 @@ fn kernel(name: &str) -> Result<Kernel, SpecError> {
 
 impl KernelArgs {
     /// The structures of a list, with this instruction set and these threads.
-    pub fn structures(
-        &self,
-        registry: &Registry,
-        list: &str,
-    ) -> Result<Vec<StructureSpec>, SpecError> {
+    pub fn structures(&self, registry: &Registry, list: &str) -> Result<Vec<StructureSpec>> {
         let execution = self.execution()?;
         let mut specs: Vec<StructureSpec> = Vec::new();
         for spec in registry.structures(list)? {
@@ -262,7 +292,7 @@ pub struct LensArgs {
 }
 
 impl LensArgs {
-    pub fn defaults(&self) -> anyhow::Result<LensDefaults> {
+    pub fn defaults(&self) -> Result<LensDefaults> {
         if let (Some(near), Some(far)) = (self.near, self.far) {
             ensure!(
                 near < far,
@@ -302,7 +332,7 @@ pub struct CullingArgs {
 
 impl CullingArgs {
     /// The culling test of that name, with the other settings from the options.
-    pub fn culling(&self, test: &str) -> anyhow::Result<Culling> {
+    pub fn culling(&self, test: &str) -> Result<Culling> {
         if let (Some(c), Arithmetic::F64) = (self.epsilon.filter(|&c| c > 0.0), self.arithmetic) {
             bail!("--epsilon is {c} with --arithmetic f64, which has none; expected 0, or f32");
         }
@@ -328,4 +358,33 @@ pub enum TableFormat {
 pub enum RowFormat {
     Csv,
     Json,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn policies_make_rows_and_mistakes_are_named() {
+        let specs = Registry::builtin()
+            .structures("wide,octree-textbook")
+            .unwrap();
+        let labels = |list: &str| -> Result<Vec<String>, String> {
+            let all = under_policies(list, &specs).map_err(|e| e.to_string())?;
+            Ok(all.into_iter().map(|spec| spec.label).collect())
+        };
+        let all = "wide,wide@rebuild,wide@every=10,wide@fat=0.1,octree-textbook,\
+                   octree-textbook@fat=0.1";
+        let found = labels("refit,rebuild,every=10,fat=10%").unwrap();
+        assert_eq!(found.join(","), all);
+        assert_eq!(
+            labels("rebuild").unwrap(),
+            ["wide@rebuild", "octree-textbook"]
+        );
+        for bad in ["", "often", "every", "every=1", "fat=0", "fat=x", "refit=1"] {
+            let error = labels(bad).unwrap_err();
+            assert!(error.contains("expected refit, rebuild"), "{bad}: {error}");
+        }
+        assert!(labels("refit,refit").unwrap_err().contains("named twice"));
+    }
 }

@@ -20,8 +20,6 @@ pub struct ChosenSuite {
     pub scenes: Vec<PlannedScene>,
     pub effort: Effort,
     pub structures: String,
-    /// True if a file states them itself.
-    pub states_structures: bool,
 }
 
 /// A suite as it is written; a field that is not known is refused.
@@ -44,13 +42,13 @@ struct WrittenScene {
     cold: bool,
 }
 
-/// The suite of a name or a TOML file.
+/// The suite of a name or a TOML file, with structures where it states none.
 ///
 /// # Errors
 /// An unknown name; a file that cannot be read or is no suite, with its line.
-pub fn suite(text: &str) -> Result<ChosenSuite, InputError> {
+pub fn suite(text: &str, default: Option<&str>) -> Result<ChosenSuite, InputError> {
     if text.ends_with(".toml") {
-        return written(text);
+        return written(text, default);
     }
     let suite = named(text, Some("FILE.toml"))?;
     let paths = |paths: &[&str]| paths.iter().map(|&path| path.to_owned()).collect();
@@ -61,8 +59,7 @@ pub fn suite(text: &str) -> Result<ChosenSuite, InputError> {
         is_built_in: true,
         scenes: rows.collect(),
         effort: suite.effort,
-        structures: suite.structures.to_owned(),
-        states_structures: false,
+        structures: default.unwrap_or(suite.structures).to_owned(),
     })
 }
 
@@ -81,7 +78,7 @@ fn named(name: &str, or: Option<&'static str>) -> Result<&'static Suite, SpecErr
     suite.ok_or_else(|| SpecError::unknown("suite", name, known))
 }
 
-fn written(file: &str) -> Result<ChosenSuite, InputError> {
+fn written(file: &str, default: Option<&str>) -> Result<ChosenSuite, InputError> {
     let bytes = read_file(Path::new(file))?;
     let text = str::from_utf8(&bytes).map_err(|error| {
         InputError::byte(file, error.valid_up_to(), "not UTF-8", "a suite in TOML")
@@ -113,14 +110,12 @@ fn written(file: &str) -> Result<ChosenSuite, InputError> {
         let nothing = "no scenes; expected [[scenes]] with a scene and its paths";
         return Err(bad(&nothing));
     }
-    let structures = suite.structures;
-    let states_structures = structures.is_some();
+    let structures = default.unwrap_or(like.structures);
     Ok(ChosenSuite {
         name: file.to_owned(),
         is_built_in: false,
         scenes,
         effort,
-        structures: structures.unwrap_or_else(|| like.structures.to_owned()),
-        states_structures,
+        structures: suite.structures.unwrap_or_else(|| structures.to_owned()),
     })
 }
