@@ -113,7 +113,7 @@ fn of_portals<'w>(world: &World, row: &RegionRow) -> Bound<'w> {
         let mut seen = Vec::new();
         row.from_eye(world.rays(view), &mut Scratch::default(), &mut seen);
         let is_seen = |region: &RegionId| seen.binary_search(region).is_ok();
-        let openings = row.graph.openings().iter();
+        let openings = row.graph.openings.iter();
         let inner = openings.filter(|opening| opening.sides.iter().all(is_seen));
         inner.copied().collect()
     };

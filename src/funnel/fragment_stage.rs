@@ -270,9 +270,9 @@ impl Room {
         if !graph.homes(rays, &mut homes) {
             return None;
         }
-        let exits = homes.iter().flat_map(|&home| graph.exits(home));
+        let exits = homes.iter().flat_map(|&home| &graph.exits[home as usize]);
         let portals = exits.map(|&exit| {
-            let corners = graph.openings()[exit as usize].corners;
+            let corners = graph.openings[exit as usize].corners;
             WorldBox::union_of(corners.map(|corner| WorldBox::new(corner, corner)))
         });
         let of_rooms = homes.iter().flat_map(|&home| regions.items.of_region(home));
@@ -341,7 +341,7 @@ pub fn mirrored(
         let direct = draw(&canvas, bodies(solids, &left), &Tests::default());
         let stencil = direct.stencil(&canvas, &[face]);
         let reflected = canvas.mirrored(axis, face.min[axis]);
-        let screen = reflected.screen();
+        let screen = &reflected.screen;
         let rectangles = solids.boxes.iter().filter_map(|b| screen.rectangle(b));
         fits_drawing(world.samples, rectangles)?;
         let tests = Tests {

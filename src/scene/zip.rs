@@ -160,22 +160,22 @@ fn chosen<'e, 'r, 'w>(
     let listed = first_of(&names, MOST_NAMED);
     let all = counted(entries.len(), "entry");
     let sought = shortened(wanted.unwrap_or_default(), 80);
-    let (found, expected) = match (wanted, &scenes[..]) {
+    let refused = |found, expected: &str| InputError::at(file, "directory", found, expected);
+    Err(match (wanted, &scenes[..]) {
         (None, [(name, record)]) => return Ok((name, record, None)),
-        (None, []) => (
-            format!("no scene among {all}"),
-            format!("a name that ends in {}", SCENES.join(", ")),
-        ),
-        (None, _) => (
-            format!("{} scenes, {listed}", scenes.len()),
-            part_hint(file, &names[0]),
-        ),
-        (Some(_), _) => (
-            format!("no '{sought}' among {all}; scenes: {listed}"),
-            "the name of an entry".to_owned(),
-        ),
-    };
-    Err(InputError::at(file, "directory", found, &expected))
+        (None, []) => {
+            let expected = format!("a name that ends in {}", SCENES.join(", "));
+            refused(format!("no scene among {all}"), &expected)
+        }
+        (None, [..]) => {
+            let found = format!("{} scenes, {listed}", scenes.len());
+            refused(found, &part_hint(file, &names[0]))
+        }
+        (Some(_), _) => {
+            let found = format!("no '{sought}' among {all}; scenes: {listed}");
+            refused(found, "the name of an entry")
+        }
+    })
 }
 
 #[cfg(test)]

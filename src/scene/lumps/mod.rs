@@ -123,26 +123,20 @@ impl<'a> Wad<'a> {
         let maps = self.markers();
         let listed = || first_of(&maps.iter().map(|m| m.0).collect::<Vec<_>>(), MOST_NAMED);
         let mut wanted = maps.iter().filter(|(name, _)| is_wanted(name));
-        let (found, expected) = match (wanted.next(), wanted.next(), map) {
+        Err(match (wanted.next(), wanted.next(), map) {
             (Some(one), None, _) => return Ok(*one),
-            (Some(first), _, _) => (
-                format!("{} maps, {}", maps.len(), listed()),
-                part_hint(self.file, first.0),
-            ),
-            (None, _, None) => (
-                "no map".to_owned(),
-                "a map marker followed by THINGS".to_owned(),
-            ),
+            (Some(first), _, _) => {
+                let found = format!("{} maps, {}", maps.len(), listed());
+                self.error(0, found, part_hint(self.file, first.0))
+            }
+            (None, _, None) => self.error(0, "no map", "a map marker followed by THINGS"),
             (None, _, Some(map)) => {
                 let lump = self.lumps.iter().any(|lump| is_wanted(&lump.name));
                 let lump = lump.then_some(" (THINGS does not follow the lump of that name)");
-                (
-                    format!("no map '{map}' among {}{}", listed(), lump.unwrap_or("")),
-                    "one of the file's maps".to_owned(),
-                )
+                let found = format!("no map '{map}' among {}{}", listed(), lump.unwrap_or(""));
+                self.error(0, found, "one of the file's maps")
             }
-        };
-        Err(self.error(0, found, expected))
+        })
     }
 
     /// The tables of the named map, or of the only one.

@@ -201,7 +201,8 @@ pub struct Stencil {
 /// 88 bytes per sample for boxes, 128 for triangles.
 #[derive(Clone, Debug)]
 pub struct Canvas<B: Body = SolidBox> {
-    screen: Screen,
+    /// The image, in which boxes and triangles can be placed.
+    pub screen: Screen,
     /// Zero of the bodies' local coordinates.
     pub(super) origin: DVec3,
     probes: Vec<B::Probe>,
@@ -235,11 +236,6 @@ impl<B: Body> Canvas<B> {
     /// Columns and rows.
     pub fn grid(&self) -> SampleGrid {
         self.screen.grid
-    }
-
-    /// The image, in which boxes and triangles can be placed.
-    pub fn screen(&self) -> &Screen {
-        &self.screen
     }
 
     /// The ray of a sample.

@@ -37,7 +37,7 @@ pub trait Drawable: Body {
 
 impl Drawable for SolidBox {
     fn rectangle(&self, canvas: &Canvas) -> Option<Rectangle> {
-        canvas.screen().rectangle(&self.b)
+        canvas.screen.rectangle(&self.b)
     }
 
     fn is_opaque(&self, holes: &Holes, probe: &Probe, at: &Crossing) -> bool {
@@ -58,7 +58,7 @@ impl Drawable for SolidBox {
 
 impl Drawable for Facet {
     fn rectangle(&self, canvas: &Canvas<Facet>) -> Option<Rectangle> {
-        canvas.screen().triangle(self.corners, canvas.origin)
+        canvas.screen.triangle(self.corners, canvas.origin)
     }
 
     fn is_opaque(&self, _: &Holes, _: &TriangleProbe, _: &Meeting) -> bool {
@@ -250,7 +250,7 @@ impl Drawn {
         let mut marked = vec![false; canvas.grid().samples()];
         let mut tested = 0;
         for rectangle in rectangles {
-            let place = canvas.screen().rectangle(rectangle);
+            let place = canvas.screen.rectangle(rectangle);
             let [asked, _] = canvas.scan(place, None, |sample, probe| {
                 let is_before = |at| {
                     let before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();

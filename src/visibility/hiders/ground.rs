@@ -82,13 +82,9 @@ impl Ground {
         let [least, extent] = [scene.bounds.min, scene.bounds.extent()].map(|v| up.to_z_up(v).z);
         let bottom = least - extent - 1.0;
         let mut cells = Cells::new(CELLS, filled);
-        while boxes.len() < MOST_BOXES {
-            // All columns of cells begin at the lowest place.
-            let found = cells.next_box(0..1);
-            let Some((count, found)) = found.filter(|(count, _)| share(*count) >= LEAST_GAIN)
-            else {
-                break;
-            };
+        // All columns of cells begin at the lowest place.
+        let found = std::iter::from_fn(|| cells.next_box(0..1)).take(MOST_BOXES);
+        for (count, found) in found.take_while(|(count, _)| share(*count) >= LEAST_GAIN) {
             held += share(count);
             let Aabb { min, max } = heights.to_box(found, bottom);
             boxes.push(Aabb::new(up.from_z_up(min), up.from_z_up(max)));
@@ -119,11 +115,7 @@ impl Ground {
 
     /// Returns `true` if all rays are above the ground at the near plane. O(t).
     pub fn is_below(&self, rays: &Rays) -> bool {
-        let camera = &rays.camera;
-        let near = match camera.lens.is_orthographic() {
-            true => camera.lens.near(),
-            false => camera.lens.near().max(0.0),
-        };
+        let near = rays.camera.lens.near();
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
         let corners =
             corners.map(|[x, y]| self.up.to_z_up(rays.through(x, y).at(near)) - self.origin);

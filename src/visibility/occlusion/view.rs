@@ -140,12 +140,11 @@ impl<'v> View<'v> {
         let corner = if parallel { corner } else { corner + forward };
         let across = u * ((right - left) / width);
         let down = v * ((bottom - top) / height);
-        let linear = |axis: usize| Linear {
+        let lines = [0, 1, 2].map(|axis| Linear {
             x: across[axis],
             y: down[axis],
             c: corner[axis],
-        };
-        let lines = [linear(0), linear(1), linear(2)];
+        });
         let tiles = [
             (grid.width as usize, TILE_WIDTH),
             (grid.height as usize, TILE_HEIGHT),
@@ -247,12 +246,10 @@ impl Projection {
         let (width, height) = (f64::from(grid.width), f64::from(grid.height));
         let (per_x, per_y) = (width / (right - left), height / (bottom - top));
         let (u, v, f) = (frame.u(), frame.v(), frame.forward());
+        let tilted = [(u - f * left) * per_x, (v - f * top) * per_y, f];
         let (rows, shift) = match parallel {
             true => ([u * per_x, v * per_y, f], [-left * per_x, -top * per_y]),
-            false => (
-                [(u - f * left) * per_x, (v - f * top) * per_y, f],
-                [0.0, 0.0],
-            ),
+            false => (tilted, [0.0, 0.0]),
         };
         let local = eye.as_vec3();
         let rest = (eye - local.as_dvec3()).as_vec3();

@@ -23,10 +23,12 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
 /// Regions joined by openings: sight leads from one to another through these only.
 #[derive(Clone, Debug)]
 pub struct RegionGraph {
-    /// The boxes that each region lies in.
+    /// The boxes that together hold each region; one in most graphs.
     pub(super) parts: Vec<Vec<WorldBox>>,
-    openings: Vec<Opening>,
-    exits: Vec<Vec<u32>>,
+    /// All openings; an exit is an index in this list.
+    pub openings: Vec<Opening>,
+    /// The openings on the border of each region.
+    pub exits: Vec<Vec<u32>>,
     pub(super) ground: Arc<dyn Ground>,
 }
 
@@ -55,21 +57,6 @@ impl RegionGraph {
     #[allow(clippy::len_without_is_empty)] // No caller needs `is_empty`.
     pub fn len(&self) -> usize {
         self.exits.len()
-    }
-
-    /// The boxes that together hold a region; one in most graphs.
-    pub fn parts(&self, region: RegionId) -> &[WorldBox] {
-        &self.parts[region as usize]
-    }
-
-    /// All openings; an exit is an index in this list.
-    pub fn openings(&self) -> &[Opening] {
-        &self.openings
-    }
-
-    /// The openings on a region's border.
-    pub fn exits(&self, region: RegionId) -> &[u32] {
-        &self.exits[region as usize]
     }
 
     /// Replaces `homes` by the regions in which rays of the camera begin to see: all

@@ -136,8 +136,8 @@ impl RegionItems {
     /// If regions have no height of their own (a map's), boxes of regions are taken
     /// to extend without end up and down. O(n log n) for items much smaller than regions.
     pub fn of(graph: &RegionGraph, scene: &Scene) -> RegionItems {
-        let regions = 0..graph.len() as u32;
-        let owners = regions.flat_map(|region| graph.parts(region).iter().map(move |_| region));
+        let owned = (0..).zip(&graph.parts);
+        let owners = owned.flat_map(|(region, parts)| parts.iter().map(move |_| region));
         let owners: Vec<RegionId> = owners.collect();
         let grid = BoxGrid::new(graph.parts.concat());
         let mut lists = vec![Vec::new(); graph.len()];

@@ -71,8 +71,8 @@ impl<S: Copy, W: Windows<Window = S>> Search<W, S> {
         let mut next = 0;
         while let Some(&Entry { region, window, .. }) = self.entries.get(next) {
             next += 1;
-            for &exit in graph.exits(region) {
-                let opening = &graph.openings()[exit as usize];
+            for &exit in &graph.exits[region as usize] {
+                let opening = &graph.openings[exit as usize];
                 let Some(entered) = W::entered(opening, region, view) else {
                     continue;
                 };
@@ -166,12 +166,8 @@ impl Windows for PortalRect {
         let Some(seen) = view.rectangle(opening) else {
             return false;
         };
-        self.current = [
-            window[0].max(seen[0]),
-            window[1].min(seen[1]),
-            window[2].max(seen[2]),
-            window[3].min(seen[3]),
-        ];
+        let ([x0, x1, y0, y1], [left, right, bottom, top]) = (window, seen);
+        self.current = [x0.max(left), x1.min(right), y0.max(bottom), y1.min(top)];
         self.current[0] <= self.current[1] && self.current[2] <= self.current[3]
     }
 

@@ -44,11 +44,6 @@ pub struct HalfSpace {
     pub number: u32,
 }
 
-/// The sum of absolute coordinates: at least the length, at most sqrt(3) of it.
-fn size(x: DVec3) -> f64 {
-    x.x.abs() + x.y.abs() + x.z.abs()
-}
-
 /// A camera as half-spaces.
 #[derive(Clone, Debug)]
 pub struct View {
@@ -80,7 +75,7 @@ impl View {
         let window @ [left, right, bottom, top] = rays.window;
         let side = |number: u32, x: f64, y: f64, z: f64| HalfSpace {
             normal: DVec3::new(x, y, z),
-            bound: size(DVec3::new(x, y, z)),
+            bound: DVec3::new(x, y, z).abs().element_sum(),
             number,
         };
         View {
@@ -112,7 +107,9 @@ impl View {
     /// The corners of an opening in camera coordinates, and the largest size of one.
     fn corners(&self, opening: &Opening) -> ([DVec3; 4], f64) {
         let corners = opening.corners.map(|c| self.turned(c - self.eye));
-        let reach = corners.iter().fold(0.0, |most: f64, c| most.max(size(*c)));
+        let reach = corners
+            .iter()
+            .fold(0.0, |most: f64, c| most.max(c.abs().element_sum()));
         (corners, reach)
     }
 
@@ -229,7 +226,7 @@ pub fn through_edge(
     let (a, b) = (corners[edge], corners[(edge + 1) % 4]);
     let middle = (corners[0] + corners[1] + corners[2] + corners[3]) * 0.25;
     let normal = a.cross(b);
-    let bound = size(a) * size(b);
+    let bound = a.abs().element_sum() * b.abs().element_sum();
     let towards = normal.dot(middle);
     if towards.abs() <= 16.0 * SLACK * bound * reach {
         return None;

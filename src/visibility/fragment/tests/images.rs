@@ -171,7 +171,7 @@ fn screen_rectangles_hold_every_sample_that_meets_the_box() {
         let rays = Rays::of(&judge::camera(&mut rng)).unwrap();
         let canvas = Canvas::of(&rays, grid);
         for b in &solids.boxes {
-            let rectangle = canvas.screen().rectangle(b);
+            let rectangle = canvas.screen.rectangle(b);
             held += rectangle.as_ref().map_or(0, Rectangle::samples);
             for sample in 0..grid.samples() {
                 let probe = canvas.probe(sample);

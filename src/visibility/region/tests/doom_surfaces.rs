@@ -100,7 +100,7 @@ fn what_is_visible_lies_in_sectors_that_every_row_lists() {
 #[test]
 fn a_graph_that_lacks_openings_is_caught() {
     let world = world("freedm-map12");
-    let openings = world.graph.openings().len();
+    let openings = world.graph.openings.len();
     let caught = |opening: &usize| {
         let graph = Arc::new(without_opening(&world.graph, *opening));
         let (_, lost) = visible_and_lost(&world, &graph, 12);

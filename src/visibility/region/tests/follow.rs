@@ -14,7 +14,7 @@ use crate::visibility::Ray;
 pub fn boxes(graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
     let start = ray.at(ray.near);
     let start = WorldBox::new(start, start);
-    for home in (0..graph.len() as u32).filter(|&id| graph.parts(id)[0].meets(&start)) {
+    for home in (0..graph.len() as u32).filter(|&id| graph.parts[id as usize][0].meets(&start)) {
         boxes_from(graph, home, ray, seen);
     }
 }
@@ -24,7 +24,7 @@ fn boxes_from(graph: &RegionGraph, home: RegionId, ray: &Ray, seen: &mut IdSet) 
     // A ray passes each region once.
     for _ in 0..graph.len() {
         seen.insert(region);
-        let b = graph.parts(region)[0];
+        let b = graph.parts[region as usize][0];
         let Some((axis, at, t)) = way_out(&b, ray) else {
             return;
         };
@@ -34,13 +34,13 @@ fn boxes_from(graph: &RegionGraph, home: RegionId, ray: &Ray, seen: &mut IdSet) 
         }
         let p = ray.at(depth);
         let through = |exit: &&u32| {
-            let opening = &graph.openings()[**exit as usize];
+            let opening = &graph.openings[**exit as usize];
             let same = OpeningPlane::Axis { axis, at } == opening.plane;
             let [low, high] = bounds(opening);
             same && (0..3).all(|k| k == axis || low[k] < p[k] && p[k] < high[k])
         };
-        match graph.exits(region).iter().find(through) {
-            Some(&exit) => region = graph.openings()[exit as usize].other(region),
+        match graph.exits[region as usize].iter().find(through) {
+            Some(&exit) => region = graph.openings[exit as usize].other(region),
             None => return,
         }
     }

@@ -22,7 +22,7 @@ fn lost_hits(world: &str, graph_of: fn(&crate::scene::Scene) -> RegionGraph) -> 
     let (mut marks, mut list) = (IdSet::default(), Vec::new());
     let mut lost = vec![0; rows.len()];
     for _ in 0..250 {
-        let b = graph.parts(rng.below(graph.len()) as u32)[0];
+        let b = graph.parts[rng.below(graph.len())][0];
         let eye = b.min + (b.max - b.min) * rng.point();
         let frame = Frame::looking_along(eye, rng.normal3(), rng.normal3()).unwrap();
         let near = [0.01, 0.1, 0.5][rng.below(3)];
@@ -66,7 +66,7 @@ fn items_of_regions_are_those_that_meet_them() {
     let items = RegionItems::of(&graph, &scene);
     let (mut marks, mut list) = (IdSet::default(), Vec::new());
     for region in 0..graph.len() as u32 {
-        let room = graph.parts(region)[0];
+        let room = graph.parts[region as usize][0];
         let meets = |b: &crate::geometry::Aabb| {
             let (min, max) = b.in_world(scene.origin);
             min.cmple(room.max).all() && room.min.cmple(max).all()

@@ -9,7 +9,7 @@ use crate::arithmetic::Expansion;
 /// through openings only, touching no edge. Of a graph of boxes; O(regions passed * exits).
 pub fn leads_through(graph: &RegionGraph, regions: [RegionId; 2], [a, b]: [DVec3; 2]) -> bool {
     for (region, p) in regions.into_iter().zip([a, b]) {
-        let room = graph.parts(region)[0];
+        let room = graph.parts[region as usize][0];
         if !(p.cmpgt(room.min).all() && p.cmplt(room.max).all()) {
             return false;
         }
@@ -20,7 +20,7 @@ pub fn leads_through(graph: &RegionGraph, regions: [RegionId; 2], [a, b]: [DVec3
             return true;
         }
         let passed = |exit: &&u32| {
-            let opening = &graph.openings()[**exit as usize];
+            let opening = &graph.openings[**exit as usize];
             let OpeningPlane::Axis { axis, at } = opening.plane else {
                 return false;
             };
@@ -30,8 +30,8 @@ pub fn leads_through(graph: &RegionGraph, regions: [RegionId; 2], [a, b]: [DVec3
             };
             onward && passes(axis, at, &opening.corners, a, b)
         };
-        match graph.exits(region).iter().find(passed) {
-            Some(&exit) => region = graph.openings()[exit as usize].other(region),
+        match graph.exits[region as usize].iter().find(passed) {
+            Some(&exit) => region = graph.openings[exit as usize].other(region),
             None => return false,
         }
     }

@@ -18,7 +18,7 @@ pub fn rooms(spec: &str) -> (Scene, Arc<RegionGraph>) {
 /// A camera in a random region, its eye 1.7 above the floor where that is inside,
 /// looking about level.
 pub fn eye_in(graph: &RegionGraph, rng: &mut SeededRng) -> Rays {
-    let b = graph.parts(rng.below(graph.len()) as u32)[0];
+    let b = graph.parts[rng.below(graph.len())][0];
     let size = b.max - b.min;
     let mut eye = b.min + size * DVec3::new(rng.unit(), rng.unit(), 0.5) * 0.999;
     eye.z = (b.min.z + 1.7).min(b.max.z - 0.01);
@@ -89,8 +89,8 @@ pub fn cubes(count: [usize; 3], rng: &mut SeededRng) -> Arc<RegionGraph> {
 
 /// A graph without one of its openings: wrong on purpose, to see who notices.
 pub fn without_opening(graph: &RegionGraph, index: usize) -> RegionGraph {
-    let mut openings = graph.openings().to_vec();
+    let mut openings = graph.openings.to_vec();
     openings.remove(index);
-    let regions = (0..graph.len() as u32).map(|r| graph.parts(r).to_vec());
+    let regions = (0..graph.len() as u32).map(|r| graph.parts[r as usize].to_vec());
     RegionGraph::new(regions.collect(), openings, graph.ground.clone())
 }
