@@ -177,7 +177,7 @@ pub struct Prepared {
 /// A camera, a structure, a back end or an image that is refused.
 pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, StudyError> {
     fits(input.samples, available_bytes())?;
-    let world = World::new(input.scene, input, begin)?;
+    let world = World::new(input, begin)?;
     let mut warnings = input.path.warnings(input.scene);
     let rounded = world.rounded();
     rounded.iter().for_each(|text| warn(text));
@@ -277,7 +277,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
 /// # Errors
 /// The errors of [`prepare`].
 pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes, StudyError> {
-    let world = World::new(input.scene, input, &|_| ())?;
+    let world = World::new(input, &|_| ())?;
     let study = Study::new(&world, input)?;
     let mut tasks = study.tasks();
     if let Some(covered) = plan.expected(&covered_key()) {

@@ -176,7 +176,7 @@ impl<'w> Swept<'w> {
 /// # Errors
 /// The errors of [`prepare`](super::prepare).
 pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSweep, StudyError> {
-    let world = World::new(input.scene, input, &|_| ())?;
+    let world = World::new(input, &|_| ())?;
     let swept = Swept::new(&world, input.chain, stage);
     // The side of a triangle needs no rays.
     let (rays, truth) = match stage {
@@ -213,7 +213,7 @@ pub fn time_sweep(
     stage: StageKind,
     plan: &FunnelPlan,
 ) -> Result<ProcessTimes, StudyError> {
-    let world = World::new(input.scene, input, &|_| ())?;
+    let world = World::new(input, &|_| ())?;
     let swept = Swept::new(&world, input.chain, stage);
     let tasks = swept.points().into_iter().map(|(_, task)| task);
     Ok(plan.time(tasks.collect(), input))

@@ -134,12 +134,9 @@ impl<'a> World<'a> {
     /// # Errors
     /// Options that do not fit the scene, a camera without frustum or rays, a structure
     /// that refuses the scene.
-    pub fn new(
-        scene: &'a Scene,
-        input: &FunnelInput,
-        begin: &dyn Fn(&str),
-    ) -> Result<World<'a>, StudyError> {
+    pub fn new(input: &FunnelInput<'a>, begin: &dyn Fn(&str)) -> Result<World<'a>, StudyError> {
         check_options(input)?;
+        let scene = input.scene;
         let views = views(input)?;
         let regions = regions(input)?;
         check_chain(input, regions.as_ref())?;
@@ -458,7 +455,7 @@ mod tests {
             picks: true,
             sorted: false,
         };
-        let world = World::new(&scene, &input, &|_| ()).expect("a world");
+        let world = World::new(&input, &|_| ()).expect("a world");
         let run = |stage, name| world.run(stage, name, world.samples);
         let mut found = 0;
         for view in world.views() {

@@ -107,7 +107,7 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene> {
     }
     let spec = Spec::parse_behind(MESH_PREFIX, source)?;
     if let Some(family) = Family::named(spec.name()) {
-        check_generated(source, family, &spec, options)?;
+        family.check_fits(source, &spec, options)?;
         return Ok(Scene {
             unit: Some("m"),
             ..family.generate(source, spec)?
@@ -129,26 +129,22 @@ pub fn check_fits(source: &str, options: &LoadOptions) -> Result<()> {
     let Ok(spec) = Spec::parse_behind(MESH_PREFIX, source) else {
         return Ok(());
     };
-    match Family::named(spec.name()) {
-        Some(_) if is_readable(Path::new(source)) => Ok(()),
-        Some(family) => check_generated(source, family, &spec, options),
-        None => Ok(()),
-    }
+    let family = Family::named(spec.name()).filter(|_| !is_readable(Path::new(source)));
+    family.map_or(Ok(()), |family| family.check_fits(source, &spec, options))
 }
 
-fn check_generated(
-    source: &str,
-    family: &Family,
-    spec: &Spec,
-    options: &LoadOptions,
-) -> Result<()> {
-    // The generator reports a count that is no number.
-    let Ok(n) = spec.clone().whole("n", COUNT, MOST) else {
-        return Ok(());
-    };
-    match family.build {
-        Build::Boxes(_) | Build::Rooms(_) => options.check_fits(source, Some(n), 0),
-        Build::Mesh(_) => options.check_fits(source, None, n),
+impl Family {
+    /// Refuses a scene that would not fit.
+    ///
+    /// The generator reports a count that is no number.
+    fn check_fits(&self, source: &str, spec: &Spec, options: &LoadOptions) -> Result<()> {
+        let Ok(n) = spec.clone().whole("n", COUNT, MOST) else {
+            return Ok(());
+        };
+        match self.build {
+            Build::Boxes(_) | Build::Rooms(_) => options.check_fits(source, Some(n), 0),
+            Build::Mesh(_) => options.check_fits(source, None, n),
+        }
     }
 }
 

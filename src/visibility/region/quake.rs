@@ -18,39 +18,28 @@ const SLACK: f64 = 0.125;
 #[derive(Debug)]
 struct LeafGround(Arc<QuakeMap>);
 
-impl LeafGround {
-    fn is_in_leaf(&self, b: &WorldBox, leaf: RegionId) -> bool {
-        b.meets(&WorldBox::of(
-            &self.0.tree.boxes[leaf as usize],
-            DVec3::ZERO,
-        ))
-    }
-}
-
-/// Signed distance of a point from the plane of a node, in lengths of its normal.
-fn value(node: &LeafNode, p: DVec3) -> f64 {
-    node.normal.as_dvec3().dot(p) - f64::from(node.distance)
-}
-
 /// Which sides of a node a box may meet, the front first.
 fn sides(node: &LeafNode, b: &WorldBox) -> [bool; 2] {
     let (centre, half) = ((b.min + b.max) / 2.0, (b.max - b.min) / 2.0 + SLACK);
-    let (at, reach) = (value(node, centre), node.normal.as_dvec3().abs().dot(half));
+    // Signed distances from the plane, in lengths of its normal.
+    let (normal, distance) = (node.normal.as_dvec3(), f64::from(node.distance));
+    let (at, reach) = (normal.dot(centre) - distance, normal.abs().dot(half));
     [at + reach >= 0.0, at - reach <= 0.0]
 }
 
 impl Ground for LeafGround {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
+        let tree = &self.0.tree;
         let (mut inside, mut open) = (true, vec![BspChild::Node(0)]);
         while let Some(at) = open.pop() {
             match at {
                 BspChild::Solid => inside = false,
-                BspChild::Leaf(leaf) if self.is_in_leaf(b, leaf) => {
-                    out.push(self.0.tree.clusters[leaf as usize]);
+                BspChild::Leaf(leaf) => {
+                    let own = WorldBox::of(&tree.boxes[leaf as usize], DVec3::ZERO);
+                    out.extend(b.meets(&own).then_some(tree.clusters[leaf as usize]));
                 }
-                BspChild::Leaf(_) => {}
                 BspChild::Node(node) => {
-                    let node = &self.0.tree.nodes[node as usize];
+                    let node = &tree.nodes[node as usize];
                     let met = node.children.into_iter().zip(sides(node, b));
                     open.extend(met.filter_map(|(child, is_met)| is_met.then_some(child)));
                 }
