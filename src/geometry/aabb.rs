@@ -164,15 +164,8 @@ impl Aabb {
 
     /// Corner `i` of eight: bit k of `i` picks `max` on axis k.
     pub fn corner(&self, i: usize) -> Vec3 {
-        let pick = |axis: usize| {
-            let corner = if i >> axis & 1 == 1 {
-                self.max
-            } else {
-                self.min
-            };
-            corner[axis]
-        };
-        Vec3::new(pick(0), pick(1), pick(2))
+        let ends = [self.min, self.max];
+        Vec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2 & 1].z)
     }
 }
 

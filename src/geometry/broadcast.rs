@@ -8,6 +8,9 @@ use super::box_block::{BoxBlock, sums_at};
 use super::{Balls, BoxCorner, ConvexVolume, PlaneMask, Spheres};
 use crate::kernel::{Isa, LaneMask};
 
+/// Lanes of a block that no plane excludes, and the planes that are open below each lane.
+pub type Sorted<I> = (LaneMask, <I as Isa>::Words);
+
 /// Planes of a volume, prepared for many blocks without other open planes.
 pub trait Planes<I: Isa>: Copy {
     /// True if four blocks at once are faster than one after another.
@@ -290,12 +293,7 @@ impl BoxBlock {
     /// each lane. A lane's word is `mask` without the planes that hold the
     /// whole box ([`Plane::contains`](super::Plane::contains)).
     #[inline(always)]
-    pub fn sorted_by<I: Isa>(
-        &self,
-        isa: I,
-        volume: &ConvexVolume,
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
+    pub fn sorted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> Sorted<I> {
         let mut kept = isa.keep_all();
         let mut open = isa.splat_word(mask);
         let mut left = mask;

@@ -1,11 +1,11 @@
 //! The query volume: an intersection of at most 32 half-spaces, with the six
 //! planes of a frustum named.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::aabb::held;
-use super::{Aabb, BoxCorner, Plane};
+use super::{Aabb, BoxCorner, Plane, PlaneF64};
 
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
 pub const MAX_PLANES: usize = 32;
@@ -169,24 +169,6 @@ impl ConvexVolume {
         Ok(volume)
     }
 
-    /// The planes, in the order in which they were given.
-    pub fn planes(&self) -> &[Plane] {
-        &self.planes[..self.count]
-    }
-
-    /// Plane `index` of a mask bit: like `planes()[index]`, but without a check
-    /// in the inner loop (a bit index is always below [`MAX_PLANES`]).
-    #[inline(always)]
-    pub fn plane_of_bit(&self, index: u32) -> &Plane {
-        &self.planes[index as usize % MAX_PLANES]
-    }
-
-    /// The p-vertex of plane `index`, without a check.
-    #[inline(always)]
-    pub fn p_vertex_of_bit(&self, index: u32) -> BoxCorner {
-        self.p_vertices[index as usize % MAX_PLANES]
-    }
-
     /// `-d` of plane `index`, without a check.
     #[inline(always)]
     pub fn minus_d_of_bit(&self, index: u32) -> f32 {
@@ -208,12 +190,6 @@ impl ConvexVolume {
         }
     }
 
-    /// Bits of the planes that constrain anything.
-    #[inline(always)]
-    pub fn mask(&self) -> PlaneMask {
-        self.mask
-    }
-
     /// The six-plane box test: true unless one plane has the whole box on its
     /// outer side. Conservative: boxes beside a frustum edge may pass. An
     /// empty box is never seen. O(planes).
@@ -227,6 +203,89 @@ impl ConvexVolume {
         self.planes().iter().all(|plane| plane.contains_point(p))
     }
 }
+
+/// The closed intersection of up to 32 half-spaces in f64, tested against f32 boxes.
+///
+/// Boxes are promoted exactly. Corners and order of operations are those of the f32 test, so it
+/// is as monotone.
+#[derive(Clone, Debug)]
+pub struct ConvexVolumeF64 {
+    planes: [PlaneF64; MAX_PLANES],
+    count: usize,
+    mask: PlaneMask,
+    p_vertices: [BoxCorner; MAX_PLANES],
+}
+
+impl ConvexVolumeF64 {
+    /// # Errors
+    /// More than 32 planes, or a plane with a NaN or infinite number.
+    pub fn from_planes(planes: &[PlaneF64]) -> Result<Self, VolumeError> {
+        VolumeError::check_count(planes.len())?;
+        for (index, plane) in planes.iter().enumerate() {
+            if !plane.is_finite() {
+                let numbers = plane.normal.extend(plane.d).to_array();
+                return Err(VolumeError::plane(&format!("plane {index}"), numbers));
+            }
+        }
+        Ok(Self::from_finite(planes.iter().copied()))
+    }
+
+    fn from_finite(planes: impl ExactSizeIterator<Item = PlaneF64>) -> Self {
+        let mut volume = ConvexVolumeF64 {
+            planes: [PlaneF64::new(DVec3::ZERO, 0.0); MAX_PLANES],
+            count: planes.len(),
+            mask: 0,
+            p_vertices: [BoxCorner([true; 3]); MAX_PLANES],
+        };
+        for (index, plane) in planes.enumerate() {
+            volume.planes[index] = plane;
+            volume.p_vertices[index] = plane.p_vertex_corner();
+            volume.mask |= PlaneMask::from(!plane.is_trivial()) << index;
+        }
+        volume
+    }
+}
+
+/// The very same planes; only the arithmetic of the test is finer.
+impl From<&ConvexVolume> for ConvexVolumeF64 {
+    fn from(volume: &ConvexVolume) -> Self {
+        Self::from_finite(volume.planes().iter().map(PlaneF64::from))
+    }
+}
+
+/// The planes of a volume, and what is known of them by the bits of its mask.
+macro_rules! planes_of {
+    ($Volume:ident, $Plane:ident) => {
+        impl $Volume {
+            /// The planes, in the order in which they were given.
+            pub fn planes(&self) -> &[$Plane] {
+                &self.planes[..self.count]
+            }
+
+            /// Plane `index` of a mask bit: like `planes()[index]`, but without a check
+            /// in the inner loop (a bit index is always below [`MAX_PLANES`]).
+            #[inline(always)]
+            pub fn plane_of_bit(&self, index: u32) -> &$Plane {
+                &self.planes[index as usize % MAX_PLANES]
+            }
+
+            /// The p-vertex of plane `index`, without a check.
+            #[inline(always)]
+            pub fn p_vertex_of_bit(&self, index: u32) -> BoxCorner {
+                self.p_vertices[index as usize % MAX_PLANES]
+            }
+
+            /// Bits of the planes that constrain anything.
+            #[inline(always)]
+            pub fn mask(&self) -> PlaneMask {
+                self.mask
+            }
+        }
+    };
+}
+
+planes_of!(ConvexVolume, Plane);
+planes_of!(ConvexVolumeF64, PlaneF64);
 
 #[cfg(test)]
 mod tests {
@@ -266,5 +325,29 @@ mod tests {
             ConvexVolume::from_planes(&[sound; 33]),
             Err(VolumeError::TooManyPlanes { count: 33 })
         ));
+    }
+
+    #[test]
+    fn what_f32_rounds_away_decides_in_f64() {
+        // 1e8 - 1 is no f32: in f32 the point touches the plane.
+        let plane = PlaneF64::new(DVec3::X, -1e8 - 1.0);
+        let b = Aabb::new(Vec3::splat(0.0), Vec3::new(1e8, 0.0, 0.0));
+        assert!(plane.excludes(&b) && !plane.narrow().excludes(&b));
+    }
+
+    #[test]
+    fn bad_planes_in_f64_are_typed_errors() {
+        let good = PlaneF64::new(DVec3::X, 0.0);
+        let bad = PlaneF64::new(DVec3::X, f64::NAN);
+        assert!(matches!(
+            ConvexVolumeF64::from_planes(&[good, bad]),
+            Err(VolumeError::NotFinite { what, .. }) if what.starts_with("plane 1 ")
+        ));
+        assert!(matches!(
+            ConvexVolumeF64::from_planes(&[good; 33]),
+            Err(VolumeError::TooManyPlanes { count: 33 })
+        ));
+        let free = ConvexVolumeF64::from_planes(&[PlaneF64::new(DVec3::ZERO, 0.0), good]).unwrap();
+        assert_eq!(free.mask(), 0b10);
     }
 }

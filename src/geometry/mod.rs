@@ -7,10 +7,8 @@ mod balls;
 mod box_block;
 mod broadcast;
 mod convex_volume;
-mod convex_volume_f64;
 mod p_vertex;
 mod plane;
-mod plane_f64;
 mod plane_rows;
 mod plane_tree;
 mod relative_volume;
@@ -19,12 +17,12 @@ mod spheres;
 pub use aabb::Aabb;
 pub use balls::{BallBlock, BallBlocks, Balls};
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, blocks_of};
-pub use broadcast::{BallFrustum, BallPlane, BroadcastPlane, BroadcastPlanes, Planes};
-pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
-pub use convex_volume_f64::ConvexVolumeF64;
+pub use broadcast::{BallFrustum, BallPlane, BroadcastPlane, BroadcastPlanes, Planes, Sorted};
+pub use convex_volume::{
+    ConvexVolume, ConvexVolumeF64, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError,
+};
 pub use p_vertex::BoxCorner;
-pub use plane::Plane;
-pub use plane_f64::PlaneF64;
+pub use plane::{Plane, PlaneF64};
 pub use plane_rows::{PlaneRows, ROW_LANES};
 pub use plane_tree::{PlaneTree, PlaneTreeNode};
 pub use relative_volume::RelativeVolume;

@@ -2,7 +2,7 @@
 //! this crate goes through the arithmetic of [`Plane::value_at`]; changing one
 //! operation of it changes what the whole toolkit calls visible.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::{Aabb, BoxCorner};
@@ -20,81 +20,120 @@ pub struct Plane {
     pub d: f32,
 }
 
-impl Plane {
-    /// The half-space `normal . x + d >= 0`.
-    pub const fn new(normal: Vec3, d: f32) -> Self {
-        Plane { normal, d }
-    }
+/// A half-space in f64: the points `x` with `normal . x + d >= 0` (closed).
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PlaneF64 {
+    /// Points inward; of any length.
+    pub normal: DVec3,
+    /// Offset: above 0 where the zero point is inside.
+    pub d: f64,
+}
 
+/// The plane and its test, in f32 and in f64.
+macro_rules! half_space {
+    ($Plane:ident, $Vector:ident, $Real:ident) => {
+        impl $Plane {
+            /// The half-space `normal . x + d >= 0`.
+            pub const fn new(normal: $Vector, d: $Real) -> Self {
+                $Plane { normal, d }
+            }
+
+            /// `((nx*x + ny*y) + nz*z) + d` in the plane's numbers: three products, three sums, in
+            /// this order, no fused multiply-add.
+            ///
+            /// Each operation is monotone under round-to-nearest, so a corner that is
+            /// farther along the normal on every axis never evaluates lower. That is
+            /// why a parent box can never contradict its child and why trees return
+            /// the very same set as a linear scan, bit for bit. A box's f32 coordinate is
+            /// an f64 number, so nothing is rounded before the first product.
+            #[inline(always)]
+            pub fn value_at(&self, x: $Vector) -> $Real {
+                ((self.normal.x * x.x + self.normal.y * x.y) + self.normal.z * x.z) + self.d
+            }
+
+            /// The corner of `b` farthest along the normal (the p-vertex; Greene 1994,
+            /// "Detecting intersection of a rectangular solid and a convex
+            /// polyhedron", Graphics Gems IV, p. 74).
+            #[inline(always)]
+            pub fn p_vertex(&self, b: &Aabb) -> $Vector {
+                let pick =
+                    |n: $Real, low: f32, high: f32| $Real::from(if n >= 0.0 { high } else { low });
+                $Vector::new(
+                    pick(self.normal.x, b.min.x, b.max.x),
+                    pick(self.normal.y, b.min.y, b.max.y),
+                    pick(self.normal.z, b.min.z, b.max.z),
+                )
+            }
+
+            /// The corner that `p_vertex` takes of every box.
+            pub fn p_vertex_corner(&self) -> BoxCorner {
+                BoxCorner(self.normal.to_array().map(|n| n >= 0.0))
+            }
+
+            /// The corner of `b` nearest against the normal (the n-vertex).
+            #[inline(always)]
+            pub fn n_vertex(&self, b: &Aabb) -> $Vector {
+                self.p_vertex(&Aabb::new(b.max, b.min))
+            }
+
+            /// Returns whether the whole box lies strictly outside: its p-vertex evaluates
+            /// below zero. Touching is not outside.
+            #[inline(always)]
+            pub fn excludes(&self, b: &Aabb) -> bool {
+                self.value_at(self.p_vertex(b)) < 0.0
+            }
+
+            /// Returns whether the whole box lies inside: its n-vertex evaluates to at least
+            /// zero.
+            #[inline(always)]
+            pub fn contains(&self, b: &Aabb) -> bool {
+                self.value_at(self.n_vertex(b)) >= 0.0
+            }
+
+            /// Returns whether the point lies in the closed half-space.
+            #[inline(always)]
+            pub fn contains_point(&self, x: $Vector) -> bool {
+                self.value_at(x) >= 0.0
+            }
+
+            /// Returns whether all four numbers are finite.
+            pub fn is_finite(&self) -> bool {
+                self.normal.is_finite() && self.d.is_finite()
+            }
+
+            /// No constraint: a zero normal with `d >= 0`.
+            pub fn is_trivial(&self) -> bool {
+                self.normal == $Vector::ZERO && self.d >= 0.0
+            }
+        }
+    };
+}
+
+half_space!(Plane, Vec3, f32);
+half_space!(PlaneF64, DVec3, f64);
+
+impl Plane {
     /// The plane through `point` with inward `normal`.
     pub fn through(point: Vec3, normal: Vec3) -> Self {
         Plane::new(normal, -normal.dot(point))
     }
+}
 
-    /// `((nx*x + ny*y) + nz*z) + d` in f32: three products, three sums, in
-    /// this order, no fused multiply-add.
-    ///
-    /// Each operation is monotone under round-to-nearest, so a corner that is
-    /// farther along the normal on every axis never evaluates lower. That is
-    /// why a parent box can never contradict its child and why trees return
-    /// the very same set as a linear scan, bit for bit.
-    #[inline(always)]
-    pub fn value_at(&self, x: Vec3) -> f32 {
-        ((self.normal.x * x.x + self.normal.y * x.y) + self.normal.z * x.z) + self.d
+impl PlaneF64 {
+    /// The same plane in coordinates about another point.
+    pub fn about(&self, zero: DVec3) -> PlaneF64 {
+        PlaneF64::new(self.normal, self.normal.dot(zero) + self.d)
     }
 
-    /// The corner of `b` farthest along the normal (the p-vertex; Greene 1994,
-    /// "Detecting intersection of a rectangular solid and a convex
-    /// polyhedron", Graphics Gems IV, p. 74).
-    #[inline(always)]
-    pub fn p_vertex(&self, b: &Aabb) -> Vec3 {
-        let pick = |n: f32, low: f32, high: f32| if n >= 0.0 { high } else { low };
-        Vec3::new(
-            pick(self.normal.x, b.min.x, b.max.x),
-            pick(self.normal.y, b.min.y, b.max.y),
-            pick(self.normal.z, b.min.z, b.max.z),
-        )
+    /// Rounded once to f32.
+    pub fn narrow(&self) -> Plane {
+        Plane::new(self.normal.as_vec3(), self.d as f32)
     }
+}
 
-    /// The corner that [`Plane::p_vertex`] takes of every box.
-    pub fn p_vertex_corner(&self) -> BoxCorner {
-        BoxCorner(self.normal.to_array().map(|n| n >= 0.0))
-    }
-
-    /// The corner of `b` nearest against the normal (the n-vertex).
-    #[inline(always)]
-    pub fn n_vertex(&self, b: &Aabb) -> Vec3 {
-        self.p_vertex(&Aabb::new(b.max, b.min))
-    }
-
-    /// Returns whether the whole box lies strictly outside: its p-vertex evaluates
-    /// below zero. Touching is not outside.
-    #[inline(always)]
-    pub fn excludes(&self, b: &Aabb) -> bool {
-        self.value_at(self.p_vertex(b)) < 0.0
-    }
-
-    /// Returns whether the whole box lies inside: its n-vertex evaluates to at least
-    /// zero.
-    #[inline(always)]
-    pub fn contains(&self, b: &Aabb) -> bool {
-        self.value_at(self.n_vertex(b)) >= 0.0
-    }
-
-    /// Returns whether the point lies in the closed half-space.
-    #[inline(always)]
-    pub fn contains_point(&self, x: Vec3) -> bool {
-        self.value_at(x) >= 0.0
-    }
-
-    /// Returns whether all four numbers are finite.
-    pub fn is_finite(&self) -> bool {
-        self.normal.is_finite() && self.d.is_finite()
-    }
-
-    /// No constraint: a zero normal with `d >= 0`.
-    pub fn is_trivial(&self) -> bool {
-        self.normal == Vec3::ZERO && self.d >= 0.0
+impl From<&Plane> for PlaneF64 {
+    fn from(plane: &Plane) -> Self {
+        PlaneF64::new(plane.normal.as_dvec3(), f64::from(plane.d))
     }
 }
 
