@@ -18,8 +18,8 @@ use std::process::ExitCode;
 use cullbench::culling::{Culling, CullingTest};
 use cullbench::index::Registry;
 use cullbench::measure::{
-    Machine, Protocol, ReportCell, Schedule, Status, Stopwatch, Subject, TimedTask, Workload,
-    measure_group, timed,
+    Group, GroupPlan, Machine, Protocol, ReportCell, SceneInfo, Schedule, Status, Stopwatch,
+    Subject, TimedTask, Workload, measure, timed,
 };
 use cullbench::path::{self, CameraPath};
 use cullbench::scene::{self, Scene};
@@ -267,8 +267,10 @@ fn main() -> ExitCode {
             .map(|spec| Subject::build(spec, false, &scene, CullingTest::SixPlane))
             .collect();
         subjects.push(Subject::build(twin, true, &scene, CullingTest::SixPlane));
-        let group =
-            measure_group(&workload, &subjects, &[], &protocol, &|| false).expect("not stopped");
+        let info = SceneInfo::of(&scene);
+        let plan = GroupPlan::new(&workload, &info, protocol);
+        let measured = measure(&workload, &subjects, plan);
+        let group = Group::of(&[measured.expect("not stopped").0]);
         let query_ns = |cell: &ReportCell| {
             assert_eq!(cell.status, Status::Ok, "{:?}", cell.reason);
             cell.metrics["query_ns"].value

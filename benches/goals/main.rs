@@ -16,8 +16,8 @@ use cullbench::index::{
     FrustumQuery, Info, Input, Kind, Origin, RegionIndex, Registry, StructureSpec, Wide, caught,
 };
 use cullbench::measure::{
-    BOUNDS, Group, Machine, Metric, Protocol, ReportCell, Status, Stopwatch, Subject, Workload,
-    cameras_within, measure_group,
+    BOUNDS, Group, GroupPlan, Machine, Metric, Protocol, ReportCell, SceneInfo, Status, Stopwatch,
+    Subject, Workload, cameras_within, measure,
 };
 use cullbench::query::AnyVolume;
 use cullbench::scene::Scene;
@@ -162,7 +162,7 @@ fn heat(entered: Vec<Subject>, workload: &Workload) -> (Vec<Subject>, Vec<Subjec
     let of_peers = |c: &Subject| is_peer(c.spec.info()).then(|| time(c)).flatten();
     let times: Vec<Option<f64>> = entered.iter().map(of_peers).collect();
     let timed = entered.iter().zip(&times);
-    let of_crates = timed.filter(|(c, _)| c.spec.info().origin.is_crate());
+    let of_crates = timed.filter(|(c, _)| matches!(c.spec.info().origin, Origin::Crate(_)));
     let fastest = of_crates
         .filter_map(|(_, time)| *time)
         .fold(f64::INFINITY, f64::min);
@@ -366,8 +366,13 @@ fn main() -> ExitCode {
             };
             println!("{}", world.row(way));
             let (stay, out) = heat(subjects, &workload);
-            let group =
-                measure_group(&workload, &stay, BOUNDS, &protocol, &|| false).expect("not stopped");
+            let info = SceneInfo::of(&scene);
+            let plan = GroupPlan {
+                bounds: BOUNDS,
+                ..GroupPlan::new(&workload, &info, protocol)
+            };
+            let measured = measure(&workload, &stay, plan);
+            let group = Group::of(&[measured.expect("not stopped").0]);
             judge_row(&mut judge, world, way, &group);
             subjects = stay.into_iter().chain(out).collect();
             if way.path == ALL && !world.cold {

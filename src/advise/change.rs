@@ -12,8 +12,7 @@ use super::options::{AdviseInput, planned};
 use crate::culling::{Culling, CullingTest};
 use crate::funnel::StudyError;
 use crate::measure::{
-    Group, GroupPlan, Known, Part, PathInfo, ProcessTimes, ReportCell, SceneInfo, Subject,
-    Workload, measure_queries_or_frames,
+    Group, GroupPlan, Known, Part, ProcessTimes, ReportCell, SceneInfo, Subject, Workload, measure,
 };
 use crate::motion::Motion;
 
@@ -256,17 +255,15 @@ impl Changed {
             Subject::build(spec, false, scene, CullingTest::SixPlane)
         };
         let subjects: Vec<_> = beside.contenders.iter().chain(further).map(build).collect();
+        let info = SceneInfo::of(scene);
         let plan = GroupPlan {
-            scene: &SceneInfo::of(scene),
-            path: PathInfo::of(&path.name, &workload, false),
             process: u32::from(self.known.is_some()),
-            protocol: *input.protocol,
-            bounds: &[],
             known: self.known.as_ref(),
             plan_only: self.known.is_none(),
             locate: false,
+            ..GroupPlan::new(&workload, &info, *input.protocol)
         };
-        let measured = measure_queries_or_frames(&workload, &subjects, plan, &|_, _| (), &|| false);
+        let measured = measure(&workload, &subjects, plan);
         let (part, items) = (measured?.0, scene.items.len());
         let moved = workload.motion.as_ref().map(Motion::share);
         let reached = match self.axis {
@@ -281,7 +278,7 @@ impl Changed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::{GroupKey, Status};
+    use crate::measure::{GroupKey, PathInfo, Status};
 
     /// Cells of structures with their times, ns; ten processes, each a little off.
     fn cells(times: &[(&str, f64)]) -> Vec<ReportCell> {

@@ -55,7 +55,7 @@ impl MotionChoice {
         let mut all = input.structures.iter();
         let are_rows = all.clone().any(|s| s.policy != UpdatePolicy::Refit);
         let spec = all.find(|s| structure.name.as_ref() == Some(&s.label));
-        let refits = spec.is_none_or(|spec| spec.info().capabilities.refits);
+        let refits = spec.is_none_or(|spec| spec.info().refits);
         let spec = spec.filter(|_| refits && !structure.is_scan);
         for policy in POLICIES.into_iter().filter(|_| !are_rows) {
             let frames = match policy {

@@ -134,7 +134,7 @@ fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSp
     }
     let mut all = Vec::new();
     for spec in specs {
-        let refits = spec.info().capabilities.refits;
+        let refits = spec.info().refits;
         let mut has_rebuilt = false;
         for &policy in &policies {
             let mut own = spec.clone();
@@ -196,10 +196,14 @@ impl KernelArgs {
     /// Fails if this machine lacks the instruction set.
     pub fn execution(&self) -> Result<Execution, SpecError> {
         let kernel = self.name.unwrap_or_else(Kernel::best);
-        let kernel = kernel.checked().map_err(|error| {
+        if !kernel.is_available() {
             let here: Vec<_> = Kernel::available().map(Kernel::name).collect();
-            SpecError::new(format_args!("{error}; available: {}", here.join(", ")))
-        })?;
+            return Err(SpecError::new(format_args!(
+                "kernel '{kernel}' needs instructions that this processor does not have; \
+                 available: {}",
+                here.join(", ")
+            )));
+        }
         Ok(Execution {
             kernel,
             threads: self.threads.iter().copied().max().unwrap_or(1),

@@ -137,7 +137,17 @@ impl Culling {
         let more = self.more(camera, local_eye, around)?;
         let about_scene = more.iter().map(|plane| plane.about(-local_eye));
         match self.arithmetic {
-            Arithmetic::F32 => self.in_f32(camera, &about_scene.collect::<Vec<_>>(), around),
+            Arithmetic::F32 => {
+                let more: Vec<PlaneF64> = about_scene.collect();
+                let volume = camera.volume_with(&more, &self.planes, around)?;
+                if self.test != CullingTest::Sphere {
+                    return Ok(CameraView::Volume(volume));
+                }
+                // The cubes about the items' spheres are what is indexed.
+                let reach = around.reach.as_dvec3();
+                check_sums(&volume, reach + reach.length())?;
+                Ok(CameraView::Spheres(Box::new(Spheres::new(&volume))))
+            }
             Arithmetic::F64 => {
                 let mut planes = camera.convex_volume_f64(around)?.planes().to_vec();
                 planes.extend(about_scene);
@@ -197,25 +207,6 @@ impl Culling {
             "the margin is proven for f32 planes of the frame with c = {DEFAULT_EPSILON} or more, \
              not for {found}: visible items may be lost"
         ))
-    }
-
-    /// f32 planes in scene coordinates.
-    fn in_f32(
-        &self,
-        camera: &Camera,
-        more: &[PlaneF64],
-        around: &Surroundings,
-    ) -> Result<CameraView, CullingError> {
-        let volume = camera.volume_with(more, &self.planes, around)?;
-        Ok(match self.test {
-            CullingTest::Sphere => {
-                // The cubes about the items' spheres are what is indexed.
-                let reach = around.reach.as_dvec3();
-                check_sums(&volume, reach + reach.length())?;
-                CameraView::Spheres(Box::new(Spheres::new(&volume)))
-            }
-            _ => CameraView::Volume(volume),
-        })
     }
 
     /// Planes of the test beyond the faces, about the eye.

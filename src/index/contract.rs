@@ -11,7 +11,7 @@ use super::{Info, TreeCell};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::{Isa, Kernel, Plain, Work};
 use crate::query::{
-    Context, ItemId, ManySink, NoRecorder, QueryContext, QueryCost, QueryVolume, Ranges, Recorder,
+    Context, ItemId, Located, NoRecorder, QueryContext, QueryCost, QueryVolume, Ranges, Recorder,
     Sink,
 };
 use crate::threads::Pool;
@@ -138,7 +138,7 @@ impl<'a> Input<'a> {
     }
 
     /// Number of threads that the build may use, at least 1. A structure that reads it
-    /// declares [`Capabilities::threaded_build`](super::Capabilities).
+    /// declares `threaded_build` in its [`Info`].
     pub fn threads(&self) -> usize {
         self.pool.map_or(1, Pool::threads)
     }
@@ -186,27 +186,20 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// that stays a call runs portable code.
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, context: &mut C) -> ControlFlow<()>;
 
-    /// Region search for many points: the sink gets the ids of each point in one slice,
-    /// in the order of [`RegionIndex::query`], point after point. `Break` if the sink
-    /// ended the batch.
+    /// Region search for many points: adds the ids of each point, in the order of
+    /// [`RegionIndex::query`], point after point.
     ///
     /// The default searches point by point; a structure that interleaves several descents
     /// overrides it.
     #[inline(always)]
-    fn query_many<I: Isa, S: ManySink>(
-        &self,
-        isa: I,
-        points: &[Vec3],
-        sink: &mut S,
-    ) -> ControlFlow<()> {
+    fn query_many<I: Isa>(&self, isa: I, points: &[Vec3], out: &mut Located) {
         let mut ids = Vec::new();
-        for (p, point) in points.iter().zip(0..) {
+        for p in points {
             ids.clear();
             // A Vec never breaks off.
             let _ = self.query(p, &mut QueryContext::new(isa, &mut ids, &mut NoRecorder));
-            sink.accept(point, &ids)?;
+            out.push(&ids);
         }
-        ControlFlow::Continue(())
     }
 
     /// Takes over the new bounds of `moved` items without a new build.
@@ -217,7 +210,7 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// empty, as before the first frame of a motion. Returns false, with the structure
     /// unchanged, if a rebuild is needed: where an item becomes or ceases to be empty, and
     /// always from a structure that does not declare
-    /// [`Capabilities::refits`](super::Capabilities).
+    /// `refits` in its [`Info`].
     fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
         false
     }
@@ -238,7 +231,7 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// Item ids in the order that ranges passed to [`Sink::accept_range`] refer to.
     ///
     /// `None` from a structure without such an order, which does not declare
-    /// [`Capabilities::ranges`](super::Capabilities).
+    /// `ranges` in its [`Info`].
     fn tree_order(&self) -> Option<&[ItemId]> {
         None
     }

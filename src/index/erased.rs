@@ -4,7 +4,6 @@
 //! compiled for that structure, volume, recorder and instruction set.
 
 use std::fmt;
-use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::str::FromStr;
 
@@ -22,10 +21,8 @@ use crate::spec::{SpecError, parse_number};
 /// changed by then stays as it is and must not be relied upon.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
-        let text = panic
-            .downcast_ref::<String>()
-            .map(String::as_str)
-            .or_else(|| panic.downcast_ref::<&str>().copied());
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
         text.unwrap_or("no message").to_owned()
     })
 }
@@ -168,7 +165,7 @@ impl<T: RegionIndex> DynIndex for WithKernel<T> {
     fn query_many(&self, points: &[Vec3], out: &mut Located) {
         out.clear();
         let index = &self.index;
-        let _ = self.kernel.run(QueryMany { index, points, out });
+        self.kernel.run(QueryMany { index, points, out });
     }
 
     fn cells(&self) -> Vec<TreeCell<'_>> {
@@ -192,11 +189,11 @@ pub(crate) struct QueryMany<'a, T> {
 }
 
 impl<T: RegionIndex> Work for QueryMany<'_, T> {
-    type Output = ControlFlow<()>;
+    type Output = ();
 
     #[inline(always)]
-    fn run<I: Isa>(self, isa: I) -> ControlFlow<()> {
-        self.index.query_many(isa, self.points, self.out)
+    fn run<I: Isa>(self, isa: I) {
+        self.index.query_many(isa, self.points, self.out);
     }
 }
 

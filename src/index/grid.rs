@@ -10,7 +10,7 @@ use glam::{UVec3, Vec3};
 
 use super::box_test::{BoxTest, BoxTested, Tally};
 use super::items::Record;
-use super::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
+use super::{BuildError, Info, Kind, MemoryUsage, NoParams};
 use crate::geometry::Aabb;
 use crate::query::{ItemId, Recorder, Sink};
 
@@ -132,11 +132,10 @@ impl UniformGrid {
 }
 
 impl BoxTested for UniformGrid {
-    const ABOUT: Info = Info::new(
+    const ABOUT: Info = Info::ours(
         "uniform-grid",
         "uniform grid: items in the cell of their centre, exact cell bounds",
         Kind::Grid,
-        Origin::Ours,
     );
     type Params = NoParams;
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// use cullbench::index::{Info, Kind, Origin};
 /// const INFO: Info = Info::new("tiles", "tiles of 32 items", Kind::Grid, Origin::Crate("mine"))
 ///     .refits();
-/// assert!(INFO.capabilities.refits && !INFO.capabilities.ranges);
+/// assert!(INFO.refits && !INFO.ranges);
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
@@ -24,8 +24,14 @@ pub struct Info {
     pub kind: Kind,
     /// Author of the code.
     pub origin: Origin<&'static str>,
-    /// Capabilities beyond the contract.
-    pub capabilities: Capabilities,
+    /// [`RegionIndex::refit`](super::RegionIndex::refit) takes over items that
+    /// have moved; otherwise it always declines.
+    pub refits: bool,
+    /// [`RegionIndex::tree_order`](super::RegionIndex::tree_order): answers
+    /// may be ranges of the structure's own order.
+    pub ranges: bool,
+    /// A build makes use of several threads.
+    pub threaded_build: bool,
     /// Timed if named, or with `all`, and not part of the list `default`: a form for
     /// comparison, or one that is always another of the list.
     pub on_request: bool,
@@ -61,20 +67,6 @@ pub enum Origin<Name = String> {
     StandIn(Name),
 }
 
-/// Capabilities of a structure beyond the contract, off unless declared.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-#[non_exhaustive]
-pub struct Capabilities {
-    /// [`RegionIndex::refit`](super::RegionIndex::refit) takes over items that
-    /// have moved; otherwise it always declines.
-    pub refits: bool,
-    /// [`RegionIndex::tree_order`](super::RegionIndex::tree_order): answers
-    /// may be ranges of the structure's own order.
-    pub ranges: bool,
-    /// A build makes use of several threads.
-    pub threaded_build: bool,
-}
-
 impl Info {
     /// Peak bytes per item of a build, its index included.
     ///
@@ -99,30 +91,33 @@ impl Info {
             summary,
             kind,
             origin,
-            capabilities: Capabilities {
-                refits: false,
-                ranges: false,
-                threaded_build: false,
-            },
+            refits: false,
+            ranges: false,
+            threaded_build: false,
             on_request: false,
         }
     }
 
-    /// Declares [`Capabilities::refits`].
+    /// A structure of this crate.
+    pub(crate) const fn ours(name: &'static str, summary: &'static str, kind: Kind) -> Info {
+        Info::new(name, summary, kind, Origin::Ours)
+    }
+
+    /// Declares the capability `refits`.
     pub const fn refits(mut self) -> Info {
-        self.capabilities.refits = true;
+        self.refits = true;
         self
     }
 
-    /// Declares [`Capabilities::ranges`].
+    /// Declares the capability `ranges`.
     pub const fn ranges(mut self) -> Info {
-        self.capabilities.ranges = true;
+        self.ranges = true;
         self
     }
 
-    /// Declares [`Capabilities::threaded_build`].
+    /// Declares the capability `threaded_build`.
     pub const fn threaded_build(mut self) -> Info {
-        self.capabilities.threaded_build = true;
+        self.threaded_build = true;
         self
     }
 
@@ -132,16 +127,8 @@ impl Info {
         self
     }
 
-    /// The declaration under another name, for a variant with parameters of its own.
-    pub const fn named(mut self, name: &'static str) -> Info {
-        self.name = name;
-        self
-    }
-}
-
-impl Capabilities {
     /// Names of the declared capabilities.
-    pub fn names(&self) -> Vec<&'static str> {
+    pub fn capabilities(&self) -> Vec<&'static str> {
         let all = [
             (self.refits, "refits"),
             (self.ranges, "ranges"),
@@ -150,17 +137,18 @@ impl Capabilities {
         let declared = all.into_iter().filter(|(is_declared, _)| *is_declared);
         declared.map(|(_, name)| name).collect()
     }
+
+    /// The declaration under another name, for a variant with parameters of its own.
+    pub const fn named(mut self, name: &'static str) -> Info {
+        self.name = name;
+        self
+    }
 }
 
 impl<Name> Origin<Name> {
     /// Returns whether this crate's code answers, not a stand-in.
     pub fn is_ours(&self) -> bool {
         matches!(self, Origin::Ours)
-    }
-
-    /// Returns whether another crate's own code answers, not a stand-in.
-    pub fn is_crate(&self) -> bool {
-        matches!(self, Origin::Crate(_))
     }
 }
 

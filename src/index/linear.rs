@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::items::{ABSENT, PaddedIds, Positions, indexable};
 use super::shared_query::{QueryInParts, QueryThreads, in_parts};
-use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex};
+use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, RegionIndex};
 use crate::geometry::{Aabb, BallBlocks, Balls, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, first_lanes, pairs};
 use crate::query::{
@@ -26,11 +26,10 @@ pub struct LinearScalar {
 }
 
 impl RegionIndex for LinearScalar {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "linear-scalar",
         "the textbook loop over all boxes, O(n)",
         Kind::Scan,
-        Origin::Ours,
     );
     type Params = NoParams;
 
@@ -185,11 +184,10 @@ impl<I: Isa, Q: QueryVolume> QueryInParts<I> for SharedScan<'_, Q> {
 }
 
 impl RegionIndex for Linear {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "linear",
         "scan over blocks of sixteen boxes, O(n)",
         Kind::Scan,
-        Origin::Ours,
     )
     .refits();
     type Params = LinearParams;

@@ -70,7 +70,7 @@ pub use contract::{BuildError, FrustumQuery, Input, MemoryUsage, NoParams, Query
 pub(crate) use erased::QueryMany;
 pub use erased::{DynIndex, Execution, UpdatePolicy, WithKernel, caught};
 pub use grid::UniformGrid;
-pub use info::{Capabilities, Info, Kind, Origin};
+pub use info::{Info, Kind, Origin};
 pub use items::{Record, indexable};
 pub use linear::{Linear, LinearParams, LinearScalar};
 pub use registry::{Registry, Row, StructureSpec};

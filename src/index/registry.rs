@@ -209,10 +209,8 @@ impl Registry {
         };
         // Numbers and booleans as such, anything else as text.
         let parsed = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
-        let given = spec
-            .given()
-            .map(|(key, text)| (key.to_owned(), parsed(text)));
-        let given: Map<String, Value> = given.collect();
+        let given = |(key, text): (&str, &str)| (key.to_owned(), parsed(text));
+        let given: Map<String, Value> = spec.given().map(given).collect();
         let params = (row.params)(&Value::Object(given)).map_err(SpecError::new)?;
         let has_given = spec.given().next().is_some();
         let spec = StructureSpec {

@@ -56,14 +56,6 @@ pub trait Work {
     fn run<I: Isa>(self, isa: I) -> Self::Output;
 }
 
-/// The processor lacks a kernel's instructions.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("kernel '{kernel}' needs instructions that this processor does not have")]
-pub struct Unavailable {
-    /// The requested kernel.
-    pub kernel: Kernel,
-}
-
 impl Kernel {
     /// Returns whether this processor (and operating system) runs it. Detected once.
     #[inline]
@@ -81,17 +73,6 @@ impl Kernel {
     /// The largest instruction set of this machine.
     pub fn best() -> Kernel {
         Kernel::available().last().unwrap_or(Kernel::Portable)
-    }
-
-    /// Itself, if this machine runs it.
-    ///
-    /// # Errors
-    /// The processor lacks it.
-    pub fn checked(self) -> Result<Kernel, Unavailable> {
-        match self.is_available() {
-            true => Ok(self),
-            false => Err(Unavailable { kernel: self }),
-        }
     }
 
     /// Does the work with this instruction set, or with the portable one where

@@ -283,9 +283,9 @@ impl PathInfo {
         }
     }
 
-    /// The facts of a workload along the path of this name.
-    pub fn of(path: &str, workload: &Workload, cold: bool) -> PathInfo {
-        let motion = workload.motion.as_ref();
+    /// The facts of a workload.
+    pub fn of(workload: &Workload, cold: bool) -> PathInfo {
+        let (path, motion) = (&workload.path, workload.motion.as_ref());
         let name = motion.map_or("", |motion| &motion.name);
         let key = GroupKey::of(&workload.scene.name, path, cold, &workload.culling, name);
         let views_per_frame = motion.map_or(0, |_| workload.views_per_frame);

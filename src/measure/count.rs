@@ -242,11 +242,18 @@ impl Judged {
 }
 
 /// Errors with their false positives attributed to the planes or to the test.
+///
+/// What boxes would have told is the sphere test's own. The exact test tells all there is to
+/// tell: what it returns too much of the stored boxes is its planes'.
 pub fn blamed(test: CullingTest, errors: ErrorCount) -> ErrorCount {
-    match test {
-        CullingTest::Sphere => errors.of_spheres(),
-        CullingTest::Exact => errors.of_exact_test(),
-        CullingTest::SixPlane | CullingTest::SixBox => errors,
+    let by_planes = match test {
+        CullingTest::Sphere => 0,
+        CullingTest::Exact => errors.false_positives - errors.by_storage,
+        CullingTest::SixPlane | CullingTest::SixBox => errors.by_planes,
+    };
+    ErrorCount {
+        by_planes,
+        ..errors
     }
 }
 
@@ -269,7 +276,7 @@ fn verdict(
             let reason = format!("the count pass took longer than {} s", PATIENCE.as_secs());
             Verdict::new(Status::TimedOut, reason)
         }
-        Ok(()) => Verdict::ok(),
+        Ok(()) => Verdict::default(),
     }
 }
 

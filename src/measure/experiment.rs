@@ -6,16 +6,16 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::bounds::{BOUNDS, Bound};
-use super::frames::measure_queries_or_frames;
+use super::bounds::BOUNDS;
+use super::frames::measure;
 use super::group::GroupPlan;
 use super::key::{CellKey, GroupKey};
 use super::moving::refitted_ln;
 use super::process_result::{Known, Part, TaskSamples};
 use super::schedule::cameras_within;
 use super::{
-    Group, Machine, Notice, PathInfo, Protocol, SceneInfo, Status, Subject, Verdict, Workload,
-    WorkloadError, guarded,
+    Machine, Notice, Protocol, SceneInfo, Status, Subject, Verdict, Workload, WorkloadError,
+    guarded,
 };
 use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
@@ -298,15 +298,10 @@ pub fn measure_scene(
         let known = share.known[n].as_ref();
         // Built once for all tests over boxes, and again for spheres.
         let of_spheres = group.culling.test == CullingTest::Sphere;
-        if built.as_ref().is_none_or(|(kind, _)| *kind != of_spheres) {
-            // The old ones go first: memory for one set is enough.
-            drop(built.take());
-            let all = plan.subjects(&scene, group.culling.test, share, notice);
-            built = Some((of_spheres, all));
-        }
-        let Some((_, subjects)) = &built else {
-            continue;
-        };
+        // The old ones go first: memory for one set is enough.
+        drop(built.take_if(|(kind, _)| *kind != of_spheres));
+        let build = || plan.subjects(&scene, group.culling.test, share, notice);
+        let (_, subjects) = built.get_or_insert_with(|| (of_spheres, build()));
         notice(None, &group.path);
         let scale = known.and_then(|known| known.lens_scale);
         let path = path::load_scaled(&group.path, &scene, &plan.lens, scale)?;
@@ -314,19 +309,17 @@ pub fn measure_scene(
         let motion = motion.map(|motion| Motion::load(motion, &scene));
         let (motion, views) = (motion.transpose()?, plan.views_per_frame);
         let workload = Workload::moving(&scene, &path, &group.culling, motion, views)?;
+        let protocol = Protocol {
+            rounds: plan.effort.rounds,
+            task_ns: plan.effort.task_ns,
+            cameras: cameras_within(plan.effort.pass_ns, scene.items.len()),
+            cold: group.cold,
+            // Other orders in each process.
+            seed: plan.seed.wrapping_add(u64::from(share.process)),
+            cache_bytes: sweep,
+        };
         let settings = GroupPlan {
-            scene: &info,
-            path: PathInfo::of(&group.path, &workload, group.cold),
             process: share.process,
-            protocol: Protocol {
-                rounds: plan.effort.rounds,
-                task_ns: plan.effort.task_ns,
-                cameras: cameras_within(plan.effort.pass_ns, scene.items.len()),
-                cold: group.cold,
-                // Other orders in each process.
-                seed: plan.seed.wrapping_add(u64::from(share.process)),
-                cache_bytes: sweep,
-            },
             bounds: match plan.bounds && plan.has_all() {
                 true => BOUNDS,
                 false => &[],
@@ -334,10 +327,11 @@ pub fn measure_scene(
             known,
             plan_only: share.plan_only,
             locate: plan.effort.extras != Extras::Nothing,
+            notice,
+            stop,
+            ..GroupPlan::new(&workload, &info, protocol)
         };
-        let protocol = settings.protocol;
-        let measured = measure_queries_or_frames(&workload, subjects, settings, notice, stop);
-        let Some((mut part, samples)) = measured else {
+        let Some((mut part, samples)) = measure(&workload, subjects, settings) else {
             return Ok(false);
         };
         // In the first group of each scene only.
@@ -359,31 +353,6 @@ pub fn measure_scene(
         keep(part, samples);
     }
     Ok(true)
-}
-
-/// Measures a group in this process alone; `None` if stopped.
-///
-/// Values have no intervals, and ranks are the order of the values.
-pub fn measure_group(
-    workload: &Workload,
-    subjects: &[Subject],
-    bounds: &[Bound],
-    protocol: &Protocol,
-    stop: &dyn Fn() -> bool,
-) -> Option<Group> {
-    let scene = SceneInfo::of(workload.scene);
-    let plan = GroupPlan {
-        path: PathInfo::of(&workload.path, workload, protocol.cold),
-        scene: &scene,
-        process: 0,
-        protocol: *protocol,
-        bounds,
-        known: None,
-        plan_only: false,
-        locate: true,
-    };
-    let (part, _) = measure_queries_or_frames(workload, subjects, plan, &|_, _| (), stop)?;
-    Some(Group::of(&[part]))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! [`measure_frames`]: the measurement of a group whose items move, by one process.
+//! [`measure`]: the measurement of a group by one process, and here of items that move.
 //!
 //! A frame takes the moves, updates the index, and answers the queries of one or more views.
 //! Each structure replays the same motion over its own items, from a fresh build in every
@@ -6,17 +6,16 @@
 //! every set is compared with the reference scan, in later rounds every size.
 
 use super::clock::Stopwatch;
-use super::group::{GroupPlan, counts, measure_part, structure_of, task_part};
+use super::group::{GroupPlan, counts, queries, task_part};
 use super::key::TaskKey;
 use super::moving::{Frames, Laps, Moving, ageing, replay, times_of};
-use super::process_result::{Known, Part, SubjectPart, TaskSamples};
+use super::process_result::{Known, Measured, Part, SubjectPart};
 use super::schedule::Orders;
 use super::{
-    Answer, Counted, KeyedSchedule, Notice, Protocol, Sample, Schedule, Status, Subject, TIMING,
-    TaskKind, TaskPlan, Timed, Verdict, Workload, guarded,
+    Answer, Counted, KeyedSchedule, Protocol, Sample, Schedule, Status, Subject, TIMING, TaskKind,
+    TaskPlan, Timed, Verdict, Workload, guarded,
 };
 use crate::index::{StructureSpec, UpdatePolicy};
-use crate::motion::Motion;
 use crate::query::QueryCost;
 
 /// Ageing is measured in every n-th process, because it costs builds.
@@ -41,28 +40,11 @@ struct Entry<'a> {
 
 /// Measures a group in this process: queries of a still scene, or frames; `None` if
 /// stopped.
-pub fn measure_queries_or_frames(
-    workload: &Workload,
-    subjects: &[Subject],
-    plan: GroupPlan<'_>,
-    notice: Notice,
-    stop: &dyn Fn() -> bool,
-) -> Option<(Part, Vec<TaskSamples>)> {
-    match &workload.motion {
-        None => measure_part(workload, subjects, plan, notice, stop),
-        Some(motion) => measure_frames(workload, motion, subjects, plan, notice, stop),
-    }
-}
-
-/// Measures a group whose items move; `None` if stopped.
-fn measure_frames(
-    workload: &Workload,
-    motion: &Motion,
-    subjects: &[Subject],
-    plan: GroupPlan<'_>,
-    notice: Notice,
-    stop: &dyn Fn() -> bool,
-) -> Option<(Part, Vec<TaskSamples>)> {
+pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Option<Measured> {
+    let Some(motion) = &workload.motion else {
+        return queries(workload, subjects, plan);
+    };
+    let (notice, stop) = (plan.notice, plan.stop);
     let answered = plan.known.filter(|known| !known.visible.is_empty());
     if answered.is_none() {
         notice(None, "scanning the frames");
@@ -95,7 +77,7 @@ fn measure_frames(
     let given = plan.known.and_then(|known| known.query.clone());
     let planned = given.unwrap_or_else(|| schedule(&entries, frames, &plan.protocol));
     if !plan.plan_only {
-        time(&mut entries, frames, &planned, &plan, notice, stop)?;
+        time(&mut entries, frames, &planned, &plan)?;
     }
     let (mut tasks, mut samples) = (Vec::new(), Vec::new());
     for key in planned.keys.iter().filter(|_| !plan.plan_only) {
@@ -148,8 +130,7 @@ fn measure_frames(
 
 /// False for a structure that is built again in every frame or in every n-th.
 fn ages(spec: &StructureSpec) -> bool {
-    spec.info().capabilities.refits
-        && !matches!(spec.policy, UpdatePolicy::Rebuild | UpdatePolicy::Every(_))
+    spec.info().refits && !matches!(spec.policy, UpdatePolicy::Rebuild | UpdatePolicy::Every(_))
 }
 
 impl Entry<'_> {
@@ -238,21 +219,18 @@ impl Entry<'_> {
 }
 
 /// Rounds of each structure, from the time of its replay in the count pass.
-fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSchedule<TaskKey> {
+fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSchedule {
     let own = |e: &Entry| ((protocol.task_ns / e.replay_ns) as usize).clamp(1, protocol.rounds[1]);
     let timed = entries.iter().filter(|entry| entry.runs());
     let rounds = timed.clone().map(own).max().unwrap_or(0);
     let several = frames.workload.views_per_frame > 1;
-    let kinds = KINDS
-        .into_iter()
-        .filter(|kind| several || *kind != TaskKind::Further);
+    let mut kinds = KINDS.to_vec();
+    kinds.retain(|kind| several || *kind != TaskKind::Further);
     let tasks = timed.flat_map(|entry| {
         let every = (rounds / own(entry)) as u32;
-        kinds.clone().map(move |kind| {
-            (
-                (entry.part.label.clone(), kind),
-                TaskPlan { batch: 1, every },
-            )
+        kinds.iter().map(move |&kind| {
+            let key = (entry.part.label.clone(), kind);
+            (key, TaskPlan { batch: 1, every })
         })
     });
     let (keys, tasks): (Vec<TaskKey>, _) = tasks.unzip();
@@ -262,7 +240,7 @@ fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSch
         cold: false,
         tasks,
     };
-    schedule.share_rounds(&keys, |(label, kind)| (structure_of(label, &[]), *kind));
+    schedule.share_rounds(&keys);
     KeyedSchedule { keys, schedule }
 }
 
@@ -270,11 +248,10 @@ fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSch
 fn time(
     entries: &mut [Entry],
     frames: &Frames,
-    planned: &KeyedSchedule<TaskKey>,
+    planned: &KeyedSchedule,
     plan: &GroupPlan,
-    notice: Notice,
-    stop: &dyn Fn() -> bool,
 ) -> Option<()> {
+    let stop = plan.stop;
     let mut orders = Orders::new(entries.len(), plan.protocol.seed);
     for round in 0..planned.schedule.rounds {
         for n in orders.next() {
@@ -285,7 +262,7 @@ fn time(
             if !is_due || !entry.runs() {
                 continue;
             }
-            notice(Some(&entry.subject.spec.label), TIMING);
+            (plan.notice)(Some(&entry.subject.spec.label), TIMING);
             if stop() {
                 return None;
             }

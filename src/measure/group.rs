@@ -1,4 +1,4 @@
-//! [`measure_part`]: the measurement of one group of cells by one process.
+//! The measurement of one group of cells by one process: [`queries`] of a still scene.
 //!
 //! The first process counts, checks with the oracle, makes the schedules, and times. The
 //! others compare the digests of answers with those of the first, and time by its schedules.
@@ -8,12 +8,13 @@ use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
 use super::count::{Counted, MOST_JUDGED, count_pass, judge};
-use super::index_under_test::TWIN;
+use super::index_under_test::original;
 use super::key::{GroupKey, Pass, TaskKey};
-use super::process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
+use super::process_result::{Known, Measured, Part, SubjectPart, TaskPart};
+use super::schedule::Tasks;
 use super::{
     Answer, Judged, KeyedSchedule, Notice, PathInfo, Protocol, SceneInfo, Schedule, Status,
-    Subject, TIMING, TaskKind, Tasks, Timed, TimedTask, Verdict, Workload, guarded, timed,
+    Subject, TIMING, TaskKind, Timed, TimedTask, Verdict, Workload, guarded, timed,
 };
 use crate::kernel::Kernel;
 use crate::statistics::{interquartile_mean, median};
@@ -41,9 +42,31 @@ pub struct GroupPlan<'a> {
     pub plan_only: bool,
     /// True if region search is timed as well.
     pub locate: bool,
+    /// Gets each step.
+    pub notice: Notice<'a>,
+    /// Returns true to stop.
+    pub stop: &'a dyn Fn() -> bool,
 }
 
-impl GroupPlan<'_> {
+impl<'a> GroupPlan<'a> {
+    /// The plan of a process that is alone, for warm or cold caches.
+    ///
+    /// It times region search as well, and no lower bounds.
+    pub fn new(workload: &Workload, scene: &'a SceneInfo, protocol: Protocol) -> GroupPlan<'a> {
+        GroupPlan {
+            path: PathInfo::of(workload, protocol.cold),
+            scene,
+            process: 0,
+            protocol,
+            bounds: &[],
+            known: None,
+            plan_only: false,
+            locate: true,
+            notice: &|_, _| (),
+            stop: &|| false,
+        }
+    }
+
     /// The part of this process without results.
     pub(super) fn part(self, workload: &Workload, known: Option<Known>) -> Part {
         Part {
@@ -71,16 +94,9 @@ impl Entry<'_> {
     }
 }
 
-/// Measures a group in this process; `None` if stopped.
-///
-/// Returns the part, and the samples of each task.
-pub fn measure_part(
-    workload: &Workload,
-    subjects: &[Subject],
-    plan: GroupPlan<'_>,
-    notice: Notice,
-    stop: &dyn Fn() -> bool,
-) -> Option<(Part, Vec<TaskSamples>)> {
+/// Measures a group of queries of a still scene; `None` if stopped.
+pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Option<Measured> {
+    let (notice, stop) = (plan.notice, plan.stop);
     let answered = plan.known.filter(|known| !known.visible.is_empty());
     let (mut entries, judged, answers) = match answered {
         None => count(workload, subjects, notice),
@@ -113,23 +129,22 @@ pub fn measure_part(
             ..plan.protocol
         };
         let mut schedule = keyed.schedule(given, workload.views.len(), &protocol);
-        schedule.share_rounds(keyed.keys(), |(label, kind)| {
-            (structure_of(label, &[]), *kind)
-        });
-        let labels = keyed.keys().iter().map(|(label, _)| label);
-        let structures: Vec<_> = labels.map(|l| structure_of(l, &bounds)).collect();
+        schedule.share_rounds(&keyed.keys);
+        let labels = keyed.keys.iter().map(|(label, _)| label);
+        let structure = |label| (!bounds.contains(label)).then(|| original(label));
+        let structures: Vec<Option<&str>> = labels.map(structure).collect();
         let turn = |task: usize| {
             notice(structures[task], TIMING);
             stop()
         };
         let timed = match plan.plan_only {
             true => Vec::new(),
-            false => timed(keyed.tasks(), &schedule, &plan.protocol, &turn)?,
+            false => timed(&keyed.tasks, &schedule, &plan.protocol, &turn)?,
         };
-        let alone = keyed.keys().iter().zip(&schedule.tasks);
+        let alone = keyed.keys.iter().zip(&schedule.tasks);
         let alone = alone.filter(|((_, kind), _)| *kind != TaskKind::Views);
         let largest = alone.map(|(_, task)| task.batch).max().unwrap_or(1) as usize;
-        for (key, result) in keyed.keys().iter().zip(timed) {
+        for (key, result) in keyed.keys.iter().zip(timed) {
             let groups = schedule.cameras.len().div_ceil(largest);
             let has_tail = key.1 == TaskKind::Query && groups >= LEAST_TAIL;
             let largest = has_tail.then_some(largest);
@@ -141,10 +156,8 @@ pub fn measure_part(
             let own = result.map(|timed| timed.samples).unwrap_or_default();
             samples.push((key.0.clone(), key.1, own));
         }
-        schedules[pass as usize] = Some(KeyedSchedule {
-            keys: keyed.keys().to_vec(),
-            schedule,
-        });
+        let keys = keyed.keys;
+        schedules[pass as usize] = Some(KeyedSchedule { keys, schedule });
     }
     let [visible, located] = answers;
     let [query, locate] = schedules;
@@ -165,19 +178,13 @@ pub fn measure_part(
     Some((part, samples))
 }
 
-/// Label of the structure that has this task, `#twin` removed; `None` for a bound.
-pub(super) fn structure_of<'l>(label: &'l str, bounds: &[String]) -> Option<&'l str> {
-    let is_bound = bounds.iter().any(|bound| bound == label);
-    (!is_bound).then(|| label.strip_suffix(TWIN).unwrap_or(label))
-}
-
 /// The tasks of a pass, for all structures that are right so far.
 fn tasks_of<'a>(
     workload: &'a Workload,
     entries: &[Entry<'a>],
     pass: Pass,
     answers: &[Answer],
-) -> Tasks<'a, TaskKey> {
+) -> Tasks<'a> {
     let mut keyed = Tasks::default();
     for &kind in pass.tasks() {
         for entry in entries.iter().filter(|entry| entry.runs()) {
@@ -199,7 +206,7 @@ fn tasks_of<'a>(
 
 /// Adds the lower bounds that apply to the workload, and returns their names.
 fn add_bounds<'a>(
-    keyed: &mut Tasks<'a, TaskKey>,
+    keyed: &mut Tasks<'a>,
     workload: &'a Workload,
     subjects: &'a [Subject],
     visible: &[Answer],
@@ -365,9 +372,8 @@ pub(super) fn counts(counted: &Counted, items: usize) -> BTreeMap<String, f64> {
         ("regions_found", found / searches),
     ];
     let measured = means.into_iter().filter(|(_, mean)| mean.is_finite());
-    measured
-        .map(|(name, mean)| (name.to_owned(), mean))
-        .collect()
+    let measured = measured.map(|(name, mean)| (name.to_owned(), mean));
+    measured.collect()
 }
 
 #[cfg(test)]

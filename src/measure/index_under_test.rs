@@ -75,6 +75,11 @@ impl Built {
 /// Ending of a twin's label.
 pub(super) const TWIN: &str = "#twin";
 
+/// A label without the ending of a twin.
+pub(super) fn original(label: &str) -> &str {
+    label.strip_suffix(TWIN).unwrap_or(label)
+}
+
 /// Builds shorter than this are made twice, and the second one counts.
 const AGAIN_BELOW_MS: f64 = 50.0;
 
@@ -134,14 +139,12 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     }
     let boxes = scene.regions.boxes(&scene.items);
     let others = !std::ptr::eq(boxes, &items[..]);
-    let regions = others
-        .then(|| spec.build(input_of(scene, boxes)))
-        .transpose()?;
+    let regions = others.then(|| spec.build(input_of(scene, boxes)));
     Ok(Built {
         memory: index.memory(),
         build_ms,
         update_ms: Vec::new(),
         items: index,
-        regions,
+        regions: regions.transpose()?,
     })
 }

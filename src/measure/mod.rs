@@ -7,13 +7,13 @@
 //! of a run, and per group:
 //!
 //! 1. a [`Workload`]: the queries along the path; and [`Subject`]s: the built structures;
-//! 2. [`measure_part`]: in the first process [`count_pass`] and [`judge`], in the others a
+//! 2. [`measure`]: in the first process [`count_pass`] and [`judge`], in the others a
 //!    comparison of digests; then the timed pass, [`timed`], of [`TimedTask`]s by a
 //!    [`Schedule`], in which the lower bounds [`BOUNDS`] take part;
 //! 3. a [`Part`]: the results of this process for this group.
 //!
 //! [`Group::of`] derives the [`ReportCell`]s of a group from the parts of all processes.
-//! Other studies time their own tasks with [`Tasks`], [`timed`] and [`OverProcesses`].
+//! Other studies time their own tasks with [`timed`] and [`OverProcesses`].
 //!
 //! | files | contents |
 //! |---|---|
@@ -67,18 +67,17 @@ pub(crate) use count::blamed;
 pub use count::{Answer, Counted, Judged, count_pass, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
-    Effort, ExperimentError, Extras, Plan, PlannedScene, SceneGroup, Share, measure_group,
-    measure_scene,
+    Effort, ExperimentError, Extras, Plan, PlannedScene, SceneGroup, Share, measure_scene,
 };
-pub use frames::measure_queries_or_frames;
-pub use group::{GroupPlan, NO_ITEMS, measure_part};
+pub use frames::measure;
+pub use group::{GroupPlan, NO_ITEMS};
 pub use index_under_test::{Built, Subject};
 pub use key::{CellKey, GroupKey, TaskKey, TaskKind};
 pub use metrics::{METRICS, MetricInfo};
 pub use over_processes::{OverProcesses, ProcessTimes};
-pub use process_result::{Known, Part, SubjectPart, TaskPart, TaskSamples};
+pub use process_result::{Known, Measured, Part, SubjectPart, TaskPart, TaskSamples};
 pub use results::{Group, YARDSTICK};
-pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, Tasks, cameras_within};
+pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, cameras_within};
 pub use shared_work::SharedWork;
 pub use task::{Ask, AskMany, TimedTask};
 pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
@@ -138,11 +137,6 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// [`Status::Ok`], without a reason.
-    pub fn ok() -> Self {
-        Verdict::default()
-    }
-
     /// A status other than [`Status::Ok`], with its reason.
     pub fn new(status: Status, reason: impl Into<String>) -> Self {
         let reason: String = reason.into();

@@ -143,7 +143,7 @@ impl<'w> Moving<'w> {
         };
         let held = fat.as_ref().map_or(&items, |fat| &fat.boxes);
         let mut index = spec.build(input_of(workload.scene, held))?;
-        if spec.info().capabilities.refits && spec.policy != UpdatePolicy::Rebuild {
+        if spec.info().refits && spec.policy != UpdatePolicy::Rebuild {
             // Tables of positions are no part of the first frame.
             index.refit(held, &[]);
         }
@@ -361,7 +361,7 @@ pub(super) fn refitted_ln(
     protocol: &Protocol,
 ) -> Result<Option<f64>, Verdict> {
     let scene = workload.scene;
-    let refits = spec.row.info.capabilities.refits;
+    let refits = spec.row.info.refits;
     if !refits || protocol.cold || workload.items.is_empty() || scene.items.len() > MOST_UPDATED {
         return Ok(None);
     }
@@ -483,7 +483,7 @@ mod tests {
             let found = refitted_ln(&spec, &workload, &protocol).unwrap();
             assert_eq!(
                 found.is_some_and(f64::is_finite),
-                spec.row.info.capabilities.refits,
+                spec.row.info.refits,
                 "{name}: {found:?}"
             );
         }

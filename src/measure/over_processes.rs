@@ -6,8 +6,6 @@ use std::borrow::Borrow;
 
 use serde::{Deserialize, Serialize};
 
-#[cfg(doc)]
-use super::Tasks;
 use super::{Part, Timed, Verdict};
 use crate::statistics::{ALPHA, Estimate, is_less, one_run, ratio};
 
@@ -29,10 +27,8 @@ pub struct ProcessTimes {
 impl ProcessTimes {
     /// The times of tasks in one process, ln ns, in their order.
     pub fn of(timed: &[Result<Timed, Verdict>]) -> ProcessTimes {
-        let ln_ns = timed.iter().map(|timed| match timed {
-            Ok(timed) => Ok(timed.ln_ns()),
-            Err(verdict) => Err(verdict.clone()),
-        });
+        let ln_ns = timed.iter().map(|timed| timed.as_ref().map(Timed::ln_ns));
+        let ln_ns = ln_ns.map(|own| own.map_err(Verdict::clone));
         ProcessTimes {
             ln_ns: ln_ns.collect(),
             ..ProcessTimes::default()
@@ -65,8 +61,7 @@ impl OverProcesses {
 }
 
 impl<K: PartialEq> OverProcesses<K> {
-    /// The times of tasks by their keys, given in the order of the schedule
-    /// ([`Tasks::keys`]).
+    /// The times of tasks by their keys, given in the order of the schedule.
     ///
     /// # Panics
     /// If the processes have not timed the same tasks.

@@ -114,16 +114,16 @@ pub struct Known {
     /// Right answer of the region search at every eye.
     pub located: Vec<Answer>,
     /// Schedule of frustum queries, bounds last. `None` where nothing is timed.
-    pub query: Option<KeyedSchedule<TaskKey>>,
+    pub query: Option<KeyedSchedule>,
     /// Schedule of region searches.
-    pub locate: Option<KeyedSchedule<TaskKey>>,
+    pub locate: Option<KeyedSchedule>,
     /// Scale of the lens where the path names a visible share.
     pub lens_scale: Option<f64>,
 }
 
 impl Known {
     /// Schedule of a pass, if it is timed, and the right answers.
-    pub(super) fn pass(&self, pass: Pass) -> (Option<&KeyedSchedule<TaskKey>>, &[Answer]) {
+    pub(super) fn pass(&self, pass: Pass) -> (Option<&KeyedSchedule>, &[Answer]) {
         match pass {
             Pass::Queries => (self.query.as_ref(), &self.visible),
             Pass::Searches => (self.locate.as_ref(), &self.located),
@@ -223,3 +223,6 @@ impl Part {
 
 /// The samples of one task of a part.
 pub type TaskSamples = (String, TaskKind, Vec<Sample>);
+
+/// The result of a process, and the samples of each task.
+pub type Measured = (Part, Vec<TaskSamples>);

@@ -150,7 +150,7 @@ impl<'p> MergedParts<'p> {
         let mut all = own.chain(timed).chain(contradicted);
         let first = all.clone().next();
         let failed = all.find(|v| v.status != Status::Ok);
-        failed.or(first).cloned().unwrap_or_else(Verdict::ok)
+        failed.or(first).cloned().unwrap_or_default()
     }
 
     /// Results of a structure in each process.
@@ -257,14 +257,14 @@ impl<'p> MergedParts<'p> {
         });
         let (batch, cameras_timed) = planned.unwrap_or_default();
         let builds: Vec<f64> = self.subjects(label).filter_map(|s| s.build_ms).collect();
-        let by_process = METRICS.iter().map(|metric| {
-            let times = match metric.of {
-                Of::Time(task) => self.ln_ns(label, task).unwrap_or_default(),
-                _ => return (metric.name, Vec::new()),
-            };
-            (metric.name, times.iter().map(|x| x.exp()).collect())
+        let by_process = METRICS.iter().filter_map(|metric| match metric.of {
+            Of::Time(task) => {
+                let times = self.ln_ns(label, task)?.iter();
+                Some((metric.name.to_owned(), times.map(|x| x.exp()).collect()))
+            }
+            _ => None,
         });
-        let by_process = by_process.chain([("build_ms", builds)]);
+        let by_process = by_process.chain([("build_ms".to_owned(), builds)]);
         let by_process = by_process.filter(|(_, times)| !times.is_empty());
         let queries = self.tasks(label, TaskKind::Query);
         let rounds = queries.map(|task| task.rounds_ns.len());
@@ -274,9 +274,7 @@ impl<'p> MergedParts<'p> {
             cameras_timed,
             cameras_checked: self.known.map_or(0, |known| known.visible.len()),
             batch,
-            by_process: by_process
-                .map(|(name, times)| (name.to_owned(), times))
-                .collect(),
+            by_process: by_process.collect(),
         }
     }
 

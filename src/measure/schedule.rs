@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::clock::Stopwatch;
 use super::guarded;
+use super::index_under_test::original;
+use super::key::TaskKey;
 use super::task::TimedTask;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
@@ -132,18 +134,14 @@ impl Schedule {
         }
     }
 
-    /// Gives tasks whose keys have the same `name` the same rounds, the most of them.
+    /// Gives a twin and its original the same rounds, the most of them.
     ///
     /// A pilot is only ever too slow, and a twin is to be measured as its original is.
-    pub(super) fn share_rounds<'k, K, N: PartialEq>(
-        &mut self,
-        keys: &'k [K],
-        name: impl Fn(&'k K) -> N,
-    ) {
+    pub(super) fn share_rounds(&mut self, keys: &[TaskKey]) {
         let every: Vec<u32> = self.tasks.iter().map(|task| task.every).collect();
-        for (task, key) in self.tasks.iter_mut().zip(keys) {
+        for (task, (label, kind)) in self.tasks.iter_mut().zip(keys) {
             let alike = keys.iter().zip(&every);
-            let alike = alike.filter(|(other, _)| name(other) == name(key));
+            let alike = alike.filter(|(o, _)| o.1 == *kind && original(&o.0) == original(label));
             task.every = alike.map(|(_, every)| *every).min().unwrap_or(task.every);
         }
     }
@@ -181,55 +179,35 @@ fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
 
 /// Queries per clock reading: a power of two that makes the clock negligible.
 fn batch(query_ns: f64, cameras: usize) -> usize {
-    let needed = CLOCK_NS / (MOST_OVERHEAD * query_ns.max(1.0));
-    (needed.ceil().max(1.0) as usize)
-        .next_power_of_two()
-        .min(cameras)
+    let needed = (CLOCK_NS / (MOST_OVERHEAD * query_ns.max(1.0))).ceil();
+    (needed.max(1.0) as usize).next_power_of_two().min(cameras)
 }
 
 /// Tasks of one timed pass and their keys, in the order in which they are pushed.
-pub struct Tasks<'a, K> {
-    keys: Vec<K>,
-    tasks: Vec<TimedTask<'a>>,
+#[derive(Default)]
+pub(super) struct Tasks<'a> {
+    /// Keys in the order of the tasks.
+    pub keys: Vec<TaskKey>,
+    /// The tasks, as [`Schedule::new`] and [`timed`](super::timed) take them.
+    pub tasks: Vec<TimedTask<'a>>,
 }
 
 /// A schedule with the keys of its tasks.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct KeyedSchedule<K> {
+pub struct KeyedSchedule {
     /// Keys of the tasks, in the order of the schedule.
     #[serde(rename = "names")]
-    pub keys: Vec<K>,
+    pub keys: Vec<TaskKey>,
     /// Cameras, batches and rounds.
     pub schedule: Schedule,
 }
 
-impl<K> Default for Tasks<'_, K> {
-    fn default() -> Self {
-        Tasks {
-            keys: Vec::new(),
-            tasks: Vec::new(),
-        }
-    }
-}
-
-impl<'a, K: PartialEq> Tasks<'a, K> {
+impl<'a> Tasks<'a> {
     /// Adds a task.
-    pub fn push(&mut self, key: K, task: TimedTask<'a>) {
+    pub fn push(&mut self, key: TaskKey, task: TimedTask<'a>) {
         debug_assert!(!self.keys.contains(&key), "each key once");
         self.keys.push(key);
         self.tasks.push(task);
-    }
-
-    /// Keys in the order of the tasks: what [`OverProcesses::keyed`] takes.
-    ///
-    /// [`OverProcesses::keyed`]: super::OverProcesses::keyed
-    pub fn keys(&self) -> &[K] {
-        &self.keys
-    }
-
-    /// The tasks, as [`Schedule::new`] and [`timed`](super::timed) take them.
-    pub fn tasks(&self) -> &[TimedTask<'a>] {
-        &self.tasks
     }
 
     /// Makes the schedule of the tasks for `cameras` cameras.
@@ -238,7 +216,7 @@ impl<'a, K: PartialEq> Tasks<'a, K> {
     /// that it does not have.
     pub fn schedule(
         &mut self,
-        given: Option<&KeyedSchedule<K>>,
+        given: Option<&KeyedSchedule>,
         cameras: usize,
         protocol: &Protocol,
     ) -> Schedule {
@@ -308,6 +286,7 @@ impl Orders {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::TaskKind;
 
     fn protocol() -> Protocol {
         Protocol {
@@ -376,10 +355,11 @@ mod tests {
         assert!(schedule.rounds / schedule.tasks[1].every >= 3);
         // As if a twin's pilot had been interrupted.
         let mut shared = schedule.clone();
-        shared.share_rounds(&["bvh", "bvh"], |name| *name);
+        let keys = |labels: [&str; 2]| labels.map(|label| (label.to_owned(), TaskKind::Query));
+        shared.share_rounds(&keys(["bvh", "bvh#twin"]));
         assert_eq!([shared.tasks[0].every, shared.tasks[1].every], [1, 1]);
         shared = schedule.clone();
-        shared.share_rounds(&["bvh", "linear"], |name| *name);
+        shared.share_rounds(&keys(["bvh", "linear"]));
         assert_eq!(shared, schedule);
     }
 

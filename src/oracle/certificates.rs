@@ -24,9 +24,10 @@ use super::rough::{RoughSpaces, may_agree};
 use crate::arithmetic::combinations;
 
 /// Extent of a volume, independent of the box.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Debug)]
 pub(super) enum Extent {
     /// No point satisfies all constraints.
+    #[default]
     Empty,
     /// Points, but none that satisfies them all strictly: nothing is more than
     /// touched.
@@ -36,6 +37,7 @@ pub(super) enum Extent {
 }
 
 /// The certificates of a volume, faces first, then bounds, then shadows.
+#[derive(Default)]
 pub(super) struct Certificates {
     pub extent: Extent,
     pub faces: usize,
@@ -46,17 +48,12 @@ pub(super) struct Certificates {
 /// O(m^4) steps in f64 for m of them; exact sums only for what is kept and
 /// where rounding could matter.
 pub(super) fn certificates(given: Vec<HalfSpace>, precision: Precision) -> Certificates {
-    let empty = || Certificates {
-        extent: Extent::Empty,
-        faces: 0,
-        all: Vec::new(),
-    };
     // A zero normal is no constraint, or one that nothing satisfies.
     let mut constraints = Vec::with_capacity(given.len());
     for constraint in given {
         let is_zero = constraint.normal.iter().all(|n| precision.sign(n) == 0);
         match (is_zero, precision.sign(&constraint.d)) {
-            (true, -1) => return empty(),
+            (true, -1) => return Certificates::default(),
             (true, _) => {}
             (false, _) => constraints.push(constraint),
         }
@@ -80,7 +77,7 @@ pub(super) fn certificates(given: Vec<HalfSpace>, precision: Precision) -> Certi
         search.pairs(false);
     }
     if search.extent == Extent::Empty {
-        return empty();
+        return Certificates::default();
     }
     let faces = search.constraints.len();
     let mut all = search.constraints;
@@ -258,11 +255,8 @@ fn keep_tightest(bounds: &mut Vec<HalfSpace>) {
     for (direction, ratio) in bounds.iter().filter_map(placed) {
         best[direction] = best[direction].min(ratio);
     }
-    bounds.retain(|b| {
-        placed(b).is_some_and(|(direction, ratio)| {
-            ratio <= best[direction] + DOUBT * best[direction].abs()
-        })
-    });
+    let most = best.map(|best| best + DOUBT * best.abs());
+    bounds.retain(|b| placed(b).is_some_and(|(direction, ratio)| ratio <= most[direction]));
 }
 
 #[cfg(test)]

@@ -106,22 +106,11 @@ pub(super) struct Number {
     pub size: f64,
 }
 
-impl From<Expansion> for Number {
-    fn from(value: Expansion) -> Self {
+impl<T: Into<Expansion>> From<T> for Number {
+    fn from(value: T) -> Self {
+        let value = value.into();
         let size = value.estimate().abs();
         Number { value, size }
-    }
-}
-
-impl From<f32> for Number {
-    fn from(value: f32) -> Self {
-        Expansion::from(value).into()
-    }
-}
-
-impl From<f64> for Number {
-    fn from(value: f64) -> Self {
-        Expansion::from(value).into()
     }
 }
 
@@ -247,11 +236,7 @@ impl Exact {
             value = sum;
             lost += error.abs();
         }
-        let mut sign = if value == 0.0 {
-            0
-        } else {
-            value.signum() as i32
-        };
+        let mut sign = i32::from(value > 0.0) - i32::from(value < 0.0);
         if lost != 0.0 {
             let mut total = Expansion::default();
             parts.for_each(|part| total.grow(part));

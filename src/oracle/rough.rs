@@ -53,12 +53,9 @@ impl Rough {
 
     /// The sign, if it is certain. Nothing but products with zero is zero.
     pub fn sign(self) -> Option<i32> {
-        if self.size == 0.0 {
-            Some(0)
-        } else if self.value.abs() > self.error() {
-            Some(if self.value > 0.0 { 1 } else { -1 })
-        } else {
-            None
+        match self.value.abs() > self.error() {
+            true => Some(if self.value > 0.0 { 1 } else { -1 }),
+            false => (self.size == 0.0).then_some(0),
         }
     }
 }

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::volume::each_volume;
 use super::{AnyVolume, Predicate, QueryVolume, Recorder};
-use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows};
+use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows, Sorted};
 use crate::kernel::Isa;
 
 /// Any volume of planes, with the verdicts and costs of the volume inside, bit for
@@ -55,12 +55,7 @@ impl QueryVolume for Dispatched<'_> {
     /// Does nothing: an untimed query gains nothing by it.
     fn prefetch(&self, _: &BoxBlock, _: PlaneMask) {}
     #[inline(never)]
-    fn sorted_lanes<I: Isa>(
-        &self,
-        isa: I,
-        block: &BoxBlock,
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
+    fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         each_volume!(self.0, volume => volume.sorted_lanes(isa, block, mask))
     }
     #[inline(never)]

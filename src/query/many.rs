@@ -1,20 +1,9 @@
-//! Answers to many region searches at once: their sink, and a collector.
-
-use std::ops::ControlFlow;
+//! Answers to many region searches at once.
 
 use super::ItemId;
 use crate::kernel::extend;
 
-/// Destination of the answers to a batch of points.
-///
-/// One call for every point, in ascending order of the points, with all its ids in one
-/// slice (empty if no item contains the point). `Break` ends the batch.
-pub trait ManySink {
-    /// Takes the answer of the point with this index in the batch.
-    fn accept(&mut self, point: u32, ids: &[ItemId]) -> ControlFlow<()>;
-}
-
-/// Collects answers as compressed rows: all ids, and the end of each point's ids.
+/// Answers as compressed rows: all ids, and the end of each point's ids.
 #[derive(Clone, Default, PartialEq, Eq, Debug)]
 pub struct Located {
     ids: Vec<ItemId>,
@@ -27,6 +16,17 @@ impl Located {
     pub fn clear(&mut self) {
         self.ids.clear();
         self.ends.clear();
+    }
+
+    /// Adds the answer of the next point: no ids if no item contains it.
+    #[inline(always)]
+    pub fn push(&mut self, ids: &[ItemId]) {
+        match ids {
+            // The usual case on a tiling, without a call to copy four bytes.
+            [id] => self.ids.push(*id),
+            _ => extend(&mut self.ids, ids),
+        }
+        self.ends.push(self.ids.len());
     }
 
     /// Number of answered points.
@@ -42,11 +42,6 @@ impl Located {
     /// The ids of all points, point after point.
     pub fn ids(&self) -> &[ItemId] {
         &self.ids
-    }
-
-    /// The end of each point's ids in [`Located::ids`].
-    pub fn ends(&self) -> &[usize] {
-        &self.ends
     }
 
     /// The ids of a point, in the order of
@@ -65,20 +60,6 @@ impl Located {
     }
 }
 
-impl ManySink for Located {
-    #[inline(always)]
-    fn accept(&mut self, point: u32, ids: &[ItemId]) -> ControlFlow<()> {
-        debug_assert_eq!(point as usize, self.ends.len(), "every point, in order");
-        match ids {
-            // The usual case on a tiling, without a call to copy four bytes.
-            [id] => self.ids.push(*id),
-            _ => extend(&mut self.ids, ids),
-        }
-        self.ends.push(self.ids.len());
-        ControlFlow::Continue(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,10 +67,10 @@ mod tests {
     #[test]
     fn rows_end_where_they_should_and_may_be_empty() {
         let mut located = Located::default();
-        for (point, ids) in [&[][..], &[5], &[], &[7, 3, 9], &[]].iter().enumerate() {
-            assert!(located.accept(point as u32, ids).is_continue());
+        for ids in [&[][..], &[5], &[], &[7, 3, 9], &[]] {
+            located.push(ids);
         }
-        assert_eq!(located.ends(), [0, 1, 1, 4, 4]);
+        assert_eq!(located.ids(), [5, 7, 3, 9]);
         let rows: Vec<&[ItemId]> = located.iter().collect();
         assert_eq!(rows, [&[][..], &[5], &[], &[7, 3, 9], &[]]);
         located.clear();

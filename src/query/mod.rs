@@ -9,10 +9,10 @@ mod recorder;
 mod sink;
 mod volume;
 
-pub use crate::geometry::Planes;
+pub use crate::geometry::{Planes, Sorted};
 pub use context::{Context, QueryContext};
 pub(crate) use dispatched::Dispatched;
-pub use many::{Located, ManySink};
+pub use many::Located;
 pub(crate) use predicate::Bits;
 pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};

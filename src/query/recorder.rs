@@ -77,14 +77,3 @@ impl Recorder for QueryCost {
         self.subtrees_rejected += u64::from(count);
     }
 }
-
-impl std::ops::AddAssign for QueryCost {
-    fn add_assign(&mut self, other: QueryCost) {
-        self.nodes_tested += other.nodes_tested;
-        self.planes_tested += other.planes_tested;
-        self.items_tested += other.items_tested;
-        self.items_accepted_untested += other.items_accepted_untested;
-        self.subtrees_accepted += other.subtrees_accepted;
-        self.subtrees_rejected += other.subtrees_rejected;
-    }
-}

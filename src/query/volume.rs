@@ -6,7 +6,8 @@ use glam::Vec3;
 
 use crate::geometry::{
     Aabb, BallFrustum, BallPlane, Balls, BoxBlock, BroadcastPlane, BroadcastPlanes, ConvexVolume,
-    ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, Planes, RelativeVolume, Spheres,
+    ConvexVolumeF64, LANES, LaneMask, PlaneMask, PlaneRows, Planes, RelativeVolume, Sorted,
+    Spheres,
 };
 
 use super::predicate::Bits;
@@ -103,12 +104,7 @@ pub trait QueryVolume: Predicate {
     /// for each of them the planes that do not contain it, bit for bit
     /// [`Predicate::classify`]. Lanes that are excluded have any word.
     #[inline(always)]
-    fn sorted_lanes<I: Isa>(
-        &self,
-        isa: I,
-        block: &BoxBlock,
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
+    fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         let mut kept = 0;
         let mut open = [mask; LANES];
         for (lane, open) in open.iter_mut().enumerate() {
@@ -207,12 +203,7 @@ impl QueryVolume for ConvexVolume {
         }
     }
     #[inline(always)]
-    fn sorted_lanes<I: Isa>(
-        &self,
-        isa: I,
-        block: &BoxBlock,
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
+    fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         block.sorted_by(isa, self, mask)
     }
     fn rows(&self) -> Option<PlaneRows> {
@@ -240,12 +231,7 @@ impl QueryVolume for Spheres {
         BallFrustum::new(isa, self)
     }
     #[inline(always)]
-    fn sorted_lanes<I: Isa>(
-        &self,
-        isa: I,
-        block: &BoxBlock,
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
+    fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         block.sorted_by(isa, self.planes(), mask)
     }
     #[inline(always)]
@@ -276,12 +262,7 @@ impl QueryVolume for RelativeVolume {
         moved.admitted_by(isa, self.planes(), mask)
     }
     #[inline(always)]
-    fn sorted_lanes<I: Isa>(
-        &self,
-        isa: I,
-        block: &BoxBlock,
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
+    fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         let moved = block.relative_to(self.eye());
         moved.sorted_by(isa, self.planes(), mask)
     }

@@ -10,7 +10,7 @@ use super::changes::Setting;
 use super::folder::{self, save_report};
 
 use super::reading::read_stream;
-use super::stream::{Header, KeptPart, Stream, pairs};
+use super::stream::{Header, Stream, pairs};
 use super::writing::{self, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::writing::{folder_of, temporary_folder_in};
 use crate::input::InputError;
@@ -90,14 +90,9 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
     let mut samples_end = SAMPLE_COLUMNS.len() as u64;
     let kept = parts.into_iter().map(|(part, samples)| {
         samples_end += samples.1[1] - samples.1[0];
-        let part = part.clone();
-        (
-            KeptPart {
-                samples_end,
-                ..part
-            },
-            samples,
-        )
+        let mut part = part.clone();
+        part.samples_end = samples_end;
+        (part, samples)
     });
     let (kept, samples) = kept.unzip();
     let streams: Vec<&Stream> = shards.iter().map(|(_, stream)| stream).collect();
@@ -185,14 +180,9 @@ fn another_plan(begin: &Header, own: &Header, first: &Path) -> Option<String> {
             differs + "; expected the same in all shards"
         },
     );
-    let is_other = begin.whole() != own.whole();
-    differs.or_else(|| {
-        is_other.then(|| {
-            format!(
-                "a shard of another plan than {first}; expected the same scenes, paths and tests"
-            )
-        })
-    })
+    let other = "expected the same scenes, paths and tests";
+    let other = || format!("a shard of another plan than {first}; {other}");
+    differs.or_else(|| (begin.whole() != own.whole()).then(other))
 }
 
 /// The cell that two shards have in common, or the scene that is not the same

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::changes::{Fact, Setting, differences, facts, known};
 use super::ranking::unique;
 use super::surface::enter_growths;
-use super::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef};
+use super::{Noise, Report, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
 use crate::shown::counted;
@@ -241,24 +241,18 @@ impl Stream {
             let Some(first) = parts.first().filter(|part| part.process == 0) else {
                 continue;
             };
-            let group = Group::of(&parts);
+            let mut group = Group::of(&parts);
             if let Some(twin) = &group.twin {
                 report.noise.add(&key.scene, &first.path, &key.test, twin);
             }
-            let cell = |cell: ReportCell| {
-                let rows = kept
-                    .iter()
-                    .filter_map(|kept| kept.rows.get(&cell.structure));
-                let rows = rows.fold(0, |sum: u64, rows| sum.saturating_add(*rows));
+            for cell in group.cells.iter_mut().chain(&mut group.bounds) {
+                let rows = |kept: &&KeptPart| kept.rows.get(&cell.structure).copied();
+                let rows = kept.iter().filter_map(rows).fold(0, u64::saturating_add);
                 let file = super::writing::SAMPLES.to_owned();
-                let samples_ref = (rows > 0).then_some(SamplesRef { file, rows });
-                ReportCell {
-                    samples_ref,
-                    ..cell
-                }
-            };
-            report.cells.extend(group.cells.into_iter().map(cell));
-            report.bounds.extend(group.bounds.into_iter().map(cell));
+                cell.samples_ref = (rows > 0).then_some(SamplesRef { file, rows });
+            }
+            report.cells.append(&mut group.cells);
+            report.bounds.append(&mut group.bounds);
             for task in parts.iter().flat_map(|part| &part.tasks) {
                 speeds.1 += 1;
                 speeds.0 += usize::from(two_speeds(&task.rounds_ns).is_some());

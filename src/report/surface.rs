@@ -251,16 +251,12 @@ pub fn growths(report: &Report) -> Vec<Growth<'_>> {
 
 /// Gives every cell of a series its `growth_exponent`.
 pub(super) fn enter_growths(report: &mut Report) {
-    let of_cells = |growth: Growth| {
-        growth
-            .cells
-            .into_iter()
-            .map(move |cell| (cell, growth.exponent))
-    };
-    let found: Vec<(usize, Estimate)> = growths(report).into_iter().flat_map(of_cells).collect();
-    for (cell, exponent) in found {
-        let metrics = &mut report.cells[cell].metrics;
-        metrics.insert("growth_exponent".to_owned(), Metric::of(exponent, "1"));
+    let found = growths(report).into_iter().map(|g| (g.cells, g.exponent));
+    for (cells, exponent) in found.collect::<Vec<_>>() {
+        for cell in cells {
+            let metrics = &mut report.cells[cell].metrics;
+            metrics.insert("growth_exponent".to_owned(), Metric::of(exponent, "1"));
+        }
     }
 }
 

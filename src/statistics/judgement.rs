@@ -153,30 +153,21 @@ pub(super) fn judge_estimates(
             _ if is_same(cell, threshold) => Change::Same,
             _ => Change::Inconclusive,
         };
-        judgement(cell, fixed[i], change, tests, [threshold, floor])
+        let margin = cell.margin(INTERVAL);
+        let more = || more_pairs(cell, fixed[i], tests, [threshold, floor]);
+        let is_open = change == Change::Inconclusive;
+        Judgement {
+            change,
+            ratio: cell.mean.exp(),
+            lower: Some((cell.mean - margin).exp()),
+            upper: Some((cell.mean + margin).exp()),
+            resolution: Some(resolution(cell, tests, floor)),
+            more_pairs: is_open.then(more).flatten(),
+            pairs: cell.count,
+        }
     });
     let judged = |estimate: &Option<Trimmed>| estimate.and_then(|_| judged.next());
     estimates.iter().map(judged).collect()
-}
-
-fn judgement(
-    cell: &Trimmed,
-    fixed: f64,
-    change: Change,
-    tests: usize,
-    [threshold, floor]: [f64; 2],
-) -> Judgement {
-    let margin = cell.margin(INTERVAL);
-    let undecided = Some(cell).filter(|_| change == Change::Inconclusive);
-    Judgement {
-        change,
-        ratio: cell.mean.exp(),
-        lower: Some((cell.mean - margin).exp()),
-        upper: Some((cell.mean + margin).exp()),
-        resolution: Some(resolution(cell, tests, floor)),
-        more_pairs: undecided.and_then(|cell| more_pairs(cell, fixed, tests, [threshold, floor])),
-        pairs: cell.count,
-    }
 }
 
 /// Two one-sided tests of 5 % each.

@@ -73,23 +73,6 @@ impl ErrorCount {
         self.false_positives.saturating_sub(others)
     }
 
-    /// The same for a test of spheres: what boxes would have told is its own.
-    pub fn of_spheres(self) -> ErrorCount {
-        ErrorCount {
-            by_planes: 0,
-            ..self
-        }
-    }
-
-    /// The same for a test that tells all there is to tell: what it returns too
-    /// much of the stored boxes is its planes'.
-    pub fn of_exact_test(self) -> ErrorCount {
-        ErrorCount {
-            by_planes: self.false_positives - self.by_storage,
-            ..self
-        }
-    }
-
     /// False negatives in a million visible items.
     pub fn false_negative_ppm(&self) -> Option<f64> {
         (self.visible > 0).then(|| self.false_negatives as f64 / self.visible as f64 * 1e6)
@@ -107,14 +90,6 @@ impl std::ops::AddAssign for ErrorCount {
         self.by_planes += other.by_planes;
         self.worst_miss = self.worst_miss.max(other.worst_miss);
         self.worst_excess = self.worst_excess.max(other.worst_excess);
-    }
-}
-
-impl std::iter::Sum for ErrorCount {
-    fn sum<I: Iterator<Item = ErrorCount>>(all: I) -> ErrorCount {
-        let mut sum = ErrorCount::default();
-        all.for_each(|own| sum += own);
-        sum
     }
 }
 

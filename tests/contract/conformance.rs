@@ -14,7 +14,7 @@ use cullbench::index::{Info, Kind, Moving, RegionIndex, UniformGrid, Wide};
 use cullbench::kernel::Isa;
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
-use cullbench::query::{AnyVolume, Context, ItemId, ManySink, QueryVolume};
+use cullbench::query::{AnyVolume, Context, ItemId, Located, QueryVolume};
 use cullbench::scene;
 use cullbench::verify::Trial;
 use cullbench::verify::conformance::properties;
@@ -49,13 +49,8 @@ impl<T: RegionIndex> RegionIndex for Given<T> {
         self.0.query(volume, cx)
     }
 
-    fn query_many<I: Isa, S: ManySink>(
-        &self,
-        isa: I,
-        points: &[Vec3],
-        sink: &mut S,
-    ) -> ControlFlow<()> {
-        self.0.query_many(isa, points, sink)
+    fn query_many<I: Isa>(&self, isa: I, points: &[Vec3], out: &mut Located) {
+        self.0.query_many(isa, points, out);
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {

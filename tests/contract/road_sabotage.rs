@@ -11,8 +11,8 @@ use cullbench::index::{
     BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, Registry, indexable,
 };
 use cullbench::measure::{
-    GroupPlan, Known, Part, PathInfo, Protocol, SceneInfo, Status, Subject, TaskKind, Workload,
-    measure_group, measure_part,
+    Group, GroupPlan, Known, Part, Protocol, SceneInfo, Status, Subject, TaskKind, Workload,
+    measure,
 };
 use cullbench::path;
 use cullbench::query::{Context, ItemId, QueryVolume, Recorder};
@@ -129,8 +129,10 @@ fn protocol() -> Protocol {
 }
 
 fn statuses(workload: &Workload, subjects: &[Subject]) -> Vec<Status> {
-    let group = measure_group(workload, subjects, &[], &protocol(), &|| false);
-    let cells = group.expect("not stopped").cells;
+    let info = SceneInfo::of(workload.scene);
+    let plan = GroupPlan::new(workload, &info, protocol());
+    let measured = measure(workload, subjects, plan);
+    let cells = Group::of(&[measured.expect("not stopped").0]).cells;
     for cell in &cells {
         let is_ok = cell.status == Status::Ok;
         assert_eq!(cell.rank.is_some(), is_ok, "{cell:?}");
@@ -145,21 +147,16 @@ fn part(process: u32, known: Option<&Known>) -> Part {
     let (workload, subjects) = (workload(&scene), subjects("linear,bvh,octree", &scene));
     let info = SceneInfo::of(&scene);
     let plan = GroupPlan {
-        scene: &info,
-        path: PathInfo::of("orbit", &workload, false),
         process,
-        protocol: protocol(),
-        bounds: &[],
         known,
-        plan_only: false,
-        locate: true,
+        ..GroupPlan::new(&workload, &info, protocol())
     };
-    let measured = measure_part(&workload, &subjects, plan, &|_, _| (), &|| false);
+    let measured = measure(&workload, &subjects, plan);
     measured.expect("not stopped").0
 }
 
 fn of_parts(parts: &[Part]) -> Vec<Status> {
-    let cells = cullbench::measure::Group::of(parts).cells;
+    let cells = Group::of(parts).cells;
     cells.iter().map(|cell| cell.status).collect()
 }
 

@@ -14,7 +14,7 @@ use cullbench::index::{
 };
 use cullbench::kernel::{Isa, Kernel, Plain};
 use cullbench::query::{
-    Containment, Context, ItemId, ManySink, NoRecorder, QueryContext, QueryVolume, Recorder, Sink,
+    Containment, Context, ItemId, Located, NoRecorder, QueryContext, QueryVolume, Recorder, Sink,
 };
 use cullbench::verify::conformance::properties;
 use glam::Vec3;
@@ -283,15 +283,10 @@ impl<const CLAIMS: Claims> RegionIndex for Toy<CLAIMS> {
         Vec::new()
     }
 
-    fn query_many<I: Isa, S: ManySink>(
-        &self,
-        isa: I,
-        points: &[Vec3],
-        sink: &mut S,
-    ) -> ControlFlow<()> {
+    fn query_many<I: Isa>(&self, isa: I, points: &[Vec3], out: &mut Located) {
         let skips = self.fault == MANY_ARE_WRONG_BY_THE_BEST_KERNEL && is_best::<I>();
         let is_stale = self.fault == MANY_ARE_STALE_AFTER_REFIT && self.boxes != self.first;
-        for (p, n) in points.iter().zip(0..) {
+        for p in points {
             let mut ids = Vec::new();
             let _ = self.query(p, &mut QueryContext::new(isa, &mut ids, &mut NoRecorder));
             if skips {
@@ -302,9 +297,8 @@ impl<const CLAIMS: Claims> RegionIndex for Toy<CLAIMS> {
                 let held = held.filter(|(_, b)| b.contains_point(*p));
                 ids = held.map(|(&id, _)| id).collect();
             }
-            sink.accept(n, &ids)?;
+            out.push(&ids);
         }
-        ControlFlow::Continue(())
     }
 
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {

@@ -9,7 +9,7 @@ use cullbench::index::{
     BuildError, DynIndex, Info, Kind, MemoryUsage, Origin, Row as Structure, StructureSpec,
     indexable,
 };
-use cullbench::query::{AnyVolume, ItemId, Located, ManySink, QueryCost};
+use cullbench::query::{AnyVolume, ItemId, Located, QueryCost};
 use cullbench::stress::extremes::{CAMERA_FAMILIES, Case, Findings, PLANES_FAMILIES, camera_case};
 use cullbench::stress::{Replay, Row, Status, built_in, replay};
 use glam::Vec3;
@@ -50,10 +50,10 @@ impl DynIndex for Scan {
 
     fn query_many(&self, points: &[Vec3], out: &mut Located) {
         out.clear();
-        for (&p, point) in points.iter().zip(0..) {
+        for &p in points {
             let mut ids = Vec::new();
             self.locate(p, &mut ids);
-            let _ = out.accept(point, &ids);
+            out.push(&ids);
         }
     }
 
@@ -170,7 +170,7 @@ fn findings(family: &str, structure: &[StructureSpec]) -> Vec<Findings> {
         }
     }
     for family in PLANES_FAMILIES.iter().filter(|f| f.name == family) {
-        found.extend((0..4).map(|seed| (family.case)(seed).check(structure)));
+        found.extend((0..4).map(|seed| family.check(&(family.case)(seed), structure)));
     }
     assert!(!found.is_empty(), "{family}");
     found

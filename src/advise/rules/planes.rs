@@ -15,7 +15,7 @@ use crate::geometry::{Aabb, BoxBlock, ConvexVolume, FrustumPlane, LANES, LaneMas
 use crate::index::{DynIndex, FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::measure::Workload;
-use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume};
+use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryVolume, Sorted};
 use crate::shown::{count, counted, significant};
 
 /// Share of the planes below which the saving is lost in noise.
@@ -84,12 +84,11 @@ pub(super) fn plane_masks(trials: &mut Trials) -> Result<Draft, Unfit> {
     let tree = Rc::new(Wide::build(&input, &Default::default())?);
     let volumes: Rc<[ConvexVolume]> = case.volumes().cloned().collect();
     let step = volumes.len().div_ceil(COUNTED).max(1);
-    let (mut with, mut without) = (QueryCost::default(), QueryCost::default());
+    let (mut fewer, mut all) = (0, 0);
     for volume in volumes.iter().step_by(step) {
-        with += tree.counted(volume).1;
-        without += tree.counted(&Unmasked(volume)).1;
+        fewer += tree.counted(volume).1.planes_tested;
+        all += tree.counted(&Unmasked(volume)).1.planes_tested;
     }
-    let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
     let mut finding = Finding::none("no plane is ever tested".to_owned());
     if all > 0 {
         let saved = 1.0 - fewer as f64 / all as f64;
@@ -161,12 +160,7 @@ impl QueryVolume for Unmasked<'_> {
         self.0.prefetch(block, mask);
     }
     #[inline(always)]
-    fn sorted_lanes<I: Isa>(
-        &self,
-        isa: I,
-        block: &BoxBlock,
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
+    fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         let (kept, words) = self.0.sorted_lanes(isa, block, mask);
         let inside = isa.zeros(words);
         let mut open = [mask; LANES];

@@ -3,7 +3,7 @@
 use super::*;
 use crate::geometry::Aabb;
 use crate::index::{LinearScalar, MemoryUsage, RegionIndex, Row};
-use crate::query::{AnyVolume, ManySink, QueryCost};
+use crate::query::{AnyVolume, QueryCost};
 use serde_json::Value;
 
 const PANICS: Row = Row {
@@ -29,8 +29,8 @@ impl DynIndex for Batches {
         let mut right = Located::default();
         self.0.query_many(points, &mut right);
         out.clear();
-        for (ids, n) in right.iter().zip(0..) {
-            let _ = out.accept(n, ids.get(1..).unwrap_or_default());
+        for ids in right.iter() {
+            out.push(ids.get(1..).unwrap_or_default());
         }
     }
     fn refit(&mut self, _: &[Aabb], _: &[ItemId]) -> bool {

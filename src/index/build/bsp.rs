@@ -9,7 +9,7 @@ use super::bsp_split_planes::{ARRANGED, between_layers, by_surface_area, divide}
 use crate::geometry::PlaneTree;
 use crate::index::items::Record;
 use crate::index::tree::{Built, Part, Splitter, Tree, TreeBuilder, build_top_down};
-use crate::index::{BuildError, Info, Input, Kind, Origin, check_range};
+use crate::index::{BuildError, Info, Input, Kind, check_range};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
 /// generation by a priori tree structures").
@@ -150,11 +150,10 @@ impl Splitter for PlaneSplitter<'_> {
 }
 
 impl TreeBuilder for BspBuilder {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "bsp",
         "binary space partition by planes of any orientation; region search by plane descent",
         Kind::Tree,
-        Origin::Ours,
     );
     type Params = BspParams;
     const BY_PLANES: bool = true;

@@ -13,7 +13,7 @@ use super::ploc;
 use crate::geometry::Aabb;
 use crate::index::items::indexable;
 use crate::index::tree::{Built, PackedTree, Tree, TreeBuilder};
-use crate::index::{Info, Input, Kind, Origin, check_range};
+use crate::index::{Info, Input, Kind, check_range};
 use crate::query::ItemId;
 
 /// A BVH built bottom-up (PLOC: Meister and Bittner 2018, "Parallel locally
@@ -176,11 +176,10 @@ fn packed(items: &[Aabb], stacks: &Stacks, built: &Bvh2) -> PackedTree {
 }
 
 impl TreeBuilder for BvhBuilder {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "bvh",
         "bounding volume hierarchy (crate obvhs), items re-laid in tree order, plane masks",
         Kind::Tree,
-        Origin::Ours,
     );
     type Params = BvhParams;
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Aabb;
 use crate::index::items::Record;
 use crate::index::tree::{Built, Part, Splitter, Tree, TreeBuilder, build_top_down};
-use crate::index::{Info, Input, Kind, Origin, check_range};
+use crate::index::{Info, Input, Kind, check_range};
 
 /// An octree with fitted nodes (Meagher 1982, "Geometric modeling using octree
 /// encoding"; loose variant Ulrich 2000).
@@ -38,11 +38,10 @@ pub struct OctreeBuilder;
 pub struct QuadtreeBuilder;
 
 impl TreeBuilder for OctreeBuilder {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "octree",
         "octree with fitted nodes; loose=2 for the loose variant",
         Kind::Tree,
-        Origin::Ours,
     );
     type Params = CellParams;
 
@@ -52,11 +51,10 @@ impl TreeBuilder for OctreeBuilder {
 }
 
 impl TreeBuilder for QuadtreeBuilder {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "quadtree",
         "quadtree over the two widest axes, high cells in slabs; loose=2 for the loose variant",
         Kind::Tree,
-        Origin::Ours,
     );
     type Params = CellParams;
 

@@ -108,7 +108,7 @@ mod tests {
             "peer-bevy-style",
         ] {
             let spec = StructureSpec::parse(text).expect("a structure");
-            assert!(spec.info().capabilities.refits, "{text}");
+            assert!(spec.info().refits, "{text}");
             let at = |i: u32| Vec3::new((i % 11) as f32, (i / 11 % 9) as f32, (i / 99) as f32);
             let items = (0..900).map(|i| Aabb::around(at(i) * 2.0 - 9.0, Vec3::splat(0.4)));
             let mut items: Vec<Aabb> = items.collect();

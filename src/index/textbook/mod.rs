@@ -14,9 +14,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::items::Record;
-use super::{
-    BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell, check_range,
-};
+use super::{BuildError, Info, Input, Kind, MemoryUsage, RegionIndex, TreeCell, check_range};
 use crate::geometry::{Aabb, Plane, PlaneMask};
 use crate::kernel::pairs;
 use crate::query::{Containment, Context, ItemId, Predicate, QueryVolume, Recorder, Sink};
@@ -179,7 +177,7 @@ pub struct Textbook<D> {
 }
 
 impl<D: Division> RegionIndex for Textbook<D> {
-    const INFO: Info = Info::new(D::NAME, D::SUMMARY, Kind::Tree, Origin::Ours).on_request();
+    const INFO: Info = Info::ours(D::NAME, D::SUMMARY, Kind::Tree).on_request();
     type Params = TextbookParams;
 
     fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {

@@ -8,7 +8,7 @@ use crate::geometry::Aabb;
 use crate::index::{
     BuildError, Info, Input, Linear, MemoryUsage, NoParams, RegionIndex, Registry, StructureSpec,
 };
-use crate::measure::{Group, PathInfo, SceneInfo};
+use crate::measure::{Group, SceneInfo};
 use crate::path;
 use crate::query::{Context, ItemId, QueryVolume};
 use crate::scene;
@@ -26,24 +26,20 @@ fn part(specs: &[StructureSpec], motion: &str, test: CullingTest, known: Option<
     let build = |spec: &StructureSpec| Subject::build(spec.clone(), false, &scene, test);
     let subjects: Vec<Subject> = specs.iter().map(build).collect();
     let info = SceneInfo::of(&scene);
-    let plan = GroupPlan {
-        scene: &info,
-        path: PathInfo::of("orbit:frames=7", &workload, false),
-        process: u32::from(known.is_some()),
-        protocol: Protocol {
-            rounds: [2, 2],
-            task_ns: 1e9,
-            cameras: 8,
-            cold: false,
-            seed: 1,
-            cache_bytes: 0,
-        },
-        bounds: &[],
-        known,
-        plan_only: false,
-        locate: true,
+    let protocol = Protocol {
+        rounds: [2, 2],
+        task_ns: 1e9,
+        cameras: 8,
+        cold: false,
+        seed: 1,
+        cache_bytes: 0,
     };
-    let part = measure_queries_or_frames(&workload, &subjects, plan, &|_, _| (), &|| false);
+    let plan = GroupPlan {
+        process: u32::from(known.is_some()),
+        known,
+        ..GroupPlan::new(&workload, &info, protocol)
+    };
+    let part = measure(&workload, &subjects, plan);
     part.unwrap().0
 }
 
@@ -85,10 +81,7 @@ fn frames_are_measured_as_one_thing_and_in_parts() {
         let firsts = known.visible.iter().step_by(2).map(|answer| answer.count);
         let returned = firsts.sum::<u64>() as f64 / 12.0;
         assert!((of("ns_per_visible") * returned / of("query_ns") - 1.0).abs() < 1e-9);
-        assert_eq!(
-            cell.value("ageing_10").is_some(),
-            specs[rank].info().capabilities.refits
-        );
+        assert_eq!(cell.value("ageing_10").is_some(), specs[rank].info().refits);
         assert!(cell.value("ageing_100").is_none());
         assert!(of("memory_after_bytes_per_item") > 0.0 && of("visible_count") > 0.0);
         assert_eq!(cell.key().group.motion, "spawn:share=0.2,frames=12");
@@ -135,7 +128,7 @@ fn a_twin_gets_the_rounds_of_its_original() {
         .zip(times)
         .map(|(subject, replay_ns)| Entry {
             subject,
-            part: SubjectPart::of(subject, Verdict::ok()),
+            part: SubjectPart::of(subject, Verdict::default()),
             replay_ns,
             rounds: Vec::new(),
         });
@@ -165,7 +158,7 @@ fn spheres_move_as_cubes() {
         None,
     );
     for subject in &part.subjects {
-        assert_eq!(subject.verdict, Verdict::ok());
+        assert_eq!(subject.verdict, Verdict::default());
     }
 }
 

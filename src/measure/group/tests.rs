@@ -37,16 +37,12 @@ fn measured(names: &str, process: u32, known: Option<&Known>, plan_only: bool) -
     let (workload, subjects) = (workload(&scene), subjects(names, &scene));
     let info = SceneInfo::of(&scene);
     let plan = GroupPlan {
-        scene: &info,
-        path: PathInfo::of("orbit:frames=8", &workload, false),
         process,
-        protocol: protocol(),
-        bounds: &[],
         known,
         plan_only,
-        locate: true,
+        ..GroupPlan::new(&workload, &info, protocol())
     };
-    let part = measure_part(&workload, &subjects, plan, &|_, _| (), &|| false);
+    let part = queries(&workload, &subjects, plan);
     part.expect("not stopped").0
 }
 
@@ -139,7 +135,7 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
     let (workload, subjects) = (workload(&scene), subjects("bvh", &scene));
     let entry = |subject| Entry {
         subject,
-        part: SubjectPart::of(subject, Verdict::ok()),
+        part: SubjectPart::of(subject, Verdict::default()),
         counted: None,
     };
     let entries: Vec<Entry> = subjects.iter().map(entry).collect();

@@ -20,7 +20,7 @@ fn subject(label: &str, build_ms: f64) -> SubjectPart {
         params: Value::Null,
         kind: Kind::Tree,
         origin: Origin::Ours,
-        verdict: Verdict::ok(),
+        verdict: Verdict::default(),
         build_ms: Some(build_ms),
         memory_bytes: Some(4000),
         update_ms: Vec::new(),
@@ -96,7 +96,7 @@ fn parts(times: &[Times]) -> Vec<Part> {
             .map(|(label, task, ns)| TaskPart {
                 label: (*label).to_owned(),
                 task: *task,
-                verdict: Verdict::ok(),
+                verdict: Verdict::default(),
                 rounds_ns: vec![ns[process]; ROUNDS as usize],
                 wall_ln_ns: Some(ns[process].ln()),
                 tail_ns: Vec::new(),

@@ -14,11 +14,12 @@ use crate::geometry::Aabb;
 use crate::index::StructureSpec;
 use crate::scene::SeededRng;
 use crate::threads;
+use crate::verify::VOLUME_KINDS;
 
 use cameras::adversarial;
 pub use cameras::{CAMERA_FAMILIES, CameraFamily, Draft, Shapes};
 pub use check::{Case, Drops, Fault, Findings, SCALAR, Tally};
-pub use volumes::{PLANES_FAMILIES, PlanesCase, PlanesFamily};
+pub use volumes::{PLANES_FAMILIES, PlanesFamily};
 
 /// Cases of each variant that make ten million boxes at camera level.
 pub const DEFAULT_CASES: u64 = 66;
@@ -92,11 +93,11 @@ impl Extremes<'_> {
         let cases = self.cases.saturating_mul(family.factor);
         let outcomes = self.run_cases(family.name, cases, progress, |_, seed| {
             let case = (family.case)(seed);
-            let group = match case.kind == family.name {
+            let group = match family.exact {
                 true => family.name.to_owned(),
-                false => format!("{}/{}", family.name, case.kind),
+                false => format!("{}/{}", family.name, VOLUME_KINDS[case.kind]),
             };
-            (group, case.check(self.structures))
+            (group, family.check(&case, self.structures))
         });
         self.gather(&mut section, Level::Planes, outcomes);
         section

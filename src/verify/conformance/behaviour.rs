@@ -3,16 +3,14 @@
 //! A structure is queried with each kind of view, and with one point and many; it is
 //! refitted, or built again where it declines; it can do what it declares, and nothing else.
 
-use std::ops::ControlFlow;
-
 use glam::Vec3;
 
 use super::super::edge_volumes;
 use super::*;
 use crate::geometry::{ConvexVolumeF64, PlaneF64, RelativeVolume, Spheres, sphere_cube};
 use crate::index::QueryMany;
-use crate::kernel::{Kernel, Plain};
-use crate::query::{Located, ManySink, QueryVolume, Ranges};
+use crate::kernel::Kernel;
+use crate::query::{Located, QueryVolume, Ranges};
 use crate::threads::Pool;
 
 /// `visible` returns exactly `{ i : view.sees(items[i]) }` for every kind of
@@ -99,7 +97,7 @@ pub fn region_search_is_the_closed_box_scan<T: RegionIndex>() -> Outcome {
 
 /// `query_many` passes the ids of `query` for every point in order:
 /// whatever the size of the batch, with points that come again, lie on faces or
-/// outside, or are no numbers; and stops where its sink does.
+/// outside, or are no numbers.
 pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
     let scenes = edges().chain(cases(SEEDS)).chain([cells()]);
     let scenes = scenes.chain(generated_scenes(500)?);
@@ -115,14 +113,6 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
         for count in [0, 1, 3, points.len()] {
             many_are_right(&asked.items, index, &points[..count.min(points.len())])?;
         }
-        if points.len() > 1 {
-            let most = points.len() as u32 / 2;
-            let mut sink = StopsAfter { most, got: 0 };
-            let flow = index.query_many(Plain, &points, &mut sink);
-            ensure(flow.is_break() && sink.got == most, || {
-                format!("stopped after {most} points, got {} and {flow:?}", sink.got)
-            })?;
-        }
         Ok(())
     })
 }
@@ -133,9 +123,9 @@ fn many_are_right<T: RegionIndex>(items: &[Aabb], index: &T, points: &[Vec3]) ->
     for kernel in [Kernel::Portable, Kernel::best()] {
         let mut many = Located::default();
         let out = &mut many;
-        let flow = kernel.run(QueryMany { index, points, out });
-        ensure(many.len() == count && flow.is_continue(), || {
-            format!("{} of {count} points answered, {flow:?}", many.len())
+        kernel.run(QueryMany { index, points, out });
+        ensure(many.len() == count, || {
+            format!("{} of {count} points answered", many.len())
         })?;
         for (&p, found) in points.iter().zip(many.iter()) {
             trial.expect(scan(items, |b| b.contains_point(p)));
@@ -150,22 +140,6 @@ fn many_are_right<T: RegionIndex>(items: &[Aabb], index: &T, points: &[Vec3]) ->
         }
     }
     Ok(())
-}
-
-/// Breaks when it has its points.
-struct StopsAfter {
-    most: u32,
-    got: u32,
-}
-
-impl ManySink for StopsAfter {
-    fn accept(&mut self, _: u32, _: &[ItemId]) -> ControlFlow<()> {
-        self.got += 1;
-        match self.got < self.most {
-            true => ControlFlow::Continue(()),
-            false => ControlFlow::Break(()),
-        }
-    }
 }
 
 /// Cells that tile a block, with points within, on faces, edges and corners,
@@ -274,7 +248,7 @@ pub fn items_that_come_and_go_are_followed<T: RegionIndex>() -> Outcome {
 /// ranges of it are the reference set. A build looks at how many threads it may
 /// use if it says so, and answers the same with several.
 pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
-    let says = T::INFO.capabilities;
+    let says = T::INFO;
     each(generated_scenes(500)?, |asked, index: &mut T| {
         // Called by every run: they must not panic.
         let _ = (index.memory(), index.chose(), index.cells().len());

@@ -132,22 +132,6 @@ fn pass<T: RegionIndex, S: Sink>(
     }
 }
 
-/// Keeps the slices apart as they come, and breaks at a given call.
-struct Slices {
-    slices: Vec<Vec<ItemId>>,
-    breaks_at: usize,
-}
-
-impl Sink for Slices {
-    fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
-        self.slices.push(ids.to_vec());
-        match self.slices.len() < self.breaks_at {
-            true => ControlFlow::Continue(()),
-            false => ControlFlow::Break(()),
-        }
-    }
-}
-
 /// The same items give the same structure: the same ids in the same order.
 pub fn building_again_gives_the_same_structure<T: RegionIndex>() -> Outcome {
     each(cases(SEEDS), |asked, index: &mut T| {
@@ -191,11 +175,18 @@ pub fn a_sink_that_breaks_is_not_called_again<T: RegionIndex>() -> Outcome {
     let mut broken = 0;
     each(cases(SEEDS), |asked, index: &mut T| {
         for region_search in [false, true] {
+            // Keeps the slices apart as they come, and breaks at a given call.
             let until = |breaks_at: usize| {
-                let slices = Vec::new();
-                let mut sink = Slices { slices, breaks_at };
+                let mut slices = Vec::new();
+                let mut sink = |ids: &[ItemId]| {
+                    slices.push(ids.to_vec());
+                    match slices.len() < breaks_at {
+                        true => ControlFlow::Continue(()),
+                        false => ControlFlow::Break(()),
+                    }
+                };
                 let flow = pass(index, asked, region_search, &mut sink);
-                (sink.slices, flow)
+                (slices, flow)
             };
             let mut collected: Vec<ItemId> = Vec::new();
             let ended = pass(index, asked, region_search, &mut collected);
