@@ -43,16 +43,17 @@ pub fn changes(
     threshold: f64,
     metrics: &[&'static str],
 ) -> Changes {
-    let matched = matched(old, new);
+    let (pairs, alone) = matched(old, new);
+    let [only_in_old, only_in_new] = alone.map(|cells| cells.into_iter().map(lone).collect());
     let mut found = Changes {
         threshold,
-        cells_in_common: matched.pairs.len(),
-        only_in_old: matched.only_old.into_iter().map(lone).collect(),
-        only_in_new: matched.only_new.into_iter().map(lone).collect(),
+        cells_in_common: pairs.len(),
+        only_in_old,
+        only_in_new,
         ..Changes::default()
     };
     let mut comparable = Vec::new();
-    for &pair in &matched.pairs {
+    for pair in pairs {
         if asked_otherwise(pair).is_none() {
             found.work_changed.extend(work_changes(pair));
         }

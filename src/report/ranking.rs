@@ -173,12 +173,8 @@ fn keyed(cells: &[ReportCell]) -> Vec<(Numbered<'_>, &ReportCell)> {
 /// A cell in both reports.
 pub type Pair<'r> = (&'r ReportCell, &'r ReportCell);
 
-/// Cells of the same name, and those that only one side has, in their order.
-pub(super) struct Matched<'r> {
-    pub pairs: Vec<Pair<'r>>,
-    pub only_old: Vec<&'r ReportCell>,
-    pub only_new: Vec<&'r ReportCell>,
-}
+/// Cells of the same name, and those that only the old or the new side has, in their order.
+pub(super) type Matched<'r> = (Vec<Pair<'r>>, [Vec<&'r ReportCell>; 2]);
 
 pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Matched<'r> {
     let (old, new) = (keyed(old), keyed(new));
@@ -192,11 +188,7 @@ pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Match
         }
     }
     let only_new = new.into_iter().filter(|(key, _)| !known.contains(key));
-    Matched {
-        pairs,
-        only_old,
-        only_new: only_new.map(|(_, cell)| cell).collect(),
-    }
+    (pairs, [only_old, only_new.map(|(_, cell)| cell).collect()])
 }
 
 /// Why the two cells are not the same question, if they are not.

@@ -119,8 +119,8 @@ macro_rules! conforms_with {
         #[test]
         fn $name() {
             PARAMS.set($params);
-            for property in properties::<Given<$structure>>() {
-                (property.check)().expect(property.name);
+            for (name, check) in properties::<Given<$structure>>() {
+                check().expect(name);
             }
         }
     )*};

@@ -386,7 +386,7 @@ fn failing(fault: Fault) -> Vec<(&'static str, String)> {
     };
     checked
         .iter()
-        .filter_map(|p| Some((p.name, (p.check)().err()?)))
+        .filter_map(|(name, check)| Some((*name, check().err()?)))
         .collect()
 }
 
@@ -469,7 +469,7 @@ fn every_fault_is_caught_and_every_property_catches_one() {
     }
     let all: BTreeSet<_> = properties::<Toy<THAT_IT_REFITS>>()
         .iter()
-        .map(|p| p.name)
+        .map(|(name, _)| *name)
         .collect();
     assert_eq!(useful, all, "a property that catches no fault");
 }

@@ -64,24 +64,17 @@ macro_rules! conformance {
         }
     )*};
     (@table $structure:ty: $($property:ident)*) => {
-        &[$(Property {
-            name: stringify!($property),
-            check: $property::<$structure>,
-        }),*]
+        &[$((stringify!($property), $property::<$structure> as fn() -> Outcome)),*]
     };
     ($structure:ty) => {
         $crate::conformance!(@each tests $structure);
     };
 }
 
-/// A property of the contract, for one structure.
-#[derive(Clone, Copy, Debug)]
-pub struct Property {
-    /// Name of its test.
-    pub name: &'static str,
-    /// `Err` says what differed, and on which scene.
-    pub check: fn() -> Outcome,
-}
+/// A property of the contract, for one structure: the name of its test, and the check.
+///
+/// `Err` says what differed, and on which scene.
+pub type Property = (&'static str, fn() -> Outcome);
 
 /// All properties for a structure, in the order of the list.
 pub fn properties<T: RegionIndex>() -> &'static [Property] {
