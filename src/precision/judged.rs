@@ -187,8 +187,7 @@ impl Judged {
     pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point<CullingErrors> {
         let is_judged = self.refused.is_none();
         let known = || self.by_camera.iter().filter(|_| is_judged);
-        let mut counts = ErrorCount::default();
-        known().for_each(|camera| counts += camera.counts);
+        let counts: ErrorCount = known().map(|camera| camera.counts).sum();
         let of = |count: fn(&CameraErrors) -> u64| -> Vec<[f64; 2]> {
             (known().map(|c| [count(c) as f64, c.counts.visible as f64])).collect()
         };

@@ -93,6 +93,14 @@ impl std::ops::AddAssign for ErrorCount {
     }
 }
 
+impl std::iter::Sum for ErrorCount {
+    fn sum<I: Iterator<Item = ErrorCount>>(all: I) -> ErrorCount {
+        let mut sum = ErrorCount::default();
+        all.for_each(|own| sum += own);
+        sum
+    }
+}
+
 impl Truth {
     /// Camera level: the camera's numbers are exact, items are boxes about
     /// `origin`. O(items), some 50 ns each. `None` if the pose makes no frame.

@@ -9,6 +9,7 @@ use crate::index::{
     BuildError, Info, Input, Linear, MemoryUsage, NoParams, RegionIndex, Registry, StructureSpec,
 };
 use crate::measure::{Group, SceneInfo};
+use crate::motion::Motion;
 use crate::path;
 use crate::query::{Context, ItemId, QueryVolume};
 use crate::scene;
