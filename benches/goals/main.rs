@@ -203,7 +203,7 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     };
     let (peer, proper) = (
         fastest(|origin| !origin.is_ours()),
-        fastest(Origin::is_crate),
+        fastest(|origin| matches!(origin, Origin::Crate(_))),
     );
     let trees = TREES.map(|name| {
         let suited = world.ahead.contains(&name);
