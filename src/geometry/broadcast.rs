@@ -8,7 +8,7 @@ use super::box_block::{BoxBlock, sums_at};
 use super::{Balls, BoxCorner, ConvexVolume, PlaneMask, Spheres};
 use crate::kernel::{Isa, LaneMask};
 
-/// Lanes of a block that no plane excludes, and the planes that are open below each lane.
+/// Lanes of a block that no plane excludes, and the open planes of each lane.
 pub type Sorted<I> = (LaneMask, <I as Isa>::Words);
 
 /// Planes of a volume, prepared for many blocks without other open planes.

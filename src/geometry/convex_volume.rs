@@ -204,9 +204,9 @@ impl ConvexVolume {
     }
 }
 
-/// The closed intersection of up to 32 half-spaces in f64, tested against f32 boxes.
+/// The closed intersection of up to 32 half-spaces in f64.
 ///
-/// Boxes are promoted exactly. Corners and order of operations are those of the f32 test, so it
+/// It is tested against f32 boxes, which are promoted exactly. Corners and order of operations are those of the f32 test, so it
 /// is as monotone.
 #[derive(Clone, Debug)]
 pub struct ConvexVolumeF64 {

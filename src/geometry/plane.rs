@@ -38,8 +38,9 @@ macro_rules! half_space {
                 $Plane { normal, d }
             }
 
-            /// `((nx*x + ny*y) + nz*z) + d` in the plane's numbers: three products, three sums, in
-            /// this order, no fused multiply-add.
+            /// `((nx*x + ny*y) + nz*z) + d` in the numbers of the plane.
+            ///
+            /// Three products, three sums, in this order, no fused multiply-add.
             ///
             /// Each operation is monotone under round-to-nearest, so a corner that is
             /// farther along the normal on every axis never evaluates lower. That is

@@ -243,8 +243,8 @@ impl Judged {
 
 /// Errors with their false positives attributed to the planes or to the test.
 ///
-/// What boxes would have told is the sphere test's own. The exact test tells all there is to
-/// tell: what it returns too much of the stored boxes is its planes'.
+/// Those that boxes would have told are the sphere test's own. The exact test tells all there
+/// is to tell: those it returns of the stored boxes are its planes'.
 pub fn blamed(test: CullingTest, errors: ErrorCount) -> ErrorCount {
     let by_planes = match test {
         CullingTest::Sphere => 0,

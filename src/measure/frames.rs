@@ -1,4 +1,4 @@
-//! [`measure`]: the measurement of a group by one process, and here of items that move.
+//! [`measure`]: the measurement of one group by one process, here of motions.
 //!
 //! A frame takes the moves, updates the index, and answers the queries of one or more views.
 //! Each structure replays the same motion over its own items, from a fresh build in every

@@ -1,4 +1,4 @@
-//! The measurement of one group of cells by one process: [`queries`] of a still scene.
+//! The measurement of one group by one process: [`queries`] of a still scene.
 //!
 //! The first process counts, checks with the oracle, makes the schedules, and times. The
 //! others compare the digests of answers with those of the first, and time by its schedules.

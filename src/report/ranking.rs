@@ -173,7 +173,7 @@ fn keyed(cells: &[ReportCell]) -> Vec<(Numbered<'_>, &ReportCell)> {
 /// A cell in both reports.
 pub type Pair<'r> = (&'r ReportCell, &'r ReportCell);
 
-/// Cells of the same name, and those that only the old or the new side has, in their order.
+/// Cells of the same name, and those that only one side has, in their order.
 pub(super) type Matched<'r> = (Vec<Pair<'r>>, [Vec<&'r ReportCell>; 2]);
 
 pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Matched<'r> {

@@ -70,7 +70,7 @@ fn denormals(seed: u64) -> RandomCase {
     }
 }
 
-/// Kind of a volume of a few planes, in [`VOLUME_KINDS`](crate::verify::VOLUME_KINDS).
+/// Kind of a volume of a few planes.
 const UNBOUNDED: usize = 5;
 /// The largest volume whose certificates are worth making: O(m^4).
 const MOST_PLANES: usize = 12;

@@ -71,7 +71,7 @@ macro_rules! conformance {
     };
 }
 
-/// A property of the contract, for one structure: the name of its test, and the check.
+/// A property of the contract: the name of its test, and the check.
 ///
 /// `Err` says what differed, and on which scene.
 pub type Property = (&'static str, fn() -> Outcome);
