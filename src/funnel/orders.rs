@@ -20,7 +20,7 @@ use crate::scene::Surfaces;
 use crate::statistics::{Estimate, flat};
 use crate::visibility::fragment::order::{self, ORDERS};
 use crate::visibility::fragment::{
-    self, DepthOrder, OrderErrors, Piece, Tally, ToOrder, TooManyPairs, draw_orders,
+    self, DepthOrder, OrderErrors, Piece, Tally, ToOrder, draw_orders,
 };
 use crate::visibility::truth::{Crossing, Probe, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
@@ -145,7 +145,7 @@ impl Orders {
     ///
     /// # Errors
     /// Too many items behind each other.
-    pub fn drawn(&self) -> Result<Vec<OrderRow>, TooManyPairs> {
+    pub fn drawn(&self) -> Result<Vec<OrderRow>, String> {
         let mut rows: Vec<OrderRow> = self.rows().map(OrderRow::new).collect();
         // Processes that only time need no tree of the triangles.
         let index = self.triangles.as_deref().map(SurfaceIndex::build);
@@ -172,7 +172,7 @@ impl Orders {
         &self,
         left: &Left,
         index: Option<&SurfaceIndex>,
-    ) -> Vec<(Tally, Result<OrderErrors, TooManyPairs>)> {
+    ) -> Vec<(Tally, Result<OrderErrors, String>)> {
         let (rays, samples, items) = (&left.rays, self.samples, &left.items);
         let sorted = left.orders.iter().enumerate().map(|(index, (_, order))| {
             let mut pieces = Vec::new();

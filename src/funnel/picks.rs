@@ -17,7 +17,7 @@ use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::shown::{count, counted};
 use crate::statistics::{Estimate, flat};
-use crate::visibility::pick::{BACK_ENDS, BackEnd, CursorRectangle, NotBuilt, Pick};
+use crate::visibility::pick::{BACK_ENDS, BackEnd, CursorRectangle, Pick};
 use crate::visibility::truth::{Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 
@@ -67,7 +67,7 @@ impl PickRow {
 type Answer<'w> = Box<dyn Fn(&Rays, &Cursor, &mut Vec<ItemId>) + 'w>;
 
 /// Builds a back end over the items of a scene.
-type Build<'w> = Box<dyn Fn(&BackEnd) -> Result<Box<dyn Pick>, NotBuilt> + 'w>;
+type Build<'w> = Box<dyn Fn(&BackEnd) -> Result<Box<dyn Pick>, String> + 'w>;
 
 /// A ray and a rectangle of the image.
 struct Cursor {
@@ -192,7 +192,7 @@ impl<'w> Picks<'w> {
     }
 
     /// Runs code of another crate at every cursor once, to panic here or never.
-    fn try_out(&self, name: &'static str, pick: &Rc<dyn Pick>) -> Result<(), NotBuilt> {
+    fn try_out(&self, name: &'static str, pick: &Rc<dyn Pick>) -> Result<(), String> {
         let mut hits = Vec::new();
         let ask = || {
             for cursor in self.cursors.iter().flatten() {
@@ -200,7 +200,7 @@ impl<'w> Picks<'w> {
                 pick.nearest(&cursor.ray, NEAREST, &mut hits);
             }
         };
-        caught(ask).map_err(|message| NotBuilt::panicked(name, &message))
+        caught(ask).map_err(|message| format!("'{name}' panicked: {message}"))
     }
 
     /// Every row; the ids are the answers at all cursors of a view in turn.

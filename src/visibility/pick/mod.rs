@@ -81,8 +81,8 @@ pub trait Pick: Send + Sync {
 /// Deterministic.
 ///
 /// # Errors
-/// [`NotBuilt`].
-pub type Build<Bodies> = fn(&Bodies, Kernel) -> Result<Box<dyn Pick>, NotBuilt>;
+/// The reason for which it cannot hold the items or failed, in a line.
+pub type Build<Bodies> = fn(&Bodies, Kernel) -> Result<Box<dyn Pick>, String>;
 
 /// A row of the table of back ends.
 ///
@@ -97,18 +97,6 @@ pub struct Builds {
     pub boxes: Build<Boxes>,
     /// Builds it over triangles.
     pub facets: Build<Facets>,
-}
-
-/// Reason for which a back end cannot hold the items or failed, in a line.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct NotBuilt(String);
-
-impl NotBuilt {
-    /// A panic of a back end, when it is built or when it answers.
-    pub fn panicked(name: &str, message: &str) -> NotBuilt {
-        NotBuilt(format!("'{name}' panicked: {message}"))
-    }
 }
 
 /// A rectangle of the image: (0, 0) is its upper left corner, (1, 1) its lower

@@ -13,7 +13,7 @@ use ::obvhs::triangle::Triangle;
 use glam::{DVec3, Vec3};
 
 use super::exactly::kept;
-use super::{Hit, NotBuilt, Pick};
+use super::{Hit, Pick};
 use crate::geometry::Aabb;
 use crate::index::{caught, ploc, scale_for};
 use crate::kernel::each;
@@ -136,17 +136,17 @@ const MOST_BINARY: usize = 500;
 /// Levels of an eight-wide tree for which the crate's walk has memory.
 const MOST_WIDE: usize = 32;
 
-fn refuse_deep(levels: usize, most: usize) -> Result<(), NotBuilt> {
+fn refuse_deep(levels: usize, most: usize) -> Result<(), String> {
     match levels > most {
-        true => Err(NotBuilt(format!(
+        true => Err(format!(
             "the tree of '{NAME}' has {levels} levels; expected at most {most}"
-        ))),
+        )),
         false => Ok(()),
     }
 }
 
 /// The eight-wide tree of a binary one, whose levels are counted.
-fn widened(binary: &Bvh2, levels: usize) -> Result<CwBvh, NotBuilt> {
+fn widened(binary: &Bvh2, levels: usize) -> Result<CwBvh, String> {
     refuse_deep(levels, MOST_BINARY)?;
     let tree = bvh2_to_cwbvh(binary, 3, true, false);
     let children = |node: usize| {
@@ -181,7 +181,7 @@ pub struct Obvhs<B: Primitive> {
 
 impl<B: Primitive> Obvhs<B> {
     /// Builds the tree; a panic of the crate is an error.
-    pub fn boxed(all: &Bodies<B>) -> Result<Box<dyn Pick>, NotBuilt> {
+    pub fn boxed(all: &Bodies<B>) -> Result<Box<dyn Pick>, String> {
         let (zero, scale) = (all.origin, scale_for(&all.bounds));
         let about = About { zero, scale };
         let boxes: Vec<Aabb> = all.bounds.iter().map(|b| about.scaled(b)).collect();
@@ -194,7 +194,7 @@ impl<B: Primitive> Obvhs<B> {
             });
             widened(&binary, levels)
         };
-        let panicked = |message: String| Err(NotBuilt::panicked(NAME, &message));
+        let panicked = |message: String| Err(format!("'{NAME}' panicked: {message}"));
         let tree = caught(build).unwrap_or_else(panicked)?;
         let order = tree.primitive_indices.iter().map(|&place| place as usize);
         Ok(Box::new(Obvhs::<B> {
