@@ -200,13 +200,8 @@ impl Prepared {
         let AdviseInput { scene, path, .. } = *input;
         let (times, answered) = (OverProcesses::of(processes), &self.answered);
         let ([tree, _], beside) = (self.plan.structures, &self.plan.beside);
-        let test = TestChoice::of(
-            tree,
-            input.options.draw_ns,
-            &self.entered.tests,
-            answered,
-            &times,
-        );
+        let tests = &self.entered.tests;
+        let test = TestChoice::of(tree, input.options.draw_ns, tests, answered, &times);
         let groups = beside.groups(self.counted, processes);
         // Under further policies the first one is the workload itself.
         let here = groups.first().filter(|_| beside.has_policies());

@@ -22,13 +22,9 @@ pub fn short_structure(name: &str) -> String {
 pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String {
     let other = |text: &String, usual: &str| (text != usual).then(|| text.clone());
     let test = other(&group.test, CullingTest::SixPlane.name());
-    let (cache, motion) = (other(&group.cache, "warm"), other(&group.motion, ""));
-    let parts = [
-        Some(short(&group.path)),
-        test,
-        cache,
-        motion.map(|motion| short(&motion)),
-    ];
+    let cache = other(&group.cache, "warm");
+    let motion = other(&group.motion, "").map(|motion| short(&motion));
+    let parts = [Some(short(&group.path)), test, cache, motion];
     let parts = parts.into_iter().flatten().chain(unusual(group));
     let rest: String = parts.map(|part| format!(" {part}")).collect();
     let scene = short(&group.scene);

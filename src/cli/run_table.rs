@@ -136,19 +136,14 @@ pub const OF_FRAMES: [Figure; 9] = [
 ///
 /// In full with intervals, lower bounds and every figure.
 pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) -> Table {
-    let (time, figures, brief) = match comparison.about().path.motion.is_empty() {
-        true => (
-            "time per query",
-            OF_QUERIES.to_vec(),
-            OF_QUERIES[..2].to_vec(),
-        ),
-        false => (
-            "time per frame",
-            [&OF_FRAMES, &OF_QUERIES[..2]].concat(),
-            [&OF_FRAMES[..4], &OF_FRAMES[7..8]].concat(),
-        ),
+    let is_still = comparison.about().path.motion.is_empty();
+    let time = ["time per frame", "time per query"][usize::from(is_still)];
+    let figures = match (is_still, is_full) {
+        (true, true) => OF_QUERIES.to_vec(),
+        (true, false) => OF_QUERIES[..2].to_vec(),
+        (false, true) => [&OF_FRAMES, &OF_QUERIES[..2]].concat(),
+        (false, false) => [&OF_FRAMES[..4], &OF_FRAMES[7..8]].concat(),
     };
-    let figures = if is_full { figures } else { brief };
     let peer = comparison.fastest_peer().filter(|_| is_full);
     let of_base = text::some(base, |base| format!("vs {}", text::plain(base)));
     let head = ["structure", "rank", time, &of_base].into_iter();

@@ -87,16 +87,13 @@ struct SweptTest {
 /// The f32 default, with a plain frame as well; f64, f32 about the eye and every
 /// derivation without epsilon.
 fn tests() -> Vec<SweptTest> {
-    let bare = |arithmetic, method| {
-        let planes = PlaneOptions {
-            method,
-            epsilon: 0.0,
-        };
+    let bare = PlaneOptions::default().without_epsilon();
+    let of = |arithmetic, method| {
+        let planes = PlaneOptions { method, ..bare };
         Culling::new(CullingTest::SixPlane, arithmetic, planes)
     };
-    let method = PlaneOptions::default().method;
-    let arithmetics = [Arithmetic::F64, Arithmetic::F32Relative].map(|a| bare(a, method));
-    let methods = PLANE_METHODS.map(|(method, ..)| bare(Arithmetic::F32, method));
+    let arithmetics = [Arithmetic::F64, Arithmetic::F32Relative].map(|a| of(a, bare.method));
+    let methods = PLANE_METHODS.map(|(method, ..)| of(Arithmetic::F32, method));
     let all = [&[Culling::default(); 2][..], &arithmetics, &methods].concat();
     let tests = all.into_iter().enumerate().map(|(n, culling)| SweptTest {
         culling,
