@@ -153,8 +153,8 @@ const FAR_OUTSIDE: f64 = 3.0;
 
 /// One line for each kind of doubt about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
-    let doubts: [fn(&Scene, &[Camera]) -> Option<String>; 5] =
-        [rolled, unstraight, mirrored, far_outside, blind];
+    type Doubt = fn(&Scene, &[Camera]) -> Option<String>;
+    let doubts: [Doubt; 5] = [rolled, unstraight, mirrored, far_outside, blind];
     let found = doubts.iter().filter_map(|doubt| doubt(scene, cameras));
     found.map(|doubt| format!("{path}: {doubt}")).collect()
 }
