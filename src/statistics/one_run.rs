@@ -94,6 +94,17 @@ fn differences(own: &[f64], other: &[f64]) -> Option<Vec<f64>> {
     (own.len() == other.len()).then(|| pairs.map(|(own, other)| own - other).collect())
 }
 
+/// The trimmed mean of `own` less that of `other` in the same processes, with the error that
+/// the intervals shown have: none that holds a ratio of 1 is of two ranks.
+///
+/// `None` below three processes and for a NaN.
+pub(super) fn paired_difference(own: &[f64], other: &[f64]) -> Option<Trimmed> {
+    Some(Trimmed {
+        mean: centre(own)? - centre(other)?,
+        ..estimate(&differences(own, other)?)?
+    })
+}
+
 /// Half the width of the 95 % interval; NaN below three values.
 fn margin(values: &[f64]) -> f64 {
     estimate(values).map_or(f64::NAN, |found| found.margin(0.5 + LEVEL / 2.0))

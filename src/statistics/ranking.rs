@@ -1,6 +1,7 @@
 //! Ranks of structures that ran in the same processes, and Pareto fronts.
 
-use super::trimmed::{centre, paired_difference};
+use super::one_run::paired_difference;
+use super::trimmed::centre;
 
 /// Level at which two are told apart.
 pub const ALPHA: f64 = 0.05;
@@ -9,8 +10,8 @@ pub const ALPHA: f64 = 0.05;
 /// 1 are followed by rank 3. Per structure: one value per process, all from the same
 /// processes, paired by index.
 ///
-/// A structure shares the rank of the fastest of that rank unless Yuen's paired
-/// test over the processes tells the two apart (two-sided, `alpha`). Under three
+/// A structure shares the first rank from whose fastest a paired test over the processes,
+/// that of the intervals shown, does not tell it apart (two-sided, `alpha`). Under three
 /// processes nothing can be tested, and each has a rank of its own by order.
 /// Equal means are ordered by index, a structure with no values or with one
 /// that is not finite comes last: the ranks are the same for the same input.
@@ -19,18 +20,25 @@ pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<usize> {
     let means: Vec<f64> = values.iter().map(mean).collect();
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| means[a].total_cmp(&means[b]));
-    let mut ranks = vec![0; values.len()];
-    let mut leader: Option<(usize, usize)> = None;
-    for (&i, place) in order.iter().zip(1..) {
-        let shared = leader.filter(|(first, _)| !told_apart(&values[*first], &values[i], alpha));
-        leader = shared.or(Some((i, place)));
-        ranks[i] = leader.map_or(place, |(_, rank)| rank);
+    // The fastest of each rank first, with those that share it.
+    let mut shared: Vec<Vec<usize>> = Vec::new();
+    for i in order {
+        let is_tied = |group: &&mut Vec<usize>| !told_apart(&values[group[0]], &values[i], alpha);
+        match shared.iter_mut().find(is_tied) {
+            Some(group) => group.push(i),
+            None => shared.push(vec![i]),
+        }
+    }
+    let (mut ranks, mut rank) = (vec![0; values.len()], 1);
+    for group in shared {
+        group.iter().for_each(|&i| ranks[i] = rank);
+        rank += group.len();
     }
     ranks
 }
 
 /// Returns true if a paired test over the processes finds `a` less than `b`
-/// (Yuen's, two-sided, `alpha`); under three processes, if its trimmed mean is
+/// (two-sided, `alpha`); under three processes, if its trimmed mean is
 /// less.
 pub fn is_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
     let means = centre(a).zip(centre(b));
@@ -38,7 +46,7 @@ pub fn is_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
 }
 
 fn told_apart(leader: &[f64], other: &[f64], alpha: f64) -> bool {
-    match paired_difference(leader, other) {
+    match paired_difference(other, leader) {
         Some(difference) => difference.p_above(0.0) <= alpha / 2.0,
         None => true,
     }
@@ -96,8 +104,33 @@ pub fn dominance<V: AsRef<[f64]>>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::one_run::ratio;
     use super::*;
     use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_rank_of_its_own_is_where_the_interval_shown_leaves_out_1(
+            rows in prop::collection::vec((0.0..1.0f64, -0.1..0.1f64, -0.1..0.1f64), 3..20),
+            shift in 0.0..0.2f64,
+        ) {
+            let of = |own: fn(&(f64, f64, f64)) -> f64| rows.iter().map(own).collect::<Vec<f64>>();
+            let base = of(|row| row.0);
+            let (mut a, mut b) = (of(|row| row.0 + row.1), of(|row| row.0 + row.2));
+            b.iter_mut().for_each(|b| *b += shift);
+            if centre(&a) > centre(&b) {
+                std::mem::swap(&mut a, &mut b);
+            }
+            let less = |own: &[f64]| own.iter().zip(&base).map(|(own, base)| own - base).collect();
+            let shown = ratio(&base, &a, &b).unwrap();
+            let relative: [Vec<f64>; 2] = [less(&a), less(&b)];
+            // The ratio shown is that of the trimmed means beside the base.
+            let order = [centre(&relative[0]), centre(&relative[1])];
+            prop_assume!(order[0] < order[1]);
+            let is_apart = ranks(&relative, ALPHA) == [1, 2];
+            prop_assert_eq!(is_apart, shown.upper.unwrap() < 1.0);
+        }
+    }
 
     #[test]
     fn ranks_are_shared_unless_the_processes_tell_them_apart() {
@@ -114,6 +147,14 @@ mod tests {
         let values = [vec![2.0], vec![1.0], vec![], vec![1.0]];
         assert_eq!(ranks(&values, 0.05), [3, 1, 4, 2]);
         assert_eq!(ranks(&[], 0.05), [0; 0]);
+    }
+
+    #[test]
+    fn what_is_not_told_apart_from_the_fastest_shares_its_rank() {
+        let steady = |shift: f64| vec![shift; 10];
+        let unsteady: Vec<f64> = (0..10).map(|p| f64::from(p % 2) * 4.0 - 1.8).collect();
+        let values = [steady(0.0), steady(0.1), unsteady];
+        assert_eq!(ranks(&values, 0.05), [1, 3, 1]);
     }
 
     #[test]
@@ -135,12 +176,14 @@ mod tests {
         ) {
             let placed = ranks(&rows, 0.05);
             let means: Vec<f64> = rows.iter().map(|row| centre(row).unwrap()).collect();
-            for (i, a) in placed.iter().enumerate() {
+            for a in &placed {
                 let before = placed.iter().filter(|b| *b < a).count();
                 prop_assert_eq!(*a, before + 1);
-                for (k, b) in placed.iter().enumerate() {
-                    prop_assert!(a >= b || means[i] <= means[k]);
-                }
+                // The fastest of a rank comes before all of later ranks.
+                let own = (0..rows.len()).filter(|k| placed[*k] == *a);
+                let fastest = own.map(|k| means[k]).fold(f64::INFINITY, f64::min);
+                let mut later = (0..rows.len()).filter(|k| placed[*k] > *a);
+                prop_assert!(later.all(|k| fastest <= means[k]));
             }
         }
     }

@@ -6,8 +6,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::means::{mean, squares};
+use super::one_run::paired_difference;
 use super::student;
-use super::trimmed::{Trimmed, paired_difference};
+use super::trimmed::Trimmed;
 
 /// Level of the intervals shown.
 const LEVEL: f64 = 0.95;
@@ -114,13 +115,13 @@ pub fn shows_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
 }
 
 /// Compares the sums of the means of two independent samples, each paired by index:
-/// true if they show less for `a` than for `b`. `times` over processes by Yuen's paired
+/// true if they show less for `a` than for `b`. `times` over processes by the
 /// difference of trimmed means, `counts` over clusters as in [`shows_less`], with
 /// the degrees of freedom of Welch. Under three processes the order of the sums
 /// decides.
 pub fn shows_less_in_sum(times: [&[f64]; 2], counts: [&[f64]; 2], alpha: f64) -> bool {
     let counts = plain_difference(counts[0], counts[1]);
-    match paired_difference(times[0], times[1]) {
+    match paired_difference(times[1], times[0]) {
         Some(times) => is_above_zero(&[times, counts], alpha),
         None => plain_difference(times[0], times[1]).mean + counts.mean > 0.0,
     }

@@ -114,22 +114,6 @@ pub(super) fn difference(old: &Trimmed, new: &Trimmed) -> Trimmed {
     }
 }
 
-/// The difference of two trimmed means of the same processes, `b` - `a`, paired
-/// by index: Yuen's test for dependent samples (Wilcox 2017, sec. 5.9.5). Its
-/// difference is that of the two trimmed means, so that its sign never
-/// contradicts their order. `None` below three pairs or for a NaN.
-pub(super) fn paired_difference(a: &[f64], b: &[f64]) -> Option<Trimmed> {
-    if a.len() != b.len() || a.len() < 3 {
-        return None;
-    }
-    let mean = centre(b)? - centre(a)?;
-    // The sum of squares of the differences of the Winsorised values is q1 + q2
-    // - 2 q12 of the source.
-    let (a, b) = (winsorised(a), winsorised(b));
-    let differences: Vec<f64> = a.iter().zip(&b).map(|(a, b)| b - a).collect();
-    Some(Trimmed::of(mean, &differences))
-}
-
 /// Lends each cell of one comparison what the others tell about the variance:
 /// se² becomes (8 median(se²) + df se²) / (8 + df), and df grows by 8.
 ///
@@ -235,22 +219,6 @@ mod tests {
         near(found.standard_error, 5f64.sqrt());
         near(found.df, 25.0 / (1.0 / 5.0 + 16.0 / 9.0));
         near(difference(&cell(0.0, 5.0), &cell(0.0, 5.0)).df, 10.0);
-    }
-
-    #[test]
-    fn paired_differences_know_what_the_processes_share() {
-        let shifted = VALUES.map(|value| value + 1.0);
-        let found = paired_difference(&VALUES, &shifted).unwrap();
-        assert_eq!((found.mean, found.standard_error), (1.0, 0.0));
-        // Against the reverse order: -5 -5 -5 -3 -1 1 3 5 5 5, squares 170.
-        let rising: Vec<f64> = (1..=10).map(f64::from).collect();
-        let falling: Vec<f64> = rising.iter().rev().copied().collect();
-        let found = paired_difference(&rising, &falling).unwrap();
-        near(found.mean, 0.0);
-        near(found.standard_error, (170f64 / 30.0).sqrt());
-        assert_eq!(found.df, 5.0);
-        assert_eq!(paired_difference(&rising, &falling[1..]), None);
-        assert_eq!(paired_difference(&[1.0; 2], &[1.0; 2]), None);
     }
 
     #[test]
