@@ -59,6 +59,9 @@ impl Ended {
     }
 }
 
+/// Between two looks at a worker; longer, and its parent was stopped.
+const LONGEST_GAP: Duration = Duration::from_secs(1);
+
 /// A worker at work.
 pub struct Worker {
     child: Child,
@@ -67,7 +70,9 @@ pub struct Worker {
     lines: Receiver<io::Result<Vec<u8>>>,
     last_words: Option<JoinHandle<Vec<u8>>>,
     doing: (Option<String>, String),
-    since: Instant,
+    /// Since the last message, but for what this process did not run itself (Ctrl-Z).
+    waited: Duration,
+    looked: Instant,
     patience: Duration,
 }
 
@@ -77,7 +82,15 @@ impl Worker {
     /// # Errors
     /// The program cannot be started.
     pub fn start(program: &Path, request: &Request, patience: Duration) -> anyhow::Result<Worker> {
-        let mut child = Command::new(program)
+        let mut command = Command::new(program);
+        // Ctrl-C of a terminal goes to a whole group, and would end a worker that has no
+        // handler yet: its cells would have failed for good.
+        #[cfg(unix)]
+        {
+            use std::os::unix::process::CommandExt;
+            command.process_group(0).arg0(super::program::name());
+        }
+        let mut child = command
             .arg("worker")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -125,7 +138,8 @@ impl Worker {
             lines,
             last_words,
             doing: (None, "starting".to_owned()),
-            since: Instant::now(),
+            waited: Duration::ZERO,
+            looked: Instant::now(),
             patience,
         })
     }
@@ -135,15 +149,17 @@ impl Worker {
     /// # Errors
     /// A message that no worker of this version sends.
     pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Result<Message, Ended>>> {
+        let gap = std::mem::replace(&mut self.looked, Instant::now()).elapsed();
+        self.waited += gap.min(LONGEST_GAP);
         let line = match self.lines.recv_timeout(wait) {
             Ok(line) => line?,
-            Err(RecvTimeoutError::Timeout) if self.since.elapsed() > self.patience => {
+            Err(RecvTimeoutError::Timeout) if self.waited > self.patience => {
                 return Ok(Some(Err(self.give_up())));
             }
             Err(RecvTimeoutError::Timeout) => return Ok(None),
             Err(RecvTimeoutError::Disconnected) => return Ok(Some(Err(self.obituary()?))),
         };
-        self.since = Instant::now();
+        self.waited = Duration::ZERO;
         let told = str::from_utf8(&line).ok();
         let message = told.and_then(|line| serde_json::from_str(line).ok());
         let message = message.ok_or_else(|| {
@@ -305,7 +321,7 @@ impl Workers {
             spool.push(file);
         }
         Ok(Workers {
-            program: std::env::current_exe().context("this program cannot be found again")?,
+            program: own_program()?,
             args,
             patience,
             cpus: processors(),
@@ -355,6 +371,15 @@ impl Workers {
         ended.done().with_context(place)?;
         Ok(found)
     }
+}
+
+/// This very program; on Linux also when another has taken its place.
+fn own_program() -> anyhow::Result<PathBuf> {
+    let running = PathBuf::from("/proc/self/exe");
+    if cfg!(target_os = "linux") && running.exists() {
+        return Ok(running);
+    }
+    std::env::current_exe().context("this program cannot be found again")
 }
 
 /// The processors that this process may run on; empty where that is not known.
