@@ -7,6 +7,7 @@
 mod boxes_csv;
 mod bsp;
 mod disputes;
+mod face;
 mod families;
 mod generate;
 mod gltf;

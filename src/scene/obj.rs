@@ -1,8 +1,8 @@
 //! Wavefront OBJ: every object or group with faces is an item.
 //!
 //! A group that is opened again is another item of the same name.
-//! Faces become fans of opaque triangles, counter-clockwise as seen from the outside. Boxes
-//! hold the vertices as written. Weights and colours of vertices, normals and texture
+//! Faces become opaque triangles, counter-clockwise as seen from the outside: fans, or ears
+//! of a concave face. Boxes hold the vertices as written. Weights and colours of vertices, normals and texture
 //! coordinates change nothing. Source: Wavefront Technologies, Advanced Visualizer Manual,
 //! appendix B1, "Object Files (.obj)".
 
@@ -11,6 +11,7 @@ use std::fmt::Display;
 
 use glam::DVec3;
 
+use super::face::add_triangles;
 use super::{Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory};
 use crate::input::{InputError, Result, finite, note};
 use crate::shown::{counted, first_of, shortened};
@@ -149,14 +150,14 @@ impl Obj<'_> {
                 self.points.push(point.into());
             }
             b"f" => {
-                let corners = words.map(|word| self.corner(word, number));
-                let corners: Vec<u32> = corners.collect::<Result<_>>()?;
-                if corners.len() < 3 {
-                    let found = counted(corners.len(), "corner");
+                let face = words.map(|word| self.corner(word, number));
+                let face: Vec<u32> = face.collect::<Result<_>>()?;
+                if face.len() < 3 {
+                    let found = counted(face.len(), "corner");
                     return Err(self.error(number, found, "three or more"));
                 }
-                let rim = corners[1..].windows(2);
-                (self.corners).extend(rim.map(|pair| [corners[0], pair[0], pair[1]]));
+                add_triangles(&self.points, &face, &mut self.corners)
+                    .map_err(|found| self.error(number, found, "at most 1,000, or triangles"))?;
             }
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use gltf::json::Index;
 use gltf::json::accessor::Accessor;
-use gltf::json::material::AlphaMode;
+use gltf::json::material::{AlphaMode, Material};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
@@ -23,6 +23,13 @@ pub struct Triangles {
     pub kinds: Vec<SurfaceKind>,
     /// Sides of each triangle, alike.
     pub two_sided: Vec<bool>,
+}
+
+/// Returns false for a mask that is opaque everywhere: no texture, and no vertex has an alpha.
+fn has_holes(material: &Material) -> bool {
+    let own = &material.pbr_metallic_roughness;
+    let cutoff = material.alpha_cutoff.unwrap_or_default();
+    own.base_color_texture.is_some() || own.base_color_factor.0[3] < cutoff.0
 }
 
 impl Triangles {
@@ -71,12 +78,17 @@ impl File<'_> {
                 let material = self.get(&self.root.materials, material, &place)?;
                 two_sided = material.double_sided;
                 let extensions = material.extensions.as_ref();
-                let is_glass =
-                    extensions.is_some_and(|e| e.others.contains_key("KHR_materials_transmission"));
+                let transmission =
+                    extensions.and_then(|e| e.others.get("KHR_materials_transmission"));
+                // The factor's default is 0: opaque.
+                let factor = transmission.and_then(|t| t["transmissionFactor"].as_f64());
+                let is_glass = factor.is_some_and(|factor| factor > 0.0);
                 match material.alpha_mode {
                     _ if is_glass => kind = SurfaceKind::Clear,
                     Checked::Valid(AlphaMode::Blend) => kind = SurfaceKind::Clear,
-                    Checked::Valid(AlphaMode::Mask) => kind = SurfaceKind::CutOut,
+                    Checked::Valid(AlphaMode::Mask) if has_holes(material) => {
+                        kind = SurfaceKind::CutOut;
+                    }
                     _ => {}
                 }
             }

@@ -34,7 +34,7 @@ fn file() -> Value {
         ],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
-        "materials": [{"alphaMode": "MASK", "doubleSided": true}],
+        "materials": [{"alphaMode": "MASK", "alphaCutoff": 2, "doubleSided": true}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
              "min": [0, 0, 0], "max": [1.5, 2, 3]},
@@ -414,13 +414,29 @@ fn glass_is_clear() {
     glass["materials"][0] = json!({"extensions": transmission});
     let surfaces = read(&glass).unwrap().surfaces.expect("triangles");
     assert_eq!(surfaces.kinds, [SurfaceKind::Clear; 8]);
+    // The factor is 0 unless it is said.
+    glass["materials"][0] = json!({"extensions": {"KHR_materials_transmission": {}}});
+    let surfaces = read(&glass).unwrap().surfaces.expect("triangles");
+    assert_eq!(surfaces.kinds, [SurfaceKind::Opaque; 8]);
+}
+
+#[test]
+fn a_mask_hides_where_nothing_can_be_cut_out() {
+    let mut mask = file();
+    for (alpha, kind) in [(1.0, SurfaceKind::Opaque), (0.4, SurfaceKind::CutOut)] {
+        let own = json!({"baseColorFactor": [1, 1, 1, alpha]});
+        mask["materials"][0] = json!({"alphaMode": "MASK", "pbrMetallicRoughness": own});
+        let surfaces = read(&mask).unwrap().surfaces.expect("triangles");
+        assert_eq!(surfaces.kinds, [kind; 8]);
+    }
 }
 
 #[test]
 fn each_triangle_has_the_material_of_its_primitive() {
     let mut file = file();
-    file["materials"] =
-        json!([{"alphaMode": "MASK"}, {"doubleSided": true}, {"alphaMode": "BLEND"}]);
+    let mask =
+        json!({"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}});
+    file["materials"] = json!([mask, {"doubleSided": true}, {"alphaMode": "BLEND"}]);
     let primitive = &file["meshes"][0]["primitives"][0];
     let all = [Some(1), Some(0), None, Some(2)].map(|material| {
         let mut own = primitive.clone();

@@ -1,0 +1,128 @@
+//! Polygons of three and more corners as triangles.
+
+use earcut::Earcut;
+use glam::{DVec2, DVec3};
+
+use crate::shown::counted;
+
+/// Most corners of a concave face: cutting one that crosses itself takes the square of them.
+const MOST_CONCAVE: usize = 1000;
+
+/// Adds the triangles of a face, turned as it is: a fan, or the ears of a concave one.
+///
+/// `face` holds three or more indices of points. A corner that no ear has, such as the end
+/// of a spur, is a triangle of its own, so that the triangles have the bounds of the face.
+///
+/// # Errors
+/// What a concave face of too many corners is.
+pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> Result<(), String> {
+    let Some(flat) = flat_if_concave(points, face) else {
+        to.extend(face[1..].windows(2).map(|pair| [face[0], pair[0], pair[1]]));
+        return Ok(());
+    };
+    if face.len() > MOST_CONCAVE {
+        return Err(format!(
+            "a concave face of {}",
+            counted(face.len(), "corner")
+        ));
+    }
+    let mut ears: Vec<u32> = Vec::new();
+    Earcut::new().earcut(flat, &[], &mut ears);
+    let mut is_left = vec![true; face.len()];
+    (ears.iter()).for_each(|place| is_left[*place as usize] = false);
+    let ears = ears.chunks_exact(3);
+    to.extend(ears.map(|ear| [0, 1, 2].map(|n| face[ear[n] as usize])));
+    let alone = face.iter().zip(is_left).filter(|(_, is_left)| *is_left);
+    to.extend(alone.map(|(corner, _)| [*corner; 3]));
+    Ok(())
+}
+
+/// A face as seen along its normal (Newell's), counter-clockwise, if it turns both ways.
+fn flat_if_concave(points: &[DVec3], face: &[u32]) -> Option<Vec<[f64; 2]>> {
+    if face.len() < 4 {
+        return None;
+    }
+    let all = 0..face.len();
+    let origin = points[face[0] as usize];
+    let at = |place: usize| points[face[place % face.len()] as usize] - origin;
+    let normal: DVec3 = all.clone().map(|n| at(n).cross(at(n + 1))).sum();
+    let axis = normal.abs().max_position();
+    let sign = normal[axis].signum();
+    let seen = |place: usize| {
+        let point = at(place);
+        DVec2::new(sign * point[(axis + 1) % 3], point[(axis + 2) % 3])
+    };
+    let turns_left = |place: usize| {
+        let [a, b, c] = [0, 1, 2].map(|next| seen(place + next));
+        (b - a).perp_dot(c - b) >= 0.0
+    };
+    let is_concave = normal.is_finite() && !all.clone().all(turns_left);
+    is_concave.then(|| all.map(|place| seen(place).to_array()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangles(points: &[DVec3], face: &[u32]) -> Vec<[u32; 3]> {
+        let mut found = Vec::new();
+        add_triangles(points, face, &mut found).unwrap();
+        found
+    }
+
+    /// From any of its corners, along any axis, from both sides.
+    #[test]
+    fn a_concave_face_leaves_its_notch_open() {
+        let u = [
+            [0, 0],
+            [3, 0],
+            [3, 3],
+            [2, 3],
+            [2, 1],
+            [1, 1],
+            [1, 3],
+            [0, 3],
+        ];
+        for (first, axis) in (0..8).flat_map(|first| [0, 1, 2].map(|axis| (first, axis))) {
+            let point = |[a, b]: [i32; 2]| {
+                let mut point = [0.0, f64::from(a), f64::from(b)];
+                point.rotate_right(axis);
+                DVec3::from(point)
+            };
+            let points = u.map(point);
+            for side in [1.0, -1.0] {
+                let mut face: Vec<u32> = (0..8).map(|n| (n + first) % 8).collect();
+                if side < 0.0 {
+                    face.reverse();
+                }
+                let areas = triangles(&points, &face).into_iter().map(|corners| {
+                    let [a, b, c] = corners.map(|corner| points[corner as usize]);
+                    (b - a).cross(c - a) / 2.0
+                });
+                let areas: Vec<DVec3> = areas.collect();
+                assert_eq!(areas.iter().map(|area| area.length()).sum::<f64>(), 7.0);
+                assert_eq!(areas.iter().sum::<DVec3>()[axis], 7.0 * side);
+            }
+        }
+    }
+
+    #[test]
+    fn every_corner_has_a_triangle() {
+        let [o, x, far, xy] = [[0, 0], [1, 0], [9, 0], [1, 1]]
+            .map(|[x, y]| DVec3::new(f64::from(x), f64::from(y), 0.0));
+        let found = triangles(&[o, x, far, x, xy], &[0, 1, 2, 3, 4]);
+        let held: Vec<u32> = found.into_iter().flatten().collect();
+        assert!((0..5).all(|corner| held.contains(&corner)), "{held:?}");
+    }
+
+    #[test]
+    fn a_large_concave_face_is_refused() {
+        let zigzag = |n: u32| DVec3::new(f64::from(n), f64::from(n % 2), 0.0);
+        for (count, is_read) in [(1000, true), (1001, false)] {
+            let points: Vec<DVec3> = (0..count).map(zigzag).collect();
+            let face: Vec<u32> = (0..count).collect();
+            let found = add_triangles(&points, &face, &mut Vec::new());
+            assert_eq!(found.is_ok(), is_read, "{count}: {found:?}");
+        }
+    }
+}
