@@ -23,7 +23,8 @@ WIDTHS = [390, 1400, 1800]
 SCHEMES = ["light", "dark"]
 LONGEST_PAINT_MS = 1000
 
-# Faults of a page as it is shown, as a list of sentences.
+# Faults of a page as it is shown, as a list of sentences. A narrow window reports the width of
+# what does not fit into it: innerWidth stands for the width asked for.
 FAULTS = """(() => {
   const faults = [], all = (s, from = document) => [...from.querySelectorAll(s)];
   const width = document.scrollingElement.scrollWidth;
@@ -196,7 +197,7 @@ def check(browser, page, shots, most_mb):
             browser.open(url)
             browser.show(width, scheme, url)
             paints.append(browser.value(PAINT))
-            found = list(browser.value(FAULTS)) + list(browser.complaints())
+            found = list(browser.value(FAULTS.replace("innerWidth", str(width)))) + list(browser.complaints())
             faults += [f"{width} px, {scheme}: {fault}" for fault in found]
             if shots:
                 browser.shot(shots / f"{page.stem}-{width}-{scheme}.png")

@@ -265,7 +265,15 @@ fn structure_table(choice: &StructureChoice) -> Table {
         (">worst frame", |r| some(r.value("worst_frame_ns"), time)),
         ("status", |r| r.status.name().to_owned()),
     ];
-    Table::with(&choice.rows, columns).without_empty_columns()
+    let mut table = Table::with(&choice.rows, columns);
+    if choice
+        .rows
+        .iter()
+        .any(|row| row.value("frame_ns").is_some())
+    {
+        table.header[2] = "speed-up of frames".to_owned();
+    }
+    table.without_empty_columns()
 }
 
 fn test_table(choice: &TestChoice) -> Table {

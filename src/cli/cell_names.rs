@@ -28,7 +28,7 @@ pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String
     let parts = parts.into_iter().flatten().chain(unusual(group));
     let rest: String = parts.map(|part| format!(" {part}")).collect();
     let scene = short(&group.scene);
-    if scene.chars().count() + rest.chars().count() <= room {
+    if text::across(&scene) + text::across(&rest) <= room {
         return scene + &rest;
     }
     let most = room.saturating_sub(3);

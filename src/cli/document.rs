@@ -5,8 +5,8 @@ use std::io::{self, Write};
 
 use super::figure::Figure;
 use super::table::Table;
+use super::text;
 use super::text::html;
-use super::{program, text};
 
 pub enum Block {
     /// A heading of the first, second or third level.
@@ -54,7 +54,12 @@ fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
     let of_structures = table.header.first().is_some_and(|name| name == "structure");
     let row = |row: &Vec<String>| {
         // Without the mark of the fastest.
-        let number = |cell: &String| cell.trim_start_matches('*').parse::<f64>().ok();
+        let number = |cell: &String| {
+            cell.trim_start_matches('*')
+                .replace(',', "")
+                .parse::<f64>()
+                .ok()
+        };
         let most = row.iter().filter_map(number).fold(0.0, f64::max);
         let cells = row.iter().enumerate().map(|(column, cell)| {
             let shade = text::some(number(cell).filter(|_| is_heat), |value| {
@@ -129,37 +134,6 @@ pub fn to_terminal(blocks: &[Block], width: usize) -> String {
 pub fn show(blocks: &[Block]) -> io::Result<()> {
     let text = to_terminal(blocks, text::width());
     io::stdout().lock().write_all(text.as_bytes())
-}
-
-/// A page of what a terminal shows, with figures after its conclusions.
-///
-/// Those are the last `most` lines of the document, behind all tables.
-pub fn to_page(
-    about: &str,
-    most: usize,
-    figures: impl IntoIterator<Item = Block>,
-    mut blocks: Vec<Block>,
-) -> String {
-    let is_line = |block: &Block| matches!(block, Block::Line(_));
-    let lines = blocks.iter().rev().take_while(|block| is_line(block));
-    let mut told = blocks.split_off(blocks.len() - lines.count().min(most));
-    told.retain(|block| !matches!(block, Block::Line(text) if text.is_empty()));
-    for block in &mut told {
-        if let Block::Line(text) = block {
-            *text = text.trim_start_matches("- ").to_owned();
-        }
-    }
-    // The heading of the conclusions, and the title of a terminal.
-    if matches!(blocks.last(), Some(Block::Heading(..))) {
-        blocks.pop();
-    }
-    blocks.retain(|block| !matches!(block, Block::Heading(1, _)));
-    let title = format!("{} {about}", program::name());
-    let mut all = vec![Block::Heading(1, title.clone())];
-    all.extend(told);
-    all.extend(figures);
-    all.extend(blocks);
-    to_html(&title, &all)
 }
 
 /// The document as one page that needs no other file.

@@ -3,8 +3,9 @@
 
 use super::args::DriftArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
-use super::document::{Block, show, to_page};
+use super::document::{Block, show};
 use super::figure::{Axis, Figure, Look, is_drawn, picture};
+use super::page::to_page;
 use super::processes::Timing;
 use super::study::Study;
 use super::table::{Column, Table};

@@ -12,8 +12,9 @@ use serde_json::Value;
 
 use super::command_args::FunnelArgs;
 use super::diagram::{Row, rows};
-use super::document::{Block, show, to_page};
+use super::document::{Block, show};
 use super::figure::{Axis, Figure};
+use super::page::to_page;
 use super::plan::Plan;
 use super::processes::Timing;
 use super::shared_args::{StudyArgs, TableFormat};

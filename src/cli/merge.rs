@@ -30,7 +30,7 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
         tell(&format!("note: no shard has {}", merged.missing_named()));
     }
     let report = merged.stream.report();
-    write_page(&report, &args.out)?;
+    write_page(&report, &args.out, Vec::new())?;
     unread_is_fine(show(&shown(&report, false, text::width())))?;
     let cells = text::counted(report.cells.len(), "cell");
     let shards = text::counted(args.runs.len(), "shard");

@@ -5,9 +5,10 @@
 use anyhow::{Result, bail};
 
 use super::args::PrecisionArgs;
-use super::document::{Block, show, to_page};
+use super::document::{Block, show};
 use super::figure::picture;
 use super::funnel::{nothing_for_it, plain_input};
+use super::page::to_page;
 use super::precision_conclusions::is_wrong;
 use super::processes::Timing;
 use super::study::{Setting, Study};

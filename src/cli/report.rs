@@ -1,7 +1,7 @@
 //! `cullbench report`: the results of a run as Markdown, pictures or one HTML page,
 //! from its report.json; their summary on the terminal, at the end of `run`.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
@@ -10,20 +10,18 @@ use anyhow::{Context, bail};
 
 use super::args::ReportArgs;
 use super::document::{Block, to_html, to_markdown};
+use super::page::{glossary, origin};
 use super::surface_tables::Picture;
-use super::table::Table;
 use super::{
     Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_plan,
     run_table, surface_tables, tell, text, write_text,
 };
-use crate::index::Registry;
-use crate::measure::{BOUNDS, METRICS};
 use crate::report::{
     Comparison, Overall, Report, Views, comparisons, folder_of, grouped, read_report, save_page,
     views,
 };
 
-pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
+pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
     let outputs = [
         ("--markdown", &args.markdown),
         ("--html", &args.html),
@@ -43,8 +41,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         let count = args.reports.len();
         bail!("{count} reports; expected one, or --history FILE");
     };
-    let mut report = read_report(path)?;
-    declare(&mut report, registry);
+    let report = read_report(path)?;
     if let Some(path) = &args.markdown {
         write_text(path, &to_markdown(&blocks(&report, &BTreeMap::new())))?;
     }
@@ -62,77 +59,31 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     }
     if let Some(file) = &args.html {
         let folder = if path.is_dir() { path } else { folder_of(path) };
-        write_text(file, &page(&report, folder))?;
+        write_text(file, &page(&report, folder, Vec::new()))?;
     } else if args.markdown.is_none() && args.svg.is_none() && args.bencher.is_none() {
         io::stdout().write_all(to_markdown(&blocks(&report, &BTreeMap::new())).as_bytes())?;
     }
     Ok(Ending::Ok)
 }
 
-/// The page of a run; `folder` has its stream and samples.
-fn page(report: &Report, folder: &Path) -> String {
+/// The page of a run; `folder` has its stream and samples, and `why` is of `--why`.
+fn page(report: &Report, folder: &Path, why: Vec<Block>) -> String {
     let mut blocks = blocks(report, &views(folder, report));
+    if !why.is_empty() {
+        blocks.push(Block::heading(
+            "Tests, and time per test, beside the best structure's",
+        ));
+        blocks.extend(why);
+    }
     blocks.extend(glossary(&blocks));
     to_html(&title(report), &blocks)
 }
 
 /// Writes the page and the pictures of a run into its folder.
-pub fn write_page(report: &Report, folder: &Path) -> anyhow::Result<()> {
+pub fn write_page(report: &Report, folder: &Path, why: Vec<Block>) -> anyhow::Result<()> {
     let pictures = surface_tables::pictures(report);
     let named = pictures.iter().map(|p| (p.0.as_str(), p.1.as_str()));
-    Ok(save_page(folder, &page(report, folder), named)?)
-}
-
-/// Meaning of the columns and labels that occur in tables.
-fn glossary(blocks: &[Block]) -> [Block; 2] {
-    let tables = blocks.iter().filter_map(|block| match block {
-        Block::Table(table) | Block::Heat(table) => Some(table),
-        _ => None,
-    });
-    let rows = tables.flat_map(|table| table.rows.iter().chain([&table.header]));
-    let texts: BTreeSet<&String> = rows.flatten().collect();
-    let is_of = |text: &str, name: &str| {
-        text.split(", ").next() == Some(name) || name.contains('[') && text.contains(" [")
-    };
-    let occurs = |name: &str| texts.iter().any(|text| is_of(text, name));
-    let figures = run_table::OF_QUERIES.iter().chain(&run_table::OF_FRAMES);
-    let figures = figures.map(|figure| (figure.0, figure.1));
-    let figures = [("vs linear", "speedup")].into_iter().chain(figures);
-    let figures = figures.map(|(column, metric)| {
-        let info = METRICS.iter().find(|info| info.name == metric);
-        [column, info.map_or("", |info| info.summary)]
-    });
-    let bounds = BOUNDS.iter().map(|bound| [bound.name, bound.summary]);
-    let meanings = MEANINGS.iter().filter_map(|line| line.split_once(" | "));
-    let meanings = meanings.map(<[&str; 2]>::from).chain(figures).chain(bounds);
-    let mut table = Table::of("column | meaning");
-    for row in meanings.filter(|row| occurs(row[0])) {
-        table.add_row(row);
-    }
-    [Block::heading("Columns"), Block::Table(table)]
-}
-
-/// Columns that are no metrics.
-const MEANINGS: [&str; 6] = [
-    "structure | name and parameters of the structure; bound-: a lower bound, no structure",
-    "rank | 1 is the fastest; structures that no test tells apart share a rank",
-    "±, [a, b] | 95 % interval over the processes",
-    "vs fastest peer | time of the fastest structure of another crate / time of this structure",
-    "geometric mean | mean of the speed-ups over all scenes and paths; shades are relative to the \
-     best of a row",
-    "status | ok: the answers are right; anything else has its reason under Statuses",
-];
-
-/// Older reports do not say what their structures are: the registry does, where
-/// it has one of the very same name.
-fn declare(report: &mut Report, registry: &Registry) {
-    for cell in &mut report.cells {
-        let name = cell.structure.split(':').next().unwrap_or_default();
-        if let (None, Some(row)) = (cell.kind, registry.named(name)) {
-            cell.kind = Some(row.info.kind);
-            cell.origin = Some(row.info.origin.owned());
-        }
-    }
+    Ok(save_page(folder, &page(report, folder, why), named)?)
 }
 
 /// All of them, or no folder that was not there before.
@@ -197,6 +148,11 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
         }
     }
     blocks.extend(details(&all, views));
+    blocks.extend(
+        run_table::choices(&all.iter().collect::<Vec<_>>())
+            .into_iter()
+            .map(Block::Line),
+    );
     blocks.extend(surface_tables::blocks(report, 1));
     blocks.push(Block::Heading(2, "Statuses".to_owned()));
     let cells = text::counted(report.cells.len(), "cell");
@@ -249,34 +205,20 @@ fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Vie
     blocks
 }
 
-fn known(text: &Option<String>) -> &str {
-    text.as_deref().unwrap_or("unknown")
-}
-
 /// Origin of the figures, in lines.
 fn about(report: &Report) -> Vec<String> {
     let (run, machine) = (&report.run, &report.machine);
     let suite = run.suite.as_deref().unwrap_or("chosen by hand");
     let (start, seed) = (&run.started_at, run.seed);
     let unfinished = ["", "; not finished"][usize::from(run.finished_at.is_none())];
-    let is_dirty = report.source.dirty == Some(true);
-    let dirty = ["", " with a dirty working tree"][usize::from(is_dirty)];
-    let (cpu, kernel) = (known(&machine.cpu), known(&machine.kernel));
-    let cores = text::counted(machine.cores, "core");
-    let isa = &machine.instruction_set;
-    let (built, commit) = (&report.toolchain, known(&report.source.commit));
-    let (rustc, profile) = (known(&built.rustc), known(&built.profile));
-    let (flags, features) = (&built.flags, built.features.join(","));
     let mut lines = vec![
         format!("{start}, suite: {suite}, seed {seed}{unfinished}."),
-        format!("Command: {}", run.command),
-        format!("Machine: {cpu}, {cores}, kernel {kernel}, instruction set {isa}."),
-        format!(
-            "Built with {rustc}, profile {profile}, flags '{flags}', features '{features}'; source \
-             {commit}{dirty}."
-        ),
         format!("{}.", text::conclusion(report)),
     ];
+    lines.splice(
+        1..1,
+        origin(&run.command, machine, &report.toolchain, &report.source),
+    );
     lines.extend(report.noise.warnings.iter().cloned());
     lines.extend(report.input_warnings().into_iter().map(str::to_owned));
     lines

@@ -138,11 +138,12 @@ impl<'a> Run<'a> {
         }
         // Tables before files: where a file cannot be written, what was measured is seen.
         let mut blocks = shown(&report, self.args.all_columns, text::width());
-        let why = self.args.why.iter();
-        blocks.extend(why.flat_map(|structure| run_why::blocks(&report, structure)));
+        let why = || self.args.why.iter();
+        let why = || why().flat_map(|structure| run_why::blocks(&report, structure));
+        blocks.extend(why());
         let shown = unread_is_fine(show(&blocks));
         save_report(self.folder.path(), &report)?;
-        write_page(&report, self.folder.path())?;
+        write_page(&report, self.folder.path(), why().collect())?;
         let save = self.args.save.as_deref().filter(|_| !stopped);
         if let Some(name) = save {
             compare::save_baseline(name, &report)?;
@@ -295,7 +296,8 @@ impl<'a> Run<'a> {
 }
 
 /// Options that decide how files are read, and what a frame of moving items is.
-const READS: &str = "up items views update skip-bad-items matrix-convention fovy aspect near far";
+const READS: &str =
+    "up items views update threads skip-bad-items matrix-convention fovy aspect near far";
 
 /// The command that a reader will want next, with what it gives if that fits into
 /// `width` characters; `None` where nothing is ranked.

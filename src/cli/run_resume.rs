@@ -12,6 +12,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, Parser};
 
 use super::args::{Cli, Command, RunArgs};
+use super::page::command_line;
 use super::run_plan::{RunPlan, same_digest};
 use super::{program, tell, text};
 use crate::measure::{Machine, Source, Toolchain};
@@ -41,8 +42,7 @@ pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFo
     };
     let typed = typed_args()?;
     let mut header = Header::of(&plan.plan, machine, format!("{stamp}-{id}"), now);
-    let words = [&[program::name().to_owned()], &typed[..]].concat();
-    header.run.command = words.join(" ");
+    header.run.command = command_line(&typed);
     header.run.suite = plan.suite.clone();
     header.run.shard.clone_from(&args.shard);
     header.args = typed;

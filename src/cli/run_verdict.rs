@@ -34,7 +34,10 @@ pub fn times(ratio: f64) -> String {
 /// Conclusion of one scene and path.
 pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     let mut told = vec![ranking(comparison, base)];
-    told.extend(base.and_then(fallback));
+    told.extend(
+        base.filter(|_| comparison.sound().nth(1).is_some())
+            .and_then(fallback),
+    );
     told.extend(repaid(comparison));
     told.extend(gains(&SharedWork::of(comparison.sound())));
     told.extend(checked(&[comparison]));
@@ -207,7 +210,8 @@ fn were(count: usize) -> String {
 /// Conclusion of several scenes and paths.
 pub fn of_many(all: &[&Comparison], overall: &Overall) -> String {
     let mut told = vec![standing(all.len(), overall)];
-    told.extend(overall.base.and_then(fallback));
+    let base = overall.base.filter(|_| overall.standings.len() > 1);
+    told.extend(base.and_then(fallback));
     told.extend(checked(all));
     told.extend(failed(all));
     told.extend(caveats(all));
@@ -230,10 +234,17 @@ fn standing(all: usize, overall: &Overall) -> String {
         [one] => format!("{one} is the fastest on the whole"),
         _ => format!("{} tie on the whole", listed(&names, "and")),
     };
-    told += &format!(": {} {base} in the geometric mean", times(lead));
-    if let Some(next) = next.filter(|next| next.structure != base) {
+    // The base is not compared with itself.
+    let of_base = !names.contains(&base);
+    let of_base = of_base.then(|| format!("{} {base} in the geometric mean", times(lead)));
+    let next = next.filter(|next| next.structure != base || of_base.is_none());
+    let of_next = next.map(|next| {
         let ratio = lead / next.speedup.unwrap_or(lead);
-        told += &format!(", {} {}, the next best", times(ratio), next.structure);
+        format!("{} {}, the next best", times(ratio), next.structure)
+    });
+    let leads: Vec<String> = of_base.into_iter().chain(of_next).collect();
+    if !leads.is_empty() {
+        told += &format!(": {}", leads.join(", "));
     }
     let firsts = [best].into_iter().chain(tied.iter().copied());
     let firsts: Vec<String> = firsts.map(|s| s.first_in.to_string()).collect();

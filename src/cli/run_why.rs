@@ -42,6 +42,9 @@ pub fn blocks(report: &Report, structure: &str) -> Vec<Block> {
         }
         blocks.push(Block::Line(sentence));
     }
+    if blocks.is_empty() {
+        blocks.push(Block::Line(format!("{structure} was not measured.")));
+    }
     blocks
 }
 

@@ -7,6 +7,7 @@ use super::document::Block;
 use super::figure::{Axis, Figure, ends, is_drawn, left_out, picture};
 use super::table::{Column, Table};
 use super::{run_figures, text};
+use crate::measure::YARDSTICK;
 use crate::report::{
     Crossing, Growth, Overall, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
 };
@@ -90,7 +91,9 @@ fn break_even(surface: &Surface) -> Option<Table> {
         let name = [format!("{items}, {visible}")].into_iter();
         table.add_row(name.chain(structures.iter().map(|structure| told(place, structure))));
     }
-    (!structures.is_empty()).then_some(table)
+    let mut places = surface.places.iter();
+    let is_known = places.any(|place| place.cell(YARDSTICK).is_some());
+    (is_known && !structures.is_empty()).then_some(table)
 }
 
 /// Crossovers and growth of a report, in tables and figures; a surface has as many

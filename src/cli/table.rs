@@ -1,6 +1,6 @@
 //! A table as rows and columns, and its form on a terminal.
 
-use super::text::{plain, wrapped};
+use super::text::{across, plain, wrapped};
 use crate::report::{grouped, unique};
 
 /// Blanks between columns.
@@ -129,10 +129,10 @@ impl Table {
         }
     }
 
-    /// The widest cell of each column, in characters.
+    /// The widest cell of each column, in columns of a terminal.
     fn widths(&self) -> Vec<usize> {
         let rows = || std::iter::once(&self.header).chain(&self.rows);
-        let width = |column: usize| rows().map(move |row| plain(&row[column]).chars().count());
+        let width = |column: usize| rows().map(move |row| across(&plain(&row[column])));
         let columns = 0..self.header.len();
         columns.map(|c| width(c).max().unwrap_or(0)).collect()
     }
@@ -145,10 +145,11 @@ impl Table {
             let mut line = String::new();
             for (column, (cell, width)) in row.iter().zip(&widths).enumerate() {
                 let (cell, gap) = (plain(cell), if column > 0 { GAP } else { 0 });
+                let pad = " ".repeat(width - across(&cell));
                 line += &" ".repeat(gap);
                 line += &match self.right.contains(&column) {
-                    true => format!("{cell:>width$}"),
-                    false => format!("{cell:<width$}"),
+                    true => pad + &cell,
+                    false => cell + &pad,
                 };
             }
             text += line.trim_end();

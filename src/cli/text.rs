@@ -184,11 +184,16 @@ pub fn share(found: Option<Rate>, whole: f64) -> String {
     rate(found.map(within), 1.0)
 }
 
+/// How many columns of a terminal a text takes: two for each character of Chinese.
+pub fn across(text: &str) -> usize {
+    console::measure_text_width(text)
+}
+
 /// Text with line breaks in place of spaces in lines longer than `width`.
 pub fn wrapped(text: &str, width: usize) -> String {
     let mut lines: Vec<String> = Vec::new();
     for line in text.split('\n') {
-        if line.chars().count() <= width {
+        if across(line) <= width {
             lines.push(line.to_owned());
             continue;
         }
@@ -196,7 +201,7 @@ pub fn wrapped(text: &str, width: usize) -> String {
         for word in line.split(' ') {
             match lines.last_mut() {
                 Some(line) if line.is_empty() => line.push_str(word),
-                Some(line) if line.chars().count() + word.chars().count() < width => {
+                Some(line) if across(line) + across(word) < width => {
                     *line += &format!(" {word}");
                 }
                 _ => lines.push(word.to_owned()),
@@ -287,7 +292,7 @@ pub fn sources(errors: ErrorCount) -> String {
 /// A word as a shell takes it.
 pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,%+@".contains(c);
-    match word.chars().all(is_plain) {
+    match !word.is_empty() && word.chars().all(is_plain) {
         true => word.to_owned(),
         false => format!("'{}'", word.replace('\'', "'\\''")),
     }

@@ -15,7 +15,7 @@
   // Numbers with a unit, such as "1.81 us [1.75, 1.90]"; text otherwise.
   const UNITS = { ns: 1, us: 1e3, ms: 1e6, s: 1e9 };
   const value = (cell) => {
-    const found = /^[<>~= ]*(-?[\d,]*\.?\d+(?:e-?\d+)?)\s*(ns|us|ms|s)?\b/.exec(cell.textContent);
+    const found = /^[<>~= ]*(-?[\d,]*\.?\d+(?:e-?\d+)?)(?:±[\d.]+| \[[^\]]*\])?\s*(ns|us|ms|s)?\b/.exec(cell.textContent);
     return found ? Number(found[1].replaceAll(",", "")) * (UNITS[found[2]] || 1) : NaN;
   };
   const order = (a, b, column) => {
@@ -23,7 +23,8 @@
     if (!x.textContent || !y.textContent) return (x.textContent ? 0 : 1) - (y.textContent ? 0 : 1) || 0;
     const [m, n] = [value(x), value(y)];
     if (column > 0 && m === m && n === n) return m - n;
-    return x.textContent.localeCompare(y.textContent, "en", { numeric: true });
+    const [s, t] = [x, y].map((cell) => cell.textContent.replace(/(\d),(?=\d{3})/g, "$1"));
+    return s.localeCompare(t, "en", { numeric: true });
   };
   const sort = (table, column, down) => {
     const body = table.tBodies[0];

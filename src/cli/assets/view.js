@@ -19,9 +19,10 @@
     history.replaceState(null, "", "#" + parts.join("&"));
   };
   const read = () => {
+    [look.through, look.off] = [false, new Set()];
     for (const [key, text] of new URLSearchParams(location.hash.slice(1))) {
-      const numbers = text.split(",").map(Number);
-      if (!numbers.every(Number.isFinite)) continue;
+      const numbers = text.split(",").filter(Boolean).map(Number);
+      if (!numbers.length || !numbers.every(Number.isFinite)) continue;
       if (key === "frame") look.frame = clamp(Math.round(numbers[0]), 0, frames.length - 1);
       if (key === "through") look.through = numbers[0] === 1;
       if (key === "off") look.off = new Set(numbers);
@@ -198,7 +199,8 @@
     return node;
   };
   const end = Math.max(frames.length - 1, 1);
-  const peak = Math.max(...frames.map((frame) => frame.returned), 1);
+  const most = Math.max(...frames.map((frame) => frame.returned));
+  const peak = Math.max(most, 1);
   $("strip").setAttribute("viewBox", `0 0 ${end} 1`);
   for (const [name, of] of [["c2", (f) => f.counts[1]], ["c7", (f) => f.returned]]) {
     const points = frames.map((frame, n) => `${n},${1 - of(frame) / peak}`);
@@ -206,7 +208,7 @@
   }
   const cursor = svg("line", { y1: 0, y2: 1 });
   $("frame").max = frames.length - 1;
-  $("peak").textContent = `returned per view, at most ${count(peak)}`;
+  $("peak").textContent = `returned per view, at most ${count(most)}`;
 
   // Everything that depends on the view of the path.
   const tell = () => {

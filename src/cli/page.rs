@@ -1,0 +1,145 @@
+//! Pages of what commands show, with the meaning of their columns and where they are from.
+
+use std::collections::BTreeSet;
+
+use super::document::{Block, to_html};
+use super::run_resume::typed_args;
+use super::table::Table;
+use super::{program, run_table, text};
+use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
+
+/// A page of what a terminal shows, with figures after its conclusions.
+///
+/// Those are the last `most` lines of the document, behind all tables.
+pub fn to_page(
+    about: &str,
+    most: usize,
+    figures: impl IntoIterator<Item = Block>,
+    mut blocks: Vec<Block>,
+) -> String {
+    let is_line = |block: &Block| matches!(block, Block::Line(_));
+    let lines = blocks.iter().rev().take_while(|block| is_line(block));
+    let mut told = blocks.split_off(blocks.len() - lines.count().min(most));
+    told.retain(|block| !matches!(block, Block::Line(text) if text.is_empty()));
+    for block in &mut told {
+        if let Block::Line(text) = block {
+            *text = text.trim_start_matches("- ").to_owned();
+        }
+    }
+    // The heading of the conclusions, and the title of a terminal.
+    if matches!(blocks.last(), Some(Block::Heading(..))) {
+        blocks.pop();
+    }
+    blocks.retain(|block| !matches!(block, Block::Heading(1, _)));
+    let title = format!("{} {about}", program::name());
+    let mut all = vec![Block::Heading(1, title.clone())];
+    all.extend(told);
+    all.extend(figures);
+    all.extend(blocks);
+    all.extend(glossary(&all));
+    all.push(Block::heading("Machine and command"));
+    let command = command_line(&typed_args().unwrap_or_default());
+    let lines = origin(
+        &command,
+        &Machine::capture(),
+        &Toolchain::capture(),
+        &Source::capture(),
+    );
+    all.extend(lines.map(Block::Line));
+    to_html(&title, &all)
+}
+
+/// The words of a command, to be typed again.
+pub fn command_line(typed: &[String]) -> String {
+    let words = typed.iter().map(|word| text::quoted(word));
+    let words = [program::name().to_owned()].into_iter().chain(words);
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// Command, machine and build, a line each.
+pub fn origin(command: &str, machine: &Machine, built: &Toolchain, source: &Source) -> [String; 3] {
+    let known = |text: &Option<String>| text.clone().unwrap_or_else(|| "unknown".to_owned());
+    let (cpu, kernel) = (known(&machine.cpu), known(&machine.kernel));
+    let cores = text::counted(machine.cores, "core");
+    let isa = &machine.instruction_set;
+    let (rustc, profile) = (known(&built.rustc), known(&built.profile));
+    let (flags, features) = (&built.flags, built.features.join(","));
+    let dirty = ["", " with a dirty working tree"][usize::from(source.dirty == Some(true))];
+    let commit = known(&source.commit);
+    [
+        format!("Command: {command}"),
+        format!("Machine: {cpu}, {cores}, kernel {kernel}, instruction set {isa}."),
+        format!(
+            "Built with {rustc}, profile {profile}, flags '{flags}', features '{features}'; source \
+             {commit}{dirty}."
+        ),
+    ]
+}
+
+/// Meaning of the columns and labels that occur in tables.
+pub fn glossary(blocks: &[Block]) -> Vec<Block> {
+    let tables = blocks.iter().filter_map(|block| match block {
+        Block::Table(table) | Block::Heat(table) => Some(table),
+        _ => None,
+    });
+    let rows = tables.flat_map(|table| table.rows.iter().chain([&table.header]));
+    let texts: BTreeSet<&String> = rows.flatten().collect();
+    let is_of = |text: &str, name: &str| {
+        text.split(", ").next() == Some(name) || name.contains('[') && text.contains(" [")
+    };
+    let occurs = |name: &str| texts.iter().any(|text| is_of(text, name));
+    let figures = run_table::OF_QUERIES.iter().chain(&run_table::OF_FRAMES);
+    let figures = figures.map(|figure| (figure.0, figure.1));
+    let figures = figures.map(|(column, metric)| {
+        let info = METRICS.iter().find(|info| info.name == metric);
+        [column, info.map_or("", |info| info.summary)]
+    });
+    let bounds = BOUNDS.iter().map(|bound| [bound.name, bound.summary]);
+    let meanings = MEANINGS.iter().filter_map(|line| line.split_once(" | "));
+    let meanings = meanings.map(<[&str; 2]>::from).chain(figures).chain(bounds);
+    let speedups = texts
+        .iter()
+        .filter(|text| text.starts_with("vs ") && **text != PEER);
+    let speedups = speedups.map(|name| [name, "time of that structure / time of this one"]);
+    let mut table = Table::of("column | meaning");
+    for row in meanings.filter(|row| occurs(row[0])).chain(speedups) {
+        table.add_row(row);
+    }
+    match table.rows.is_empty() {
+        true => Vec::new(),
+        false => vec![Block::heading("Columns"), Block::Table(table)],
+    }
+}
+
+const PEER: &str = "vs fastest peer";
+
+/// Columns that are no metrics.
+const MEANINGS: [&str; 24] = [
+    "structure | name and parameters of the structure; bound-: a lower bound, no structure",
+    "rank | 1 is the fastest; structures that no test tells apart share a rank",
+    "time per query | CPU time of a frustum query, mean over the cameras",
+    "time per frame | CPU time of a frame: the update and its queries, mean over the frames",
+    "±, [a, b] | 95 % interval over the processes",
+    "vs fastest peer | time of the fastest structure of another crate / time of this structure",
+    "geometric mean | mean of the speed-ups over all scenes and paths; shades are relative to the \
+     best of a row",
+    "status | ok: the answers are right; anything else has its reason under Statuses",
+    "by | back end of the stage; *: of the chain, ?: without a guarantee",
+    "in | items (triangles in the triangle stage) that the stage receives, per view",
+    "out | items (triangles in the triangle stage) that it passes, per view",
+    "truth | received items in front at some sample; received triangles that face the eye",
+    "FP | false positives: passed, not visible",
+    "FN | false negatives: visible, not passed",
+    "per item | time / number of removed items",
+    "worth it from | cost of drawing one item (a triangle, shading a fragment) above which the \
+     stage pays off",
+    "FP % | items returned that are not visible / visible items",
+    "FN ppm | visible items that are not returned, per million",
+    "by source | false positives by storage in f32 / rounded planes and margin / the test itself",
+    "px | how far the worst missed item reaches into an image 1,080 pixels high",
+    "flicker % | items whose answer changes from one camera to the next while the truth does \
+     not / visible items",
+    "tie | dominated by the values alone, which the samples do not show",
+    "overdraw | shaded fragments / covered samples",
+    "resolves | the change that 95 % of such comparisons find",
+];
