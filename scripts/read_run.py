@@ -49,9 +49,10 @@ def times_of(samples, task="query"):
     logs = (rounds.ns / rounds.queries).map(math.log)
 
     def interquartile(values):
-        values = values.sort_values()
-        cut = len(values) // 4
-        return values.iloc[cut:len(values) - cut].mean()
+        # A value that a quartile falls into counts by the share of it that lies inside.
+        values, low, high = values.sort_values(), len(values) / 4, len(values) * 3 / 4
+        shares = [max(0, min(high, i + 1) - max(low, i)) for i in range(len(values))]
+        return (values * shares).sum() / (high - low)
 
     return logs.groupby([*CELL, "process"]).agg(interquartile).unstack("process").map(math.exp)
 

@@ -39,7 +39,7 @@ impl Pool {
 }
 
 /// Does every job on `threads` threads, of which this is one: a free thread
-/// takes the next. With one thread the jobs are done in order, here.
+/// takes the next. With one thread, or one job, the jobs are done in order, here.
 ///
 /// If the system gives fewer threads, those do the work. A thread costs some
 /// 20 to 50 us to start: jobs are worth it from a fraction of a millisecond on.
@@ -51,6 +51,7 @@ pub fn share<J: Send>(
     jobs: impl Iterator<Item = J> + Send,
     work: impl Fn(J) + Sync,
 ) {
+    let threads = jobs.size_hint().1.map_or(threads, |most| threads.min(most));
     if threads <= 1 {
         return jobs.for_each(work);
     }

@@ -11,7 +11,7 @@ use crate::geometry::FrustumPlane;
 const PARALLEL: f64 = 1e-8;
 
 /// Largest shear and tilt of a camera with rays; f32 rounding makes some 1e-7.
-const STRAIGHT: f64 = 1e-4;
+const STRAIGHT: f64 = 1e-5;
 
 /// Opposite edges of a window are this much alike, relative to its size, where its
 /// lens is symmetric.
@@ -29,6 +29,8 @@ pub struct Unprojected {
     /// True if the image is mirrored: y points down (Vulkan), or the world is
     /// left-handed.
     pub is_mirrored: bool,
+    /// True if `is_mirrored` is of a clip space that may have y downward (Vulkan).
+    pub is_downward: bool,
     /// Cosine of the angle between the image's axes; 0 for a camera.
     pub shear: f64,
     /// Change of clip-space depth across the axis of view, relative to the change of w
@@ -76,6 +78,7 @@ impl ViewProjection {
             camera: Camera { frame, lens },
             depths,
             is_mirrored,
+            is_downward,
             shear: across.normalize().dot(upward.normalize()).abs(),
             tilt: aside(z).length() / change.length(),
         })
@@ -159,7 +162,7 @@ impl Camera {
             ("near plane of the matrix is oblique", found.tilt),
         ] {
             let found = format_args!("the {name} by {value:.1e}");
-            let rule = "at most 1e-4 where rays are needed, or another --matrix-convention";
+            let rule = "at most 1e-5 where rays are needed, or another --matrix-convention";
             require(value <= STRAIGHT, found, rule)?;
         }
         if matrix.is_from_zero() && self.may_be_reversed() {

@@ -229,7 +229,8 @@ fn outline_floors(items: &mut [Drawn], sheet: &Sheet) {
 ///
 /// Without a far plane the edges leave the sheet.
 fn draw_camera(camera: &Camera, up: UpAxis, sheet: &Sheet, body: &mut String) {
-    let Camera { frame, lens } = camera;
+    let camera = camera.unprojected().unwrap_or(*camera);
+    let Camera { frame, lens } = &camera;
     let beyond = || lens.with_far(Some(2.0 * (lens.near() + SIDE / sheet.scale)));
     let corners = match lens.far() {
         None => beyond().ok().and_then(|lens| lens.corners(frame)),

@@ -88,7 +88,14 @@ impl SceneFacts {
         };
         let step = |axis: usize| {
             let farthest = bounds.min[axis].abs().max(bounds.max[axis].abs()) as f32;
-            f64::from(farthest.next_up() - farthest)
+            // The largest f32 has no finite number above it.
+            let low = farthest.min(f32::MAX.next_down());
+            f64::from(low.next_up() - low)
+                * if farthest < f32::INFINITY {
+                    1.0
+                } else {
+                    f64::INFINITY
+                }
         };
         let (mut sampled, mut meeting, mut others) = (0, 0, 0);
         if !scene.items.is_empty() {
@@ -204,10 +211,13 @@ fn histogram(edges: &[f64]) -> Vec<SizeStep> {
         [least, .., most] if least < most => (least, most),
         _ => return Vec::new(),
     };
+    // By logarithms, whose difference f64 always holds.
+    let [low, high] = [least, most].map(libm::log);
+    let between = |share: f64| low + (high - low) * share;
     let end = |step: usize| match step {
         0 => least,
         STEPS => most,
-        _ => least * libm::pow(most / least, step as f64 / STEPS as f64),
+        _ => libm::exp(between(step as f64 / STEPS as f64)),
     };
     // Each step has its lower end, the last one both.
     let below = |step: usize| match step {

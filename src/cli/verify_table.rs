@@ -83,6 +83,7 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
     let checked = format!(
         "{}: {} in {:.1} s ({:.1} million/s), {}",
         match (differ.count(), &all[..]) {
+            (0, []) => "Nothing was checked".to_owned(),
             (0, [(one, _)]) => format!("{one} returns the sets of {reference}"),
             (0, _) => format!("All {of} return the sets of {reference}"),
             (1, _) => format!("1 of {of} differs from {reference} or misses what the cameras see"),

@@ -396,9 +396,15 @@ fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
     };
     let [x, y, z, w] = matrix.rows().map(DVec4::from);
     let lowest = if matrix.is_from_zero() { 0.0 } else { -1.0 };
-    let depths = matrix.unprojected().map(|found| found.depths);
-    let [near, far] = depths.unwrap_or([lowest, 1.0]);
+    let found = matrix.unprojected();
+    let [near, far] = found.as_ref().map_or([lowest, 1.0], |found| found.depths);
     let z = (2.0 * z - (near + far) * w) / (far - near);
+    // The page draws y upward, also for Vulkan.
+    let y = if found.is_ok_and(|found| found.is_downward) {
+        -y
+    } else {
+        y
+    };
     DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
 }
 

@@ -92,8 +92,8 @@ impl MemoryUsage {
 
 /// Input of a build: items, and optionally a partition and a thread pool.
 ///
-/// Items are numbered by their index in the slice. An empty box (min > max) is
-/// an item that no query ever returns.
+/// Items are numbered by their index in the slice. An empty box of finite numbers (min > max),
+/// such as [`REMOVED`](crate::motion::REMOVED), is an item that no query ever returns.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Input<'a> {

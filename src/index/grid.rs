@@ -18,6 +18,8 @@ use crate::query::{ItemId, Recorder, Sink};
 const ITEMS_PER_CELL: f64 = 8.0;
 /// Most cells along an axis.
 const MOST_CELLS: f64 = 1024.0;
+/// Cells that are all tested: the bounds of the centres asked for take longer.
+const FEW_CELLS: usize = 32;
 
 /// A uniform grid (Bentley and Friedman 1979, "Data structures for range
 /// searching"): cells in rows along x, items in the order of their cells.
@@ -195,7 +197,11 @@ impl BoxTested for UniformGrid {
         if self.ids.is_empty() || test.rejects(&self.scene) {
             return ControlFlow::Continue(());
         }
-        let asked = test.centres(self.half, &self.scene);
+        // Few cells are tested sooner than the bounds of what is asked for are known.
+        let asked = match self.bounds.len() {
+            0..=FEW_CELLS => self.centres,
+            _ => test.centres(self.half, &self.scene),
+        };
         if asked.is_empty() {
             return ControlFlow::Continue(());
         }

@@ -341,7 +341,8 @@ impl StructureSpec {
     }
 
     /// Updates an index after items have moved: by refitting if the structure can, else
-    /// by a new build. True for a refit.
+    /// by a new build. True for a refit. There are as many items as it was built over; another
+    /// number needs [`StructureSpec::build`].
     ///
     /// # Errors
     /// A moved item with a NaN or infinite bound, or one that is not among `items`: the index

@@ -286,7 +286,8 @@ fn unstraight(_: &Scene, cameras: &[Camera]) -> Option<String> {
 fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     let bounds = scene.world_bounds();
     let diagonal = (bounds.max - bounds.min).length();
-    let diagonal = if diagonal > 0.0 { diagonal } else { 1.0 };
+    // Paths about a point go as if its diagonal were 2.
+    let diagonal = if diagonal > 0.0 { diagonal } else { 2.0 };
     let outside = |camera: &Camera| {
         let eye = camera.frame.eye;
         let distance = eye.distance(eye.clamp(bounds.min, bounds.max));

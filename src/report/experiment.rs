@@ -113,7 +113,20 @@ impl Experiment {
         let (scenes, [least, most]) = (&plan.scenes, effort.rounds);
         let labels: BTreeSet<_> = plan.structures.iter().map(|s| &s.label).collect();
         let is_time = |ns: f64| (0.0..f64::INFINITY).contains(&ns);
+        // What is named twice would count as two processes.
+        let once = |names: Vec<&String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
+        let is_warm = |s: &PlannedScene| plan.motions.is_empty() || s.caches == [false];
         let rules = [
+            (
+                once(scenes.iter().map(|s| &s.source).collect()),
+                "a scene twice",
+            ),
+            (
+                scenes.iter().all(|s| once(s.paths.iter().collect())),
+                "a path twice",
+            ),
+            (once(plan.motions.iter().collect()), "a motion twice"),
+            (scenes.iter().all(is_warm), "cold caches of items that move"),
             (!scenes.is_empty(), "no scene"),
             (scenes.iter().all(|s| !s.paths.is_empty()), "no path"),
             (scenes.iter().all(|s| !s.caches.is_empty()), "no caches"),

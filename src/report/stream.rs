@@ -304,6 +304,10 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
              frequency, or run on a machine of your own"
         ));
     }
+    if report.toolchain.opt_level.as_deref() == Some("0") {
+        let advice = "times are not those of a release; build with --release";
+        warnings.push(format!("the program is not optimised: {advice}"));
+    }
     let twins = report.noise.twins.iter();
     let holds = twins.filter_map(super::TwinEntry::holds_one);
     let (all, missed) = (holds.clone().count(), holds.filter(|holds| !holds).count());

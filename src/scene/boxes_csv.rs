@@ -82,6 +82,15 @@ impl Rows {
                 ));
             }
         }
+        let own = self.labels.iter().find(|label| label.column == "id");
+        let is_row = |(item, row): (usize, &ItemId)| {
+            own.is_none_or(|label| label.get(item).parse() == Ok(*row))
+        };
+        if !self.kept.iter().enumerate().all(is_row) {
+            note(&format!(
+                "{file}: ids are data rows from 0; column 'id' is a label"
+            ));
+        }
     }
 }
 

@@ -46,8 +46,10 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
             decision: costs.map(|_| Decision::of(taken.is_scan)),
             is_tie: costs.map(|_| taken.is_mixed),
             note: match crossing {
-                0.0 => format!("no scan wins from {least:.0} items on"),
-                _ => format!("a scan wins up to {crossing:.0} items"),
+                // Parts are measured with the structures that there were.
+                _ if costs.is_none() => String::new(),
+                0.0 => format!("no scan wins from {} items on", count(least as usize)),
+                _ => format!("a scan wins up to {} items", count(crossing as usize)),
             },
             ..Finding::new(all, crossing, reason)
         }
