@@ -1,4 +1,4 @@
-//! Pages of what commands show, with the meaning of their columns and where they are from.
+//! Pages of what commands show, with origin and the meaning of their columns.
 
 use std::collections::BTreeSet;
 

@@ -18,7 +18,7 @@ use crate::query::{ItemId, Recorder, Sink};
 const ITEMS_PER_CELL: f64 = 8.0;
 /// Most cells along an axis.
 const MOST_CELLS: f64 = 1024.0;
-/// Cells that are all tested: the bounds of the centres asked for take longer.
+/// Cells that are all tested: the bounds of the centres that matter take longer.
 const FEW_CELLS: usize = 32;
 
 /// A uniform grid (Bentley and Friedman 1979, "Data structures for range
@@ -197,7 +197,7 @@ impl BoxTested for UniformGrid {
         if self.ids.is_empty() || test.rejects(&self.scene) {
             return ControlFlow::Continue(());
         }
-        // Few cells are tested sooner than the bounds of what is asked for are known.
+        // Few cells are tested sooner than the bounds of centres that matter are known.
         let asked = match self.bounds.len() {
             0..=FEW_CELLS => self.centres,
             _ => test.centres(self.half, &self.scene),

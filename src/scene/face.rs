@@ -5,12 +5,14 @@ use glam::{DVec2, DVec3};
 
 use crate::shown::counted;
 
-/// Most corners of a concave face: cutting one that crosses itself takes the square of them.
+/// Most corners of a concave face.
+///
+/// Cutting one that crosses itself takes time in the square of them.
 const MOST_CONCAVE: usize = 1000;
 
-/// Adds the triangles of a face, turned as it is: a fan, or the ears of a concave one.
+/// Adds the triangles of a face: a fan, or the ears of a concave one.
 ///
-/// `face` holds three or more indices of points. A corner that no ear has, such as the end
+/// They turn as the face does. `face` holds three or more indices of points. A corner that no ear has, such as the end
 /// of a spur, is a triangle of its own, so that the triangles have the bounds of the face.
 ///
 /// # Errors
@@ -37,7 +39,9 @@ pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> 
     Ok(())
 }
 
-/// A face as seen along its normal (Newell's), counter-clockwise, if it turns both ways.
+/// A face as seen along its normal, if it turns both ways.
+///
+/// Counter-clockwise; the normal is Newell's.
 fn flat_if_concave(points: &[DVec3], face: &[u32]) -> Option<Vec<[f64; 2]>> {
     if face.len() < 4 {
         return None;

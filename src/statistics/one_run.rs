@@ -94,9 +94,9 @@ fn differences(own: &[f64], other: &[f64]) -> Option<Vec<f64>> {
     (own.len() == other.len()).then(|| pairs.map(|(own, other)| own - other).collect())
 }
 
-/// The trimmed mean of `own` less that of `other` in the same processes, with the error that
-/// the intervals shown have: none that holds a ratio of 1 is of two ranks.
+/// The trimmed mean of `own` less that of `other` in the same processes.
 ///
+/// Its error is that of the intervals shown: none that holds a ratio of 1 is of two ranks.
 /// `None` below three processes and for a NaN.
 pub(super) fn paired_difference(own: &[f64], other: &[f64]) -> Option<Trimmed> {
     Some(Trimmed {

@@ -25,7 +25,7 @@ pub struct Triangles {
     pub two_sided: Vec<bool>,
 }
 
-/// Returns false for a mask that is opaque everywhere: no texture, and no vertex has an alpha.
+/// Returns false for a mask that is opaque everywhere: no texture, no low alpha.
 fn has_holes(material: &Material) -> bool {
     let own = &material.pbr_metallic_roughness;
     let cutoff = material.alpha_cutoff.unwrap_or_default();
