@@ -5,60 +5,19 @@
 //! tree has come to. All are counts, so every run chooses the same, and no answer depends
 //! on the choice.
 
-use std::ops::ControlFlow;
+mod params;
+
+use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use serde::{Deserialize, Serialize};
-
-use super::{BlockOrder, Moving, WideParams};
+pub use self::params::AutoParams;
+use self::params::{Update, Use};
+use super::{Moving, Wide, WideParams};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::linear::{Linear, LinearParams};
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::kernel::Plain;
 use crate::query::{Context, Count, ItemId, QueryContext, QueryCost, QueryVolume};
-
-/// Parameters: `auto:use=linear,update=rebuild`.
-#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AutoParams {
-    /// The structure to be: `linear`, `wide` or `moving`; `auto` for the cheapest.
-    #[serde(rename = "use")]
-    pub structure: Use,
-    /// Updates by `refit` or `rebuild`; `auto` for the cheapest.
-    pub update: Update,
-    /// The order of the items: `median` or `morton`.
-    pub order: BlockOrder,
-}
-
-/// Structure that [`Auto`] is to be.
-#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Use {
-    /// The cheapest of a scan and a tree.
-    #[default]
-    Auto,
-    /// A scan of all items.
-    Linear,
-    /// A tree.
-    Wide,
-    /// A tree of what rests beside a tree of what moves.
-    Moving,
-}
-
-/// Work of [`Auto`] after items have moved.
-#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Update {
-    /// The cheapest.
-    #[default]
-    Auto,
-    /// New bounds in the same structure.
-    Refit,
-    /// A new structure.
-    Rebuild,
-}
 
 /// Searches by their index in [`Auto::costs`].
 const SEARCHES: [&str; 2] = ["scan of all items", "tree"];
@@ -72,19 +31,19 @@ const REFIT: usize = 1;
 const REBUILD: usize = 2;
 
 // Times in ns, measured on one processor (AVX-512). Only their ratios choose.
-/// A query, besides what it tests.
-const QUERY_NS: f64 = 51.0;
-/// A tested node, a tested item, an item passed with its subtree; of a tree.
-const TREE_NS: [f64; 3] = [1.65, 0.28, 0.03];
+/// A query, besides what it tests, by search.
+const QUERY_NS: [f64; 2] = [100.0, 51.0];
+/// A tested node, item, plane of an item, and an item passed with its subtree.
+const TREE_NS: [f64; 4] = [1.5, 0.12, 0.15, 0.03];
 /// An item of a scan, in the nearest cache.
-const SCAN_NS: f64 = 0.32;
+const SCAN_NS: f64 = 0.5;
 /// Items that fit the nearest cache.
 ///
 /// Beyond it the time of an item grows with the cube root of their number.
-const NEAR: f64 = 32_768.0;
-/// An overwritten item, and (more) an item of a scan that leaves or enters.
-const MOVE_NS: f64 = 7.0;
-const ENTER_NS: f64 = 8.0;
+const NEAR: f64 = 65_536.0;
+/// An overwritten item, and (more) one that leaves or enters, of a scan and a tree.
+const MOVE_NS: [f64; 2] = [7.0, 8.0];
+const ENTER_NS: [f64; 2] = [12.0, 9.0];
 /// A refit, and a leaf whose bounds it fits.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
 /// The same of two trees, of a moved item.
@@ -94,6 +53,8 @@ const BUILD_NS: f64 = 45.0;
 
 /// Fewest items that go to a scan in an update.
 const LEAST_FILLED: usize = 256;
+/// Most updates in which a scan is filled.
+const PARTS: usize = 8;
 /// Mark of a scan that has all items.
 const WHOLE: usize = usize::MAX;
 
@@ -102,7 +63,13 @@ const VIEWS: usize = 8;
 /// Time of a counted query / time of a query.
 const COUNTED: f64 = 4.0;
 /// Time of updates and queries / time of counting the work of the refitted tree.
-const RARELY: f64 = 32.0;
+const RARELY: f64 = 16.0;
+/// Time that a new tree would have saved / time of its build: less may be chance.
+const AGE: f64 = 4.0;
+/// Most that counts become rarer where a tree does not age.
+const MOST_PATIENCE: f64 = 16.0;
+/// Weighings in which a scan forgets most of a tree's age.
+const FORGETS: f64 = 256.0;
 /// Updates that are weighed at once.
 const TOGETHER: u32 = 8;
 /// Most queries that are counted between two weighings; then nothing is written.
@@ -121,20 +88,26 @@ pub struct Auto {
     built: usize,
     /// Modelled time of a query, ns, by search; infinite where that is unknown.
     costs: [f64; 2],
-    /// The same of the refitted tree, when its work was counted last.
+    /// The same of the refitted tree, and of each view in a new tree.
     aged: f64,
+    fresh: [Option<f64>; VIEWS],
+    /// The view that was counted last.
+    turn: usize,
     /// Queries since the last weighing, at most [`MOST_ASKED`].
     asked: AtomicU32,
-    /// Updates since the last weighing, items moved, and how many of them left.
+    /// Updates since the last weighing, and items moved.
     weighing: u32,
     moved: f64,
-    left: f64,
     /// Present kind of update, and the modelled time it has lost to the best, ns.
     update: usize,
     regret: f64,
-    /// Queries and modelled time since work was counted, and time lost to age, ns.
+    /// Queries and modelled time since work was counted.
     since: [f64; 2],
-    lost: f64,
+    /// Queries of the tree before that, and what a new one would have saved, ns.
+    answered: f64,
+    saving: f64,
+    /// Doubled with each count that finds no change.
+    patience: f64,
     /// Updates by kind, and the modelled time of all of them by each kind, ns.
     updates: [u32; 3],
     spent: [f64; 3],
@@ -146,63 +119,89 @@ impl Auto {
         self.params.structure == Use::Moving
     }
 
-    /// Frusta of 60 degrees from the centre of an item to that of another one.
-    fn views(&self, items: &[Aabb]) -> Vec<ConvexVolume> {
+    /// Frustum of 60 degrees from the centre of an item to that of another one.
+    fn view(&self, items: &[Aabb], i: usize) -> Option<ConvexVolume> {
         let ids = &self.trees.still.ids[..];
         let centre = |at: usize| {
-            let from = ids.iter().cycle().skip(at % ids.len()).take(ids.len());
-            let present = from.filter_map(|&id| items.get(id as usize));
-            Some(present.copied().find(|b| !b.is_empty())?.centre())
+            let from = ids
+                .iter()
+                .cycle()
+                .skip(at % ids.len().max(1))
+                .take(ids.len());
+            let mut present = from.filter_map(|&id| items.get(id as usize));
+            Some(present.find(|b| !b.is_empty())?.centre())
         };
-        let view = |i: usize| {
-            // Tree order is spread over space: half, a quarter, .. of the items between.
-            let at = i * ids.len() / VIEWS;
-            let (eye, end) = (centre(at)?, centre(at + (ids.len() >> (1 + i % 4)))?);
-            let forward = (end - eye).try_normalize()?;
-            let (right, up) = forward.any_orthonormal_pair();
-            let side = |across| (forward * 0.5 + across * 0.75_f32.sqrt(), eye);
-            let planes = [
-                side(right),
-                side(-right),
-                side(up),
-                side(-up),
-                (-forward, end),
-            ];
-            let planes = planes.map(|(normal, through)| Plane::new(normal, -normal.dot(through)));
-            ConvexVolume::from_planes(&planes).ok()
-        };
-        let views = if ids.is_empty() { 0 } else { VIEWS };
-        (0..views).filter_map(view).collect()
+        // Tree order is spread over space: half, a quarter, .. of the items between.
+        let at = i * ids.len() / VIEWS;
+        let (eye, end) = (centre(at)?, centre(at + (ids.len() >> (1 + i % 4)))?);
+        let forward = (end - eye).try_normalize()?;
+        let (right, up) = forward.any_orthonormal_pair();
+        let side = |across| (forward * 0.5 + across * 0.75_f32.sqrt(), eye);
+        let planes = [
+            side(right),
+            side(-right),
+            side(up),
+            side(-up),
+            (-forward, end),
+        ];
+        let planes = planes.map(|(normal, through)| Plane::new(normal, -normal.dot(through)));
+        ConvexVolume::from_planes(&planes).ok()
     }
 
-    /// Modelled time of a query of the trees, ns, by the counted work of some views;
-    /// infinite without a view.
-    fn tree_ns(&self, items: &[Aabb]) -> f64 {
-        let views = self.views(items);
+    /// Modelled time of a view by the trees, ns, from its counted work.
+    fn view_ns(&self, items: &[Aabb], i: usize) -> Option<f64> {
         let (mut sink, mut cost) = (Count::default(), QueryCost::default());
-        for view in &views {
-            let cx = &mut QueryContext::new(Plain, &mut sink, &mut cost);
-            let _ = self.trees.query(view, cx);
-        }
-        let [nodes, tested, passed] = TREE_NS;
-        let work = nodes * cost.nodes_tested as f64
+        let cx = &mut QueryContext::new(Plain, &mut sink, &mut cost);
+        let _ = self.trees.query(&self.view(items, i)?, cx);
+        let [nodes, tested, planes, passed] = TREE_NS;
+        let work = QUERY_NS[TREE]
+            + nodes * cost.nodes_tested as f64
             + tested * cost.items_tested as f64
+            + planes * cost.planes_tested as f64
             + passed * cost.items_accepted_untested as f64;
-        match views.len() {
-            0 => f64::INFINITY,
-            views => QUERY_NS + work / views as f64,
+        Some(work)
+    }
+
+    /// Modelled time of a query, ns, by some views beside those in a new tree.
+    ///
+    /// The present age if there is none.
+    fn age(&self, items: &[Aabb], views: Range<usize>) -> f64 {
+        let both = views.filter_map(|i| Some([self.view_ns(items, i)?, self.fresh[i]?]));
+        let [now, fresh] = both.fold([0.0; 2], |sum, both| [sum[0] + both[0], sum[1] + both[1]]);
+        match fresh > 0.0 {
+            true => self.costs[TREE] * now / fresh,
+            false => self.aged,
         }
+    }
+
+    /// Counts the work of all views in a new tree; modelled time of a query, ns.
+    fn count(&mut self, items: &[Aabb]) -> f64 {
+        self.fresh = std::array::from_fn(|i| self.view_ns(items, i));
+        let known = self.fresh.iter().flatten();
+        match known.clone().count() {
+            0 => f64::INFINITY,
+            count => known.sum::<f64>() / count as f64,
+        }
+    }
+
+    /// Modelled time of a scan of the items that are there, ns.
+    fn scan_ns(&self) -> f64 {
+        let in_tree = |tree: &Wide| tree.ids.len() - tree.vacant;
+        let held = match &self.scan {
+            Some(scan) if self.filled == WHOLE => scan.ids().len(),
+            _ => in_tree(&self.trees.still) + in_tree(&self.trees.movers),
+        } as f64;
+        QUERY_NS[SCAN] + SCAN_NS * held * (held / NEAR).max(1.0).cbrt()
     }
 
     /// Chooses the search of a new tree.
     fn calibrate(&mut self, items: &[Aabb]) {
-        let all = self.trees.still.ids.len() as f64;
-        let scan = QUERY_NS + SCAN_NS * all * (all / NEAR).max(1.0).cbrt();
-        self.costs = [scan, self.tree_ns(items)];
-        self.aged = self.costs[TREE];
+        let scan = self.scan_ns();
+        let tree = self.count(items);
+        (self.aged, self.costs) = (tree, [scan, tree]);
         self.built = match self.params.structure {
             Use::Linear => SCAN,
-            Use::Auto if scan < self.aged => SCAN,
+            Use::Auto if scan < tree => SCAN,
             _ => TREE,
         };
     }
@@ -243,9 +242,19 @@ impl Auto {
         };
         self.trees = trees;
         (self.scan, self.filled) = (None, 0);
-        (self.aged, self.since, self.lost) = (self.costs[TREE], [0.0; 2], 0.0);
+        if self.update == REFIT {
+            self.costs[TREE] = self.count(items);
+            self.aged = self.costs[TREE];
+        }
+        self.start();
         self.updates[REBUILD] += 1;
         self.built == TREE || self.begin_scan(&Input::new(items))
+    }
+
+    /// Watches the age of other trees from now on.
+    fn start(&mut self) {
+        (self.since, self.answered, self.saving) = ([0.0; 2], 0.0, 0.0);
+        self.patience = 1.0;
     }
 
     /// The scan alone, once it has all items; the trees are stale from then on.
@@ -259,7 +268,7 @@ impl Auto {
         }
         // Filled in item order, as many at once as are moved: no update is much slower.
         let more = if from == 0 { 0 } else { moved.len() };
-        let end = count.min(from + LEAST_FILLED.max(more));
+        let end = count.min(from + LEAST_FILLED.max(count / PARTS).max(more));
         let held = moved.iter().filter(|id| (**id as usize) < from);
         let ids: Vec<ItemId> = held.copied().chain(from as ItemId..end as ItemId).collect();
         self.filled = if end < count { end } else { WHOLE };
@@ -282,10 +291,11 @@ impl Auto {
             if self.is_aged() || self.has_two_trees() || !self.trees.still.take_over(items, &all) {
                 return self.rebuild(items);
             }
-            self.aged = self.tree_ns(items);
+            self.aged = self.age(items, 0..VIEWS);
+            self.start();
         }
         (self.scan, self.filled) = (None, 0);
-        if self.is_old(items) || !self.refit_held(items, moved) {
+        if !self.refit_held(items, moved) || self.is_old(items) {
             return self.rebuild(items);
         }
         self.updates[REFIT] += 1;
@@ -297,30 +307,44 @@ impl Auto {
         self.aged > 1.5 * self.costs[TREE]
     }
 
-    /// Returns whether age has cost as much as a new tree; rarely counts the work.
+    /// Returns whether a new tree pays; rarely counts the work, a view in an update.
+    ///
+    /// It does if it costs less than its queries have saved against the present age. Of a tree
+    /// that is old at once, a new one saves nothing.
     fn is_old(&mut self, items: &[Aabb]) -> bool {
         let [asked, spent] = self.since;
-        if self.params.update != Update::Auto || spent < RARELY * COUNTED * VIEWS as f64 * self.aged
+        if self.params.update != Update::Auto
+            || spent < RARELY * self.patience * COUNTED * self.aged
         {
             return false;
         }
-        let aged = self.tree_ns(items);
-        self.lost += asked * ((self.aged + aged) / 2.0 - self.costs[TREE]).max(0.0);
-        (self.aged, self.since) = (aged, [0.0; 2]);
-        self.lost > BUILD_NS * items.len() as f64
+        self.turn = (self.turn + 1) % VIEWS;
+        let aged = self.age(items, self.turn..self.turn + 1);
+        // Half of it later on, as views differ.
+        let more = (aged - self.aged) / if self.answered > 0.0 { 2.0 } else { 1.0 };
+        self.saving += more * self.answered;
+        self.answered += asked;
+        self.aged += more;
+        self.patience = match more.abs() < 0.05 * self.aged {
+            true => MOST_PATIENCE.min(2.0 * self.patience),
+            false => 1.0,
+        };
+        self.since = [0.0; 2];
+        self.saving > AGE * BUILD_NS * items.len() as f64
     }
 
     /// Chooses the kind of updates: another one when the present one has lost what a
     /// change costs, so that a few exceptions change nothing.
-    fn weigh(&mut self, items: usize) {
-        let is_first = self.updates == [0; 3];
+    fn weigh(&mut self, items: &[Aabb], now: &[ItemId]) {
+        let before = self.updates.iter().sum::<u32>();
         let updates = f64::from(std::mem::take(&mut self.weighing));
         let moved = std::mem::take(&mut self.moved);
-        let left = std::mem::take(&mut self.left);
+        let left = now.iter().filter(|id| items[**id as usize].is_empty());
+        let left = left.count() as f64 * updates;
         let asked = f64::from(std::mem::take(self.asked.get_mut()));
         // Queries before the first update are of no frame.
-        let asked = if is_first { 1.0 } else { asked.max(updates) };
-        let (all, leaves) = (items as f64, self.trees.still.occupied.len() as f64);
+        let asked = if before == 0 { 1.0 } else { asked.max(updates) };
+        let (all, leaves) = (items.len() as f64, self.trees.still.occupied.len() as f64);
         // About the number of leaves that hold them, if items move anywhere.
         let fitted = moved * leaves / (moved / updates).hypot(leaves);
         let fit = REFIT_NS[0] * updates
@@ -329,18 +353,19 @@ impl Auto {
                 false => REFIT_NS[1] * fitted,
             };
         let is_scan = self.filled == WHOLE;
-        let tree = match is_scan {
-            true => self.costs[TREE],
-            false => self.aged,
-        };
+        self.costs[SCAN] = self.scan_ns();
+        if is_scan && self.aged > self.costs[TREE] {
+            self.aged += (self.costs[TREE] - self.aged) / FORGETS;
+        }
         let change = match is_scan && self.is_aged() || self.has_two_trees() {
             true => BUILD_NS * all,
-            false => MOVE_NS * all + REFIT_NS[1] * leaves,
+            false => MOVE_NS[TREE] * all + REFIT_NS[1] * leaves,
         };
+        // About as many enter as leave.
+        let taken = |kind: usize| MOVE_NS[kind] * moved + 2.0 * ENTER_NS[kind] * left;
         let costs = [
-            // About as many enter as leave.
-            MOVE_NS * moved + 2.0 * ENTER_NS * left + asked * self.costs[SCAN],
-            MOVE_NS * moved + fit + asked * tree,
+            taken(SCAN) + asked * self.costs[SCAN],
+            taken(TREE) + fit + asked * self.aged,
             BUILD_NS * all * updates + asked * self.costs[self.built],
         ];
         for (spent, cost) in self.spent.iter_mut().zip(costs) {
@@ -351,12 +376,11 @@ impl Auto {
             (_, Use::Linear) => OVERWRITE,
             (Update::Refit, _) => REFIT.min(self.built),
             (_, Use::Wide | Use::Moving) => REFIT,
-            _ if costs[OVERWRITE] <= costs[REFIT].min(costs[REBUILD]) => OVERWRITE,
-            _ if costs[REFIT] <= costs[REBUILD] => REFIT,
-            _ => REBUILD,
+            _ => (0..3).fold(0, |best, i| if costs[i] < costs[best] { i } else { best }),
         };
         self.regret += costs[self.update] - costs[best];
-        if is_first || self.regret > change {
+        // The second knows the queries of a frame.
+        if before < 2 || self.regret > change {
             (self.update, self.regret) = (best, 0.0);
         }
         self.since = [self.since[0] + asked, self.since[1] + costs[self.update]];
@@ -385,6 +409,7 @@ impl RegionIndex for Auto {
             ..Auto::default()
         };
         auto.calibrate(input.items);
+        auto.start();
         if auto.built == SCAN {
             auto.begin_scan(input);
         }
@@ -433,10 +458,8 @@ impl RegionIndex for Auto {
         self.trees.still.balls = None;
         self.weighing += 1;
         self.moved += moved.len() as f64;
-        let left = moved.iter().filter(|id| items[**id as usize].is_empty());
-        self.left += left.count() as f64;
-        if self.weighing == TOGETHER || self.updates == [0; 3] {
-            self.weigh(items.len());
+        if self.weighing == TOGETHER || self.updates.iter().sum::<u32>() < 2 {
+            self.weigh(items, moved);
         }
         match self.update {
             OVERWRITE => self.overwrite(items, moved),

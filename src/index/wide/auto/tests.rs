@@ -8,6 +8,11 @@ use rand_pcg::Pcg64;
 
 const WORLD: u32 = 64;
 
+/// The frusta whose work is counted.
+fn views(index: &Auto, items: &[Aabb]) -> Vec<ConvexVolume> {
+    (0..VIEWS).filter_map(|i| index.view(items, i)).collect()
+}
+
 /// Ids of the items for which the test holds.
 fn scan(items: &[Aabb], sees: impl Fn(&Aabb) -> bool) -> Vec<ItemId> {
     let seen = items.iter().zip(0..).filter(|(b, _)| sees(b));
@@ -95,10 +100,10 @@ fn answers_are_those_of_a_scan_whatever_is_chosen_and_moves() {
 #[test]
 fn the_tree_answers_while_the_scan_fills() {
     let mut rng = Pcg64::seed_from_u64(11);
-    for turns in [0, 9] {
+    for turns in [0, 5] {
         let mut items = cubes(&mut rng, 5200);
         let mut index = built(&items, "");
-        index.updates[OVERWRITE] = 1;
+        index.updates[OVERWRITE] = 2;
         let mut partly = 0;
         for round in 1..24 {
             (index.update, index.weighing) = (OVERWRITE, 0);
@@ -119,7 +124,7 @@ fn the_tree_answers_while_the_scan_fills() {
             assert!(index.refit(&items, &[]));
             assert_right(&index, &items, &mut rng, &told);
         }
-        assert!(partly > 10 && (index.filled == WHOLE) == (turns == 0));
+        assert!(partly > 5 && index.filled == WHOLE);
     }
 }
 
@@ -183,7 +188,7 @@ fn a_view_tests_no_more_than_all_items_and_nodes() {
         let cube = |_| Aabb::around(point(&mut rng), Vec3::splat(half));
         let items: Vec<Aabb> = (0..20_000).map(cube).collect();
         let index = built(&items, ":use=wide");
-        let views = index.views(&items);
+        let views = views(&index, &items);
         assert_eq!(views.len(), VIEWS);
         for view in &views {
             let tested = index.counted(view).1.comparisons();
@@ -238,7 +243,7 @@ fn many_queries_between_updates_keep_the_tree() {
 fn a_tree_that_has_aged_is_built_again() {
     let mut rng = Pcg64::seed_from_u64(12);
     let mut items = cubes(&mut rng, 4000);
-    let mut index = built(&items, "");
+    let mut index = built(&items, ":use=wide");
     let volume = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -60.0)]).unwrap();
     for round in 0..2000 {
         // Two items go anywhere.
@@ -284,9 +289,9 @@ fn items_that_come_and_go_have_a_lane_after_each_build() {
     // No frustum begins at an item that is gone.
     let last = items.len() - 1;
     items[..last].fill(GONE);
-    assert_eq!(index.views(&items).len(), 0);
+    assert_eq!(views(&index, &items).len(), 0);
     items[..100].copy_from_slice(&cubes(&mut rng, 100));
-    assert_eq!(index.views(&items).len(), VIEWS);
+    assert_eq!(views(&index, &items).len(), VIEWS);
 }
 
 #[test]
