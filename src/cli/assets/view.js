@@ -199,8 +199,8 @@
     return node;
   };
   const end = Math.max(frames.length - 1, 1);
-  const most = Math.max(...frames.map((frame) => frame.returned));
-  const peak = Math.max(most, 1);
+  const largest = Math.max(...frames.map((frame) => frame.returned));
+  const peak = Math.max(largest, 1);
   $("strip").setAttribute("viewBox", `0 0 ${end} 1`);
   for (const [name, of] of [["c2", (f) => f.counts[1]], ["c7", (f) => f.returned]]) {
     const points = frames.map((frame, n) => `${n},${1 - of(frame) / peak}`);
@@ -208,7 +208,7 @@
   }
   const cursor = svg("line", { y1: 0, y2: 1 });
   $("frame").max = frames.length - 1;
-  $("peak").textContent = `returned per view, at most ${count(most)}`;
+  $("peak").textContent = `returned per view, at most ${count(largest)}`;
 
   // Everything that depends on the view of the path.
   const tell = () => {
