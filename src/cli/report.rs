@@ -16,12 +16,13 @@ use super::{
     Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_plan,
     run_table, surface_tables, tell, text, write_text,
 };
+use crate::index::Registry;
 use crate::report::{
     Comparison, Overall, Report, Views, comparisons, folder_of, grouped, read_report, save_page,
     views,
 };
 
-pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
+pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
     let outputs = [
         ("--markdown", &args.markdown),
         ("--html", &args.html),
@@ -41,7 +42,8 @@ pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
         let count = args.reports.len();
         bail!("{count} reports; expected one, or --history FILE");
     };
-    let report = read_report(path)?;
+    let mut report = read_report(path)?;
+    declare(&mut report, registry);
     if let Some(path) = &args.markdown {
         write_text(path, &to_markdown(&blocks(&report, &BTreeMap::new())))?;
     }
@@ -84,6 +86,18 @@ pub fn write_page(report: &Report, folder: &Path, why: Vec<Block>) -> anyhow::Re
     let pictures = surface_tables::pictures(report);
     let named = pictures.iter().map(|p| (p.0.as_str(), p.1.as_str()));
     Ok(save_page(folder, &page(report, folder, why), named)?)
+}
+
+/// Older reports do not say what their structures are: the registry does, where
+/// it has one of the very same name.
+fn declare(report: &mut Report, registry: &Registry) {
+    for cell in &mut report.cells {
+        let name = cell.structure.split(':').next().unwrap_or_default();
+        if let (None, Some(row)) = (cell.kind, registry.named(name)) {
+            cell.kind = Some(row.info.kind);
+            cell.origin = Some(row.info.origin.owned());
+        }
+    }
 }
 
 /// All of them, or no folder that was not there before.
