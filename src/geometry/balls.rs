@@ -2,12 +2,7 @@
 //!
 //! Four rows decide nearly every item by one sum per plane. Items within the rounding
 //! errors of a plane get the test of [`Spheres::drops`], so the sets are the same.
-//! Trees have nodes over spheres too. They leave radii out, so a plane is open for fewer nodes
-//! than over cubes: it keeps all spheres of a node from where it touches the last one.
 
-use glam::Vec3;
-
-use super::box_block::sums_at;
 use super::{Aabb, Ball, BoxBlock, LANES, LaneMask, PlaneMask, Spheres};
 use crate::kernel::{Isa, prefetch};
 
@@ -18,23 +13,10 @@ pub struct BallBlock {
     rows: [[f32; LANES]; 4],
 }
 
-/// Below 1 / sqrt(3): moved by it along all axes, no plane's value changes by 1.
-const SHARE: f32 = 0.577;
-
-/// Nodes over spheres, and the radii that they leave out.
-pub type BallNodes<'t> = (&'t [[BoxBlock; 2]], [f32; 2]);
-
 /// Spheres in blocks, in the order in which they were set.
 #[derive(Clone, Default, Debug)]
 pub struct BallBlocks {
     blocks: Vec<BallBlock>,
-    /// Sixteen nodes each, 768 bytes.
-    ///
-    /// At the corner farthest along a plane's normal, the second block bounds the values of all
-    /// spheres of a node from above, the first one from below.
-    nodes: Vec<[BoxBlock; 2]>,
-    /// Radii that the blocks of nodes leave out.
-    radii: [f32; 2],
     /// No coordinate of any item is larger.
     reach: f32,
 }
@@ -61,45 +43,9 @@ impl BallBlocks {
     pub fn of(cubes: impl ExactSizeIterator<Item = Aabb>) -> BallBlocks {
         let mut all = BallBlocks {
             blocks: vec![BallBlock::default(); cubes.len().div_ceil(LANES)],
-            ..BallBlocks::default()
+            reach: 0.0,
         };
         cubes.enumerate().for_each(|(at, cube)| all.set(at, &cube));
-        all
-    }
-
-    /// The same with nodes above, level by level. O(cubes).
-    ///
-    /// The value of a sphere's farthest point is that of its centre and the radius. Blocks of
-    /// nodes leave out a radius that all of them share: the least one, for the bounds from below,
-    /// and one that few exceed, for those from above. For what a radius is larger, its centre
-    /// moves outward along all axes, which is enough, or by [`SHARE`] of it, which is not too
-    /// much.
-    pub fn tree_of(cubes: impl ExactSizeIterator<Item = Aabb> + Clone) -> BallBlocks {
-        let balls = || cubes.clone().map(|cube| Ball::in_cube(&cube));
-        let mut all = BallBlocks::of(cubes.clone());
-        let mut radii = Vec::from_iter(balls().map(|b| b.radius).chain([f32::MAX]));
-        let most = (radii.len() - 1) * 31 / 32;
-        let (below, typical, _) = radii.select_nth_unstable_by(most, f32::total_cmp);
-        all.radii = [below.iter().copied().fold(f32::MAX, f32::min), *typical];
-        let around = |b: Ball| {
-            let [near, far] = all.radii.map(|radius| b.radius - radius);
-            [-SHARE * near, far.max(SHARE * far)].map(|by| Aabb::around(b.centre, Vec3::splat(by)))
-        };
-        let mut bounds: Vec<[Aabb; 2]> = balls().map(around).collect();
-        while bounds.len() > LANES {
-            let join = |[a, b]: [Aabb; 2], [c, d]: [Aabb; 2]| [a.union(&c), b.union(&d)];
-            let united = |some: &[_]| some.iter().copied().reduce(join);
-            bounds = bounds.chunks(LANES).filter_map(united).collect();
-            for some in bounds.chunks(LANES) {
-                let mut nodes = [BoxBlock::EMPTY; 2];
-                for (lane, [near, far]) in some.iter().enumerate() {
-                    // So that the farthest corner's rows hold the nearest one.
-                    nodes[0].set(lane, &Aabb::new(near.max, near.min));
-                    nodes[1].set(lane, far);
-                }
-                all.nodes.push(nodes);
-            }
-        }
         all
     }
 
@@ -122,15 +68,9 @@ impl BallBlocks {
         Some(Balls { blocks, doubt })
     }
 
-    /// The nodes from an index on, and the radii that they leave out.
-    #[inline(always)]
-    pub fn nodes_from(&self, first: usize) -> BallNodes<'_> {
-        (&self.nodes[first..], self.radii)
-    }
-
     /// Heap bytes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.blocks[..]) + size_of_val(&self.nodes[..])
+        size_of_val(&self.blocks[..])
     }
 }
 
@@ -242,35 +182,6 @@ impl Spheres {
         })
     }
 
-    /// The lanes of a block of nodes whose spheres no plane is sure to drop all.
-    ///
-    /// For each of them, the planes of the mask that may drop one.
-    ///
-    /// Answers have the same order on all instruction sets: no fused sums.
-    #[inline(always)]
-    pub fn sorted_nodes<I: Isa>(
-        &self,
-        isa: I,
-        (nodes, [least, typical]): BallNodes,
-        (at, doubt): (usize, f32),
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
-        let [near, far] = &nodes[at];
-        let (mut kept, mut open) = (isa.keep_all(), isa.splat_word(mask));
-        let mut left = mask;
-        while left != 0 {
-            let bit = left.trailing_zeros();
-            left &= left - 1;
-            let [x, y, z, d] = self.plane_of_bit(bit).1.unit;
-            let (normal, corner) = (Vec3::new(x, y, z), self.planes().p_vertex_of_bit(bit));
-            let sums = sums_at(isa, normal, far.corner_rows(corner));
-            kept = isa.keep(kept, sums, isa.splat(-doubt - d - typical));
-            let sums = sums_at(isa, normal, near.corner_rows(corner));
-            open = isa.without(open, sums, isa.splat(doubt - d - least), 1 << bit);
-        }
-        (isa.kept(kept), open)
-    }
-
     /// Those of the lanes that no plane of the mask drops, one by one.
     #[cold]
     #[inline(never)]
@@ -289,7 +200,7 @@ mod tests {
     use crate::geometry::arbitrary::{any_box, number, vector};
     use crate::geometry::{BallFrustum, ConvexVolume, Plane, Planes, sphere_cube};
     use crate::kernel::{Kernel, Plain, Work};
-    use glam::{EulerRot, Quat};
+    use glam::{EulerRot, Quat, Vec3};
     use proptest::prelude::*;
 
     fn bits(lanes: impl Iterator<Item = bool>) -> LaneMask {
@@ -350,18 +261,6 @@ mod tests {
         Some(frustum.is_some())
     }
 
-    /// Planes through spheres' farthest points, but for a few roundings, or free.
-    fn touching(normals: &[(Vec3, f32, i32)], boxes: &[Aabb]) -> Vec<Plane> {
-        let through = |((normal, d, ulps), b): (&(Vec3, f32, i32), &Aabb)| {
-            let ball = Ball::in_cube(b);
-            let far = normal.dot(ball.centre) + ball.radius * normal.length();
-            let touches = f32::from_bits((-far).to_bits().saturating_add_signed(*ulps));
-            let free = *ulps % 3 == 0 || !touches.is_finite();
-            Plane::new(*normal, if free { *d } else { touches })
-        };
-        normals.iter().zip(boxes).map(through).collect()
-    }
-
     #[test]
     fn the_end_of_f32_is_left_to_the_bounds() {
         let far = Aabb::around(Vec3::splat(1e38), Vec3::splat(1e38));
@@ -388,7 +287,14 @@ mod tests {
             let boxes: [Aabb; LANES] = boxes.try_into().unwrap();
             let boxes = if as_cubes { boxes.map(|b| sphere_cube(&b)) } else { boxes };
             prop_assume!(boxes.iter().all(|b| !b.is_empty() && b.is_finite()));
-            check(&boxes, &touching(&normals, &boxes), mask);
+            let touching = normals.iter().zip(&boxes).map(|((normal, d, ulps), b)| {
+                // Through the sphere's farthest point, but for a few roundings.
+                let ball = Ball::in_cube(b);
+                let far = normal.dot(ball.centre) + ball.radius * normal.length();
+                let touches = f32::from_bits((-far).to_bits().saturating_add_signed(*ulps));
+                Plane::new(*normal, if *ulps % 3 == 0 || !touches.is_finite() { *d } else { touches })
+            });
+            check(&boxes, &touching.collect::<Vec<_>>(), mask);
         }
 
         #[test]
@@ -423,43 +329,6 @@ mod tests {
             let boxes: Vec<Aabb> = boxes.collect();
             let is_frustum = check(&boxes.try_into().unwrap(), &planes, 0b11_1111);
             prop_assert_eq!(is_frustum, Some(true));
-        }
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(400))]
-
-        #[test]
-        fn no_node_contradicts_its_spheres(
-            boxes in prop::collection::vec(any_box(), 17..400),
-            normals in prop::collection::vec((vector(), number(), -40i32..40), 1..8),
-        ) {
-            let mut cubes: Vec<Aabb> = boxes.iter().map(sphere_cube).collect();
-            cubes.retain(|b| !b.is_empty() && b.is_finite() && Ball::in_cube(b).reach < 1e6);
-            cubes.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
-            let planes: Vec<Plane> = touching(&normals, &cubes);
-            let spheres = Spheres::new(&ConvexVolume::from_planes(&planes).unwrap());
-            let all = BallBlocks::tree_of(cubes.iter().copied());
-            let Some(Balls { doubt, .. }) = all.seen_by(&spheres) else { return Ok(()) };
-            let nodes = all.nodes_from(0);
-            let leaves = cubes.len().div_ceil(LANES);
-            for (first, span) in [(0, LANES), (leaves.div_ceil(LANES), LANES * LANES)] {
-                for (node, below) in cubes.chunks(span).enumerate() {
-                    let (at, lane) = (first + node / LANES, node % LANES);
-                    if at >= nodes.0.len() {
-                        continue;
-                    }
-                    for plane in (0..32).filter(|i| spheres.planes().mask() >> i & 1 == 1) {
-                        let (kept, open) = spheres.sorted_nodes(Plain, nodes, (at, doubt), 1 << plane);
-                        let drops = below.iter().filter(|b| spheres.drops(plane, b)).count();
-                        if kept >> lane & 1 == 0 {
-                            prop_assert_eq!(drops, below.len(), "dropped by {:?}", planes);
-                        } else if open[lane] == 0 {
-                            prop_assert_eq!(drops, 0, "inside of {:?}", planes);
-                        }
-                    }
-                }
-            }
         }
     }
 }

@@ -15,7 +15,7 @@ mod relative_volume;
 mod spheres;
 
 pub use aabb::Aabb;
-pub use balls::{BallBlock, BallBlocks, BallNodes, Balls};
+pub use balls::{BallBlock, BallBlocks, Balls};
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, blocks_of};
 pub use broadcast::{BallFrustum, BallPlane, BroadcastPlane, BroadcastPlanes, Planes, Sorted};
 pub use convex_volume::{

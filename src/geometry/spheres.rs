@@ -96,7 +96,7 @@ impl SphereMargin {
     /// Roundings between the sum over centre and radius for the plane of length 1 and
     /// both tests of [`Spheres::drops`], of the sum `2 |n|_1 * reach + |d|`: 24 for the
     /// margin above and 15 for what it covers, 4 from cube to sphere, 12 of the sum itself
-    /// and of the division, 8 of the bounds of nodes over spheres.
+    /// and of the division.
     const OF_BOTH: f64 = 96.0;
 
     fn of(plane: &Plane) -> SphereMargin {
@@ -144,7 +144,7 @@ impl SphereMargin {
 ///
 /// A plane drops an item if the cube's p-vertex evaluates below zero or the
 /// sphere lies surely outside. No verdict about a node (over cubes, by the
-/// plane test; those over spheres decide by sums beyond any doubt) contradicts the verdict about an item in it, bit for bit:
+/// plane test) contradicts the verdict about an item in it, bit for bit:
 ///
 /// - A node outside a plane has only cubes outside it (the plane test is
 ///   monotone), and those are dropped by the first clause; the sphere alone,

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::volume::each_volume;
 use super::{AnyVolume, Predicate, QueryVolume, Recorder};
-use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows, Sorted, Spheres};
+use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows, Sorted};
 use crate::kernel::Isa;
 
 /// Any volume of planes, with the verdicts and costs of the volume inside, bit for
@@ -48,12 +48,6 @@ impl Predicate for Dispatched<'_> {
 }
 
 impl QueryVolume for Dispatched<'_> {
-    fn as_spheres(&self) -> Option<&Spheres> {
-        let AnyVolume::Spheres(spheres) = self.0 else {
-            return None;
-        };
-        Some(spheres)
-    }
     #[inline(never)]
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         each_volume!(self.0, volume => volume.kept_lanes(isa, block, mask))

@@ -48,6 +48,19 @@ pub trait QueryVolume: Predicate {
         })
     }
 
+    /// [`QueryVolume::kept_lanes`] of a block with that index, whose spheres are in
+    /// `balls`.
+    #[inline(always)]
+    fn kept_balls<I: Isa>(
+        &self,
+        isa: I,
+        _balls: &Balls,
+        (_, block): (usize, &BoxBlock),
+        mask: PlaneMask,
+    ) -> LaneMask {
+        self.kept_lanes(isa, block, mask)
+    }
+
     /// The plane of that bit, prepared for many blocks:
     /// [`QueryVolume::kept_lanes`] with this bit for a mask.
     #[inline(always)]
@@ -139,10 +152,7 @@ impl<I: Isa, V: QueryVolume> Planes<I> for UnpreparedPlanes<'_, V> {
 
     #[inline(always)]
     fn kept_balls(&self, isa: I, balls: &Balls, block: (usize, &BoxBlock)) -> LaneMask {
-        match self.view.as_spheres() {
-            Some(spheres) => spheres.kept_balls(isa, balls, block, self.mask),
-            None => self.view.kept_lanes(isa, block.1, self.mask),
-        }
+        self.view.kept_balls(isa, balls, block, self.mask)
     }
 
     #[inline(always)]
@@ -223,6 +233,16 @@ impl QueryVolume for Spheres {
     #[inline(always)]
     fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         block.sorted_by(isa, self.planes(), mask)
+    }
+    #[inline(always)]
+    fn kept_balls<I: Isa>(
+        &self,
+        isa: I,
+        balls: &Balls,
+        block: (usize, &BoxBlock),
+        mask: PlaneMask,
+    ) -> LaneMask {
+        self.kept_balls(isa, balls, block, mask)
     }
 }
 

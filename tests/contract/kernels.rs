@@ -50,15 +50,10 @@ fn ask(structure: &str, kernel: Kernel, case: &RandomCase) -> Said {
     };
     let cubes: Vec<Aabb> = case.items.iter().map(sphere_cube).collect();
     let (index, index_of_cubes) = (build(&case.items), build(&cubes));
-    let spec = StructureSpec::parse(structure).expect(structure);
-    let spec = spec.by(Execution { kernel, threads: 1 });
-    let index_of_balls = spec.build(Input::new(&cubes).spheres(true));
-    let index_of_balls = index_of_balls.expect(structure);
     let volume = &case.volume;
     let mut said = Said::default();
     said.see(&*index, volume.into());
     said.see(&*index_of_cubes, (&Spheres::new(volume)).into());
-    said.see(&*index_of_balls, (&Spheres::new(volume)).into());
     said.see(&*index, (&ConvexVolumeF64::from(volume)).into());
     if let Ok(relative) = RelativeVolume::about(case.point, volume) {
         said.see(&*index, (&relative).into());

@@ -37,10 +37,10 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
         let (blocks, masks) = here.entries();
         let mut run = Merger::default();
         for i in first_ahead(layer.far) {
-            layer.prefetch(self.volume, here, i);
+            layer.prefetch(blocks, i);
         }
         for (i, (&block, &mask)) in pairs(blocks, masks).enumerate() {
-            layer.prefetch(self.volume, here, i + AHEAD);
+            layer.prefetch(blocks, i + AHEAD);
             let inside = self.sort_lanes(layer, (block, mask), below);
             for items in layer.items_of(block as usize, inside, self.ids.len()) {
                 if let Some(ended) = run.join(items) {
@@ -65,10 +65,10 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
     ) -> ControlFlow<()> {
         let (blocks, masks) = here.entries();
         for i in first_ahead(layer.far) {
-            layer.prefetch(self.volume, here, i);
+            layer.prefetch(blocks, i);
         }
         for (i, (&block, &mask)) in pairs(blocks, masks).enumerate() {
-            layer.prefetch(self.volume, here, i + AHEAD);
+            layer.prefetch(blocks, i + AHEAD);
             let inside = self.sort_lanes(layer, (block, mask), below);
             whole.push(self.isa, self.isa.iota(block * LANES as u32), inside);
         }
@@ -147,12 +147,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
         self.recorder.nodes_tested(lanes.count_ones());
         self.recorder
             .planes_tested(lanes.count_ones() * V::planes_open(mask));
-        let (kept, open) = match (&layer.balls, self.volume.as_spheres()) {
-            (Some(balls), Some(spheres)) => {
-                spheres.sorted_nodes(self.isa, layer.nodes, (at, balls.doubt), mask)
-            }
-            _ => (self.volume).sorted_lanes(self.isa, &layer.blocks[at], mask),
-        };
+        let (kept, open) = self.volume.sorted_lanes(self.isa, &layer.blocks[at], mask);
         let kept = kept & lanes;
         self.recorder
             .subtrees_rejected((lanes & !kept).count_ones());
@@ -294,10 +289,11 @@ impl<I: Isa, V: QueryVolume, P: Planes<I>> LeafTest<I> for SinglePlane<'_, V, P>
 
     #[inline(always)]
     fn kept(&self, isa: I, leaves: &Layer, (_, at): (usize, usize)) -> LaneMask {
-        let block = (at, &leaves.blocks[at]);
         match &leaves.balls {
-            Some(balls) if V::SPHERES => self.plane.kept_balls(isa, balls, block),
-            _ => self.plane.kept(isa, block.1),
+            Some(balls) if V::SPHERES => {
+                (self.plane).kept_balls(isa, balls, (at, &leaves.blocks[at]))
+            }
+            _ => self.plane.kept(isa, &leaves.blocks[at]),
         }
     }
 
@@ -325,8 +321,8 @@ impl<I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'_, V> {
     fn kept(&self, isa: I, leaves: &Layer, (i, at): (usize, usize)) -> LaneMask {
         let mask = self.masks[i];
         let block = (at, &leaves.blocks[at]);
-        match (&leaves.balls, self.volume.as_spheres()) {
-            (Some(balls), Some(spheres)) => spheres.kept_balls(isa, balls, block, mask),
+        match &leaves.balls {
+            Some(balls) if V::SPHERES => self.volume.kept_balls(isa, balls, block, mask),
             _ => self.volume.kept_lanes(isa, block.1, mask),
         }
     }

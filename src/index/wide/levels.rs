@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use crate::geometry::{BallNodes, Balls, BoxBlock, LANES, LaneMask};
-use crate::index::frontier::Frontier;
-use crate::query::{QueryVolume, runs};
+use crate::geometry::{Balls, BoxBlock, LANES, LaneMask};
+use crate::query::runs;
 
 /// A level's position among the blocks of the tree.
 #[derive(Clone, Copy, Debug)]
@@ -59,10 +58,8 @@ pub struct Layer<'t> {
     pub span: usize,
     /// True if its memory is prefetched.
     pub far: bool,
-    /// Spheres of the items, for a query of spheres.
+    /// Spheres of its items, for a query of spheres.
     pub balls: Option<Balls<'t>>,
-    /// Its nodes over them, and those of levels above.
-    pub nodes: BallNodes<'t>,
 }
 
 impl Layer<'_> {
@@ -84,17 +81,12 @@ impl Layer<'_> {
 
     /// Prefetches the block of an entry of a frontier, if there is such an entry.
     #[inline(always)]
-    pub fn prefetch<V: QueryVolume>(&self, volume: &V, here: &Frontier, i: usize) {
-        let (entries, masks) = here.entries();
+    pub fn prefetch(&self, entries: &[u32], i: usize) {
         if self.far
-            && let Some(&at) = entries.get(i)
-            && let Some(block) = self.blocks.get(at as usize)
+            && let Some(&block) = entries.get(i)
+            && let Some(block) = self.blocks.get(block as usize)
         {
-            match (&self.balls, volume.as_spheres()) {
-                (Some(_), Some(spheres)) => (self.nodes.0[at as usize].iter())
-                    .for_each(|block| spheres.planes().prefetch(block, masks[i])),
-                _ => block.prefetch(),
-            }
+            block.prefetch();
         }
     }
 }

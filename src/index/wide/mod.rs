@@ -23,7 +23,7 @@ use super::frontier::{Frontier, NodeList, is_far, pass_run, put_back, take};
 use super::items::{ABSENT, PaddedIds, Positions, indexable};
 use super::linear::seen_by;
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
-use crate::geometry::{Aabb, BallBlocks, Balls, BoxBlock, LANES, LaneMask};
+use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES, LaneMask};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{Bits, Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
@@ -61,8 +61,8 @@ pub struct Wide {
     /// Bounds of all items, or more.
     root: Aabb,
     positions: Positions,
-    /// Spheres of the leaves and nodes over them, where the items are
-    /// [spheres](Input::spheres), until one moves.
+    /// Spheres of the leaves, where the items are [spheres](Input::spheres), until one
+    /// moves.
     balls: Option<BallBlocks>,
 }
 
@@ -174,17 +174,14 @@ impl Wide {
 
     /// A level for a traversal; level 0 are the leaves.
     #[inline(always)]
-    fn layer<'t>(&'t self, index: usize, balls: Option<Balls<'t>>) -> Layer<'t> {
+    fn layer(&self, index: usize) -> Layer<'_> {
         let level = self.levels[index];
-        // Leaves are apart from the nodes over spheres.
-        let above = level.first.saturating_sub(self.levels[0].blocks);
         Layer {
             blocks: &self.blocks[level.first..level.end()],
             level,
             span: 1 << (index * LANES.ilog2() as usize),
             far: is_far(self.ids.len()),
-            balls,
-            nodes: (self.balls.as_ref()).map_or_else(Default::default, |all| all.nodes_from(above)),
+            balls: None,
         }
     }
 
@@ -206,8 +203,10 @@ impl Wide {
         };
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        let balls = seen_by(self.balls.as_ref(), volume);
-        let leaves = self.layer(0, balls);
+        let leaves = Layer {
+            balls: seen_by(self.balls.as_ref(), volume),
+            ..self.layer(0)
+        };
         let Scratch {
             here,
             below,
@@ -230,7 +229,7 @@ impl Wide {
         here.start(isa, volume.mask());
         for level in (1..=top).rev() {
             below.clear(here.len());
-            let layer = self.layer(level, balls);
+            let layer = self.layer(level);
             if level == 1 {
                 whole.clear(here.len());
                 traversal.sort_last_level(&layer, &leaves, here, below, whole)?;
@@ -364,7 +363,7 @@ impl RegionIndex for Wide {
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
         let threads = input.threads();
         let ids = block_ordered(input.items, indexable(input.items)?, params.order, threads);
-        let cubes = || BallBlocks::tree_of(ids.iter().map(|&id| input.items[id as usize]));
+        let cubes = || BallBlocks::of(ids.iter().map(|&id| input.items[id as usize]));
         Ok(Wide {
             balls: input.spheres.then(cubes),
             ..Wide::over(input.items, &ids, threads)
