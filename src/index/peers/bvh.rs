@@ -143,7 +143,10 @@ impl BoxTested for PeerBvh {
         let overflows = |(_, b): &(usize, Aabb)| b.reach().max_element() > LARGEST;
         let builds = placed.len() * 2 > self.shapes.len();
         let builds = builds || self.scaled || placed.iter().any(overflows);
-        let changed: Vec<usize> = placed.iter().map(|(at, _)| *at).collect();
+        let mut changed: Vec<usize> = placed.iter().map(|(at, _)| *at).collect();
+        // The crate adds a shape as often as it is named.
+        changed.sort_unstable();
+        changed.dedup();
         for (at, bounds) in placed {
             self.shapes[at].item.bounds = bounds;
         }
