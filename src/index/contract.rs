@@ -207,7 +207,8 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// `items` holds the bounds of all items, the new ones included: finite, and as many as
     /// were built. Ids are below their number; others may panic, and
     /// [`StructureSpec::update`](super::StructureSpec::update) refuses them. `moved` may be
-    /// empty, as before the first frame of a motion. Returns false, with the structure
+    /// empty, as before the first frame of a motion; it has any order and may name an item
+    /// twice. Returns false, with the structure
     /// unchanged, if a rebuild is needed: where an item becomes or ceases to be empty, and
     /// always from a structure that does not declare
     /// `refits` in its [`Info`].
