@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::document::{Block, to_html};
-use super::run_resume::typed_args;
+use super::run_resume::{command_line, typed_args};
 use super::table::Table;
 use super::{program, run_table, text};
 use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
@@ -47,13 +47,6 @@ pub fn to_page(
     );
     all.extend(lines.map(Block::Line));
     to_html(&title, &all)
-}
-
-/// The words of a command, to be typed again.
-pub fn command_line(typed: &[String]) -> String {
-    let words = typed.iter().map(|word| text::quoted(word));
-    let words = [program::name().to_owned()].into_iter().chain(words);
-    words.collect::<Vec<_>>().join(" ")
 }
 
 /// Command, machine and build, a line each.

@@ -12,7 +12,6 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, Parser};
 
 use super::args::{Cli, Command, RunArgs};
-use super::page::command_line;
 use super::run_plan::{RunPlan, same_digest};
 use super::{program, tell, text};
 use crate::measure::{Machine, Source, Toolchain};
@@ -55,6 +54,13 @@ pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFo
     header.files = names.into_iter().filter_map(digest).collect();
     let folder = RunFolder::create(&path, &header)?;
     Ok((folder, Stream::of(header)))
+}
+
+/// The words of a command, to be typed again.
+pub fn command_line(typed: &[String]) -> String {
+    let words = typed.iter().map(|word| text::quoted(word));
+    let words = [program::name().to_owned()].into_iter().chain(words);
+    words.collect::<Vec<_>>().join(" ")
 }
 
 /// The arguments behind the program's name, to be read again by a worker.
