@@ -1,9 +1,12 @@
-//! Camera controls: slide, advance, zoom, yaw, pitch and roll.
+//! Camera controls: slide, advance, zoom, orbit, yaw, pitch and roll.
 //!
 //! Angles are degrees, counter-clockwise about their axis (right-hand rule). Rotations
 //! correct their drift.
 
-use super::{Camera, CameraError, Frame, Lens, LensKind, Result, require};
+use glam::{DQuat, DVec3};
+
+use super::frame::{check_finite, unit};
+use super::{Camera, CameraError, Frame, Lens, LensKind, Result, finite, require};
 
 /// Rotations between two corrections: a rotation drifts by about 2e-16, so
 /// the frame stays orthonormal to 1e-13 at no visible cost.
@@ -50,6 +53,34 @@ impl Frame {
         self.rotated();
     }
 
+    /// Swings the whole camera about `centre`: `around` degrees about `axis`
+    /// (through the centre), then `over` degrees about its own u. Distance
+    /// and bearing to the centre stay.
+    ///
+    /// # Errors
+    /// An axis of length zero, or a value that is not finite; the frame is unchanged.
+    pub fn orbit(&mut self, centre: DVec3, axis: DVec3, around: f64, over: f64) -> Result<()> {
+        let found = format_args!("the axis of the orbit is zero or not finite");
+        let is_direction = axis.is_finite() && axis != DVec3::ZERO;
+        require(is_direction, found, "a direction")?;
+        check_finite("centre", centre)?;
+        finite("the angle around", around)?;
+        finite("the angle over", over)?;
+        self.swing(centre, unit(axis), around);
+        // Read only now: the first swing has turned u.
+        self.swing(centre, self.u, over);
+        Ok(())
+    }
+
+    /// Turns eye and axes about the unit vector `axis` through `centre`.
+    fn swing(&mut self, centre: DVec3, axis: DVec3, degrees: f64) {
+        let (sin, cos) = sin_cos(degrees / 2.0);
+        let turn = DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos);
+        self.eye = centre + turn * (self.eye - centre);
+        (self.u, self.v, self.n) = (turn * self.u, turn * self.v, turn * self.n);
+        self.rotated();
+    }
+
     fn rotated(&mut self) {
         self.written = None;
         self.rotations += 1;
@@ -92,7 +123,6 @@ impl Camera {
 mod tests {
     use super::*;
     use crate::camera::{PlaneOptions, Surroundings, look_at};
-    use glam::DVec3;
     use proptest::prelude::*;
 
     fn level() -> Frame {
@@ -135,12 +165,34 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_by_no_number_has_no_volume() {
+    fn an_orbit_keeps_its_distance_and_its_target_in_view() {
+        let centre = DVec3::new(5.0, -1.0, 2.0);
+        let mut frame = look_at(centre + DVec3::X * 10.0, centre, DVec3::Z).unwrap();
+        for _ in 0..1000 {
+            frame.orbit(centre, DVec3::Z, 0.7, 0.0).unwrap();
+        }
+        let to_centre = centre - frame.eye;
+        assert!((to_centre.length() - 10.0).abs() < 1e-10);
+        assert!(close(to_centre / 10.0, frame.forward()));
+        let swung = 700.0f64.to_radians();
+        assert!(close(
+            frame.eye - centre,
+            DVec3::new(swung.cos(), swung.sin(), 0.0) * 10.0
+        ));
+        assert!(frame.orbit(centre, DVec3::ZERO, 1.0, 0.0).is_err());
+        let before = frame;
         for bad in [f64::NAN, f64::INFINITY] {
-            let mut frame = level();
-            frame.yaw(bad);
+            assert!(frame.orbit(DVec3::splat(bad), DVec3::Z, 1.0, 0.0).is_err());
+            assert!(frame.orbit(centre, DVec3::Z, bad, 0.0).is_err());
+            assert!(frame.orbit(centre, DVec3::Z, 1.0, bad).is_err());
+            assert_eq!(frame, before);
+            let mut turned = frame;
+            turned.yaw(bad);
             let lens = Lens::perspective(90.0, 1.0, 1.0, None).unwrap();
-            let camera = Camera { frame, lens };
+            let camera = Camera {
+                frame: turned,
+                lens,
+            };
             let volume = camera.volume(&PlaneOptions::default(), &Surroundings::default());
             assert!(volume.is_err(), "a turn by {bad}");
         }

@@ -1,4 +1,4 @@
-//! Slides, turns and zooms, by the lecture's formulas.
+//! Slides, turns, orbits and zooms, by the lecture's formulas.
 
 use super::*;
 
@@ -98,6 +98,26 @@ proptest! {
         let before = flown.world_to_eye();
         flown.pitch(angle);
         prop_assert!(check(&flown, before, DMat4::from_rotation_x(back)));
+    }
+
+    #[test]
+    fn an_orbit_is_a_rotation_about_the_centre(
+        frame in any_frame(),
+        centre in vector(-1, 3),
+        axis in vector(-3, 3).prop_filter("an axis", |axis| axis.length() > 1e-6),
+        around in -360.0f64..360.0,
+        over in -360.0f64..360.0,
+    ) {
+        let mut swung = frame;
+        swung.orbit(centre, axis, around, over).unwrap();
+        let first = DQuat::from_axis_angle(axis.normalize(), around.to_radians());
+        let second = DQuat::from_axis_angle(first * frame.u(), over.to_radians());
+        let q = second * first;
+        let wanted = [frame.u(), frame.v(), frame.n()].map(|axis| q * axis);
+        let size = 1.0 + centre.length() + frame.eye.length();
+        let eye = centre + q * (frame.eye - centre);
+        prop_assert!((swung.eye - eye).length() < 1e-12 * size);
+        prop_assert!(apart(&swung, swung.eye, wanted) < 1e-11);
     }
 
     #[test]
