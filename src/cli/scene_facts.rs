@@ -373,6 +373,22 @@ mod tests {
         assert_eq!(facts.f32_step_unmoved[0], step);
     }
 
+    #[test]
+    fn figures_at_the_end_of_f32_are_numbers() {
+        let facts = SceneFacts::of(&scene(&[[-3.4e38, 1e-300], [0.0, 3.4e38]])).unwrap();
+        assert_eq!(
+            facts.f32_step_unmoved[0],
+            f64::from(f32::MAX) - f64::from(f32::MAX.next_down())
+        );
+        let steps = &facts.size_histogram;
+        assert!(
+            steps
+                .iter()
+                .all(|step| step.from < step.to && step.to.is_finite())
+        );
+        assert_eq!((steps[0].count, steps[STEPS - 1].count), (1, 1));
+    }
+
     /// f32 has steps of 2 there.
     #[test]
     fn figures_are_those_of_the_boxes_as_written() {

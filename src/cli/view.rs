@@ -411,6 +411,22 @@ fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::{Lens, MatrixConvention};
+
+    #[test]
+    fn the_view_of_a_vulkan_matrix_is_upright() {
+        let frame = crate::camera::look_at(DVec3::X, DVec3::ZERO, DVec3::Z).unwrap();
+        let lens = Lens::perspective(60.0, 1.5, 0.5, Some(40.0)).unwrap();
+        let above = DVec4::new(0.0, 0.0, 0.1, 1.0);
+        for side in [1.0, -1.0] {
+            let flip = DMat4::from_scale(DVec3::new(1.0, side, 1.0));
+            let matrix = flip * lens.projection(ClipSpace::D3d) * frame.world_to_eye();
+            let rows = matrix.transpose().to_cols_array_2d();
+            let camera = Camera::of_matrix(rows, MatrixConvention::ColumnD3d).unwrap();
+            let seen = clip_matrix(&camera, DVec3::ZERO) * above;
+            assert!(seen.y > 0.0, "{side}: {seen}");
+        }
+    }
 
     #[test]
     fn numbers_and_runs_are_packed_as_the_page_reads_them() {

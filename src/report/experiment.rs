@@ -149,6 +149,23 @@ mod tests {
     use super::*;
 
     #[test]
+    fn each_is_named_once_and_what_moves_is_warm() {
+        let named = |paths: [&str; 2]| {
+            let spec = StructureSpec::parse("linear").unwrap();
+            let begun = Experiment::new("uniform:n=20").structures(vec![spec]);
+            paths.into_iter().fold(begun, Experiment::path)
+        };
+        assert!(named(["spin:frames=2", "orbit:frames=2"]).check().is_ok());
+        let twice = named(["spin:frames=2"; 2]).check().unwrap_err().to_string();
+        assert!(twice.contains("a path twice"), "{twice}");
+        let mut cold = named(["spin:frames=2", "orbit:frames=2"]);
+        cold.plan.motions.push("drift".to_owned());
+        cold.plan.scenes[0].caches = vec![false, true];
+        let cold = cold.check().unwrap_err().to_string();
+        assert!(cold.contains("cold caches"), "{cold}");
+    }
+
+    #[test]
     fn a_plan_that_measures_nothing_or_not_what_it_says_is_an_error() {
         let sound = || {
             let spec = |name| StructureSpec::parse(name).unwrap();

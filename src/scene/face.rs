@@ -12,11 +12,12 @@ const MOST_CONCAVE: usize = 1000;
 
 /// Adds the triangles of a face: a fan, or the ears of a concave one.
 ///
-/// They turn as the face does. `face` holds three or more indices of points. A corner that no ear has, such as the end
-/// of a spur, is a triangle of its own, so that the triangles have the bounds of the face.
+/// They turn as the face does. `face` holds three or more indices of points. A corner that no
+/// ear has, such as the end of a spur, is a triangle of its own, so that the triangles have the
+/// bounds of the face. O(corners); of a concave face up to their square.
 ///
 /// # Errors
-/// What a concave face of too many corners is.
+/// The words "a concave face of N corners", N above [`MOST_CONCAVE`].
 pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> Result<(), String> {
     let Some(flat) = flat_if_concave(points, face) else {
         to.extend(face[1..].windows(2).map(|pair| [face[0], pair[0], pair[1]]));
