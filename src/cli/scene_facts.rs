@@ -375,7 +375,8 @@ mod tests {
 
     #[test]
     fn figures_at_the_end_of_f32_are_numbers() {
-        let facts = SceneFacts::of(&scene(&[[-3.4e38, 1e-300], [0.0, 3.4e38]])).unwrap();
+        let facts =
+            SceneFacts::of(&scene(&[[-f64::from(f32::MAX), 1e-300], [0.0, 3.4e38]])).unwrap();
         assert_eq!(
             facts.f32_step_unmoved[0],
             f64::from(f32::MAX) - f64::from(f32::MAX.next_down())
