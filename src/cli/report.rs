@@ -196,7 +196,6 @@ fn details(all: &[Comparison], views: &BTreeMap<String, Views>) -> Vec<Block> {
             let about = comparison.about();
             let base = Overall::of(&[comparison]).base;
             let own = views.get(&about.key().group.id());
-            let own = own.filter(|_| about.path.motion.is_empty());
             blocks.extend(of_comparison(comparison, base, own));
         }
         blocks.extend(run_figures::errors(tests).map(Block::Figure));

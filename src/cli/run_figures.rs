@@ -77,11 +77,20 @@ fn ratio_name(ratio: f64) -> String {
     }
 }
 
-/// Time and visible items along the path, and the distribution of times over it.
+/// Time and visible items along the path, or the frames of a motion, and the
+/// distribution of times over it.
 pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
+    let path = &comparison.about().path;
+    let [view, query, course] = match path.motion.as_str() {
+        "" => ["view", "query", "along the path"],
+        _ => ["frame", "frame, update and queries,", "of the motion"],
+    };
+    // Of a frame with several queries the first.
+    let visible = views.visible.iter().step_by(path.views_per_frame.max(1));
+    let visible: Vec<u64> = visible.copied().collect();
     let frame = |frame: f64| text::count(frame as usize);
-    let frames = 0.0..views.visible.len().saturating_sub(1) as f64;
-    let x = || Axis::linear("view", frames.clone(), &frame);
+    let frames = 0.0..visible.len().saturating_sub(1) as f64;
+    let x = || Axis::linear(view, frames.clone(), &frame);
     let (mut series, mut spread, mut queries) = (Vec::new(), Vec::new(), 1);
     for cell in comparison.sound() {
         let Some(readings) = views.times.get(&cell.structure) else {
@@ -107,7 +116,7 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
             spread.push(Row {
                 label: format!("{name} {}", told[2]),
                 note: format!(
-                    "{name}: median {}, half of the views {} to {}, nine tenths {} to {}",
+                    "{name}: median {}, half of the {view}s {} to {}, nine tenths {} to {}",
                     told[2], told[1], told[3], told[0], told[4]
                 ),
                 name,
@@ -126,27 +135,27 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
     if !series.is_empty() {
         let points = series.iter().flat_map(|s| s.points.iter().map(|p| p.at[1]));
         let y = Axis::log("", points, 1.1, &text::time);
-        let caption = format!("{about}: time per query along the path{each}");
+        let caption = format!("{about}: time per {query} {course}{each}");
         figures.push(Diagram::of(caption, [x(), y], Joined::Bare, series).draw());
     }
-    if views.visible.len() >= LEAST_READINGS[0] {
-        let most = views.visible.iter().copied().fold(1, u64::max);
+    if visible.len() >= LEAST_READINGS[0] {
+        let most = visible.iter().copied().fold(1, u64::max);
         let count = |items: f64| text::count(items as usize);
         let point = |(frame, items): (usize, &u64)| Point {
             at: [frame as f64, *items as f64],
             ..Point::default()
         };
-        let visible = Series {
+        let series = Series {
             name: "visible items".to_owned(),
             look: Look::nth(0),
             is_scan: true,
-            points: views.visible.iter().enumerate().map(point).collect(),
+            points: visible.iter().enumerate().map(point).collect(),
         };
         let y = Axis::linear("", 0.0..most as f64, &count);
         let short = "; single views are too short to be timed each";
         let why = if figures.is_empty() { short } else { "" };
-        let caption = format!("{about}: visible items along the path{why}");
-        let mut diagram = Diagram::of(caption, [x(), y], Joined::Bare, vec![visible]);
+        let caption = format!("{about}: visible items {course}{why}");
+        let mut diagram = Diagram::of(caption, [x(), y], Joined::Bare, vec![series]);
         diagram.height = 120.0;
         figures.push(diagram.draw());
     }
@@ -154,7 +163,7 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         let values = spread.iter().flat_map(Row::range);
         let axis = Axis::log("", values, 1.1, &text::time);
         let caption = format!(
-            "{about}: distribution over the views{each}; median, middle half, and 5 to 95 %"
+            "{about}: distribution over the {view}s{each}; median, middle half, and 5 to 95 %"
         );
         figures.push(rows(caption, &axis, None, &spread));
     }

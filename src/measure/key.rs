@@ -37,6 +37,14 @@ impl GroupKey {
         };
         serde_json::to_string(&key).unwrap_or_default()
     }
+
+    /// The path in samples.csv, with the motion.
+    pub fn samples_path(&self) -> String {
+        match self.motion.as_str() {
+            "" => self.path.clone(),
+            motion => format!("{} + {motion}", self.path),
+        }
+    }
 }
 
 /// Key of a cell: a structure in a group.

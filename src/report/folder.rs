@@ -104,11 +104,13 @@ impl RunFolder {
         let mut write = || -> Result<Vec<u8>, csv::Error> {
             let mut csv = csv::Writer::from_writer(Vec::new());
             for (label, task, samples) in samples {
-                let path = match key.motion.as_str() {
-                    "" => key.path.clone(),
-                    motion => format!("{} + {motion}", key.path),
-                };
-                let names = [&key.scene, &path, &key.cache, label, &key.test];
+                let names = [
+                    &key.scene,
+                    &key.samples_path(),
+                    &key.cache,
+                    label,
+                    &key.test,
+                ];
                 let names = names.map(|name| lines(name));
                 for s in samples {
                     let at = (part.process, s.round, s.frame, s.queries);

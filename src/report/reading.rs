@@ -143,11 +143,11 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
 /// A clock reading along a path: the median over all rounds.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reading {
-    /// Middle of the views, as an index of the path.
+    /// Middle of the views, as an index of the path; of a motion the frame.
     pub frame: f64,
     /// Number of views in the reading.
     pub queries: u32,
-    /// CPU time per query.
+    /// CPU time per query; of a motion per frame, update and all queries.
     pub ns: f64,
 }
 
@@ -191,7 +191,10 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
         let Ok(row): Result<SampleRow, _> = row else {
             break;
         };
-        if row.task == TaskKind::Query.name() {
+        if [TaskKind::Query, TaskKind::Frame]
+            .map(TaskKind::name)
+            .contains(&row.task.as_str())
+        {
             let key = [row.scene, row.path, row.cache, row.test, row.structure];
             let readings = cells.entry(key).or_default();
             let times = readings.entry((row.frame, row.queries)).or_default();
@@ -206,14 +209,18 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
         let schedule = known.query.as_ref().map(|query| &query.schedule.cameras);
         let own = |label: &str| {
             let key = &kept.key;
-            let names = [&key.scene, &key.path, &key.cache, &key.test, label];
+            let path = key.samples_path();
+            let names = [&key.scene, &path, &key.cache, &key.test, label];
             let readings = cells.get(&names.map(lines))?;
-            let cameras = schedule?;
             let reading = |(&(frame, queries), ns): (&(u32, u32), &Vec<f64>)| {
-                let first = cameras.iter().position(|camera| *camera == frame)?;
-                let last = cameras.get(first + (queries as usize).max(1) - 1)?;
+                let mut last = frame;
+                if key.motion.is_empty() {
+                    let cameras = schedule?;
+                    let first = cameras.iter().position(|camera| *camera == frame)?;
+                    last = *cameras.get(first + (queries as usize).max(1) - 1)?;
+                }
                 Some(Reading {
-                    frame: (f64::from(frame) + f64::from(*last)) / 2.0,
+                    frame: (f64::from(frame) + f64::from(last)) / 2.0,
                     queries,
                     ns: median(ns)?,
                 })

@@ -237,6 +237,12 @@ fn a_motion_is_an_axis_of_a_run() {
     };
     assert_eq!((of("query_ns"), of("frame_ns")), (8, 8), "{same}");
     let page = fs::read_to_string(at("r/report.html")).expect("a page");
+    for figure in [
+        "time per frame, update and queries, of the motion</figcaption>",
+        "visible items of the motion</figcaption>",
+    ] {
+        assert_eq!(page.matches(figure).count(), 2, "{figure}");
+    }
     assert!(page.contains("swarm:frames=10"), "no motion on the page");
 }
 
