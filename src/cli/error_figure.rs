@@ -1,7 +1,9 @@
 //! Figure of error against run time.
 //!
-//! A mark per structure and test, the Pareto front before them, and each level of error
-//! named by its tests.
+//! A mark per structure and test, the Pareto front before them, and the tests named
+//! at their levels of error.
+
+use std::collections::BTreeSet;
 
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::figure::{Axis, Figure, is_drawn, left_out};
@@ -49,13 +51,16 @@ impl Against {
         let mut places: Vec<(f64, &String)> = places.collect();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
         let near = |a: &(f64, &String), b: &(f64, &String)| b.0 / a.0 < 1.25;
-        let level = |own: &[(f64, &String)]| {
-            let mut tests: Vec<&str> = own.iter().map(|place| place.1.as_str()).collect();
-            tests.sort_unstable();
-            tests.dedup();
-            (own[own.len() / 2].0, tests.join(", "))
-        };
-        places.chunk_by(near).map(level).collect()
+        let mut levels = Vec::new();
+        for own in places.chunk_by(near) {
+            let tests: BTreeSet<&String> = own.iter().map(|place| place.1).collect();
+            levels.extend(
+                tests
+                    .into_iter()
+                    .map(|test| (own[own.len() / 2].0, test.clone())),
+            );
+        }
+        levels
     }
 
     pub fn draw(mut self) -> Figure {

@@ -147,7 +147,7 @@ impl<'t> Axis<'t> {
             let class = if Some(tick) == one { "one" } else { "grid" };
             parts += &line(class, [x, x], [0.0, bottom]);
             // Percent of the narrowest plot.
-            let half = 50.0 * CHARACTER * name.chars().count() as f64 / 200.0;
+            let half = 50.0 * CHARACTER * name.chars().count() as f64 / 150.0;
             if x - half >= free {
                 free = x + half;
                 let (y, name) = (bottom + LINE, html(&name));
