@@ -200,7 +200,7 @@ pub struct TestRow {
     /// The query's time in each process, ns.
     #[serde(skip)]
     by_process: Vec<f64>,
-    /// The cost of drawing at each judged camera, ns.
+    /// The cost of drawing at each judged camera, ns; their mean where all are judged.
     #[serde(skip)]
     by_camera: Vec<f64>,
 }
@@ -239,7 +239,14 @@ impl TestChoice {
             let extra = errors.map(|e| e.false_positives as f64 / judged);
             let extra = extra.filter(|extra| extra.is_finite());
             let drawn = extra.map(|extra| extra * draw_ns);
-            let of_cameras = by_camera.iter().map(|e| e.false_positives as f64 * draw_ns);
+            // Of the whole path nothing is left to chance.
+            let by_camera = match answered.judged < answered.counts[task].len() {
+                true => by_camera
+                    .iter()
+                    .map(|e| e.false_positives as f64 * draw_ns)
+                    .collect(),
+                false => drawn.into_iter().collect(),
+            };
             TestRow {
                 test: test.name(),
                 query_ns: query,
@@ -248,7 +255,7 @@ impl TestChoice {
                 false_positives_per_query: extra,
                 total_ns: query.zip(drawn).map(|(query, drawn)| query.value + drawn),
                 by_process: times.ln_ns(task).iter().map(|ln_ns| ln_ns.exp()).collect(),
-                by_camera: of_cameras.collect(),
+                by_camera,
             }
         });
         let rows: Vec<TestRow> = rows.collect();
@@ -361,10 +368,14 @@ mod tests {
         // What is drawn at one camera of four may be chance.
         let mut rare = row("six-plane", 90.0, 50.0);
         rare.by_camera = vec![200.0, 0.0, 0.0, 0.0];
+        let exact = row("exact", 100.0, 0.0);
         assert_eq!(
-            near_the_least(&[rare, row("exact", 100.0, 0.0)]),
+            near_the_least(&[rare.clone(), exact.clone()]),
             ["six-plane", "exact"]
         );
+        // Of a path that was judged whole it is not.
+        rare.by_camera = vec![50.0];
+        assert_eq!(near_the_least(&[rare, exact]), ["exact"]);
         // What is drawn counts.
         let clear = [
             dear.clone(),
