@@ -272,7 +272,10 @@ pub fn see_through(
         if interrupt::asked() {
             return Err(Interrupted.into());
         }
-        match worker.listen(GLANCE)? {
+        match worker
+            .listen(GLANCE)
+            .with_context(|| program.display().to_string())?
+        {
             Some(Ok(Message::Ready { .. })) => tell("started"),
             Some(Ok(Message::Doing { structure, step })) => {
                 tell(format!("{step} {}", structure.unwrap_or_default()).trim_end());

@@ -8,6 +8,7 @@ use serde::Deserialize;
 use crate::input::{InputError, read_file};
 use crate::measure::{Effort, PlannedScene};
 use crate::scene::every_part;
+use crate::shown::plain;
 use crate::spec::SpecError;
 use crate::suite::{DEFAULT_PATH, SUITES, Suite};
 
@@ -104,6 +105,12 @@ fn written(file: &str, default: Option<&str>) -> Result<ChosenSuite, InputError>
     for row in suite.scenes {
         let parts = every_part(&row.scene)?.into_iter();
         let paths = row.paths.unwrap_or_else(|| vec![DEFAULT_PATH.to_owned()]);
+        if paths.is_empty() {
+            let scene = plain(&row.scene);
+            return Err(bad(&format_args!(
+                "'{scene}' has no paths; expected one or more, or no line 'paths' for {DEFAULT_PATH}"
+            )));
+        }
         scenes.extend(parts.map(|source| planned(source, paths.clone(), row.cold)));
     }
     if scenes.is_empty() {

@@ -159,9 +159,10 @@ impl Motion {
         let (seen, cameras) = (self.frames * views, path.lines.len());
         if path.times.is_empty() {
             if ![0, seen].contains(&cameras) {
-                let cameras = counted(cameras, "camera");
+                let [cameras, seen] =
+                    [(cameras, "camera"), (seen, "view")].map(|of| counted(of.0, of.1));
                 warn(&format!(
-                    "{name}: its frames have {seen} views, but '{path_name}' has {cameras} and not a \
+                    "{name}: its frames have {seen}, but '{path_name}' has {cameras} and not a \
                      time for each: they are paired by their numbers"
                 ));
             }

@@ -296,7 +296,12 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
             .then_some(distance / diagonal)
     };
     let far: Vec<f64> = cameras.iter().filter_map(outside).collect();
-    let farthest = far.iter().copied().reduce(f64::max)?;
+    // A scene of no items is nowhere.
+    let farthest = far
+        .iter()
+        .copied()
+        .reduce(f64::max)
+        .filter(|_| !scene.items.is_empty())?;
     Some(format!(
         "{} more than {FAR_OUTSIDE} scene diagonals outside of {} as loaded, up to {}; expected the \
          scene's unit and axes",

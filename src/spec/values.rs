@@ -101,7 +101,7 @@ pub fn baseline(name: &str) -> Result<String, SpecError> {
     let name = (sound && !name.starts_with(['.', '-'])).then(|| name.to_owned());
     expected(
         name,
-        "a name of at most 100 letters, digits, '.', '_' and '-'",
+        "a name of at most 100 letters, digits, '_', and '.' and '-' but in front",
     )
 }
 

@@ -83,6 +83,10 @@ fn a_file_that_is_no_suite_is_refused_with_its_line() {
         ),
         ("scenes = []", "bad.toml: no scenes; expected"),
         (
+            "[[scenes]]\nscene = 'uniform:n=9'\npaths = []",
+            "bad.toml: 'uniform:n=9' has no paths; expected",
+        ),
+        (
             "[[scenes]]\npath = [3]",
             "bad.toml, line 2: | 'path' | 'paths'",
         ),
