@@ -52,13 +52,13 @@
 //!   [`motion`]: items that move between frames
 //! - [`verify`]: the reference answer, and how others differ from it
 //! - [`measure`]: count, verify, time; [`statistics`] turns times into figures
-//! - [`report`]: the files that other tools read; [`suite`]: named sets of scenes and paths
+//! - [`report`]: the files that other tools read
 //! - [`spec`], [`input`], [`json`], [`shown`]: texts and files of users, read and shown
 //!
 //! Features: `cli` (default) is the `cullbench` program (`cli::main_with`) with the
 //! studies behind it: `visibility` (the stages before and after the object stage),
-//! `funnel`, `advise`, `precision`, `drift` and `stress`. `peers` adds structures of
-//! other crates behind the same traits.
+//! `funnel`, `advise`, `precision`, `drift`, `stress` and `suite` (named sets of scenes and
+//! paths). `peers` adds structures of other crates behind the same traits.
 //!
 //! Conventions: everything is right-handed; z is up in scenes; bounds are
 //! closed, so touching counts as visible; plane normals point inward; angles
@@ -108,6 +108,7 @@ pub mod spec;
 pub mod statistics;
 #[cfg(feature = "cli")]
 pub mod stress;
+#[cfg(feature = "cli")]
 pub mod suite;
 pub mod threads;
 pub mod verify;

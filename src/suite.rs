@@ -1,189 +1,70 @@
-//! The suites of the main job: which scenes, which ways through them, how
-//! long. A table and nothing else.
+//! The suites of the main job: which scenes, which ways through them, how long.
+//!
+//! Those of the program are in `suites.toml`; a file of the user takes the place of a name.
 
-use crate::measure::{Effort, Extras};
+use std::fmt::Display;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use crate::input::{InputError, read_file};
+use crate::measure::Effort;
+use crate::scene::every_part;
+use crate::shown::plain;
+use crate::spec::SpecError;
 
 /// A named set of scenes and paths with the time to spend on them.
+#[derive(Clone, Deserialize)]
 #[non_exhaustive]
 pub struct Suite {
     /// Value of `--suite`.
-    pub name: &'static str,
+    pub name: String,
     /// One line for `cullbench list scenes`.
-    pub summary: &'static str,
-    /// Scenes with their paths, in the order in which they are measured.
-    pub plan: &'static [SuiteScene],
+    pub summary: String,
+    /// The list of structures where none are named.
+    pub structures: String,
     /// Processes, rounds and times.
     pub effort: Effort,
-    /// The list of structures where none are named.
-    pub structures: &'static str,
+    /// Scenes with their paths, in the order in which they are measured.
+    pub scenes: Vec<SuiteScene>,
 }
 
 /// A scene of a suite with the ways through it.
+#[derive(Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct SuiteScene {
-    /// Spec of the scene.
-    pub scene: &'static str,
-    /// Specs of the paths.
-    pub paths: &'static [&'static str],
+    /// File or spec of the scene.
+    pub scene: String,
+    /// Files or specs of the paths.
+    #[serde(default = "default_paths")]
+    pub paths: Vec<String>,
     /// Measured with cold caches as well as with warm ones.
+    #[serde(default)]
     pub cold: bool,
 }
 
-/// Scenes with the ways through them, each of them cold as well or not.
-macro_rules! scenes {
-    (cold: $cold:literal; $($scene:literal $paths:expr;)+) => {
-        &[$(SuiteScene { scene: $scene, paths: &$paths, cold: $cold }),+]
-    };
+/// A suite as a user writes it; a field that is not known is refused.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    /// The suite whose rounds and structures it takes where it states none.
+    like: Option<String>,
+    structures: Option<String>,
+    processes: Option<u32>,
+    scenes: Vec<SuiteScene>,
 }
-
-/// From a thousandth of the items to all of them, and further ways. Many views
-/// for small scenes, where a few would train the branch predictor; few for large
-/// ones, of which every query has branches enough and a scan takes milliseconds.
-macro_rules! surface {
-    ($frames:literal $(, $more:expr)*) => {
-        [
-            concat!("flythrough:frames=", $frames, ",visible=0.1%"),
-            concat!("flythrough:frames=", $frames, ",visible=2%"),
-            concat!("orbit:frames=", $frames, ",visible=20%"),
-            concat!("outside:frames=", $frames)
-            $(, $more)*
-        ]
-    };
-}
-
-/// The same number of visible items whatever the size of the scene.
-const FIXED_COUNT: &str = "flythrough:frames=256,visible=500";
-
-/// Effort of short suites.
-const SHORT: Effort = Effort {
-    processes: 10,
-    rounds: [2, 40],
-    task_ns: 2.5e6,
-    pass_ns: 7e6,
-    extras: Extras::All,
-};
-
-/// Effort of long ones.
-const LONG: Effort = Effort {
-    rounds: [3, 40],
-    task_ns: 40e6,
-    pass_ns: 100e6,
-    ..SHORT
-};
 
 /// All suites. The first one is what `cullbench run` does by itself.
-pub static SUITES: &[Suite] = &[
-    Suite {
-        name: "quick",
-        summary: "five generated worlds of 50k to 100k items and the four real ones; about a minute",
-        plan: scenes! { cold: false;
-            "uniform:n=100000" ["flythrough:frames=128,visible=2%", "teleport:frames=128,visible=0.1%"];
-            "clustered:n=100000" ["flythrough:frames=128,visible=2%"];
-            "city:n=100000" ["flythrough:frames=128,visible=2%", "outside:frames=128"];
-            "forest:n=100000" ["orbit:frames=128"];
-            "rooms:n=50000" ["spin:frames=256"];
-            "freedm-map12" ["places"];
-            "freedm-map20" ["places", "flythrough:frames=512"];
-            "helsinki" ["flythrough:frames=512,visible=2%", "zoom:frames=512"];
-            "us-counties" ["orbit:frames=512", "outside:frames=512"];
-        },
-        effort: SHORT,
-        structures: "default",
-    },
-    Suite {
-        name: "standard",
-        summary: "like quick, with a million items, more paths and more rounds; several minutes",
-        plan: scenes! { cold: false;
-            "uniform:n=10000" ["flythrough:frames=512,visible=2%"];
-            "uniform:n=1000000" ["flythrough:visible=0.1%", "flythrough:visible=2%", "orbit", "outside"];
-            "clustered:n=1000000" ["flythrough:visible=2%", "orbit"];
-            "city:n=1000000" ["flythrough:visible=2%", "spin", "outside"];
-            "forest:n=1000000" ["flythrough:visible=2%", "orbit"];
-            "rooms:n=1000000" ["flythrough:visible=0.1%", "teleport"];
-            "freedm-map12" ["places", "teleport:frames=512"];
-            "freedm-map20" ["places", "flythrough:frames=512", "teleport:frames=512"];
-            "helsinki" ["flythrough:frames=512,visible=2%", "orbit:frames=512", "zoom:frames=512",
-                "teleport:frames=512"];
-            "us-counties" ["flythrough:frames=512", "orbit:frames=512", "outside:frames=512"];
-        },
-        effort: Effort {
-            processes: 12,
-            rounds: [3, 60],
-            task_ns: 60e6,
-            ..LONG
-        },
-        structures: "all",
-    },
-    Suite {
-        name: "full",
-        summary: "the crossover surface: worlds from a thousand to a million items, 0.1 % to all \
-                  of them visible, and the real ones, warm and cold; about an hour with the \
-                  structures of other crates",
-        plan: scenes! { cold: true;
-            "uniform:n=1000" surface!(512);
-            "uniform:n=10000" surface!(512, "flythrough:frames=512,visible=500");
-            "uniform:n=100000" surface!(256, "flythrough:frames=256,visible=500");
-            "uniform:n=1000000" surface!(64, "flythrough:frames=64,visible=500");
-            "city:n=10000" surface!(512);
-            "city:n=100000" surface!(256);
-            "city:n=1000000" surface!(64);
-            "clustered:n=100000" surface!(256);
-            "freedm-map12" ["places", "flythrough:frames=512,visible=2%", "outside:frames=512"];
-            "freedm-map20" ["places", "flythrough:frames=512,visible=2%", "outside:frames=512"];
-            "helsinki" ["flythrough:frames=512,visible=2%", "orbit:frames=512"];
-            "us-counties" ["orbit:frames=512", "outside:frames=512"];
-        },
-        effort: LONG,
-        structures: "default",
-    },
-    Suite {
-        name: REAL,
-        summary: "the real scenes: four that come with the program and those that scripts/fetch.py \
-                  has fetched; a minute or two",
-        plan: scenes! { cold: false;
-            "freedm-map12" ["places", "walk:frames=128"];
-            "freedm-map20" ["places", "walk:frames=128"];
-            "helsinki" ["flythrough:frames=128,visible=2%", "street:frames=128"];
-            "us-counties" ["flythrough:frames=128,visible=2%", "outside:frames=128"];
-        },
-        effort: SHORT,
-        structures: "default",
-    },
-    Suite {
-        name: "compare",
-        summary: "for `compare --against`: a real scene and two generated ones, frustum queries \
-                  only; a minute and a half by itself",
-        plan: scenes! { cold: false;
-            "helsinki" ["flythrough:frames=128,visible=2%"];
-            "city:n=20000" ["flythrough:frames=128,visible=2%"];
-            "uniform:n=100000" ["flythrough:frames=64,visible=2%"];
-        },
-        effort: Effort {
-            rounds: [12, 80],
-            task_ns: 80e6,
-            pass_ns: 40e6,
-            extras: Extras::Nothing,
-            ..LONG
-        },
-        structures: "default",
-    },
-    Suite {
-        name: "growth",
-        summary: "a fixed number of visible items among ten thousand to ten million; choose structures, all of them need tens of gigabytes",
-        plan: scenes! { cold: false;
-            "uniform:n=10000" [FIXED_COUNT];
-            "uniform:n=100000" [FIXED_COUNT];
-            "uniform:n=1000000" [FIXED_COUNT];
-            "uniform:n=10000000" [FIXED_COUNT];
-        },
-        effort: Effort {
-            task_ns: 60e6,
-            pass_ns: 200e6,
-            ..LONG
-        },
-        structures: "default",
-    },
-];
+pub static SUITES: LazyLock<Vec<Suite>> = LazyLock::new(|| {
+    #[derive(Deserialize)]
+    struct All {
+        suites: Vec<Suite>,
+    }
+    let all: Result<All, _> = toml::from_str(include_str!("suites.toml"));
+    all.expect("the suites of the program").suites
+});
 
 /// The suite that fetched scenes join.
 pub const REAL: &str = "real";
@@ -193,6 +74,96 @@ pub const REAL_PATHS: &[&str] = &["flythrough:frames=128", "outside:frames=64"];
 
 /// The way through a scene when none is named.
 pub const DEFAULT_PATH: &str = "flythrough";
+
+fn default_paths() -> Vec<String> {
+    vec![DEFAULT_PATH.to_owned()]
+}
+
+impl SuiteScene {
+    /// A scene with its ways, and warm caches only.
+    pub fn new(scene: String, paths: &[&str]) -> SuiteScene {
+        SuiteScene {
+            scene,
+            paths: paths.iter().map(|&path| path.to_owned()).collect(),
+            cold: false,
+        }
+    }
+}
+
+impl Suite {
+    /// The suite of a name or a TOML file, with structures where that states none.
+    ///
+    /// # Errors
+    /// An unknown name; a file that cannot be read or is no suite, with its line.
+    pub fn of(text: &str, default: Option<&str>) -> Result<Suite, InputError> {
+        let mut suite = match text.ends_with(".toml") {
+            true => return written(text, default),
+            false => named(text, Some("FILE.toml"))?,
+        };
+        if let Some(default) = default {
+            default.clone_into(&mut suite.structures);
+        }
+        Ok(suite)
+    }
+
+    /// True if it comes with the program.
+    pub fn is_built_in(&self) -> bool {
+        !self.name.ends_with(".toml")
+    }
+}
+
+fn named(name: &str, or: Option<&str>) -> Result<Suite, SpecError> {
+    let known = SUITES.iter().map(|suite| suite.name.as_str()).chain(or);
+    let suite = SUITES.iter().find(|suite| suite.name == name).cloned();
+    suite.ok_or_else(|| SpecError::unknown("suite", name, known))
+}
+
+fn written(file: &str, default: Option<&str>) -> Result<Suite, InputError> {
+    let bytes = read_file(Path::new(file))?;
+    let text = str::from_utf8(&bytes).map_err(|error| {
+        InputError::byte(file, error.valid_up_to(), "not UTF-8", "a suite in TOML")
+    })?;
+    let written: Written = toml::from_str(text).map_err(|error| {
+        let begin = error.span().map_or(0, |span| span.start);
+        let line = 1 + text.bytes().take(begin).filter(|b| *b == b'\n').count();
+        let found = error.message().replace('\n', ", ").replace('`', "'");
+        let expected = "; expected a suite: [[scenes]], each with a scene and its paths";
+        let expected = [expected, ""][usize::from(found.contains("expected"))];
+        InputError::new(format_args!("{file}, line {line}: {found}{expected}"))
+    })?;
+    let bad = |found: &dyn Display| InputError::new(format_args!("{file}: {found}"));
+    let like = written.like.as_deref().unwrap_or(&SUITES[0].name);
+    let mut suite = named(like, None).map_err(|error| bad(&error))?;
+    suite.name = file.to_owned();
+    suite.effort.processes = written.processes.unwrap_or(suite.effort.processes);
+    if !(1..=1000).contains(&suite.effort.processes) {
+        let processes = suite.effort.processes;
+        let expected = "expected a whole number from 1 to 1000";
+        return Err(bad(&format_args!("processes is {processes}; {expected}")));
+    }
+    let structures = written.structures.or(default.map(str::to_owned));
+    suite.structures = structures.unwrap_or(suite.structures);
+    suite.scenes.clear();
+    for row in written.scenes {
+        if row.paths.is_empty() {
+            let scene = plain(&row.scene);
+            return Err(bad(&format_args!(
+                "'{scene}' has no paths; expected one or more, or no line 'paths' for {DEFAULT_PATH}"
+            )));
+        }
+        let parts = every_part(&row.scene)?.into_iter();
+        suite.scenes.extend(parts.map(|scene| SuiteScene {
+            scene,
+            ..row.clone()
+        }));
+    }
+    if suite.scenes.is_empty() {
+        return Err(bad(
+            &"no scenes; expected [[scenes]] with a scene and its paths",
+        ));
+    }
+    Ok(suite)
+}
 
 #[cfg(test)]
 mod tests {
@@ -205,23 +176,23 @@ mod tests {
     fn every_suite_names_what_exists_and_those_that_rank_have_the_real_scenes() {
         // One is about growth, one about a change between two programs.
         let ranks = |name: &str| !["growth", "compare"].contains(&name);
-        for suite in SUITES {
-            for row in suite.plan {
-                let scene = Spec::parse(row.scene).unwrap();
+        for suite in SUITES.iter() {
+            for row in &suite.scenes {
+                let scene = Spec::parse(&row.scene).unwrap();
                 let families = FAMILIES.iter().map(|f| f.name);
                 assert!(
                     families
                         .chain(SAMPLES.iter().map(|s| s.name))
                         .any(|n| n == scene.name())
                 );
-                for path in row.paths {
+                for path in &row.paths {
                     let path = Spec::parse(path).unwrap();
                     assert!(PATHS.iter().any(|p| p.name == path.name()));
                 }
             }
-            for sample in SAMPLES.iter().filter(|_| ranks(suite.name)) {
+            for sample in SAMPLES.iter().filter(|_| ranks(&suite.name)) {
                 assert!(
-                    suite.plan.iter().any(|row| row.scene == sample.name),
+                    suite.scenes.iter().any(|row| row.scene == sample.name),
                     "{}",
                     suite.name
                 );

@@ -19,8 +19,6 @@ use crate::suite::SUITES;
 const MOST_CAMERAS: usize = 4096;
 /// Rounds of a task, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 25];
-/// Effort of `run --scene`.
-const EFFORT: Effort = SUITES[0].effort;
 
 pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
     let setting = setting(registry, args, None)?;
@@ -75,7 +73,7 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
         load: study.lens.scene_args.options(structures.len()),
         effort: Effort {
             processes: study.spread.processes,
-            ..EFFORT
+            ..SUITES[0].effort
         },
         bounds: true,
         seed: study.spread.seed,
@@ -99,7 +97,7 @@ fn setting(registry: &Registry, args: &AdviseArgs, timing: Option<&Timing>) -> R
         ));
     }
     setting.path = setting.path.at_most(MOST_CAMERAS);
-    setting.protocol.cameras = cameras_within(EFFORT.pass_ns, setting.scene.items.len());
+    setting.protocol.cameras = cameras_within(SUITES[0].effort.pass_ns, setting.scene.items.len());
     Ok(setting)
 }
 

@@ -139,7 +139,7 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
                  glTF or GLB, OBJ, a Doom WAD (maps.wad#MAP07 picks a map), a Quake III BSP, or a \
                  zip or pk3 with one (pak.pk3#maps/q.bsp).\nReal scenes have licences of their own: `{} licences`.\nSuites of `run`:\n{}",
                 program::name(),
-                entries(SUITES.iter().map(|s| [s.name, s.summary]))
+                entries(SUITES.iter().map(|s| [s.name.as_str(), &s.summary]))
             );
             let rows = families.chain(meshes).chain(samples).chain(fetched);
             ("scenes", note, rows.collect())

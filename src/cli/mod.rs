@@ -52,7 +52,6 @@ mod shared_args;
 mod sheet;
 mod stress;
 mod study;
-mod suite_file;
 mod surface_tables;
 mod table;
 #[cfg(test)]

@@ -9,7 +9,6 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::args::RunArgs;
 use super::shared_args::WhatArgs;
-use super::suite_file::{self, ChosenSuite, planned};
 use crate::culling::Culling;
 use crate::index::Registry;
 use crate::input::{InputError, is_readable, names_file, note, tell_warnings};
@@ -18,7 +17,7 @@ use crate::motion::Motion;
 use crate::path::{self, LensDefaults};
 use crate::report::{KeptPart, Stream};
 use crate::scene::{self, FETCHED, Scene, every_part, split_part};
-use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES};
+use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES, Suite, SuiteScene};
 
 /// A plan with where it comes from.
 pub struct RunPlan {
@@ -35,7 +34,7 @@ pub struct RunPlan {
 
 /// The plan that arguments stand for; scenes and paths are not looked at yet.
 pub fn plan(registry: &Registry, args: &RunArgs) -> Result<RunPlan> {
-    let mut planned = plan_of(registry, &args.what, SUITES[0].name, None)?;
+    let mut planned = plan_of(registry, &args.what, &SUITES[0].name, None)?;
     if let Some(processes) = args.processes {
         planned.plan.effort.processes = processes;
     }
@@ -56,7 +55,7 @@ pub fn plan_of(
     default_structures: Option<&str>,
 ) -> Result<RunPlan> {
     let suite = args.suite.as_deref().unwrap_or(default_suite);
-    let suite = suite_file::suite(suite, default_structures)?;
+    let suite = Suite::of(suite, default_structures)?;
     let names = match args.structure.is_empty() {
         true => suite.structures.clone(),
         false => args.structure.join(","),
@@ -88,7 +87,7 @@ pub fn plan_of(
     let is_suite = args.scene.is_empty() && args.path.is_empty();
     Ok(RunPlan {
         plan,
-        is_built_in: is_suite && suite.is_built_in && suite.name != REAL,
+        is_built_in: is_suite && suite.is_built_in() && suite.name != REAL,
         suite: is_suite.then_some(suite.name),
         structures: names,
         whole: Vec::new(),
@@ -245,22 +244,18 @@ pub fn same_digest(
     Ok(())
 }
 
-fn scenes(args: &WhatArgs, suite: &ChosenSuite) -> Result<Vec<PlannedScene>, InputError> {
-    let planned = |source: String, paths: &[&str]| {
-        let paths = paths.iter().map(|&path| path.to_owned());
-        planned(source, paths.collect(), false)
-    };
+fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputError> {
     let mut scenes = suite.scenes.clone();
     if !args.scene.is_empty() {
         scenes.clear();
         for source in &args.scene {
             let parts = every_part(source)?.into_iter();
-            scenes.extend(parts.map(|source| planned(source, &[DEFAULT_PATH])));
+            scenes.extend(parts.map(|source| SuiteScene::new(source, &[DEFAULT_PATH])));
         }
     } else if suite.name == REAL {
         let (there, missing): (Vec<_>, Vec<_>) = FETCHED.iter().partition(|row| row.is_there());
         let fetched = there.iter().flat_map(|row| row.scenes());
-        scenes.extend(fetched.map(|source| planned(source, REAL_PATHS)));
+        scenes.extend(fetched.map(|source| SuiteScene::new(source, REAL_PATHS)));
         if !missing.is_empty() {
             let names: Vec<&str> = missing.iter().map(|row| row.name.as_str()).collect();
             let names = names.join(" ");
@@ -269,13 +264,16 @@ fn scenes(args: &WhatArgs, suite: &ChosenSuite) -> Result<Vec<PlannedScene>, Inp
             ));
         }
     }
-    for row in &mut scenes {
-        if !args.path.is_empty() {
-            row.paths.clone_from(&args.path);
-        }
-        if args.cold {
-            row.caches = vec![false, true];
-        }
-    }
-    Ok(scenes)
+    let planned = scenes.into_iter().map(|row| PlannedScene {
+        source: row.scene,
+        paths: match args.path.is_empty() {
+            true => row.paths,
+            false => args.path.clone(),
+        },
+        caches: match row.cold || args.cold {
+            true => vec![false, true],
+            false => vec![false],
+        },
+    });
+    Ok(planned.collect())
 }

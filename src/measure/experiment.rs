@@ -28,7 +28,7 @@ use crate::scene::{self, LoadOptions, Scene};
 const UPDATES_EVERY: u32 = 4;
 
 /// Amount of measurement: processes, rounds, times.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, serde::Deserialize)]
 pub struct Effort {
     /// Processes that the rounds are spread over; an interval needs ten.
     pub processes: u32,
@@ -44,7 +44,8 @@ pub struct Effort {
 }
 
 /// Measurements beside frustum queries.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Extras {
     /// Frustum queries only.
