@@ -8,7 +8,7 @@ use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::input::InputError;
-use crate::measure::{Workload, WorkloadError, input_of};
+use crate::measure::{Setting, Workload, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
@@ -35,8 +35,13 @@ impl<'a> Case<'a> {
         workload: &'a Workload<'a>,
         [tree, scan]: &[String; 2],
     ) -> Result<Case<'a>, BuildError> {
-        let AdviseInput { scene, path, .. } = *all;
-        let [spec, scan] = [tree, scan].map(|label| planned(all.structures, label));
+        let Setting {
+            scene,
+            path,
+            structures,
+            ..
+        } = all.setting;
+        let [spec, scan] = [tree, scan].map(|label| planned(structures, label));
         Ok(Case {
             index: spec.build(input_of(scene, &scene.items))?,
             workload,

@@ -3,6 +3,7 @@
 //! The structures that are in question are measured on parts of the scene, with other
 //! shares of the items in view, and with other shares of movers, by the tasks of a run.
 
+use anyhow::Context;
 use serde::{Deserialize, Serialize};
 
 use super::case::part_of;
@@ -10,7 +11,6 @@ use super::choice::{fastest, time_over};
 use super::omission::is_longer;
 use super::options::{AdviseInput, planned};
 use crate::culling::{Culling, CullingTest};
-use crate::funnel::StudyError;
 use crate::measure::{
     Group, GroupPlan, Known, Part, ProcessTimes, ReportCell, SceneInfo, Subject, Workload, measure,
 };
@@ -145,11 +145,10 @@ impl Beside {
     }
 
     /// Measures the workloads in one process.
-    pub(super) fn times(&self, input: &AdviseInput) -> Result<Vec<Part>, StudyError> {
-        let reason = "another scene or motion than the advice was planned for";
+    pub(super) fn times(&self, input: &AdviseInput) -> anyhow::Result<Vec<Part>> {
         let parts = self.changed.iter().map(|changed| {
             let measured = changed.measured(input, self).map(|(_, part)| part);
-            measured.ok_or_else(|| StudyError::Refused(reason.to_owned()))
+            measured.context("another scene or motion than the advice was planned for")
         });
         parts.collect()
     }
@@ -229,11 +228,11 @@ impl Changed {
     /// `None` if there is no such workload.
     fn measured(&self, input: &AdviseInput, beside: &Beside) -> Option<(f64, Part)> {
         let is = |axis| self.axis == Some(axis);
-        let count = self.value.round() as usize;
-        let part = is(Axis::Items).then(|| part_of(input.scene, input.scene.origin, count));
+        let (whole, count) = (&input.setting.scene, self.value.round() as usize);
+        let part = is(Axis::Items).then(|| part_of(whole, whole.origin, count));
         let part = part.transpose().ok()?;
-        let scene = part.as_ref().unwrap_or(input.scene);
-        let mut path = input.path.clone();
+        let scene = part.as_ref().unwrap_or(whole);
+        let mut path = input.setting.path.clone();
         if is(Axis::ShareInView) {
             let lens_scale = self.known.as_ref().and_then(|known| known.lens_scale);
             path = path.seeing(scene, self.value, lens_scale).ok()?;
@@ -251,7 +250,7 @@ impl Changed {
         let workload = Workload::moving(scene, &path, &culling, motion, input.views).ok()?;
         let further = beside.policies.iter().filter(|_| self.axis.is_none());
         let build = |label: &String| {
-            let spec = planned(input.structures, label);
+            let spec = planned(&input.setting.structures, label);
             Subject::build(spec, false, scene, CullingTest::SixPlane)
         };
         let subjects: Vec<_> = beside.contenders.iter().chain(further).map(build).collect();
@@ -261,7 +260,7 @@ impl Changed {
             known: self.known.as_ref(),
             plan_only: self.known.is_none(),
             locate: false,
-            ..GroupPlan::new(&workload, &info, *input.protocol)
+            ..GroupPlan::new(&workload, &info, input.setting.protocol)
         };
         let measured = measure(&workload, &subjects, plan);
         let (part, items) = (measured?.0, scene.items.len());

@@ -12,6 +12,7 @@ mod rule;
 mod rules;
 mod trials;
 
+use anyhow::{Result, ensure};
 use serde::{Deserialize, Serialize};
 
 pub use change::{Axis, Beside, Change};
@@ -22,9 +23,9 @@ pub use options::{AdviseInput, AdviseOptions};
 pub use rule::Omission;
 
 use crate::culling::CullingTest;
-use crate::funnel::{self, FunnelPlan, StudyError};
+use crate::funnel::{self, FunnelPlan};
 use crate::measure::{
-    OverProcesses, Part, ProcessTimes, ReportCell, Schedule, SharedWork, timed_to_end,
+    OverProcesses, Part, ProcessTimes, ReportCell, Schedule, Setting, SharedWork, timed_to_end,
 };
 use crate::motion::Motion;
 use crate::statistics::Estimate;
@@ -118,8 +119,8 @@ pub fn prepare(
     input: &AdviseInput,
     cells: Vec<ReportCell>,
     progress: &dyn Fn(&str),
-) -> Result<Prepared, StudyError> {
-    let AdviseInput { scene, path, .. } = *input;
+) -> Result<Prepared> {
+    let Setting { scene, path, .. } = input.setting;
     let workload = input.workload()?;
     let structure = StructureChoice::of(&cells);
     let structures = structure.tree_and_scan();
@@ -147,7 +148,7 @@ pub fn prepare(
     Ok(Prepared {
         plan: TrialPlan {
             structures,
-            schedule: Schedule::new(path.cameras.len(), &tasks, input.protocol),
+            schedule: Schedule::new(path.cameras.len(), &tasks, &input.setting.protocol),
             expected: answered.counts.clone(),
             beside,
             stages: funnel.as_ref().ok().map(|prepared| prepared.plan.clone()),
@@ -166,25 +167,25 @@ pub fn prepare(
 ///
 /// # Errors
 /// The errors of [`prepare`], and a scene other than the planned one.
-pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, StudyError> {
+pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
+    let Setting { path, protocol, .. } = input.setting;
     let workload = input.workload()?;
     let case = Case::new(input, &workload, &plan.structures)?;
     let mut trials = Trials::new(&case);
     enter(&mut trials, &|_| ())?;
     let (found, planned) = (trials.len(), plan.expected.len());
     let cameras = plan.expected.iter().map(Vec::len);
-    if found != planned || cameras.min() != Some(input.path.cameras.len()) {
-        return Err(StudyError::Refused(format!(
-            "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed \
-             on the way"
-        )));
-    }
+    ensure!(
+        found == planned && cameras.min() == Some(path.cameras.len()),
+        "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed on \
+         the way"
+    );
     let once_ns = trials.once_ns.clone();
     let tasks = trials.tasks(&plan.expected);
     let mut times = ProcessTimes {
         once_ns,
         parts: plan.beside.times(input)?,
-        ..ProcessTimes::of(&timed_to_end(&tasks, &plan.schedule, input.protocol))
+        ..ProcessTimes::of(&timed_to_end(&tasks, &plan.schedule, protocol))
     };
     if let Some(of_stages) = &plan.stages {
         let stages = Stages::of(input, &plan.structures[0]);
@@ -197,7 +198,7 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes, Study
 impl Prepared {
     /// The advice from the times of all processes.
     pub fn conclude(self, input: &AdviseInput, processes: &[ProcessTimes]) -> Advice {
-        let AdviseInput { scene, path, .. } = *input;
+        let Setting { scene, path, .. } = input.setting;
         let (times, answered) = (OverProcesses::of(processes), &self.answered);
         let ([tree, _], beside) = (self.plan.structures, &self.plan.beside);
         let tests = &self.entered.tests;
@@ -259,7 +260,7 @@ struct Entered {
     twin: usize,
 }
 
-fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<Entered, StudyError> {
+fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<Entered> {
     let mut rules = Vec::with_capacity(RULES.len());
     for rule in RULES {
         progress(rule.name);

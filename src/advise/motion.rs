@@ -52,7 +52,7 @@ impl MotionChoice {
     ) -> Option<(MotionChoice, Vec<String>)> {
         let motion = motion?;
         let (mut ruled_out, mut measured) = (Vec::new(), Vec::new());
-        let mut all = input.structures.iter();
+        let mut all = input.setting.structures.iter();
         let are_rows = all.clone().any(|s| s.policy != UpdatePolicy::Refit);
         let spec = all.find(|s| structure.name.as_ref() == Some(&s.label));
         let refits = spec.is_none_or(|spec| spec.info().refits);

@@ -1,15 +1,14 @@
 //! Costs and limits of the advice, and its inputs.
 
+use anyhow::{Result, ensure};
 use clap::Args;
 use serde::Serialize;
 
 use crate::culling::Culling;
-use crate::funnel::{StudyError, check_memory};
+use crate::funnel::check_memory;
 use crate::index::{Execution, StructureSpec};
-use crate::measure::{Protocol, Workload};
+use crate::measure::{Setting, Workload};
 use crate::motion::Motion;
-use crate::path::CameraPath;
-use crate::scene::Scene;
 use crate::spec::values;
 
 /// Costs and limits that the advice depends on.
@@ -39,20 +38,14 @@ const BYTES_PER_ITEM: u64 = 1000;
 /// Scene, path and options.
 #[derive(Clone, Copy)]
 pub struct AdviseInput<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// The cameras.
-    pub path: &'a CameraPath,
-    /// Structures to choose from.
-    pub structures: &'a [StructureSpec],
+    /// Scene, cameras, structures to choose from, rounds and times of a process.
+    pub setting: &'a Setting,
     /// Motion of the items, file or spec; `None` for a still scene.
     pub motion: Option<&'a str>,
     /// Queries per frame.
     pub views: usize,
     /// Costs and limits.
     pub options: &'a AdviseOptions,
-    /// Rounds and times of a process.
-    pub protocol: &'a Protocol,
 }
 
 impl<'a> AdviseInput<'a> {
@@ -60,17 +53,16 @@ impl<'a> AdviseInput<'a> {
     ///
     /// # Errors
     /// A scene without items, a path without cameras, an unfit motion.
-    pub fn workload(&self) -> Result<Workload<'a>, StudyError> {
-        let (scene, path) = (self.scene, self.path);
+    pub fn workload(&self) -> Result<Workload<'a>> {
+        let Setting { scene, path, .. } = self.setting;
         for (kind, name, things, count) in [
             ("scene", &scene.name, "items", scene.items.len()),
             ("path", &path.name, "cameras", path.cameras.len()),
         ] {
-            if count == 0 {
-                return Err(StudyError::Refused(format!(
-                    "{kind} '{name}' has no {things}; expected at least one"
-                )));
-            }
+            ensure!(
+                count > 0,
+                "{kind} '{name}' has no {things}; expected at least one"
+            );
         }
         check_memory(&scene.name, BYTES_PER_ITEM * scene.items.len() as u64)?;
         let motion = self.motion.map(|motion| Motion::load(motion, scene));

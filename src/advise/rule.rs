@@ -7,7 +7,7 @@ use super::change::Change;
 use super::choice::{StructureChoice, TestChoice};
 use super::omission::{By, Check, Decision, LeftOutIf, is_longer};
 use super::trials::{Answered, Sides, Trials};
-use crate::funnel::{FunnelReport, StudyError};
+use crate::funnel::FunnelReport;
 use crate::measure::OverProcesses;
 use crate::statistics::Estimate;
 
@@ -40,10 +40,10 @@ pub struct Rule {
 pub enum Unfit {
     /// It does not apply to this scene or these cameras, for a reason.
     NotApplicable(String),
-    Failed(StudyError),
+    Failed(anyhow::Error),
 }
 
-impl<E: Into<StudyError>> From<E> for Unfit {
+impl<E: Into<anyhow::Error>> From<E> for Unfit {
     fn from(error: E) -> Unfit {
         Unfit::Failed(error.into())
     }

@@ -7,11 +7,11 @@ use super::advise_table::blocks;
 use super::args::AdviseArgs;
 use super::document::show;
 use super::processes::{Job, Message, Timing};
-use super::study::{Setting, Study};
+use super::study::{Study, load, note_solid};
 use super::{Ending, print, tell, text};
 use crate::advise::{self, AdviseInput};
 use crate::index::Registry;
-use crate::measure::{Effort, Group, Part, Plan, ProcessTimes, Share, cameras_within};
+use crate::measure::{Effort, Group, Part, Plan, ProcessTimes, Setting, Share, cameras_within};
 use crate::report::Experiment;
 use crate::suite::SUITES;
 
@@ -53,7 +53,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
     let step = "with and without every rule";
     let times = study.times(step, setting.path.lens_scale, &prepared.plan)?;
     let advice = prepared.conclude(&input, &times);
-    setting.note_solid(args.format);
+    note_solid(&setting.scene, args.format);
     print(args.format, &advice, || {
         show(&blocks(&advice, args.all_columns, text::width()))
     })?;
@@ -87,7 +87,7 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
 fn setting(registry: &Registry, args: &AdviseArgs, timing: Option<&Timing>) -> Result<Setting> {
     let study = &args.study;
     let held = |structures| study.lens.scene_args.options(structures);
-    let mut setting = Setting::load(registry, study, ROUNDS, timing, held)?;
+    let mut setting = load(registry, study, ROUNDS, timing, held)?;
     setting.structures = plan(registry, args)?.structures;
     let all = text::counted(setting.path.cameras.len(), "camera");
     if setting.path.cameras.len() > MOST_CAMERAS && timing.is_none() {
@@ -103,20 +103,17 @@ fn setting(registry: &Registry, args: &AdviseArgs, timing: Option<&Timing>) -> R
 
 fn input<'s>(args: &'s AdviseArgs, setting: &'s Setting) -> AdviseInput<'s> {
     AdviseInput {
-        scene: &setting.scene,
-        path: &setting.path,
-        structures: &setting.structures,
+        setting,
         motion: args.moves.motion.first().map(String::as_str),
         views: args.moves.views,
         options: &args.options,
-        protocol: &setting.protocol,
     }
 }
 
 /// Times the trials in one process.
 pub fn time(registry: &Registry, args: &AdviseArgs, timing: &Timing) -> Result<ProcessTimes> {
     let setting = setting(registry, args, Some(timing))?;
-    Ok(advise::time(&input(args, &setting), &timing.plan()?)?)
+    advise::time(&input(args, &setting), &timing.plan()?)
 }
 
 #[cfg(test)]

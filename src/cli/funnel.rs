@@ -19,14 +19,14 @@ use super::plan::Plan;
 use super::processes::Timing;
 use super::shared_args::{StudyArgs, TableFormat};
 use super::sheet::Class;
-use super::study::{Setting, Study};
+use super::study::{Study, load, note_solid};
 use super::{Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_text};
 use crate::funnel::{
     self, Chain, Fate, FunnelInput, FunnelReport, NONE, OrderRow, PickRow, StageKind, StageRow,
 };
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
-use crate::measure::ProcessTimes;
+use crate::measure::{ProcessTimes, Setting};
 use crate::scene::{LoadOptions, Scene};
 use crate::shown::lines;
 use crate::spec::SpecError;
@@ -77,7 +77,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
         bail!("a stage failed when it was timed: {reason}");
     }
     let report = prepared.conclude(&times);
-    stages.setting.note_solid(args.format);
+    note_solid(&stages.setting.scene, args.format);
     let shown = print(args.format, &report, || {
         show(&funnel_table::blocks(&report, args.all))
     });
@@ -106,8 +106,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
 /// Amount of work.
 fn work(input: &FunnelInput) -> String {
     let SampleGrid { width, height } = input.samples;
-    let items = text::counted(input.scene.items.len(), "item");
-    let views = input.most_views.min(input.path.cameras.len());
+    let Setting { scene, path, .. } = input.setting;
+    let items = text::counted(scene.items.len(), "item");
+    let views = input.most_views.min(path.cameras.len());
     let views = text::counted(views, "view");
     format!("{items}, {views} of {width}x{height} samples")
 }
@@ -192,7 +193,7 @@ impl Stages {
             per_triangle: funnel::BYTES_PER_TRIANGLE,
             ..args.study.lens.scene_args.options(structures + 2)
         };
-        let setting = Setting::load(registry, &args.study, ROUNDS, timing, held)?;
+        let setting = load(registry, &args.study, ROUNDS, timing, held)?;
         Ok(Stages {
             chain: chain(args, &setting.scene, &setting.structures)?,
             claim: claim(args.pvs.as_deref())?,
@@ -227,15 +228,13 @@ pub fn plain_input<'s>(
     args: &StudyArgs,
 ) -> Result<FunnelInput<'s>> {
     Ok(FunnelInput {
-        scene: &setting.scene,
-        path: &setting.path,
+        setting,
         most_views: frames as usize,
         samples,
         cut_outs: None,
         mirror: None,
         chain,
         structures: &setting.structures,
-        protocol: &setting.protocol,
         claim: None,
         inner_boxes: None,
         loading: args.lens.scene_args.options(0),
@@ -249,7 +248,7 @@ pub fn plain_input<'s>(
 /// Times every stage in one process.
 pub fn time(registry: &Registry, args: &FunnelArgs, timing: &Timing) -> Result<ProcessTimes> {
     let stages = Stages::of(registry, args, Some(timing))?;
-    Ok(funnel::time(&stages.input(args)?, &timing.plan()?)?)
+    funnel::time(&stages.input(args)?, &timing.plan()?)
 }
 
 /// Tables of the report, each a list of rows or a single row, with their fields.

@@ -11,7 +11,7 @@ use super::funnel::{nothing_for_it, plain_input};
 use super::page::to_page;
 use super::precision_conclusions::is_wrong;
 use super::processes::Timing;
-use super::study::{Setting, Study};
+use super::study::{Study, load};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time_plus_minus};
 use super::{
@@ -19,8 +19,8 @@ use super::{
 };
 use crate::funnel::{self, Chain, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
-use crate::measure::ProcessTimes;
-use crate::precision::{self, PrecisionInput, SWEEPS, size_sweep, sweep};
+use crate::measure::{ProcessTimes, Setting};
+use crate::precision::{self, SWEEPS, size_sweep, sweep};
 use crate::scene::LoadOptions;
 use crate::visibility::{Guarantee, SampleGrid};
 
@@ -41,7 +41,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 0, spread)?;
     study.begin("every point, checked");
-    let prepared = precision::prepare(&input(args, &setting))?;
+    let prepared = precision::prepare(&setting, args.frames as usize)?;
     let items = text::counted(setting.scene.items.len(), "item");
     study.announce(&items, "about a minute");
     let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
@@ -102,17 +102,7 @@ fn blocks(outcome: &precision_tables::Outcome, all: bool, room: usize) -> Vec<Bl
 /// The inputs of the command itself, or of a worker.
 fn setting(registry: &Registry, args: &PrecisionArgs, timing: Option<&Timing>) -> Result<Setting> {
     let held = |structures| args.study.lens.scene_args.options(2 * structures);
-    Setting::load(registry, &args.study, ROUNDS, timing, held)
-}
-
-fn input<'s>(args: &PrecisionArgs, setting: &'s Setting) -> PrecisionInput<'s> {
-    PrecisionInput {
-        scene: &setting.scene,
-        path: &setting.path,
-        structures: &setting.structures,
-        most_cameras: args.frames as usize,
-        protocol: &setting.protocol,
-    }
+    load(registry, &args.study, ROUNDS, timing, held)
 }
 
 /// Times all points in one process.
@@ -120,10 +110,11 @@ pub fn time(registry: &Registry, args: &PrecisionArgs, timing: &Timing) -> Resul
     if let Some(stage) = args.stage {
         let (setting, chain) = stage_setting(registry, args, Some(timing))?;
         let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
-        return Ok(funnel::time_sweep(&input, stage, &timing.plan()?)?);
+        return funnel::time_sweep(&input, stage, &timing.plan()?);
     }
     let setting = setting(registry, args, Some(timing))?;
-    Ok(precision::time(&input(args, &setting), &timing.plan()?)?)
+    let frames = args.frames as usize;
+    Ok(precision::time(&setting, frames, &timing.plan()?)?)
 }
 
 /// Rounds of a point, if one process has them all.
@@ -142,7 +133,7 @@ fn stage_setting(
         ..args.study.lens.scene_args.options(3)
     };
     let (study, rounds) = (&args.study, STAGE_ROUNDS);
-    let mut setting = Setting::load(registry, study, rounds, timing, held)?;
+    let mut setting = load(registry, study, rounds, timing, held)?;
     setting.structures.truncate(1);
     let object = setting.structures.first().map_or(NONE, |spec| &spec.label);
     let chain = Chain::for_scene(&setting.scene, false).with(StageKind::Object, object);

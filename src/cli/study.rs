@@ -13,10 +13,10 @@ use serde_json::json;
 use super::processes::{Job, Message, Timing, Workers};
 use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
 use super::{Ending, interrupt, load_scene, print, tell, text};
-use crate::index::{Registry, StructureSpec};
+use crate::index::Registry;
 use crate::input::{is_readable, tell_warnings};
-use crate::measure::{NO_ITEMS, ProcessTimes, Protocol, Status};
-use crate::path::{self, CameraPath};
+use crate::measure::{NO_ITEMS, ProcessTimes, Setting, Status};
+use crate::path;
 use crate::scene::{self, LoadOptions, Scene, split_part};
 
 /// A progress bar of `parts` parts, with a word for them.
@@ -36,52 +36,41 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
     bar
 }
 
-/// Inputs of a study, loaded.
-pub struct Setting {
-    pub scene: Scene,
-    pub path: CameraPath,
-    pub structures: Vec<StructureSpec>,
-    pub protocol: Protocol,
+/// Loads what the arguments name: in a worker for its `timing`, in the command
+/// itself without one and with `held`, the limits of a scene for n structures.
+pub fn load(
+    registry: &Registry,
+    args: &StudyArgs,
+    rounds: [usize; 2],
+    timing: Option<&Timing>,
+    held: impl Fn(usize) -> LoadOptions,
+) -> anyhow::Result<Setting> {
+    let structures = args.kernel.structures(registry, &args.structure)?;
+    // An impossible lens is reported before anything is loaded.
+    let lens = args.lens.defaults()?;
+    let scene = match timing {
+        None => load_scene(&args.scene, &held(structures.len()))?,
+        Some(_) => scene::load(&args.scene, &args.lens.scene_args.options(0))?,
+    };
+    if scene.items.is_empty() {
+        return Err(LeftOut(scene.name).into());
+    }
+    let lens_scale = timing.and_then(|timing| timing.lens_scale);
+    let process = timing.map_or(0, |timing| timing.process);
+    Ok(Setting {
+        path: path::load_scaled(&args.path, &scene, &lens, lens_scale)?,
+        protocol: args.spread.protocol(rounds, process, usize::MAX),
+        structures,
+        scene,
+    })
 }
 
-impl Setting {
-    /// Loads what the arguments name: in a worker for its `timing`, in the command
-    /// itself without one and with `held`, the limits of a scene for n structures.
-    pub fn load(
-        registry: &Registry,
-        args: &StudyArgs,
-        rounds: [usize; 2],
-        timing: Option<&Timing>,
-        held: impl Fn(usize) -> LoadOptions,
-    ) -> anyhow::Result<Setting> {
-        let structures = args.kernel.structures(registry, &args.structure)?;
-        // An impossible lens is reported before anything is loaded.
-        let lens = args.lens.defaults()?;
-        let scene = match timing {
-            None => load_scene(&args.scene, &held(structures.len()))?,
-            Some(_) => scene::load(&args.scene, &args.lens.scene_args.options(0))?,
-        };
-        if scene.items.is_empty() {
-            return Err(LeftOut(scene.name).into());
-        }
-        let lens_scale = timing.and_then(|timing| timing.lens_scale);
-        let process = timing.map_or(0, |timing| timing.process);
-        Ok(Setting {
-            path: path::load_scaled(&args.path, &scene, &lens, lens_scale)?,
-            protocol: args.spread.protocol(rounds, process, usize::MAX),
-            structures,
-            scene,
-        })
-    }
-
-    /// Tells readers of tables that boxes of a file are taken as what is drawn.
-    pub fn note_solid(&self, format: TableFormat) {
-        let scene = &self.scene;
-        let is_file = is_readable(Path::new(split_part(&scene.name).0));
-        let is_boxes = scene.surfaces.is_none() && scene.own_tree.is_none();
-        if format == TableFormat::Table && is_file && is_boxes {
-            tell("warning: items count as solid boxes; the meshes in them may hide less");
-        }
+/// Tells readers of tables that boxes of a file are taken as what is drawn.
+pub fn note_solid(scene: &Scene, format: TableFormat) {
+    let is_file = is_readable(Path::new(split_part(&scene.name).0));
+    let is_boxes = scene.surfaces.is_none() && scene.own_tree.is_none();
+    if format == TableFormat::Table && is_file && is_boxes {
+        tell("warning: items count as solid boxes; the meshes in them may hide less");
     }
 }
 

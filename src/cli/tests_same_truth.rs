@@ -6,9 +6,9 @@ use super::verify::judge_camera_level;
 use crate::camera::{Camera, Lens, PlaneOptions, Pose, look_at};
 use crate::culling::Culling;
 use crate::index::Registry;
-use crate::measure::{Protocol, Subject, Workload, judge};
+use crate::measure::{Protocol, Setting, Subject, Workload, judge};
 use crate::path::CameraPath;
-use crate::precision::{self, PrecisionInput};
+use crate::precision;
 use crate::scene::{Scene, WorldBox};
 use crate::stress::extremes::Case;
 use glam::DVec3;
@@ -72,23 +72,19 @@ fn missed(camera: Camera) -> [bool; 4] {
     judge_camera_level(&workload, &mut checks, "");
     let by_verify = checks.iter().any(|check| check.difference.is_some());
 
-    let protocol = Protocol {
-        rounds: [1, 1],
-        task_ns: 0.0,
-        cameras: 1,
-        cold: false,
-        seed: 1,
-        cache_bytes: 0,
+    let setting = Setting {
+        protocol: Protocol {
+            rounds: [1, 1],
+            cameras: 1,
+            seed: 1,
+            ..Protocol::default()
+        },
+        scene,
+        path,
+        structures,
     };
-    let input = PrecisionInput {
-        scene: &scene,
-        path: &path,
-        structures: &structures,
-        most_cameras: 1,
-        protocol: &protocol,
-    };
-    let prepared = precision::prepare(&input).expect("no refusal");
-    let times = precision::time(&input, &prepared.plan);
+    let prepared = precision::prepare(&setting, 1).expect("no refusal");
+    let times = precision::time(&setting, 1, &prepared.plan);
     let measured = prepared.conclude(&[times.expect("no refusal")]);
     let by_precision = measured.points.iter().any(|point| {
         let is_default = point.errors.names.test == "six-plane"

@@ -1,35 +1,16 @@
-//! Reasons for which a funnel, or a row of it, is missing.
+//! Memory and rows that are missing, with the reason.
 
 use serde::Serialize;
 
-use crate::index::BuildError;
 use crate::input::InputError;
-use crate::measure::WorkloadError;
 use crate::scene::memory::{available_bytes, fits_into};
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::Rectangle;
 
-/// A scene and a path that cannot be studied.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// A structure refuses the scene.
-    #[error(transparent)]
-    Build(#[from] BuildError),
-    /// A camera has no frustum.
-    #[error(transparent)]
-    View(#[from] WorkloadError),
-    /// Too little free memory, a motion, or the scene's file, read a second time.
-    #[error(transparent)]
-    Input(#[from] InputError),
-    /// Options, cameras and scene that do not fit each other or the plan.
-    #[error("{0}")]
-    Refused(String),
-}
-
 /// Refuses a step that needs more memory than is free.
-pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), StudyError> {
+pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), InputError> {
     let told = [step, "", "fewer items or views"];
-    Ok(fits_into(available_bytes(), told, needed)?)
+    fits_into(available_bytes(), told, needed)
 }
 
 /// A row that is left out of a section of the report.

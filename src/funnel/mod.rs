@@ -22,7 +22,6 @@ mod truth;
 mod world;
 
 pub use bounds::BoundRow;
-pub use error::StudyError;
 pub(crate) use error::check_memory;
 pub use fragment_stage::FragmentCounts;
 pub use item_stages::Fate;

@@ -2,8 +2,10 @@
 //!
 //! All are compared with the truth, then timed side by side in one or more processes.
 
+use anyhow::Result;
+
 use super::bounds::{bounds, covered_key};
-use super::error::{LeftOutRow, StudyError, check_memory};
+use super::error::{LeftOutRow, check_memory};
 use super::fragment_stage::{FragmentCounts, FragmentStage, Tested, mirrored};
 use super::item_stages::{ItemStages, PlanView};
 use super::orders::{OrderRow, Orders, SORTED};
@@ -15,7 +17,7 @@ use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, visible};
 use super::world::{FunnelInput, World};
 use crate::input::{InputError, warn};
-use crate::measure::{ProcessTimes, Verdict};
+use crate::measure::{ProcessTimes, Setting, Verdict};
 use crate::scene::memory::{available_bytes, fits_into};
 use crate::visibility::{Level, SampleGrid};
 
@@ -51,7 +53,7 @@ struct Study<'w> {
 }
 
 impl<'w> Study<'w> {
-    fn new(world: &'w World<'w>, input: &FunnelInput<'w>) -> Result<Study<'w>, StudyError> {
+    fn new(world: &'w World<'w>, input: &FunnelInput<'w>) -> Result<Study<'w>> {
         let chain = input.chain;
         let items = ItemStages::all(world, chain);
         let steps = chain.steps();
@@ -175,10 +177,11 @@ pub struct Prepared {
 ///
 /// # Errors
 /// A camera, a structure, a back end or an image that is refused.
-pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, StudyError> {
+pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
+    let Setting { scene, path, .. } = input.setting;
     fits(input.samples, available_bytes())?;
     let world = World::new(input, begin)?;
-    let mut warnings = input.path.warnings(input.scene);
+    let mut warnings = path.warnings(scene);
     let rounded = world.rounded();
     rounded.iter().for_each(|text| warn(text));
     warnings.extend(rounded);
@@ -189,7 +192,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
     let mut rows = study.rows(&truth);
     let tested = study.fragments.tested(&study.items, &study.steps, &truth);
     rows.extend(tested.iter().map(|tested| study.test_row(tested)));
-    let mut left_out = Vec::from_iter(left_out_of(input.scene));
+    let mut left_out = Vec::from_iter(left_out_of(scene));
     if let Some(reason) = &study.fragments.too_much {
         left_out.push(LeftOutRow::new(["stages", "fragment"], reason));
         let orders = (input.all || input.sorted).then_some("orders");
@@ -233,15 +236,15 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
     let cut_outs = input.cut_outs.zip(world.cut_outs.as_ref());
     let ground = world.hiders.ground.as_ref();
     let report = FunnelReport {
-        scene: input.scene.name.clone(),
-        path: input.path.name.clone(),
-        items: input.scene.items.len(),
-        skipped_items: input.scene.skipped_items,
+        scene: scene.name.clone(),
+        path: path.name.clone(),
+        items: scene.items.len(),
+        skipped_items: scene.skipped_items,
         views: world.views.len(),
-        cameras: input.path.cameras.len(),
+        cameras: path.cameras.len(),
         samples: [input.samples.width, input.samples.height],
         processes: 0,
-        level: Level::of(&input.scene.name, input.scene, &input.loading)?,
+        level: Level::of(&scene.name, scene, &input.loading)?,
         cut_outs: cut_outs.map(|(typed, made)| CutOutRow {
             typed: *typed,
             item_count: made.count(),
@@ -276,7 +279,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared, St
 ///
 /// # Errors
 /// The errors of [`prepare`].
-pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes, StudyError> {
+pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes> {
     let world = World::new(input, &|_| ())?;
     let study = Study::new(&world, input)?;
     let mut tasks = study.tasks();

@@ -4,16 +4,16 @@
 //! stage has a point for each of several sizes of its buffer.
 //! The truth has rays between the samples too, so that no size of a buffer judges itself.
 
+use anyhow::Result;
 use serde::Serialize;
 
-use super::error::StudyError;
 use super::item_stages::ItemStages;
 use super::stage::{BackEnd, Chain, NONE, StageKind, Step};
 use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, ViewCounts, count_items, visible};
 use super::world::{FunnelInput, World};
-use crate::measure::{Ask, ProcessTimes};
+use crate::measure::{Ask, ProcessTimes, Setting};
 use crate::query::ItemId;
 use crate::statistics::{Estimate, dominance, flat};
 use crate::visibility::SampleGrid;
@@ -175,7 +175,8 @@ impl<'w> Swept<'w> {
 ///
 /// # Errors
 /// The errors of [`prepare`](super::prepare).
-pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSweep, StudyError> {
+pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSweep> {
+    let Setting { scene, path, .. } = input.setting;
     let world = World::new(input, &|_| ())?;
     let swept = Swept::new(&world, input.chain, stage);
     // The side of a triangle needs no rays.
@@ -192,14 +193,14 @@ pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSw
     Ok(PreparedSweep {
         plan: FunnelPlan::new(tasks, world.views.len(), input),
         sweep: StageSweep {
-            scene: input.scene.name.clone(),
-            path: input.path.name.clone(),
+            scene: scene.name.clone(),
+            path: path.name.clone(),
             stage,
             views: world.views.len(),
             rays_per_view: rays,
             processes: 0,
             points,
-            warnings: input.path.warnings(input.scene),
+            warnings: path.warnings(scene),
         },
     })
 }
@@ -212,7 +213,7 @@ pub fn time_sweep(
     input: &FunnelInput,
     stage: StageKind,
     plan: &FunnelPlan,
-) -> Result<ProcessTimes, StudyError> {
+) -> Result<ProcessTimes> {
     let world = World::new(input, &|_| ())?;
     let swept = Swept::new(&world, input.chain, stage);
     let tasks = swept.points().into_iter().map(|(_, task)| task);

@@ -79,7 +79,7 @@ impl FunnelPlan {
             (key, TimedTask::new(expected, ask))
         });
         let (keys, tasks): (Vec<_>, Vec<_>) = tasks.unzip();
-        let schedule = Schedule::new(views, &tasks, input.protocol);
+        let schedule = Schedule::new(views, &tasks, &input.setting.protocol);
         let expected = tasks.into_iter().map(|task| task.expected);
         FunnelPlan {
             schedule,
@@ -97,7 +97,11 @@ impl FunnelPlan {
             TimedTask::new(expected.clone(), ask)
         });
         let planned: Vec<TimedTask> = planned.collect();
-        ProcessTimes::of(&timed_to_end(&planned, &self.schedule, input.protocol))
+        ProcessTimes::of(&timed_to_end(
+            &planned,
+            &self.schedule,
+            &input.setting.protocol,
+        ))
     }
 
     /// Expected numbers of ids of a task, by view.

@@ -2,9 +2,10 @@
 //!
 //! Solid boxes are boxes to rays, meshes and maps are triangles.
 
+use anyhow::anyhow;
 use serde::Serialize;
 
-use super::error::{StudyError, most_drawn};
+use super::error::most_drawn;
 use super::world::{Shape, World};
 use crate::query::ItemId;
 use crate::statistics::{Rate, rate};
@@ -28,16 +29,16 @@ pub type Truth = Vec<Vec<(ItemId, u32)>>;
 ///
 /// # Errors
 /// Too many items in front at the same samples, or too many bodies around the eye.
-pub fn visible(world: &World, random_rays: usize, threads: usize) -> Result<Truth, StudyError> {
+pub fn visible(world: &World, random_rays: usize, threads: usize) -> anyhow::Result<Truth> {
     let rays_end = RaysEnd::at(&world.shape, world.cut_outs.as_ref());
     let samples = world.samples;
     let items = world.items() as ItemId;
     let mut all = Vec::with_capacity(world.views.len());
     for view in world.views() {
         let rays = world.rays(view);
-        let truth = rays_end.visible(rays, samples, threads).map_err(|error| {
-            StudyError::Refused(format!("camera {}: {error}", world.views[view].camera))
-        })?;
+        let truth = rays_end.visible(rays, samples, threads);
+        let camera = world.views[view].camera;
+        let truth = truth.map_err(|error| anyhow!("camera {camera}: {error}"))?;
         let counts = truth.visible.iter().copied().zip(truth.samples_of);
         let mut seen: Vec<(ItemId, u32)> = counts.collect();
         if random_rays > 0 {

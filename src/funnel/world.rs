@@ -4,14 +4,15 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::error::{StudyError, check_memory};
+use anyhow::{Result, bail, ensure};
+
+use super::error::check_memory;
 use super::stage::{BackEnd, Chain, NONE, StageKind, back_ends, left_out_of};
 use crate::camera::{CameraError, PlaneOptions};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
 use crate::kernel::Kernel;
-use crate::measure::{Protocol, WorkloadError, input_of};
-use crate::path::CameraPath;
+use crate::measure::{Setting, WorkloadError, input_of};
 use crate::query::ItemId;
 use crate::scene::{self, Dispute, ItemShape, LoadOptions, Scene, Surfaces, WorldBox};
 use crate::shown::{counted, significant};
@@ -34,10 +35,8 @@ const MOST_MOVED: f64 = 1.0 / 64.0;
 /// Scene, path and options of a study.
 #[derive(Clone, Copy)]
 pub struct FunnelInput<'a> {
-    /// Items.
-    pub scene: &'a Scene,
-    /// Cameras.
-    pub path: &'a CameraPath,
+    /// Scene, cameras, rounds and times of a process.
+    pub setting: &'a Setting,
     /// Most views, evenly spread over the path.
     pub most_views: usize,
     /// Samples of a view that decide which items are visible.
@@ -50,8 +49,6 @@ pub struct FunnelInput<'a> {
     pub chain: &'a Chain,
     /// Structures for the object stage; one of them is the chain's.
     pub structures: &'a [StructureSpec],
-    /// Rounds and times of a process.
-    pub protocol: &'a Protocol,
     /// Claimed visible regions of each region: a back end of the region stage.
     pub claim: Option<&'a Arc<Pvs>>,
     /// Most boxes inside each item of a mesh, at least 1; `None` for [`BOXES`].
@@ -134,9 +131,9 @@ impl<'a> World<'a> {
     /// # Errors
     /// Options that do not fit the scene, a camera without frustum or rays, a structure
     /// that refuses the scene.
-    pub fn new(input: &FunnelInput<'a>, begin: &dyn Fn(&str)) -> Result<World<'a>, StudyError> {
+    pub fn new(input: &FunnelInput<'a>, begin: &dyn Fn(&str)) -> Result<World<'a>> {
         check_options(input)?;
-        let scene = input.scene;
+        let scene = &input.setting.scene;
         let views = views(input)?;
         let regions = regions(input)?;
         check_chain(input, regions.as_ref())?;
@@ -265,14 +262,14 @@ fn rows<'l>(
 }
 
 /// Views of the path, evenly spread.
-fn views(input: &FunnelInput) -> Result<Vec<View>, StudyError> {
-    let around = input.scene.surroundings();
-    let all = &input.path.cameras;
+fn views(input: &FunnelInput) -> Result<Vec<View>> {
+    let Setting { scene, path, .. } = input.setting;
+    let (around, all) = (scene.surroundings(), &path.cameras);
     let count = all.len().min(input.most_views.max(1));
     let chosen = (0..count).map(|k| k * all.len() / count);
     let views = chosen.map(|index| {
         let refused = |error: CameraError| WorkloadError {
-            place: input.path.place(index),
+            place: path.place(index),
             error: error.into(),
         };
         let rays = Rays::of(&all[index]).map_err(refused)?;
@@ -289,70 +286,72 @@ fn views(input: &FunnelInput) -> Result<Vec<View>, StudyError> {
 }
 
 /// Refuses back ends of the item stages that the scene cannot have.
-fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<(), StudyError> {
+fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<()> {
+    let scene = &input.setting.scene;
     for stage in StageKind::OF_ITEMS {
         let labels = input.structures.iter().map(|spec| &spec.label);
-        let known = rows(back_ends(stage, input.scene, false), regions, labels);
+        let known = rows(back_ends(stage, scene, false), regions, labels);
         let name = input.chain.of(stage);
         if !known.iter().any(|(_, known)| known == name) {
             let known: Vec<String> = known.into_iter().map(|(_, name)| name).collect();
-            let why = left_out_of(input.scene).filter(|row| row.name == name);
+            let why = left_out_of(scene).filter(|row| row.name == name);
             let why = why.map_or(String::new(), |row| format!(" ({})", row.reason));
-            return Err(StudyError::Refused(format!(
-                "{} '{name}' needs what the scene does not have{why}; expected one of {}",
-                stage.name(),
-                known.join(", ")
-            )));
+            let (stage, known) = (stage.name(), known.join(", "));
+            bail!(
+                "{stage} '{name}' needs what the scene does not have{why}; expected one of {known}"
+            );
         }
     }
     Ok(())
 }
 
 /// Refuses options that the items of the scene cannot have.
-fn check_options(input: &FunnelInput) -> Result<(), StudyError> {
-    let (scene, mirror, inner_boxes) = (input.scene, &input.mirror, input.inner_boxes);
+fn check_options(input: &FunnelInput) -> Result<()> {
+    let (scene, mirror) = (&input.setting.scene, input.mirror);
     let (name, shape) = (&scene.name, scene.item_shape());
     for (option, is_given, expected) in [
         ("--cut-out", input.cut_outs.is_some(), ItemShape::Box),
         ("--mirror", mirror.is_some(), ItemShape::Box),
-        ("--inner-boxes", inner_boxes.is_some(), ItemShape::Mesh),
+        (
+            "--inner-boxes",
+            input.inner_boxes.is_some(),
+            ItemShape::Mesh,
+        ),
     ] {
-        if is_given && shape != expected {
-            return Err(StudyError::Refused(format!(
-                "the items of '{name}' are {}; expected a scene of {} for {option}",
-                shape.name(),
-                expected.name()
-            )));
-        }
+        ensure!(
+            !is_given || shape == expected,
+            "the items of '{name}' are {}; expected a scene of {} for {option}",
+            shape.name(),
+            expected.name()
+        );
     }
     let items = scene.items.len();
-    match mirror {
-        Some(item) if *item as usize >= items => Err(StudyError::Refused(format!(
-            "--mirror {item}: '{name}' has {items} items; expected one from 0 to {}",
-            items - 1
-        ))),
-        _ => Ok(()),
+    if let Some(item) = mirror.filter(|item| *item as usize >= items) {
+        let last = items - 1;
+        bail!("--mirror {item}: '{name}' has {items} items; expected one from 0 to {last}");
     }
+    Ok(())
 }
 
 /// Regions of the scene, with the claimed table.
-fn regions(input: &FunnelInput) -> Result<Option<Regions>, StudyError> {
-    let name = &input.scene.name;
-    let refused = match (Regions::of(input.scene), input.claim) {
-        (Ok(mut regions), Some(claim)) => match regions.store(claim.clone(), Source::Claim) {
-            true => return Ok(Some(regions)),
-            false => {
-                let (own, all) = (claim.len(), regions.graph.len());
-                format!("the potentially visible set has {own} regions; expected the scene's {all}")
-            }
-        },
-        (regions, None) => return Ok(regions.ok()),
-        (Err(None), _) => format!("'{name}' has no rooms or sectors; expected some for --pvs"),
-        (Err(Some(dispute)), _) => {
-            format!("'{name}': {dispute}; expected sectors that divide the map for --pvs")
+fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
+    let scene = &input.setting.scene;
+    let name = &scene.name;
+    match (Regions::of(scene), input.claim) {
+        (Ok(mut regions), Some(claim)) => {
+            let (own, all) = (claim.len(), regions.graph.len());
+            ensure!(
+                regions.store(claim.clone(), Source::Claim),
+                "the potentially visible set has {own} regions; expected the scene's {all}"
+            );
+            Ok(Some(regions))
         }
-    };
-    Err(StudyError::Refused(refused))
+        (regions, None) => Ok(regions.ok()),
+        (Err(None), _) => bail!("'{name}' has no rooms or sectors; expected some for --pvs"),
+        (Err(Some(dispute)), _) => {
+            bail!("'{name}': {dispute}; expected sectors that divide the map for --pvs")
+        }
+    }
 }
 
 /// Rooms of a scene, or sectors or clusters of its map.
@@ -413,6 +412,7 @@ impl Regions {
 mod tests {
     use super::*;
     use crate::index::Row;
+    use crate::measure::Protocol;
     use crate::path::{self, LensDefaults};
     use crate::scene;
 
@@ -430,23 +430,27 @@ mod tests {
         };
         let scene = scene::load("rooms:n=500", &Default::default()).expect("rooms");
         let path = path::load("street:frames=3", &scene, &LensDefaults::default());
+        let setting = Setting {
+            path: path.expect("a path"),
+            scene,
+            structures: vec![LINEAR(), blind],
+            protocol: Protocol {
+                rounds: [1, 1],
+                task_ns: 1e6,
+                cameras: 3,
+                seed: 1,
+                ..Protocol::default()
+            },
+        };
+        let scene = &setting.scene;
         let input = FunnelInput {
-            scene: &scene,
-            path: &path.expect("a path"),
+            setting: &setting,
             most_views: 3,
             samples: SampleGrid::new(8, 5),
             cut_outs: None,
             mirror: None,
-            chain: &Chain::for_scene(&scene, false).with(StageKind::Object, "linear"),
-            structures: &[LINEAR(), blind],
-            protocol: &Protocol {
-                rounds: [1, 1],
-                task_ns: 1e6,
-                cameras: 3,
-                cold: false,
-                seed: 1,
-                cache_bytes: 0,
-            },
+            chain: &Chain::for_scene(scene, false).with(StageKind::Object, "linear"),
+            structures: &setting.structures,
             claim: None,
             inner_boxes: None,
             loading: Default::default(),

@@ -82,7 +82,7 @@ pub use shared_work::SharedWork;
 pub use task::{Ask, AskMany, TimedTask};
 pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
 pub use update::{UPDATE_SHARES, move_share};
-pub use workload::{Workload, WorkloadError, input_of};
+pub use workload::{Setting, Workload, WorkloadError, input_of};
 
 named! {
     /// Ending of a cell. A gap is never silent.

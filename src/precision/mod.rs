@@ -12,7 +12,7 @@ mod sweeps;
 
 pub use judged::{CullingErrors, Names};
 pub use point::{Point, StableAfter};
-pub use points::{Precision, PrecisionInput, prepare, time};
+pub use points::{Precision, prepare, time};
 pub use region_search::RegionErrors;
 pub use size_sweep::{SizeRow, size_sweep};
 pub use sweeps::{SWEEPS, SweepRow, sweep};

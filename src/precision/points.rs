@@ -11,10 +11,9 @@ use crate::camera::{PLANE_METHODS, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{
-    OverProcesses, ProcessTimes, Protocol, Schedule, Status, TimedTask, Verdict, input_of,
+    OverProcesses, ProcessTimes, Schedule, Setting, Status, TimedTask, Verdict, input_of,
     timed_to_end,
 };
-use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::statistics::Estimate;
@@ -71,21 +70,6 @@ pub struct Prepared {
     /// Tasks of the other processes.
     pub plan: PointPlan,
     precision: Precision,
-}
-
-/// Input of a diagram.
-#[derive(Clone, Copy)]
-pub struct PrecisionInput<'a> {
-    /// Items to be culled.
-    pub scene: &'a Scene,
-    /// Cameras to be culled for.
-    pub path: &'a CameraPath,
-    /// Structures to be measured with every test.
-    pub structures: &'a [StructureSpec],
-    /// Largest number of cameras of the path, evenly spread.
-    pub most_cameras: usize,
-    /// Rounds and times of a process.
-    pub protocol: &'a Protocol,
 }
 
 /// Every test with every arithmetic, with and without epsilon; every
@@ -166,14 +150,14 @@ enum Way<'b> {
 
 impl<'a> Built<'a> {
     fn new(
-        input: &PrecisionInput<'a>,
+        Setting {
+            scene, structures, ..
+        }: &'a Setting,
         shots: &Shots,
         truths: Option<&Truths>,
     ) -> Result<Built<'a>, BuildError> {
-        let scene = input.scene;
         let judge = |culling| Judged::new(scene, shots, truths, culling);
-        let structures = input.structures.iter();
-        let structures = structures.map(|spec| Indexes::new(spec, scene));
+        let structures = structures.iter().map(|spec| Indexes::new(spec, scene));
         Ok(Built {
             judged: cullings().into_iter().map(judge).collect(),
             structures: structures.collect::<Result<_, _>>()?,
@@ -245,16 +229,16 @@ impl<'a> Built<'a> {
 /// Every answer is compared with the plain loop before it is timed, and the
 /// plain loop with the exact truth: O(cameras * items) verdicts of some 50 ns
 /// and as many plain tests for each culling, twice for what changes from frame to
-/// frame.
+/// frame. Of the path at most `most` cameras are looked at, evenly spread.
 ///
 /// # Errors
 /// A structure that refuses the scene.
-pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
-    let scene = input.scene;
+pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
+    let Setting { scene, path, .. } = setting;
     let items = scene.items.len();
-    let shots = Shots::of(input.path, input.most_cameras);
+    let shots = Shots::of(path, most);
     let cameras = shots.cameras.len();
-    let built = Built::new(input, &shots, Some(&shots.truths(scene)))?;
+    let built = Built::new(setting, &shots, Some(&shots.truths(scene)))?;
     let region_judged = built.queries.judged();
     let (mut points, mut region_points) = (Vec::new(), Vec::new());
     let (mut tasks, mut twin) = (Vec::new(), None);
@@ -295,11 +279,11 @@ pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
         }
     }
     tasks.extend(twin);
-    let schedule = Schedule::new(cameras, &built.tasks(&tasks), input.protocol);
+    let schedule = Schedule::new(cameras, &built.tasks(&tasks), &setting.protocol);
     Ok(Prepared {
         precision: Precision {
             scene: scene.name.clone(),
-            path: input.path.name.clone(),
+            path: path.name.clone(),
             items,
             cameras,
             rounds: schedule.rounds as usize,
@@ -318,12 +302,12 @@ pub fn prepare(input: &PrecisionInput) -> Result<Prepared, BuildError> {
 ///
 /// # Panics
 /// If the scene is not the one that was planned for.
-pub fn time(input: &PrecisionInput, plan: &PointPlan) -> Result<ProcessTimes, BuildError> {
-    let shots = Shots::of(input.path, input.most_cameras);
+pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessTimes, BuildError> {
+    let shots = Shots::of(&setting.path, most);
     let cameras = shots.cameras.len();
-    let built = Built::new(input, &shots, None)?;
+    let built = Built::new(setting, &shots, None)?;
     let tasks = built.tasks(&plan.tasks);
-    let timed = timed_to_end(&tasks, &plan.schedule, input.protocol);
+    let timed = timed_to_end(&tasks, &plan.schedule, &setting.protocol);
     let laps = timed.iter().map(|timed| match timed {
         Ok(timed) => by_camera(timed, cameras),
         Err(_) => Vec::new(),
@@ -371,6 +355,7 @@ impl Prepared {
 mod tests {
     use super::*;
     use crate::index::Row;
+    use crate::measure::Protocol;
 
     #[test]
     fn a_structure_that_loses_items_is_wrong_and_no_point_that_misses() {
@@ -389,21 +374,18 @@ mod tests {
         };
         let scene = crate::scene::load("city:n=200", &Default::default()).expect("a city");
         let path = crate::path::load("orbit:frames=3", &scene, &Default::default());
-        let input = PrecisionInput {
-            scene: &scene,
-            path: &path.expect("a path"),
-            structures: &[linear(), blind],
-            most_cameras: 3,
-            protocol: &Protocol {
+        let setting = Setting {
+            path: path.expect("a path"),
+            scene,
+            structures: vec![linear(), blind],
+            protocol: Protocol {
                 rounds: [1, 1],
-                task_ns: 0.0,
                 cameras: 3,
-                cold: false,
                 seed: 1,
-                cache_bytes: 0,
+                ..Protocol::default()
             },
         };
-        let points = prepare(&input).expect("no refusal").precision.points;
+        let points = prepare(&setting, 3).expect("no refusal").precision.points;
         for point in points {
             let reason = point.reason.unwrap_or_default();
             let is_wrong = point.status == Status::Wrong && reason.contains("own planes");

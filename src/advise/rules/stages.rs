@@ -27,8 +27,8 @@ pub struct Stages {
 
 impl Stages {
     pub fn of(all: &AdviseInput, tree: &str) -> Stages {
-        let tree = planned(all.structures, tree);
-        let chain = Chain::for_scene(all.scene, false)
+        let tree = planned(&all.setting.structures, tree);
+        let chain = Chain::for_scene(&all.setting.scene, false)
             .with(StageKind::Object, &tree.label)
             .with(StageKind::Triangle, "several-cones")
             .with(StageKind::Fragment, NONE);
@@ -37,15 +37,13 @@ impl Stages {
 
     pub fn input<'s>(&'s self, all: &AdviseInput<'s>) -> FunnelInput<'s> {
         FunnelInput {
-            scene: all.scene,
-            path: all.path,
-            most_views: (ITEMS / all.scene.items.len().max(1)).clamp(1, VIEWS),
+            setting: all.setting,
+            most_views: (ITEMS / all.setting.scene.items.len().max(1)).clamp(1, VIEWS),
             samples: SAMPLES,
             cut_outs: None,
             mirror: None,
             chain: &self.chain,
             structures: std::slice::from_ref(&self.tree),
-            protocol: all.protocol,
             claim: None,
             inner_boxes: None,
             loading: Default::default(),
