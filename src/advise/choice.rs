@@ -13,8 +13,7 @@ use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::BuildError;
 use crate::measure::{OverProcesses, ReportCell};
-use crate::statistics::{ALPHA, Estimate, Rate, flat, rate, ratio, shows_less_in_sum};
-use crate::verify::ErrorCount;
+use crate::statistics::{ALPHA, Estimate, Rate, flat, rate_of, ratio, shows_less_in_sum};
 
 /// Which structure, and all that took part.
 #[derive(Clone, Debug, Serialize)]
@@ -231,11 +230,7 @@ impl TestChoice {
             let query = times.ns(task);
             let errors = answered.errors(task);
             let by_camera = answered.by_camera(task).unwrap_or_default();
-            let rate_of = |count: fn(&ErrorCount) -> u64| {
-                let clusters = by_camera.iter();
-                let clusters = clusters.map(|e| [count(e) as f64, e.visible as f64]);
-                rate(&clusters.collect::<Vec<_>>())
-            };
+            let missed = rate_of(by_camera, |e| [e.false_negatives, e.visible]);
             let extra = errors.map(|e| e.false_positives as f64 / judged);
             let extra = extra.filter(|extra| extra.is_finite());
             let drawn = extra.map(|extra| extra * draw_ns);
@@ -250,8 +245,8 @@ impl TestChoice {
             TestRow {
                 test: test.name(),
                 query_ns: query,
-                excess: rate_of(|e| e.false_positives),
-                false_negative_ppm: rate_of(|e| e.false_negatives).map(|share| share.per(1e6)),
+                excess: rate_of(by_camera, |e| [e.false_positives, e.visible]),
+                false_negative_ppm: missed.map(|share| share.per(1e6)),
                 false_positives_per_query: extra,
                 total_ns: query.zip(drawn).map(|(query, drawn)| query.value + drawn),
                 by_process: times.ln_ns(task).iter().map(|ln_ns| ln_ns.exp()).collect(),
@@ -306,6 +301,7 @@ mod tests {
     use super::super::options::planned;
     use super::*;
     use crate::index::{Registry, UpdatePolicy};
+    use crate::statistics::rate;
 
     /// A query of about 100 ns in ten processes, each a little off.
     fn row(test: &'static str, query: f64, drawn: f64) -> TestRow {

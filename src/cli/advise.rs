@@ -86,7 +86,7 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
 /// The inputs of the command, which tells what is left out, or of a worker.
 fn setting(registry: &Registry, args: &AdviseArgs, timing: Option<&Timing>) -> Result<Setting> {
     let study = &args.study;
-    let held = |structures| study.lens.scene_args.options(structures);
+    let held = |structures| [structures as u64, 0];
     let mut setting = load(registry, study, ROUNDS, timing, held)?;
     setting.structures = plan(registry, args)?.structures;
     let all = text::counted(setting.path.cameras.len(), "camera");

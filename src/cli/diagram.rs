@@ -23,6 +23,16 @@ pub struct Point {
     pub is_large: bool,
 }
 
+impl Point {
+    /// A bare place.
+    pub fn new(at: [f64; 2]) -> Point {
+        Point {
+            at,
+            ..Point::default()
+        }
+    }
+}
+
 /// Places with the look of a structure.
 pub struct Series {
     pub name: String,

@@ -17,7 +17,7 @@ use super::figure::{Axis, Figure};
 use super::page::to_page;
 use super::plan::Plan;
 use super::processes::Timing;
-use super::shared_args::{StudyArgs, TableFormat};
+use super::shared_args::TableFormat;
 use super::sheet::Class;
 use super::study::{Study, load, note_solid};
 use super::{Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_text};
@@ -27,7 +27,7 @@ use crate::funnel::{
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
 use crate::measure::{ProcessTimes, Setting};
-use crate::scene::{LoadOptions, Scene};
+use crate::scene::Scene;
 use crate::shown::lines;
 use crate::spec::SpecError;
 use crate::visibility::region::Pvs;
@@ -189,10 +189,7 @@ struct Stages {
 
 impl Stages {
     fn of(registry: &Registry, args: &FunnelArgs, timing: Option<&Timing>) -> Result<Self> {
-        let held = |structures| LoadOptions {
-            per_triangle: funnel::BYTES_PER_TRIANGLE,
-            ..args.study.lens.scene_args.options(structures + 2)
-        };
+        let held = |structures| [structures as u64 + 2, funnel::BYTES_PER_TRIANGLE];
         let setting = load(registry, &args.study, ROUNDS, timing, held)?;
         Ok(Stages {
             chain: chain(args, &setting.scene, &setting.structures)?,
@@ -202,8 +199,8 @@ impl Stages {
     }
 
     fn input<'s>(&'s self, args: &'s FunnelArgs) -> Result<FunnelInput<'s>> {
-        let (setting, chain, study) = (&self.setting, &self.chain, &args.study);
-        let plain = plain_input(setting, chain, args.frames, args.samples, study)?;
+        let (study, views) = (&args.study, (args.frames as usize, args.samples));
+        let execution = study.kernel.execution()?;
         Ok(FunnelInput {
             cut_outs: args.cut_out.as_ref(),
             mirror: args.mirror,
@@ -214,35 +211,10 @@ impl Stages {
                 || args.csv.is_some()
                 || args.format != TableFormat::Table,
             picks: !args.no_picks,
-            ..plain
+            loading: study.lens.scene_args.options(0),
+            ..FunnelInput::new(&self.setting, &self.chain, views, execution)
         })
     }
-}
-
-/// The input of a funnel without any option.
-pub fn plain_input<'s>(
-    setting: &'s Setting,
-    chain: &'s Chain,
-    frames: u32,
-    samples: SampleGrid,
-    args: &StudyArgs,
-) -> Result<FunnelInput<'s>> {
-    Ok(FunnelInput {
-        setting,
-        most_views: frames as usize,
-        samples,
-        cut_outs: None,
-        mirror: None,
-        chain,
-        structures: &setting.structures,
-        claim: None,
-        inner_boxes: None,
-        loading: args.lens.scene_args.options(0),
-        execution: args.kernel.execution()?,
-        all: true,
-        picks: true,
-        sorted: false,
-    })
 }
 
 /// Times every stage in one process.

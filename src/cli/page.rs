@@ -88,7 +88,7 @@ pub fn glossary(blocks: &[Block]) -> Vec<Block> {
         [column, info.map_or("", |info| info.summary)]
     });
     let bounds = BOUNDS.iter().map(|bound| [bound.name, bound.summary]);
-    let meanings = MEANINGS.iter().filter_map(|line| line.split_once(" | "));
+    let meanings = MEANINGS.lines().filter_map(|line| line.split_once(" | "));
     let meanings = meanings.map(<[&str; 2]>::from).chain(figures).chain(bounds);
     let speedups = texts
         .iter()
@@ -106,33 +106,5 @@ pub fn glossary(blocks: &[Block]) -> Vec<Block> {
 
 const PEER: &str = "vs fastest peer";
 
-/// Columns that are no metrics.
-const MEANINGS: [&str; 24] = [
-    "structure | name and parameters of the structure; bound-: a lower bound, no structure",
-    "rank | 1 is the fastest; structures that no test tells apart share a rank",
-    "time per query | CPU time of a frustum query, mean over the cameras",
-    "time per frame | CPU time of a frame: the update and its queries, mean over the frames",
-    "±, [a, b] | 95 % interval over the processes",
-    "vs fastest peer | time of the fastest structure of another crate / time of this structure",
-    "geometric mean | mean of the speed-ups over all scenes and paths; shades are relative to the \
-     best of a row",
-    "status | ok: the answers are right; anything else has its reason under Statuses",
-    "by | back end of the stage; *: of the chain, ?: without a guarantee",
-    "in | items (triangles in the triangle stage) that the stage receives, per view",
-    "out | items (triangles in the triangle stage) that it passes, per view",
-    "truth | received items in front at some sample; received triangles that face the eye",
-    "FP | false positives: passed, not visible",
-    "FN | false negatives: visible, not passed",
-    "per item | time / number of removed items",
-    "worth it from | cost of drawing one item (a triangle, shading a fragment) above which the \
-     stage pays off",
-    "FP % | items returned that are not visible / visible items",
-    "FN ppm | visible items that are not returned, per million",
-    "by source | false positives by storage in f32 / rounded planes and margin / the test itself",
-    "px | how far the worst missed item reaches into an image 1,080 pixels high",
-    "flicker % | items whose answer changes from one camera to the next while the truth does \
-     not / visible items",
-    "tie | dominated by the values alone, which the samples do not show",
-    "overdraw | shaded fragments / covered samples",
-    "resolves | the change that 95 % of such comparisons find",
-];
+/// Columns that are no metrics, and their meanings.
+const MEANINGS: &str = include_str!("assets/meanings.txt");

@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use super::args::PrecisionArgs;
 use super::document::{Block, show};
 use super::figure::picture;
-use super::funnel::{nothing_for_it, plain_input};
+use super::funnel::nothing_for_it;
 use super::page::to_page;
 use super::precision_conclusions::is_wrong;
 use super::processes::Timing;
@@ -17,11 +17,10 @@ use super::text::{self, significant, some, time_plus_minus};
 use super::{
     Ending, expect_places, funnel_table, precision_conclusions, precision_tables, print, write_text,
 };
-use crate::funnel::{self, Chain, NONE, StageKind, StageSweep, SweepPoint};
+use crate::funnel::{self, Chain, FunnelInput, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Setting};
 use crate::precision::{self, SWEEPS, size_sweep, sweep};
-use crate::scene::LoadOptions;
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Rounds of a point, if one process has them all.
@@ -101,15 +100,16 @@ fn blocks(outcome: &precision_tables::Outcome, all: bool, room: usize) -> Vec<Bl
 
 /// The inputs of the command itself, or of a worker.
 fn setting(registry: &Registry, args: &PrecisionArgs, timing: Option<&Timing>) -> Result<Setting> {
-    let held = |structures| args.study.lens.scene_args.options(2 * structures);
-    load(registry, &args.study, ROUNDS, timing, held)
+    load(registry, &args.study, ROUNDS, timing, |structures| {
+        [2 * structures as u64, 0]
+    })
 }
 
 /// Times all points in one process.
 pub fn time(registry: &Registry, args: &PrecisionArgs, timing: &Timing) -> Result<ProcessTimes> {
     if let Some(stage) = args.stage {
         let (setting, chain) = stage_setting(registry, args, Some(timing))?;
-        let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
+        let input = stage_input(args, &setting, &chain)?;
         return funnel::time_sweep(&input, stage, &timing.plan()?);
     }
     let setting = setting(registry, args, Some(timing))?;
@@ -128,16 +128,22 @@ fn stage_setting(
     args: &PrecisionArgs,
     timing: Option<&Timing>,
 ) -> Result<(Setting, Chain)> {
-    let held = |_| LoadOptions {
-        per_triangle: funnel::BYTES_PER_TRIANGLE,
-        ..args.study.lens.scene_args.options(3)
-    };
-    let (study, rounds) = (&args.study, STAGE_ROUNDS);
-    let mut setting = load(registry, study, rounds, timing, held)?;
+    let held = |_| [3, funnel::BYTES_PER_TRIANGLE];
+    let mut setting = load(registry, &args.study, STAGE_ROUNDS, timing, held)?;
     setting.structures.truncate(1);
     let object = setting.structures.first().map_or(NONE, |spec| &spec.label);
     let chain = Chain::for_scene(&setting.scene, false).with(StageKind::Object, object);
     Ok((setting, chain))
+}
+
+fn stage_input<'s>(
+    args: &PrecisionArgs,
+    setting: &'s Setting,
+    chain: &'s Chain,
+) -> Result<FunnelInput<'s>> {
+    let views = (args.frames as usize, SAMPLES);
+    let execution = args.study.kernel.execution()?;
+    Ok(FunnelInput::new(setting, chain, views, execution))
 }
 
 fn sweep_stage(registry: &Registry, args: &PrecisionArgs, stage: StageKind) -> Result<Ending> {
@@ -152,7 +158,7 @@ fn sweep_stage(registry: &Registry, args: &PrecisionArgs, stage: StageKind) -> R
     let about = format!("{}, {} stage: ", args.study.scene, stage.name());
     let study = Study::new(about, 0, &args.study.spread)?;
     study.begin("every point, judged");
-    let input = plain_input(&setting, &chain, args.frames, SAMPLES, &args.study)?;
+    let input = stage_input(args, &setting, &chain)?;
     let prepared = funnel::prepare_sweep(&input, stage)?;
     let items = text::counted(scene.items.len(), "item");
     study.announce(&items, "less than a minute");

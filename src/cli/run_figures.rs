@@ -97,10 +97,7 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
             continue;
         };
         let readings: Vec<_> = readings.iter().filter(|r| is_drawn(r.ns)).collect();
-        let point = |reading: &&Reading| Point {
-            at: [reading.frame, reading.ns],
-            ..Point::default()
-        };
+        let point = |reading: &&Reading| Point::new([reading.frame, reading.ns]);
         if readings.len() >= LEAST_READINGS[0] {
             queries = readings.iter().map(|r| r.queries).fold(queries, u32::max);
             let points = readings.iter().map(point).collect();
@@ -141,10 +138,7 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
     if visible.len() >= LEAST_READINGS[0] {
         let most = visible.iter().copied().fold(1, u64::max);
         let count = |items: f64| text::count(items as usize);
-        let point = |(frame, items): (usize, &u64)| Point {
-            at: [frame as f64, *items as f64],
-            ..Point::default()
-        };
+        let point = |(frame, items): (usize, &u64)| Point::new([frame as f64, *items as f64]);
         let series = Series {
             name: "visible items".to_owned(),
             look: Look::nth(0),

@@ -37,20 +37,29 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
 }
 
 /// Loads what the arguments name: in a worker for its `timing`, in the command
-/// itself without one and with `held`, the limits of a scene for n structures.
+/// itself without one and with `held`: of n structures so many, and bytes per triangle.
 pub fn load(
     registry: &Registry,
     args: &StudyArgs,
     rounds: [usize; 2],
     timing: Option<&Timing>,
-    held: impl Fn(usize) -> LoadOptions,
+    held: impl Fn(usize) -> [u64; 2],
 ) -> anyhow::Result<Setting> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     // An impossible lens is reported before anything is loaded.
     let lens = args.lens.defaults()?;
+    let plain = args.lens.scene_args.options(0);
     let scene = match timing {
-        None => load_scene(&args.scene, &held(structures.len()))?,
-        Some(_) => scene::load(&args.scene, &args.lens.scene_args.options(0))?,
+        None => {
+            let [structures, per_triangle] = held(structures.len());
+            let options = LoadOptions {
+                structures,
+                per_triangle,
+                ..plain
+            };
+            load_scene(&args.scene, &options)?
+        }
+        Some(_) => scene::load(&args.scene, &plain)?,
     };
     if scene.items.is_empty() {
         return Err(LeftOut(scene.name).into());

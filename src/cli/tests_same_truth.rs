@@ -79,9 +79,9 @@ fn missed(camera: Camera) -> [bool; 4] {
             seed: 1,
             ..Protocol::default()
         },
-        scene,
+        scene: scene.clone(),
         path,
-        structures,
+        structures: structures.clone(),
     };
     let prepared = precision::prepare(&setting, 1).expect("no refusal");
     let times = precision::time(&setting, 1, &prepared.plan);

@@ -10,10 +10,11 @@ use serde::Serialize;
 
 use super::error::fits_drawing;
 use super::item_stages::ItemStages;
-use super::stage::{BackEnd, NONE, STENCIL, StageKind, Step, Z};
+use super::report::StageRow;
+use super::stage::{BackEnd, Chain, NONE, STENCIL, StageKind, Step, Z};
 use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
-use super::truth::{Truth, ViewCounts, count_items};
+use super::truth::{Errors, Truth, count_items};
 use super::world::{Shape, World};
 use crate::camera::Camera;
 use crate::measure::Ask;
@@ -52,14 +53,6 @@ impl FragmentCounts {
             covered_count: mean(|tally| tally.covered_count),
         })
     }
-}
-
-/// A test in every view.
-pub struct Tested {
-    pub back_end: BackEnd,
-    pub counts: Vec<ViewCounts>,
-    /// Empty where nothing is drawn.
-    pub tallies: Vec<Tally>,
 }
 
 /// Items that the chain leaves, to be drawn.
@@ -182,15 +175,20 @@ impl<'w> FragmentStage<'w> {
         })
     }
 
-    /// Counts of no test and of every test.
-    pub fn tested(&self, stages: &ItemStages, steps: &[Step], truth: &Truth) -> Vec<Tested> {
-        let world = self.world;
+    /// No test and every test of a chain, with the tallies of each view that is drawn.
+    pub fn tested(
+        &self,
+        stages: &ItemStages,
+        chain: &Chain,
+        truth: &Truth,
+    ) -> Vec<(StageRow, Vec<Tally>)> {
+        let (world, steps) = (self.world, chain.steps());
         let rows = world.back_ends(StageKind::Fragment).into_iter();
         let drawn = rows.filter(|row| row.name == NONE || self.too_much.is_none());
         let tested = drawn.map(|back_end| {
             let (mut counts, mut tallies) = (Vec::new(), Vec::new());
             for view in world.views() {
-                let given = stages.items(steps, view);
+                let given = stages.items(&steps, view);
                 let mut output = Vec::new();
                 match back_end.name {
                     NONE => output.extend_from_slice(&world.listed(given)),
@@ -198,11 +196,11 @@ impl<'w> FragmentStage<'w> {
                 }
                 counts.push(count_items(given, world.items(), &output, &truth[view]));
             }
-            Tested {
-                back_end,
-                counts,
-                tallies,
-            }
+            let row = StageRow {
+                fragments: FragmentCounts::of(&tallies),
+                ..StageRow::new(back_end, back_end.name, chain, Errors::of(&counts))
+            };
+            (row, tallies)
         });
         tested.collect()
     }

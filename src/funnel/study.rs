@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::bounds::{bounds, covered_key};
 use super::error::{LeftOutRow, check_memory};
-use super::fragment_stage::{FragmentCounts, FragmentStage, Tested, mirrored};
+use super::fragment_stage::{FragmentStage, mirrored};
 use super::item_stages::{ItemStages, PlanView};
 use super::orders::{OrderRow, Orders, SORTED};
 use super::picks::Picks;
@@ -19,6 +19,7 @@ use super::world::{FunnelInput, World};
 use crate::input::{InputError, warn};
 use crate::measure::{ProcessTimes, Setting, Verdict};
 use crate::scene::memory::{available_bytes, fits_into};
+use crate::visibility::fragment::Tally;
 use crate::visibility::{Level, SampleGrid};
 
 /// Bytes per sample of a view: rays, depths and ties of two images.
@@ -108,15 +109,6 @@ impl<'w> Study<'w> {
         rows
     }
 
-    /// Row of a test of the fragment stage.
-    fn test_row(&self, tested: &Tested) -> StageRow {
-        let errors = Errors::of(&tested.counts);
-        StageRow {
-            fragments: FragmentCounts::of(&tested.tallies),
-            ..StageRow::new(tested.back_end, tested.back_end.name, self.chain, errors)
-        }
-    }
-
     /// The chain without each of its stages, from the rows of all stages.
     fn gains(&self, rows: &[StageRow]) -> Vec<Gain> {
         let timed = self.items.timed(self.chain);
@@ -190,8 +182,12 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     begin("every stage, compared with the truth");
     let study = Study::new(&world, input)?;
     let mut rows = study.rows(&truth);
-    let tested = study.fragments.tested(&study.items, &study.steps, &truth);
-    rows.extend(tested.iter().map(|tested| study.test_row(tested)));
+    let tested = (study.fragments).tested(&study.items, input.chain, &truth);
+    let (tests, tallies): (Vec<_>, Vec<_>) = tested.into_iter().unzip();
+    let z = tests.iter().position(|test| test.back_end.name == Z);
+    let drawn = z.iter().flat_map(|&z: &usize| &tallies[z]);
+    let covered: Vec<u64> = drawn.map(|tally: &Tally| tally.covered_count).collect();
+    rows.extend(tests);
     let mut left_out = Vec::from_iter(left_out_of(scene));
     if let Some(reason) = &study.fragments.too_much {
         left_out.push(LeftOutRow::new(["stages", "fragment"], reason));
@@ -224,9 +220,6 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
             "not asked for: --no-picks",
         ));
     }
-    let z = tested.iter().find(|tested| tested.back_end.name == Z);
-    let tallies = z.iter().flat_map(|z| &z.tallies);
-    let covered: Vec<u64> = tallies.map(|tally| tally.covered_count).collect();
     let bounds = input
         .all
         .then(|| bounds(&world, &study.triangles, &covered));

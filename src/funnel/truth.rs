@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::error::most_drawn;
 use super::world::{Shape, World};
 use crate::query::ItemId;
-use crate::statistics::{Rate, rate};
+use crate::statistics::{Rate, rate_of};
 use crate::visibility::truth::{
     RayIndex, SampleTruth, SolidBox, SurfaceIndex, visible_by_random_rays,
 };
@@ -212,10 +212,7 @@ impl Errors {
         let mean = |of: fn(&ViewCounts) -> u64| {
             views.iter().map(|view| of(view) as f64).sum::<f64>() / views.len().max(1) as f64
         };
-        let clusters = |of: fn(&ViewCounts) -> [u64; 2]| -> Vec<[f64; 2]> {
-            views.iter().map(|v| of(v).map(|n| n as f64)).collect()
-        };
-        let share = |of| rate(&clusters(of)).map(Rate::of_share);
+        let share = |of: fn(&ViewCounts) -> [u64; 2]| rate_of(views, of).map(Rate::of_share);
         let streaks = views.split(|view| view.false_negatives == 0);
         let worst = views.iter().map(|v| v.worst_missing_samples).max();
         Errors {
@@ -224,7 +221,7 @@ impl Errors {
             truth_count: mean(|v| v.truth),
             false_positive_count: mean(|v| v.false_positives),
             false_negative_count: mean(|v| v.false_negatives),
-            excess: rate(&clusters(|v| [v.false_positives, v.truth])),
+            excess: rate_of(views, |v| [v.false_positives, v.truth]),
             missing: share(|v| [v.false_negatives, v.truth]),
             image_error: share(|v| [v.missing_samples, v.samples]),
             worst_missing_samples: worst.unwrap_or(0),

@@ -65,6 +65,33 @@ pub struct FunnelInput<'a> {
     pub sorted: bool,
 }
 
+impl<'a> FunnelInput<'a> {
+    /// Everything about a chain, on so many views with so many samples.
+    pub fn new(
+        setting: &'a Setting,
+        chain: &'a Chain,
+        (most_views, samples): (usize, SampleGrid),
+        execution: Execution,
+    ) -> FunnelInput<'a> {
+        FunnelInput {
+            setting,
+            most_views,
+            samples,
+            cut_outs: None,
+            mirror: None,
+            chain,
+            structures: &setting.structures,
+            claim: None,
+            inner_boxes: None,
+            loading: LoadOptions::default(),
+            execution,
+            all: true,
+            picks: true,
+            sorted: false,
+        }
+    }
+}
+
 /// Items as rays meet them.
 pub enum Shape {
     /// Solid boxes.
@@ -443,22 +470,9 @@ mod tests {
             },
         };
         let scene = &setting.scene;
-        let input = FunnelInput {
-            setting: &setting,
-            most_views: 3,
-            samples: SampleGrid::new(8, 5),
-            cut_outs: None,
-            mirror: None,
-            chain: &Chain::for_scene(scene, false).with(StageKind::Object, "linear"),
-            structures: &setting.structures,
-            claim: None,
-            inner_boxes: None,
-            loading: Default::default(),
-            execution: Execution::default(),
-            all: true,
-            picks: true,
-            sorted: false,
-        };
+        let chain = Chain::for_scene(scene, false).with(StageKind::Object, "linear");
+        let views = (3, SampleGrid::new(8, 5));
+        let input = FunnelInput::new(&setting, &chain, views, Execution::default());
         let world = World::new(&input, &|_| ()).expect("a world");
         let run = |stage, name| world.run(stage, name, world.samples);
         let mut found = 0;

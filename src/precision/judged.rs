@@ -13,7 +13,7 @@ use crate::measure::{Status, blamed};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
-use crate::statistics::{Rate, rate};
+use crate::statistics::{Rate, rate_of};
 use crate::verify::{ErrorCount, Truth, scan};
 
 /// Names of a culling: test, arithmetic, planes and epsilon.
@@ -186,19 +186,18 @@ impl Judged {
     /// The culling's errors as a point of a structure, without a time.
     pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point<CullingErrors> {
         let is_judged = self.refused.is_none();
-        let known = || self.by_camera.iter().filter(|_| is_judged);
+        let judged = if is_judged { &self.by_camera[..] } else { &[] };
+        let known = || judged.iter();
         let counts: ErrorCount = known().map(|camera| camera.counts).sum();
-        let of = |count: fn(&CameraErrors) -> u64| -> Vec<[f64; 2]> {
-            (known().map(|c| [count(c) as f64, c.counts.visible as f64])).collect()
-        };
         let has_neighbours = self.by_camera.iter().any(|c| c.flicker.is_some());
-        let flicker = rate(&of(|c| c.flicker.unwrap_or(0))).filter(|_| has_neighbours);
+        let flicker = rate_of(judged, |c| [c.flicker.unwrap_or(0), c.counts.visible]);
+        let missed = rate_of(judged, |c| [c.counts.false_negatives, c.counts.visible]);
         let worst_miss_px = known().map(|c| c.worst_miss_px).fold(0.0, f64::max);
         let errors = CullingErrors {
             names: Names::of(&self.culling),
-            excess: rate(&of(|c| c.counts.false_positives)),
-            false_negative_ppm: rate(&of(|c| c.counts.false_negatives)).map(|share| share.per(1e6)),
-            flicker,
+            excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
+            false_negative_ppm: missed.map(|share| share.per(1e6)),
+            flicker: flicker.filter(|_| has_neighbours),
             counts: is_judged.then_some(counts),
             worst_miss_px: is_judged.then_some(worst_miss_px),
             ns_per_item: None,

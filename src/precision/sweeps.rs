@@ -15,7 +15,7 @@ use crate::culling::{Arithmetic, CameraView, Culling, CullingError, CullingTest}
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
-use crate::statistics::{Rate, rate};
+use crate::statistics::{Rate, rate_of};
 use crate::verify::{ErrorCount, Truth, scan};
 
 named! {
@@ -155,18 +155,16 @@ struct Judged {
 
 impl Judged {
     fn row(self, sweep: Sweep, value: f64, test: &SweptTest) -> SweepRow {
-        let of = |count: fn(&ErrorCount) -> u64| -> Vec<[f64; 2]> {
-            let errors = self.errors.iter().filter(|_| self.refused.is_none());
-            (errors.map(|e| [count(e) as f64, e.visible as f64])).collect()
-        };
-        let errors = self.errors.iter().copied().sum();
+        let known = self.refused.is_none();
+        let judged = if known { &self.errors[..] } else { &[] };
+        let missed = rate_of(judged, |e| [e.false_negatives, e.visible]);
         SweepRow {
             sweep,
             value,
             names: test.names(),
-            false_negative_ppm: rate(&of(|e| e.false_negatives)).map(|share| share.per(1e6)),
-            excess: rate(&of(|e| e.false_positives)),
-            errors: Some(errors).filter(|_| self.refused.is_none()),
+            false_negative_ppm: missed.map(|share| share.per(1e6)),
+            excess: rate_of(judged, |e| [e.false_positives, e.visible]),
+            errors: known.then(|| judged.iter().copied().sum()),
             refused: self.refused,
         }
     }

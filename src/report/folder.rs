@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
 use tempfile::NamedTempFile;
 
 use super::reading::read_stream;
@@ -19,7 +20,6 @@ use super::writing::{locked_temporary_in, replace_atomically, sweep};
 use super::{Report, ReportCell};
 use crate::input::InputError;
 use crate::measure::{METRICS, Part, TaskSamples};
-use crate::path::CameraFacts;
 use crate::shown::lines;
 
 /// The folder of a run that is being measured, locked against others.
@@ -313,105 +313,68 @@ pub fn save_report(folder: &Path, report: &Report) -> Result<(), InputError> {
     })
 }
 
-/// A column of summary.csv before those of the metrics.
-type Column = (&'static str, fn(&ReportCell) -> String);
-
-const SUMMARY_COLUMNS: [Column; 16] = [
-    ("scene", |cell| lines(&cell.scene.name)),
-    ("path", |cell| lines(&cell.path.name)),
-    ("cache", |cell| cell.path.cache.clone()),
-    ("structure", |cell| lines(&cell.structure)),
-    ("test", |cell| cell.test.clone()),
-    ("arithmetic", |cell| cell.path.arithmetic.clone()),
-    ("planes", |cell| cell.path.planes.clone()),
-    ("epsilon", |cell| cell.path.epsilon.to_string()),
-    ("status", |cell| cell.status.name().to_owned()),
-    ("reason", |cell| lines(&text(cell.reason.as_ref()))),
-    ("rank", |cell| text(cell.rank)),
-    ("processes", |cell| cell.times.processes.to_string()),
-    ("rounds", |cell| cell.times.rounds.to_string()),
-    ("cameras_timed", |cell| cell.times.cameras_timed.to_string()),
-    ("cameras_checked", |cell| {
-        cell.times.cameras_checked.to_string()
-    }),
-    ("total_count", |cell| cell.scene.total_count.to_string()),
+/// Columns of summary.csv before and behind those of the metrics: `name=field`, with `/`
+/// before a field of a field, or the name of the field alone.
+const COLUMNS: [&str; 2] = [
+    "scene=scene/name path=path/name cache=path/cache structure test arithmetic=path/arithmetic \
+     planes=path/planes epsilon=path/epsilon status reason rank processes=times/processes \
+     rounds=times/rounds cameras_timed=times/cameras_timed cameras_checked=times/cameras_checked \
+     total_count=scene/total_count",
+    "up=scene/up unit=scene/unit fovy_deg_min=path/lens/fovy_deg/0 \
+     fovy_deg_max=path/lens/fovy_deg/1 ortho_height_min=path/lens/ortho_height/0 \
+     ortho_height_max=path/lens/ortho_height/1 aspect_min=path/lens/aspect/0 \
+     aspect_max=path/lens/aspect/1 near_min=path/lens/near/0 near_max=path/lens/near/1 \
+     far_min=path/lens/far/0 far_max=path/lens/far/1 \
+     matrix_convention=path/lens/matrix/convention motion=path/motion \
+     views_per_frame=path/views_per_frame chose skipped_items=scene/skipped_items",
 ];
-
-/// Columns of summary.csv behind those of the metrics.
-const INPUT_COLUMNS: [Column; 17] = [
-    ("up", |cell| cell.scene.up.clone()),
-    ("unit", |cell| text(cell.scene.unit.as_ref())),
-    ("fovy_deg_min", |cell| end(cell, |l| l.fovy_deg, 0)),
-    ("fovy_deg_max", |cell| end(cell, |l| l.fovy_deg, 1)),
-    ("ortho_height_min", |cell| end(cell, |l| l.ortho_height, 0)),
-    ("ortho_height_max", |cell| end(cell, |l| l.ortho_height, 1)),
-    ("aspect_min", |cell| end(cell, |l| l.aspect, 0)),
-    ("aspect_max", |cell| end(cell, |l| l.aspect, 1)),
-    ("near_min", |cell| end(cell, |l| l.near, 0)),
-    ("near_max", |cell| end(cell, |l| l.near, 1)),
-    ("far_min", |cell| end(cell, far, 0)),
-    ("far_max", |cell| end(cell, far, 1)),
-    ("matrix_convention", |cell| {
-        let lens = cell.path.lens.as_ref();
-        text(lens.and_then(|lens| Some(lens.matrix.as_ref()?.convention.as_str())))
-    }),
-    ("motion", |cell| lines(&cell.path.motion)),
-    ("views_per_frame", |cell| {
-        text(Some(cell.path.views_per_frame).filter(|views| *views > 0))
-    }),
-    ("chose", |cell| lines(&text(cell.chose.as_ref()))),
-    ("skipped_items", |cell| cell.scene.skipped_items.to_string()),
-];
-
-/// The least or the most of a value of the lenses of a cell.
-fn end(cell: &ReportCell, of: fn(&CameraFacts) -> Option<[f64; 2]>, end: usize) -> String {
-    let ends = cell.path.lens.as_ref().and_then(of);
-    text(ends.map(|ends| ends[end]))
-}
-
-fn far(lens: &CameraFacts) -> Option<[f64; 2]> {
-    Some(lens.far.map(|far| far.unwrap_or(f64::INFINITY)))
-}
 
 /// The metrics whose intervals summary.csv has.
-const WITH_INTERVALS: &[&str] = &[
-    "query_ns",
-    "speedup",
-    "times_read",
-    "times_memcpy",
-    "locate_ns",
-    "build_ms",
-    "frame_ns",
-];
+const WITH_INTERVALS: &str = "query_ns speedup times_read times_memcpy locate_ns build_ms frame_ns";
 
-/// Text of a value; empty without one.
-fn text(value: Option<impl ToString>) -> String {
-    value.map_or(String::new(), |value| value.to_string())
+/// Names of the columns of summary.csv, and the places of their fields in a cell.
+fn columns() -> Vec<[String; 2]> {
+    let [before, behind] = COLUMNS.map(|columns| {
+        let columns = columns.split(' ');
+        columns.map(|column| column.split_once('=').unwrap_or((column, column)))
+    });
+    let own = |(name, field): (&str, &str)| [name.to_owned(), format!("/{field}")];
+    let mut all: Vec<[String; 2]> = before.map(own).collect();
+    for name in METRICS.iter().map(|metric| metric.name) {
+        all.push([name.to_owned(), format!("/metrics/{name}/value")]);
+        if WITH_INTERVALS.split(' ').any(|with| with == name) {
+            let end = |end| [format!("{name}_{end}"), format!("/metrics/{name}/{end}")];
+            all.extend(["lower", "upper"].map(end));
+        }
+    }
+    all.extend(behind.map(own));
+    all
+}
+
+/// Text of a field; empty without one.
+fn text(field: Option<&Value>) -> String {
+    match field {
+        None | Some(Value::Null) => String::new(),
+        Some(Value::String(text)) => lines(text),
+        Some(Value::Number(number)) if number.is_f64() => {
+            number.as_f64().unwrap_or(f64::NAN).to_string()
+        }
+        Some(other) => other.to_string(),
+    }
 }
 
 /// One tidy row per cell; a metric that was not measured is an empty field.
 fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(out);
-    let mut header: Vec<String> = SUMMARY_COLUMNS.map(|(name, _)| name.to_owned()).into();
-    for metric in METRICS {
-        header.push(metric.name.to_owned());
-        if WITH_INTERVALS.contains(&metric.name) {
-            header.extend(["lower", "upper"].map(|end| format!("{}_{end}", metric.name)));
-        }
-    }
-    header.extend(INPUT_COLUMNS.map(|(name, _)| name.to_owned()));
-    csv.write_record(&header)?;
+    let (mut csv, columns) = (csv::Writer::from_writer(out), columns());
+    csv.write_record(columns.iter().map(|[name, _]| name))?;
     for cell in cells {
-        let mut row: Vec<String> = SUMMARY_COLUMNS.map(|(_, of)| of(cell)).into();
-        for metric in METRICS {
-            let found = cell.metrics.get(metric.name);
-            row.push(text(found.map(|m| m.value)));
-            if WITH_INTERVALS.contains(&metric.name) {
-                row.extend([found.and_then(|m| m.lower), found.and_then(|m| m.upper)].map(text));
+        let cell = serde_json::to_value(cell)?;
+        csv.write_record(columns.iter().map(|[_, field]| {
+            match (field.starts_with("/path/lens/far/"), cell.pointer(field)) {
+                (true, Some(Value::Null)) => f64::INFINITY.to_string(),
+                (_, found) => text(found),
             }
-        }
-        row.extend(INPUT_COLUMNS.map(|(_, of)| of(cell)));
-        csv.write_record(&row)?;
+        }))?;
     }
     csv.flush()
 }

@@ -21,7 +21,7 @@ pub use means::{median, quantile, sorted};
 pub use one_run::{Estimate, one_run, ratio, speedup};
 pub use ranking::{ALPHA, is_less, ranks};
 pub use ranking::{Standing, dominance};
-pub use rate::{Rate, rate, shows_less, shows_less_in_sum};
+pub use rate::{Rate, rate, rate_of, shows_less, shows_less_in_sum};
 pub use student::slope;
 pub use trimmed::{Trimmed, trimmed_mean};
 pub use unpaired::judge_unpaired;

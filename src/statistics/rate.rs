@@ -53,6 +53,12 @@ impl Rate {
     }
 }
 
+/// The rate of clusters by their numbers of events and units.
+pub fn rate_of<T>(clusters: &[T], of: impl Fn(&T) -> [u64; 2]) -> Option<Rate> {
+    let counts = clusters.iter().map(|cluster| of(cluster).map(|n| n as f64));
+    rate(&counts.collect::<Vec<_>>())
+}
+
 /// The rate of clusters, each with its events and its units; `None` without
 /// units.
 ///

@@ -36,21 +36,14 @@ impl Stages {
     }
 
     pub fn input<'s>(&'s self, all: &AdviseInput<'s>) -> FunnelInput<'s> {
+        let most = (ITEMS / all.setting.scene.items.len().max(1)).clamp(1, VIEWS);
+        let execution = self.tree.execution;
         FunnelInput {
-            setting: all.setting,
-            most_views: (ITEMS / all.setting.scene.items.len().max(1)).clamp(1, VIEWS),
-            samples: SAMPLES,
-            cut_outs: None,
-            mirror: None,
-            chain: &self.chain,
             structures: std::slice::from_ref(&self.tree),
-            claim: None,
-            inner_boxes: None,
-            loading: Default::default(),
-            execution: self.tree.execution,
             all: false,
             picks: false,
             sorted: true,
+            ..FunnelInput::new(all.setting, &self.chain, (most, SAMPLES), execution)
         }
     }
 }
