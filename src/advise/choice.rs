@@ -235,11 +235,9 @@ impl TestChoice {
             let extra = extra.filter(|extra| extra.is_finite());
             let drawn = extra.map(|extra| extra * draw_ns);
             // Of the whole path nothing is left to chance.
-            let by_camera = match answered.judged < answered.counts[task].len() {
-                true => by_camera
-                    .iter()
-                    .map(|e| e.false_positives as f64 * draw_ns)
-                    .collect(),
+            let of_cameras = by_camera.iter().map(|e| e.false_positives as f64 * draw_ns);
+            let of_cameras = match answered.judged < answered.counts[task].len() {
+                true => of_cameras.collect(),
                 false => drawn.into_iter().collect(),
             };
             TestRow {
@@ -250,7 +248,7 @@ impl TestChoice {
                 false_positives_per_query: extra,
                 total_ns: query.zip(drawn).map(|(query, drawn)| query.value + drawn),
                 by_process: times.ln_ns(task).iter().map(|ln_ns| ln_ns.exp()).collect(),
-                by_camera,
+                by_camera: of_cameras,
             }
         });
         let rows: Vec<TestRow> = rows.collect();

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 
 use anyhow::{Context, bail};
+use indicatif::ProgressBar;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::json;
@@ -64,11 +65,7 @@ pub fn compare_against<'a>(
         of_run: arguments(&plan.structures)?,
         plan: &plan.plan,
         programs: [binary.to_owned(), new],
-        progress: &|done, most, step| {
-            bar.set_length(most as u64);
-            bar.set_position(done as u64);
-            bar.set_message(step.to_owned());
-        },
+        bar: &bar,
     };
     // Before it begins: afterwards the load is its own.
     let load = Machine::capture();
@@ -200,8 +197,8 @@ struct Duel<'a> {
     /// The arguments of `run` that the plan follows from.
     of_run: Vec<String>,
     programs: [PathBuf; 2],
-    /// Receives the pairs that are done, the most there may be, and the step.
-    progress: &'a dyn Fn(usize, usize, &str),
+    /// Of pairs.
+    bar: &'a ProgressBar,
 }
 
 impl Duel<'_> {
@@ -217,7 +214,9 @@ impl Duel<'_> {
             Gate::Time => pairs(self.args.threshold),
             Gate::Work => (0, 0),
         };
-        let mut seen = self.count(most)?;
+        self.bar.set_length(most as u64);
+        self.bar.set_message("counting and checking answers");
+        let mut seen = self.count()?;
         let mut rng = Pcg64::seed_from_u64(self.plan.seed);
         let mut pairs = 0;
         loop {
@@ -244,7 +243,8 @@ impl Duel<'_> {
                     return Ok((changes, head));
                 }
             }
-            (self.progress)(pairs, most, "pairs of processes");
+            self.bar.set_position(pairs as u64);
+            self.bar.set_message("pairs of processes");
             for scene in 0..self.plan.scenes.len() {
                 let both = self.pair(scene, pairs as u32, &seen, &mut rng)?;
                 for (seen, own) in seen.iter_mut().zip(both) {
@@ -276,12 +276,11 @@ impl Duel<'_> {
     }
 
     /// Has both sides count and check their answers.
-    fn count(&self, most: usize) -> anyhow::Result<[Vec<Part>; 2]> {
+    fn count(&self) -> anyhow::Result<[Vec<Part>; 2]> {
         let mut seen = [Vec::new(), Vec::new()];
         for scene in 0..self.plan.scenes.len() {
             // The plan is the new side's; the old one keeps to it.
             for side in [NEW, OLD] {
-                (self.progress)(0, most, "counting and checking answers");
                 let program = &self.programs[side];
                 let mut share = self.share(scene, 0, [&seen[NEW], &[]]);
                 share.plan_only = true;

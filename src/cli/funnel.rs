@@ -296,16 +296,7 @@ fn passed(report: &FunnelReport) -> Figure {
     rows(caption, &axis, None, &stages)
 }
 
-/// Every fate of an item, and its class in the picture.
-const FATES: [Fate; 6] = [
-    Fate::Removed(StageKind::Region),
-    Fate::Removed(StageKind::Object),
-    Fate::Removed(StageKind::Occlusion),
-    Fate::Kept,
-    Fate::Visible,
-    Fate::Lost,
-];
-const _: () = assert!(FATES.len() == FATE_CLASSES.len());
+/// Classes of items by the stage that removed them, then the others.
 const FATE_CLASSES: &[Class] = rows! { Class { colour, words, is_key }
     "#e4e4e4", "region: not reached through portals", false;
     "#c0c8d0", "object: outside of the frustum", false;
@@ -318,10 +309,12 @@ const FATE_CLASSES: &[Class] = rows! { Class { colour, words, is_key }
 /// The picture as SVG.
 pub fn draw(report: &FunnelReport, scene: &Scene) -> String {
     let view = &report.plan_view;
-    let class_of = |item: usize| {
-        let fate = view.fates.get(item);
-        let class = FATES.iter().position(|own| Some(own) == fate);
-        class.unwrap_or(0)
+    let class_of = |item: usize| match view.fates.get(item) {
+        None => 0,
+        Some(Fate::Removed(stage)) => *stage as usize,
+        Some(Fate::Kept) => 3,
+        Some(Fate::Visible) => 4,
+        Some(Fate::Lost) => 5,
     };
     let (name, path) = (&report.scene, &report.path);
     Plan {

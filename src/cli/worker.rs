@@ -2,7 +2,6 @@
 //! in the help. It reads one request, does one process's share of a job, and writes
 //! steps and results to standard output, a JSON line each.
 
-use std::cell::RefCell;
 use std::io::{self, BufRead, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -47,9 +46,9 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
         "protocol {} is requested; expected {PROTOCOL}: the two programs are of different versions",
         request.protocol
     );
-    let here = Here::default();
+    let at = Arc::new(At::default());
     // Before the processor is chosen: it may wake up on another one.
-    here.at.clone().tell_of_turns();
+    at.clone().tell_of_turns();
     let _held = vary_layout(request.layout);
     crate::input::hold_files(request.files);
     for (source, file) in &request.spooled {
@@ -72,18 +71,17 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
             if !plan.structures.iter().any(StructureSpec::is_threaded) {
                 stay_on(request.cpu);
             }
-            here.scene(&plan, scene, &share, samples)?;
+            at.scene(&plan, scene, &share, samples)?;
         }
         Job::Times(plan, mut timing) => {
             timing.plan = plan;
             stay_on(request.cpu);
-            here.at.set(None, TIMING);
-            here.tell(&here.at.message());
-            here.tell(&Message::Times(times(registry, &command, &timing)?));
+            at.set(None, TIMING);
+            tell(&at.message());
+            tell(&Message::Times(times(registry, &command, &timing)?));
         }
     }
-    let failed = here.failed.into_inner();
-    failed.map_or(Ok(()), |error| Err(error.into()))
+    Ok(())
 }
 
 /// Times of one process of a study.
@@ -125,6 +123,27 @@ impl At {
         Message::Doing { structure, step }
     }
 
+    /// Measures one scene of a plan; sends samples only if they are `wanted`.
+    fn scene(&self, plan: &Plan, scene: usize, share: &Share, wanted: bool) -> anyhow::Result<()> {
+        let mut keep = |part: Part, samples: Vec<TaskSamples>| {
+            let samples = if wanted { samples } else { Vec::new() };
+            tell(&Message::Part(Box::new(part), samples));
+        };
+        let notice = |structure: Option<&str>, step: &str| {
+            if self.set(structure, step) && step != TIMING {
+                tell(&self.message());
+            }
+        };
+        // Called before every turn of a timed pass, and elsewhere.
+        let goes_on = || {
+            self.turns.fetch_add(1, Ordering::Relaxed);
+            false
+        };
+        let planned = &plan.scenes[scene];
+        measure_scene(plan, planned, share, &mut keep, &notice, &goes_on)?;
+        Ok(())
+    }
+
     fn tell_of_turns(self: Arc<Self>) {
         thread::spawn(move || {
             let mut told = 0;
@@ -141,43 +160,10 @@ impl At {
     }
 }
 
-/// Messages to the parent, and the error of the first that was not received.
-#[derive(Default)]
-struct Here {
-    failed: RefCell<Option<io::Error>>,
-    at: Arc<At>,
-}
-
-impl Here {
-    fn tell(&self, message: &Message) {
-        if let Err(error) = send(message) {
-            self.failed.borrow_mut().get_or_insert(error);
-        }
-    }
-
-    fn notice(&self, structure: Option<&str>, step: &str) {
-        if self.at.set(structure, step) && step != TIMING {
-            self.tell(&self.at.message());
-        }
-    }
-
-    /// Returns true to stop; called before every turn of a timed pass, and elsewhere.
-    fn stop(&self) -> bool {
-        self.at.turns.fetch_add(1, Ordering::Relaxed);
-        // The parent is gone.
-        self.failed.borrow().is_some()
-    }
-
-    /// Measures one scene of a plan; sends samples only if they are `wanted`.
-    fn scene(&self, plan: &Plan, scene: usize, share: &Share, wanted: bool) -> anyhow::Result<()> {
-        let mut keep = |part: Part, samples: Vec<TaskSamples>| {
-            let samples = if wanted { samples } else { Vec::new() };
-            self.tell(&Message::Part(Box::new(part), samples));
-        };
-        let notice = |structure: Option<&str>, step: &str| self.notice(structure, step);
-        let planned = &plan.scenes[scene];
-        measure_scene(plan, planned, share, &mut keep, &notice, &|| self.stop())?;
-        Ok(())
+/// Sends a message; ends this process where the parent is gone.
+fn tell(message: &Message) {
+    if send(message).is_err() {
+        std::process::exit(ORPHANED);
     }
 }
 
