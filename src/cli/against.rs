@@ -197,7 +197,7 @@ struct Duel<'a> {
     /// The arguments of `run` that the plan follows from.
     of_run: Vec<String>,
     programs: [PathBuf; 2],
-    /// Of pairs.
+    /// Progress bar of the pairs.
     bar: &'a ProgressBar,
 }
 

@@ -37,7 +37,8 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
 }
 
 /// Loads what the arguments name: in a worker for its `timing`, in the command
-/// itself without one and with `held`: of n structures so many, and bytes per triangle.
+/// itself without one and with `held`: the number
+/// of structures to hold for n of them, and bytes per triangle.
 pub fn load(
     registry: &Registry,
     args: &StudyArgs,

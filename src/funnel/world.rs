@@ -66,7 +66,7 @@ pub struct FunnelInput<'a> {
 }
 
 impl<'a> FunnelInput<'a> {
-    /// Everything about a chain, on so many views with so many samples.
+    /// Everything about a chain, on `most_views` views at most.
     pub fn new(
         setting: &'a Setting,
         chain: &'a Chain,

@@ -313,8 +313,9 @@ pub fn save_report(folder: &Path, report: &Report) -> Result<(), InputError> {
     })
 }
 
-/// Columns of summary.csv before and behind those of the metrics: `name=field`, with `/`
-/// before a field of a field, or the name of the field alone.
+/// Columns of summary.csv before and behind those of the metrics.
+///
+/// `name=field`, with `/` before a field of a field, or the name of the field alone.
 const COLUMNS: [&str; 2] = [
     "scene=scene/name path=path/name cache=path/cache structure test arithmetic=path/arithmetic \
      planes=path/planes epsilon=path/epsilon status reason rank processes=times/processes \
