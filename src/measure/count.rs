@@ -13,6 +13,7 @@ use crate::culling::CullingTest;
 use crate::geometry::Aabb;
 use crate::index::Kind;
 use crate::query::{ItemId, Located, QueryCost};
+use crate::scene::mix64;
 use crate::statistics::rate;
 use crate::verify::{
     ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility, scan,
@@ -31,13 +32,7 @@ pub struct Answer {
 impl Answer {
     /// The answer that consists of these ids, in any order.
     pub fn of(ids: &[ItemId]) -> Answer {
-        /// SplitMix64's finaliser (Steele, Lea and Flood 2014).
-        fn mixed(id: ItemId) -> u64 {
-            let mut z = u64::from(id).wrapping_add(0x9E37_79B9_7F4A_7C15);
-            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            z ^ (z >> 31)
-        }
+        let mixed = |id: ItemId| mix64(id.into());
         Answer {
             count: ids.len() as u64,
             digest: ids.iter().fold(0, |all, &id| all.wrapping_add(mixed(id))),

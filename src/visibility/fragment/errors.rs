@@ -4,6 +4,7 @@
 //! where the ray meets it first; a one-sided triangle is met from its front only.
 
 use std::cmp::Ordering;
+use std::collections::HashSet;
 
 use super::canvas::{Rectangle, Screen};
 use super::draw::{Drawable, Tally};
@@ -46,10 +47,8 @@ pub(super) struct Layer<A> {
 pub(super) struct ErrorCount {
     wrong_samples: u64,
     /// Pairs (nearer, deeper) that were drawn in the right and in the wrong order.
-    right: Vec<(ItemId, ItemId)>,
-    wrong: Vec<(ItemId, ItemId)>,
-    /// Number of pairs after the last sort.
-    sorted: usize,
+    right: HashSet<(ItemId, ItemId)>,
+    wrong: HashSet<(ItemId, ItemId)>,
     /// Items of the last sample in the order in which they were drawn, each with its
     /// place in the exact order of depths; items at the same depth share one.
     ranked: Vec<(ItemId, u32)>,
@@ -93,17 +92,11 @@ impl ErrorCount {
         for (i, a) in ranked.iter().enumerate() {
             for b in &ranked[i + 1..] {
                 match a.1.cmp(&b.1) {
-                    Ordering::Less => self.right.push((a.0, b.0)),
-                    Ordering::Greater => self.wrong.push((b.0, a.0)),
-                    Ordering::Equal => {}
-                }
+                    Ordering::Less => self.right.insert((a.0, b.0)),
+                    Ordering::Greater => self.wrong.insert((b.0, a.0)),
+                    Ordering::Equal => false,
+                };
             }
-        }
-        // Drops duplicates, where there is much that is new.
-        if self.right.len() + self.wrong.len() > 2 * self.sorted + 1_000_000 {
-            sort_and_dedup(&mut self.right);
-            sort_and_dedup(&mut self.wrong);
-            self.sorted = self.right.len() + self.wrong.len();
         }
     }
 
@@ -115,27 +108,15 @@ impl ErrorCount {
                  expected fewer --samples or fewer items behind each other"
             ));
         }
-        let (mut right, mut wrong) = (self.right, self.wrong);
-        sort_and_dedup(&mut wrong);
-        let wrong_pairs = wrong.len() as u64;
-        right.append(&mut wrong);
-        sort_and_dedup(&mut right);
-        let cyclic = items_in_cycles(&right);
-        let unordered = right.iter().map(|&(a, b)| (a.min(b), a.max(b)));
-        let mut overlapping: Vec<(ItemId, ItemId)> = unordered.collect();
-        sort_and_dedup(&mut overlapping);
+        let all: Vec<(ItemId, ItemId)> = self.right.union(&self.wrong).copied().collect();
+        let unordered = all.iter().map(|&(a, b)| (a.min(b), a.max(b)));
         Ok(OrderErrors {
-            pairs: overlapping.len() as u64,
-            wrong: wrong_pairs,
+            pairs: unordered.collect::<HashSet<_>>().len() as u64,
+            wrong: self.wrong.len() as u64,
             wrong_samples: self.wrong_samples,
-            cyclic,
+            cyclic: items_in_cycles(&all),
         })
     }
-}
-
-fn sort_and_dedup(pairs: &mut Vec<(ItemId, ItemId)>) {
-    pairs.sort_unstable();
-    pairs.dedup();
 }
 
 /// A part of an item, the samples that it may be met at, and its place in the list.
