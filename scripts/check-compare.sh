@@ -9,11 +9,11 @@ n=${1:-40}
 shift || true
 slowed=${SLOWED:-octree:20}
 sides=${SIDES:-same slowed}
-CULLBENCH_TEST_BUILD=1 cargo build --release --bin cullbench --target-dir target/test-build
+cargo build --release --example slowed
 found=target/compare-runs/${slowed/:/-}
 rm -rf "$found"
 mkdir -p "$found"
-for side in same slowed; do cp target/test-build/release/cullbench "$found/$side"; done
+for side in same slowed; do cp target/release/examples/slowed "$found/$side"; done
 echo "$slowed" >"$found/slowed.slowed"
 # One of each in turns, so that both meet the same hours of the machine.
 for i in $(seq "$n"); do

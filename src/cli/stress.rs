@@ -173,11 +173,14 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
              to decide); {} and {}; dropped without the epsilon: {}; refused because sums could \
              overflow: {}",
             text::counted(tally.boxes as usize, "box"),
-            text::count(tally.seen as usize),
+            text::count(tally.errors.visible as usize),
             text::count(tally.ties as usize),
-            text::count(tally.undecided as usize),
-            text::counted(tally.false_negatives as usize, "false negative"),
-            text::counted(tally.touch_dropped as usize, "dropped boundary contact"),
+            text::count(tally.errors.undecided as usize),
+            text::counted(tally.errors.false_negatives as usize, "false negative"),
+            text::counted(
+                tally.errors.touch_dropped as usize,
+                "dropped boundary contact"
+            ),
             text::count(tally.lost_bare as usize),
             text::count(tally.refused as usize),
         );

@@ -3,7 +3,7 @@
 //! Made from a structure and a [`TaskKind`]; lower bounds and other studies make their own
 //! with [`TimedTask::new`].
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use super::{Answer, Built, TaskKind, Workload};
@@ -63,13 +63,9 @@ impl<'a> TimedTask<'a> {
             }
             _ => {
                 let index = built.items.as_ref();
-                let ask = move |camera: usize, out: &mut Vec<ItemId>| {
+                Box::new(move |camera, out| {
                     index.query(workload.views[camera].as_any(), out);
-                };
-                match slowed(&spec.label) {
-                    Some(every) => twice_in(every, ask),
-                    None => Box::new(ask),
-                }
+                })
             }
         };
         let ask_many = match task {
@@ -100,34 +96,6 @@ impl<'a> TimedTask<'a> {
         }
         returned
     }
-}
-
-/// Number n if a test build is to answer every n-th query of this structure twice.
-///
-/// In a test build (`CULLBENCH_TEST_BUILD=1 cargo build`) a file `PROGRAM.slowed` beside
-/// the program with the text `octree:20` makes its octree answer every 20th query twice,
-/// 5 % more work. scripts/check-compare.sh shows with it what `compare --against` finds:
-/// two copies of one file differ by nothing else, two builds by their code layout too.
-fn slowed(label: &str) -> Option<usize> {
-    option_env!("CULLBENCH_TEST_BUILD")?;
-    let mut file = std::env::current_exe().ok()?.into_os_string();
-    file.push(".slowed");
-    let text = std::fs::read_to_string(file).ok()?;
-    let (name, every) = text.trim().split_once(':')?;
-    every.parse().ok().filter(|_| name == label)
-}
-
-/// Answers every n-th query twice.
-fn twice_in<'a>(every: usize, ask: impl Fn(usize, &mut Vec<ItemId>) + 'a) -> Ask<'a> {
-    let answered = Cell::new(0_usize);
-    Box::new(move |camera, out| {
-        answered.set(answered.get() + 1);
-        if answered.get().is_multiple_of(every) {
-            ask(camera, out);
-            out.clear();
-        }
-        ask(camera, out);
-    })
 }
 
 /// Frustum queries of several cameras, shared among threads.

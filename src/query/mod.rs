@@ -14,6 +14,8 @@ pub use context::{Context, QueryContext};
 pub(crate) use dispatched::Dispatched;
 pub use many::Located;
 pub(crate) use predicate::Bits;
+#[cfg(feature = "cli")]
+pub(crate) use predicate::plane_test;
 pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use sink::{Count, Ranges, Sink, Tests, runs};

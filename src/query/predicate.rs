@@ -143,45 +143,44 @@ impl Predicate for Aabb {
     }
 }
 
-/// THE plane test. Monotone because round-to-nearest is: see
+/// THE plane test, of planes and of the bounds as they see them.
+///
+/// Monotone because round-to-nearest is: see
 /// [`Plane::value_at`](crate::geometry::Plane::value_at). In f64 as well: promoting a box
 /// is exact.
 macro_rules! plane_test {
-    ($($Volume:ty),+) => {$(
-        impl Predicate for $Volume {
-            #[inline(always)]
-            fn mask(&self) -> PlaneMask {
-                self.mask()
-            }
-            #[inline(always)]
-            fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-                self.plane_of_bit(plane).excludes(bounds)
-            }
-            #[inline(always)]
-            fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-                self.plane_of_bit(plane).contains(bounds)
-            }
+    ($own:ident => $planes:expr, $bounds:ident => $moved:expr) => {
+        #[inline(always)]
+        fn mask(&$own) -> PlaneMask {
+            $planes.mask()
         }
-    )+};
+        #[inline(always)]
+        fn excludes(&$own, plane: u32, $bounds: &Aabb) -> bool {
+            $planes.plane_of_bit(plane).excludes($moved)
+        }
+        #[inline(always)]
+        fn contains(&$own, plane: u32, $bounds: &Aabb) -> bool {
+            $planes.plane_of_bit(plane).contains($moved)
+        }
+    };
 }
-plane_test!(ConvexVolume, ConvexVolumeF64);
+#[cfg(feature = "cli")]
+pub(crate) use plane_test;
+
+impl Predicate for ConvexVolume {
+    plane_test!(self => self, bounds => bounds);
+}
+
+impl Predicate for ConvexVolumeF64 {
+    plane_test!(self => self, bounds => bounds);
+}
 
 /// The sphere test, on an index over [sphere cubes](crate::geometry::sphere_cube).
 /// Nodes get the plane test, items the plane test and the sphere test; monotone because
 /// both use the cube's corners: see [`Spheres`].
 impl Predicate for Spheres {
-    #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.planes().mask()
-    }
-    #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.planes().plane_of_bit(plane).excludes(bounds)
-    }
-    #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.planes().plane_of_bit(plane).contains(bounds)
-    }
+    plane_test!(self => self.planes(), bounds => bounds);
+
     #[inline(always)]
     fn drops(&self, plane: u32, item: &Aabb) -> bool {
         self.drops(plane, item)
@@ -192,18 +191,7 @@ impl Predicate for Spheres {
 /// is ([`Aabb::relative_to`]): a box within another is moved to a box within
 /// the other one moved, and there the plane test is monotone.
 impl Predicate for RelativeVolume {
-    #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.planes().mask()
-    }
-    #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        Predicate::excludes(self.planes(), plane, &self.moved(bounds))
-    }
-    #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        Predicate::contains(self.planes(), plane, &self.moved(bounds))
-    }
+    plane_test!(self => self.planes(), bounds => &self.moved(bounds));
 }
 
 /// The bits that are set, lowest first.

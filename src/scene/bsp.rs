@@ -223,23 +223,34 @@ fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
 /// The part of a convex polygon where a depth is not negative.
 ///
 /// The depth is linear in the point (Sutherland and Hodgman 1974).
-pub fn clipped<P>(polygon: &[P], depth: impl Fn(P) -> f64) -> Vec<P>
-where
-    P: Copy + Add<Output = P> + Sub<Output = P> + Mul<f64, Output = P>,
-{
+pub fn clipped<P: Point>(polygon: &[P], depth: impl Fn(P) -> f64) -> Vec<P> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (i, &p) in polygon.iter().enumerate() {
-        let previous = polygon[(i + polygon.len() - 1) % polygon.len()];
-        let (a, b) = (depth(previous), depth(p));
-        if (a < 0.0) != (b < 0.0) {
+    clip_into(polygon, depth, &mut kept);
+    kept
+}
+
+/// As [`clipped`], in place of what was kept.
+pub fn clip_into<P: Point>(polygon: &[P], depth: impl Fn(P) -> f64, kept: &mut Vec<P>) {
+    kept.clear();
+    let mut last = polygon.last().map(|&last| (last, depth(last)));
+    for &p in polygon {
+        let b = depth(p);
+        if let Some((previous, a)) = last.replace((p, b))
+            && (a < 0.0) != (b < 0.0)
+        {
             kept.push(previous + (p - previous) * (a / (a - b)));
         }
         if b >= 0.0 {
             kept.push(p);
         }
     }
-    kept
 }
+
+/// A point in the plane or in space.
+pub trait Point: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self> {}
+
+impl Point for DVec2 {}
+impl Point for DVec3 {}
 
 /// The polygon's box at height zero, grown by [`CELL_MARGIN`].
 ///

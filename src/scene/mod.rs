@@ -43,7 +43,7 @@ pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
 pub use bsp::BspChild;
 #[cfg(feature = "cli")]
-pub(crate) use bsp::clipped;
+pub(crate) use bsp::{clip_into, clipped};
 pub use disputes::{Dispute, Linedef};
 pub(crate) use families::CityGrid;
 pub(crate) use generate::COUNT;
@@ -127,11 +127,12 @@ impl WorldBox {
 }
 
 /// The regions of a scene, numbered from zero: the targets of region search.
-#[derive(Clone, Debug)]
+#[derive(Clone, Default, Debug)]
 #[non_exhaustive]
 pub enum Regions {
     /// The items themselves, closed boxes that may overlap: a point belongs
     /// to every one that holds it.
+    #[default]
     Items,
     /// Boxes that tile a volume, joined by portals. Closed as well: a point
     /// on a shared wall belongs to both sides.
@@ -188,7 +189,7 @@ impl Regions {
 }
 
 /// Input of every structure.
-#[derive(Clone, Debug)]
+#[derive(Clone, Default, Debug)]
 pub struct Scene {
     /// Its source: a file or a spec such as `city:n=100000,seed=7`.
     pub name: String,
@@ -262,18 +263,9 @@ impl Scene {
             bounds: Aabb::union_of(&items),
             originals: Originals::of(boxes, &items, origin),
             name,
-            up: UpAxis::Z,
-            unit: None,
             origin,
             items,
-            surfaces: None,
-            regions: Regions::Items,
-            labels: Vec::new(),
-            places: Vec::new(),
-            animation: None,
-            own_tree: None,
-            skipped_items: 0,
-            rows: Vec::new(),
+            ..Scene::default()
         })
     }
 

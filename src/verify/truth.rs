@@ -18,9 +18,7 @@ pub struct Truth {
     /// differ.
     written: Option<(Oracle, Originals)>,
     verdicts: Vec<Verdict>,
-    /// Items that touch, or come nearer than the truth is known.
-    undecided: u64,
-    visible: u64,
+    visible: ErrorCount,
 }
 
 /// How answers differ from the truth: sums over items and cameras.
@@ -65,6 +63,11 @@ impl ErrorCount {
     /// False positives per visible item; `None` if nothing is visible.
     pub fn excess(&self) -> Option<f64> {
         (self.visible > 0).then(|| self.false_positives as f64 / self.visible as f64)
+    }
+
+    /// Visible items that were not returned.
+    pub fn dropped(&self) -> u64 {
+        self.false_negatives + self.touch_dropped
     }
 
     /// False positives that are neither the storage's nor the planes'.
@@ -135,15 +138,18 @@ impl Truth {
         let count = |is_one: fn(&&Judgement) -> bool| all.clone().filter(is_one).count() as u64;
         Truth {
             written: None,
-            undecided: count(|judgement| judgement.undecided),
-            visible: count(|judgement| judgement.verdict != Verdict::Out),
+            visible: ErrorCount {
+                visible: count(|judgement| judgement.verdict != Verdict::Out),
+                undecided: count(|judgement| judgement.undecided),
+                ..ErrorCount::default()
+            },
             verdicts: all.map(|judgement| judgement.verdict).collect(),
             oracle,
         }
     }
 
     /// How deep item `id` reaches into the volume, as it was written.
-    fn depth(&self, id: usize, item: &Aabb) -> f64 {
+    pub fn depth(&self, id: usize, item: &Aabb) -> f64 {
         let written = self.written.as_ref();
         let b = written.and_then(|(world, boxes)| Some((world, boxes.boxes()?.get(id)?)));
         match b {
@@ -157,8 +163,13 @@ impl Truth {
         &self.verdicts
     }
 
+    /// What is visible, and no errors yet.
+    pub fn visible(&self) -> ErrorCount {
+        self.visible
+    }
+
     /// Every item of the truth: its id, its verdict, and whether it is in the answer.
-    fn answered(&self, answer: &[ItemId]) -> impl Iterator<Item = (usize, Verdict, bool)> {
+    pub fn answered(&self, answer: &[ItemId]) -> impl Iterator<Item = (usize, Verdict, bool)> {
         let mut returned = vec![false; self.verdicts.len()];
         answer.iter().for_each(|&id| returned[id as usize] = true);
         let items = self.verdicts.iter().zip(returned).enumerate();
@@ -177,11 +188,7 @@ impl Truth {
     /// The errors of an answer (any order, no id twice) about the very items
     /// the truth was made of. O(items).
     pub fn errors(&self, items: &[Aabb], answer: &[ItemId]) -> ErrorCount {
-        let mut count = ErrorCount {
-            visible: self.visible,
-            undecided: self.undecided,
-            ..ErrorCount::default()
-        };
+        let mut count = self.visible;
         for (id, verdict, returned) in self.answered(answer) {
             let item = &items[id];
             match (verdict, returned) {

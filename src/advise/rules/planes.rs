@@ -15,7 +15,7 @@ use crate::geometry::{Aabb, BoxBlock, ConvexVolume, FrustumPlane, LANES, LaneMas
 use crate::index::{DynIndex, FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::measure::Workload;
-use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryVolume, Sorted};
+use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryVolume, Sorted, plane_test};
 use crate::shown::{count, counted, significant};
 
 /// Share of the planes below which the saving is lost in noise.
@@ -119,18 +119,7 @@ fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<
 struct Unmasked<'a>(&'a ConvexVolume);
 
 impl Predicate for Unmasked<'_> {
-    #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.0.mask()
-    }
-    #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.0.excludes(plane, bounds)
-    }
-    #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.0.contains(plane, bounds)
-    }
+    plane_test!(self => self.0, bounds => bounds);
 }
 
 impl QueryVolume for Unmasked<'_> {

@@ -9,11 +9,11 @@ use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, Input, StructureSpec};
-use crate::oracle::{Judgement, Oracle, Pose, Verdict};
+use crate::oracle::{Oracle, Pose, Verdict};
 use crate::query::{AnyVolume, ItemId};
 use crate::stress::sheet::slack;
 use crate::stress::{Level, Row, Said, Status};
-use crate::verify::{self, Trial};
+use crate::verify::{self, ErrorCount, Trial, Truth, scan};
 
 /// Name of the scalar loop in place of a structure.
 pub const SCALAR: &str = "scalar";
@@ -23,16 +23,10 @@ pub const SCALAR: &str = "scalar";
 pub struct Tally {
     /// Boxes judged at camera level.
     pub boxes: u64,
-    /// Boxes that are in or touch.
-    pub seen: u64,
     /// Boxes that touch, to all that is known.
     pub ties: u64,
-    /// Ties that the oracle cannot prove.
-    pub undecided: u64,
-    /// Boxes that reach into the view and were not returned.
-    pub false_negatives: u64,
-    /// Boxes that touch the view and were not returned.
-    pub touch_dropped: u64,
+    /// What is visible, and what answers with a margin lost of it.
+    pub errors: ErrorCount,
     /// Views that were refused because their sums could overflow.
     pub refused: u64,
     /// Boxes that the six planes would lose without their epsilon.
@@ -42,11 +36,8 @@ pub struct Tally {
 impl std::ops::AddAssign for Tally {
     fn add_assign(&mut self, other: Tally) {
         self.boxes += other.boxes;
-        self.seen += other.seen;
         self.ties += other.ties;
-        self.undecided += other.undecided;
-        self.false_negatives += other.false_negatives;
-        self.touch_dropped += other.touch_dropped;
+        self.errors += other.errors;
         self.refused += other.refused;
         self.lost_bare += other.lost_bare;
     }
@@ -121,11 +112,10 @@ impl Findings {
         built
     }
 
-    /// Compares every structure with the scalar loop, which `seen` has the answer of.
-    pub fn compare(&mut self, built: &Built, test: &str, volume: AnyVolume<'_>, seen: &[bool]) {
-        let mut trial = Trial::new(seen.len());
-        let wanted = seen.iter().zip(0..).filter(|(seen, _)| **seen);
-        trial.expect(wanted.map(|(_, id): (_, ItemId)| id));
+    /// Compares every structure with the scalar loop over its items.
+    pub fn compare(&mut self, built: &Built, test: &str, volume: AnyVolume<'_>, items: &[Aabb]) {
+        let mut trial = Trial::new(items.len());
+        trial.see(items, volume);
         for (structure, index) in built {
             self.check([structure, test]);
             match trial.ask(|out| index.query(volume, out)).map(drop) {
@@ -136,7 +126,7 @@ impl Findings {
                 }
                 Err(verify::Fault::Differs(difference)) => {
                     let item = difference.first.map(|id| id as usize);
-                    let item = item.filter(|&item| item < seen.len());
+                    let item = item.filter(|&item| item < items.len());
                     let expected = format!("the {} items of the scalar loop", trial.expected());
                     self.fault([structure, test], item, expected, difference.to_string());
                 }
@@ -163,23 +153,7 @@ pub struct Case {
     pub around: Surroundings,
     /// Boxes to be culled, in scene coordinates.
     pub items: Vec<Aabb>,
-    oracle: Oracle,
-    judgements: Vec<Judgement>,
-}
-
-/// Items that an answer lost.
-#[derive(Clone, Copy, Default, PartialEq, Debug)]
-pub struct Drops {
-    /// Boxes that reach into the view and were not returned.
-    pub false_negatives: u64,
-    /// Boxes that touch the view and were not returned.
-    pub touch_dropped: u64,
-    /// Empty boxes that were returned.
-    pub ghosts: u64,
-    /// The first item concerned.
-    pub first: Option<usize>,
-    /// How deep the deepest false negative reaches into the volume.
-    pub deepest: f64,
+    truth: Truth,
 }
 
 impl Case {
@@ -192,39 +166,35 @@ impl Case {
         items: Vec<Aabb>,
     ) -> Option<Case> {
         let oracle = Oracle::of_camera(pose, &camera.lens, around.origin)?;
-        let judgements = items.iter().map(|b| oracle.judge(b)).collect();
         Some(Case {
+            truth: Truth::new(oracle, &items),
             camera,
             planes,
             around,
             items,
-            oracle,
-            judgements,
         })
     }
 
-    /// Items that a test loses that sees these.
-    pub fn drops(&self, seen: &[bool]) -> Drops {
-        let mut drops = Drops::default();
-        for (i, (&seen, judgement)) in seen.iter().zip(&self.judgements).enumerate() {
-            match (judgement.verdict, seen) {
-                (Verdict::In, false) => {
-                    drops.false_negatives += 1;
-                    drops.deepest = drops.deepest.max(self.oracle.depth(&self.items[i]));
-                }
-                (Verdict::Touch, false) => drops.touch_dropped += 1,
-                (_, true) if self.items[i].is_empty() => drops.ghosts += 1,
-                _ => continue,
-            }
-            drops.first.get_or_insert(i);
-        }
-        drops
+    /// The errors of a test that sees these items.
+    pub fn errors(&self, seen: &[ItemId]) -> ErrorCount {
+        self.truth.errors(&self.items, seen)
     }
 
     /// Checks every culling test and every structure. Structures are built over
     /// the first `share` items.
     pub fn check(&self, structures: &[StructureSpec], share: usize) -> Findings {
-        let mut found = self.judged();
+        let verdicts = self.truth.verdicts().iter();
+        let boxes = self.items.len() as u64;
+        let mut found = Findings {
+            boxes,
+            tally: Tally {
+                boxes,
+                ties: verdicts.filter(|v| **v == Verdict::Touch).count() as u64,
+                errors: self.truth.visible(),
+                ..Tally::default()
+            },
+            ..Findings::default()
+        };
         let share = share.min(self.items.len());
         let cubes = CullingTest::Sphere.items(&self.items);
         let items = &self.items[..];
@@ -249,9 +219,10 @@ impl Case {
                 };
                 match culling.view(&self.camera, &self.around) {
                     Ok(view) => {
-                        let seen = seen(items, view.as_any());
+                        let view = view.as_any();
+                        let seen: Vec<ItemId> = scan(items, |b| view.sees(b)).collect();
                         self.scalar(&culling, &name, &seen, &mut found);
-                        found.compare(built, &name, view.as_any(), &seen[..share]);
+                        found.compare(built, &name, view, &items[..share]);
                     }
                     Err(error) if self.may_refuse(&error) => found.tally.refused += 1,
                     Err(error) => found.fault([SCALAR, &name], None, "a view", error.to_string()),
@@ -260,24 +231,6 @@ impl Case {
         }
         self.check_without_epsilon(&boxes.1, &cubes, share, &mut found);
         found.described(|item| self.describe(item))
-    }
-
-    /// Counts the verdicts of the oracle.
-    fn judged(&self) -> Findings {
-        let verdicts = self.judgements.iter();
-        let count = |of: fn(&&Judgement) -> bool| verdicts.clone().filter(of).count() as u64;
-        let boxes = self.items.len() as u64;
-        Findings {
-            boxes,
-            tally: Tally {
-                boxes,
-                seen: count(|j| j.verdict != Verdict::Out),
-                ties: count(|j| j.verdict == Verdict::Touch),
-                undecided: count(|j| j.undecided),
-                ..Tally::default()
-            },
-            ..Findings::default()
-        }
     }
 
     /// Tests for a declared refusal: a view whose sums could overflow.
@@ -305,18 +258,18 @@ impl Case {
         let Ok(six) = view(CullingTest::SixPlane) else {
             return;
         };
-        let seen = seen(&self.items, six.as_any());
-        let drops = self.drops(&seen);
-        found.tally.lost_bare = drops.false_negatives + drops.touch_dropped;
-        found.compare(built, "six-plane epsilon 0", six.as_any(), &seen[..share]);
+        let six = six.as_any();
+        let seen: Vec<ItemId> = scan(&self.items, |b| six.sees(b)).collect();
+        found.tally.lost_bare = self.errors(&seen).dropped();
+        found.compare(built, "six-plane epsilon 0", six, &self.items[..share]);
         let Ok(sphere) = view(CullingTest::Sphere) else {
             return;
         };
         // A sphere holds its box: what the box test sees it must see too.
         let subject = [SCALAR, "sphere epsilon 0"];
         found.check(subject);
-        let mut boxes = seen.iter().zip(cubes);
-        let lost = boxes.position(|(seen, cube)| *seen && !sphere.as_any().sees(cube));
+        let mut seen = seen.into_iter().map(|id| id as usize);
+        let lost = seen.find(|&id| !sphere.as_any().sees(&cubes[id]));
         if lost.is_some() {
             let expected = "all that the six planes see";
             found.fault(subject, lost, expected, "dropped".to_owned());
@@ -324,23 +277,32 @@ impl Case {
     }
 
     /// Checks the losses of the scalar loop.
-    fn scalar(&self, culling: &Culling, name: &str, seen: &[bool], found: &mut Findings) {
+    fn scalar(&self, culling: &Culling, name: &str, seen: &[ItemId], found: &mut Findings) {
         found.check([SCALAR, name]);
-        let drops = self.drops(seen);
+        let errors = self.errors(seen);
+        let ghosts = seen
+            .iter()
+            .filter(|id| self.items[**id as usize].is_empty());
         let promised = culling.arithmetic != Arithmetic::F64;
         // Without a margin f64 is as good as its own roundings. Planes that
         // are sums of others have lost digits; they are measured, not judged.
         let judged = promised || culling.test == CullingTest::SixPlane;
         let allowed = self.size() * F64_MARGIN;
         let lost = match promised {
-            true => drops.false_negatives + drops.touch_dropped > 0,
-            false => judged && drops.deepest > allowed,
+            true => errors.dropped() > 0,
+            false => judged && errors.worst_miss > allowed,
         };
         if promised {
-            found.tally.false_negatives += drops.false_negatives;
-            found.tally.touch_dropped += drops.touch_dropped;
+            found.tally.errors.false_negatives += errors.false_negatives;
+            found.tally.errors.touch_dropped += errors.touch_dropped;
         }
-        if lost || drops.ghosts > 0 {
+        let ghosts = ghosts.count();
+        if lost || ghosts > 0 {
+            let is_wrong = |&(id, verdict, seen): &(usize, Verdict, bool)| match seen {
+                true => self.items[id].is_empty(),
+                false => verdict != Verdict::Out,
+            };
+            let first = self.truth.answered(seen).find(is_wrong);
             let proven = "nothing dropped that is inside or touches, nothing empty returned";
             let expected = match promised {
                 true => proven.to_owned(),
@@ -348,9 +310,9 @@ impl Case {
             };
             let got = format!(
                 "{} false negatives (deepest {:e}), {} boundary contacts dropped, {} empty boxes returned",
-                drops.false_negatives, drops.deepest, drops.touch_dropped, drops.ghosts
+                errors.false_negatives, errors.worst_miss, errors.touch_dropped, ghosts
             );
-            found.fault([SCALAR, name], drops.first, expected, got);
+            found.fault([SCALAR, name], first.map(|found| found.0), expected, got);
         }
         if culling.test == CullingTest::Exact && culling.arithmetic == Arithmetic::F32 {
             self.tight(name, seen, found);
@@ -358,11 +320,11 @@ impl Case {
     }
 
     /// The exact test returns nothing that is out by more than its margin.
-    fn tight(&self, name: &str, seen: &[bool], found: &mut Findings) {
-        let mut out = (0..seen.len()).filter_map(|i| {
-            let (b, verdict) = (&self.items[i], self.judgements[i].verdict);
-            let is_extra = seen[i] && verdict == Verdict::Out && !b.is_empty();
-            let away = is_extra.then(|| -self.oracle.depth(b))?;
+    fn tight(&self, name: &str, seen: &[ItemId], found: &mut Findings) {
+        let mut out = self.truth.answered(seen).filter_map(|(i, verdict, seen)| {
+            let b = &self.items[i];
+            let is_extra = seen && verdict == Verdict::Out && !b.is_empty();
+            let away = is_extra.then(|| -self.truth.depth(i, b))?;
             let margin = slack(&self.camera, &self.around, b);
             (away > margin).then_some((i, away, margin))
         });
@@ -384,13 +346,12 @@ impl Case {
     /// The box and the truth about it, so that a reader can check by hand.
     pub fn describe(&self, item: usize) -> String {
         let b = &self.items[item];
-        let judgement = &self.judgements[item];
         format!(
             "box {:?} to {:?} is {:?} by {:e}; {:?}, scene origin {:?}",
             b.min.to_array(),
             b.max.to_array(),
-            judgement.verdict,
-            self.oracle.depth(b),
+            self.truth.verdicts()[item],
+            self.truth.depth(item, b),
             self.camera,
             DVec3::to_array(&self.around.origin),
         )
@@ -405,8 +366,3 @@ const F64_MARGIN: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Planes of volumes this large may not fit f32.
 const HUGE: f64 = 1e38;
-
-/// Answer of the scalar loop, by item.
-pub(super) fn seen(items: &[Aabb], view: AnyVolume<'_>) -> Vec<bool> {
-    items.iter().map(|b| view.sees(b)).collect()
-}

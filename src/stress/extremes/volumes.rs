@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use super::check::{Findings, SCALAR, seen};
+use super::check::{Findings, SCALAR};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, Plane, RelativeVolume, Spheres, sphere_cube,
 };
@@ -101,7 +101,7 @@ impl PlanesFamily {
         ];
         for (name, view, (items, built)) in views {
             if let Some(view) = view {
-                found.compare(built, name, view, &seen(items, view));
+                found.compare(built, name, view, items);
             }
         }
         found.described(|item| explain_visibility(&case.items[item], &case.volume))

@@ -44,16 +44,8 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         "masked tiles of 8 x 4 pixels; pixels whose centre is covered hide (stand-in for \
          Hasselgren, Andersson, Akenine-Moeller 2016)"
     };
-    const GUARANTEE: Guarantee = if WHOLE {
-        Guarantee::Conservative
-    } else {
-        Guarantee::Unproven
-    };
-    const COVERAGE: Coverage = if WHOLE {
-        Coverage::Whole
-    } else {
-        Coverage::Centre
-    };
+    const GUARANTEE: Guarantee = [Guarantee::Unproven, Guarantee::Conservative][WHOLE as usize];
+    const COVERAGE: Coverage = [Coverage::Centre, Coverage::Whole][WHOLE as usize];
 
     fn new(grid: SampleGrid) -> Self {
         let columns = (grid.width as usize).div_ceil(TILE_WIDTH);

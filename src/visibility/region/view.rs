@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::graph::Opening;
+use crate::scene::clip_into;
 use crate::visibility::Rays;
 
 /// Distance within which a point outside of a half-space `n . x >= 0` is kept.
@@ -183,27 +184,14 @@ impl Polygon {
 
     /// Cuts off the part that is surely outside of the half-space.
     ///
-    /// After Sutherland and Hodgman (1974); `false` if nothing is left.
+    /// `false` if nothing is left.
     fn cut(&mut self, by: &HalfSpace) -> bool {
         let slack = SLACK * by.bound * self.reach;
         let depth = |x: DVec3| by.normal.dot(x) + slack;
         if self.corners.iter().all(|c| depth(*c) >= 0.0) {
             return true;
         }
-        self.spare.clear();
-        let mut previous = *self.corners.last().expect("a polygon has corners");
-        let mut before = depth(previous);
-        for &corner in &self.corners {
-            let here = depth(corner);
-            if (before < 0.0) != (here < 0.0) {
-                let t = before / (before - here);
-                self.spare.push(previous + (corner - previous) * t);
-            }
-            if here >= 0.0 {
-                self.spare.push(corner);
-            }
-            (previous, before) = (corner, here);
-        }
+        clip_into(&self.corners, depth, &mut self.spare);
         std::mem::swap(&mut self.corners, &mut self.spare);
         !self.corners.is_empty()
     }
