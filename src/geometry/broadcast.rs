@@ -6,7 +6,7 @@ use glam::DVec4;
 use super::balls::{Unit, decide, distances, splat};
 use super::box_block::{BoxBlock, sums_at};
 use super::{Balls, BoxCorner, ConvexVolume, PlaneMask, Spheres};
-use crate::kernel::{Isa, LaneMask};
+use crate::kernel::{Isa, LaneMask, each};
 
 /// Lanes of a block that no plane excludes, and the open planes of each lane.
 pub type Sorted<I> = (LaneMask, <I as Isa>::Words);
@@ -30,13 +30,8 @@ pub trait Planes<I: Isa>: Copy {
 
     /// [`Planes::kept`] of four blocks.
     #[inline(always)]
-    fn kept_of_four(&self, isa: I, [a, b, c, d]: &[BoxBlock; 4]) -> [LaneMask; 4] {
-        [
-            self.kept(isa, a),
-            self.kept(isa, b),
-            self.kept(isa, c),
-            self.kept(isa, d),
-        ]
+    fn kept_of_four(&self, isa: I, blocks: &[BoxBlock; 4]) -> [LaneMask; 4] {
+        each([0, 1, 2, 3], |i| self.kept(isa, &blocks[i]))
     }
 
     /// Prefetches the rows of a block that the test reads.
@@ -281,12 +276,7 @@ impl BoxBlock {
                 kept[i] = plane.keep(isa, kept[i], &blocks[i]);
             }
         }
-        [
-            isa.kept(kept[0]),
-            isa.kept(kept[1]),
-            isa.kept(kept[2]),
-            isa.kept(kept[3]),
-        ]
+        each(kept, |kept| isa.kept(kept))
     }
 
     /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below

@@ -7,10 +7,8 @@ mod balls;
 mod box_block;
 mod broadcast;
 mod convex_volume;
-mod p_vertex;
 mod plane;
 mod plane_rows;
-mod plane_tree;
 mod relative_volume;
 mod spheres;
 
@@ -21,9 +19,7 @@ pub use broadcast::{BallFrustum, BallPlane, BroadcastPlane, BroadcastPlanes, Pla
 pub use convex_volume::{
     ConvexVolume, ConvexVolumeF64, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError,
 };
-pub use p_vertex::BoxCorner;
-pub use plane::{Plane, PlaneF64};
+pub use plane::{BoxCorner, Plane, PlaneF64, PlaneTree, PlaneTreeNode};
 pub use plane_rows::{PlaneRows, ROW_LANES};
-pub use plane_tree::{PlaneTree, PlaneTreeNode};
 pub use relative_volume::RelativeVolume;
 pub use spheres::{Ball, SphereMargin, Spheres, sphere_cube};

@@ -5,7 +5,7 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Aabb, BoxCorner};
+use super::Aabb;
 
 /// A half-space: the points `x` with `normal . x + d >= 0` (closed).
 ///
@@ -136,6 +136,52 @@ impl From<&Plane> for PlaneF64 {
     fn from(plane: &Plane) -> Self {
         PlaneF64::new(plane.normal.as_dvec3(), f64::from(plane.d))
     }
+}
+
+/// BoxCorner of a box: on each axis the upper bound, or else the lower one.
+///
+/// The p-vertex of a plane (the corner farthest along its normal) is the same corner of
+/// every box, and so three fixed rows of a block.
+// Booleans and no numbers: a row of theirs needs no check.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct BoxCorner(pub [bool; 3]);
+
+impl BoxCorner {
+    /// The corner across the box; of a p-vertex the n-vertex.
+    #[inline(always)]
+    pub(super) fn opposite(self) -> BoxCorner {
+        let BoxCorner([x, y, z]) = self;
+        BoxCorner([!x, !y, !z])
+    }
+
+    /// Rows of a block that hold its coordinates.
+    #[inline(always)]
+    pub(super) fn rows(self) -> [usize; 3] {
+        let BoxCorner([x, y, z]) = self;
+        [
+            3 * usize::from(x),
+            1 + 3 * usize::from(y),
+            2 + 3 * usize::from(z),
+        ]
+    }
+}
+
+/// Planes in a tree. Nodes refer to each other by their place in the list.
+#[derive(Clone, Default, PartialEq, Debug)]
+pub struct PlaneTree {
+    /// In any order.
+    pub nodes: Vec<PlaneTreeNode>,
+    /// `None` for a space that is not divided.
+    pub root: Option<u32>,
+}
+
+/// A dividing plane; its inside is the front.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PlaneTreeNode {
+    /// Its normal points to the front.
+    pub plane: Plane,
+    /// Front, then back; `None` where the division ends.
+    pub children: [Option<u32>; 2],
 }
 
 #[cfg(test)]

@@ -19,12 +19,12 @@
 //! |---|---|
 //! | `experiment`, `key` | plan, groups and cells of a run; one process's share of a scene |
 //! | `group`, `process_result` | measurement of one group in one process; its result, [`Part`] |
-//! | `workload`, `index_under_test` | queries; built structures |
+//! | `workload`, `index_under_test` | queries; built structures and their updates |
 //! | `count` | count pass, oracle; digests of answers |
 //! | `task`, `schedule` | one timed task; a keyed list of them; their schedule and order |
 //! | `timing`, `clock` | timed pass, cold caches; clocks |
 //! | `frames`, `moving` | groups whose items move: update and queries, frame by frame |
-//! | `update`, `bounds` | updates of moved items; lower bounds |
+//! | `bounds` | lower bounds |
 //! | `results`, `cell`, `metrics` | cells of a report from parts |
 //! | `shared_work` | gain from threads |
 //! | `over_processes` | times of a study's tasks over several processes |
@@ -49,7 +49,6 @@ mod schedule;
 mod shared_work;
 mod task;
 mod timing;
-mod update;
 mod workload;
 
 use serde::{Deserialize, Serialize};
@@ -71,7 +70,7 @@ pub use experiment::{
 };
 pub use frames::measure;
 pub use group::{GroupPlan, NO_ITEMS};
-pub use index_under_test::{Built, Subject};
+pub use index_under_test::{Built, Subject, UPDATE_SHARES, move_share};
 pub use key::{CellKey, GroupKey, TaskKey, TaskKind};
 pub use metrics::{METRICS, MetricInfo};
 pub use over_processes::{OverProcesses, ProcessTimes};
@@ -81,7 +80,6 @@ pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, camera
 pub use shared_work::SharedWork;
 pub use task::{Ask, AskMany, TimedTask};
 pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
-pub use update::{UPDATE_SHARES, move_share};
 pub use workload::{Setting, Workload, WorkloadError, input_of};
 
 named! {

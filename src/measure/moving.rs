@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 
 use super::clock::{Lap, Stopwatch};
 use super::count::{Judging, MOST_JUDGED, spread};
+use super::index_under_test::{MOST_UPDATED, USUAL_SHARE};
 use super::process_result::Known;
-use super::update::{MOST_UPDATED, USUAL_SHARE, move_share};
 use super::{
     Answer, Judged, Protocol, Status, TaskKind, TimedTask, Verdict, Workload, compare_with_scan,
-    guarded, input_of, timed_rounds,
+    guarded, input_of, move_share, timed_rounds,
 };
 use crate::culling::CameraView;
 use crate::geometry::Aabb;

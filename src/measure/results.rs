@@ -9,10 +9,9 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use super::group::LEAST_TAIL;
-use super::index_under_test::TWIN;
+use super::index_under_test::{MOST_UPDATED, TWIN};
 use super::metrics::{METRICS, MetricInfo, Of};
 use super::process_result::{Known, Part, SubjectPart, TaskPart};
-use super::update::MOST_UPDATED;
 use super::{CellTimes, Judged, Metric, ReportCell, Status, TaskKind, Verdict};
 use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted, speedup,

@@ -12,7 +12,7 @@ use crate::geometry::{
 
 use super::predicate::Bits;
 use super::{Containment, NoRecorder, Predicate};
-use crate::kernel::Isa;
+use crate::kernel::{Isa, each};
 
 /// A frustum, a point or a box that sees items.
 ///
@@ -83,15 +83,10 @@ pub trait QueryVolume: Predicate {
     fn kept_of_four<I: Isa>(
         &self,
         isa: I,
-        [a, b, c, d]: &[BoxBlock; 4],
+        blocks: &[BoxBlock; 4],
         mask: PlaneMask,
     ) -> [LaneMask; 4] {
-        [
-            self.kept_lanes(isa, a, mask),
-            self.kept_lanes(isa, b, mask),
-            self.kept_lanes(isa, c, mask),
-            self.kept_lanes(isa, d, mask),
-        ]
+        each([0, 1, 2, 3], |i| self.kept_lanes(isa, &blocks[i], mask))
     }
 
     /// Prefetches the rows of a block that [`QueryVolume::kept_lanes`] reads.

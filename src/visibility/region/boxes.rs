@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
-use super::id_set::RegionId;
+use super::graph::{Ground, Opening, OpeningPlane, RegionGraph, RegionId, rectangle};
 use super::locate::{BoxGrid, covers};
 use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};

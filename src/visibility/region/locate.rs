@@ -4,8 +4,7 @@
 
 use glam::DVec3;
 
-use super::graph::RegionGraph;
-use super::id_set::{IdSet, RegionId};
+use super::graph::{IdSet, RegionGraph, RegionId};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 

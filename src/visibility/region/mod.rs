@@ -13,15 +13,13 @@
 mod boxes;
 pub mod doom;
 mod graph;
-mod id_set;
 mod locate;
 mod quake;
 mod row;
 mod search;
 mod view;
 
-pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, rectangle};
-pub use id_set::{IdSet, RegionId};
+pub use graph::{Ground, IdSet, Opening, OpeningPlane, RegionGraph, RegionId, rectangle};
 pub use locate::{RegionItems, without};
 pub use row::{BACK_ENDS, BackEnd, Pvs, RegionRow, Scratch, Source};
 

@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::graph::{Ground, RegionGraph};
-use super::id_set::RegionId;
+use super::graph::{Ground, RegionGraph, RegionId};
 use super::row::Pvs;
 use crate::scene::{BspChild, LeafNode, QuakeMap, WorldBox};
 

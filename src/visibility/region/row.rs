@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::graph::RegionGraph;
-use super::id_set::{IdSet, RegionId};
+use super::graph::{IdSet, RegionGraph, RegionId};
 use super::search::{Flood, PortalClip, PortalRect, Search};
 use crate::input::{InputError, Result};
 use crate::json::from_json;

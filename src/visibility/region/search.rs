@@ -3,8 +3,7 @@
 //! Windows are the parts of the image in which each region is seen; each back end has its own
 //! form of them.
 
-use super::graph::{Opening, RegionGraph};
-use super::id_set::{IdSet, RegionId};
+use super::graph::{IdSet, Opening, RegionGraph, RegionId};
 use super::view::{HalfSpace, MOST_PLANES, Polygon, View, through_edge};
 use crate::visibility::Rays;
 

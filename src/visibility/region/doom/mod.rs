@@ -19,8 +19,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::graph::{Ground, Opening, OpeningPlane, RegionGraph};
-use super::id_set::RegionId;
+use super::graph::{Ground, Opening, OpeningPlane, RegionGraph, RegionId};
 use super::row::Pvs;
 use crate::scene::{Dispute, Linedef, Regions, Scene, WadMap, WorldBox};
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::super::id_set::RegionId;
+use super::super::graph::RegionId;
 use super::DoomMap;
 use crate::scene::{Dispute, Linedef, Scene, SurfaceKind, Surfaces};
 
