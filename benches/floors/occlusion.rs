@@ -34,7 +34,7 @@ impl Work for Project<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> LaneMask {
         let (mut rects, mut all) = (Rects::default(), 0);
-        for block in &self.0.levels[0] {
+        for block in self.0.levels[0].blocks() {
             rects.project(isa, block, self.1);
             all ^= black_box(&rects).seen;
         }
@@ -95,7 +95,7 @@ impl Work for Ask<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         let Ask(scene, view, asked) = self;
-        for (index, block) in scene.levels[0].iter().enumerate() {
+        for (index, block) in scene.levels[0].blocks().iter().enumerate() {
             let admitted = block.admitted_by(isa, view.volume, view.volume.mask());
             let mut rects = Rects::default();
             rects.project(isa, block, view);

@@ -97,6 +97,13 @@ impl BoxBlock {
         }
     }
 
+    /// Minima by axis, then maxima.
+    #[cfg(feature = "cli")]
+    #[inline(always)]
+    pub(crate) fn rows(&self) -> &[[f32; LANES]; 6] {
+        &self.rows
+    }
+
     /// The coordinates of one corner, the same one of every box.
     #[inline(always)]
     pub(crate) fn corner_rows(&self, corner: BoxCorner) -> [&[f32; LANES]; 3] {

@@ -131,7 +131,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 continue;
             }
             let (level, index) = (usize::from(entry.level), entry.block as usize);
-            let block = &scene.levels[level][index];
+            let block = &scene.levels[level].blocks()[index];
             let mut lanes = scene.lanes(level, index);
             if level > 0 {
                 let (kept, words) = block.sorted_by(isa, view.volume, entry.open);

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use crate::geometry::{Aabb, BoxBlock};
+use crate::geometry::{Aabb, BoxBlock, BoxBlocks};
 use crate::kernel::{LANES, LaneMask, first_lanes};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
@@ -30,7 +30,7 @@ pub struct OccluderScene {
     /// World position of the zero of the boxes.
     pub(super) origin: DVec3,
     /// Level 0 holds the items' outer boxes; the last level is one block.
-    pub levels: Vec<Vec<BoxBlock>>,
+    pub levels: Vec<BoxBlocks>,
     /// In tree order, as what hides.
     ids: Vec<ItemId>,
     /// All occluders, in tree order.
@@ -92,11 +92,10 @@ impl OccluderScene {
         }
         let centres: Vec<_> = outer.iter().map(Aabb::centre).collect();
         sort_into(&mut ids, capacity, &|id, axis| centres[id as usize][axis]);
-        let in_order: Vec<Aabb> = ids.iter().map(|&id| outer[id as usize]).collect();
-        let mut levels = vec![blocks_of(&in_order)];
-        while let Some(last) = levels.last().filter(|last| last.len() > 1) {
-            let unions: Vec<Aabb> = last.iter().map(BoxBlock::union).collect();
-            levels.push(blocks_of(&unions));
+        let mut levels: Vec<BoxBlocks> = vec![ids.iter().map(|&id| &outer[id as usize]).collect()];
+        while let Some(last) = levels.last().filter(|last| last.blocks().len() > 1) {
+            let unions: Vec<Aabb> = last.blocks().iter().map(BoxBlock::union).collect();
+            levels.push(unions.iter().collect());
         }
         let mut occluders = Vec::with_capacity(by_number.len());
         let mut first_occluders = vec![0];
@@ -136,17 +135,13 @@ impl OccluderScene {
     /// The lanes of a block that hold a box.
     #[inline(always)]
     pub fn lanes(&self, level: usize, block: usize) -> LaneMask {
-        let boxes = match level {
-            0 => self.ids.len(),
-            _ => self.levels[level - 1].len(),
-        };
-        first_lanes(boxes - block * LANES)
+        first_lanes(self.levels[level].len() - block * LANES)
     }
 
     /// The outer box at a position: what may be hidden.
     #[inline(always)]
     pub fn outer(&self, position: usize) -> Aabb {
-        self.levels[0][position / LANES].get(position % LANES)
+        self.levels[0].get(position)
     }
 
     /// Occluders at a position; none where the item is not solid.
@@ -180,20 +175,6 @@ fn sort_into(ids: &mut [ItemId], capacity: usize, centre: &impl Fn(ItemId, usize
     let (before, behind) = ids.split_at_mut(left);
     sort_into(before, capacity, centre);
     sort_into(behind, capacity, centre);
-}
-
-fn blocks_of(boxes: &[Aabb]) -> Vec<BoxBlock> {
-    let filled = |chunk: &[Aabb]| {
-        let mut block = BoxBlock::EMPTY;
-        let lanes = chunk.iter().enumerate();
-        lanes.for_each(|(lane, b)| block.set(lane, b));
-        block
-    };
-    let blocks: Vec<BoxBlock> = boxes.chunks(LANES).map(filled).collect();
-    if blocks.is_empty() {
-        return vec![BoxBlock::EMPTY];
-    }
-    blocks
 }
 
 fn faces_reached(b: &WorldBox, bounds: &WorldBox) -> Faces {

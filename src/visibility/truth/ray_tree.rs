@@ -9,10 +9,10 @@ use std::hint::black_box;
 use std::mem::swap;
 use std::ops::Range;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use super::slabs::{Rows, Slabs};
-use crate::geometry::Aabb;
+use super::slabs::Slabs;
+use crate::geometry::{Aabb, BoxBlock};
 use crate::index::{Record, by_surface_area};
 use crate::kernel::{Isa, LANES, LaneMask};
 use crate::query::{Bits, ItemId};
@@ -52,7 +52,7 @@ impl RayTree {
         while let Some(at) = open.pop() {
             let node = &self.nodes[at.node()];
             for (lane, &child) in node.children.iter().enumerate() {
-                let bounds = node.bounds(lane);
+                let bounds = node.boxes.get(lane);
                 if bounds.is_empty() || misses(ray, self.zero, &bounds) {
                     continue;
                 }
@@ -82,7 +82,7 @@ impl RayTree {
         let mut at = self.root;
         loop {
             let node = &self.nodes[at.node()];
-            let tested = slabs.test(isa, &node.rows, found.bound());
+            let tested = slabs.test(isa, node.boxes.rows(), found.bound());
             let items = at.items();
             let left = tested.lanes;
             if left != 0 {
@@ -91,7 +91,7 @@ impl RayTree {
                     let lane = lane as usize % LANES;
                     let low = -less_entry[lane];
                     if low <= found.bound() {
-                        let latest = || slabs.latest(&node.rows, lane, low);
+                        let latest = || slabs.latest(node.boxes.rows(), lane, low);
                         found.offer(low, node.children[lane], latest);
                     }
                 }
@@ -220,7 +220,7 @@ impl Open {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct Node {
-    rows: Rows,
+    boxes: BoxBlock,
     /// Places of items in tree order, nodes as [`Child`]; of unused lanes any.
     children: [u32; LANES],
 }
@@ -251,29 +251,9 @@ impl Child {
 }
 
 const EMPTY: Node = Node {
-    rows: {
-        let (low, high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
-        [low, low, low, high, high, high]
-    },
+    boxes: BoxBlock::EMPTY,
     children: [0; LANES],
 };
-
-impl Node {
-    fn set(&mut self, lane: usize, b: &Aabb, child: u32) {
-        for axis in 0..3 {
-            self.rows[axis][lane] = b.min[axis];
-            self.rows[axis + 3][lane] = b.max[axis];
-        }
-        self.children[lane] = child;
-    }
-
-    /// The box of a lane, empty in an unused one.
-    fn bounds(&self, lane: usize) -> Aabb {
-        let corner =
-            |row: usize| Vec3::from_array([0, 1, 2].map(|axis| self.rows[row + axis][lane]));
-        Aabb::new(corner(0), corner(3))
-    }
-}
 
 impl RayTree {
     /// Builds the tree over boxes relative to a zero. O(n log n).
@@ -300,7 +280,8 @@ impl RayTree {
             }
             let mut node = EMPTY;
             for (lane, part) in parts.iter().enumerate() {
-                node.set(lane, &part.bounds, part.range.start as u32);
+                node.boxes.set(lane, &part.bounds);
+                node.children[lane] = part.range.start as u32;
             }
             nodes.push(node);
             for (lane, part) in parts.into_iter().enumerate().skip(single).rev() {
@@ -371,6 +352,8 @@ impl Part {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::scene::SeededRng;
 
@@ -385,7 +368,7 @@ mod tests {
         for (at, node) in nodes.iter().enumerate() {
             let items = children[at].items();
             for lane in 0..LANES {
-                let b = node.bounds(lane);
+                let b = node.boxes.get(lane);
                 let child = node.children[lane];
                 if b.is_empty() {
                     continue;
@@ -397,7 +380,7 @@ mod tests {
                     let child = Child(child);
                     children[child.node()] = child;
                     reached[child.node()] += 1;
-                    let below = &nodes[child.node()].rows;
+                    let below = nodes[child.node()].boxes.rows();
                     for axis in 0..3 {
                         let low = below[axis].iter().fold(f32::INFINITY, |a, &b| a.min(b));
                         let high = below[axis + 3].iter();

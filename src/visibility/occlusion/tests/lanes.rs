@@ -57,7 +57,7 @@ impl Work for Projected<'_> {
     fn run<I: Isa>(self, isa: I) -> Vec<Rects> {
         let mut rects = Rects::default();
         let mut all = Vec::new();
-        for block in &self.0.occluders.levels[0] {
+        for block in self.0.occluders.levels[0].blocks() {
             rects.project(isa, block, self.1);
             all.push(rects);
         }
