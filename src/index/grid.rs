@@ -12,7 +12,7 @@ use super::box_test::{BoxTest, BoxTested, Tally};
 use super::items::Record;
 use super::{BuildError, Info, Kind, MemoryUsage, NoParams};
 use crate::geometry::Aabb;
-use crate::query::{ItemId, Recorder, Sink};
+use crate::query::{Bits, ItemId, Recorder, Sink};
 
 /// Average number of items per cell.
 const ITEMS_PER_CELL: f64 = 8.0;
@@ -123,9 +123,8 @@ impl UniformGrid {
                 tally.item(test);
                 admitted |= u64::from(test.admits(b)) << i;
             }
-            while admitted != 0 {
-                let place = start + admitted.trailing_zeros() as usize;
-                admitted &= admitted - 1;
+            for bit in Bits(admitted) {
+                let place = start + bit as usize;
                 sink.accept(&self.ids[place..=place])?;
             }
         }

@@ -144,10 +144,11 @@ pub(super) fn expected(name: &str) -> &'static str {
     }
 }
 
-pub(super) fn drift(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
+/// In a direction of its own, at another size.
+pub(super) fn straight(world: &World, id: ItemId, moves: u32, scale: f64) -> Option<Aabb> {
     let b = &world.start[id as usize];
     let offset = world.direction(id) * world.step(b) * f64::from(moves);
-    Some(world.placed(b, offset, 1.0))
+    Some(world.placed(b, offset, scale))
 }
 
 pub(super) fn traffic(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
@@ -181,12 +182,6 @@ pub(super) fn doors(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
     let width = if width > 0.0 { width } else { world.mean };
     let open = to_and_fro(world.step * f64::from(moves), 1.0);
     Some(world.placed(b, world.up.from_z_up(axis * width * open), 1.0))
-}
-
-pub(super) fn projectiles(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
-    let b = &world.start[id as usize];
-    let offset = world.direction(id) * world.step(b) * f64::from(moves);
-    Some(world.placed(b, offset, 0.1))
 }
 
 pub(super) fn growth(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {

@@ -39,11 +39,12 @@ pub struct MotionFamily {
 /// All generated motions, in the order of the help.
 pub static MOTIONS: &[MotionFamily] = rows! { MotionFamily { name, summary, share, step, law }
     "drift", "each mover in a direction of its own, reflected at the scene's bounds",
-        0.01, 0.1, laws::drift;
+        0.01, 0.1, |world, id, moves| laws::straight(world, id, moves, 1.0);
     "traffic", "along the streets of a city", 0.1, 0.5, laws::traffic;
     "swarm", "neighbours move alike, in circles of 64 frames", 1.0, 0.1, laws::swarm;
     "doors", "to and fro by the mover's own width", 0.001, 0.05, laws::doors;
-    "projectiles", "a tenth of the size, straight and fast", 0.001, 5.0, laws::projectiles;
+    "projectiles", "a tenth of the size, straight and fast", 0.001, 5.0,
+        |world, id, moves| laws::straight(world, id, moves, 0.1);
     "growth", "bounds swell to twice the size and shrink again", 0.01, 0.05, laws::growth;
     "spawn", "half of the movers disappear, half appear at a new place (step is not read)",
         0.01, 1.0, laws::spawn;

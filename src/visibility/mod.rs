@@ -31,7 +31,6 @@ named! {
     /// Guarantee that a back end declares of its answers and that tests check.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug, Serialize)]
     #[serde(rename_all = "kebab-case")]
-    #[non_exhaustive]
     pub enum Guarantee {
         /// The visible set itself.
         Exact = "exact",
@@ -47,7 +46,6 @@ named! {
 
 /// A row of a stage's table of back ends.
 #[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
 pub struct Row<B> {
     /// Name on the command line and in tables, unique in the table.
     pub name: &'static str,

@@ -54,7 +54,6 @@ impl Ray {
 
 /// All rays of a camera.
 #[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
 pub struct Rays {
     /// The camera that they are of, with an eye and a lens.
     pub camera: Camera,

@@ -118,19 +118,15 @@ impl Findings {
         trial.see(items, volume);
         for (structure, index) in built {
             self.check([structure, test]);
-            match trial.ask(|out| index.query(volume, out)).map(drop) {
-                Ok(()) => {}
-                Err(verify::Fault::Panicked(text)) => {
-                    let got = format!("panicked: {text}");
-                    self.fault([structure, test], None, "an answer", got);
-                }
-                Err(verify::Fault::Differs(difference)) => {
-                    let item = difference.first.map(|id| id as usize);
-                    let item = item.filter(|&item| item < items.len());
-                    let expected = format!("the {} items of the scalar loop", trial.expected());
-                    self.fault([structure, test], item, expected, difference.to_string());
-                }
-            }
+            let answer = trial.ask(|out| index.query(volume, out)).map(drop);
+            let Err(fault) = answer else { continue };
+            let expected = format!("the {} items of the scalar loop", trial.expected());
+            let (expected, first) = match &fault {
+                verify::Fault::Panicked(_) => ("an answer".to_owned(), None),
+                verify::Fault::Differs(difference) => (expected, difference.first),
+            };
+            let item = first.map(|id| id as usize).filter(|&id| id < items.len());
+            self.fault([structure, test], item, expected, fault.explained(|_| None));
         }
     }
 

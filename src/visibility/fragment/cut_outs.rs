@@ -16,7 +16,6 @@ named! {
     /// Pattern of the opaque parts of a surface.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
     #[serde(rename_all = "lowercase")]
-    #[non_exhaustive]
     pub enum Mask, MASKS {
         Fence = "fence", "four pickets in ten of a tile, and two rails";
         Foliage = "foliage", "six in ten of the cells of a grid of 8 x 8, at random";
@@ -98,7 +97,6 @@ impl Holes {
 
 /// A seeded share of the items of a scene, cut out by one mask.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct CutOuts {
     /// Pattern of their opaque parts.
     pub mask: Mask,

@@ -99,7 +99,6 @@ struct Fragment<At> {
 
 /// A drawn image, of boxes or of triangles.
 #[derive(Clone, Debug)]
-#[non_exhaustive]
 pub struct Drawn<B: Body = SolidBox> {
     /// Counts of all that was drawn.
     pub tally: Tally,

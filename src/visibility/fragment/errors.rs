@@ -15,7 +15,6 @@ use crate::visibility::{Rays, SampleGrid};
 
 /// The errors of an order that should be front to back.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-#[non_exhaustive]
 pub struct OrderErrors {
     /// Pairs of items that overlap in the image: both met by a sample's ray, at
     /// different depths.

@@ -30,7 +30,6 @@ const LEAST_GAIN: f64 = 1.0 / 16384.0;
 
 /// The boxes below the ground of a mesh.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct GroundRow {
     /// Items that are ground.
     pub item_count: usize,

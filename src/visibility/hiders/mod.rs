@@ -84,7 +84,6 @@ impl Hiders {
 
 /// The boxes in the solid of a map.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct BlocksRow {
     /// Number of boxes; none if a sector does not close.
     pub box_count: usize,

@@ -26,7 +26,6 @@ pub(crate) use super::inscribed::cells::Cells;
 
 /// Boxes proven to be inside an item.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub struct Inscribed {
     /// Scene-local, those that add most first; they overlap. The open inside of none
     /// holds a point of the piece of the surface that it is inside of.
@@ -162,7 +161,6 @@ fn parts(surfaces: &Surfaces) -> Vec<Vec<[Vec3; 3]>> {
 
 /// The boxes inside the items of a mesh.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct InnerRow {
     /// Items of the mesh.
     pub item_count: usize,

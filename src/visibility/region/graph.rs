@@ -126,7 +126,6 @@ impl RegionGraph {
 
 /// The plane of an opening and its front side.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum OpeningPlane {
     /// Across an axis: the front has the larger coordinates.
     Axis {

@@ -124,7 +124,6 @@ pub type BackEnd = Row<Source>;
 
 /// Source of the answers of a back end.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum Source {
     /// A search that takes each opening by itself.
     Flood,

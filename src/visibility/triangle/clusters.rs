@@ -20,7 +20,6 @@ pub const MOST_TRIANGLES: usize = 64;
 
 /// The triangles of surfaces in clusters. An item's clusters follow one another.
 #[derive(Clone, Debug)]
-#[non_exhaustive]
 pub struct Clusters {
     /// The surfaces that were clustered.
     pub surfaces: Arc<Surfaces>,

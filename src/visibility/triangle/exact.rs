@@ -14,7 +14,6 @@ use crate::kernel::each;
 /// towards it. A triangle `a`, `b`, `c` turns its front to the eye `e` where
 /// `((b - a) x (c - a)) . (e - weight a) > 0`.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[non_exhaustive]
 pub struct Eye {
     /// The larger part.
     pub high: DVec3,

@@ -36,7 +36,6 @@ const BAND: usize = 4;
 ///
 /// The same on any number of threads.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct SampleTruth {
     /// The front item of each sample, row by row from the top left; the lowest of a
     /// tie, [`NO_ITEM`] where there is none.

@@ -37,7 +37,6 @@ pub type SurfaceIndex = BodyIndex<Facet>;
 
 /// The items that are seen along a ray; its memory serves for many.
 #[derive(Clone, Debug)]
-#[non_exhaustive]
 pub struct Front<At> {
     /// Bodies that hide nothing, where the ray meets them.
     through: Vec<(ItemId, At)>,
