@@ -1,4 +1,4 @@
-//! The program with a structure that is slower than it says, for `scripts/check-compare.sh`.
+//! The program with one slow structure, for `scripts/check-compare.sh`.
 //!
 //! A file `PROGRAM.slowed` beside it with the text `octree:20` makes its octree answer every 20th
 //! query twice, 5 % more work. The script shows with it what `compare --against` finds: two copies

@@ -229,7 +229,7 @@ pub fn clipped<P: Point>(polygon: &[P], depth: impl Fn(P) -> f64) -> Vec<P> {
     kept
 }
 
-/// As [`clipped`], in place of what was kept.
+/// The same part, in place of what was kept.
 pub fn clip_into<P: Point>(polygon: &[P], depth: impl Fn(P) -> f64, kept: &mut Vec<P>) {
     kept.clear();
     let mut last = polygon.last().map(|&last| (last, depth(last)));

@@ -163,7 +163,7 @@ impl Truth {
         &self.verdicts
     }
 
-    /// What is visible, and no errors yet.
+    /// Counts of the visible items, and no errors yet.
     pub fn visible(&self) -> ErrorCount {
         self.visible
     }

@@ -25,7 +25,7 @@ pub struct Tally {
     pub boxes: u64,
     /// Boxes that touch, to all that is known.
     pub ties: u64,
-    /// What is visible, and what answers with a margin lost of it.
+    /// Visible boxes, and those that answers with a margin lost.
     pub errors: ErrorCount,
     /// Views that were refused because their sums could overflow.
     pub refused: u64,
