@@ -150,14 +150,17 @@ fn title(report: &Report) -> String {
 fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
     let mut blocks = vec![Block::Heading(1, title(report))];
     let all = comparisons(report);
-    for group in run_table::groups(&all) {
-        let overall = Overall::of(&group);
-        blocks.push(Block::Line(run_table::conclusion(&group, &overall)));
+    let groups = run_table::groups(&all);
+    for (group, of) in groups.iter().zip(run_table::settings(&groups)) {
+        let overall = Overall::of(group);
+        let conclusion = run_table::conclusion(group, &overall);
+        blocks.push(Block::Line(text::labelled(&of, &conclusion)));
         if let Some(base) = overall.base.filter(|_| group.len() > 1) {
             let names = group.iter().map(|comparison| run_figures::of(comparison));
-            let table = run_table::matrix(names.collect(), &group, &overall);
-            let heading = Block::Heading(2, format!("Speed-up over {base}"));
-            let legend = Block::Line(run_table::legend(&group, &overall));
+            let table = run_table::matrix(names.collect(), group, &overall);
+            let heading = text::joined([&format!("Speed-up over {base}"), &of]);
+            let heading = Block::Heading(2, heading);
+            let legend = Block::Line(run_table::legend(group, &overall));
             blocks.extend([heading, Block::Heat(table), legend]);
         }
     }

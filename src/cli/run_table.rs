@@ -19,6 +19,15 @@ pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>>
     groups.into_iter().map(|(_, group)| group).collect()
 }
 
+/// What tells each group from the others: "cold, six-box"; nothing of a single one.
+pub fn settings(groups: &[Vec<&Comparison>]) -> Vec<String> {
+    let keys: Vec<[&str; 3]> = groups.iter().map(|group| key(group[0])).collect();
+    let differs = |n: &usize| keys.iter().any(|key| key[*n] != keys[0][*n]);
+    let parts: Vec<usize> = (0..3).filter(differs).collect();
+    let name = |key: &[&str; 3]| text::joined(parts.iter().map(|&n| key[n].replace("_ns", "")));
+    keys.iter().map(name).collect()
+}
+
 /// Conclusion of a group in sentences.
 pub fn conclusion(group: &[&Comparison], overall: &Overall) -> String {
     match group {

@@ -117,7 +117,7 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     let of_base = base.and_then(|base| comparison.sound_cell(base));
     let other = described(&next.structure);
     let is_proven = best.time().is_none_or(|time| time.upper.is_some());
-    let leads = format!(": {} as fast as {other}, the next best", lead(next));
+    let leads = format!("{} as fast as {other}, the next best", lead(next));
     let said = match names[..] {
         // Prints as 1.01 x at most.
         [one] if !is_proven && times_as_fast(next, best).is_some_and(|ratio| ratio < 1.015) => {
@@ -125,8 +125,8 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
                 "{one} or {other}: {one} is less than 2 % ahead, unproven (--processes 10 tells)"
             )
         }
-        [one] => format!("{}{leads}", described(one)),
-        _ => format!("{} (a tie){leads}", listed(&names, "or")),
+        [one] => format!("{}: {leads}", described(one)),
+        _ => format!("{} (a tie): {} is {leads}", listed(&names, "or"), names[0]),
     };
     let of_base = text::some(of_base, |cell| {
         let (lead, base) = (lead(cell), described(&cell.structure));

@@ -3,7 +3,7 @@
 //! Their two ratios multiply to the ratio of the times.
 
 use super::document::Block;
-use super::run_table::{groups, labels};
+use super::run_table::{groups, labels, settings};
 use super::run_verdict::times;
 use super::table::Table;
 use super::text::{self, some};
@@ -30,17 +30,18 @@ struct Pair<'r> {
 /// A table and a sentence for each cache state and culling test.
 pub fn blocks(report: &Report, structure: &str) -> Vec<Block> {
     let (all, mut blocks) = (comparisons(report), Vec::new());
-    for group in groups(&all) {
+    let groups = groups(&all);
+    for (group, of) in groups.iter().zip(settings(&groups)) {
         let pairs = group.iter().map(|comparison| pair(comparison, structure));
         let pairs: Vec<Result<Pair, String>> = pairs.collect();
         let (table, sentence) = match &pairs[..] {
             [Ok(one)] => (of_one(one), one.sentence()),
-            _ => of_many(&labels(&group), &pairs, structure),
+            _ => of_many(&labels(group), &pairs, structure),
         };
         if !table.rows.is_empty() {
             blocks.extend([Block::Table(table), Block::line("")]);
         }
-        blocks.push(Block::Line(sentence));
+        blocks.push(Block::Line(text::labelled(&of, &sentence)));
     }
     if blocks.is_empty() {
         blocks.push(Block::Line(format!("{structure} was not measured.")));
@@ -130,7 +131,7 @@ fn ns_per_test(cell: &ReportCell) -> Option<f64> {
 /// Neither does where they differ by less than the interval of the time.
 fn parts(tests: f64, per_test: f64, margin: f64) -> String {
     let decides = match tests.ln().abs() - per_test.ln().abs() {
-        more if more.abs() <= margin => "both count alike",
+        more if more.abs() <= margin => "neither decides",
         more if more > 0.0 => "the number of tests decides",
         _ => "the time per test decides",
     };
@@ -215,7 +216,7 @@ mod tests {
             "it tests 4.00 x as many nodes and items, and a test takes 0.500 x as long, so the \
              number of tests decides"
         );
-        assert!(parts(1.32, 1.35, 0.1).ends_with("so both count alike"));
+        assert!(parts(1.32, 1.35, 0.1).ends_with("so neither decides"));
         assert!(parts(1.32, 1.35, 0.0).ends_with("so the time per test decides"));
         assert!(parts(1.1, 3.0, 0.1).ends_with("so the time per test decides"));
         assert!(parts(0.2, 3.0, 0.1).ends_with("so the number of tests decides"));

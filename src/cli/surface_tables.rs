@@ -249,7 +249,8 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
         let base = Overall::of(&[comparison]).base;
         if let Some(mut figure) = base.and_then(|base| run_figures::speedups(comparison, base)) {
             let [scene, path] = [&about.scene.name, &about.path.name];
-            figure.caption = format!("{scene}, {path}: {}", figure.caption);
+            let of = run_figures::of(comparison);
+            figure.caption = format!("{of}, {}: {}", about.test, figure.caption);
             add([scene, path, &about.path.cache, &about.test], figure);
         }
     }

@@ -21,6 +21,14 @@ pub fn joined(texts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
     texts.join(", ")
 }
 
+/// "Cold, six-box: Take wide .."; the sentence alone where nothing is named.
+pub fn labelled(name: &str, sentence: &str) -> String {
+    match name {
+        "" => sentence.to_owned(),
+        _ => format!("{}{}: {sentence}", name[..1].to_uppercase(), &name[1..]),
+    }
+}
+
 /// "10 processes", or the fewest and the most: "3 to 10 processes".
 pub fn range((least, most): (usize, usize), shown: impl Fn(usize) -> String) -> String {
     match least == most {
