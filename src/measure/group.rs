@@ -119,7 +119,12 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
     let (mut bounds, mut tasks, mut samples) = (Vec::new(), Vec::new(), Vec::new());
     let mut schedules = [None, None];
     for &pass in &Pass::ALL[..1 + usize::from(plan.locate)] {
-        let mut keyed = tasks_of(workload, &entries, pass, &answers[pass as usize]);
+        let mut keyed = tasks_of(
+            workload,
+            &entries,
+            (pass, plan.protocol.cold),
+            &answers[pass as usize],
+        );
         if pass == Pass::Queries {
             bounds = add_bounds(&mut keyed, workload, subjects, &answers[0], plan.bounds);
         }
@@ -182,7 +187,7 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
 fn tasks_of<'a>(
     workload: &'a Workload,
     entries: &[Entry<'a>],
-    pass: Pass,
+    (pass, cold): (Pass, bool),
     answers: &[Answer],
 ) -> Tasks<'a> {
     let mut keyed = Tasks::default();
@@ -193,8 +198,10 @@ fn tasks_of<'a>(
             };
             let least_ns = entry.counted.as_ref().map(|c| c.least_ns(pass));
             let spec = &entry.subject.spec;
-            // Views are shared where builds are, unless each is shared already.
-            if kind == TaskKind::Views && (spec.execution.threads < 2 || spec.query_threads() > 1) {
+            // Views are shared where builds are, unless each is shared already. One sweep
+            // for all of them would compare warm views with cold queries.
+            let are_shared = spec.execution.threads > 1 && spec.query_threads() < 2 && !cold;
+            if kind == TaskKind::Views && !are_shared {
                 continue;
             }
             let task = TimedTask::of(kind, spec, workload, built, answers, least_ns);
