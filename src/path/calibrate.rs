@@ -16,6 +16,10 @@ pub(super) const MOST_TESTS: usize = 160_000 * MOST_CAMERAS;
 /// more items than that: a share of 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;
 
+/// Items seen by all cameras of the sample together, where that is no more work than
+/// [`MOST_TESTS`]: few cameras and a small share would be left to chance.
+const SEEN_BY_ALL: f64 = 1_000.0;
+
 /// Far plane in near planes, at least, where near was named.
 const LEAST_DEPTH: f64 = 1.01;
 
@@ -42,6 +46,9 @@ pub(super) fn for_visible_share(
         return Err(unfit(path, reason));
     }
     let needed = (LEAST_SEEN / share).ceil() as usize;
+    let watched = cameras.len().clamp(1, MOST_CAMERAS);
+    let by_all = (SEEN_BY_ALL / share / watched as f64).ceil() as usize;
+    let needed = needed.max(by_all.min(MOST_TESTS / watched));
     let items = every_nth(&scene.items, MOST_ITEMS.max(needed));
     let sample = every_nth(cameras, most_cameras(items.len()));
     let around = scene.surroundings();

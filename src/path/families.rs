@@ -102,7 +102,8 @@ pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
             ..Pose::new(from + forward * travelled, forward)
         }
     };
-    Ok(stage.turns().map(pose).collect())
+    let last = stage.count.saturating_sub(1).max(1) as f64;
+    Ok((0..stage.count).map(|i| pose(i as f64 / last)).collect())
 }
 
 /// Unrelated views: the eye jumps, so nothing of the last frame helps.

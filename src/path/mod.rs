@@ -130,7 +130,7 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
         "waypoints=8 (at least 4)", families::flythrough;
     "spin", "a full turn in place at the centre (yaw)", "", families::spin;
     "zoom", "a dolly towards the centre, then a zoom by field of view",
-        "power=8 (largest magnification)", families::zoom;
+        "power=8 (magnification of the last view)", families::zoom;
     "teleport", "a new random place and direction every frame: no coherence", "", families::teleport;
     "outside", "the whole scene from outside, from all around", "", families::outside;
     "street", "eyes outside of every item, above the ground, looking level",

@@ -22,7 +22,7 @@ struct Door {
 }
 
 /// Floors joined by doors.
-struct Plan {
+struct Plan<'s> {
     doors: Vec<Door>,
     /// Height of the floor of each region.
     floors: Vec<f64>,
@@ -30,13 +30,14 @@ struct Plan {
     exits: Vec<Vec<usize>>,
     /// Lines that a step must not meet; none where regions are convex.
     walls: Vec<[DVec2; 2]>,
+    map: Option<&'s WadMap>,
 }
 
 pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let (plan, natural) = match &stage.scene.regions {
         Regions::Tiling(tiling) => (Plan::of_rooms(stage, tiling), 1.7),
         Regions::Bsp(map) => (Plan::of_map(map), 41.0),
-        _ => (Plan::new(Vec::new(), Vec::new(), Vec::new()), 1.7),
+        _ => (Plan::new(Vec::new(), Vec::new()), 1.7),
     };
     let height = spec.number_between("height", natural, 0.0, 1e6)?;
     let doors = spec.count("doors", 32, 100_000)? as usize;
@@ -48,7 +49,8 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let way = plan.way(doors, height, &mut stage.rng());
     let mut lengths = vec![0.0];
     lengths.extend(way.windows(2).scan(0.0, |total, step| {
-        *total += step[0].distance(step[1]);
+        // A step up or down is none of the way.
+        *total += step[0].truncate().distance(step[1].truncate());
         Some(*total)
     }));
     let at = |length: f64| {
@@ -74,8 +76,8 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     Ok(poses.collect())
 }
 
-impl Plan {
-    fn new(doors: Vec<Door>, floors: Vec<f64>, walls: Vec<[DVec2; 2]>) -> Plan {
+impl<'s> Plan<'s> {
+    fn new(doors: Vec<Door>, floors: Vec<f64>) -> Self {
         let mut exits = vec![Vec::new(); floors.len()];
         for (i, door) in doors.iter().enumerate() {
             for side in door.sides {
@@ -86,11 +88,12 @@ impl Plan {
             doors,
             floors,
             exits,
-            walls,
+            walls: Vec::new(),
+            map: None,
         }
     }
 
-    fn of_rooms(stage: &Stage, tiling: &Tiling) -> Plan {
+    fn of_rooms(stage: &Stage, tiling: &Tiling) -> Self {
         let floors = tiling.boxes.iter().map(|room| stage.in_world(room).0.z);
         let doors = tiling.portals.iter().map(|portal| {
             let (min, max) = stage.in_world(&portal.opening);
@@ -100,10 +103,10 @@ impl Plan {
                 wall: None,
             }
         });
-        Plan::new(doors.collect(), floors.collect(), Vec::new())
+        Plan::new(doors.collect(), floors.collect())
     }
 
-    fn of_map(map: &WadMap) -> Plan {
+    fn of_map(map: &'s WadMap) -> Self {
         let floors = map.sectors.iter().map(|sector| sector.heights[0]);
         let lines = map.lines.iter();
         let walls = lines.map(|line| line.ends.map(|end| DVec2::from(end.map(f64::from))));
@@ -121,8 +124,11 @@ impl Plan {
                 wall: Some(i),
             })
         });
-        let doors = doors.collect();
-        Plan::new(doors, floors.collect(), walls)
+        Plan {
+            map: Some(map),
+            walls: walls.clone(),
+            ..Plan::new(doors.collect(), floors.collect())
+        }
     }
 
     /// Corners of a walk through `count` doors, eyes `height` above the floors.
@@ -139,7 +145,9 @@ impl Plan {
             let exits = &self.exits[side as usize];
             let mut drawn = (0..DRAWN).map(|_| exits[rng.below(exits.len())]);
             // Back through the same door if there is no way on.
-            here = drawn.find(|&next| self.is_free(here, next)).unwrap_or(here);
+            here = drawn
+                .find(|&next| self.is_free(side, here, next))
+                .unwrap_or(here);
             way.push(eye(here));
             let [a, b] = self.doors[here].sides;
             side = if side == a { b } else { a };
@@ -147,8 +155,9 @@ impl Plan {
         way
     }
 
-    /// Tests whether the way between two doors of a region meets no wall.
-    fn is_free(&self, from: usize, to: usize) -> bool {
+    /// Tests whether the way between two doors of a region meets no wall and does not
+    /// leave it.
+    fn is_free(&self, region: u32, from: usize, to: usize) -> bool {
         let [a, b] = [from, to].map(|door| &self.doors[door]);
         let (p, q) = (a.at, b.at);
         let side = |u: DVec2, v: DVec2, w: DVec2| (v - u).perp_dot(w - u);
@@ -160,7 +169,15 @@ impl Plan {
             |&[u, v]: &[DVec2; 2]| u.min(v).cmple(p.max(q)).all() && p.min(q).cmple(u.max(v)).all();
         let own = [a.wall, b.wall];
         let mut walls = self.walls.iter().enumerate();
-        from != to && !walls.any(|(i, w)| !own.contains(&Some(i)) && is_near(w) && meets(w))
+        // Where no line is met, all of the way is where its middle is: between two edges
+        // of a platform it leads over that.
+        let is_within = self.map.is_none_or(|map| {
+            let leaf = map.tree.descend((p + q) / 2.0);
+            leaf.is_some_and(|leaf| map.leaf_sectors[leaf as usize] == region)
+        });
+        from != to
+            && is_within
+            && !walls.any(|(i, w)| !own.contains(&Some(i)) && is_near(w) && meets(w))
     }
 }
 
@@ -228,6 +245,17 @@ mod tests {
                 map.leaf_sectors[leaf as usize]
             };
             let mut sectors: Vec<u32> = eyes.iter().map(|&eye| sector(eye)).collect();
+            // Planes of the tree are rounded: beside a line its sector is uncertain.
+            let is_below = |eye: &&DVec3| {
+                let off = map.lines.iter().all(|line| {
+                    let [u, v] = line.ends.map(|end| glam::DVec2::from(end.map(f64::from)));
+                    (v - u).perp_dot(eye.truncate() - u).abs() > (v - u).length()
+                });
+                let floor = map.sectors[sector(**eye) as usize].heights[0];
+                off && (eye.z - floor - 41.0).abs() > 1e-9
+            };
+            let below: Vec<&DVec3> = eyes.iter().filter(is_below).collect();
+            assert!(below.is_empty(), "{name}: {below:?}");
             for pair in eyes.windows(2) {
                 let [p, q] = [pair[0].truncate(), pair[1].truncate()];
                 for line in &solid {
