@@ -19,7 +19,7 @@ pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>>
     groups.into_iter().map(|(_, group)| group).collect()
 }
 
-/// What tells each group from the others: "cold, six-box"; nothing of a single one.
+/// Settings that tell groups apart: "cold, six-box"; nothing of a single one.
 pub fn settings(groups: &[Vec<&Comparison>]) -> Vec<String> {
     let keys: Vec<[&str; 3]> = groups.iter().map(|group| key(group[0])).collect();
     let differs = |n: &usize| keys.iter().any(|key| key[*n] != keys[0][*n]);

@@ -16,7 +16,7 @@ pub(super) const MOST_TESTS: usize = 160_000 * MOST_CAMERAS;
 /// more items than that: a share of 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;
 
-/// Items seen by all cameras of the sample together, where that is no more work than
+/// Items that all cameras of the sample see, where that is no more work than
 /// [`MOST_TESTS`]: few cameras and a small share would be left to chance.
 const SEEN_BY_ALL: f64 = 1_000.0;
 
