@@ -133,9 +133,8 @@ fn program(name: &Path) -> anyhow::Result<PathBuf> {
 fn side(program: &Path) -> anyhow::Result<Side> {
     let bytes = fs::read(program).with_context(|| program.display().to_string())?;
     let digest = scene::hex(&hmac_sha256::Hash::hash(&bytes));
-    let short: String = digest.chars().take(12).collect();
     Ok(Side {
-        line: format!("{}, digest {short}", program.display()),
+        line: format!("{}, digest {digest:.12}", program.display()),
         json: json!({ "program": program.display().to_string(), "digest": digest }),
     })
 }

@@ -115,11 +115,10 @@ fn processes(report: &Report) -> String {
 fn side(report: &Report) -> Side {
     let (run, source) = (&report.run, &report.source);
     let commit = source.commit.as_deref().unwrap_or("unknown");
-    let commit: String = commit.chars().take(12).collect();
     let cells = text::counted(report.cells.len(), "cell");
     let (id, version) = (&run.id, &source.version);
     Side {
-        line: format!("{id}, version {version}, commit {commit}, {cells}"),
+        line: format!("{id}, version {version}, commit {commit:.12}, {cells}"),
         json: json!({
             "id": run.id,
             "started_at": run.started_at,

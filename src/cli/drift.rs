@@ -15,7 +15,7 @@ use crate::drift::{
     self, ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, DriftReport, ORBIT_RADIUS, Rated,
     Recommendation, RotationDrift, StabilityLimit,
 };
-use crate::measure::{ProcessTimes, Protocol};
+use crate::measure::ProcessTimes;
 use crate::report::grouped;
 
 /// Rounds of what is timed, if one process has them all.
@@ -35,7 +35,7 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
         study.begin(job);
         study.advance();
     });
-    let schedule = drift::plan(options, &protocol(args, 0));
+    let schedule = drift::plan(options, &args.spread.protocol(ROUNDS, 0));
     let times = study.times("everything, timed", None, &schedule)?;
     report.conclude(&times, schedule.rounds);
     print(args.format, &report, || show(&blocks(&report, args.all)))?;
@@ -50,14 +50,10 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-fn protocol(args: &DriftArgs, process: u32) -> Protocol {
-    args.spread.protocol(ROUNDS, process, usize::MAX)
-}
-
 /// Times everything in one process.
 pub fn time(args: &DriftArgs, timing: &Timing) -> anyhow::Result<ProcessTimes> {
-    let (plan, protocol) = (timing.plan()?, protocol(args, timing.process));
-    Ok(drift::time(&args.options, &plan, &protocol))
+    let protocol = args.spread.protocol(ROUNDS, timing.process);
+    Ok(drift::time(&args.options, &timing.plan()?, &protocol))
 }
 
 /// A number of steps.

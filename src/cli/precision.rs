@@ -20,7 +20,7 @@ use super::{
 use crate::funnel::{self, Chain, FunnelInput, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Setting};
-use crate::precision::{self, SWEEPS, size_sweep, sweep};
+use crate::precision::{self, Precision, SWEEPS, size_sweep, sweep};
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Rounds of a point, if one process has them all.
@@ -56,22 +56,18 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     }
     let lens_scale = setting.path.lens_scale;
     let times = study.times("every point, timed", lens_scale, &prepared.plan)?;
-    let precision = prepared.conclude(&times);
-    let wrong =
-        precision.points.iter().any(is_wrong) || precision.region_points.iter().any(is_wrong);
-    let outcome = precision_tables::Outcome {
-        precision,
-        skipped_items: setting.scene.skipped_items,
+    let outcome = Precision {
         seed: spread.seed,
-        warnings: setting.path.warnings(&setting.scene),
         size_sweep: sizes,
         sweeps,
+        ..prepared.conclude(&times)
     };
+    let wrong = outcome.points.iter().any(is_wrong) || outcome.region_points.iter().any(is_wrong);
     let shown = print(args.format, &outcome, || {
         let room = if args.all { usize::MAX } else { text::width() };
         show(&blocks(&outcome, args.all, room))
     });
-    let figures = precision_conclusions::figures(&outcome.precision);
+    let figures = precision_conclusions::figures(&outcome);
     if let Some(file) = &args.svg {
         write_text(file, &picture(&figures, 1))?;
     }
@@ -86,7 +82,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
 }
 
 /// Tables, then the conclusions.
-fn blocks(outcome: &precision_tables::Outcome, all: bool, room: usize) -> Vec<Block> {
+fn blocks(outcome: &Precision, all: bool, room: usize) -> Vec<Block> {
     let mut blocks = precision_tables::blocks(outcome, all, room);
     blocks.push(Block::heading("Conclusions:"));
     let told = precision_conclusions::conclusions(outcome).into_iter();

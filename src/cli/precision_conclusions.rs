@@ -4,15 +4,14 @@
 use super::diagram;
 use super::error_figure::{Against, Measured};
 use super::figure::{Figure, ends};
-use super::precision_tables::{CullingPoint, Outcome, elsewhere, named, numbers, percent, swept};
+use super::precision_tables::{CullingPoint, elsewhere, named, numbers, percent, swept};
 use super::text;
 use crate::measure::Status;
 use crate::precision::{Point, Precision, RegionErrors, SWEEPS, SizeRow, SweepRow};
 use crate::statistics::Rate;
 
-pub fn conclusions(outcome: &Outcome) -> Vec<String> {
-    let p = &outcome.precision;
-    let (sizes, sweeps) = (of_sizes(&outcome.size_sweep), of_sweeps(&outcome.sweeps));
+pub fn conclusions(p: &Precision) -> Vec<String> {
+    let (sizes, sweeps) = (of_sizes(&p.size_sweep), of_sweeps(&p.sweeps));
     let mut told = of_points(p);
     told.extend(
         [of_storage(p), of_regions(p), sizes, sweeps]

@@ -1,8 +1,6 @@
 //! Tables of `cullbench precision`: errors and times, the Pareto fronts and the
 //! sweeps. Sentences about them are in `precision_conclusions`.
 
-use serde::Serialize;
-
 use super::document::Block;
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time, time_plus_minus};
@@ -15,24 +13,10 @@ use crate::statistics::Rate;
 /// A structure with a culling.
 pub type CullingPoint = Point<CullingErrors>;
 
-/// Everything that is printed.
-#[derive(Serialize)]
-pub struct Outcome {
-    #[serde(flatten)]
-    pub precision: Precision,
-    /// Items left out on request (`--skip-bad-items`).
-    pub skipped_items: usize,
-    pub seed: u64,
-    pub size_sweep: Vec<SizeRow>,
-    pub sweeps: Vec<SweepRow>,
-    pub warnings: Vec<String>,
-}
-
 /// The Pareto front within `room` characters.
 ///
 /// With `all` every point, region search and the sweeps too.
-pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
-    let p = &outcome.precision;
+pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     let visible = p.points.iter().find_map(|point| point.errors.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
     let items = text::counted(p.items, "item");
@@ -65,12 +49,12 @@ pub fn blocks(outcome: &Outcome, all: bool, room: usize) -> Vec<Block> {
         let title = "Cameras after which the order of the points by time is final";
         add(title, stability_table(p), "");
     }
-    if all && !outcome.size_sweep.is_empty() {
+    if all && !p.size_sweep.is_empty() {
         let title = "False positives / visible, %, by cube edge s / depth D of the frustum";
-        let note = sizes_note(&outcome.size_sweep);
-        add(title, sizes_table(&outcome.size_sweep), &note);
+        let note = sizes_note(&p.size_sweep);
+        add(title, sizes_table(&p.size_sweep), &note);
         for (sweep, name, what) in SWEEPS {
-            let rows = outcome.sweeps.iter().filter(|row| row.sweep == sweep);
+            let rows = p.sweeps.iter().filter(|row| row.sweep == sweep);
             let (table, note) = swept_errors(&rows.collect::<Vec<_>>());
             let title = format!("Missed visible items (ppm) by {name} ({what}), nothing rebased");
             add(&title, table, &note);

@@ -227,14 +227,14 @@ fn about(report: &Report) -> Vec<String> {
     let suite = run.suite.as_deref().unwrap_or("chosen by hand");
     let (start, seed) = (&run.started_at, run.seed);
     let unfinished = ["", "; not finished"][usize::from(run.finished_at.is_none())];
-    let mut lines = vec![
-        format!("{start}, suite: {suite}, seed {seed}{unfinished}."),
-        format!("{}.", text::conclusion(report)),
-    ];
-    lines.splice(
-        1..1,
-        origin(&run.command, machine, &report.toolchain, &report.source),
-    );
+    let mut lines = vec![format!("{start}, suite: {suite}, seed {seed}{unfinished}.")];
+    lines.extend(origin(
+        &run.command,
+        machine,
+        &report.toolchain,
+        &report.source,
+    ));
+    lines.push(format!("{}.", text::conclusion(report)));
     lines.extend(report.noise.warnings.iter().cloned());
     lines.extend(report.input_warnings().into_iter().map(str::to_owned));
     lines

@@ -230,16 +230,14 @@ pub fn same_digest(
     before: Option<String>,
     now: impl Fn() -> String,
 ) -> Result<()> {
-    let short = |digest: &str| digest.chars().take(12).collect::<String>();
     let Some(before) = before else {
         return Ok(());
     };
     let now = now();
-    let (was, is) = (short(&before), short(&now));
     ensure!(
         before == now,
-        "{what} '{name}' has changed since the run was begun: its digest was {was} and is {is}; \
-         expected the same: begin a new run"
+        "{what} '{name}' has changed since the run was begun: its digest was {before:.12} and is \
+         {now:.12}; expected the same: begin a new run"
     );
     Ok(())
 }

@@ -244,7 +244,7 @@ pub struct SpreadArgs {
 
 impl SpreadArgs {
     /// The protocol of one of the processes, with its share of the `rounds` of a study.
-    pub fn protocol(&self, rounds: [usize; 2], process: u32, cameras: usize) -> Protocol {
+    pub fn protocol(&self, rounds: [usize; 2], process: u32) -> Protocol {
         let processes = self.processes as usize;
         let [least, most] = rounds;
         Protocol {
@@ -253,7 +253,7 @@ impl SpreadArgs {
                 (2 * most / processes).clamp(LEAST_ROUNDS, most),
             ],
             task_ns: TASK_NS / f64::from(self.processes),
-            cameras,
+            cameras: usize::MAX,
             cold: false,
             // Other orders in each process.
             seed: self.seed.wrapping_add(u64::from(process)),

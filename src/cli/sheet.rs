@@ -9,7 +9,7 @@ use super::text;
 use super::text::html;
 use crate::geometry::{Aabb, Plane};
 use crate::index::TreeCell;
-use crate::scene::{Scene, UpAxis};
+use crate::scene::{Scene, UpAxis, clipped};
 
 /// Low and high corner.
 pub type Rect = [DVec2; 2];
@@ -294,27 +294,13 @@ pub fn corners_of([a, b]: Rect) -> [DVec2; 4] {
 
 /// The part of a polygon in a half-space about an origin.
 ///
-/// All of it if the plane is not upright. By Sutherland and Hodgman 1974, "Reentrant
-/// polygon clipping".
+/// All of it if the plane is not upright.
 pub fn cut(polygon: &[DVec2], side: &Plane, origin: DVec3) -> Vec<DVec2> {
     if !is_upright(side) {
         return polygon.to_vec();
     }
     let (normal, origin) = (side.normal.as_dvec3().truncate(), origin.truncate());
-    let value = |p: DVec2| normal.dot(p - origin) + f64::from(side.d);
-    let mut part = Vec::new();
-    for (i, &to) in polygon.iter().enumerate() {
-        let from = polygon[(i + polygon.len() - 1) % polygon.len()];
-        let (before, here) = (value(from), value(to));
-        if (before < 0.0) != (here < 0.0) {
-            let share = before / (before - here);
-            part.push(from + (to - from) * share);
-        }
-        if here >= 0.0 {
-            part.push(to);
-        }
-    }
-    part
+    clipped(polygon, |p| normal.dot(p - origin) + f64::from(side.d))
 }
 
 #[cfg(test)]

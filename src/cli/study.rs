@@ -36,9 +36,10 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
     bar
 }
 
-/// Loads what the arguments name: in a worker for its `timing`, in the command
-/// itself without one and with `held`: the number
-/// of structures to hold for n of them, and bytes per triangle.
+/// Loads what the arguments name, in a worker for its `timing`.
+///
+/// In the command itself `held` gives structures to have room for, by the number of those
+/// named, and bytes per triangle.
 pub fn load(
     registry: &Registry,
     args: &StudyArgs,
@@ -69,7 +70,7 @@ pub fn load(
     let process = timing.map_or(0, |timing| timing.process);
     Ok(Setting {
         path: path::load_scaled(&args.path, &scene, &lens, lens_scale)?,
-        protocol: args.spread.protocol(rounds, process, usize::MAX),
+        protocol: args.spread.protocol(rounds, process),
         structures,
         scene,
     })

@@ -263,7 +263,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         tasks.retain(|(key, _)| report.needs(key));
     }
     Ok(Prepared {
-        plan: FunnelPlan::new(tasks, world.views.len(), input),
+        plan: FunnelPlan::of(tasks, world.views.len(), input),
         report,
     })
 }

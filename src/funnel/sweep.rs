@@ -191,7 +191,7 @@ pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSw
         tasks.push(task);
     }
     Ok(PreparedSweep {
-        plan: FunnelPlan::new(tasks, world.views.len(), input),
+        plan: FunnelPlan::of(tasks, world.views.len(), input),
         sweep: StageSweep {
             scene: scene.name.clone(),
             path: path.name.clone(),

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::stage::{Chain, NONE, StageKind, Step};
 use super::world::FunnelInput;
-use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed_to_end};
+use crate::measure::{Ask, OverProcesses, ProcessTimes, StudyPlan, TimedTask};
 
 named! {
     /// A question about a cursor.
@@ -58,16 +58,11 @@ impl FunnelKey {
 pub type KeyedTask<'w> = (FunnelKey, Ask<'w>);
 
 /// Tasks and schedule of the timed pass, the same for all processes.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct FunnelPlan {
-    schedule: Schedule,
-    /// Tasks with the expected number of ids in each view.
-    tasks: Vec<(FunnelKey, Vec<u64>)>,
-}
+pub type FunnelPlan = StudyPlan<FunnelKey>;
 
 impl FunnelPlan {
     /// Does every task once in each of `views` views, and plans their times.
-    pub fn new(tasks: Vec<KeyedTask>, views: usize, input: &FunnelInput) -> FunnelPlan {
+    pub fn of(tasks: Vec<KeyedTask>, views: usize, input: &FunnelInput) -> FunnelPlan {
         let mut out = Vec::new();
         let mut count = |ask: &Ask, view| {
             out.clear();
@@ -78,13 +73,7 @@ impl FunnelPlan {
             let expected = (0..views).map(|view| count(&ask, view)).collect();
             (key, TimedTask::new(expected, ask))
         });
-        let (keys, tasks): (Vec<_>, Vec<_>) = tasks.unzip();
-        let schedule = Schedule::new(views, &tasks, &input.setting.protocol);
-        let expected = tasks.into_iter().map(|task| task.expected);
-        FunnelPlan {
-            schedule,
-            tasks: keys.into_iter().zip(expected).collect(),
-        }
+        StudyPlan::new(tasks.collect(), views, &input.setting.protocol)
     }
 
     /// Times of one process.
@@ -92,16 +81,8 @@ impl FunnelPlan {
     /// A planned task that this process does not have fails by its counts.
     pub fn time(&self, tasks: Vec<KeyedTask>, input: &FunnelInput) -> ProcessTimes {
         let mut asks: HashMap<FunnelKey, Ask> = tasks.into_iter().collect();
-        let planned = self.tasks.iter().map(|(key, expected)| {
-            let ask = asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
-            TimedTask::new(expected.clone(), ask)
-        });
-        let planned: Vec<TimedTask> = planned.collect();
-        ProcessTimes::of(&timed_to_end(
-            &planned,
-            &self.schedule,
-            &input.setting.protocol,
-        ))
+        let ask = |key: &FunnelKey| asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
+        ProcessTimes::of(&self.timed(&input.setting.protocol, ask))
     }
 
     /// Expected numbers of ids of a task, by view.

@@ -73,7 +73,7 @@ pub use group::{GroupPlan, NO_ITEMS};
 pub use index_under_test::{Built, Subject, UPDATE_SHARES, move_share};
 pub use key::{CellKey, GroupKey, TaskKey, TaskKind};
 pub use metrics::{METRICS, MetricInfo};
-pub use over_processes::{OverProcesses, ProcessTimes};
+pub use over_processes::{OverProcesses, ProcessTimes, StudyPlan};
 pub use process_result::{Known, Measured, Part, SubjectPart, TaskPart, TaskSamples};
 pub use results::{Group, YARDSTICK};
 pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, cameras_within};

@@ -2,17 +2,18 @@
 //! culling, checked, judged against the exact truth, and timed side by side; and region
 //! search likewise.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::judged::{CullingErrors, Judged, Shots, Truths};
 use super::point::{self, Point, StableAfter, by_camera, stability};
 use super::region_search::{POINTS_PER_CAMERA, RegionErrors, RegionNumbers, RegionQueries};
+use super::size_sweep::SizeRow;
+use super::sweeps::SweepRow;
 use crate::camera::{PLANE_METHODS, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{
-    OverProcesses, ProcessTimes, Schedule, Setting, Status, TimedTask, Verdict, input_of,
-    timed_to_end,
+    OverProcesses, ProcessTimes, Setting, Status, StudyPlan, TimedTask, Verdict, input_of,
 };
 use crate::query::ItemId;
 use crate::scene::Scene;
@@ -45,25 +46,23 @@ pub struct Precision {
     pub region_points: Vec<Point<RegionErrors>>,
     /// How the order by time settles with more cameras.
     pub stability: Vec<StableAfter>,
+    /// Items left out on request (`--skip-bad-items`).
+    pub skipped_items: usize,
+    /// Warnings about the cameras in the scene.
+    pub warnings: Vec<String>,
+    /// Seed of the sweeps and of the order of the tasks.
+    pub seed: u64,
+    /// False positives by the size of items; empty unless requested.
+    pub size_sweep: Vec<SizeRow>,
+    /// Missed items of ill-conditioned cameras; empty unless requested.
+    pub sweeps: Vec<SweepRow>,
 }
 
 /// The timed tasks, the same in every process.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct PointPlan {
-    tasks: Vec<PlannedTask>,
-    schedule: Schedule,
-}
-
-/// One way to answer, timed.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct PlannedTask {
-    /// Index among all ways: those of the first diagram, then those of the other.
-    way: usize,
-    /// True if the same is timed a second time, as a check.
-    is_twin: bool,
-    /// Number of ids of every query.
-    expected: Vec<u64>,
-}
+///
+/// Their indices among all ways, those of the first diagram and then those of the other;
+/// true if the same is timed a second time, as a check.
+pub type PointPlan = StudyPlan<(usize, bool)>;
 
 /// All points, checked and judged, but not timed.
 pub struct Prepared {
@@ -212,15 +211,6 @@ impl<'a> Built<'a> {
         }
         Ok(())
     }
-
-    fn tasks(&self, planned: &[PlannedTask]) -> Vec<TimedTask<'_>> {
-        let ways = self.ways();
-        let task = |planned: &PlannedTask| {
-            let (way, expected) = (ways[planned.way], planned.expected.clone());
-            TimedTask::new(expected, move |n, out| self.answer(way, n, out))
-        };
-        planned.iter().map(task).collect()
-    }
 }
 
 /// Checks and judges all points, and plans how they are timed.
@@ -266,10 +256,11 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
         if !is_sound {
             continue;
         }
-        let task = |is_twin| PlannedTask {
-            way: index,
-            is_twin,
-            expected: answers.iter().map(|ids| ids.len() as u64).collect(),
+        let built = &built;
+        let task = |is_twin| {
+            let expected = answers.iter().map(|ids| ids.len() as u64).collect();
+            let ask = move |n: usize, out: &mut Vec<ItemId>| built.answer(way, n, out);
+            ((index, is_twin), TimedTask::new(expected, ask))
         };
         tasks.push(task(false));
         if let Way::Culling(_, judged) = way
@@ -279,19 +270,21 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
         }
     }
     tasks.extend(twin);
-    let schedule = Schedule::new(cameras, &built.tasks(&tasks), &setting.protocol);
+    let plan = StudyPlan::new(tasks, cameras, &setting.protocol);
     Ok(Prepared {
         precision: Precision {
             scene: scene.name.clone(),
             path: path.name.clone(),
             items,
             cameras,
-            rounds: schedule.rounds as usize,
+            rounds: plan.schedule.rounds as usize,
             points,
             region_points,
+            skipped_items: scene.skipped_items,
+            warnings: path.warnings(scene),
             ..Precision::default()
         },
-        plan: PointPlan { tasks, schedule },
+        plan,
     })
 }
 
@@ -306,8 +299,11 @@ pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessT
     let shots = Shots::of(&setting.path, most);
     let cameras = shots.cameras.len();
     let built = Built::new(setting, &shots, None)?;
-    let tasks = built.tasks(&plan.tasks);
-    let timed = timed_to_end(&tasks, &plan.schedule, &setting.protocol);
+    let (built, ways) = (&built, built.ways());
+    let timed = plan.timed(&setting.protocol, |&(way, _)| {
+        let way = ways[way];
+        Box::new(move |n, out| built.answer(way, n, out))
+    });
     let laps = timed.iter().map(|timed| match timed {
         Ok(timed) => by_camera(timed, cameras),
         Err(_) => Vec::new(),
@@ -324,11 +320,11 @@ impl Prepared {
         let (mut precision, plan) = (self.precision, self.plan);
         let times = OverProcesses::of(processes);
         // The twin comes last: the first task of its way is the original.
-        let original = |way| plan.tasks.iter().position(|planned| planned.way == way);
+        let original = |way| plan.tasks.iter().position(|(own, _)| own.0 == way);
         let mut culled = Vec::new();
-        for (task, planned) in plan.tasks.iter().enumerate() {
-            let way = planned.way;
-            if planned.is_twin {
+        let keys = plan.tasks.iter().map(|(key, _)| *key);
+        for (task, (way, is_twin)) in keys.enumerate() {
+            if is_twin {
                 precision.twin = original(way).and_then(|own| times.ratio(task, own));
             } else if let Some(point) = precision.points.get_mut(way) {
                 culled.push(task);

@@ -199,8 +199,7 @@ pub fn asked_otherwise((old, new): Pair) -> Option<String> {
         return None;
     }
     let digests = |what: &str, old: &str, new: &str| {
-        let short = |digest: &str| digest.chars().take(8).collect::<String>();
-        (old != new).then(|| format!("{what}: digest {} and {}", short(old), short(new)))
+        (old != new).then(|| format!("{what}: digest {old:.8} and {new:.8}"))
     };
     if let Some(reason) = digests("other items", &old.scene.digest, &new.scene.digest) {
         return Some(reason);
