@@ -161,7 +161,7 @@ pub trait RegionIndex: Sized + Send + Sync {
     const INFO: Info;
     /// Build parameters, `name:key=value` on the command line.
     ///
-    /// Keys that are not given have the values of `Default`. A field `threads` is the number of threads that share one query.
+    /// Keys that are not given have the values of `Default`, others are refused. A field `threads` is the number of threads that share one query.
     type Params: Default + Serialize + DeserializeOwned;
 
     /// Builds the structure. Deterministic: the same items and parameters give

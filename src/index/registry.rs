@@ -6,7 +6,7 @@
 use std::hint::black_box;
 
 use serde::Deserialize;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 #[cfg(feature = "peers")]
 use super::peers;
@@ -18,6 +18,7 @@ use super::{
 use crate::geometry::PlaneTree;
 use crate::json::told;
 use crate::query::ItemId;
+use crate::shown::first_of;
 use crate::spec::{Spec, SpecError};
 use crate::threads::Pool;
 
@@ -50,6 +51,18 @@ impl Row {
                 (Some(all), Some(given)) => {
                     // Not the nulls: JSON has no other form of NaN and infinity.
                     all.retain(|_, value| !value.is_null());
+                    // Only a key that serde passes over takes any value; a field's other
+                    // name does not, nor a field that is not serialised.
+                    let unknown = given.keys().find(|key| {
+                        let mut probe = all.clone();
+                        probe.insert((*key).clone(), json!([[]])).is_none()
+                            && T::Params::deserialize(Value::Object(probe)).is_ok()
+                    });
+                    if let Some(key) = unknown {
+                        let known = first_of(&all.keys().collect::<Vec<_>>(), 20);
+                        let reason = format!("a field '{key}'; expected {known}");
+                        return Err(BuildError::Params { structure, reason });
+                    }
                     all.extend(given.clone());
                 }
                 // Parameters without names, such as `()` or a number.

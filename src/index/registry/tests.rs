@@ -77,6 +77,9 @@ mod foreign {
     pub struct Aliased {
         #[serde(alias = "size")]
         leaf: u32,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        most: Option<u32>,
+        least: Option<u32>,
     }
 
     impl Default for Derived {
@@ -133,12 +136,15 @@ mod foreign {
 #[test]
 fn parameters_need_no_serde_default_and_may_have_no_names() {
     use foreign::{Alias, Number, Plain, Unit};
-    let aliased = Registry::empty().with::<Alias>().structure("Alias:size=7");
-    assert_eq!(aliased.unwrap().params["leaf"], 7);
+    let aliased = Registry::empty().with::<Alias>();
+    let aliased = aliased.structure("Alias:size=7,most=8,least=6");
+    let params = aliased.unwrap().params;
+    assert_eq!(params, json!({ "leaf": 7, "most": 8, "least": 6 }));
     let registry = Registry::empty()
         .with::<Plain>()
         .with::<Number>()
         .with::<Unit>();
+    let has_more = registry.clone().with::<Alias>();
     let specs = registry
         .structures("all,Plain:level=5,Plain:scale=2")
         .unwrap();
@@ -157,12 +163,18 @@ fn parameters_need_no_serde_default_and_may_have_no_names() {
     );
     assert!(specs.iter().all(|spec| spec.build(&[]).is_ok()));
     for (text, wanted) in [
+        // Without `deny_unknown_fields` serde passes over it.
+        (
+            "Plain:depth=5",
+            "'Plain': a field 'depth'; expected level, scale",
+        ),
+        ("Alias:leaf=5,leav=5", "'Alias': a field 'leav'; expected"),
         ("Plain:level=10", "level out of range"),
         ("Plain:level=-1", "level=-1; expected a whole number"),
         ("Number:level=1", "an object; expected a whole number"),
         ("Unit:level=1", "an object; expected "),
     ] {
-        let error = registry.structure(text).unwrap_err().to_string();
+        let error = has_more.structure(text).unwrap_err().to_string();
         assert!(error.contains(wanted), "{text}: {error}");
     }
 }
