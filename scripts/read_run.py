@@ -3,9 +3,8 @@
 usage: python3 scripts/read_run.py RUN [PICTURE.svg]
 
 Prints the time per query (of items that move, per frame) of each structure by scene, path, cache
-and test, once as report.json has it and once computed here from samples.csv, and draws the former.
-Needs pandas, and
-matplotlib for the picture. `python3 -i scripts/read_run.py RUN` leaves `summary` and `samples`
+and test, once as report.json has it and once computed here from samples.csv (or samples.csv.gz) by
+the same estimator, and draws the former. Needs pandas, and matplotlib for the picture. `python3 -i scripts/read_run.py RUN` leaves `summary` and `samples`
 to work with; docs/METHODOLOGY.md describes the columns.
 """
 
@@ -23,10 +22,14 @@ CELL = ["scene", "path", "cache", "test", "structure"]
 
 def read(run):
     """The rows of summary.csv (one per cell) and of samples.csv (one per clock reading)."""
+    tables = []
     for name in ("summary", "samples"):
-        if not (Path(run) / f"{name}.csv").is_file():
+        files = [Path(run) / f"{name}.csv", Path(run) / f"{name}.csv.gz"]
+        kept = [file for file in files if file.is_file()]
+        if not kept:
             sys.exit(f"read_run.py: {run}: {name}.csv was not kept; expected the folder of a whole run")
-    summary, samples = (pd.read_csv(Path(run) / f"{name}.csv") for name in ("summary", "samples"))
+        tables.append(pd.read_csv(kept[0]))
+    summary, samples = tables
     moves = summary.motion.notna()
     summary.loc[moves, "path"] += " + " + summary.motion[moves].astype(str)  # as in the samples
     return summary, samples
@@ -55,6 +58,26 @@ def times_of(samples, task="query"):
         return (values * shares).sum() / (high - low)
 
     return logs.groupby([*CELL, "process"]).agg(interquartile).unstack("process").map(math.exp)
+
+
+def over_processes(times):
+    """The time of each cell in ns, by the estimator of report.json (docs/METHODOLOGY.md, "Processes").
+
+    The 20 % trimmed mean of the logarithms of linear, and of the differences to it in each process;
+    without linear the first by name stands for it (in the report the first that was entered).
+    """
+    def trimmed(values):
+        values = values.dropna().sort_values()
+        cut = len(values) // 5
+        return values[cut:len(values) - cut].mean()
+
+    def of_group(logs):
+        labels = logs.index.get_level_values("structure")
+        base = logs[labels == "linear"] if "linear" in labels else logs[:1]
+        return (logs - base.iloc[0]).apply(trimmed, axis=1) + trimmed(base.iloc[0])
+
+    groups = times.map(math.log).groupby(CELL[:-1])
+    return pd.concat([of_group(logs) for _, logs in groups]).map(math.exp)
 
 
 def draw(summary, file):
@@ -86,7 +109,7 @@ if __name__ == "__main__":
     task = task_of(summary)
     times = [f"{task}_ns", f"{task}_ns_lower", f"{task}_ns_upper"]
     table = summary.set_index(CELL).reindex(columns=times)
-    table["from samples"] = times_of(samples, task).median(axis=1)
+    table["from samples"] = over_processes(times_of(samples, task))
     print(table.to_string())
     if len(sys.argv) == 3:
         draw(summary, sys.argv[2])
