@@ -93,8 +93,7 @@ def fastest(cells):
 
 def size_ratio(info):
     low, high = info["size_min"], info["size_max"]
-    # Points become boxes of one step of f32.
-    return "points" if high <= 4 * step(info) else f"1 : {number(high / low)}" if low else "from 0"
+    return "points" if not high else f"1 : {number(high / low)}" if low else "from 0"
 
 
 def table(run, scenes):
