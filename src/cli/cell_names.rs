@@ -32,7 +32,7 @@ pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String
         return scene + &rest;
     }
     let most = room.saturating_sub(3);
-    let left = most.saturating_sub(rest.chars().count() + 3).max(8);
+    let left = most.saturating_sub(text::across(&rest) + 3).max(8);
     shortened(&(shortened(&scene, left) + &rest), most)
 }
 

@@ -260,6 +260,17 @@ mod tests {
     }
 
     #[test]
+    fn wide_characters_take_two_columns() {
+        let mut table = Table::of("name | >one");
+        table.add_row(["\u{6f22}\u{5b57}", "1"]);
+        table.add_row(["abcd", "2"]);
+        assert_eq!(
+            table.bare(),
+            "name  one\n\u{6f22}\u{5b57}    1\nabcd    2\n"
+        );
+    }
+
+    #[test]
     fn text_in_the_last_column_is_wrapped_before_columns_move() {
         let mut table = Table::of("name | >time | why");
         table.add_row(["wide", "7 us", "the fastest of all that are right"]);
