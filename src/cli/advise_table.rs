@@ -88,7 +88,8 @@ fn taken(advice: &Advice) -> String {
         format!(", test {test}{}", ties(&advice.test.ties))
     });
     let repaid = row.and_then(|row| row.value("break_even_queries"));
-    let repaid = some(repaid.filter(|n| *n > 0.0), |n| {
+    let is_tied = choice.ties.iter().any(|tie| tie == YARDSTICK);
+    let repaid = some(repaid.filter(|n| *n > 0.0 && !is_tied), |n| {
         let queries = text::counted(n as usize, "query");
         format!(" Its build is repaid after {queries}.")
     });

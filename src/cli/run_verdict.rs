@@ -38,7 +38,7 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
         base.filter(|_| comparison.sound().nth(1).is_some())
             .and_then(fallback),
     );
-    told.extend(repaid(comparison));
+    told.extend(repaid(comparison, base));
     told.extend(gains(&SharedWork::of(comparison.sound())));
     told.extend(checked(&[comparison]));
     told.extend(failed(&[comparison]));
@@ -141,8 +141,13 @@ fn fallback(base: &str) -> Option<String> {
     other.then(|| format!("Speed-ups refer to {base}, the slowest: {YARDSTICK} has no times."))
 }
 
-fn repaid(comparison: &Comparison) -> Option<String> {
+/// The queries after which the build of the fastest has paid.
+///
+/// `None` where the base is not proven slower.
+fn repaid(comparison: &Comparison, base: Option<&str>) -> Option<String> {
     let best = comparison.winners().next()?;
+    let mut winners = comparison.winners();
+    let is_slower = winners.all(|cell| Some(cell.structure.as_str()) != base);
     let queries = best.value("break_even_queries").filter(|n| *n > 0.0)? as usize;
     let whose = match comparison.winners().count() {
         1 => "Its build".to_owned(),
@@ -152,7 +157,7 @@ fn repaid(comparison: &Comparison) -> Option<String> {
         1 => "one query".to_owned(),
         _ => format!("{} queries", text::count(queries)),
     };
-    Some(format!("{whose} is repaid after {queries}."))
+    is_slower.then(|| format!("{whose} is repaid after {queries}."))
 }
 
 /// Checks of the answers: by the reference scan, and in exact arithmetic.
