@@ -316,6 +316,7 @@ pub struct PrecisionArgs {
 
 #[derive(Args, Debug)]
 #[command(mut_arg("structure", |arg| arg.help("Structures to choose from, e.g. linear,bvh:leaf=4")))]
+#[command(mut_arg("motion", |arg| arg.conflicts_with_all(["moved", "queries_per_update"])))]
 pub struct AdviseArgs {
     #[command(flatten)]
     pub study: StudyArgs,

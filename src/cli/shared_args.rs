@@ -237,7 +237,7 @@ pub struct SpreadArgs {
     /// Processes to spread the rounds over; ten or more give intervals, one gives none
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::whole(1..=1000u32))]
     pub processes: u32,
-    /// Random seed: scenes of sweeps, order of measurement
+    /// Random seed: order of measurement; of precision also the scenes of sweeps
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
     pub seed: u64,
 }

@@ -493,6 +493,14 @@ fn mistakes_are_one_line() {
             "--motion 'doors' | one motion",
         ),
         ("--motion drift --update often", "--update 'often'"),
+        (
+            "--motion drift --moved 50%",
+            "--motion | cannot be used with | --moved",
+        ),
+        (
+            "--motion drift --queries-per-update 7",
+            "--motion | cannot be used with | --queries-per-update",
+        ),
     ] {
         all_refused(&folder, &[format!("{line} {more}")], wanted);
     }
