@@ -19,7 +19,7 @@ use crate::scene::{FAMILIES, FETCHED, MESHES, SAMPLES, SCENE_PARAMS};
 use crate::suite::SUITES;
 
 /// Further columns of rows, in the order of the tables.
-const COLUMNS: [&str; 6] = ["kind", "origin", "capabilities", "timed", "params", "unit"];
+const COLUMNS: &str = "kind origin capabilities timed params licence unit";
 
 pub fn list(registry: &Registry, args: &ListArgs) -> Result<Ending> {
     let topics = ListTopic::value_variants().to_vec();
@@ -57,7 +57,7 @@ pub fn list(registry: &Registry, args: &ListArgs) -> Result<Ending> {
 
 /// Further columns of a row, for people.
 fn told(row: &Value) -> Vec<String> {
-    let told = COLUMNS.iter().filter_map(|column| {
+    let told = COLUMNS.split(' ').filter_map(|column| {
         // Parameters as they are typed behind the name.
         let value = text_of(row.get(column)?).replace("\":", "=");
         Some((column, value.replace(['{', '}', '"'], "")))
@@ -122,17 +122,15 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
             });
             let meshes = MESHES.iter();
             let meshes = meshes.map(|m| row(m.name, "params", SCENE_PARAMS, m.summary));
-            let samples = SAMPLES.iter().map(|s| {
-                let params = format!("real; {}", s.licence);
-                row(s.name, "params", &params, s.summary)
-            });
+            let samples = SAMPLES.iter();
+            let samples = samples.map(|s| row(s.name, "licence", s.licence, s.summary));
             let fetched = FETCHED.iter().map(|f| {
                 let state = match f.is_there() {
                     true => "fetched".to_owned(),
                     false => format!("missing: scripts/fetch.py {}", f.name),
                 };
-                let params = format!("{state}; {}", f.licence);
-                row(&f.path().to_string_lossy(), "params", &params, &f.summary)
+                let licence = format!("{} ({state})", f.licence);
+                row(&f.path().to_string_lossy(), "licence", &licence, &f.summary)
             });
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, \

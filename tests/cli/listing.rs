@@ -136,6 +136,8 @@ fn every_scene_and_path_of_the_list_can_be_used() {
     let here = Path::new(".");
     let list = json(&works(here, "list --format json"));
     let real = set("freedm-map12 freedm-map20 helsinki us-counties");
+    let told = works(here, "list scenes");
+    assert!(told.contains(" licence ") && !told.contains("params real"));
     // Files are there only if they were fetched.
     let scenes = names(&list["scenes"]);
     for name in scenes.filter(|name| !name.contains('/')) {
