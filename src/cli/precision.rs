@@ -194,10 +194,11 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
     let is_lossy = |point: &&SweepPoint| point.errors.false_negative_count > 0.0;
     let lossy = sweep.points.iter().filter(is_lossy);
     let told = format!(
-        "{} of {} points dropped visible items{}. * On the Pareto front: no other point has fewer \
+        "{} of {} points dropped visible {}{}. * On the Pareto front: no other point has fewer \
          errors in these views, or is shown to be faster, and is as good in the rest.",
         lossy.clone().count(),
         sweep.points.len(),
+        sweep.stage.unit(),
         match lossy.filter(|point| is_guaranteed(point)).count() {
             0 => String::new(),
             wrong => format!("; {wrong} of these with a guarantee"),
@@ -206,7 +207,7 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
     vec![
         Block::Line(title),
         Block::Line(basis),
-        Block::Table(Table::with(&sweep.points, columns)),
+        Block::Table(Table::with(&sweep.points, columns).without_empty_columns()),
         Block::line(""),
         Block::Line(told),
     ]

@@ -47,6 +47,8 @@ fn a_map_has_regions_and_the_faces_of_its_walls() {
     assert!(gains.iter().any(|gain| gain["unit"] == "triangles"));
     let sweep = "precision --stage triangle --scene freedm-map12 --path street:frames=2 \
                  --processes 1 --format json";
+    let told = works(Path::new("."), sweep.trim_end_matches(" --format json"));
+    assert!(told.contains("points dropped visible triangles") && !told.contains("buffer"));
     let sweep = json(&works(Path::new("."), sweep));
     assert!(array(&sweep, "points").len() >= 3);
     // Boxes in its solid hide, and nothing that is visible.
