@@ -55,9 +55,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
         ("--no-picks", args.no_picks, ""),
     ] {
         if is_given && !input.all {
-            tell(&format!(
-                "note: {option} has no effect; expected --all{to_see} with it"
-            ));
+            let expected = format!("expected --all{to_see} with it");
+            tell(&format!("note: {option} has no effect; {expected}"));
         }
     }
     let is_begun = Cell::new(false);
@@ -88,7 +87,12 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
         write_text(file, &draw(&report, &stages.setting.scene))?;
     }
     if let Some(file) = &args.html {
-        let picture = Block::Picture(draw(&report, &stages.setting.scene));
+        // Beside the picture's own, which narrow pages make small.
+        let key = FATE_CLASSES.iter().map(|Class { colour, words, .. }| {
+            format!("<span><i style=\"background:{colour}\"></i>{words}</span> ")
+        });
+        let key = format!("<figcaption>{}</figcaption>", key.collect::<String>());
+        let picture = Block::Picture(draw(&report, &stages.setting.scene) + &key);
         let figures = [Block::Figure(passed(&report)), picture];
         let title = format!("funnel {}, {}", report.scene, report.path);
         let blocks = funnel_table::blocks(&report, true);

@@ -296,6 +296,8 @@ fn tables_fit_and_pictures_are_whole() {
     assert!(picture.contains("behind others") && picture.trim_end().ends_with("</svg>"));
     let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
     assert!(page.contains("<svg") && page.contains("<table>"));
+    // Its colours are text of the page too.
+    assert!(page.contains("</svg>\n<figcaption><span><i style=\"background:#e4e4e4\"></i>region"));
 }
 
 #[test]

@@ -362,7 +362,7 @@
     a: () => turn(-0.1, 0), d: () => turn(0.1, 0), w: () => turn(0, 0.1), s: () => turn(0, -0.1),
     q: () => zoom(1.15), e: () => zoom(1 / 1.15),
   };
-  FATES.forEach((_, fate) => (KEYS[fate + 1] = () => toggle(fate)));
+  Object.keys(FATES).filter((fate) => legend[fate]).forEach((fate, n) => (KEYS[n + 1] = () => toggle(Number(fate))));
   document.addEventListener("keydown", (event) => {
     const act = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     const isOwn = event.target.matches?.("button,summary,input[type=checkbox]") && event.key === " ";
