@@ -9,20 +9,21 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
-use super::cell_names::name;
+use super::cell_names::{name, place};
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{CompareTable, Side, change_of, counted, reason};
 use super::diagram::{Row, rows};
 use super::document::Block;
-use super::figure::{Axis, Figure, is_drawn};
+use super::figure::{Axis, Figure, LINE, is_drawn, line};
 use super::page::to_page;
 use super::run_resume::newest_run;
+use super::run_table::short;
 use super::{Ending, expect_places, run_plan, text, unread_is_fine, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
     Basis, Changes, JUDGED_METRICS, JudgedRow, Outcome, Report, ReportCell, Setting, WORK, changes,
-    read_report, settings, write_atomically,
+    read_report, settings, unique, write_atomically,
 };
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
@@ -145,17 +146,14 @@ fn expect_judged(changes: &Changes) -> anyhow::Result<()> {
     let cells = changes.cells_in_common;
     // A cell has a row per metric.
     let different = changes.count(Outcome::Different).min(cells);
-    let of_first = |row: &JudgedRow| {
-        let why = format!(" ({}: {})", name(&row.cell), reason(row));
-        text::plain(&why)
-    };
+    let of_first = |row: &JudgedRow| format!(" ({}: {})", name(&row.cell), reason(row));
     ensure!(
         !changes.judges_nothing(),
         "nothing can be judged: of {} in common, {different} not the same question, {} without \
          a figure{}; expected runs of the same scenes, cameras and metrics",
         text::counted(cells, "cell"),
         cells - different,
-        text::some(changes.rows.first(), of_first)
+        text::plain(&text::some(changes.rows.first(), of_first))
     );
     Ok(())
 }
@@ -175,33 +173,39 @@ fn show(table: &CompareTable) -> anyhow::Result<Ending> {
 
 /// The changes with intervals, the worst first.
 fn figure(changes: &Changes) -> Option<Figure> {
+    let groups = unique(changes.rows.iter().map(|row| &row.cell.group));
     let all = changes.rows.iter().filter_map(|row| {
+        let (group, structure) = (&row.cell.group, &row.cell.structure);
+        let at = text::some(groups.get(1), |_| format!(" {}", place(group, 36, short)));
         let ratio = row.ratio().filter(|ratio| is_drawn(*ratio))?;
         let judged = row.judgement.as_ref();
         let ends = judged.and_then(|judged| judged.lower.zip(judged.upper));
         Some(Row {
-            name: row.cell.structure.clone(),
+            name: structure.clone(),
             value: ratio,
             ends: ends.map(<[f64; 2]>::from),
-            label: format!("{} {}", row.cell.structure, change_of(ratio, None)),
+            label: format!("{structure}{at} {}", change_of(ratio, None)),
             note: format!("{}: {}", name(&row.cell), change_of(ratio, ends)),
             ..Row::default()
         })
     });
     let shown: Vec<Row> = all.take(DRAWN).collect();
     shown.first()?;
-    let change = |ratio: f64| format!("{:+.0} %", (ratio - 1.0) * 100.0);
+    let change = |ratio: f64| format!("{:+} %", ((ratio - 1.0) * 1e3).round() / 10.0 + 0.0);
     let most = 1.0 + changes.threshold;
     let limits = [1.0 / most, 1.0, most];
     let values = shown.iter().flat_map(Row::range);
-    let mut axis = Axis::log("", values.chain(limits), 1.05, &change);
-    axis.ticks = limits.to_vec();
+    let axis = Axis::log("", values.chain(limits), 1.05, &change);
     let (worst, all) = (shown.len(), text::counted(changes.rows.len(), "figure"));
     let caption = format!(
-        "Change from OLD to NEW with its 95 % interval, the worst {worst} of {all}; lines: no \
-         change, and the threshold"
+        "Change from OLD to NEW with its 95 % interval, the worst {worst} of {all}; strong line: no \
+         change, dotted: the threshold"
     );
-    Some(rows(caption, &axis, Some(1.0), &shown))
+    let mut figure = rows(caption, &axis, Some(1.0), &shown);
+    let height = [0.0, figure.height - 1.5 * LINE];
+    let threshold = |limit: f64| line("tie", [axis.percent(limit); 2], height);
+    figure.parts += &[limits[0], limits[2]].map(threshold).concat();
+    Some(figure)
 }
 
 /// Folder of the baselines, beside the runs.

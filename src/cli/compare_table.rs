@@ -97,8 +97,7 @@ impl CompareTable<'_> {
             }
             (false, TableFormat::Table) => {
                 let width = text::width();
-                let room = if args.all { usize::MAX } else { width };
-                to_terminal(&self.blocks(args.all, Some(room)), width)
+                to_terminal(&self.blocks(args.all, Some(width)), width)
             }
             (false, TableFormat::Json) => return self.json(),
         };
@@ -246,7 +245,7 @@ impl CompareTable<'_> {
             table.add_row(places.into_iter().chain(figures));
         }
         let table = table.without_empty_columns();
-        let Some(room) = room.filter(|room| *room < usize::MAX) else {
+        let Some(room) = room.filter(|room| *room < usize::MAX && !self.args.all) else {
             return table;
         };
         let mut first_to_go = vec!["metric", "resolves", processes, "old", "new"];

@@ -4,6 +4,7 @@ use super::cell_names::question;
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, to_html};
 use super::figure::{Axis, ends, is_drawn};
+use super::run_table::distinct;
 use super::table::{Column, Table};
 use super::{program, text};
 use crate::measure::Metric;
@@ -22,9 +23,21 @@ fn name(report: &Report) -> String {
     name.chars().take(digits).collect::<String>() + dirty
 }
 
+/// Names of the runs, with their start where two would be the same.
+fn names(reports: &[Report]) -> Vec<String> {
+    let started = |run: &usize| {
+        let start = reports[*run].run.started_at.chars().skip(5).take(14);
+        let start = start.collect::<String>().replace('T', " ");
+        format!("{} {start}", name(&reports[*run]))
+    };
+    let runs = Vec::from_iter(0..reports.len());
+    distinct(&runs, |run| name(&reports[*run]), started)
+}
+
 /// The page; runs are sorted by their start.
 pub fn page(mut reports: Vec<Report>) -> String {
     reports.sort_by(|a, b| a.run.started_at.cmp(&b.run.started_at));
+    let run_names = names(&reports);
     let cells = reports.iter().enumerate();
     let cells = cells.flat_map(|(run, report)| report.cells.iter().map(move |cell| (run, cell)));
     let cells = cells.map(|(run, cell)| (cell.key().group, (cell.structure.as_str(), (run, cell))));
@@ -34,8 +47,8 @@ pub fn page(mut reports: Vec<Report>) -> String {
     for (group, cells) in grouped(cells) {
         let heading = format!("{}, {}", group.scene, question(&group));
         let per = ["query", "frame"][usize::from(!group.motion.is_empty())];
-        let names = reports.iter().map(name).chain(["last / first".to_owned()]);
-        let mut table = Table::of_numbers(["structure".to_owned()].into_iter().chain(names));
+        let names = run_names.iter().map(String::as_str).chain(["last / first"]);
+        let mut table = Table::of_numbers(["structure"].into_iter().chain(names));
         let mut series = Vec::new();
         for (structure, cells) in grouped(cells.into_iter()) {
             let sound = cells.iter().filter(|(_, cell)| cell.rank.is_some());
@@ -75,9 +88,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
             let point = |&(run, time): &(usize, &Metric)| Point {
                 at: [run as f64, time.value],
                 ends: ends(time.estimate()),
-                note: text::joined([structure, &name(&reports[run])])
-                    + ": "
-                    + &text::time_with(time),
+                note: text::joined([structure, &run_names[run]]) + ": " + &text::time_with(time),
                 ..Point::default()
             };
             let is_scan = cells.iter().any(|(_, cell)| cell.is_scan());
@@ -93,7 +104,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
         });
         blocks.push(Block::Heading(2, heading.clone()));
         if !series.is_empty() {
-            let commit = |run: f64| reports.get(run as usize).map_or(String::new(), name);
+            let commit = |run: f64| run_names.get(run as usize).cloned().unwrap_or_default();
             let mut x = Axis::linear("run", 0.0..(reports.len() - 1) as f64, &commit);
             x.ticks = (0..reports.len()).map(|run| run as f64).collect();
             let points = series.iter().flat_map(|s| s.points.iter());
@@ -123,8 +134,8 @@ fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<Strin
         [first, rest @ ..] if rest.len() > 2 => format!(": {first} and {} others", rest.len()),
         names => format!(": {}", names.join("; ")),
     };
-    let [first, .., last] = reports else {
-        return "One run; a history has several.".to_owned();
+    let ([first, .., last], 1..) = (reports, compared) else {
+        return "No structure has times in two runs that can be compared.".to_owned();
     };
     let settings = settings(first, last);
     let differ: Vec<&str> = settings.iter().map(|setting| setting.what).collect();

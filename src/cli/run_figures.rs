@@ -157,7 +157,8 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         let values = spread.iter().flat_map(Row::range);
         let axis = Axis::log("", values, 1.1, &text::time);
         let caption = format!(
-            "{about}: distribution over the {view}s{each}; median, middle half, and 5 to 95 %"
+            "{about}: distribution over the {view}s{each}; median, middle half, and 5 to 95 % (p95 in \
+             tables: over groups of views that are the same for all structures)"
         );
         figures.push(rows(caption, &axis, None, &spread));
     }

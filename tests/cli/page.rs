@@ -120,6 +120,7 @@ fn what_failed_is_on_the_page_with_its_reason_and_has_no_mark() {
     let cells = report["cells"].as_array_mut().expect("an array");
     for cell in cells.iter_mut() {
         cell["rank"] = json!(1);
+        cell["metrics"]["break_even_queries"] = json!({ "value": 13.0, "unit": "queries" });
     }
     let wide = cells.iter_mut().find(|cell| cell["structure"] == "wide");
     let wide = wide.expect("a cell");
@@ -129,6 +130,8 @@ fn what_failed_is_on_the_page_with_its_reason_and_has_no_mark() {
     works(folder.path(), "report run --html page.html");
     let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
     assert_well_formed(&page);
+    // Tied with the base, no build is repaid.
+    assert!(page.contains("A tie: ") && !page.contains(" is repaid after "));
     assert!(page.contains("<p>wide: wrong: item 3 &lt;is&gt; missing</p>"));
     assert!(page.contains("Not ok, of 3 cells: 1 wrong."));
     assert_eq!(page.matches("<polygon class=\"mark").count(), 2);
@@ -172,14 +175,18 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     assert_eq!(plots[0].matches("<polygon class=\"mark").count(), 4);
     assert_eq!(plots[0].matches("class=\"interval\"").count(), 4);
     // Another question of the same name is left out, and says so.
+    // Runs of one commit have their starts too.
+    new["source"] = report["source"].clone();
     for cell in new["cells"].as_array_mut().expect("an array") {
         cell["path"]["camera_count"] = json!(80);
     }
     fs::write(folder.path().join("new.json"), new.to_string()).expect("writable");
     works(folder.path(), "report new.json old --history other.html");
     let page = fs::read_to_string(folder.path().join("other.html")).expect("a page");
-    assert!(page.contains("0 of no times took longer and 0 took less time"));
+    assert!(page.contains("<p>No structure has times in two runs that can be compared.</p>"));
     assert_eq!(page.matches("8 cameras and 80</td>").count(), 2);
+    let commits = usize::from(report["source"]["commit"].is_string());
+    assert_eq!(page.matches(" 01-01 00:00:00</th>").count(), commits);
     // What tells two sections apart is in their headings.
     for cell in new["cells"].as_array_mut().expect("an array") {
         let own = &mut cell["path"];
@@ -208,6 +215,20 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
     let run = "run --scene city:n=300 --path orbit:frames=4 --structure linear,bvh --no-bounds \
         --processes 3 --out run";
     works(folder.path(), run);
+    // Rows of several scenes name theirs.
+    let two = format!("{run}2 --scene city:n=400");
+    works(folder.path(), &two);
+    works(folder.path(), "compare run2 run2 --html page.html");
+    let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
+    for label in ["bvh city 300 orbit +0.0 %", "bvh city 400 orbit +0.0 %"] {
+        assert!(
+            page.contains(&format!(">{label}</text>")),
+            "{label}: {page}"
+        );
+    }
+    // The three limits have lines, and the axis its own ticks.
+    assert_eq!(page.matches("<line class=\"tie\"").count(), 2);
+    assert!(page.matches("class=\"tick\"").count() > 2, "{page}");
     let small = "--scene city:n=300 --path orbit:frames=4 --structure wide,linear --processes 1";
     let arms = "--arm linear --stiffness 1e4 --rate 60 --seconds 1 --processes 1";
     for (line, told, marks) in [
