@@ -3,6 +3,8 @@
 //! Four rows decide nearly every item by one sum per plane. Items within the rounding
 //! errors of a plane get the test of [`Spheres::drops`], so the sets are the same.
 
+use std::hint::cold_path;
+
 use super::{Aabb, Ball, BoxBlock, LANES, LaneMask, PlaneMask, Spheres};
 use crate::kernel::{Isa, prefetch};
 
@@ -114,6 +116,8 @@ pub(super) fn decide<'s, I: Isa>(
     if possible == sure {
         return sure;
     }
+    // Else a loop may keep its planes in memory instead of registers, for the sake of the call.
+    cold_path();
     let (spheres, mask, block) = question();
     sure | spheres.settled(block, mask, possible & !sure)
 }

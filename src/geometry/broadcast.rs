@@ -164,28 +164,26 @@ impl<I: Isa> Planes<I> for BallPlane<'_, I> {
     }
 }
 
-/// The six planes of a view frustum in vectors: three sums in place of six.
+/// The six planes of a view frustum as three sums in place of six.
 ///
 /// The lesser of the distances from two planes is `s - |t|`, where s and t are half the sum
 /// and half the difference of both. For the planes of a symmetric frustum, s of each pair of
 /// sides is linear in t of near and far plane.
-#[derive(Clone, Copy)]
-pub struct BallFrustum<'a, I: Isa> {
-    spheres: &'a Spheres,
-    depth: Unit<I>,
-    half_depth: I::Floats,
+#[derive(Clone, Debug)]
+pub(super) struct FrustumSums {
+    depth: [f32; 4],
+    half_depth: f32,
     /// Factor of the depth, offset, and t, of each pair of sides.
-    sides: [([I::Floats; 2], Unit<I>); 2],
+    sides: [([f32; 2], [f32; 4]); 2],
 }
 
-impl<'a, I: Isa> BallFrustum<'a, I> {
+impl FrustumSums {
     /// Largest part of s that is not linear in the depth, per unit of coordinates: with
     /// the roundings of the sums, less than half of [`Spheres::doubt`].
     const RESIDUAL: f64 = 3e-6;
 
     /// `None` for other planes than those of a symmetric frustum with a far plane.
-    #[inline(always)]
-    pub fn new(isa: I, spheres: &'a Spheres) -> Option<Self> {
+    pub fn of(spheres: &Spheres) -> Option<Self> {
         if spheres.planes().mask() != 0b11_1111 {
             return None;
         }
@@ -197,7 +195,6 @@ impl<'a, I: Isa> BallFrustum<'a, I> {
             let (a, b) = (plane(2 * pair), plane(2 * pair + 1));
             ((a + b) * 0.5, (a - b) * 0.5)
         };
-        let vector = |t: DVec4| splat(isa, t.as_vec4().to_array());
         let (still, depth) = halves(2);
         let mut residual = still.truncate().length();
         let axis = depth.truncate();
@@ -206,15 +203,40 @@ impl<'a, I: Isa> BallFrustum<'a, I> {
             let factor = s.truncate().dot(axis) / axis.length_squared();
             let rest = s - depth * factor;
             residual = residual.max(rest.truncate().length());
-            let linear = [isa.splat(factor as f32), isa.splat(rest.w as f32)];
-            (linear, vector(t))
+            ([factor as f32, rest.w as f32], t.as_vec4().to_array())
         };
         let sides = [side(0), side(1)];
-        (residual <= Self::RESIDUAL).then(|| BallFrustum {
-            spheres,
-            depth: vector(depth),
-            half_depth: isa.splat(still.w as f32),
+        (residual <= Self::RESIDUAL).then(|| FrustumSums {
+            depth: depth.as_vec4().to_array(),
+            half_depth: still.w as f32,
             sides,
+        })
+    }
+}
+
+/// The planes of a view frustum in vectors, for many blocks.
+#[derive(Clone, Copy)]
+pub struct BallFrustum<'a, I: Isa> {
+    spheres: &'a Spheres,
+    depth: Unit<I>,
+    half_depth: I::Floats,
+    sides: [([I::Floats; 2], Unit<I>); 2],
+}
+
+impl<'a, I: Isa> BallFrustum<'a, I> {
+    /// `None` for other planes than those of a symmetric frustum with a far plane.
+    #[inline(always)]
+    pub fn new(isa: I, spheres: &'a Spheres) -> Option<Self> {
+        let sums = spheres.frustum()?;
+        let [([f, r], t), ([g, s], u)] = sums.sides;
+        Some(BallFrustum {
+            spheres,
+            depth: splat(isa, sums.depth),
+            half_depth: isa.splat(sums.half_depth),
+            sides: [
+                ([isa.splat(f), isa.splat(r)], splat(isa, t)),
+                ([isa.splat(g), isa.splat(s)], splat(isa, u)),
+            ],
         })
     }
 }

@@ -5,6 +5,7 @@
 
 use glam::Vec3;
 
+use super::broadcast::FrustumSums;
 use super::convex_volume::MAX_PLANES;
 use super::{Aabb, ConvexVolume, Plane};
 use crate::arithmetic::rounding::{difference_down, difference_up, round_up};
@@ -164,6 +165,7 @@ impl SphereMargin {
 pub struct Spheres {
     planes: ConvexVolume,
     margins: [SphereMargin; MAX_PLANES],
+    frustum: Option<FrustumSums>,
 }
 
 impl Spheres {
@@ -173,10 +175,19 @@ impl Spheres {
         for (margin, plane) in margins.iter_mut().zip(planes.planes()) {
             *margin = SphereMargin::of(plane);
         }
-        Spheres {
+        let mut spheres = Spheres {
             planes: planes.clone(),
             margins,
-        }
+            frustum: None,
+        };
+        spheres.frustum = FrustumSums::of(&spheres);
+        spheres
+    }
+
+    /// All planes as sums, if they are those of a symmetric frustum with a far plane.
+    #[inline(always)]
+    pub(super) fn frustum(&self) -> Option<&FrustumSums> {
+        self.frustum.as_ref()
     }
 
     /// The planes in f32; what the sphere test adds to them is not in it.
