@@ -84,22 +84,6 @@ pub struct LinearParams {
 }
 
 impl Linear {
-    /// No items yet, and memory for the boxes of as many.
-    pub(super) fn with_room(items: usize) -> Self {
-        Linear {
-            boxes: BoxBlocks::with_capacity(items),
-            ids: PaddedIds::default(),
-            positions: Positions::default(),
-            balls: None,
-            workers: None,
-        }
-    }
-
-    /// Ids of the items, in the order of answers.
-    pub(super) fn ids(&self) -> &PaddedIds {
-        &self.ids
-    }
-
     /// Removes the item at a position; the last item takes its place.
     fn remove(&mut self, position: usize, id: ItemId) {
         if let Some(last) = self.ids.pop() {
@@ -114,6 +98,28 @@ impl Linear {
         }
     }
 
+    /// The blocks, all lanes of which hold an item up to the last one.
+    #[inline(always)]
+    fn blocks(&self) -> ScannedBlocks<'_, false> {
+        ScannedBlocks {
+            blocks: self.boxes.blocks(),
+            ids: &self.ids,
+            balls: self.balls.as_ref(),
+            occupied: &[],
+        }
+    }
+}
+
+/// Blocks of items to be scanned.
+pub(super) struct ScannedBlocks<'a, const VACANT: bool> {
+    pub blocks: &'a [BoxBlock],
+    pub ids: &'a PaddedIds,
+    pub balls: Option<&'a BallBlocks>,
+    /// If there are `VACANT` lanes, those of each block that hold an item.
+    pub occupied: &'a [LaneMask],
+}
+
+impl<const VACANT: bool> ScannedBlocks<'_, VACANT> {
     /// Tests a range of blocks against all planes; `open` is their number.
     #[inline(always)]
     fn scan_all<P: Planes<C::Isa>, C: Context>(
@@ -132,11 +138,16 @@ impl Linear {
                 blocks: &blocks[here.clone()],
                 doubt,
             });
-            let tests = BlockTests {
-                blocks: &self.boxes.blocks()[here.clone()],
+            let tests = BlockTests::<VACANT, _, _> {
+                blocks: &self.blocks[here.clone()],
                 planes,
                 balls,
                 items: self.ids.len() - first * LANES,
+                occupied: if VACANT {
+                    &self.occupied[here.clone()]
+                } else {
+                    &[]
+                },
                 open,
                 recorder: &mut *recorder,
                 four: [0; 4],
@@ -148,14 +159,14 @@ impl Linear {
 
     /// Tests a range of blocks, on this thread.
     #[inline(always)]
-    fn scan<Q: QueryVolume, C: Context>(
+    pub fn scan<Q: QueryVolume, C: Context>(
         &self,
         range: Range<usize>,
         volume: &Q,
         cx: &mut C,
     ) -> ControlFlow<()> {
         let open = Q::planes_open(volume.mask());
-        let balls = seen_by(self.balls.as_ref(), volume);
+        let balls = seen_by(self.balls, volume);
         if C::Isa::MANY_REGISTERS
             && let Some(planes) = volume.all_planes(cx.isa())
         {
@@ -179,7 +190,7 @@ impl<I: Isa, Q: QueryVolume> QueryInParts<I> for SharedScan<'_, Q> {
         let recorder = &mut NoRecorder;
         let mut cx = QueryContext::new(isa, ids, recorder);
         // A Vec never breaks off.
-        let _ = self.scan.scan(first..end, self.volume, &mut cx);
+        let _ = self.scan.blocks().scan(first..end, self.volume, &mut cx);
     }
 }
 
@@ -241,7 +252,7 @@ impl RegionIndex for Linear {
             let work = SharedScan { scan: self, volume };
             return in_parts(workers, blocks.div_ceil(BLOCKS_PER_CALL), &work, cx);
         }
-        self.scan(0..blocks, volume, cx)
+        self.blocks().scan(0..blocks, volume, cx)
     }
 
     /// O(moved): overwrites their lanes. Items may become or cease to be empty.
@@ -275,12 +286,13 @@ pub fn seen_by<'t, Q: QueryVolume>(balls: Option<&'t BallBlocks>, volume: &Q) ->
 }
 
 /// The tests of consecutive blocks against all planes, run by the sink.
-struct BlockTests<'a, P, R> {
+struct BlockTests<'a, const VACANT: bool, P, R> {
     blocks: &'a [BoxBlock],
     planes: P,
     balls: Option<Balls<'a>>,
     /// Number of items in these blocks and the following ones.
     items: usize,
+    occupied: &'a [LaneMask],
     /// Number of open planes.
     open: u32,
     recorder: &'a mut R,
@@ -288,7 +300,9 @@ struct BlockTests<'a, P, R> {
     four: [LaneMask; 4],
 }
 
-impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for BlockTests<'_, P, R> {
+impl<const VACANT: bool, I: Isa, P: Planes<I>, R: Recorder> Tests<I>
+    for BlockTests<'_, VACANT, P, R>
+{
     const SPARSE: bool = true;
 
     #[inline(always)]
@@ -298,7 +312,10 @@ impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for BlockTests<'_, P, R> {
 
     #[inline(always)]
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
-        let lanes = first_lanes(self.items - i * LANES);
+        let lanes = match VACANT {
+            true => self.occupied[i],
+            false => first_lanes(self.items - i * LANES),
+        };
         self.recorder.items_tested(lanes.count_ones());
         let tests = lanes.count_ones() * self.open;
         self.recorder.planes_tested(tests);

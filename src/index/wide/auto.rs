@@ -12,9 +12,8 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 pub use self::params::AutoParams;
 use self::params::{Update, Use};
-use super::{Moving, Wide, WideParams};
+use super::{Moving, WideParams};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
-use crate::index::linear::{Linear, LinearParams};
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::kernel::Plain;
 use crate::query::{Context, Count, ItemId, QueryContext, QueryCost, QueryVolume};
@@ -25,10 +24,11 @@ const SCAN: usize = 0;
 const TREE: usize = 1;
 
 /// Kinds of updates by their index in [`Auto::updates`].
-const UPDATES: [&str; 3] = ["overwriting", "refit", "rebuild"];
+const UPDATES: [&str; 4] = ["overwriting", "refit", "rebuild", "two trees"];
 const OVERWRITE: usize = 0;
 const REFIT: usize = 1;
 const REBUILD: usize = 2;
+const PART: usize = 3;
 
 // Times in ns, measured on one processor (AVX-512). Only their ratios choose.
 /// A query, besides what it tests, by search.
@@ -41,27 +41,21 @@ const SCAN_NS: f64 = 0.5;
 ///
 /// Beyond it the time of an item grows with the cube root of their number.
 const NEAR: f64 = 65_536.0;
-/// An overwritten item, and (more) one that leaves or enters, of a scan and a tree.
-const MOVE_NS: [f64; 2] = [7.0, 8.0];
-const ENTER_NS: [f64; 2] = [12.0, 9.0];
+/// An overwritten item.
+const MOVE_NS: f64 = 8.0;
 /// A refit, and a leaf whose bounds it fits.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
-/// The same of two trees, of a moved item.
-const REFIT_TWO_NS: f64 = 15.0;
+/// The same of two trees, of a moved item: one that jumps, as those do that age a tree.
+const PART_NS: f64 = 250.0;
+/// Time of a query of two trees / of one in a new tree, until it is counted.
+const TWO: f64 = 2.0;
 /// An item of a build.
 const BUILD_NS: f64 = 45.0;
-
-/// Fewest items that go to a scan in an update.
-const LEAST_FILLED: usize = 256;
-/// Most updates in which a scan is filled.
-const PARTS: usize = 8;
-/// Mark of a scan that has all items.
-const WHOLE: usize = usize::MAX;
 
 /// Number of frusta whose work is counted.
 const VIEWS: usize = 8;
 /// Time of a counted query / time of a query.
-const COUNTED: f64 = 4.0;
+const COUNTED: f64 = 8.0;
 /// Time of updates and queries / time of counting the work of the refitted tree.
 const RARELY: f64 = 16.0;
 /// Time that a new tree would have saved / time of its build: less may be chance.
@@ -79,17 +73,17 @@ const MOST_ASKED: u32 = 256;
 #[derive(Default)]
 pub struct Auto {
     trees: Moving,
-    /// The trees are as they were when it became whole.
-    scan: Option<Linear>,
-    /// Items that have gone to the scan; [`WHOLE`] once it takes the queries.
-    filled: usize,
+    /// Queries test all leaves; the blocks above them are as they were before.
+    scans: bool,
+    /// Movers have a tree of their own.
+    is_parted: bool,
     params: AutoParams,
     /// Index of the search after a build.
     built: usize,
     /// Modelled time of a query, ns, by search; infinite where that is unknown.
     costs: [f64; 2],
-    /// The same of the refitted tree, and of each view in a new tree.
-    aged: f64,
+    /// The same of the refitted tree and of two trees, and of each view in a new tree.
+    aged: [f64; 2],
     fresh: [Option<f64>; VIEWS],
     /// The view that was counted last.
     turn: usize,
@@ -106,19 +100,14 @@ pub struct Auto {
     /// Queries of the tree before that, and what a new one would have saved, ns.
     answered: f64,
     saving: f64,
-    /// Doubled with each count that finds no change.
+    /// Grows with each count that finds no change.
     patience: f64,
     /// Updates by kind, and the modelled time of all of them by each kind, ns.
-    updates: [u32; 3],
-    spent: [f64; 3],
+    updates: [u32; 4],
+    spent: [f64; 4],
 }
 
 impl Auto {
-    /// Returns whether movers get a tree of their own.
-    fn has_two_trees(&self) -> bool {
-        self.params.structure == Use::Moving
-    }
-
     /// Frustum of 60 degrees from the centre of an item to that of another one.
     fn view(&self, items: &[Aabb], i: usize) -> Option<ConvexVolume> {
         let ids = &self.trees.still.ids[..];
@@ -170,7 +159,7 @@ impl Auto {
         let [now, fresh] = both.fold([0.0; 2], |sum, both| [sum[0] + both[0], sum[1] + both[1]]);
         match fresh > 0.0 {
             true => self.costs[TREE] * now / fresh,
-            false => self.aged,
+            false => self.aged[usize::from(self.is_parted)],
         }
     }
 
@@ -184,46 +173,35 @@ impl Auto {
         }
     }
 
-    /// Modelled time of a scan of the items that are there, ns.
+    /// Modelled time of a scan, ns.
     fn scan_ns(&self) -> f64 {
-        let in_tree = |tree: &Wide| tree.ids.len() - tree.vacant;
-        let held = match &self.scan {
-            Some(scan) if self.filled == WHOLE => scan.ids().len(),
-            _ => in_tree(&self.trees.still) + in_tree(&self.trees.movers),
-        } as f64;
-        QUERY_NS[SCAN] + SCAN_NS * held * (held / NEAR).max(1.0).cbrt()
+        let lanes = self.trees.still.ids.len() as f64;
+        QUERY_NS[SCAN] + SCAN_NS * lanes * (lanes / NEAR).max(1.0).cbrt()
     }
 
     /// Chooses the search of a new tree.
     fn calibrate(&mut self, items: &[Aabb]) {
         let scan = self.scan_ns();
         let tree = self.count(items);
-        (self.aged, self.costs) = (tree, [scan, tree]);
+        (self.aged, self.costs) = ([tree, TWO * tree], [scan, tree]);
         self.built = match self.params.structure {
             Use::Linear => SCAN,
             Use::Auto if scan < tree => SCAN,
             _ => TREE,
         };
-    }
-
-    /// Scans from now on; false if that cannot be.
-    fn begin_scan(&mut self, input: &Input<'_>) -> bool {
-        self.scan = Linear::build(input, &LinearParams::default()).ok();
-        self.filled = WHOLE;
-        self.scan.is_some()
+        self.scans = self.built == SCAN;
     }
 
     /// Trees with a lane for each item, one that is gone beside the item before it.
-    fn trees_of(items: &[Aabb], params: &AutoParams) -> Result<Moving, BuildError> {
-        let order = params.order;
+    fn trees_of(&self, items: &[Aabb]) -> Result<Moving, BuildError> {
+        let order = self.params.order;
         let resting = |items: &[Aabb]| Moving::resting(&Input::new(items), &WideParams { order });
         // A bound that is no number is refused by the build.
         let is_gone = |b: &Aabb| b.is_empty() && b.is_finite();
         let ids = (0..).zip(items).filter(|(_, b)| is_gone(b));
         let gone: Vec<ItemId> = ids.map(|(id, _)| id).collect();
         let held = items.iter().find(|b| !b.is_empty());
-        let (false, Some(mut last)) = (params.structure == Use::Moving || gone.is_empty(), held)
-        else {
+        let (false, Some(mut last)) = (self.update == PART || gone.is_empty(), held) else {
             return resting(items);
         };
         let held = items.iter().map(|b| {
@@ -237,74 +215,76 @@ impl Auto {
 
     /// Replaces the trees; false with nothing changed if they cannot be built.
     fn rebuild(&mut self, items: &[Aabb]) -> bool {
-        let Ok(trees) = Auto::trees_of(items, &self.params) else {
+        let Ok(trees) = self.trees_of(items) else {
             return false;
         };
         self.trees = trees;
-        (self.scan, self.filled) = (None, 0);
-        if self.update == REFIT {
+        self.is_parted = self.update == PART;
+        self.scans = self.built == SCAN && !self.is_parted;
+        if matches!(self.update, REFIT | PART) {
             self.costs[TREE] = self.count(items);
-            self.aged = self.costs[TREE];
+            let new = self.costs[TREE];
+            self.aged = if self.is_parted {
+                [self.aged[0], TWO * new]
+            } else {
+                [new, self.aged[1]]
+            };
         }
         self.start();
         self.updates[REBUILD] += 1;
-        self.built == TREE || self.begin_scan(&Input::new(items))
+        true
     }
 
     /// Watches the age of other trees from now on.
     fn start(&mut self) {
         (self.since, self.answered, self.saving) = ([0.0; 2], 0.0, 0.0);
-        self.patience = 1.0;
+        // The first count comes early.
+        self.patience = 0.25;
     }
 
-    /// The scan alone, once it has all items; the trees are stale from then on.
+    /// The leaves alone; the blocks above them are stale from then on.
     fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let count = items.len();
-        let scan = (self.scan).get_or_insert_with(|| Linear::with_room(count));
-        let from = self.filled;
-        if from == WHOLE {
-            self.updates[OVERWRITE] += 1;
-            return scan.refit(items, moved);
+        if self.trees.still.overwrite(items, moved).is_none() {
+            return self.rebuild(items);
         }
-        // Filled in item order, as many at once as are moved: no update is much slower.
-        let more = if from == 0 { 0 } else { moved.len() };
-        let end = count.min(from + LEAST_FILLED.max(count / PARTS).max(more));
-        let held = moved.iter().filter(|id| (**id as usize) < from);
-        let ids: Vec<ItemId> = held.copied().chain(from as ItemId..end as ItemId).collect();
-        self.filled = if end < count { end } else { WHOLE };
-        let is_held = scan.refit(items, &ids) && (end == count || self.refit_held(items, moved));
-        self.updates[OVERWRITE] += u32::from(is_held);
-        is_held || self.rebuild(items)
+        self.scans = true;
+        self.updates[OVERWRITE] += 1;
+        true
     }
 
     /// New bounds in the trees; false if they cannot take them over.
     fn refit_held(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        match self.has_two_trees() {
+        match self.is_parted {
             true => self.trees.refit(items, moved),
             false => self.trees.still.take_over(items, moved),
         }
     }
 
     fn refit_trees(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        if self.filled == WHOLE {
-            let all: Vec<ItemId> = (0..items.len() as ItemId).collect();
-            if self.is_aged() || self.has_two_trees() || !self.trees.still.take_over(items, &all) {
-                return self.rebuild(items);
-            }
-            self.aged = self.age(items, 0..VIEWS);
+        let is_held = match self.scans {
+            true => !self.is_aged() && self.trees.still.overwrite(items, moved).is_some(),
+            false => self.refit_held(items, moved),
+        };
+        if is_held && std::mem::take(&mut self.scans) {
+            self.trees.still.fit();
+            self.aged[0] = self.age(items, 0..VIEWS);
             self.start();
         }
-        (self.scan, self.filled) = (None, 0);
-        if !self.refit_held(items, moved) || self.is_old(items) {
-            return self.rebuild(items);
+        if !is_held || self.is_old(items) {
+            let is_built = self.rebuild(items);
+            if self.is_parted && !is_held {
+                // Too crowded, now and after the build.
+                self.aged[1] = f64::INFINITY;
+            }
+            return is_built;
         }
-        self.updates[REFIT] += 1;
+        self.updates[self.update] += 1;
         true
     }
 
     /// Returns whether queries take half as long again as those of a new tree.
     fn is_aged(&self) -> bool {
-        self.aged > 1.5 * self.costs[TREE]
+        self.aged[0] > 1.5 * self.costs[TREE]
     }
 
     /// Returns whether a new tree pays; rarely counts the work, a view in an update.
@@ -312,21 +292,21 @@ impl Auto {
     /// It does if it costs less than its queries have saved against the present age. Of a tree
     /// that is old at once, a new one saves nothing.
     fn is_old(&mut self, items: &[Aabb]) -> bool {
-        let [asked, spent] = self.since;
-        if self.params.update != Update::Auto
-            || spent < RARELY * self.patience * COUNTED * self.aged
+        let ([asked, spent], present) = (self.since, self.aged[usize::from(self.is_parted)]);
+        if self.params.update != Update::Auto || spent < RARELY * self.patience * COUNTED * present
         {
             return false;
         }
         self.turn = (self.turn + 1) % VIEWS;
         let aged = self.age(items, self.turn..self.turn + 1);
-        // Half of it later on, as views differ.
-        let more = (aged - self.aged) / if self.answered > 0.0 { 2.0 } else { 1.0 };
+        // Half of it later on, as views differ, unless it is much.
+        let is_less = self.answered > 0.0 && aged < 2.0 * present;
+        let more = (aged - present) / if is_less { 2.0 } else { 1.0 };
         self.saving += more * self.answered;
         self.answered += asked;
-        self.aged += more;
-        self.patience = match more.abs() < 0.05 * self.aged {
-            true => MOST_PATIENCE.min(2.0 * self.patience),
+        self.aged[usize::from(self.is_parted)] += more;
+        self.patience = match more.abs() < 0.05 * aged {
+            true => MOST_PATIENCE.min(4.0 * self.patience),
             false => 1.0,
         };
         self.since = [0.0; 2];
@@ -335,38 +315,27 @@ impl Auto {
 
     /// Chooses the kind of updates: another one when the present one has lost what a
     /// change costs, so that a few exceptions change nothing.
-    fn weigh(&mut self, items: &[Aabb], now: &[ItemId]) {
+    fn weigh(&mut self, items: &[Aabb]) {
         let before = self.updates.iter().sum::<u32>();
         let updates = f64::from(std::mem::take(&mut self.weighing));
         let moved = std::mem::take(&mut self.moved);
-        let left = now.iter().filter(|id| items[**id as usize].is_empty());
-        let left = left.count() as f64 * updates;
         let asked = f64::from(std::mem::take(self.asked.get_mut()));
         // Queries before the first update are of no frame.
         let asked = if before == 0 { 1.0 } else { asked.max(updates) };
         let (all, leaves) = (items.len() as f64, self.trees.still.occupied.len() as f64);
         // About the number of leaves that hold them, if items move anywhere.
         let fitted = moved * leaves / (moved / updates).hypot(leaves);
-        let fit = REFIT_NS[0] * updates
-            + match self.has_two_trees() {
-                true => REFIT_TWO_NS * moved,
-                false => REFIT_NS[1] * fitted,
-            };
-        let is_scan = self.filled == WHOLE;
+        let fit = REFIT_NS[1] * fitted;
         self.costs[SCAN] = self.scan_ns();
-        if is_scan && self.aged > self.costs[TREE] {
-            self.aged += (self.costs[TREE] - self.aged) / FORGETS;
+        if self.scans || self.is_parted {
+            self.aged[0] += (self.costs[TREE] - self.aged[0]) / FORGETS;
         }
-        let change = match is_scan && self.is_aged() || self.has_two_trees() {
-            true => BUILD_NS * all,
-            false => MOVE_NS[TREE] * all + REFIT_NS[1] * leaves,
-        };
-        // About as many enter as leave.
-        let taken = |kind: usize| MOVE_NS[kind] * moved + 2.0 * ENTER_NS[kind] * left;
+        let taken = MOVE_NS * moved;
         let costs = [
-            taken(SCAN) + asked * self.costs[SCAN],
-            taken(TREE) + fit + asked * self.aged,
+            taken + asked * self.costs[SCAN],
+            taken + REFIT_NS[0] * updates + fit + asked * self.aged[0],
             BUILD_NS * all * updates + asked * self.costs[self.built],
+            taken + REFIT_NS[0] * updates + PART_NS * moved + asked * self.aged[1],
         ];
         for (spent, cost) in self.spent.iter_mut().zip(costs) {
             *spent += cost;
@@ -374,9 +343,20 @@ impl Auto {
         let best = match (self.params.update, self.params.structure) {
             (Update::Rebuild, _) => REBUILD,
             (_, Use::Linear) => OVERWRITE,
+            (_, Use::Moving) => PART,
             (Update::Refit, _) => REFIT.min(self.built),
-            (_, Use::Wide | Use::Moving) => REFIT,
-            _ => (0..3).fold(0, |best, i| if costs[i] < costs[best] { i } else { best }),
+            (_, Use::Wide) => REFIT,
+            // The queries of a frame are not known yet.
+            _ if before == 0 => REFIT.min(self.built),
+            _ => (0..4).fold(0, |best, i| if costs[i] < costs[best] { i } else { best }),
+        };
+        let is_new =
+            (best == PART) != self.is_parted || self.scans && best == REFIT && self.is_aged();
+        // A build, or there and back.
+        let change = if is_new {
+            BUILD_NS * all
+        } else {
+            2.0 * REFIT_NS[1] * leaves
         };
         self.regret += costs[self.update] - costs[best];
         // The second knows the queries of a frame.
@@ -406,20 +386,16 @@ impl RegionIndex for Auto {
         let mut auto = Auto {
             trees: Moving::resting(input, &WideParams { order })?,
             params: *params,
+            is_parted: params.structure == Use::Moving,
             ..Auto::default()
         };
         auto.calibrate(input.items);
         auto.start();
-        if auto.built == SCAN {
-            auto.begin_scan(input);
-        }
         Ok(auto)
     }
 
     fn memory(&self) -> MemoryUsage {
-        let mut memory = self.trees.memory();
-        memory.item_bytes += (self.scan.as_ref()).map_or(0, |scan| scan.memory().item_bytes);
-        memory
+        self.trees.memory()
     }
 
     #[inline(always)]
@@ -431,40 +407,36 @@ impl RegionIndex for Auto {
                 self.asked.store(asked + 1, Relaxed);
             }
         }
-        match &self.scan {
-            Some(scan) if self.filled == WHOLE => {
-                // Nothing has moved: the tree's root holds all items.
-                if self.updates[OVERWRITE] == 0
-                    && let Some(flow) = self.trees.still.query_root(scan.ids(), volume, cx)
-                {
-                    return flow;
-                }
-                scan.query(volume, cx)
-            }
-            _ if self.trees.movers.ids.is_empty() => self.trees.still.query(volume, cx),
-            _ => self.trees.query(volume, cx),
+        if !self.scans {
+            return self.trees.query(volume, cx);
         }
+        let tree = &self.trees.still;
+        // Nothing has moved: the tree's root holds all items.
+        if self.updates[OVERWRITE] == 0
+            && let Some(flow) = tree.query_root(volume, cx)
+        {
+            return flow;
+        }
+        tree.scan(volume, cx)
     }
 
     /// O(moved), or a new build. Items may become or cease to be empty.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         if moved.is_empty() {
             // Tables for the updates that follow.
-            return match &mut self.scan {
-                Some(scan) => scan.refit(items, moved),
-                None => self.refit_held(items, moved) || self.rebuild(items),
-            };
+            return self.refit_held(items, moved) || self.rebuild(items);
         }
         self.trees.still.balls = None;
         self.weighing += 1;
         self.moved += moved.len() as f64;
         if self.weighing == TOGETHER || self.updates.iter().sum::<u32>() < 2 {
-            self.weigh(items, moved);
+            self.weigh(items);
         }
         match self.update {
+            REBUILD => self.rebuild(items),
+            kind if (kind == PART) != self.is_parted => self.rebuild(items),
             OVERWRITE => self.overwrite(items, moved),
-            REFIT => self.refit_trees(items, moved),
-            _ => self.rebuild(items),
+            _ => self.refit_trees(items, moved),
         }
     }
 

@@ -21,10 +21,10 @@ use self::levels::{Layer, Level};
 use self::single_plane_buckets::SinglePlaneBuckets;
 use super::frontier::{Frontier, NodeList, is_far, pass_run, put_back, take};
 use super::items::{ABSENT, PaddedIds, Positions, indexable};
-use super::linear::seen_by;
+use super::linear::{ScannedBlocks, scan_blocks, seen_by};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES, LaneMask};
-use crate::kernel::{Isa, prefetch};
+use crate::kernel::{Isa, pairs, prefetch};
 use crate::query::{Bits, Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
 
@@ -241,26 +241,51 @@ impl Wide {
         traversal.test_leaves(&leaves, here, buckets)
     }
 
+    /// A query that tests all leaves, whatever the blocks above them hold.
+    #[inline(always)]
+    fn scan<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        let leaves = ScannedBlocks::<true> {
+            blocks: &self.blocks[..self.occupied.len()],
+            ids: &self.ids,
+            balls: self.balls.as_ref(),
+            occupied: &self.occupied,
+        };
+        if !Q::IS_POINT {
+            return leaves.scan(0..self.occupied.len(), volume, cx);
+        }
+        let blocks = pairs(leaves.blocks, &self.occupied).enumerate();
+        let blocks = blocks.map(|(at, (block, lanes))| (at * LANES, *lanes, block));
+        let isa = cx.isa();
+        let (sink, recorder) = cx.parts();
+        scan_blocks(
+            isa,
+            blocks,
+            &self.ids,
+            (volume, volume.mask()),
+            sink,
+            recorder,
+        )
+    }
+
     /// The whole query where the bounds of all items decide it.
     ///
-    /// It finds nothing or, without vacant lanes, everything: `ids`, those of the tree in some
-    /// order. `None` for a query that counts its work, that of blocks.
+    /// It finds nothing or, without vacant lanes, everything. `None` for a query that counts
+    /// its work, that of blocks.
     #[inline(always)]
     fn query_root<Q: QueryVolume, C: Context>(
         &self,
-        ids: &PaddedIds,
         volume: &Q,
         cx: &mut C,
     ) -> Option<ControlFlow<()>> {
         let is_counted = size_of::<C::Recorder>() > 0;
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        let all = 0..ids.len();
+        let all = 0..self.ids.len();
         match self.root_verdict(volume) {
             _ if is_counted => None,
             Containment::Outside => Some(ControlFlow::Continue(())),
             Containment::Inside if self.vacant == 0 => {
-                Some(pass_run(isa, all, ids, sink, recorder))
+                Some(pass_run(isa, all, &self.ids, sink, recorder))
             }
             _ => None,
         }
@@ -392,7 +417,7 @@ impl RegionIndex for Wide {
                 None => ControlFlow::Continue(()),
             };
         }
-        if let Some(flow) = self.query_root(&self.ids, volume, cx) {
+        if let Some(flow) = self.query_root(volume, cx) {
             return flow;
         }
         let mut scratch = take(&SCRATCH);

@@ -11,11 +11,17 @@ impl Wide {
     ///
     /// False with nothing changed if an item has no lane.
     pub(super) fn take_over(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        let changed = self.overwrite(items, moved);
+        changed.map(|leaves| self.fit_above(leaves)).is_some()
+    }
+
+    /// The leaves alone; returns those that have changed.
+    pub(super) fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<Dirty> {
         self.positions.prepare(&self.ids, items.len());
         let enters =
             |&id: &ItemId| self.positions.of(id).is_none() && !items[id as usize].is_empty();
         if items.len() > self.ids.len() && moved.iter().any(enters) {
-            return false;
+            return None;
         }
         let mut leaves = self.untouched();
         for (i, &id) in moved.iter().enumerate() {
@@ -35,8 +41,14 @@ impl Wide {
             }
             leaves.mark(position / LANES);
         }
+        Some(leaves)
+    }
+
+    /// Fits all blocks above the leaves.
+    pub(super) fn fit(&mut self) {
+        let mut leaves = self.untouched();
+        (0..self.occupied.len()).for_each(|leaf| _ = leaves.mark(leaf));
         self.fit_above(leaves);
-        true
     }
 
     /// No leaf, for [`Wide::fit_above`].
