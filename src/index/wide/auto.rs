@@ -45,7 +45,9 @@ const NEAR: f64 = 65_536.0;
 const MOVE_NS: f64 = 8.0;
 /// A refit, and a leaf whose bounds it fits.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
-/// The same of two trees, of a moved item: one that jumps, as those do that age a tree.
+/// The same of two trees, of a moved item.
+///
+/// One that jumps, as those do that age a tree.
 const PART_NS: f64 = 250.0;
 /// Time of a query of two trees / of one in a new tree, until it is counted.
 const TWO: f64 = 2.0;
