@@ -18,7 +18,6 @@ use super::{
 use crate::geometry::PlaneTree;
 use crate::json::told;
 use crate::query::ItemId;
-use crate::shown::first_of;
 use crate::spec::{Spec, SpecError};
 use crate::threads::Pool;
 
@@ -59,7 +58,7 @@ impl Row {
                             && T::Params::deserialize(Value::Object(probe)).is_ok()
                     });
                     if let Some(key) = unknown {
-                        let known = first_of(&all.keys().collect::<Vec<_>>(), 20);
+                        let known = Vec::from_iter(all.keys().map(String::as_str)).join(", ");
                         let reason = format!("a field '{key}'; expected {known}");
                         return Err(BuildError::Params { structure, reason });
                     }
