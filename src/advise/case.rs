@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::options::{AdviseInput, AdviseOptions, planned};
-use crate::camera::{PlaneOptions, Surroundings};
+use crate::camera::{Camera, PlaneOptions, Surroundings};
 use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
@@ -108,7 +108,7 @@ impl<'a> Case<'a> {
     ///
     /// The distance from the eye for a scene that is a point, and not zero even there.
     pub fn depth(&self, camera: usize) -> f64 {
-        let camera = &self.workload.cameras[camera];
+        let camera = self.camera(camera);
         let Scene { bounds, origin, .. } = self.scene();
         let [low, high] = [bounds.min, bounds.max].map(Vec3::as_dvec3);
         let depths = [high, camera.frame.eye - *origin].map(|end| end.distance(low));
@@ -116,13 +116,24 @@ impl<'a> Case<'a> {
         camera.lens.far().or(depth).unwrap_or(1.0)
     }
 
+    /// A camera without its far plane, if that is far beyond all items.
+    fn camera(&self, index: usize) -> Camera {
+        let Camera { frame, lens } = self.workload.cameras[index];
+        let bounds = self.scene().world_bounds();
+        let reach = frame.eye.distance(bounds.min) + bounds.min.distance(bounds.max);
+        let is_idle = lens.far().is_some_and(|far| far > 2.0 * reach);
+        let open = is_idle.then(|| lens.with_far(None).ok()).flatten();
+        let lens = open.unwrap_or(lens);
+        Camera { frame, lens }
+    }
+
     /// Outward displacement of planes for rounding about an origin, in depths.
     ///
     /// The largest of all cameras and planes, in depths of the view.
     pub fn margin(&self, around: &Surroundings) -> f64 {
         let options = PlaneOptions::default();
-        let cameras = self.workload.cameras.iter().enumerate();
-        let margins = cameras.filter_map(|(index, camera)| {
+        let margins = (0..self.workload.cameras.len()).filter_map(|index| {
+            let camera = self.camera(index);
             let moved = camera.volume(&options, around).ok()?;
             let derived = camera.volume(&options.without_epsilon(), around).ok()?;
             let planes = moved.planes().iter().zip(derived.planes());

@@ -49,21 +49,21 @@ pub enum LensKind {
 
 impl Lens {
     /// # Errors
-    /// fov outside (0, 180), aspect or near not above 0, near >= far, a value
-    /// that is not finite. A far plane beyond [`FARTHEST`] is an infinite one.
+    /// fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0 or, as far,
+    /// beyond 1e100, near >= far, a value that is not finite. A far plane beyond [`FARTHEST`] is an infinite one.
     pub fn perspective(fovy_deg: f64, aspect: f64, near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::Perspective { fovy_deg, aspect }, near, far)
     }
 
     /// # Errors
-    /// Height or aspect not above 0, near >= far, a value that is not finite.
+    /// Height or aspect outside 1e-100 to 1e100, near >= far, a value that is not finite.
     pub fn orthographic(height: f64, aspect: f64, near: f64, far: f64) -> Result<Lens> {
         Lens::new(LensKind::Orthographic { height, aspect }, near, Some(far))
     }
 
     /// # Errors
-    /// An empty window, near not above 0, near >= far, a value that is not
-    /// finite.
+    /// An empty window or one outside 1e-100 to 1e100, near not above 0, near >= far, a
+    /// value that is not finite.
     pub fn off_axis(window: [f64; 4], near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::OffAxis { window }, near, far)
     }
@@ -92,6 +92,8 @@ impl Lens {
             LensKind::Matrix(_) => return Err(CameraError::of_matrix("near and far planes")),
         }
         finite("near", near)?;
+        let found = format_args!("near is {near:e}");
+        require(near.abs() <= *EXACT.end(), found, "at most 1e100")?;
         let parallel = matches!(kind, LensKind::Orthographic { .. });
         let rule = "near > 0 for a perspective lens";
         require(parallel || near > 0.0, format_args!("near is {near}"), rule)?;
@@ -192,17 +194,22 @@ fn slope(degrees: f64) -> f64 {
     }
 }
 
+/// Sizes whose products of four neither overflow nor underflow in the oracle.
+const EXACT: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+
 fn check_aspect(aspect: f64) -> Result<()> {
-    let sound = aspect > 0.0 && aspect.is_finite();
-    let found = format_args!("the aspect ratio is {aspect}");
-    require(sound, found, "a number above 0")
+    let found = format_args!("the aspect ratio is {aspect:?}");
+    require(EXACT.contains(&aspect), found, "1e-100 to 1e100")
 }
 
 fn check_window(name: &str, low: f64, high: f64) -> Result<()> {
     finite(name, low)?;
     finite(name, high)?;
     let found = format_args!("the window is empty: {low} to {high} ({name})");
-    require(low < high, found, "low < high")
+    require(low < high, found, "low < high")?;
+    let is_held = EXACT.contains(&(high - low)) && low.abs().max(high.abs()) <= *EXACT.end();
+    let found = format_args!("the window is {low:e} to {high:e} ({name})");
+    require(is_held, found, "sizes from 1e-100 to 1e100")
 }
 
 impl Camera {
@@ -305,9 +312,19 @@ mod tests {
                 "{fovy_deg}"
             );
         }
-        for aspect in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        for aspect in [0.0, -1.0, 1e-101, 1e101, f64::NAN, f64::INFINITY] {
             let lens = Lens::perspective(60.0, aspect, 1.0, None);
             assert!(refused(lens, "the aspect ratio is "), "{aspect}");
+        }
+        for size in [5e-324, 1e-101, 1e101] {
+            let lens = Lens::orthographic(size, 1.0, 0.0, 1.0);
+            assert!(refused(lens, "the window is 0e0 to "), "{size}");
+            let lens = Lens::off_axis([0.0, 1.0, 0.0, size], 1.0, None);
+            assert!(refused(lens, "the window is 0e0 to "), "{size}");
+        }
+        for at in [1e101, -1e300] {
+            let lens = Lens::orthographic(1.0, 1.0, at, 1.0);
+            assert!(refused(lens, "near is "), "{at}");
         }
         let near = |near, far| Lens::perspective(60.0, 1.0, near, far);
         for at in [0.0, -0.0, -1.0, -1e-300] {

@@ -16,7 +16,14 @@ pub(super) const TINY: f64 = f64::from_bits((1023 - 147) << 52);
 
 /// The derivation in f64: each component of an axis is true to 4 units of
 /// 2^-53, a normal to 8, and the offset is a sum of products with the eye. 16
-/// units of what they are multiplied with cover all of it.
+/// units of what they are multiplied with cover all of it: at a point x of
+/// `reach`, 8 units of x, and of the eye 8, 3 for the sum and 2 for its own rounding.
+///
+/// Depths of near and far and windows of orthographic lenses do not count, though
+/// offsets of such planes round them twice. At a distance D from the plane such a
+/// length is at most `|x|` + `|eye|` + D. Two units of the former fit into the 16, as
+/// the normal is an axis with 4; those of D are far less than D itself, which
+/// comes on top of what x evaluates to.
 const DERIVED: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// Sums of the plane test must stay below this: half the largest f32, because
@@ -57,8 +64,6 @@ impl Margin {
         let near = at_depth(lens.near());
         let far = lens.far().map(at_depth);
         let reach = reach(&near, far.as_ref(), of_scene);
-        let deepest = lens.far().unwrap_or(lens.near()).abs() + lens.near().abs();
-        let coordinates = reach + frame.eye.abs();
         Margin {
             c,
             reach,
@@ -66,7 +71,7 @@ impl Margin {
             far,
             depth: lens.far().map_or(f64::INFINITY, |far| far - lens.near()),
             rays: lens.corners_at(&frame.relative_to(frame.eye), 1.0),
-            derived: [DERIVED * (coordinates.element_sum() + deepest); 2],
+            derived: [DERIVED * (reach + frame.eye.abs()).element_sum(); 2],
             of_frame,
         }
     }

@@ -37,15 +37,22 @@ fn ratio(a: &CullingPoint, b: &CullingPoint) -> String {
     text::significant(both.map_or(f64::NAN, |(a, b)| a / b))
 }
 
+/// The false positives of a point in words.
+fn extras(point: &CullingPoint) -> String {
+    match point.errors.excess {
+        None => "nothing is visible".to_owned(),
+        excess => format!("false positives {} %", percent(excess)),
+    }
+}
+
 fn of_points(p: &Precision) -> Vec<String> {
     let mut sound = p.points.iter().filter(is_safe);
     let Some(fastest) = sound.clone().next() else {
         return vec!["No point that is safe by its margin has a time.".to_owned()];
     };
-    let extras = |point: &CullingPoint| percent(point.errors.excess);
     let (name, time) = (named(fastest), text::time_plus_minus(fastest.time));
     let mut all = vec![format!(
-        "Fastest point that cannot miss an item: {name} at {time}, false positives {} %.",
+        "Fastest point that cannot miss an item: {name} at {time}, {}.",
         extras(fastest)
     )];
     let extra = |point: &CullingPoint| point.errors.counts.map(|errors| errors.false_positives);
@@ -54,7 +61,7 @@ fn of_points(p: &Precision) -> Vec<String> {
         let (times, name, extra) = (ratio(tight, fastest), named(tight), extras(tight));
         let fewer = "Fewer false positives take";
         all.push(format!(
-            "{fewer} {times} times as long or more: {name}, {extra} %."
+            "{fewer} {times} times as long or more: {name}, {extra}."
         ));
     }
     let depth = |point: &CullingPoint| point.errors.worst_miss_px.unwrap_or(0.0);
@@ -84,10 +91,10 @@ fn of_storage(p: &Precision) -> Option<String> {
     let least = p.points.iter().filter(is_safe);
     let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
     let (name, bytes) = (named(least), text::significant(memory(&least)));
-    let extra = percent(least.errors.excess);
+    let extra = extras(least);
     let time = text::some(least.query_ns(), text::time);
     Some(format!(
-        "Least memory: {name} at {bytes} B/item, false positives {extra} %, {time}."
+        "Least memory: {name} at {bytes} B/item, {extra}, {time}."
     ))
 }
 

@@ -24,6 +24,8 @@ use crate::shown::shortened;
 
 /// Longest wait before looking whether the user wants to stop.
 const GLANCE: Duration = Duration::from_millis(20);
+/// Step of a worker that has not told any.
+const STARTING: &str = "starting";
 /// Bytes of a worker's last words.
 const LAST_WORDS: usize = 4096;
 
@@ -137,7 +139,7 @@ impl Worker {
             _stdin: stdin,
             lines,
             last_words,
-            doing: (None, "starting".to_owned()),
+            doing: (None, STARTING.to_owned()),
             waited: Duration::ZERO,
             looked: Instant::now(),
             patience,
@@ -165,9 +167,13 @@ impl Worker {
         let message = message.ok_or_else(|| {
             let text = String::from_utf8_lossy(&line[..line.len().min(300)]);
             let text = shortened(text.trim_end(), 60);
+            // A worker that has told what it does speaks the protocol.
+            let why = match self.doing.1 == STARTING {
+                true => ": the program is of another version",
+                false => "",
+            };
             anyhow::anyhow!(
-                "a worker printed '{text}'; expected a message of protocol {PROTOCOL}: the \
-                 program is of another version"
+                "a worker printed '{text}'; expected a message of protocol {PROTOCOL}{why}"
             )
         })?;
         Ok(Some(match message {

@@ -217,8 +217,8 @@ impl Exact {
         }
     }
 
-    /// The sign of the value at the p-vertex.
-    pub fn sign_at_p_vertex(&self, b: &Corners, precision: Precision) -> i32 {
+    /// The value at the p-vertex, rounded; its sign is exact. Noise is zero.
+    pub fn at_p_vertex(&self, b: &Corners, precision: Precision) -> f64 {
         // The sign of a coefficient is that of its largest, last term.
         let mut corner = b.high;
         for &(k, term) in &self.terms {
@@ -236,20 +236,19 @@ impl Exact {
             value = sum;
             lost += error.abs();
         }
-        let mut sign = i32::from(value > 0.0) - i32::from(value < 0.0);
         if lost != 0.0 {
             let mut total = Expansion::default();
             parts.for_each(|part| total.grow(part));
-            (sign, value) = (total.sign(), total.estimate());
+            value = total.estimate();
         }
         if !precision.is_exact() {
             let [x, y, z, d] = self.size;
             let size = x * corner[0].abs() + y * corner[1].abs() + z * corner[2].abs() + d;
             if precision.is_noise(value, size) {
-                return 0;
+                return 0.0;
             }
         }
-        sign
+        value
     }
 }
 

@@ -135,12 +135,11 @@ impl Oracle {
     /// Depth of the box in the volume (positive) or a lower bound of its distance
     /// (negative), world units.
     ///
-    /// The least value of any certificate of unit length, to f64 rounding
-    /// (some 1e-15 of the coordinates and offsets). For a box that is IN this
+    /// The least value of any certificate of unit length, to a millionth of itself. For a box that is IN this
     /// is the length of the shortest move that makes it touch; for one that is
     /// OUT the widest gap that an axis of the separating axis test shows, never
-    /// more than the true distance (less where two corners are nearest). Zero
-    /// but for rounding for a touch, of which the sign is arbitrary. Infinite for a volume without constraints, minus infinity for an
+    /// more than the true distance (less where two corners are nearest). Zero for a
+    /// touch. Infinite for a volume without constraints, minus infinity for an
     /// empty box or volume. O(certificates).
     ///
     /// ```
@@ -167,10 +166,14 @@ impl Oracle {
         if corners.is_empty() || self.extent == Extent::Empty {
             return f64::NEG_INFINITY;
         }
-        let depths = self.filter.iter().map(|certificate| {
-            let [x, y, z] = certificate.normal;
+        let depths = self.filter.iter().zip(&self.exact).map(|(filter, exact)| {
+            let [x, y, z] = filter.normal;
             let length = (x * x + y * y + z * z).sqrt();
-            certificate.at_p_vertex(corners).0 / length
+            let (value, error) = filter.at_p_vertex(corners);
+            match error > value.abs() * 1e-6 {
+                true => exact.at_p_vertex(corners, self.precision) / length,
+                false => value / length,
+            }
         });
         depths.fold(f64::INFINITY, f64::min)
     }
@@ -193,7 +196,8 @@ impl Oracle {
         if value < -error {
             return -1;
         }
-        self.exact[certificate].sign_at_p_vertex(corners, self.precision)
+        let value = self.exact[certificate].at_p_vertex(corners, self.precision);
+        i32::from(value > 0.0) - i32::from(value < 0.0)
     }
 
     /// Returns whether a point of the box lies strictly inside all planes for certain:

@@ -65,8 +65,8 @@ pub(super) fn for_visible_share(
     let unreached = |found: &str, wanted: &str| {
         let scene = &scene.name;
         let reason = format!(
-            "visible={share} cannot be reached: {found} of '{scene}' is visible along it; \
-             expected a {wanted} share"
+            "visible={share} cannot be reached: six planes return {found} of '{scene}' along \
+             it; expected a {wanted} share"
         );
         unfit(path, reason)
     };

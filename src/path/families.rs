@@ -16,7 +16,7 @@ use crate::spec::Spec;
 /// `radius` is in half diagonals, `height` (of the eye above the centre) in radii.
 pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let radius = spec.number_between("radius", 0.6, 0.0, 1e6)? * stage.radius();
-    let height = spec.number("height", 0.35)? * radius;
+    let height = spec.number_between("height", 0.35, -1e6, 1e6)? * radius;
     let pose = |turn: f64| {
         let angle = std::f64::consts::TAU * turn;
         let arm = DVec3::new(libm::cos(angle) * radius, libm::sin(angle) * radius, height);

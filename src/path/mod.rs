@@ -128,7 +128,7 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
         "radius=0.6 (of half the scene's diagonal), height=0.35 (of the radius)", families::orbit;
     "flythrough", "a closed spline through seeded way points, looking ahead",
         "waypoints=8 (at least 4)", families::flythrough;
-    "spin", "a full turn in place at the centre (yaw)", "", families::spin;
+    "spin", "a full turn in place above the centre, at 0.3 of the height (yaw)", "", families::spin;
     "zoom", "a dolly towards the centre, then a zoom by field of view",
         "power=8 (magnification of the last view)", families::zoom;
     "teleport", "a new random place and direction every frame: no coherence", "", families::teleport;
@@ -144,8 +144,8 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
 
 /// Parameters that every generated path takes.
 pub const PATH_PARAMS: &str = "frames=256, seed=1 (of random choices), fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000, \
-     far=from the farthest eye to the centre and half the diagonal more (or inf), visible (choose far so that this share of the items is visible on average, e.g. \
-     visible=2%, or this many of them, e.g. visible=2000)";
+     far=from the farthest eye to the centre and half the diagonal more (or inf), visible (choose far so that the six-plane test returns this share of the items on average, \
+     false positives included, e.g. visible=2%, or this many of them, e.g. visible=2000)";
 
 /// The error of a path that a scene cannot have: what was found and expected.
 fn unfit(path: &str, reason: impl Display) -> InputError {

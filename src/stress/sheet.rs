@@ -20,16 +20,14 @@ use crate::query::{AnyVolume, QueryCost};
 ///
 /// A plane of unit length is rounded (u of `|d|` and of each `|n_k| x_k`),
 /// moved by c = 8 times u of `sum |n_k| A_k + |d|`, and evaluated with at most
-/// 4 roundings of the magnitudes at the box's corner: 13 u of the sum over k
-/// of the larger of A_k and the box's reach, and of `|d|`. The plane touches
-/// the volume, whose points near the camera are among its corners, so `|d|`
-/// is no more than the sum of A_k. 16 covers the sum of both; what is below
-/// f32 altogether is 2^-140 at most. An eye far away from all that it sees
-/// costs 2^-49 of its coordinates and depths, by the derivation in f64 and by
-/// the margin for it; for planes that are sums of others four times that is
-/// allowed. A view so wide that its sides are all
-/// but parallel leaves f64 no digits for its bounds; what the exact test then
-/// returns is not judged.
+/// 4 roundings of the magnitudes at the box's corner. `|d|` is no more than the
+/// magnitudes there and what the box is outside by, and A_k no more than the scene's
+/// reach: 26 u of the larger of that and of the box's own reach, and 32 covers it
+/// whatever the depths of near and far are. Below f32 altogether is 2^-140 at
+/// most. An eye far away from all that it sees costs 2^-49 of its coordinates, by the
+/// derivation in f64 and by the margin for it; for planes that are sums of others four
+/// times that is allowed. A view so wide that its sides are all but parallel leaves
+/// f64 no digits for its bounds; what the exact test then returns is not judged.
 pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
     const TINY: f64 = f64::from_bits((1023 - 140) << 52);
@@ -38,17 +36,17 @@ pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     if openness(&camera.lens) < CANCELLED {
         return f64::INFINITY;
     }
-    let near = camera.lens.near();
-    let nearby = camera.lens.with_far(camera.lens.far().or(Some(near * 2.0)));
-    let corners = nearby.ok().and_then(|lens| lens.corners(&camera.frame));
-    let corners = corners.iter().flatten().map(|corner| corner.abs());
-    let reach = corners.fold(around.reach.as_dvec3(), DVec3::max);
-    let size = reach.max(b.reach().as_dvec3()).element_sum() + reach.element_sum();
+    // A scene without extent has the volume's.
+    let mut reach = around.reach.as_dvec3();
+    if let (DVec3::ZERO, Some(corners)) = (reach, camera.lens.corners(&camera.frame)) {
+        reach = corners
+            .iter()
+            .fold(reach, |r, corner| r.max((*corner - around.origin).abs()));
+    }
+    let size = reach.max(b.reach().as_dvec3()).element_sum();
     let eye = camera.frame.eye;
-    let far_away = (eye.abs() + (eye - around.origin).abs()).element_sum()
-        + near.abs()
-        + camera.lens.far().unwrap_or(near).abs();
-    16.0 * UNIT_ROUNDOFF * size + DERIVED * far_away + TINY
+    let far_away = (eye.abs() + (eye - around.origin).abs()).element_sum();
+    32.0 * UNIT_ROUNDOFF * size + DERIVED * far_away + TINY
 }
 
 /// The determinant of near's, a side's and the bottom's or top's normals: what
@@ -240,11 +238,13 @@ impl Sheet<'_> {
     }
 
     /// Adds rows of the oracle's verdicts: visible and touching exactly as declared.
+    ///
+    /// A verdict that is too close to decide contradicts no claim.
     pub fn verdicts(&mut self, oracle: &Oracle, visible: &Option<Names>, touch: &Option<Names>) {
         let Some(listed) = visible.as_ref().or(touch.as_ref()) else {
             return;
         };
-        let mut wrong = Vec::new();
+        let (mut wrong, mut undecided) = (Vec::new(), Vec::new());
         let boxes = self.names.iter().zip(self.items);
         for (name, b) in boxes.filter(|(_, b)| b.is_finite()) {
             let judgement = oracle.judge(b);
@@ -261,16 +261,18 @@ impl Sheet<'_> {
                 (None, Some(false)) if found == Verdict::Touch => Verdict::In,
                 _ => found,
             };
-            // A view narrower than the oracle's numbers: what it calls a touch is visible.
-            let is_narrow = || self.vector.camera.is_some_and(|c| !c.is_carried());
-            let is_visible = judgement.undecided && wanted != Verdict::Out && is_narrow();
-            if found != wanted && !is_visible {
+            if found != wanted && judgement.undecided {
+                undecided.push(name.0.as_str());
+            } else if found != wanted {
                 wrong.push((name, wanted, format!("{found:?}").to_lowercase()));
             }
         }
         let subject = [ORACLE, CullingTest::Exact.name()];
         let got = Ok(self.seen_by(oracle).into_iter().collect());
         self.answered(None, subject, wrong.is_empty(), listed, &got);
+        if let (Some(row), false) = (self.rows.last_mut(), undecided.is_empty()) {
+            row.got = format!("too close to decide: {}", undecided.join(", ")).into();
+        }
         for (name, expected, got) in wrong {
             let expected = format!("{expected:?}").to_lowercase();
             self.row(Some(name), subject, Status::Fail, expected, got);

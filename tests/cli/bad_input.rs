@@ -246,7 +246,7 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         all_refused(&folder, &commands_with_cameras("bad.csv"), &wanted);
     }
     let folder = with_good_files(&[]);
-    let specs: [(&str, &str); 22] = [
+    let specs: [(&str, &str); 24] = [
         (
             "orbit:visible=200%",
             "visible=200% | a share between 0 and 1",
@@ -258,6 +258,8 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         ),
         ("orbit:far=-1", "far is -1 | expected a number above 0"),
         ("orbit:far=0", "far is 0 | expected a number above 0"),
+        ("orbit:height=1e300", "height is '1e300' | below 1000000"),
+        ("orbit:aspect=1e304", "the aspect ratio is 1e304 | 1e100"),
         ("orbit:far=5e-324", "far is 5e-324 | expected"),
         ("missing.csv", "missing.csv: No such file"),
         ("missing.txt", "missing.txt: No such file"),

@@ -296,6 +296,26 @@ fn region_search_is_a_diagram_of_its_own() {
 }
 
 #[test]
+fn where_nothing_is_visible_no_share_is_printed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let written = |name: &str, text: &str| std::fs::write(folder.path().join(name), text);
+    written(
+        "b.csv",
+        "min_x,min_y,min_z,max_x,max_y,max_z\n2,0,0,2,0,0\n",
+    )
+    .expect("written");
+    let lens = "fovy_deg,aspect,near,far\n0,0,0,-1,0,0,60,1,.1,100\n";
+    let camera = format!("eye_x,eye_y,eye_z,look_x,look_y,look_z,{lens}");
+    written("c.csv", &camera).expect("written");
+    let line = "precision --scene b.csv --path c.csv --cubes 0 --processes 1 --structure linear";
+    let out = works(folder.path(), line);
+    assert!(
+        out.contains("nothing is visible") && !out.contains("positives  %"),
+        "{out}"
+    );
+}
+
+#[test]
 fn one_process_gives_the_same_errors_without_intervals_or_ties() {
     let one = json(&works(
         Path::new("."),

@@ -50,6 +50,21 @@ fn depths_worked_by_hand() {
     assert_eq!(nothing.depth(&behind), f64::NEG_INFINITY);
 }
 
+/// A sum that f64 loses between two products of 48 bits.
+#[test]
+fn a_depth_below_the_rounding_of_f64_keeps_its_digits() {
+    let normal = Vec3::new(16_777_213.0, 1.0, -16_777_213.0);
+    for height in [2f32.powi(-20), -2f32.powi(-20), 0.0] {
+        let point = Vec3::new(16_777_183.0, height, 16_777_183.0);
+        let found = oracle(&[(normal, 0.0)]).depth(&Aabb::new(point, point));
+        let wanted = f64::from(height) / normal.as_dvec3().length();
+        assert!(
+            (found - wanted).abs() <= 1e-12 * wanted.abs(),
+            "{found:e}, {wanted:e}"
+        );
+    }
+}
+
 #[test]
 fn no_move_shorter_than_the_depth_changes_the_verdict() {
     let (mut ins, mut outs) = (0, 0);
