@@ -198,8 +198,8 @@ fn a_lens_that_is_narrower_than_the_oracle_carries_fails_nothing() {
     };
     for (fovy, aspect) in [("1e-9", "1"), ("1e-46", "1"), ("90", "1e-50"), ("90", "1")] {
         assert!(seen(fovy, aspect, r#"["b"]"#).is_empty(), "{fovy} {aspect}");
-        assert!(seen(fovy, aspect, "[]").contains(&"v/b".to_owned()));
     }
+    assert!(seen("90", "1", "[]").contains(&"v/b".to_owned()));
 }
 
 #[test]
