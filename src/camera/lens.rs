@@ -93,7 +93,11 @@ impl Lens {
         }
         finite("near", near)?;
         let found = format_args!("near is {near:e}");
-        require(near.abs() <= *EXACT.end(), found, "at most 1e100 from the eye")?;
+        require(
+            near.abs() <= *EXACT.end(),
+            found,
+            "at most 1e100 from the eye",
+        )?;
         let parallel = matches!(kind, LensKind::Orthographic { .. });
         let rule = "near > 0 for a perspective lens";
         require(parallel || near > 0.0, format_args!("near is {near}"), rule)?;
