@@ -372,7 +372,7 @@ fn structures_drop_none_of_them_either() {
     }
 }
 
-/// Depths beyond what any scene has: for orthographic views, of near behind the eye.
+/// Far planes, and orthographic near planes behind the eye, beyond any scene.
 #[test]
 fn a_plane_beyond_everything_moves_no_other_and_drops_nothing() {
     let mut rng = SeededRng::new(41);

@@ -107,7 +107,7 @@ fn a_touch_that_is_declared_and_not_visible_fails() {
     assert_eq!(wedge("[]"), ["v", "v/b"]);
 }
 
-/// Points nearer to a side plane than the oracle's 250 bits; their verdicts are from 900.
+/// A point nearer to a side plane than the oracle's 250 bits tell.
 #[test]
 fn what_is_too_close_for_the_oracle_contradicts_no_claim() {
     let text = r#"[{"id":"v","camera":{"eye":[0,-0.9420451126176258,0.7904697065498091],
