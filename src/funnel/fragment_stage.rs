@@ -10,8 +10,7 @@ use serde::Serialize;
 
 use super::error::fits_drawing;
 use super::item_stages::ItemStages;
-use super::report::StageRow;
-use super::stage::{BackEnd, Chain, NONE, STENCIL, StageKind, Step, Z};
+use super::stage::{BackEnd, NONE, STENCIL, StageKind, Step, Z};
 use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, count_items};
@@ -175,20 +174,20 @@ impl<'w> FragmentStage<'w> {
         })
     }
 
-    /// No test and every test of a chain, with the tallies of each view that is drawn.
+    /// No test and every test behind `steps`; with tallies of the views drawn.
     pub fn tested(
         &self,
         stages: &ItemStages,
-        chain: &Chain,
+        steps: &[Step],
         truth: &Truth,
-    ) -> Vec<(StageRow, Vec<Tally>)> {
-        let (world, steps) = (self.world, chain.steps());
+    ) -> Vec<(BackEnd, Errors, Vec<Tally>)> {
+        let world = self.world;
         let rows = world.back_ends(StageKind::Fragment).into_iter();
         let drawn = rows.filter(|row| row.name == NONE || self.too_much.is_none());
         let tested = drawn.map(|back_end| {
             let (mut counts, mut tallies) = (Vec::new(), Vec::new());
             for view in world.views() {
-                let given = stages.items(&steps, view);
+                let given = stages.items(steps, view);
                 let mut output = Vec::new();
                 match back_end.name {
                     NONE => output.extend_from_slice(&world.listed(given)),
@@ -196,11 +195,7 @@ impl<'w> FragmentStage<'w> {
                 }
                 counts.push(count_items(given, world.items(), &output, &truth[view]));
             }
-            let row = StageRow {
-                fragments: FragmentCounts::of(&tallies),
-                ..StageRow::new(back_end, back_end.name, chain, Errors::of(&counts))
-            };
-            (row, tallies)
+            (back_end, Errors::of(&counts), tallies)
         });
         tested.collect()
     }

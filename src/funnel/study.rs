@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::bounds::{bounds, covered_key};
 use super::error::{LeftOutRow, check_memory};
-use super::fragment_stage::{FragmentStage, mirrored};
+use super::fragment_stage::{FragmentCounts, FragmentStage, mirrored};
 use super::item_stages::{ItemStages, PlanView};
 use super::orders::{OrderRow, Orders, SORTED};
 use super::picks::Picks;
@@ -19,7 +19,6 @@ use super::world::{FunnelInput, World};
 use crate::input::{InputError, warn};
 use crate::measure::{ProcessTimes, Setting, Verdict};
 use crate::scene::memory::{available_bytes, fits_into};
-use crate::visibility::fragment::Tally;
 use crate::visibility::{Level, SampleGrid};
 
 /// Bytes per sample of a view: rays, depths and ties of two images.
@@ -182,12 +181,16 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     begin("every stage, compared with the truth");
     let study = Study::new(&world, input)?;
     let mut rows = study.rows(&truth);
-    let tested = (study.fragments).tested(&study.items, input.chain, &truth);
-    let (tests, tallies): (Vec<_>, Vec<_>) = tested.into_iter().unzip();
-    let z = tests.iter().position(|test| test.back_end.name == Z);
-    let drawn = z.iter().flat_map(|&z: &usize| &tallies[z]);
-    let covered: Vec<u64> = drawn.map(|tally: &Tally| tally.covered_count).collect();
-    rows.extend(tests);
+    let mut covered: Vec<u64> = Vec::new();
+    for (back_end, errors, tallies) in study.fragments.tested(&study.items, &study.steps, &truth) {
+        if back_end.name == Z {
+            covered = tallies.iter().map(|tally| tally.covered_count).collect();
+        }
+        rows.push(StageRow {
+            fragments: FragmentCounts::of(&tallies),
+            ..StageRow::new(back_end, back_end.name, input.chain, errors)
+        });
+    }
     let mut left_out = Vec::from_iter(left_out_of(scene));
     if let Some(reason) = &study.fragments.too_much {
         left_out.push(LeftOutRow::new(["stages", "fragment"], reason));

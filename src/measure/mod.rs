@@ -47,6 +47,7 @@ mod process_result;
 mod results;
 mod schedule;
 mod shared_work;
+mod study;
 mod task;
 mod timing;
 mod workload;
@@ -73,14 +74,15 @@ pub use group::{GroupPlan, NO_ITEMS};
 pub use index_under_test::{Built, Subject, UPDATE_SHARES, move_share};
 pub use key::{CellKey, GroupKey, TaskKey, TaskKind};
 pub use metrics::{METRICS, MetricInfo};
-pub use over_processes::{OverProcesses, ProcessTimes, StudyPlan};
+pub use over_processes::{OverProcesses, ProcessTimes};
 pub use process_result::{Known, Measured, Part, SubjectPart, TaskPart, TaskSamples};
 pub use results::{Group, YARDSTICK};
 pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, cameras_within};
 pub use shared_work::SharedWork;
+pub use study::{Setting, StudyPlan};
 pub use task::{Ask, AskMany, TimedTask};
 pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
-pub use workload::{Setting, Workload, WorkloadError, input_of};
+pub use workload::{Workload, WorkloadError, input_of};
 
 named! {
     /// Ending of a cell. A gap is never silent.

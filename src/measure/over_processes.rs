@@ -6,41 +6,8 @@ use std::borrow::Borrow;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Ask, Part, Protocol, Schedule, Timed, TimedTask, Verdict, timed_to_end};
+use super::{Part, Timed, Verdict};
 use crate::statistics::{ALPHA, Estimate, is_less, one_run, ratio};
-
-/// Timed tasks of a study by their keys, the same in every process.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct StudyPlan<K> {
-    /// Tasks with the number of ids of each query.
-    pub tasks: Vec<(K, Vec<u64>)>,
-    /// Rounds and order of the tasks.
-    pub schedule: Schedule,
-}
-
-impl<K> StudyPlan<K> {
-    /// A plan of tasks, each of them with `queries` queries.
-    pub fn new(tasks: Vec<(K, TimedTask)>, queries: usize, protocol: &Protocol) -> StudyPlan<K> {
-        let (keys, tasks): (Vec<_>, Vec<_>) = tasks.into_iter().unzip();
-        let schedule = Schedule::new(queries, &tasks, protocol);
-        let expected = tasks.into_iter().map(|task| task.expected);
-        StudyPlan {
-            tasks: keys.into_iter().zip(expected).collect(),
-            schedule,
-        }
-    }
-
-    /// Times the tasks in this process, answered by what `ask` gives for their keys.
-    pub fn timed<'a>(
-        &self,
-        protocol: &Protocol,
-        mut ask: impl FnMut(&K) -> Ask<'a>,
-    ) -> Vec<Result<Timed, Verdict>> {
-        let tasks = self.tasks.iter();
-        let tasks = tasks.map(|(key, expected)| TimedTask::new(expected.clone(), ask(key)));
-        timed_to_end(&tasks.collect::<Vec<_>>(), &self.schedule, protocol)
-    }
-}
 
 /// Times of the tasks of a schedule in one process, in the order of the schedule.
 /// Plain data that goes from process to process.

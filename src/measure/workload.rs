@@ -6,11 +6,10 @@ use std::borrow::Cow;
 
 use glam::Vec3;
 
-use super::Protocol;
 use crate::camera::{Camera, Surroundings};
 use crate::culling::{CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
-use crate::index::{Input, StructureSpec};
+use crate::index::Input;
 use crate::motion::Motion;
 use crate::path::CameraPath;
 use crate::query::ItemId;
@@ -20,18 +19,6 @@ use crate::scene::{Scene, Sought};
 /// them indexed, with the scene's own partition.
 pub fn input_of<'a>(scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
     Input::new(items).own_tree(scene.own_tree.as_ref())
-}
-
-/// Inputs of a study, loaded.
-pub struct Setting {
-    /// Items.
-    pub scene: Scene,
-    /// Cameras.
-    pub path: CameraPath,
-    /// Structures to be measured.
-    pub structures: Vec<StructureSpec>,
-    /// Rounds and times of a process.
-    pub protocol: Protocol,
 }
 
 /// A scene with the queries along one path.
