@@ -134,14 +134,23 @@ impl Positions {
     }
 }
 
-/// Set of nodes whose bounds have changed, a bit each.
-#[derive(Default)]
-pub struct Dirty(Vec<u64>);
+/// A set of numbers below a bound, listed in ascending order: ids, or nodes that changed.
+#[derive(Clone, Default, PartialEq, Eq, Debug)]
+pub struct IdSet(Vec<u64>);
 
-impl Dirty {
+/// The nodes whose bounds have to be fitted again.
+pub type Dirty = IdSet;
+
+impl IdSet {
     /// None of `nodes` nodes.
-    pub fn none(nodes: usize) -> Dirty {
-        Dirty(vec![0; nodes.div_ceil(64)])
+    pub fn none(nodes: usize) -> IdSet {
+        IdSet(vec![0; nodes.div_ceil(64)])
+    }
+
+    /// Makes it the empty set of ids below `bound`.
+    pub fn clear(&mut self, bound: usize) {
+        self.0.clear();
+        self.lengthen(bound);
     }
 
     /// Makes it a set of as many nodes, more than now.
@@ -156,6 +165,24 @@ impl Dirty {
         let is_new = *word & bit == 0;
         *word |= bit;
         is_new
+    }
+
+    /// Adds an id; returns `true` if it was not in the set.
+    pub fn insert(&mut self, id: u32) -> bool {
+        self.mark(id as usize)
+    }
+
+    /// Tests whether the id is in the set.
+    pub fn holds(&self, id: u32) -> bool {
+        self.0[id as usize / 64] >> (id % 64) & 1 != 0
+    }
+
+    /// Replaces `out` by the ids, ascending. O(bound / 64 + ids).
+    pub fn list(&self, out: &mut Vec<u32>) {
+        out.clear();
+        for (first, &word) in (0u32..).step_by(64).zip(&self.0) {
+            out.extend(Bits(word).map(|bit| first + bit));
+        }
     }
 
     /// Number of words of 64 nodes.

@@ -71,7 +71,7 @@ pub(crate) use erased::QueryMany;
 pub use erased::{DynIndex, Execution, UpdatePolicy, WithKernel, caught};
 pub use grid::UniformGrid;
 pub use info::{Info, Kind, Origin};
-pub use items::{Record, indexable};
+pub use items::{IdSet, Record, indexable};
 pub use linear::{Linear, LinearParams, LinearScalar};
 pub use registry::{Registry, Row, StructureSpec};
 pub use shared_query::QueryThreads;

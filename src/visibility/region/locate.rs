@@ -4,7 +4,8 @@
 
 use glam::DVec3;
 
-use super::graph::{IdSet, RegionGraph, RegionId};
+use super::graph::{RegionGraph, RegionId};
+use crate::index::IdSet;
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 

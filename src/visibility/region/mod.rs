@@ -19,7 +19,8 @@ mod row;
 mod search;
 mod view;
 
-pub use graph::{Ground, IdSet, Opening, OpeningPlane, RegionGraph, RegionId, rectangle};
+pub use crate::index::IdSet;
+pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, RegionId, rectangle};
 pub use locate::{RegionItems, without};
 pub use row::{BACK_ENDS, BackEnd, Pvs, RegionRow, Scratch, Source};
 

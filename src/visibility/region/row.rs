@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::graph::{IdSet, RegionGraph, RegionId};
+use super::graph::{RegionGraph, RegionId};
 use super::search::{Flood, PortalClip, PortalRect, Search};
+use crate::index::IdSet;
 use crate::input::{InputError, Result};
 use crate::json::from_json;
 use crate::kernel::extend;

@@ -3,8 +3,9 @@
 //! Windows are the parts of the image in which each region is seen; each back end has its own
 //! form of them.
 
-use super::graph::{IdSet, Opening, RegionGraph, RegionId};
+use super::graph::{Opening, RegionGraph, RegionId};
 use super::view::{HalfSpace, MOST_PLANES, Polygon, View, through_edge};
+use crate::index::IdSet;
 use crate::visibility::Rays;
 
 /// Most different windows of a region; further ones are the whole image.
