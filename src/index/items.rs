@@ -134,7 +134,7 @@ impl Positions {
     }
 }
 
-/// A set of numbers below a bound, listed in ascending order: ids, or nodes that changed.
+/// A set of numbers below a bound, ascending: ids, or nodes that changed.
 #[derive(Clone, Default, PartialEq, Eq, Debug)]
 pub struct IdSet(Vec<u64>);
 
