@@ -67,7 +67,11 @@ impl StructureChoice {
     /// From what a run measures of all structures on one scene and path.
     pub(super) fn of(cells: &[ReportCell]) -> StructureChoice {
         let mut rows = cells.to_vec();
-        rows.sort_by(|a, b| or_last(ns(a)).total_cmp(&or_last(ns(b))));
+        // Wrong answers and fat bounds below: they have no rank.
+        rows.sort_by(|a, b| {
+            let order = a.rank.is_none().cmp(&b.rank.is_none());
+            order.then(or_last(ns(a)).total_cmp(&or_last(ns(b))))
+        });
         let first = |metric| fastest(cells, metric).into_iter();
         let mut first_located = first(Some("locate_ns")).map(|cell| cell.structure.clone());
         let mut first = first(None).map(|cell| cell.structure.clone());
@@ -75,7 +79,7 @@ impl StructureChoice {
         let is_tied = |row: &&ReportCell| [&name, &ties].iter().any(|n| n.contains(&row.structure));
         let tied = |is_scan| (rows.iter().filter(is_tied)).any(|row| row.is_scan() == is_scan);
         StructureChoice {
-            is_scan: matches!(rows.first(), Some(row) if row.is_scan() && ns(row).is_some()),
+            is_scan: matches!(rows.first(), Some(row) if row.is_scan() && row.rank.is_some()),
             is_mixed: tied(false) && tied(true),
             name: name.into_iter().next(),
             ties,
@@ -123,10 +127,10 @@ impl StructureChoice {
     }
 }
 
-/// Rows with a time on one thread.
+/// Rows with a rank on one thread.
 fn alone(rows: &[ReportCell]) -> impl Iterator<Item = &ReportCell> {
     let is_shared = |row: &ReportCell| row.params["threads"].as_u64() > Some(1);
-    (rows.iter()).filter(move |row| ns(row).is_some() && !is_shared(row))
+    (rows.iter()).filter(move |row| row.rank.is_some() && !is_shared(row))
 }
 
 /// Time of a structure / time of another one.
@@ -323,7 +327,7 @@ mod tests {
                 "bounds_max": [1.0, 1.0, 1.0], "skipped_items": 0, "digest": "d" },
             "path": { "name": "p", "camera_count": 8, "cache": "warm", "planes": "frame",
                 "epsilon": 8.0, "arithmetic": "f32" },
-            "structure": structure, "kind": kind, "params": { "threads": threads },
+            "structure": structure, "kind": kind, "params": { "threads": threads }, "rank": 1,
             "test": "six-plane", "status": "ok", "reason": null, "error": null,
             "left_out": [], "samples_ref": null,
             "metrics": { "query_ns": { "value": 1.0, "unit": "ns" } },

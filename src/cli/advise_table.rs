@@ -69,11 +69,19 @@ pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
 fn taken(advice: &Advice) -> String {
     let choice = &advice.structure;
     let Some(name) = &choice.name else {
-        return "No structure answered right".to_owned();
+        let why = match choice
+            .rows
+            .iter()
+            .any(|row| row.value("fat_excess") > Some(0.0))
+        {
+            true => "No structure with exact bounds was measured",
+            false => "No structure answered right",
+        };
+        return why.to_owned();
     };
     let row = choice.rows.iter().find(|row| row.structure == *name);
     let next = choice.rows.iter().find(|row| {
-        ns(row).is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
+        row.rank.is_some() && row.structure != *name && !choice.ties.contains(&row.structure)
     });
     let faster = next.and_then(|next| {
         let times = times(ns(next)? / ns(row?)?);

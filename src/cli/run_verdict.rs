@@ -99,10 +99,17 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
         };
         return format!("Nothing is ranked: {why}.");
     };
-    let names: Vec<&str> = winners.iter().map(|cell| cell.structure.as_str()).collect();
+    let next = comparison.sound().nth(winners.len());
+    // Noise alone may tie the fastest with what is slower than the next best.
+    let is_ahead =
+        |cell: &&&ReportCell| next.and_then(|next| times_as_fast(next, cell)) >= next.map(|_| 1.0);
+    let names = winners
+        .iter()
+        .filter(is_ahead)
+        .map(|cell| cell.structure.as_str());
+    let names: Vec<&str> = names.collect();
     let time = text::some(best.time(), |time| text::time(time.value));
     let per = ["query", "frame"][usize::from(!best.path.motion.is_empty())];
-    let next = comparison.sound().nth(winners.len());
     let lead = |cell: &ReportCell| text::some(times_as_fast(cell, best), times);
     let Some(next) = next else {
         return match names[..] {
@@ -173,6 +180,9 @@ fn checked(all: &[&Comparison]) -> Option<String> {
     let timed = most(|cell| cell.times.cameras_timed);
     let judged = all.iter().filter_map(|c| c.of_any("judged_queries"));
     let who = match right {
+        _ if right == tried && all.iter().flat_map(|c| &c.cells).any(is_fat) => {
+            "All structures with exact bounds".to_owned()
+        }
         _ if right == tried => "All structures".to_owned(),
         _ if all.len() == 1 => format!("{right} of {tried} structures"),
         _ => format!("{} of {} cells", text::count(right), text::count(tried)),
@@ -249,11 +259,24 @@ fn standing(all: usize, overall: &Overall) -> String {
     });
     let leads: Vec<String> = of_base.into_iter().chain(of_next).collect();
     if !leads.is_empty() {
-        told += &format!(": {}", leads.join(", "));
+        let whose = match tied.len() {
+            0 => ":".to_owned(),
+            _ => format!("; {} is", names[0]),
+        };
+        told += &format!("{whose} {}", leads.join(", "));
     }
     let firsts = [best].into_iter().chain(tied.iter().copied());
     let firsts: Vec<String> = firsts.map(|s| s.first_in.to_string()).collect();
     let firsts: Vec<&str> = firsts.iter().map(String::as_str).collect();
     told += &format!("; first or tied in {} of {all}.", listed(&firsts, "and"));
+    let apart = overall
+        .standings
+        .iter()
+        .filter(|s| s.speedup.is_none() && s.first_in > 0);
+    let apart = apart.map(|s| format!("{} (first or tied in {})", s.structure, s.first_in));
+    let apart = text::joined(apart);
+    if !apart.is_empty() {
+        told += &format!(" Without a mean, as not right everywhere: {apart}.");
+    }
     told
 }
