@@ -239,13 +239,13 @@ fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]
     if let Some(new) = new {
         return Ok([file, new]);
     }
-    let old = read_report(&file)?.run.id;
+    let old = read_report(&file)?.run;
     let newest = newest_run(Path::new("results"), |path| {
         let run = read_report(&path.join("report.json")).ok()?.run;
-        Some(run).filter(|run| run.id != old)
+        Some(run).filter(|run| run.id != old.id && run.started_at >= old.started_at)
     });
     let newest = newest.context(
-        "no other run in results; expected one to compare with the baseline, or its folder",
+        "no run in results since the baseline; expected one to compare with it, or its folder",
     )?;
     Ok([file, newest])
 }

@@ -65,6 +65,9 @@ impl CompareTable<'_> {
     fn summary(&self) -> String {
         let verdict = match self.verdict().1 {
             "ok" => "no regression".to_owned(),
+            "inconclusive" if self.changes.count(Outcome::Inconclusive) == 0 => {
+                "no regression".to_owned()
+            }
             other => other.replace('_', " "),
         };
         let shift = text::some(self.changes.proven_shift(), |shift| {

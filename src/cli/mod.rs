@@ -270,7 +270,7 @@ fn load_scene(source: &str, options: &LoadOptions) -> Result<Scene> {
     if scene.skipped_items > 0 {
         let (bad, name) = (text::counted(scene.skipped_items, "bad item"), &scene.name);
         tell(&format!(
-            "note: {bad} left out of {name}; the other rows keep their ids"
+            "note: {bad} left out of {name}; ids are rows of that file"
         ));
     }
     Ok(scene)

@@ -72,7 +72,7 @@ fn check_why(args: &RunArgs, plan: &RunPlan) -> Result<()> {
 /// The cells as JSON lines, nothing measured.
 fn print_plan(registry: &Registry, args: &RunArgs) -> Result<Ending> {
     let plan = plan(registry, args)?;
-    plan.check_files()?;
+    plan.check_inputs()?;
     let mut out = io::stdout().lock();
     for cell in plan.plan.cells() {
         writeln!(out, "{}", serde_json::to_string(&cell)?)?;

@@ -93,7 +93,7 @@ pub fn resume(args: &RunArgs) -> Result<(StoppedRun, Stream, RunArgs)> {
     let suite = begun.what.suite.as_deref().unwrap_or_default();
     let before = stream.header.files.get(suite).cloned();
     same_digest("suite", suite, before, || {
-        digest(Path::new(suite)).unwrap_or_default()
+        digest(Path::new(suite)).unwrap_or_else(|| "missing".to_owned())
     })
     .with_context(|| path.display().to_string())?;
     Ok((folder, stream, begun))

@@ -73,7 +73,7 @@ impl FromStr for UpdatePolicy {
         found.ok_or_else(|| {
             SpecError::new(format_args!(
                 "--update '{text}'; expected refit, rebuild, every=N (frames, at least 2) or \
-                 fat=M (margin in item sizes, above 0)"
+                 fat=M (margin in item sizes, above 0 to 100)"
             ))
         })
     }

@@ -328,7 +328,11 @@ impl<'p> MergedParts<'p> {
             Of::Tail(q) => {
                 let all = self.tail(label, TaskKind::Query);
                 let all = Some(all).filter(|all| all.len() >= LEAST_TAIL)?;
-                quantile(&all, q).map(Estimate::exact)
+                let found = quantile(&all, q)?;
+                // The mean has another estimator.
+                let mean = self.ns(label, TaskKind::Query)?.value;
+                let least = if q == 1.0 { mean } else { found };
+                Some(Estimate::exact(found.max(least)))
             }
             Of::WorstFrame => {
                 let worst = *self.tail(label, TaskKind::Frame).last()?;

@@ -87,7 +87,8 @@ impl World {
     fn direction(&self, id: ItemId) -> DVec3 {
         let z = 2.0 * self.unit(id, 1) - 1.0;
         let (turn, radius) = (TAU * self.unit(id, 2), (1.0 - z * z).sqrt());
-        DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), z)
+        let of_z_up = DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), z);
+        self.up.from_z_up(of_z_up)
     }
 
     /// Step of an item, in its own sizes.
@@ -113,7 +114,7 @@ impl World {
         let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
         let room = (self.high - self.low) - (max - min);
         let at = [0, 1, 2].map(|k| self.unit(id, 16 + 3 * u64::from(n) + k));
-        let corner = self.low + DVec3::from(at) * room;
+        let corner = self.low + self.up.from_z_up(DVec3::from(at)) * room;
         self.placed(b, corner - min, 1.0)
     }
 }

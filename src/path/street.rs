@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::{Pose, Stage};
+use super::{Pose, Stage, unfit};
 use crate::geometry::Aabb;
 use crate::input::Result;
 use crate::scene::{Regions, SeededRng};
@@ -46,6 +46,12 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let places = &stage.scene.places;
     let is_map = matches!(stage.scene.regions, Regions::Bsp(_) | Regions::Leaves(_));
     if is_map && !places.is_empty() {
+        if let Some((_, height)) = spec.given().find(|given| given.0 == "height") {
+            let scene = &stage.scene.name;
+            let reason =
+                format_args!("height={height}; expected none, as the places of '{scene}' have one");
+            return Err(unfit("street", reason));
+        }
         // Places of a map's author need no search.
         let poses = (0..stage.count).map(|_| {
             let eye = stage.up.to_z_up(places[rng.below(places.len())].eye);

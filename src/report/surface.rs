@@ -188,22 +188,22 @@ impl Surface<'_> {
         }
         let [(n0, r0), (n1, r1)] = [curve[slower], curve[slower + 1]];
         let along = -r0.ln() / (r1.ln() - r0.ln());
-        // Faster by its time already, but not by its rank: from where it is both.
+        // Faster by its time already, but not by its rank.
         if !(0.0..=1.0).contains(&along) {
-            return Some(Crossing::At(n1 as f64));
+            return Some(Crossing::Below(n1));
         }
         let (n0, n1) = ((n0 as f64).ln(), (n1 as f64).ln());
         Some(Crossing::At((n0 + along * (n1 - n0)).exp()))
     }
 
-    /// Returns true if it ranks before linear in the first path of size and class.
+    /// Returns true if it ranks before linear in every path of size and class.
     fn is_faster(&self, structure: &str, class: f64, items: usize) -> bool {
         let here = |place: &&Place| place.class == class && place.items == items;
         let mut places = self.places.iter().filter(here);
-        let place = places.find(|place| place.cell(structure).is_some());
-        let rank = |name: &str| place?.cell(name)?.rank;
-        let both = rank(structure).zip(rank(YARDSTICK));
-        both.is_some_and(|(own, linear)| own < linear)
+        places.all(|place| {
+            let [own, linear] = [structure, YARDSTICK].map(|name| place.cell(name)?.rank);
+            own.zip(linear).is_none_or(|(own, linear)| own < linear)
+        })
     }
 }
 

@@ -374,7 +374,7 @@ fn several_bad_rows_are_counted_and_skipped_on_request() {
         let done = cullbench(folder.path(), &format!("{line} --skip-bad-items"));
         assert_eq!(done.code, Some(0), "{line}: {done:?}");
         let told = (done.err)
-            .contains("3 bad items left out of bad.csv; the other rows keep their ids")
+            .contains("3 bad items left out of bad.csv; ids are rows of that file")
             || done.out.contains("3 bad items left out");
         assert!(told, "{line}: {done:?}");
     }

@@ -173,7 +173,7 @@ fn a_saved_run_is_the_baseline_of_the_newest() {
     all_refused(
         &folder,
         &["compare --baseline main"],
-        "no other run in results | expected",
+        "no run in results since the baseline | expected",
     );
     all_refused(
         &folder,
