@@ -1,8 +1,6 @@
 //! Planes as the block kernels read them: which rows of a block are a plane's
 //! corners, and its numbers in vectors for many blocks.
 
-use glam::DVec4;
-
 use super::balls::{Unit, decide, distances, splat};
 use super::box_block::{BoxBlock, sums_at};
 use super::{Balls, BoxCorner, ConvexVolume, PlaneMask, Spheres};
@@ -161,56 +159,6 @@ impl<I: Isa> Planes<I> for BallPlane<'_, I> {
         let farthest = isa.add(distances(isa, self.plane, centres), radii);
         let question = || (self.spheres, 1 << self.index, block);
         decide(isa, farthest, balls.doubt, question)
-    }
-}
-
-/// The six planes of a view frustum as three sums in place of six.
-///
-/// The lesser of the distances from two planes is `s - |t|`, where s and t are half the sum
-/// and half the difference of both. For the planes of a symmetric frustum, s of each pair of
-/// sides is linear in t of near and far plane.
-#[derive(Clone, Debug)]
-pub(super) struct FrustumSums {
-    depth: [f32; 4],
-    half_depth: f32,
-    /// Factor of the depth, offset, and t, of each pair of sides.
-    sides: [([f32; 2], [f32; 4]); 2],
-}
-
-impl FrustumSums {
-    /// Largest part of s that is not linear in the depth, per unit of coordinates: with
-    /// the roundings of the sums, less than half of [`Spheres::doubt`].
-    const RESIDUAL: f64 = 3e-6;
-
-    /// `None` for other planes than those of a symmetric frustum with a far plane.
-    pub fn of(spheres: &Spheres) -> Option<Self> {
-        if spheres.planes().mask() != 0b11_1111 {
-            return None;
-        }
-        let plane = |index: u32| {
-            let [x, y, z, d] = spheres.plane_of_bit(index).1.unit;
-            DVec4::new(x.into(), y.into(), z.into(), d.into())
-        };
-        let halves = |pair: u32| {
-            let (a, b) = (plane(2 * pair), plane(2 * pair + 1));
-            ((a + b) * 0.5, (a - b) * 0.5)
-        };
-        let (still, depth) = halves(2);
-        let mut residual = still.truncate().length();
-        let axis = depth.truncate();
-        let mut side = |pair: u32| {
-            let (s, t) = halves(pair);
-            let factor = s.truncate().dot(axis) / axis.length_squared();
-            let rest = s - depth * factor;
-            residual = residual.max(rest.truncate().length());
-            ([factor as f32, rest.w as f32], t.as_vec4().to_array())
-        };
-        let sides = [side(0), side(1)];
-        (residual <= Self::RESIDUAL).then(|| FrustumSums {
-            depth: depth.as_vec4().to_array(),
-            half_depth: still.w as f32,
-            sides,
-        })
     }
 }
 

@@ -392,7 +392,10 @@ mod tests {
         let clear = || comparison(10_000, 0.02, &[("bvh", 100.0), ("linear", 1000.0)]);
         // Faster by the clock at 1,000 items, but not told apart.
         let found = crossing(vec![tied(1_000, 950.0), clear()]);
-        assert_eq!(found, Some(Crossing::At(10_000.0)));
+        assert_eq!(found, Some(Crossing::Below(10_000)));
+        // Not before linear in another path of that size.
+        let found = crossing(vec![clear(), tied(10_000, 900.0), tied(1_000, 950.0)]);
+        assert_eq!(found, Some(Crossing::Above(10_000)));
         let found = crossing(vec![tied(1_000, 950.0), tied(10_000, 900.0)]);
         assert_eq!(found, Some(Crossing::Above(10_000)));
     }
