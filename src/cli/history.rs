@@ -156,7 +156,10 @@ fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<Strin
 fn runs(reports: &[Report]) -> Table {
     let columns: &[Column<&Report>] = &[
         ("run", |report| name(report)),
-        ("started", |report| report.run.started_at.clone()),
+        ("started", |report| {
+            let unfinished = report.run.finished_at.is_none().then_some("not finished");
+            text::joined([&report.run.started_at, unfinished.unwrap_or_default()])
+        }),
         ("version", |report| report.source.version.clone()),
         (">cells", |report| text::count(report.cells.len())),
         (">processes", |report| report.run.processes.to_string()),

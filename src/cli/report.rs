@@ -48,6 +48,9 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         write_text(path, &to_markdown(&blocks(&report, &BTreeMap::new())))?;
     }
     if let Some(path) = &args.bencher {
+        if report.run.finished_at.is_none() {
+            tell("note: the run was not finished; its cells have fewer processes or are missing");
+        }
         write_text(path, &bencher::format(&report)?)?;
     }
     if let Some(folder) = &args.svg {

@@ -162,7 +162,10 @@ impl RunPlan {
     pub fn check_goes_on(&self, begun: &Stream) -> Result<()> {
         let structures = self.plan.structures.iter().map(|s| &s.label);
         if self.plan.groups() != begun.header.groups || !structures.eq(&begun.header.structures) {
-            bail!("holds the run of another plan; expected the recorded one: begin a new run");
+            bail!(
+                "holds the run of another plan, or a merged one; expected the recorded plan: begin \
+                 a new run, or resume the shards"
+            );
         }
         self.check_scenes(&|scene, asked| {
             let of_scene = |kept: &&KeptPart| kept.part.key.scene == scene.name;
