@@ -68,13 +68,13 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
             structures.iter().cloned().map(build).collect()
         });
         for path in paths(args, &scene) {
+            let cameras = path::load(&path, &scene, &defaults)?;
+            let again = reproduce(source, &path)?;
+            checks.extend(check_path(&scene, &cameras, &culling, &subjects, &again)?);
             interrupted = interrupt::asked();
             if interrupted {
                 break 'scenes;
             }
-            let cameras = path::load(&path, &scene, &defaults)?;
-            let again = reproduce(source, &path)?;
-            checks.extend(check_path(&scene, &cameras, &culling, &subjects, &again)?);
         }
         bar.inc(1);
     }
@@ -114,6 +114,9 @@ fn check_path(
 ) -> anyhow::Result<Vec<Check>> {
     let mut rows: Vec<Check> = Vec::new();
     for (kind, workload) in workloads(scene, cameras, culling)? {
+        if interrupt::asked() {
+            break;
+        }
         let subjects = match workload.culling.test {
             CullingTest::Sphere => over_spheres,
             _ => over_boxes,
