@@ -135,6 +135,8 @@ impl<'a> Indexes<'a> {
 struct Built<'a> {
     judged: Vec<Judged>,
     structures: Vec<Indexes<'a>>,
+    /// Structures that refuse the items, and are left out.
+    refused: Vec<&'a str>,
     queries: RegionQueries<'a>,
 }
 
@@ -156,10 +158,20 @@ impl<'a> Built<'a> {
         truths: Option<&Truths>,
     ) -> Result<Built<'a>, BuildError> {
         let judge = |culling| Judged::new(scene, shots, truths, culling);
-        let structures = structures.iter().map(|spec| Indexes::new(spec, scene));
+        let (mut built, mut refused) = (Vec::new(), Vec::new());
+        for spec in structures {
+            match Indexes::new(spec, scene) {
+                // The same in every process; where memory lacks, a plan would not hold.
+                Err(BuildError::Refused { .. }) if refused.len() + 1 < structures.len() => {
+                    refused.push(spec.label.as_str());
+                }
+                indexes => built.push(indexes?),
+            }
+        }
         Ok(Built {
             judged: cullings().into_iter().map(judge).collect(),
-            structures: structures.collect::<Result<_, _>>()?,
+            structures: built,
+            refused,
             queries: RegionQueries::new(scene, shots),
         })
     }
@@ -271,6 +283,9 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
     }
     tasks.extend(twin);
     let plan = StudyPlan::new(tasks, cameras, &setting.protocol);
+    let mut warnings = path.warnings(scene);
+    let left_out = |name| format!("left out: {name} refuses these items");
+    warnings.extend(built.refused.iter().map(left_out));
     Ok(Prepared {
         precision: Precision {
             scene: scene.name.clone(),
@@ -281,7 +296,7 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
             points,
             region_points,
             skipped_items: scene.skipped_items,
-            warnings: path.warnings(scene),
+            warnings,
             ..Precision::default()
         },
         plan,
@@ -353,27 +368,34 @@ mod tests {
     use crate::index::Row;
     use crate::measure::Protocol;
 
+    fn linear_as(label: &str, change: impl FnOnce(&mut Row)) -> StructureSpec {
+        let mut linear = StructureSpec::parse("linear").expect("linear");
+        label.clone_into(&mut linear.label);
+        change(&mut linear.row);
+        linear
+    }
+
     #[test]
-    fn a_structure_that_loses_items_is_wrong_and_no_point_that_misses() {
-        let linear = || StructureSpec::parse("linear").expect("linear");
-        let blind = StructureSpec {
-            label: "blind".to_owned(),
-            row: Row {
-                build: |_, _, _| {
-                    StructureSpec::parse("linear")
-                        .expect("linear")
-                        .build(&[][..])
-                },
-                ..linear().row
-            },
-            ..linear()
-        };
+    fn structures_that_lose_items_are_wrong_and_those_that_refuse_them_left_out() {
+        let linear = StructureSpec::parse("linear").expect("linear");
+        let blind = linear_as("blind", |row| {
+            row.build = |_, _, _| {
+                let linear = StructureSpec::parse("linear").expect("linear");
+                linear.build(&[][..])
+            };
+        });
+        let shy = linear_as("shy", |row| {
+            row.build = |_, _, _| {
+                let (structure, reason) = ("shy", "too many".to_owned());
+                Err(BuildError::Refused { structure, reason })
+            };
+        });
         let scene = crate::scene::load("city:n=200", &Default::default()).expect("a city");
         let path = crate::path::load("orbit:frames=3", &scene, &Default::default());
-        let setting = Setting {
+        let mut setting = Setting {
             path: path.expect("a path"),
             scene,
-            structures: vec![linear(), blind],
+            structures: vec![linear, blind, shy.clone()],
             protocol: Protocol {
                 rounds: [1, 1],
                 cameras: 3,
@@ -381,11 +403,15 @@ mod tests {
                 ..Protocol::default()
             },
         };
-        let points = prepare(&setting, 3).expect("no refusal").precision.points;
-        for point in points {
+        let precision = prepare(&setting, 3).expect("two structures").precision;
+        let left_out = "left out: shy refuses these items".to_owned();
+        assert!(precision.warnings.contains(&left_out));
+        for point in precision.points {
             let reason = point.reason.unwrap_or_default();
             let is_wrong = point.status == Status::Wrong && reason.contains("own planes");
             assert_eq!(is_wrong, point.structure == "blind", "{:?}", point.status);
         }
+        setting.structures = vec![shy];
+        assert!(prepare(&setting, 3).is_err());
     }
 }
