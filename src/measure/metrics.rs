@@ -69,7 +69,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "query_ns_p5", "ns", Of::Tail(0.05), "5th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
     "query_ns_p95", "ns", Of::Tail(0.95), "95th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
     "query_ns_p99", "ns", Of::Tail(0.99), "99th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
-    "query_ns_max", "ns", Of::Tail(1.0), "slowest group of cameras";
+    "query_ns_max", "ns", Of::Tail(1.0), "slowest group of cameras, at least query_ns";
     "query_wall_ns", "ns", Of::Wall(TaskKind::Query), "as query_ns, wall time";
     "ns_per_visible", "ns", Of::TimePerVisible, "query_ns / items returned to a timed query, mean; interval scaled likewise";
     "speedup", "1", Of::Speedup(None), "time of linear / time of this structure: above 1 is faster; the ratio of the two query_ns, of motions that of the two frame_ns";

@@ -310,14 +310,21 @@ fn a_tail_is_read_off_twenty_groups_and_not_fewer() {
     for groups in [19, 20] {
         let mut parts = parts(&[("linear", TaskKind::Query, &linear)]);
         for part in &mut parts {
-            part.tasks[0].tail_ns = (1..=groups).map(f64::from).collect();
+            part.tasks[0].tail_ns = (1..=groups).map(|ns| 100.0 * f64::from(ns)).collect();
         }
         let metrics = &Group::of(&parts).cells[0].metrics;
         for name in ["query_ns_p5", "query_ns_p95", "query_ns_p99"] {
             assert_eq!(metrics.contains_key(name), groups == 20, "{name}");
         }
         let slowest = metrics.get("query_ns_max").map(|m| m.value);
-        assert_eq!(slowest, (groups == 20).then_some(20.0));
+        assert_eq!(slowest, (groups == 20).then_some(2000.0));
+        // No less than the mean, which has another estimator.
+        for part in &mut parts {
+            part.tasks[0].tail_ns.fill(1.0);
+        }
+        let metrics = &Group::of(&parts).cells[0].metrics;
+        let slowest = metrics.get("query_ns_max").map(|m| m.value);
+        assert_eq!(slowest, (groups == 20).then(|| metrics["query_ns"].value));
     }
 }
 
