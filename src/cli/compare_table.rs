@@ -65,17 +65,17 @@ impl CompareTable<'_> {
     fn summary(&self) -> String {
         let verdict = match self.verdict().1 {
             "ok" => "no regression".to_owned(),
-            "inconclusive" if self.changes.count(Outcome::Inconclusive) == 0 => {
-                "no regression".to_owned()
-            }
             other => other.replace('_', " "),
         };
         let shift = text::some(self.changes.proven_shift(), |shift| {
             let (metric, much) = (shift.metric, change_of(shift.ratio, None));
-            format!(
-                " among the structures; {metric} as a whole changed by {much}, which is not \
-                 judged here (use compare --against)"
-            )
+            // The shift alone may leave it open.
+            let is_open = verdict == "inconclusive";
+            let whole = match is_open && self.changes.count(Outcome::Inconclusive) == 0 {
+                true => format!("as a whole; {metric}"),
+                false => format!("among the structures; {metric} as a whole"),
+            };
+            format!(" {whole} changed by {much}, which is not judged here (use compare --against)")
         });
         let worst = self.changes.rows.first();
         let worst = worst.filter(|_| self.verdict().0 != Ending::Ok);

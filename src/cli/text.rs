@@ -198,6 +198,8 @@ pub fn across(text: &str) -> usize {
 }
 
 /// Text with line breaks in place of spaces in lines longer than `width`.
+///
+/// The rest of an indented line is indented as well.
 pub fn wrapped(text: &str, width: usize) -> String {
     let mut lines: Vec<String> = Vec::new();
     for line in text.split('\n') {
@@ -205,14 +207,16 @@ pub fn wrapped(text: &str, width: usize) -> String {
             lines.push(line.to_owned());
             continue;
         }
-        lines.push(String::new());
-        for word in line.split(' ') {
+        let words = line.trim_start_matches(' ');
+        let indent = &line[..line.len() - words.len()];
+        lines.push(indent.to_owned());
+        for word in words.split(' ') {
             match lines.last_mut() {
-                Some(line) if line.is_empty() => line.push_str(word),
+                Some(line) if line.len() == indent.len() => line.push_str(word),
                 Some(line) if across(line) + across(word) < width => {
                     *line += &format!(" {word}");
                 }
-                _ => lines.push(word.to_owned()),
+                _ => lines.push(format!("{indent}{word}")),
             }
         }
     }
@@ -462,6 +466,7 @@ mod tests {
             wrapped("a  b\nfour words of text", 11),
             "a  b\nfour words\nof text"
         );
+        assert_eq!(wrapped("  four words", 8), "  four\n  words");
         let rows = [["a", "one two three\n4"], ["name", "5"]];
         assert_eq!(
             entries(&rows.map(|row| row.map(str::to_owned)), 16),

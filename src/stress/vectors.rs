@@ -24,6 +24,9 @@ pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
 /// Name of the built-in vectors in messages.
 pub const BUILT_IN_NAME: &str = "datasets/vectors.json";
 
+/// The narrowest angle of view that the oracle of a camera carries, degrees.
+const CARRIED_DEG: f64 = 1e-12;
+
 /// Names of boxes; sorted, so that they print alike every time.
 pub type Names = BTreeSet<Name>;
 
@@ -102,6 +105,11 @@ impl VectorCamera {
             look: vector(self.look),
             up: vector(self.up),
         }
+    }
+
+    /// Returns whether the oracle carries the angles of the lens without loss.
+    pub fn is_carried(&self) -> bool {
+        self.fovy_deg.0 * self.aspect.0.min(1.0) >= CARRIED_DEG
     }
 
     /// # Errors

@@ -340,7 +340,11 @@ fn fat_bounds_are_not_said_to_return_the_sets_of_the_scan() {
         let told = format!("{line} {update} --out {says}");
         let told = unwrapped(&works(folder.path(), &told));
         let at = folder.path().join(says.to_string());
-        assert_eq!(told.contains("All structures returned"), says, "{told}");
+        assert_eq!(
+            told.contains("All structures with exact bounds returned"),
+            says,
+            "{told}"
+        );
         assert!(told.contains("fat bounds return more"), "{told}");
         let whole = json(&fs::read_to_string(at.join("report.json")).expect("there"));
         let value = |cell: &Value, name: &str| cell["metrics"][name]["value"].as_f64();

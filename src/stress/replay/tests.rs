@@ -107,24 +107,6 @@ fn a_touch_that_is_declared_and_not_visible_fails() {
     assert_eq!(wedge("[]"), ["v", "v/b"]);
 }
 
-/// A point nearer to a side plane than the oracle's 250 bits tell.
-#[test]
-fn what_is_too_close_for_the_oracle_contradicts_no_claim() {
-    let text = r#"[{"id":"v","camera":{"eye":[0,-0.9420451126176258,0.7904697065498091],
-        "look":[0,-0.9420451126176258,0],"up":[0,1,0],"fovy_deg":100,"aspect":1,"near":0.1,
-        "far":10},"boxes":[{"id":"b","lo":[0,1.0332593611063647e-16,-2.828046472768566e-17],
-        "hi":[0,1.0332593611063647e-16,-2.828046472768566e-17]}],
-        "expected_visible_camera":["b"],"touch_camera":[]}]"#;
-    for claim in [r#"["b"]"#, "[]"] {
-        let text = text.replace(r#"["b"]"#, claim);
-        assert!(failed(&text).is_empty(), "{claim}");
-        let vectors = read_vectors(text.as_bytes(), "f.json").unwrap();
-        let rows = replay(&vectors[0], &[]);
-        let row = rows.iter().find(|row| row.id == "v/b").unwrap();
-        assert_eq!(row.got.to_string(), "too close to decide");
-    }
-}
-
 #[test]
 fn boxes_that_are_declared_empty_are_inverted() {
     let text = r#"[{"id":"v","boxes":[{"id":"b","lo":[0,0,0],"hi":[1,1,1]},
@@ -198,8 +180,8 @@ fn a_lens_that_is_narrower_than_the_oracle_carries_fails_nothing() {
     };
     for (fovy, aspect) in [("1e-9", "1"), ("1e-46", "1"), ("90", "1e-50"), ("90", "1")] {
         assert!(seen(fovy, aspect, r#"["b"]"#).is_empty(), "{fovy} {aspect}");
+        assert!(seen(fovy, aspect, "[]").contains(&"v/b".to_owned()));
     }
-    assert!(seen("90", "1", "[]").contains(&"v/b".to_owned()));
 }
 
 #[test]
