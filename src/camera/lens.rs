@@ -62,8 +62,8 @@ impl Lens {
     }
 
     /// # Errors
-    /// An empty window or one outside 1e-100 to 1e100, near not above 0, near >= far, a
-    /// value that is not finite.
+    /// An empty window or one outside 1e-100 to 1e100 of near, near not above 0,
+    /// near >= far, a value that is not finite.
     pub fn off_axis(window: [f64; 4], near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::OffAxis { window }, near, far)
     }
@@ -81,13 +81,14 @@ impl Lens {
             }
             LensKind::Orthographic { height, aspect } => {
                 check_aspect(aspect)?;
-                check_window("height", 0.0, height)?;
+                check_window("height", [0.0, height], 1.0)?;
             }
             LensKind::OffAxis {
                 window: [left, right, bottom, top],
             } => {
-                check_window("left to right", left, right)?;
-                check_window("bottom to top", bottom, top)?;
+                let unit = if near > 0.0 { near } else { 1.0 };
+                check_window("left to right", [left, right], unit)?;
+                check_window("bottom to top", [bottom, top], unit)?;
             }
             LensKind::Matrix(_) => return Err(CameraError::of_matrix("near and far planes")),
         }
@@ -206,14 +207,16 @@ fn check_aspect(aspect: f64) -> Result<()> {
     require(EXACT.contains(&aspect), found, "1e-100 to 1e100")
 }
 
-fn check_window(name: &str, low: f64, high: f64) -> Result<()> {
+/// Sides of a window: of rays in units of near, which their directions depend on.
+fn check_window(name: &str, [low, high]: [f64; 2], unit: f64) -> Result<()> {
     finite(name, low)?;
     finite(name, high)?;
     let found = format_args!("the window is empty: {low} to {high} ({name})");
     require(low < high, found, "low < high")?;
-    let is_held = EXACT.contains(&(high - low)) && low.abs().max(high.abs()) <= *EXACT.end();
+    let far_out = low.abs().max(high.abs()) / unit;
+    let is_held = EXACT.contains(&((high - low) / unit)) && far_out <= *EXACT.end();
     let found = format_args!("the window is {low:e} to {high:e} ({name})");
-    require(is_held, found, "sizes from 1e-100 to 1e100")
+    require(is_held, found, "sizes from 1e-100 to 1e100, or of near")
 }
 
 impl Camera {

@@ -20,8 +20,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "uniform:n=1200,seed=7",
         "zoom:frames=4",
-        "04a65c08f63b2972",
-        "25786aaec9aaf6c9",
+        "c4e10c1e76d1ce57",
+        "f228ecbdb303eb1a",
     ],
     [
         "uniform:n=1200,seed=7",
@@ -50,8 +50,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "clustered:n=1200,seed=7",
         "zoom:frames=4",
-        "8d13b734ce556618",
-        "da75cedbe5f053f2",
+        "89289ad98b716ea8",
+        "9e12972b28f6402e",
     ],
     [
         "clustered:n=1200,seed=7",
@@ -80,8 +80,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "city:n=1200,seed=7",
         "zoom:frames=4",
-        "715fcb09a7b33e52",
-        "842644c62cdac0e6",
+        "92f6860d7c63ffbd",
+        "110602ceea77cb55",
     ],
     [
         "city:n=1200,seed=7",
@@ -110,8 +110,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "forest:n=1200,seed=7",
         "zoom:frames=4",
-        "5ef5107970cfd6b9",
-        "4a6e213928f26ceb",
+        "2a361685512d3434",
+        "2e36a16300130895",
     ],
     [
         "forest:n=1200,seed=7",
@@ -140,8 +140,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "rooms:n=1200,seed=7",
         "zoom:frames=4",
-        "891ddaa144add362",
-        "1a1a1c0007225726",
+        "88423abe375a805c",
+        "9cb7f74fd23e3d8e",
     ],
     [
         "rooms:n=1200,seed=7",
@@ -170,8 +170,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "city:n=1200,seed=7,offset=1e7",
         "zoom:frames=4",
-        "0266ada97991e10e",
-        "aa1846cdf197950e",
+        "f90b4075dd6cb716",
+        "8493c8c8553dbeb1",
     ],
     [
         "city:n=1200,seed=7,offset=1e7",
@@ -200,8 +200,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "freedm-map12",
         "zoom:frames=4",
-        "5ca8fce453374426",
-        "215812640fbfd05c",
+        "358a2b8e6eeeea34",
+        "1127c563170a7522",
     ],
     [
         "freedm-map12",
@@ -230,8 +230,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "freedm-map20",
         "zoom:frames=4",
-        "91b1ff79e53bdd2d",
-        "7d4fe740c4a044e0",
+        "8e35f22918034c35",
+        "e5a6049bbc62197f",
     ],
     [
         "freedm-map20",
@@ -260,8 +260,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "helsinki",
         "zoom:frames=4",
-        "4885b257f77e817a",
-        "2c00ee330b729000",
+        "5b92bb73b710687b",
+        "0c36a3db993423cd",
     ],
     [
         "helsinki",
@@ -290,8 +290,8 @@ pub const PINNED: &[[&str; 4]] = &[
     [
         "us-counties",
         "zoom:frames=4",
-        "84771c96fba4070b",
-        "400871b778807e7e",
+        "bf97e1c30b769b1b",
+        "8cc160d5b726ab49",
     ],
     [
         "us-counties",
