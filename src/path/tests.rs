@@ -1,7 +1,7 @@
 //! Paths against scenes: specs, files, what cannot be a path.
 
 use super::*;
-use crate::camera::PlaneOptions;
+use crate::camera::{LensKind, PlaneOptions};
 use crate::spec::tests::{keys, known, listed};
 
 fn scene(source: &str) -> Scene {
@@ -139,6 +139,29 @@ fn a_count_is_met_in_scenes_of_any_size() {
         let path = path("flythrough:frames=32,visible=200", &scene);
         let visible = visible_share(&path, &scene) * f64::from(n);
         assert!((visible / 200.0 - 1.0).abs() < 0.15, "{n}: {visible}");
+    }
+    // Few views of few items leave little to a sample: all are counted.
+    let scene = scene("uniform:n=100000");
+    let path = path("street:frames=8,visible=50", &scene);
+    let visible = visible_share(&path, &scene) * 1e5;
+    assert!((visible / 50.0 - 1.0).abs() < 0.05, "{visible}");
+}
+
+#[test]
+fn the_last_view_of_a_zoom_has_its_power() {
+    let scene = scene("city:n=100");
+    for frames in [2, 9] {
+        let path = path(&format!("zoom:frames={frames},power=8"), &scene);
+        let half = |camera: &Camera| {
+            let LensKind::Perspective { fovy_deg, .. } = camera.lens.kind() else {
+                panic!("no perspective");
+            };
+            (fovy_deg.to_radians() / 2.0).tan()
+        };
+        let [first, .., last] = &path.cameras[..] else {
+            panic!("{frames} views");
+        };
+        assert!((half(first) / half(last) - 8.0).abs() < 1e-9, "{frames}");
     }
 }
 

@@ -103,12 +103,20 @@ fn threads_change_no_byte_and_a_number_that_is_none_is_refused() {
 fn a_list_of_threads_enters_structures_that_share_a_query() {
     let here = folder(&[]);
     let line = "run --scene uniform:n=40000 --path orbit:frames=6 --structure linear,bvh \
-                --threads 1,2 --processes 2 --out o";
+                --threads 1,2 --processes 2 --cold --out o";
     works(here.path(), line);
     let report = std::fs::read_to_string(here.path().join("o/report.json")).expect("a report");
     let report = json(&report);
     let cells = report["cells"].as_array().expect("an array");
-    let names = |cell: &serde_json::Value| cell["structure"].as_str().map(str::to_owned);
+    // One sweep for all shared views would compare warm ones with cold queries.
+    let is_cold = |cell: &&serde_json::Value| cell["path"]["cache"] == "cold";
+    let (cold, cells): (Vec<_>, Vec<_>) = cells.iter().partition(is_cold);
+    assert_eq!(cold.len(), 3);
+    assert!(
+        cold.iter()
+            .all(|cell| cell["metrics"]["views_wall_ns"].is_null())
+    );
+    let names = |cell: &&serde_json::Value| cell["structure"].as_str().map(str::to_owned);
     let mut entered: Vec<String> = cells.iter().filter_map(names).collect();
     entered.sort();
     assert_eq!(entered, ["bvh", "linear", "linear:threads=2"]);
