@@ -487,20 +487,6 @@ fn mistakes_are_one_line() {
         ("--processes 0", "0 | --processes"),
         ("--fovy 0", "--fovy is '0'"),
         ("--update refit", "--motion"),
-        ("--motion drfit", "drfit | did you mean 'drift'"),
-        (
-            "--motion drift --motion doors",
-            "--motion 'doors' | one motion",
-        ),
-        ("--motion drift --update often", "--update 'often'"),
-        (
-            "--motion drift --moved 50%",
-            "--motion | cannot be used with | --moved",
-        ),
-        (
-            "--motion drift --queries-per-update 7",
-            "--motion | cannot be used with | --queries-per-update",
-        ),
     ] {
         all_refused(&folder, &[format!("{line} {more}")], wanted);
     }

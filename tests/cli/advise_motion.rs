@@ -121,3 +121,27 @@ fn policies_are_weighed_without_being_named() {
     );
     assert!(!told.contains("Another structure"), "{told}");
 }
+
+#[test]
+fn mistakes_about_motion_are_one_line() {
+    let folder = with_good_files(&[]);
+    let line = "advise --scene scene.csv --path cameras.csv";
+    for (more, wanted) in [
+        ("--motion drfit", "drfit | did you mean 'drift'"),
+        (
+            "--motion drift --motion doors",
+            "--motion 'doors' | one motion",
+        ),
+        ("--motion drift --update often", "--update 'often'"),
+        (
+            "--motion drift --moved 50%",
+            "--motion | cannot be used with | --moved",
+        ),
+        (
+            "--motion drift --queries-per-update 7",
+            "--motion | cannot be used with | --queries-per-update",
+        ),
+    ] {
+        all_refused(&folder, &[format!("{line} {more}")], wanted);
+    }
+}
