@@ -50,7 +50,8 @@ pub enum LensKind {
 impl Lens {
     /// # Errors
     /// fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0 or, as far,
-    /// beyond 1e100, near >= far, a value that is not finite. A far plane beyond [`FARTHEST`] is an infinite one.
+    /// beyond 1e100, near >= far, a value that is not finite. A far plane beyond
+    /// [`FARTHEST`] is an infinite one.
     pub fn perspective(fovy_deg: f64, aspect: f64, near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::Perspective { fovy_deg, aspect }, near, far)
     }
@@ -216,7 +217,11 @@ fn check_window(name: &str, [low, high]: [f64; 2], unit: f64) -> Result<()> {
     let far_out = low.abs().max(high.abs()) / unit;
     let is_held = EXACT.contains(&((high - low) / unit)) && far_out <= *EXACT.end();
     let found = format_args!("the window is {low:e} to {high:e} ({name})");
-    require(is_held, found, "sizes from 1e-100 to 1e100, or of near")
+    require(
+        is_held,
+        found,
+        "sizes from 1e-100 to 1e100 (off axis, times near)",
+    )
 }
 
 impl Camera {

@@ -117,7 +117,9 @@ fn in_motion(advice: &Advice) -> Option<String> {
     let frame = ns(row)?;
     let longer = others.iter().filter_map(|row| {
         let (policy, longer) = (policy_of(&row.structure), times(ns(row)? / frame));
-        Some(format!("{policy} takes {longer} as long"))
+        let fat = row.value("fat_excess") > Some(0.0);
+        let more = if fat { " and returns more" } else { "" };
+        Some(format!("{policy} takes {longer} as long{more}"))
     });
     let ruled_out = motion.ruled_out.iter().map(|(policy, builds)| {
         let longer = times(builds / frame);

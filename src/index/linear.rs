@@ -234,14 +234,8 @@ impl RegionIndex for Linear {
             let blocks = self.boxes.range(0, self.ids.len());
             let isa = cx.isa();
             let (sink, recorder) = cx.parts();
-            return scan_blocks(
-                isa,
-                blocks,
-                &self.ids,
-                (volume, volume.mask()),
-                sink,
-                recorder,
-            );
+            let asked = (volume, volume.mask());
+            return scan_blocks(isa, blocks, &self.ids, asked, sink, recorder);
         }
         let blocks = self.boxes.blocks().len();
         // Counted queries are not shared: one recorder, one thread. Nor is a single part.

@@ -135,12 +135,12 @@ impl Oracle {
     /// Depth of the box in the volume (positive) or a lower bound of its distance
     /// (negative), world units.
     ///
-    /// The least value of any certificate of unit length, to a millionth of itself. For a box that is IN this
-    /// is the length of the shortest move that makes it touch; for one that is
-    /// OUT the widest gap that an axis of the separating axis test shows, never
-    /// more than the true distance (less where two corners are nearest). Zero for a
-    /// touch. Infinite for a volume without constraints, minus infinity for an
-    /// empty box or volume. O(certificates).
+    /// The least value of any certificate of unit length, to a millionth of itself.
+    /// For a box that is IN this is the length of the shortest move that makes it
+    /// touch; for one that is OUT the widest gap that an axis of the separating axis
+    /// test shows, never more than the true distance (less where two corners are
+    /// nearest). Zero for a touch. Infinite for a volume without constraints, minus
+    /// infinity for an empty box or volume. O(certificates).
     ///
     /// ```
     /// # use cullbench::geometry::{Aabb, ConvexVolume, Plane};

@@ -257,14 +257,8 @@ impl Wide {
         let blocks = blocks.map(|(at, (block, lanes))| (at * LANES, *lanes, block));
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        scan_blocks(
-            isa,
-            blocks,
-            &self.ids,
-            (volume, volume.mask()),
-            sink,
-            recorder,
-        )
+        let asked = (volume, volume.mask());
+        scan_blocks(isa, blocks, &self.ids, asked, sink, recorder)
     }
 
     /// The whole query where the bounds of all items decide it.
