@@ -80,7 +80,10 @@ pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
         },
         Err(error) => match error.path().to_string() {
             top if top == "." => (String::new(), error.into_inner()),
-            inside => (inside, error.into_inner()),
+            inside => {
+                let inside = inside.trim_end_matches(['?', '.']).to_owned();
+                (inside, error.into_inner())
+            }
         },
     };
     let count = error.is_syntax().then(|| too_long(text, &path)).flatten();
@@ -90,7 +93,7 @@ pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
     };
     Err(JsonError {
         line: error.line(),
-        column: error.column(),
+        column: error.column().max(1),
         path,
         found,
         expected,
@@ -269,9 +272,10 @@ mod tests {
             ("{\"count\" 1}", "no JSON (expected ':')"),
             (
                 "{\"count\":\n",
-                "line 2, column 0, count: the text ends too early",
+                "line 2, column 1, count: the text ends too early",
             ),
-            ("", "line 1, column 0: the text ends too early"),
+            ("", "line 1, column 1: the text ends too early"),
+            ("{\"pair\": [1,", "column 12, pair: the text ends too early"),
         ] {
             let error = from_json::<Whole>(text.as_bytes()).unwrap_err().to_string();
             assert!(error.contains(wanted), "{text}: {error}");

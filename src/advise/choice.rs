@@ -248,7 +248,7 @@ impl TestChoice {
                 test: test.name(),
                 query_ns: query,
                 excess: rate_of(by_camera, |e| [e.false_positives, e.visible]),
-                false_negative_ppm: missed.map(|share| share.per(1e6)),
+                false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
                 false_positives_per_query: extra,
                 total_ns: query.zip(drawn).map(|(query, drawn)| query.value + drawn),
                 by_process: times.ln_ns(task).iter().map(|ln_ns| ln_ns.exp()).collect(),

@@ -103,6 +103,9 @@ impl Margin {
     /// The plane moved outward, so that no rounding error drops a visible box.
     pub(super) fn moved(&self, name: Option<FrustumPlane>, plane: &Plane, slack: f64) -> Plane {
         let d = f64::from(plane.d);
+        if !d.is_finite() {
+            return *plane;
+        }
         let error = self.c * UNIT_ROUNDOFF * self.size(name, plane);
         let derived = self.derived[usize::from(name.is_none())];
         Plane::new(plane.normal, round_up(d + (error + TINY + derived + slack)))
@@ -180,6 +183,15 @@ mod tests {
     use super::*;
     use crate::camera::{Camera, PlaneOptions, Surroundings, look_at};
     use glam::Vec3;
+
+    #[test]
+    fn a_plane_that_is_not_finite_stays_what_it_is() {
+        let margin = Margin::of_matrix(None, DVec3::ZERO, DVec3::ONE, 1.0);
+        for d in [f32::INFINITY, f32::NEG_INFINITY] {
+            let plane = Plane::new(Vec3::Y, d);
+            assert_eq!(margin.moved(None, &plane, 0.0).d, d);
+        }
+    }
 
     #[test]
     fn an_epsilon_or_a_reach_without_a_guarantee_is_an_error() {

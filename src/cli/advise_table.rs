@@ -299,7 +299,7 @@ fn test_table(choice: &TestChoice) -> Table {
         }),
         (">false positives %", |(_, r)| text::rate(r.excess, 100.0)),
         (">missed ppm", |(_, r)| {
-            text::share(r.false_negative_ppm, 1e6)
+            text::rate(r.false_negative_ppm, 1.0)
         }),
         (">false positives per query", |(_, r)| {
             some(r.false_positives_per_query, significant)

@@ -158,6 +158,9 @@ fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Resu
                     let nothing = nothing_for_it(scene);
                     bail!("--{stage} is '{name}'; expected none: {nothing}");
                 }
+                if let Some([_, need]) = funnel::NEEDS.iter().find(|[own, _]| own == name) {
+                    bail!("--{stage} is '{name}'; expected {need}");
+                }
                 let names = known.iter().map(|row| row.name);
                 let what = format!("back end of the {stage} stage");
                 return Err(SpecError::unknown(&what, name, names).into());

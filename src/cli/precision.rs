@@ -186,7 +186,7 @@ fn stage_blocks(sweep: &StageSweep) -> Vec<Block> {
         (">buffer", |p| some(p.buffer, |[w, h]| format!("{w}x{h}"))),
         (">out", |p| significant(p.errors.output_count)),
         (">FP / visible", |p| text::rate(p.errors.excess, 1.0)),
-        (">FN / visible", |p| text::share(p.errors.missing, 1.0)),
+        (">FN / visible", |p| text::rate(p.errors.missing, 1.0)),
         (">FN / view", |p| significant(p.errors.false_negative_count)),
         (">time / view", |p| time_plus_minus(p.time)),
         (">front", |p| if p.on_front { "*" } else { "" }.to_owned()),

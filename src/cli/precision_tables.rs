@@ -127,7 +127,7 @@ fn errors_table(points: &[&CullingPoint]) -> Table {
         ("culling", |p| culling(p)),
         (">FP %", |p| percent(p.errors.excess)),
         (">by source", |p| some(p.errors.counts, text::sources)),
-        (">FN ppm", |p| text::share(p.errors.false_negative_ppm, 1e6)),
+        (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
         (">px", |p| some(p.errors.worst_miss_px, significant)),
         (">flicker %", |p| percent(p.errors.flicker)),
     ];
@@ -160,7 +160,7 @@ fn front_table(p: &Precision) -> Table {
         ("culling", |p| culling(p)),
         (">query", |p| time_plus_minus(p.time)),
         (">FP %", |p| percent(p.errors.excess)),
-        (">FN ppm", |p| text::share(p.errors.false_negative_ppm, 1e6)),
+        (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
         (">B/item", |p| text::tenths(p.errors.memory_bytes_per_item)),
         ("tie", |p| if p.is_tie { "tie" } else { "" }.to_owned()),
     ];
@@ -259,7 +259,7 @@ fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
         }
         let ppm = own.iter().map(|row| match &row.refused {
             Some(_) => "refused".to_owned(),
-            None => text::share(row.false_negative_ppm, 1e6),
+            None => text::rate(row.false_negative_ppm, 1.0),
         });
         let label = numbers(&kind.names);
         let is_named = kind.names.planes != "frame";

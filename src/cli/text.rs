@@ -183,15 +183,6 @@ pub fn rate(rate: Option<Rate>, units: f64) -> String {
     })
 }
 
-/// A share of `whole`, which it does not exceed, with its 95 % interval.
-pub fn share(found: Option<Rate>, whole: f64) -> String {
-    let within = |found: Rate| Rate {
-        upper: found.upper.map(|upper| upper.min(whole)),
-        ..found
-    };
-    rate(found.map(within), 1.0)
-}
-
 /// How many columns of a terminal a text takes: two for each character of Chinese.
 pub fn across(text: &str) -> usize {
     console::measure_text_width(text)

@@ -237,8 +237,10 @@ pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str
     for check in checks.iter_mut().filter(|c| c.difference.is_none()) {
         check.status = Status::Unsafe.name();
         check.difference = Some(format!(
-            "camera level: {} visible items{or_points} and {} boundary contacts are missed, the deepest by {:e}\n  again: {again}",
-            errors.false_negatives, errors.touch_dropped, errors.worst_miss
+            "camera level: missed {}{or_points} and {}, the deepest by {:e}\n  again: {again}",
+            text::counted(errors.false_negatives as usize, "visible item"),
+            text::counted(errors.touch_dropped as usize, "boundary contact"),
+            errors.worst_miss
         ));
     }
 }

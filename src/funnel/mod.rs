@@ -28,7 +28,7 @@ pub use item_stages::Fate;
 pub use orders::OrderRow;
 pub use picks::PickRow;
 pub use report::{FunnelReport, Gain, StageRow};
-pub use stage::{Chain, NONE, StageKind, back_ends, left_out_of};
+pub use stage::{Chain, NEEDS, NONE, StageKind, back_ends, left_out_of};
 pub use study::{Prepared, failure, prepare, time};
 pub use sweep::{StageSweep, SweepPoint, prepare_sweep, time_sweep};
 pub use task::FunnelPlan;

@@ -150,6 +150,11 @@ pub const Z: &str = "z-test";
 const ALPHA: &str = "alpha-test";
 /// The test that is restricted to the samples of portals.
 pub const STENCIL: &str = "stencil-test";
+/// Tests that not every scene has, and what they need.
+pub const NEEDS: [[&str; 2]; 2] = [
+    [ALPHA, "--cut-out as well"],
+    [STENCIL, "a scene of rooms with portals"],
+];
 
 /// The region stage as left out, if the sectors of a map do not divide the plane.
 ///

@@ -117,8 +117,8 @@ pub(super) type Truths = [Vec<Truth>; 2];
 struct CameraErrors {
     counts: ErrorCount,
     /// How deep the deepest false negative reaches into the view, in pixels of
-    /// 1080p; 0 if there is none.
-    worst_miss_px: f64,
+    /// 1080p; 0 if there is none, `None` for a matrix without rays.
+    worst_miss_px: Option<f64>,
     /// Items whose answer changes to the neighbour while their truth does not.
     flicker: Option<u64>,
 }
@@ -192,14 +192,14 @@ impl Judged {
         let has_neighbours = self.by_camera.iter().any(|c| c.flicker.is_some());
         let flicker = rate_of(judged, |c| [c.flicker.unwrap_or(0), c.counts.visible]);
         let missed = rate_of(judged, |c| [c.counts.false_negatives, c.counts.visible]);
-        let worst_miss_px = known().map(|c| c.worst_miss_px).fold(0.0, f64::max);
+        let in_pixels = || known().filter_map(|c| c.worst_miss_px);
         let errors = CullingErrors {
             names: Names::of(&self.culling),
             excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
-            false_negative_ppm: missed.map(|share| share.per(1e6)),
+            false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
             flicker: flicker.filter(|_| has_neighbours),
             counts: is_judged.then_some(counts),
-            worst_miss_px: is_judged.then_some(worst_miss_px),
+            worst_miss_px: in_pixels().reduce(f64::max),
             ns_per_item: None,
             memory_bytes_per_item,
         };
@@ -207,7 +207,7 @@ impl Judged {
             Dimension::of(known().map(|c| c.counts.false_negatives as f64), f64::add),
             Dimension::of(known().map(|c| c.counts.touch_dropped as f64), f64::add),
             Dimension::of(known().map(|c| c.counts.false_positives as f64), f64::add),
-            Dimension::of(known().map(|c| c.worst_miss_px), f64::max),
+            Dimension::of(in_pixels(), f64::max),
             Dimension::fixed(memory_bytes_per_item),
         ];
         let mut point = Point::new(structure, errors, dimensions);
@@ -237,22 +237,23 @@ fn flicker(items: usize, truths: [&Truth; 2], answers: [&[ItemId]; 2]) -> u64 {
 
 /// How deep the deepest false negative reaches into the view, in pixels of a view
 /// 1080 pixels high: its depth in world units over the height that the view has
-/// where the item is nearest. World units for a matrix without rays.
-fn worst_miss_px(camera: &Camera, scene: &Scene, truth: &Truth, answer: &[ItemId]) -> f64 {
+/// where the item is nearest. `None` for a matrix without rays, which has no height.
+fn worst_miss_px(camera: &Camera, scene: &Scene, truth: &Truth, answer: &[ItemId]) -> Option<f64> {
     const PIXELS: f64 = 1080.0;
-    let misses = truth.misses(&scene.items, answer);
     let camera = camera.unprojected().unwrap_or(*camera);
-    let in_pixels = misses.into_iter().map(|(id, depth)| {
+    camera.lens.height_at(camera.lens.near())?;
+    let misses = truth.misses(&scene.items, answer);
+    let in_pixels = misses.into_iter().filter_map(|(id, depth)| {
         let item = &scene.items[id as usize];
         let ahead = |i| {
             let corner = item.corner(i).as_dvec3() + scene.origin;
             (corner - camera.frame.eye).dot(camera.frame.forward())
         };
         let nearest = (0..8).map(ahead).fold(f64::INFINITY, f64::min);
-        let height = camera.lens.height_at(nearest.max(camera.lens.near()));
-        height.map_or(depth, |height| depth / height * PIXELS)
+        let height = camera.lens.height_at(nearest.max(camera.lens.near()))?;
+        Some(depth / height * PIXELS)
     });
-    in_pixels.fold(0.0, f64::max)
+    Some(in_pixels.fold(0.0, f64::max))
 }
 
 #[cfg(test)]
@@ -279,16 +280,22 @@ mod tests {
         ];
         let scene = Scene::about("three", &boxes, DVec3::ZERO).unwrap();
         let truth = Truth::of_scene(&camera, &scene).unwrap();
-        assert_eq!(worst_miss_px(&camera, &scene, &truth, &[0, 2]), 0.0);
-        let px = worst_miss_px(&camera, &scene, &truth, &[2]);
+        let worst = |camera: &Camera, of: &[ItemId]| worst_miss_px(camera, &scene, &truth, of);
+        assert_eq!(worst(&camera, &[0, 2]), Some(0.0));
+        let px = worst(&camera, &[2]).unwrap();
         // At the far face, 12 ahead, the view is 12 high: 2 less 0 units deep.
         assert!((100.0..220.0).contains(&px), "{px}");
         // The same camera as a matrix.
         let matrix = camera.lens.projection(ClipSpace::D3d) * camera.frame.world_to_eye();
         let rows = matrix.transpose().to_cols_array_2d();
         let matrix = Camera::of_matrix(rows, MatrixConvention::ColumnD3d).unwrap();
-        let of_matrix = worst_miss_px(&matrix, &scene, &truth, &[2]);
+        let of_matrix = worst(&matrix, &[2]).unwrap();
         assert!((of_matrix / px - 1.0).abs() < 1e-9, "{of_matrix}");
+        // A sheared one has no rays, and so no pixels.
+        let mut sheared = rows;
+        sheared[0][2] += 0.01;
+        let sheared = Camera::of_matrix(sheared, MatrixConvention::ColumnD3d).unwrap();
+        assert_eq!(worst(&sheared, &[2]), None);
         // The second changes and is out both times, the first changes as well.
         let count = |a: &[ItemId], b: &[ItemId]| flicker(3, [&truth, &truth], [a, b]);
         assert_eq!(count(&[0, 2], &[0, 2]), 0);

@@ -162,7 +162,7 @@ impl Judged {
             sweep,
             value,
             names: test.names(),
-            false_negative_ppm: missed.map(|share| share.per(1e6)),
+            false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
             excess: rate_of(judged, |e| [e.false_positives, e.visible]),
             errors: known.then(|| judged.iter().copied().sum()),
             refused: self.refused,

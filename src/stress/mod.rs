@@ -9,6 +9,7 @@ mod vectors;
 use serde::Serialize;
 
 pub use replay::{Replay, replay};
+pub use sheet::ORACLE;
 pub use vectors::{
     BUILT_IN, BUILT_IN_NAME, Name, Names, Vector, VectorBox, VectorCamera, VectorPoint, built_in,
     read_vectors, read_vectors_file,

@@ -153,7 +153,10 @@ impl Replay<'_> {
             let fault = |b: &Aabb, is_wanted: bool| match (exact, is_wanted) {
                 (None, true) => Some("dropped".to_owned()),
                 (None, false) => None,
-                (Some((oracle, _)), true) => Some(format!("dropped, {:e} deep", oracle.depth(b))),
+                (Some((oracle, _)), true) => Some(match oracle.depth(b) {
+                    away if away < 0.0 => format!("dropped, {:e} away", -away),
+                    depth => format!("dropped, {depth:e} deep"),
+                }),
                 (Some((oracle, camera)), false) => {
                     let (away, slack) = (-oracle.depth(b), slack(camera, &around, b));
                     let text = format!("returned, {away:e} away; the margin is {slack:e}");

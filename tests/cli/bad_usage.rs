@@ -139,6 +139,10 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
             "--region is 'portals'; expected none | 'city:n=9' has nothing for that stage",
         ),
         (
+            "funnel --scene city:n=9 --fragment alpha-test",
+            "--fragment is 'alpha-test'; expected --cut-out as well",
+        ),
+        (
             "compare a.json b.json --seed 3 --test sphere",
             "--test says what --against BINARY measures | expected no --test",
         ),

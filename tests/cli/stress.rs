@@ -110,6 +110,40 @@ fn points_are_compared_as_written() {
     }
 }
 
+/// What another instruction set finds wrong is listed once more; the oracle has none.
+#[test]
+fn failures_are_counted_once() {
+    let file = json!([{
+        "id": "behind",
+        "camera": {"eye": [0, 0, 0], "look": [0, 0, -1], "up": [0, 1, 0], "fovy_deg": 60,
+                   "aspect": 1, "near": 1, "far": 9},
+        "boxes": [{"id": "a", "lo": [0, 0, 5], "hi": [1, 1, 6]}],
+        "expected_visible_camera": ["a"]
+    }]);
+    let folder = with_file(&file);
+    let run = |more: &str| {
+        let line = format!("stress --vectors v.json --structure linear{more}");
+        let done = cullbench(folder.path(), &line);
+        assert_eq!(done.code, Some(1), "{done:?}");
+        done.out
+    };
+    let rows = rows_of(&run(" --format json"));
+    let of = |row: &&Value| row["structure"] == "oracle" && row["id"] == "behind/a";
+    assert_eq!(rows.iter().filter(of).count(), 1, "{rows:?}");
+    let one = rows_of(&run(" --kernel portable --format json")).len();
+    let table = unwrapped(&run(""));
+    let number_before = |word: &str| -> usize {
+        let (before, _) = table.split_once(word).unwrap_or_else(|| panic!("{table}"));
+        before.rsplit([' ', '\n']).next().unwrap().parse().unwrap()
+    };
+    // By this kernel and by the portable one, if they are two.
+    let is_two = table.contains(" more by");
+    let more = is_two.then(|| number_before(" more by"));
+    let made = number_before(" checks in") + more.unwrap_or(0);
+    assert!([one, 2 * one].contains(&made), "{made} of {one}: {table}");
+    assert!(table.contains("dropped, 6e0 away"), "{table}");
+}
+
 #[test]
 fn other_vectors_run_alone() {
     let folder = with_file(&subset(&["A01-basic", "F04-nan-inf", "I01-point-location"]));
