@@ -110,7 +110,7 @@ fn points_are_compared_as_written() {
     }
 }
 
-/// What another instruction set finds wrong is listed once more; the oracle has none.
+/// Failures by another instruction set are rows of their own; the oracle has none.
 #[test]
 fn failures_are_counted_once() {
     let file = json!([{
