@@ -38,6 +38,7 @@
 //!
 //! Modules, each of which may use those before it:
 //!
+//! - [`shown`], [`spec`], [`input`], [`json`]: texts and files of users, shown and read
 //! - [`kernel`]: instruction sets, chosen at run time; [`threads`]: thread pools
 //! - [`arithmetic`]: directed rounding, exact sums and products
 //! - [`geometry`]: boxes, planes, convex volumes, and THE plane test
@@ -51,9 +52,8 @@
 //! - [`scene`]: generated and real worlds, and the regions in them; [`path`]: camera paths;
 //!   [`motion`]: items that move between frames
 //! - [`verify`]: the reference answer, and how others differ from it
-//! - [`measure`]: count, verify, time; [`statistics`] turns times into figures
+//! - [`statistics`] turns times into figures; [`measure`]: count, verify, time
 //! - [`report`]: the files that other tools read
-//! - [`spec`], [`input`], [`json`], [`shown`]: texts and files of users, read and shown
 //!
 //! Features: `cli` (default) is the `cullbench` program (`cli::main_with`) with the
 //! studies behind it: `visibility` (the stages before and after the object stage),

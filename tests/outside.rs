@@ -126,8 +126,13 @@ fn main() -> ExitCode {
         "precision --scene city:n=300 --path orbit:frames=2 --structure tiles --cubes 200 --processes 1",
     );
     assert!(precise.contains("tiles"), "{precise}");
+    works("view --scene city:n=300 --path orbit:frames=2 --structure tiles --out view.html");
+    let page = std::fs::read_to_string(folder.path().join("view.html")).expect("a page");
+    let (heading, title) = ("<h1>enter_your_crate view", "<title>enter_your_crate view");
+    assert!(page.contains(heading) && page.contains(title));
     println!(
-        "outside: list, verify, query, locate, run, report, compare, advise, stress, precision"
+        "outside: list, verify, query, locate, run, report, compare, advise, stress, precision, \
+         view"
     );
     ExitCode::SUCCESS
 }

@@ -1,4 +1,4 @@
-//! Commands and options.
+//! Commands, and options of those that `command_args` lacks.
 //!
 //! Parsers of options ([`values`]) check single values; the commands check combinations.
 

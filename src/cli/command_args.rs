@@ -1,4 +1,4 @@
-//! Options of `cullbench view`.
+//! Options of `view`, `funnel`, `scene` and `compare`.
 
 use std::path::PathBuf;
 

@@ -295,9 +295,12 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Options that decide how files are read, and what a frame of moving items is.
-const READS: &str =
-    "up items views update threads skip-bad-items matrix-convention fovy aspect near far";
+/// Options of a run that the command after it repeats.
+///
+/// They decide how files are read, what a frame of moving items is, and the threads and
+/// instructions of a query.
+const KEPT: &str =
+    "up items views update threads kernel skip-bad-items matrix-convention fovy aspect near far";
 
 /// The command that a reader will want next, with what it gives if that fits into
 /// `width` characters; `None` where nothing is ranked.
@@ -321,7 +324,7 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
         ("motion", &path.motion, ""),
     ];
     let recorded = TypedOptions::recorded(args).ok()?;
-    let read = recorded.words(|name| READS.split(' ').any(|read| read == name));
+    let read = recorded.words(|name| KEPT.split(' ').any(|kept| kept == name));
     for option in others.into_iter().filter_map(option).chain(read) {
         let last = line.rsplit('\n').next().unwrap_or_default();
         let is_within = last.chars().count() + option.chars().count() < width;

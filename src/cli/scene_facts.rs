@@ -1,4 +1,6 @@
 //! Figures of a scene's boxes: sizes, flatness, overlap, copies, loss by f32.
+//!
+//! Lenses, matrices and axes in words, which tables and pages show as well.
 
 use serde::Serialize;
 

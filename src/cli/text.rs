@@ -23,9 +23,10 @@ pub fn joined(texts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
 
 /// "Cold, six-box: Take wide .."; the sentence alone where nothing is named.
 pub fn labelled(name: &str, sentence: &str) -> String {
+    let (first, rest) = name.split_at(name.chars().next().map_or(0, char::len_utf8));
     match name {
         "" => sentence.to_owned(),
-        _ => format!("{}{}: {sentence}", name[..1].to_uppercase(), &name[1..]),
+        _ => format!("{}{rest}: {sentence}", first.to_uppercase()),
     }
 }
 
@@ -463,5 +464,17 @@ mod tests {
             entries(&rows.map(|row| row.map(str::to_owned)), 16),
             "  a     one two\n        three\n        4\n  name  5\n"
         );
+    }
+
+    #[test]
+    fn a_label_begins_with_a_capital_of_any_alphabet() {
+        let cases = [
+            ("six-box", "Six-box: so"),
+            ("écran", "Écran: so"),
+            ("", "so"),
+        ];
+        for (name, shown) in cases {
+            assert_eq!(labelled(name, "so"), shown);
+        }
     }
 }

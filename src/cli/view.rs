@@ -16,7 +16,7 @@ use super::query::frustum;
 use super::study::progress;
 use super::text::html;
 use super::{
-    Ending, expect_places, load_scene, scene_facts, tell, text, unread_is_fine, write_text,
+    Ending, expect_places, load_scene, program, scene_facts, tell, text, unread_is_fine, write_text,
 };
 use crate::camera::{Camera, ClipSpace, LensKind};
 use crate::funnel::{RaysEnd, Shape};
@@ -104,16 +104,16 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let test = culling.test.name();
     let about = format!("Scene: {axes}. Lens: {lens}{matrix}. Test: {test}.");
     let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
+    let title = format!("{} view {}", program::name(), data.scene);
     let body = format!(
-        "<main class=\"view\"><h1>cullbench view {}, {}</h1>\n<p>{}</p>\n{}<p>{}</p>\n</main>\n\
+        "<main class=\"view\"><h1>{}, {}</h1>\n<p>{}</p>\n{}<p>{}</p>\n</main>\n\
          <script type=\"application/json\" id=\"data\">{json}</script>\n",
-        html(&data.scene),
+        html(&title),
         html(&data.path),
         html(&told),
         include_str!("assets/view.html"),
         html(&about),
     );
-    let title = format!("cullbench view {}", data.scene);
     let script = concat!(
         include_str!("assets/view_data.js"),
         include_str!("assets/view_gl.js"),

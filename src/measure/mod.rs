@@ -27,7 +27,7 @@
 //! | `bounds` | lower bounds |
 //! | `results`, `cell`, `metrics` | cells of a report from parts |
 //! | `shared_work` | gain from threads |
-//! | `over_processes` | times of a study's tasks over several processes |
+//! | `over_processes`, `study` | times of a study's tasks over several processes; its options |
 //! | `environment` | machine and toolchain |
 
 mod bounds;

@@ -64,7 +64,10 @@ fn a_kernel_that_is_none_is_refused_in_one_line() {
 fn a_report_says_which_kernel_and_goes_on_with_no_other() {
     let here = folder(&[]);
     let line = "run --scene uniform:n=50 --path orbit:frames=2 --structure linear --out o";
-    works(here.path(), &format!("{line} --kernel portable"));
+    let told = works(here.path(), &format!("{line} --kernel portable"));
+    let next = told.lines().skip_while(|line| !line.starts_with("next"));
+    let next: Vec<&str> = next.collect();
+    assert!(next.join(" ").contains("--kernel=portable"), "{told}");
     let report = std::fs::read_to_string(here.path().join("o/report.json")).expect("a report");
     assert_eq!(json(&report)["machine"]["instruction_set"], "portable");
     works(here.path(), &format!("{line} --resume --kernel portable"));

@@ -128,21 +128,8 @@ impl QueryVolume for Unmasked<'_> {
         self.0.kept_lanes(isa, block, mask)
     }
     #[inline(always)]
-    fn kept_of_four<I: Isa>(
-        &self,
-        isa: I,
-        blocks: &[BoxBlock; 4],
-        mask: PlaneMask,
-    ) -> [LaneMask; 4] {
-        self.0.kept_of_four(isa, blocks, mask)
-    }
-    #[inline(always)]
     fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> impl Planes<I> {
         self.0.one_plane(isa, plane)
-    }
-    #[inline(always)]
-    fn all_planes<I: Isa>(&self, isa: I) -> Option<impl Planes<I>> {
-        self.0.all_planes(isa)
     }
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock, mask: PlaneMask) {
