@@ -201,7 +201,7 @@ impl Spheres {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::arbitrary::{any_box, number, vector};
+    use crate::geometry::tests_arbitrary::{any_box, number, vector};
     use crate::geometry::{BallFrustum, ConvexVolume, Plane, Planes, sphere_cube};
     use crate::kernel::{Kernel, Plain, Work};
     use glam::{EulerRot, Quat, Vec3};

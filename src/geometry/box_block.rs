@@ -397,7 +397,7 @@ pub fn blocks_of(first: usize, end: usize) -> impl Iterator<Item = (usize, LaneM
 
 #[cfg(test)]
 mod tests {
-    use super::super::arbitrary::{any_box, number};
+    use super::super::tests_arbitrary::{any_box, number};
     use super::super::{BroadcastPlanes, ConvexVolume, Planes};
     use super::*;
     use crate::kernel::Plain;

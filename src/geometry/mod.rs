@@ -1,8 +1,6 @@
 //! Boxes, planes, convex volumes and the plane test that all structures share.
 
 mod aabb;
-#[cfg(test)]
-pub mod arbitrary;
 mod balls;
 mod box_block;
 mod broadcast;
@@ -11,6 +9,8 @@ mod plane;
 mod plane_rows;
 mod relative_volume;
 mod spheres;
+#[cfg(test)]
+pub mod tests_arbitrary;
 
 pub use aabb::Aabb;
 pub use balls::{BallBlock, BallBlocks, Balls};

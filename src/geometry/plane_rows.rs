@@ -113,7 +113,7 @@ fn pick<const LARGER: bool>([p, q]: [f32; 2]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::arbitrary::{number, vector};
+    use super::super::tests_arbitrary::{number, vector};
     use super::*;
     use glam::Vec3;
     use proptest::prelude::*;

@@ -349,7 +349,7 @@ impl From<Vec3> for AnyVolume<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::arbitrary::{any_box, number, vector};
+    use crate::geometry::tests_arbitrary::{any_box, number, vector};
     use crate::geometry::{BoxBlocks, Plane, sphere_cube};
     use crate::kernel::Plain;
     use proptest::prelude::*;
