@@ -8,7 +8,7 @@ use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::input::InputError;
-use crate::measure::{Setting, Workload, WorkloadError, input_of};
+use crate::measure::{Setting, Workload, WorkloadError, input_for, input_of};
 use crate::path::CameraPath;
 use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
@@ -101,7 +101,7 @@ impl<'a> Case<'a> {
     pub fn tree_for(&self, test: CullingTest) -> Result<Box<dyn DynIndex>, BuildError> {
         let scene = self.scene();
         let items = test.items(&scene.items);
-        self.spec.build(input_of(scene, &items))
+        self.spec.build(input_for(test, scene, &items))
     }
 
     /// The depth of a camera's view, or of the scene where that is infinite.
@@ -162,4 +162,35 @@ pub fn part_of(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, Inpu
 pub fn some_of(count: usize, most: usize) -> impl Iterator<Item = usize> {
     let chosen = count.min(most);
     (0..chosen).map(move |n| n * count / chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{path, scene};
+
+    #[test]
+    fn the_tree_of_the_sphere_test_has_spheres() {
+        let scene = scene::load("city:n=300", &Default::default()).unwrap();
+        let path = path::load("orbit:frames=2", &scene, &Default::default()).unwrap();
+        let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
+        let spec = StructureSpec::parse("wide").unwrap();
+        let case = Case {
+            workload: &workload,
+            path: &path,
+            index: spec.build(&scene.items).unwrap(),
+            scan: spec.clone(),
+            spec,
+            options: AdviseOptions {
+                draw_ns: 1e3,
+                shade_ns: 1.0,
+                tolerance: 1e-5,
+                moved: 0.01,
+                queries_per_update: 1.0,
+            },
+        };
+        let bytes = |test| case.tree_for(test).unwrap().memory().total();
+        // Centre and radius of each item.
+        assert!(bytes(CullingTest::Sphere) - bytes(CullingTest::SixPlane) >= 300 * 16);
+    }
 }

@@ -44,17 +44,21 @@ impl BallBlocks {
     /// The spheres in cubes, one after another. O(cubes).
     pub fn of(cubes: impl ExactSizeIterator<Item = Aabb>) -> BallBlocks {
         let mut all = BallBlocks {
-            blocks: vec![BallBlock::default(); cubes.len().div_ceil(LANES)],
+            blocks: Vec::with_capacity(cubes.len().div_ceil(LANES)),
             reach: 0.0,
         };
         cubes.enumerate().for_each(|(at, cube)| all.set(at, &cube));
         all
     }
 
-    /// Replaces the sphere at an index below the number of spheres.
+    /// Sets the sphere at an index, which may lie behind the last one.
+    #[inline(always)]
     pub fn set(&mut self, at: usize, cube: &Aabb) {
         let ball = Ball::in_cube(cube);
         let values = ball.centre.to_array().into_iter().chain([ball.radius]);
+        if at / LANES >= self.blocks.len() {
+            self.blocks.resize(at / LANES + 1, BallBlock::default());
+        }
         let rows = &mut self.blocks[at / LANES].rows;
         for (row, value) in rows.iter_mut().zip(values) {
             row[at % LANES] = value;

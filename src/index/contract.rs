@@ -106,6 +106,8 @@ pub struct Input<'a> {
     /// True if the items are [cubes about spheres](crate::geometry::sphere_cube), for
     /// structures that keep spheres beside the bounds. Answers do not depend on it.
     pub spheres: bool,
+    /// True if items come and go, for structures that can keep a lane for each.
+    pub come_and_go: bool,
 }
 
 impl<'a> Input<'a> {
@@ -116,12 +118,21 @@ impl<'a> Input<'a> {
             own_tree: None,
             pool: None,
             spheres: false,
+            come_and_go: false,
         }
     }
 
     /// Declares the items cubes about spheres.
     pub fn spheres(self, spheres: bool) -> Input<'a> {
         Input { spheres, ..self }
+    }
+
+    /// Declares that absent items may appear in a refit.
+    pub fn come_and_go(self, come_and_go: bool) -> Input<'a> {
+        Input {
+            come_and_go,
+            ..self
+        }
     }
 
     /// Sets the scene's own partition, if it has one.

@@ -69,7 +69,7 @@ pub struct Linear {
     boxes: BoxBlocks,
     ids: PaddedIds,
     positions: Positions,
-    /// Spheres of the items, if they are [spheres](Input::spheres), until one moves.
+    /// Spheres of the items, if they are [spheres](Input::spheres).
     balls: Option<BallBlocks>,
     workers: Option<Workers>,
 }
@@ -84,13 +84,22 @@ pub struct LinearParams {
 }
 
 impl Linear {
+    /// Sets the bounds of the item at a position.
+    #[inline(always)]
+    fn set(&mut self, position: usize, bounds: &Aabb) {
+        self.boxes.set(position, bounds);
+        if let Some(balls) = &mut self.balls {
+            balls.set(position, bounds);
+        }
+    }
+
     /// Removes the item at a position; the last item takes its place.
     fn remove(&mut self, position: usize, id: ItemId) {
         if let Some(last) = self.ids.pop() {
             let bounds = self.boxes.get(self.ids.len());
             self.boxes.pop();
             if last != id {
-                self.boxes.set(position, &bounds);
+                self.set(position, &bounds);
                 self.ids.set(position, last);
                 self.positions.set(last, position as u32);
             }
@@ -251,7 +260,6 @@ impl RegionIndex for Linear {
 
     /// O(moved): overwrites their lanes. Items may become or cease to be empty.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        self.balls = None;
         self.positions.prepare(&self.ids, items.len());
         for (i, &id) in moved.iter().enumerate() {
             if let Some(position) = self.positions.ahead(items, moved, i) {
@@ -259,12 +267,14 @@ impl RegionIndex for Linear {
             }
             let bounds = &items[id as usize];
             match (self.positions.of(id), bounds.is_empty()) {
-                (Some(position), false) => self.boxes.set(position, bounds),
+                (Some(position), false) => self.set(position, bounds),
                 (Some(position), true) => self.remove(position, id),
                 (None, false) => {
-                    self.positions.set(id, self.ids.len() as u32);
+                    let position = self.ids.len();
+                    self.positions.set(id, position as u32);
                     self.ids.push(id);
                     self.boxes.push(bounds);
+                    self.set(position, bounds);
                 }
                 (None, true) => {}
             }

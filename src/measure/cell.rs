@@ -56,7 +56,8 @@ pub struct ReportCell {
     pub left_out: Vec<String>,
     /// Location of the samples of this cell; null without samples.
     pub samples_ref: Option<SamplesRef>,
-    /// Choice of a structure that chooses, and what it left out; absent of any other.
+    /// Choice of a structure that chooses, and what it left out; frames in which one
+    /// was built again as it could not refit. Absent of any other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chose: Option<String>,
 }

@@ -184,11 +184,15 @@ impl Entry<'_> {
         self.part.counts = counts;
         self.part.memory_after_bytes = Some(moving.index.memory().total() as u64);
         let chose = moving.index.chose();
-        self.part.chose = match self.subject.spec.policy {
+        let chose = match self.subject.spec.policy {
             // A new build counts its own updates.
             UpdatePolicy::Every(_) => chose.map(|chose| format!("since the last build: {chose}")),
             _ => chose,
         };
+        let (refused, all) = (moving.refused, frames.motion.frames());
+        let built = format!("built again in {refused} of {all} frames, which it cannot refit");
+        let notes = chose.into_iter().chain((refused > 0).then_some(built));
+        self.part.chose = notes.reduce(|told, more| format!("{told}; {more}"));
         Ok(())
     }
 

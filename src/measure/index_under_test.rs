@@ -5,7 +5,7 @@
 
 use super::clock::Stopwatch;
 use super::key::Pass;
-use super::{Verdict, Workload, compare_with_scan, guarded, input_of};
+use super::{Verdict, Workload, compare_with_scan, guarded, input_for, input_of};
 use crate::culling::CullingTest;
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, MemoryUsage, StructureSpec};
@@ -98,12 +98,9 @@ impl Subject {
 
     /// Measures updates as well, on another index that is then thrown away.
     pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Subject {
-        let updates = |spec: &StructureSpec| {
-            let items = test.items(&scene.items);
-            measure_updates(spec, scene, &items, spec.build(input_of(scene, &items))?)
-        };
         if let Ok(built) = &mut self.built {
-            match guarded(|| updates(&self.spec)).unwrap_or_else(Err) {
+            let updates = || measure_updates(&self.spec, scene, test);
+            match guarded(updates).unwrap_or_else(Err) {
                 Ok(update_ms) => built.update_ms = update_ms,
                 Err(verdict) => self.built = Err(verdict),
             }
@@ -124,8 +121,7 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     let items = test.items(&scene.items);
     let build = || {
         let watch = Stopwatch::start();
-        let spheres = test == CullingTest::Sphere;
-        let built = spec.build(input_of(scene, &items).spheres(spheres));
+        let built = spec.build(input_for(test, scene, &items));
         // This thread's CPU time says nothing about what others did for it.
         let lap = watch.lap();
         let alone = spec.execution.threads <= 1;
@@ -157,27 +153,27 @@ pub(super) const USUAL_SHARE: f64 = 0.01;
 /// Largest scene whose updates are measured: they need a second copy of it.
 pub(super) const MOST_UPDATED: usize = 2_000_000;
 
-/// Times an update for each of [`UPDATE_SHARES`], CPU ms; consumes the index.
+/// Times an update for each of [`UPDATE_SHARES`], CPU ms.
 ///
 /// Each update moves a share of the items by their own size. The first one, which touches
 /// memory for the first time, is not timed. A search after the last one is checked.
 pub(super) fn measure_updates(
     spec: &StructureSpec,
     scene: &Scene,
-    items: &[Aabb],
-    mut index: Box<dyn DynIndex>,
+    test: CullingTest,
 ) -> Result<Vec<f64>, Verdict> {
+    let mut items = test.items(&scene.items).into_owned();
     if items.is_empty() || items.len() > MOST_UPDATED {
         return Ok(Vec::new());
     }
-    let mut items = items.to_vec();
+    let mut index = spec.build(input_for(test, scene, &items))?;
     let mut times = Vec::with_capacity(UPDATE_SHARES.len());
     let first = move_share(&mut items, USUAL_SHARE);
-    spec.update(&mut index, input_of(scene, &items), &first)?;
+    spec.update(&mut index, input_for(test, scene, &items), &first)?;
     for share in UPDATE_SHARES {
         let moved = move_share(&mut items, share);
         let watch = Stopwatch::start_for(spec.is_threaded());
-        spec.update(&mut index, input_of(scene, &items), &moved)?;
+        spec.update(&mut index, input_for(test, scene, &items), &moved)?;
         times.push(watch.lap().cpu_ns / 1e6);
     }
     if let Some(moved) = items.iter().find(|b| !b.is_empty()) {

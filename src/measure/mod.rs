@@ -82,6 +82,7 @@ pub use shared_work::SharedWork;
 pub use study::{Setting, StudyPlan};
 pub use task::{Ask, AskMany, TimedTask};
 pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
+pub(crate) use workload::input_for;
 pub use workload::{Workload, WorkloadError, input_of};
 
 named! {

@@ -11,7 +11,7 @@ use super::index_under_test::{MOST_UPDATED, USUAL_SHARE};
 use super::process_result::Known;
 use super::{
     Answer, Judged, Protocol, Status, TaskKind, TimedTask, Verdict, Workload, compare_with_scan,
-    guarded, input_of, move_share, timed_rounds,
+    guarded, move_share, timed_rounds,
 };
 use crate::culling::CameraView;
 use crate::geometry::Aabb;
@@ -130,6 +130,8 @@ pub(super) struct Moving<'w> {
     /// Enlarged bounds that the index holds in place of the items'.
     fat: Option<Fat>,
     frame: u32,
+    /// Number of updates that were new builds because the structure refused a refit.
+    pub(super) refused: usize,
     pub(super) index: Box<dyn DynIndex>,
 }
 
@@ -142,7 +144,7 @@ impl<'w> Moving<'w> {
             _ => None,
         };
         let held = fat.as_ref().map_or(&items, |fat| &fat.boxes);
-        let mut index = spec.build(input_of(workload.scene, held))?;
+        let mut index = spec.build(workload.input(held))?;
         if spec.info().refits && spec.policy != UpdatePolicy::Rebuild {
             // Tables of positions are no part of the first frame.
             index.refit(held, &[]);
@@ -150,6 +152,7 @@ impl<'w> Moving<'w> {
         Ok(Moving {
             fat,
             frame: 0,
+            refused: 0,
             workload,
             spec,
             replay: motion.replay(),
@@ -169,14 +172,15 @@ impl<'w> Moving<'w> {
 
     /// Brings the index up to date.
     pub(super) fn update(&mut self) -> Result<(), Verdict> {
-        let scene = self.workload.scene;
         let is_rebuilt = match self.spec.policy {
             UpdatePolicy::Rebuild => true,
             UpdatePolicy::Every(frames) => self.frame.is_multiple_of(frames),
             _ => false,
         };
         if is_rebuilt {
-            self.index = self.spec.build(input_of(scene, &self.items))?;
+            let refits_later = self.spec.policy != UpdatePolicy::Rebuild;
+            let input = self.workload.input(&self.items).come_and_go(refits_later);
+            self.index = self.spec.build(input)?;
             return Ok(());
         }
         let (items, moved) = match &mut self.fat {
@@ -187,7 +191,9 @@ impl<'w> Moving<'w> {
             }
         };
         if !moved.is_empty() {
-            (self.spec).update(&mut self.index, input_of(scene, items), moved)?;
+            let input = self.workload.input(items);
+            let is_refitted = self.spec.update(&mut self.index, input, moved)?;
+            self.refused += usize::from(!is_refitted);
         }
         Ok(())
     }
@@ -339,6 +345,9 @@ pub(super) fn ageing(
             break;
         }
         moving.update()?;
+        if moving.refused > 0 {
+            break;
+        }
         if AGES.contains(&frame) {
             let aged = moving.index.as_ref();
             let found = over_fresh(aged, spec, frames.workload, moving.held(), protocol)?;
@@ -360,16 +369,15 @@ pub(super) fn refitted_ln(
     workload: &Workload,
     protocol: &Protocol,
 ) -> Result<Option<f64>, Verdict> {
-    let scene = workload.scene;
-    let refits = spec.row.info.refits;
-    if !refits || protocol.cold || workload.items.is_empty() || scene.items.len() > MOST_UPDATED {
+    let (refits, count) = (spec.info().refits, workload.items.len());
+    if !refits || protocol.cold || count == 0 || count > MOST_UPDATED {
         return Ok(None);
     }
     let mut items = workload.items.to_vec();
-    let mut refitted = spec.build(input_of(scene, &items))?;
+    let mut refitted = spec.build(workload.input(&items))?;
     for _ in 0..REFITS {
         let moved = move_share(&mut items, USUAL_SHARE);
-        spec.update(&mut refitted, input_of(scene, &items), &moved)?;
+        spec.update(&mut refitted, workload.input(&items), &moved)?;
     }
     over_fresh(refitted.as_ref(), spec, workload, &items, protocol)
 }
@@ -384,7 +392,7 @@ fn over_fresh(
     items: &[Aabb],
     protocol: &Protocol,
 ) -> Result<Option<f64>, Verdict> {
-    let Ok(rebuilt) = spec.build(input_of(workload.scene, items)) else {
+    let Ok(rebuilt) = spec.build(workload.input(items)) else {
         return Ok(None);
     };
     let mut expected = Vec::with_capacity(workload.views.len());
@@ -447,7 +455,7 @@ mod tests {
         let way = path::load("orbit:frames=8", &scene, &LensDefaults::default()).unwrap();
         let workload = Workload::new(&scene, &way, &Culling::default()).unwrap();
         let spec = StructureSpec::parse("linear").unwrap();
-        let aged = spec.build(input_of(&scene, &scene.items)).unwrap();
+        let aged = spec.build(workload.input(&scene.items)).unwrap();
         let mut items = scene.items.clone();
         let far = glam::Vec3::splat(1e4);
         items[7] = Aabb::new(items[7].min + far, items[7].max + far);

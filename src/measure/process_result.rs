@@ -76,7 +76,9 @@ pub struct SubjectPart {
     pub ageing_ln: BTreeMap<usize, f64>,
     /// Metrics of the count pass, means per query; the first process only.
     pub counts: BTreeMap<String, f64>,
-    /// Choice of a structure that chooses; of a motion in the first process only.
+    /// Choice of a structure that chooses, new builds in place of refits.
+    ///
+    /// Known of a motion in the first process only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chose: Option<String>,
 }

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use glam::Vec3;
 
 use crate::camera::{Camera, Surroundings};
-use crate::culling::{CameraView, Culling, CullingError};
+use crate::culling::{CameraView, Culling, CullingError, CullingTest};
 use crate::geometry::Aabb;
 use crate::index::Input;
 use crate::motion::Motion;
@@ -19,6 +19,11 @@ use crate::scene::{Scene, Sought};
 /// them indexed, with the scene's own partition.
 pub fn input_of<'a>(scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
     Input::new(items).own_tree(scene.own_tree.as_ref())
+}
+
+/// [`input_of`] with the spheres of the test that has some.
+pub(crate) fn input_for<'a>(test: CullingTest, scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
+    input_of(scene, items).spheres(test == CullingTest::Sphere)
 }
 
 /// A scene with the queries along one path.
@@ -120,6 +125,12 @@ impl<'a> Workload<'a> {
             motion,
             views_per_frame,
         })
+    }
+
+    /// Input of a structure over items as the culling test has them.
+    pub(super) fn input<'i>(&'i self, items: &'i [Aabb]) -> Input<'i> {
+        let input = input_for(self.culling.test, self.scene, items);
+        input.come_and_go(self.motion.is_some())
     }
 
     /// Region search at the eye of a camera: the answer of `ask`, made exact by

@@ -13,7 +13,8 @@ use crate::camera::{PLANE_METHODS, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{
-    OverProcesses, ProcessTimes, Setting, Status, StudyPlan, TimedTask, Verdict, input_of,
+    OverProcesses, ProcessTimes, Setting, Status, StudyPlan, TimedTask, Verdict, input_for,
+    input_of,
 };
 use crate::query::ItemId;
 use crate::scene::Scene;
@@ -106,7 +107,7 @@ impl<'a> Indexes<'a> {
     fn new(spec: &'a StructureSpec, scene: &Scene) -> Result<Indexes<'a>, BuildError> {
         let over = |test: CullingTest| {
             let items = test.items(&scene.items);
-            spec.build(input_of(scene, &items).spheres(test == CullingTest::Sphere))
+            spec.build(input_for(test, scene, &items))
         };
         let regions = scene.regions.boxes(&scene.items);
         let others = !std::ptr::eq(regions, &scene.items[..]);

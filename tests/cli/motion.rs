@@ -255,7 +255,7 @@ fn what_auto_has_chosen_stands_in_cell_summary_and_notes() {
         ("auto:use=wide", "tree, not scan of all items ("),
         ("auto:use=linear", "scan of all items, not "),
     ];
-    let check = |options: &str, updates: [&str; 2]| {
+    let check = |options: &str, built: &str, updates: [&str; 2]| {
         let line = format!("{run} {options}");
         let told = unwrapped(&works(folder.path(), &line));
         let whole = report(&folder.path().join("r"));
@@ -265,7 +265,7 @@ fn what_auto_has_chosen_stands_in_cell_summary_and_notes() {
         for (cell, ((name, wanted), update)) in forced.iter().zip(updates).enumerate() {
             let chose = chose(2 + cell).expect("a choice");
             assert!(
-                chose.starts_with(wanted) && chose.contains(update),
+                chose.starts_with(&format!("{built}{wanted}")) && chose.contains(update),
                 "{chose}"
             );
             assert!(told.contains(&format!("{name}: {chose}")), "{told}");
@@ -275,13 +275,14 @@ fn what_auto_has_chosen_stands_in_cell_summary_and_notes() {
         assert_eq!(summary[0]["chose"], "");
         assert_eq!(Some(summary[1]["chose"].as_str()), chose(1));
     };
-    check("", ["", ""]);
+    check("", "", ["", ""]);
     fs::remove_dir_all(folder.path().join("r")).expect("removable");
     check(
         "--motion drift:share=50%,frames=6",
+        "built as ",
         [
             "; refit in 6 of 6 updates, not",
-            "; overwriting in 6 of 6 updates, not",
+            "; scan of overwritten leaves in 6 of 6 updates, not",
         ],
     );
 }

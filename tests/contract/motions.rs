@@ -1,6 +1,6 @@
 //! Structures return the sets of the scan in each frame of each motion.
 
-use cullbench::culling::Culling;
+use cullbench::culling::{Culling, CullingTest};
 use cullbench::geometry::{ConvexVolume, Plane};
 use cullbench::index::Registry;
 use cullbench::measure::{Workload, input_of};
@@ -45,6 +45,41 @@ fn every_structure_is_right_in_every_frame_of_every_motion() {
                     }
                 }
                 assert!(replay.advance(&mut items).is_none());
+            }
+        }
+    }
+}
+
+#[test]
+fn spheres_are_those_of_the_scan_in_every_frame() {
+    let scene = scene::load("city:n=300", &Default::default()).unwrap();
+    let way = path::load("orbit:frames=11", &scene, &Default::default()).unwrap();
+    let test = CullingTest::Sphere;
+    let culling = Culling {
+        test,
+        ..Culling::default()
+    };
+    let workload = Workload::new(&scene, &way, &culling).unwrap();
+    let names = "linear,wide,moving,auto:use=linear,auto:use=moving,auto:use=wide";
+    let structures = Registry::builtin().structures(names).unwrap();
+    for family in MOTIONS {
+        let spec = format!("{}:share=0.15,frames={FRAMES},same=false", family.name);
+        let motion = Motion::load(&spec, &scene).unwrap();
+        for structure in &structures {
+            let (mut items, mut replay) = (scene.items.clone(), motion.replay());
+            let cubes = test.items(&items);
+            let input = input_of(&scene, &cubes).spheres(true);
+            let (mut index, mut trial) = (structure.build(input).unwrap(), Trial::new(300));
+            for frame in 0..FRAMES {
+                let moved = replay.advance(&mut items).unwrap();
+                let cubes = test.items(&items);
+                let input = input_of(&scene, &cubes).spheres(true);
+                structure.update(&mut index, input, moved).unwrap();
+                let view = workload.views[frame % way.cameras.len()].as_any();
+                trial.see(&cubes, view);
+                let asked = trial.ask(|ids| index.query(view, ids));
+                let label = &structure.label;
+                assert!(asked.is_ok(), "{label}, frame {frame} of {spec}: {asked:?}");
             }
         }
     }

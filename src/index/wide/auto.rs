@@ -24,7 +24,12 @@ const SCAN: usize = 0;
 const TREE: usize = 1;
 
 /// Kinds of updates by their index in [`Auto::updates`].
-const UPDATES: [&str; 4] = ["overwriting", "refit", "rebuild", "two trees"];
+const UPDATES: [&str; 4] = [
+    "scan of overwritten leaves",
+    "refit",
+    "rebuild",
+    "two trees",
+];
 const OVERWRITE: usize = 0;
 const REFIT: usize = 1;
 const REBUILD: usize = 2;
@@ -194,30 +199,13 @@ impl Auto {
         self.scans = self.built == SCAN;
     }
 
-    /// Trees with a lane for each item, one that is gone beside the item before it.
-    fn trees_of(&self, items: &[Aabb]) -> Result<Moving, BuildError> {
-        let order = self.params.order;
-        let resting = |items: &[Aabb]| Moving::resting(&Input::new(items), &WideParams { order });
-        // A bound that is no number is refused by the build.
-        let is_gone = |b: &Aabb| b.is_empty() && b.is_finite();
-        let ids = (0..).zip(items).filter(|(_, b)| is_gone(b));
-        let gone: Vec<ItemId> = ids.map(|(id, _)| id).collect();
-        let held = items.iter().find(|b| !b.is_empty());
-        let (false, Some(mut last)) = (self.update == PART || gone.is_empty(), held) else {
-            return resting(items);
-        };
-        let held = items.iter().map(|b| {
-            last = if is_gone(b) { last } else { b };
-            *last
-        });
-        let mut trees = resting(&held.collect::<Vec<_>>())?;
-        trees.still.take_over(items, &gone);
-        Ok(trees)
-    }
-
     /// Replaces the trees; false with nothing changed if they cannot be built.
     fn rebuild(&mut self, items: &[Aabb]) -> bool {
-        let Ok(trees) = self.trees_of(items) else {
+        let (order, spheres) = (self.params.order, self.trees.still.balls.is_some());
+        let input = Input::new(items).spheres(spheres);
+        // Two trees have other lanes for what comes.
+        let input = input.come_and_go(self.update != PART);
+        let Ok(trees) = Moving::resting(&input, &WideParams { order }) else {
             return false;
         };
         self.trees = trees;
@@ -384,11 +372,20 @@ impl RegionIndex for Auto {
 
     /// O(n log n), that of [`Wide`](super::Wide), and a few queries.
     fn build(input: &Input<'_>, params: &AutoParams) -> Result<Self, BuildError> {
-        let order = params.order;
+        let (order, is_parted) = (params.order, params.structure == Use::Moving);
+        if is_parted && params.update == Update::Rebuild {
+            return Err(BuildError::Params {
+                structure: Self::INFO.name,
+                reason: "use=moving,update=rebuild; expected update=refit, as a new tree has no \
+                         second one of movers"
+                    .to_owned(),
+            });
+        }
+        let input = input.come_and_go(input.come_and_go && !is_parted);
         let mut auto = Auto {
-            trees: Moving::resting(input, &WideParams { order })?,
+            trees: Moving::resting(&input, &WideParams { order })?,
             params: *params,
-            is_parted: params.structure == Use::Moving,
+            is_parted,
             ..Auto::default()
         };
         auto.calibrate(input.items);
@@ -428,7 +425,6 @@ impl RegionIndex for Auto {
             // Tables for the updates that follow.
             return self.refit_held(items, moved) || self.rebuild(items);
         }
-        self.trees.still.balls = None;
         self.weighing += 1;
         self.moved += moved.len() as f64;
         if self.weighing == TOGETHER || self.updates.iter().sum::<u32>() < 2 {
@@ -457,7 +453,7 @@ impl RegionIndex for Auto {
         if let Some(most) = most.filter(|_| count > 0) {
             let left_out = others(&UPDATES, &self.spent, most);
             let (name, here) = (UPDATES[most], self.updates[most]);
-            told += &format!("; {name} in {here} of {count} updates{left_out}");
+            told = format!("built as {told}; {name} in {here} of {count} updates{left_out}");
         }
         Some(told)
     }

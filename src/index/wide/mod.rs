@@ -9,6 +9,7 @@ mod moving;
 mod refit;
 mod single_plane_buckets;
 
+use std::borrow::Cow;
 use std::cell::Cell;
 use std::ops::ControlFlow;
 
@@ -61,8 +62,7 @@ pub struct Wide {
     /// Bounds of all items, or more.
     root: Aabb,
     positions: Positions,
-    /// Spheres of the leaves, where the items are [spheres](Input::spheres), until one
-    /// moves.
+    /// Spheres of the leaves, where the items are [spheres](Input::spheres).
     balls: Option<BallBlocks>,
 }
 
@@ -97,6 +97,27 @@ fn fill(items: &[Aabb], ids: &[ItemId], first: usize, leaves: &mut [BoxBlock]) {
         for (lane, &id) in here.iter().enumerate() {
             block.set(lane, &items[id as usize]);
         }
+    }
+}
+
+/// Items, those absent in the box of the item before, and ids of the absent ones.
+///
+/// All as they are unless items [come and go](Input::come_and_go).
+fn with_lanes<'a>(input: &Input<'a>) -> (Cow<'a, [Aabb]>, Vec<ItemId>) {
+    let items = input.items;
+    // A bound that is no number is refused by the build.
+    let is_gone = |b: &Aabb| input.come_and_go && b.is_empty() && b.is_finite();
+    let ids = (0..).zip(items).filter(|(_, b)| is_gone(b));
+    let gone: Vec<ItemId> = ids.map(|(id, _)| id).collect();
+    match items.iter().find(|b| !b.is_empty()) {
+        Some(mut last) if !gone.is_empty() => {
+            let held = items.iter().map(|b| {
+                last = if is_gone(b) { last } else { b };
+                *last
+            });
+            (held.collect(), gone)
+        }
+        _ => (items.into(), Vec::new()),
     }
 }
 
@@ -381,12 +402,17 @@ impl RegionIndex for Wide {
     /// O(n log n) by medians, O(n) but for the sort by Morton codes.
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
         let threads = input.threads();
-        let ids = block_ordered(input.items, indexable(input.items)?, params.order, threads);
-        let cubes = || BallBlocks::of(ids.iter().map(|&id| input.items[id as usize]));
-        Ok(Wide {
+        let (items, gone) = with_lanes(input);
+        let ids = block_ordered(&items, indexable(&items)?, params.order, threads);
+        let cubes = || BallBlocks::of(ids.iter().map(|&id| items[id as usize]));
+        let mut tree = Wide {
             balls: input.spheres.then(cubes),
-            ..Wide::over(input.items, &ids, threads)
-        })
+            ..Wide::over(&items, &ids, threads)
+        };
+        if !gone.is_empty() {
+            tree.take_over(input.items, &gone);
+        }
+        Ok(tree)
     }
 
     fn memory(&self) -> MemoryUsage {
@@ -422,7 +448,6 @@ impl RegionIndex for Wide {
 
     /// O(moved * depth). Items of the build may become empty and come back.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        self.balls = None;
         self.take_over(items, moved)
     }
 

@@ -8,12 +8,13 @@
 //! there are more movers. So bounds do not grow, however many updates come.
 
 use std::collections::BTreeSet;
+use std::iter::repeat_n;
 use std::ops::ControlFlow;
 
 use glam::Vec3;
 
 use super::{Wide, WideParams};
-use crate::geometry::{Aabb, BoxBlock, LANES};
+use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES};
 use crate::index::items::{ABSENT, Dirty, Positions};
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::kernel::prefetch;
@@ -150,7 +151,9 @@ impl Moving {
         let first_free = leaves.div_ceil(self.finest);
         // Leaves that are added later are in the order of space only among themselves.
         let count = 2 * first_free + 1;
-        let new = Wide::unfilled(&vec![ABSENT; count * LANES]);
+        let mut new = Wide::unfilled(&vec![ABSENT; count * LANES]);
+        let balls = || BallBlocks::of(repeat_n(Aabb::EMPTY, count * LANES));
+        new.balls = self.still.balls.is_some().then(balls);
         let before = std::mem::replace(&mut self.movers, new);
         self.changed = self.movers.untouched();
         self.regions.clear();
@@ -228,17 +231,17 @@ impl Moving {
                 near = (!cell.contains_point(bounds.centre())).then(|| self.leaf_for(bounds));
                 let stays = near.is_none_or(|near| self.region_of[near] == region);
                 if stays && !bounds.is_empty() {
-                    self.movers.blocks[leaf].set(at % LANES, bounds);
+                    self.movers.set(at, bounds);
                     self.changed.mark(leaf);
                     return;
                 }
                 self.remove(at);
             }
             Some(at) => {
-                let (leaf, lane) = (at / LANES, at % LANES);
+                let leaf = at / LANES;
                 let leaves = !rested && (id as u8).wrapping_add(self.now).is_multiple_of(LEAVING);
                 if !leaves && !bounds.is_empty() && self.fits(leaf, bounds) {
-                    self.still.blocks[leaf].set(lane, bounds);
+                    self.still.set(at, bounds);
                     self.still.grow(leaf, bounds);
                     return;
                 }
@@ -414,7 +417,8 @@ impl RegionIndex for Moving {
 
     /// O(n log n), that of [`Wide`].
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
-        let mut trees = Moving::resting(input, params)?;
+        // Vacant lanes and a second tree take what comes.
+        let mut trees = Moving::resting(&input.come_and_go(false), params)?;
         trees.prepare(input.items.len());
         Ok(trees)
     }
@@ -452,7 +456,6 @@ impl RegionIndex for Moving {
         if self.crowded * LANES > items.len() / 8 || items.len() > MOST_ITEMS {
             return false;
         }
-        self.still.balls = None;
         self.prepare(items.len());
         (self.changed, self.left) = (self.movers.untouched(), self.still.untouched());
         let regions = self.regions.len();

@@ -37,7 +37,7 @@ impl Wide {
             } else if self.vacant > 0 {
                 self.put(position, id, bounds);
             } else {
-                self.blocks[position / LANES].set(position % LANES, bounds);
+                self.set(position, bounds);
             }
             leaves.mark(position / LANES);
         }
@@ -62,6 +62,9 @@ impl Wide {
         (held..leaves * LANES).for_each(|_| self.ids.push(ABSENT));
         self.vacant += self.ids.len() - held;
         self.occupied.resize(leaves, 0);
+        if let Some(balls) = &mut self.balls {
+            balls.set(leaves * LANES - 1, &Aabb::EMPTY);
+        }
         let before = std::mem::replace(&mut self.levels, Level::over(self.ids.len()));
         let blocks = self.levels.last().map_or(0, Level::end);
         self.blocks.resize(blocks, BoxBlock::EMPTY);
@@ -87,7 +90,16 @@ impl Wide {
         let (leaf, lane) = (position / LANES, position % LANES);
         self.occupied[leaf] =
             self.occupied[leaf] & !(1 << lane) | LaneMask::from(id != ABSENT) << lane;
-        self.blocks[leaf].set(lane, bounds);
+        self.set(position, bounds);
+    }
+
+    /// Sets the bounds of a lane of a leaf, and its sphere.
+    #[inline(always)]
+    pub(super) fn set(&mut self, position: usize, bounds: &Aabb) {
+        self.blocks[position / LANES].set(position % LANES, bounds);
+        if let Some(balls) = &mut self.balls {
+            balls.set(position, bounds);
+        }
     }
 
     /// Enlarges the bounds above a leaf to hold a box.
