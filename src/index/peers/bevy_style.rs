@@ -7,7 +7,7 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::placed;
+use super::place_of;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxTest, BoxTested, Tally};
 use crate::index::items::Record;
@@ -56,11 +56,19 @@ impl BoxTested for PeerBevyStyle {
         Ok(PeerBevyStyle { entities })
     }
 
-    /// Overwrites the bounds.
+    /// Overwrites the bounds; an entity that is gone is hidden.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        let placed = placed(&self.entities, |e| e.item.id, items, moved)?;
-        for (at, bounds) in placed {
-            self.entities[at].item.bounds = bounds;
+        for &id in moved {
+            let bounds = items[id as usize];
+            let is_there = !bounds.is_empty();
+            match place_of(&self.entities, |e| e.item.id, id) {
+                Ok(at) => {
+                    let entity = &mut self.entities[at];
+                    (entity.item.bounds, entity.inherited_visibility) = (bounds, is_there);
+                }
+                Err(_) if is_there => return None,
+                Err(_) => {}
+            }
         }
         Some(())
     }

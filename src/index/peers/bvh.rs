@@ -68,6 +68,11 @@ impl<T: BoxTest + ?Sized, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, '_, 
 /// Boxes of this reach have areas that are still numbers in f32.
 const LARGEST: f32 = 1e18;
 
+/// Number of shapes above which an update by shapes is slow.
+///
+/// It takes as long as a build from three eighths moved on, below from three quarters on.
+const LARGE: usize = 10_000;
+
 /// The crate's tree over shapes scaled down, its nodes then fitted to the shapes.
 ///
 /// If areas overflow, the crate's builder finds no cheapest split and
@@ -136,12 +141,15 @@ impl BoxTested for PeerBvh {
         })
     }
 
-    /// `Bvh::update_shapes`, which removes and adds shape by shape; a build where most
-    /// shapes have moved, or where areas overflow.
+    /// `Bvh::update_shapes`, which removes and adds shape by shape, or a build.
+    ///
+    /// A build is faster where most shapes have moved, and needed where areas overflow.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
         let placed = placed(&self.shapes, |s| s.item.id, items, moved)?;
         let overflows = |(_, b): &(usize, Aabb)| b.reach().max_element() > LARGEST;
-        let builds = placed.len() * 2 > self.shapes.len();
+        let count = self.shapes.len();
+        let eighths = if count > LARGE { 3 } else { 6 };
+        let builds = placed.len() * 8 >= count * eighths;
         let builds = builds || self.scaled || placed.iter().any(overflows);
         let mut changed: Vec<usize> = placed.iter().map(|(at, _)| *at).collect();
         // The crate adds a shape as often as it is named.

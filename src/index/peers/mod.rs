@@ -20,6 +20,14 @@ pub use obvhs::{ObvhsParams, ObvhsUpdate, PeerObvhs};
 pub use parry3d::{Parry3dParams, Parry3dUpdate, PeerParry3d};
 pub use rstar::PeerRstar;
 
+/// Index of an item in a list ascending by id. O(log n), O(1) if no item is empty.
+fn place_of<T>(held: &[T], id_of: impl Fn(&T) -> ItemId, id: ItemId) -> Result<usize, usize> {
+    match held.get(id as usize) {
+        Some(own) if id_of(own) == id => Ok(id as usize),
+        _ => held.binary_search_by_key(&id, id_of),
+    }
+}
+
 /// Moved items by their index in a list ascending by id, with their new bounds.
 ///
 /// Empty items have none; `None` if one becomes or ceases to be empty. O(moved * log n).
@@ -31,13 +39,8 @@ fn placed<T>(
 ) -> Option<Vec<(usize, Aabb)>> {
     let mut placed = Vec::with_capacity(moved.len());
     for &id in moved {
-        // If no item is empty, the index is the id.
-        let at = match held.get(id as usize) {
-            Some(own) if id_of(own) == id => Ok(id as usize),
-            _ => held.binary_search_by_key(&id, &id_of),
-        };
         let bounds = items[id as usize];
-        match at {
+        match place_of(held, &id_of, id) {
             Ok(at) if !bounds.is_empty() => placed.push((at, bounds)),
             Err(_) if bounds.is_empty() => {}
             _ => return None,
@@ -132,8 +135,15 @@ mod tests {
                     assert_eq!(sorted(&*index, volume), wanted, "{text} frame {frame}");
                 }
             }
-            items[8] = Aabb::new(Vec3::ONE, Vec3::ZERO);
-            assert!(!index.refit(&items, &[8]), "{text}");
+            let held = std::mem::replace(&mut items[8], Aabb::new(Vec3::ONE, Vec3::ZERO));
+            let has_flags = text == "peer-bevy-style";
+            assert_eq!(index.refit(&items, &[8]), has_flags, "{text}");
+            let all = ConvexVolume::from_planes(&[]).expect("no planes");
+            for count in if has_flags { &[898, 899][..] } else { &[] } {
+                assert_eq!(sorted(&*index, &all).len(), *count);
+                items[8] = held;
+                assert!(index.refit(&items, &[8]));
+            }
         }
     }
 }

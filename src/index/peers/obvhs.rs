@@ -28,7 +28,7 @@ pub struct ObvhsParams {
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ObvhsUpdate {
-    /// `refit_from` for each leaf, or `refit_all` from one moved item in sixteen on.
+    /// `refit_from` for each leaf, or `refit_all` from one moved item in 32 on.
     #[default]
     Refit,
     /// `move_primitive`; leaves of several items are refitted.
@@ -36,7 +36,7 @@ pub enum ObvhsUpdate {
 }
 
 /// An update refits all nodes from one moved item in as many on.
-const ALL_SHARE: usize = 16;
+const ALL_SHARE: usize = 32;
 
 /// The crate's tree by its medium preset; items in the order of its primitives.
 #[derive(Default)]

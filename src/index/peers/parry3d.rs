@@ -29,10 +29,12 @@ pub struct Parry3dParams {
 pub enum Parry3dUpdate {
     /// `insert_or_update_partially`, then `refit_partial`.
     ///
-    /// `refit` in its place from one moved item in sixteen on.
+    /// `refit` in its place from one moved item in eight on.
     #[default]
     Refit,
-    /// The same, then `optimize_incremental`.
+    /// `insert_or_update_partially`, `refit`, then `optimize_incremental`.
+    ///
+    /// The crate allows no `refit_partial` after an `optimize_incremental`.
     Optimize,
     /// `reinsert_or_update_with_change_detection`.
     Reinsert,
@@ -82,7 +84,7 @@ fn crate_box(b: &Aabb) -> ParryAabb {
 }
 
 /// An update refits all nodes from one moved item in as many on.
-const ALL_SHARE: usize = 16;
+const ALL_SHARE: usize = 8;
 
 #[inline(always)]
 fn bounds_of(node: &BvhNode) -> Aabb {
@@ -126,7 +128,8 @@ impl BoxTested for PeerParry3d {
         if self.update == Parry3dUpdate::Reinsert {
             return Some(());
         }
-        if placed.len() * ALL_SHARE < self.ids.len() {
+        let is_refit = self.update == Parry3dUpdate::Refit;
+        if is_refit && placed.len() * ALL_SHARE < self.ids.len() {
             let leaves: Vec<u32> = placed.iter().map(|(leaf, _)| *leaf as u32).collect();
             self.bvh.refit_partial(&[], &leaves);
         } else {

@@ -66,7 +66,7 @@ impl BoxTested for PeerRstar {
     /// `remove` and `insert`, item by item; `bulk_load` from a quarter moved on.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
         let placed = placed(&self.items, |item| item.id, items, moved)?;
-        let bulk = placed.len() * BULK_SHARE > self.items.len();
+        let bulk = placed.len() * BULK_SHARE >= self.items.len();
         for (at, bounds) in placed {
             let item = &mut self.items[at];
             let old = std::mem::replace(&mut item.bounds, bounds);
