@@ -23,7 +23,7 @@ const COUNTERS: [(&str, &str); 4] = [
 struct Pair<'r> {
     own: &'r ReportCell,
     other: &'r ReportCell,
-    /// Half of the interval of ln(own time / other time); 0 without one.
+    /// Half of the interval of ln(own time / other time) of queries; 0 without one.
     margin: f64,
 }
 
@@ -71,6 +71,9 @@ fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, St
     let speedup = comparison.speedup(&other.structure, own);
     let ends = speedup.and_then(|found| found.1);
     let margin = ends.map_or(0.0, |[lower, upper]| (upper / lower).ln() / 2.0);
+    // As if the whole interval of a frame were that of its queries.
+    let frame = frame_ns(own).zip(queries_ns(own));
+    let margin = margin * frame.map_or(1.0, |(frame, queries)| frame / queries);
     Ok(Pair { own, other, margin })
 }
 
@@ -81,6 +84,14 @@ impl Pair<'_> {
         ratio.is_finite().then_some(ratio)
     }
 
+    /// Differences of updates and of queries of a frame / time of a frame of the other.
+    fn differences(&self) -> [f64; 2] {
+        [update_ns, queries_ns].map(|of| {
+            let difference = || Some((of(self.own)? - of(self.other)?) / frame_ns(self.other)?);
+            difference().unwrap_or(0.0)
+        })
+    }
+
     /// "bvh takes 1.20 x the time of wide, the best: it tests 4.01 x as many .."
     fn sentence(&self) -> String {
         let ratios = [query_ns, tests, ns_per_test].map(|of| self.ratio(of));
@@ -89,7 +100,8 @@ impl Pair<'_> {
         };
         let others = if time < 1.0 { " of the others" } else { "" };
         let (own, other) = (&self.own.structure, &self.other.structure);
-        let (parts, time) = (parts(tests, per_test, self.margin), times(time));
+        let parts = parts(tests, per_test, self.margin, self.differences());
+        let time = times(time);
         let Some(frame) = self.ratio(frame_ns).map(times) else {
             return format!("{own} takes {time} the time of {other}, the best{others}: {parts}.");
         };
@@ -109,6 +121,11 @@ fn update_ns(cell: &ReportCell) -> Option<f64> {
     cell.value("frame_ns").and_then(|_| cell.value("update_ns"))
 }
 
+/// Time of a frame but for its update.
+fn queries_ns(cell: &ReportCell) -> Option<f64> {
+    Some(frame_ns(cell)? - update_ns(cell)?)
+}
+
 /// Time per query; of frames with several views the mean of all, as counters are.
 fn query_ns(cell: &ReportCell) -> Option<f64> {
     let first = cell.value("query_ns")?;
@@ -126,11 +143,13 @@ fn ns_per_test(cell: &ReportCell) -> Option<f64> {
     Some(query_ns(cell)? / tests(cell)?)
 }
 
-/// The two factors of a time, and which of them decides.
+/// The two factors of a query's time, and which of them decides.
 ///
-/// Neither does where they differ by less than the interval of the time.
-fn parts(tests: f64, per_test: f64, margin: f64) -> String {
+/// Neither does where they differ by less than the interval of the time. The updates do where
+/// they make the larger difference of frames.
+fn parts(tests: f64, per_test: f64, margin: f64, [updates, queries]: [f64; 2]) -> String {
     let decides = match tests.ln().abs() - per_test.ln().abs() {
+        _ if updates.abs() > queries.abs() => "the updates decide",
         more if more.abs() <= margin => "neither decides",
         more if more > 0.0 => "the number of tests decides",
         _ => "the time per test decides",
@@ -189,6 +208,8 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
     }
     let margins = pairs.iter().flatten().map(|pair| pair.margin);
     let margin = margins.sum::<f64>() / ratios[0].len() as f64;
+    let differences = pairs.iter().flatten().map(Pair::differences);
+    let differences = differences.fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
     let means = ratios.each_ref().map(|all| geometric_mean(all));
     let failed = pairs.iter().find_map(|pair| pair.as_ref().err());
     let sentence = match means {
@@ -198,7 +219,7 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
             some(geometric_mean(&frames), |_| {
                 format!(" of the frames, and {} in queries", times(time))
             }),
-            parts(tests, per_test, margin)
+            parts(tests, per_test, margin, differences)
         ),
         _ => failed.cloned().unwrap_or_default(),
     };
@@ -212,13 +233,18 @@ mod tests {
     #[test]
     fn the_larger_factor_decides() {
         assert_eq!(
-            parts(4.0, 0.5, 0.1),
+            parts(4.0, 0.5, 0.1, [0.0; 2]),
             "it tests 4.00 x as many nodes and items, and a test takes 0.500 x as long, so the \
              number of tests decides"
         );
-        assert!(parts(1.32, 1.35, 0.1).ends_with("so neither decides"));
-        assert!(parts(1.32, 1.35, 0.0).ends_with("so the time per test decides"));
-        assert!(parts(1.1, 3.0, 0.1).ends_with("so the time per test decides"));
-        assert!(parts(0.2, 3.0, 0.1).ends_with("so the number of tests decides"));
+        let ends = |tests, per_test, margin, differences, wanted| {
+            let parts = parts(tests, per_test, margin, differences);
+            assert!(parts.ends_with(wanted), "{parts}");
+        };
+        ends(1.32, 1.35, 0.1, [0.0; 2], "so neither decides");
+        ends(1.32, 1.35, 0.0, [0.0; 2], "so the time per test decides");
+        ends(1.1, 3.0, 0.1, [0.1, 0.2], "so the time per test decides");
+        ends(0.2, 3.0, 0.1, [0.1, -0.2], "so the number of tests decides");
+        ends(0.2, 3.0, 0.1, [0.3, -0.2], "so the updates decide");
     }
 }
