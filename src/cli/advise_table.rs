@@ -4,9 +4,7 @@ use super::document::Block;
 use super::run_verdict::{gains, times};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time, time_within};
-use crate::advise::{
-    Advice, Axis, Check, Omission, StructureChoice, TestChoice, TestRow, ns, policy_of,
-};
+use crate::advise::{Advice, Axis, Check, Omission, TestChoice, TestRow, ns, policy_of};
 use crate::measure::{ReportCell, YARDSTICK};
 use crate::statistics::Estimate;
 
@@ -218,7 +216,7 @@ fn rule_table(advice: &Advice) -> Table {
 }
 
 /// Every structure, test and feature with its times.
-fn evidence(advice: &Advice) -> [Block; 8] {
+fn evidence(advice: &Advice) -> Vec<Block> {
     let columns: [Column<&Omission>; 2] = [
         ("feature", |feature| format!("  {}", feature.rule.feature)),
         ("why", |feature| {
@@ -230,16 +228,27 @@ fn evidence(advice: &Advice) -> [Block; 8] {
     let tests = format!("Culling tests on {on}, with {ns} ns to draw an item that cannot be seen:");
     let note = "The statistic decides; where both sides answer the same, the clock does if a \
                 paired test over the processes tells them apart.";
-    [
+    let mut blocks = vec![
         Block::heading("Structures, all answers checked:"),
-        Block::Table(structure_table(&advice.structure)),
+        Block::Table(structure_table(&advice.structure.rows)),
+    ];
+    let motion = advice.motion.as_ref();
+    if let Some(motion) = motion.filter(|motion| !motion.policies.is_empty()) {
+        blocks.extend([
+            Block::heading("Update policies, side by side:"),
+            Block::Table(structure_table(&motion.policies)),
+        ]);
+    }
+    let scene = some(motion, |_| " on the still scene".to_owned());
+    blocks.extend([
         Block::heading(tests),
         Block::Table(test_table(&advice.test)),
-        Block::heading("Features, measured with and without:"),
+        Block::heading(format!("Features, measured with and without{scene}:")),
         Block::Table(check_table(&advice.omissions)),
         Block::line(note),
         Block::Table(Table::with(&advice.omissions, &columns)),
-    ]
+    ]);
+    blocks
 }
 
 fn ties(names: &[impl AsRef<str>]) -> String {
@@ -258,7 +267,7 @@ fn within(cell: &ReportCell, metric: &str) -> String {
     some(cell.metrics.get(metric), |ns| time_within(ns.estimate()))
 }
 
-fn structure_table(choice: &StructureChoice) -> Table {
+fn structure_table(rows: &[ReportCell]) -> Table {
     let columns: &[Column<&ReportCell>] = &[
         ("structure", |r| r.structure.clone()),
         (">query [95 % interval]", |r| within(r, "query_ns")),
@@ -276,12 +285,8 @@ fn structure_table(choice: &StructureChoice) -> Table {
         (">worst frame", |r| some(r.value("worst_frame_ns"), time)),
         ("status", |r| r.status.name().to_owned()),
     ];
-    let mut table = Table::with(&choice.rows, columns);
-    if choice
-        .rows
-        .iter()
-        .any(|row| row.value("frame_ns").is_some())
-    {
+    let mut table = Table::with(rows, columns);
+    if rows.iter().any(|row| row.value("frame_ns").is_some()) {
         table.header[2] = "speed-up of frames".to_owned();
     }
     table.without_empty_columns()

@@ -107,8 +107,13 @@ fn other_numbers_of_items_and_shares_are_measured() {
 #[test]
 fn policies_are_weighed_without_being_named() {
     let line = "advise --scene uniform:n=300 --path orbit:frames=4 --structure wide --motion swarm:frames=20";
-    let told = works(Path::new("."), &format!("{line} --processes 1"));
+    let told = works(
+        Path::new("."),
+        &format!("{line} --processes 1 --all-columns"),
+    );
     for part in [
+        "Update policies, side by side:",
+        "Features, measured with and without on the still scene:",
         "In motion, 100 % of the items and 1 query per frame: ",
         "A frame takes ",
         "every=10 ",
