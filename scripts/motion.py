@@ -88,14 +88,30 @@ def lines():
             yield "| " + " | ".join([*shown, ", ".join(aged)]) + " |"
 
 
+def cost_of_jumps(name):
+    """Least and most us that a jump adds to an update."""
+    with open(RESULTS / "frames.csv", newline="") as table:
+        cells = list(csv.DictReader(table))
+    costs = []
+    for share in [0.01, 0.1]:
+        motion = f"shuffle:share={share:.0%},"
+        own = [c for c in cells if c["structure"] == name and c["motion"].startswith(motion)]
+        costs += [float(c["update_ns"]) / (share * 100_000) / 1000 for c in own]
+    return f"{min(costs):#.2g} to {max(costs):#.2g}"
+
+
 HEAD = """## What moves
 
-Written by `scripts/motion.py` from [results/motion](../results/motion) ({cpu}, {date}): 100,000
-items, views of 2 %, 100 frames. The fastest structures by frame (ties within 5 %), with the us of
-the first (its worst frame). *Ageing*: query time after 100 frames / that of a fresh build: {others}.
+Written by `scripts/motion.py` from [results/motion](../results/motion) ({cpu}, {date}):
+100,000 items, views of 2 %, 100 frames. The fastest structures by frame (ties within 5 %), with the
+us of the first (its worst frame). *Ageing*: query time after 100 frames / that of a fresh build:
+{others}.
 
 | moved per frame | scene | one view | sixteen views | ageing |
 |---|---|---|---|---|
+"""
+JUMPS = """
+Update per jumping item (shuffle), us: `moving` {moving}, `wide` {wide}.
 """
 NOTES = "\n### What follows\n"
 
@@ -107,7 +123,9 @@ def main():
     before, _, section = PAGE.read_text().partition("## What moves\n")
     notes = section.partition(NOTES)[2]
     head = HEAD.format(**about, others=", ".join(OTHERS))
-    PAGE.write_text(before.rstrip() + "\n\n" + head + "\n".join(lines()) + "\n" + NOTES + notes)
+    jumps = JUMPS.format(moving=cost_of_jumps("moving"), wide=cost_of_jumps("wide"))
+    table = "\n".join(lines()) + "\n"
+    PAGE.write_text(before.rstrip() + "\n\n" + head + table + jumps + NOTES + notes)
 
 
 if __name__ == "__main__":

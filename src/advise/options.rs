@@ -67,6 +67,7 @@ impl<'a> AdviseInput<'a> {
         check_memory(&scene.name, BYTES_PER_ITEM * scene.items.len() as u64)?;
         let motion = self.motion.map(|motion| Motion::load(motion, scene));
         let (motion, culling) = (motion.transpose()?, Culling::default());
+        let motion = motion.inspect(|own| own.tell_numbers(path, self.views));
         Ok(Workload::moving(scene, path, &culling, motion, self.views)?)
     }
 }

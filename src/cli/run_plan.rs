@@ -212,6 +212,7 @@ impl RunPlan {
                     for motion in moved.chain(still) {
                         let motion = motion.map(|motion| Motion::load(motion, &scene));
                         let (motion, views) = (motion.transpose()?, self.plan.views_per_frame);
+                        let motion = motion.inspect(|own| own.tell_numbers(&path, views));
                         let workload = Workload::moving(&scene, &path, culling, motion, views)?;
                         look(&scene, Some((source, &workload)))?;
                     }

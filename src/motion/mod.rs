@@ -11,7 +11,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use crate::geometry::Aabb;
-use crate::input::{InputError, names_file, note, read_file, warn};
+use crate::input::{InputError, names_file, note, read_file};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, hex};
@@ -157,16 +157,7 @@ impl Motion {
             return self;
         };
         let (name, path_name, views) = (&self.name, &path.name, views.max(1));
-        let (seen, cameras) = (self.frames * views, path.lines.len());
         if path.times.is_empty() {
-            if ![0, seen].contains(&cameras) {
-                let [cameras, seen] =
-                    [(cameras, "camera"), (seen, "view")].map(|of| counted(of.0, of.1));
-                warn(&format!(
-                    "{name}: its frames have {seen}, but '{path_name}' has {cameras} and not a \
-                     time for each: they are paired by their numbers"
-                ));
-            }
             return self;
         }
         // Without the last frame if it lacks cameras.
@@ -191,6 +182,28 @@ impl Motion {
             frames: paced.frames(),
             source: Source::Recorded(paced),
             ..self
+        }
+    }
+
+    /// Warns or notes where frames and cameras without times differ in number.
+    #[cfg(feature = "cli")]
+    pub(crate) fn tell_numbers(&self, path: &CameraPath, views: usize) {
+        let (name, path_name, cameras) = (&self.name, &path.name, path.cameras.len());
+        let (seen, lines) = (self.frames * views.max(1), path.lines.len());
+        let is_recorded = matches!(self.source, Source::Recorded(_));
+        let frames = format!("{name}: its frames have {}", counted(seen, "view"));
+        if is_recorded && path.times.is_empty() && ![0, seen].contains(&lines) {
+            let cameras = counted(cameras, "camera");
+            crate::input::warn(&format!(
+                "{frames}, but '{path_name}' has {cameras} and not a time for each: they are \
+                 paired by their numbers"
+            ));
+        } else if !is_recorded && seen < cameras {
+            let all = counted(cameras, "camera");
+            note(&format!(
+                "{frames}: the last {} of {all} of '{path_name}' are not used",
+                cameras - seen
+            ));
         }
     }
 

@@ -165,6 +165,31 @@ fn times_and_cameras_that_are_not_used_are_said() {
         assert_eq!(done.code, Some(0), "{done:?}");
         assert!(unwrapped(&done.err).contains(wanted), "{}", done.err);
     }
+    // Without times cameras see the frames of a run in turn, in a query all see one.
+    fs::write(
+        folder.path().join("still.csv"),
+        format!("{EYE_LOOK}\n{0}{0}", "-9,0.5,0.5,0,0.5,0.5\n"),
+    )
+    .expect("writable");
+    let frames = "--scene scene.csv --structure linear --motion motion.csv";
+    let run = cullbench(
+        folder.path(),
+        &format!("run {frames} --path still.csv --processes 1"),
+    );
+    assert!(unwrapped(&run.err).contains("they are paired by their numbers"));
+    let run = cullbench(
+        folder.path(),
+        "run --plan --scene city:n=20 --path orbit:frames=9 --motion drift:frames=2 --views 3",
+    );
+    let wanted = "drift:frames=2: its frames have 6 views: the last 3 of 9 cameras of \
+        'orbit:frames=9' are not used";
+    assert!(unwrapped(&run.err).contains(wanted), "{}", run.err);
+    let query = cullbench(
+        folder.path(),
+        &format!("query {frames} --cameras still.csv --frame 1"),
+    );
+    assert_eq!(query.code, Some(0), "{query:?}");
+    assert!(!query.err.contains("paired"), "{}", query.err);
 }
 
 const PLAN: &str = "run --scene city:n=300 --path orbit:frames=4 --structure linear,wide,octree,bvh \
