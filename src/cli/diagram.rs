@@ -172,6 +172,10 @@ impl<'d> Diagram<'d> {
         let places: Vec<[f64; 2]> = series.points.iter().map(|p| self.place(p.at)).collect();
         let mut shapes = match self.joined {
             Joined::Apart => String::new(),
+            // Without marks dashes tell two of one colour apart.
+            Joined::Bare if series.look.hollow => {
+                self.curve(&format!("curve d{}", series.look.shape), &places)
+            }
             _ => self.curve("curve", &places),
         };
         for (point, place) in series.points.iter().zip(&places) {

@@ -201,7 +201,7 @@ const OWN: [(&str, usize, usize); 9] = [
     ("bsp", 3, 3),
     ("quadtree", 4, 1),
     ("uniform-grid", 5, 2),
-    ("kd", 6, 3),
+    ("moving", 6, 3),
     ("linear", GREY, 0),
     ("linear-scalar", GREY, 2),
 ];
@@ -216,18 +216,24 @@ impl Look {
         }
     }
 
-    /// The look of a structure by its label. Any other label than those with a look of
-    /// their own has a hollow mark that its text decides.
+    /// The look of a structure by its label.
+    ///
+    /// Names without a look of their own have a hollow mark that their text decides. With
+    /// parameters or a policy a structure keeps its colour and has another mark, hollow.
     pub fn of(label: &str) -> Look {
         // FNV-1a.
-        let hash = label.bytes().fold(0x811c_9dc5_u32, |hash, byte| {
-            (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-        }) as usize;
-        let own = OWN.iter().find(|own| own.0 == label);
+        let hash = |text: &str| {
+            text.bytes().fold(0x811c_9dc5_u32, |hash, byte| {
+                (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+            }) as usize
+        };
+        let (name, rest) = label.split_at(label.find(['@', ':']).unwrap_or(label.len()));
+        let own = OWN.iter().find(|own| own.0 == name);
+        let other = [1 + hash(rest) % (SHAPES.len() - 1), 0][usize::from(rest.is_empty())];
         Look {
-            colour: own.map_or(hash % GREY, |own| own.1),
-            shape: own.map_or(hash / GREY % SHAPES.len(), |own| own.2),
-            hollow: own.is_none(),
+            colour: own.map_or(hash(name) % GREY, |own| own.1),
+            shape: (own.map_or(hash(name) / GREY, |own| own.2) + other) % SHAPES.len(),
+            hollow: own.is_none() || other > 0,
         }
     }
 }
@@ -387,5 +393,17 @@ mod tests {
         }
         let other = Look::of("peer-bvh");
         assert!(other.hollow && other.colour < GREY && other == Look::of("peer-bvh"));
+        let names = ["wide", "bvh", "moving", "bsp-textbook", "peer-bvh"].map(Look::of);
+        for (n, look) in names.iter().enumerate() {
+            assert!(!names[..n].contains(look), "{look:?}");
+        }
+        // Parameters and policies keep the colour, and have marks of their own.
+        for name in ["wide", "bvh", "peer-bvh"] {
+            let looks = ["", "@rebuild", "@fat=1"].map(|rest| Look::of(&format!("{name}{rest}")));
+            assert!(looks.iter().all(|look| look.colour == looks[0].colour));
+            assert!(looks[1].hollow && looks[2].hollow);
+            let shapes = looks.map(|look| look.shape);
+            assert!(shapes[0] != shapes[1] && shapes[0] != shapes[2] && shapes[1] != shapes[2]);
+        }
     }
 }
