@@ -225,6 +225,10 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     };
     Some(match UpAxis::ALL.into_iter().find(is_along) {
         Some(other) if other != scene.up => {
+            let is_up = |c: &&Camera| {
+                upward(other, c).is_some_and(|([across, along], _)| across.abs() <= along.abs())
+            };
+            let what = share(cameras.iter().filter(is_up).count(), cameras);
             let (other, name) = (other.name(), &scene.name);
             // Formats that state an axis state a unit as well.
             let advice = match scene.unit {
@@ -243,6 +247,14 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
 
 /// Up in the image of a camera that is rolled.
 fn rolled_up(up: UpAxis, camera: &Camera) -> Option<DVec3> {
+    let ([across, along], image_up) = upward(up, camera)?;
+    // Straight up or down there is no roll.
+    let is_level = across.hypot(along) > 0.1;
+    (is_level && along < across.abs()).then_some(image_up)
+}
+
+/// Parts of an axis along right and up in the image, and the vector up there.
+fn upward(axis: UpAxis, camera: &Camera) -> Option<([f64; 2], DVec3)> {
     let (frame, is_mirrored): (Frame, bool) = match camera.lens.kind() {
         LensKind::Matrix(matrix) => {
             let found = matrix.unprojected().ok()?;
@@ -250,12 +262,10 @@ fn rolled_up(up: UpAxis, camera: &Camera) -> Option<DVec3> {
         }
         _ => (camera.frame, false),
     };
-    let [across, along] = [frame.u(), frame.v()].map(|axis| axis.dot(up.vector()));
+    let [across, along] = [frame.u(), frame.v()].map(|own| own.dot(axis.vector()));
     // A mirrored image may have y downward.
     let along = if is_mirrored { along.abs() } else { along };
-    // Straight up or down there is no roll.
-    let is_level = across.hypot(along) > 0.1;
-    (is_level && along < across.abs()).then(|| frame.v())
+    Some(([across, along], frame.v()))
 }
 
 /// Matrices that are no camera's, and those whose transposes are.

@@ -262,6 +262,11 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
     let from = "0,-90,0,0,0,0";
     let files = [
         ("y_up.csv", camera("90,0,0,0,0,0", "0,1,0")),
+        (
+            // The second looks along z, about which nothing is rolled.
+            "two.csv",
+            camera("90,0,0,0,0,0", "0,1,0") + "0,0,90,0,0,0,0,1,0,50,1.5,0.5,4000\n",
+        ),
         ("rolled.csv", camera(from, "1,0,0.2")),
         ("down.csv", camera(from, "0,0,-1")),
         ("far.csv", camera("0,-3000,0,0,0,0", "0,0,1")),
@@ -277,6 +282,7 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             "y_up.csv",
             "y_up.csv: y is up in 1 of 1 camera, z in z.csv; --up y if it is the scene's",
         ),
+        ("two.csv", "two.csv: y is up in 2 of 2 cameras, z in z.csv"),
         ("y_up.csv --up y", ""),
         (
             "rolled.csv",
