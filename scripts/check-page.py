@@ -18,6 +18,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import time
 
 WIDTHS = [390, 1400, 1800]
 SCHEMES = ["light", "dark"]
@@ -93,8 +94,20 @@ USE = """(() => {
     expect(location.hash.includes("sort="), "sorting is not in the hash");
     expect(table.querySelector("[aria-sort]"), "sorting is not announced");
   }
+  for (const heat of all("table.heat")) {
+    [...heat.tHead.rows[0].cells].slice(1).forEach((head, n) => {
+      head.querySelector("button").click();
+      const texts = [...heat.tBodies[0].rows].slice(0, -1).map((row) => row.cells[n + 1].textContent);
+      const numbers = texts.filter(Boolean).map((text) => Number(text.replace(/[*,]/g, ""))).filter((x) => x === x);
+      expect(numbers.every((x, k) => !k || x >= numbers[k - 1]), `sorted wrongly: ${head.textContent} ${numbers}`);
+    });
+  }
   return faults;
 })()"""
+
+# Paper has no use for what is clicked.
+PRINT = """[...document.querySelectorAll("#filter,.t+.copy")].some((item) => getComputedStyle(item).display !== "none")
+  ? ["buttons are printed"] : []"""
 
 # A page that is opened with a hash has its state.
 STATE = """(() => {
@@ -213,6 +226,14 @@ def check(browser, page, shots, most_mb):
     browser.open(url)
     browser.show(1400, "light", f"{url}#off={off}&sort=0.0.1")
     faults += browser.value(STATE) + list(browser.complaints())
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    faults += browser.value(PRINT)
+    browser.value("setTimeout(() => (location.hash = ''), 0)")
+    time.sleep(0.5)
+    while browser.value("document.readyState") != "complete":
+        time.sleep(0.1)
+    if browser.value("!!document.querySelector('[aria-sort],tr.off')"):
+        faults.append("state stays when the hash is emptied")
     figures = browser.value("document.querySelectorAll('svg.plot').length")
     print(f"{page}: {size:.2f} MB, {figures} figures, first paint {paint:.0f} ms, {len(faults)} faults")
     for fault in faults[:40]:

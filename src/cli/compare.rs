@@ -174,9 +174,12 @@ fn show(table: &CompareTable) -> anyhow::Result<Ending> {
 /// The changes with intervals, the worst first.
 fn figure(changes: &Changes) -> Option<Figure> {
     let groups = unique(changes.rows.iter().map(|row| &row.cell.group));
+    let metrics = unique(changes.rows.iter().filter_map(|row| row.metric));
     let all = changes.rows.iter().filter_map(|row| {
         let (group, structure) = (&row.cell.group, &row.cell.structure);
         let at = text::some(groups.get(1), |_| format!(" {}", place(group, 36, short)));
+        let metric = row.metric.filter(|_| metrics.len() > 1);
+        let metric = text::some(metric, |metric| format!(" {metric}"));
         let ratio = row.ratio().filter(|ratio| is_drawn(*ratio))?;
         let judged = row.judgement.as_ref();
         let ends = judged.and_then(|judged| judged.lower.zip(judged.upper));
@@ -184,22 +187,26 @@ fn figure(changes: &Changes) -> Option<Figure> {
             name: structure.clone(),
             value: ratio,
             ends: ends.map(<[f64; 2]>::from),
-            label: format!("{structure}{at} {}", change_of(ratio, None)),
-            note: format!("{}: {}", name(&row.cell), change_of(ratio, ends)),
+            label: format!("{structure}{at}{metric} {}", change_of(ratio, None)),
+            note: format!("{}{metric}: {}", name(&row.cell), change_of(ratio, ends)),
             ..Row::default()
         })
     });
-    let shown: Vec<Row> = all.take(DRAWN).collect();
+    let mut shown: Vec<Row> = all.collect();
     shown.first()?;
+    let worst = ["", "the worst "][usize::from(shown.len() > DRAWN)];
+    shown.truncate(DRAWN);
+    let has_intervals = shown.iter().any(|row| row.ends.is_some());
+    let interval = ["", " with its 95 % interval"][usize::from(has_intervals)];
     let change = |ratio: f64| format!("{:+} %", ((ratio - 1.0) * 1e3).round() / 10.0 + 0.0);
     let most = 1.0 + changes.threshold;
     let limits = [1.0 / most, 1.0, most];
     let values = shown.iter().flat_map(Row::range);
     let axis = Axis::log("", values.chain(limits), 1.05, &change);
-    let (worst, all) = (shown.len(), text::counted(changes.rows.len(), "figure"));
+    let (count, all) = (shown.len(), text::counted(changes.rows.len(), "figure"));
     let caption = format!(
-        "Change from OLD to NEW with its 95 % interval, the worst {worst} of {all}; strong line: no \
-         change, dotted: the threshold"
+        "Change from OLD to NEW{interval}, {worst}{count} of {all}; strong line: no change, \
+         dotted: the threshold"
     );
     let mut figure = rows(caption, &axis, Some(1.0), &shown);
     let height = [0.0, figure.height - 1.5 * LINE];

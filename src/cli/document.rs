@@ -45,7 +45,9 @@ fn markdown_table(table: &Table) -> String {
 /// A table that scrolls inside itself.
 ///
 /// A row of a structure has its name as `data-s`; `is_heat` shades each number by its share of the largest of its row.
-fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
+fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
+    // Tables below one heading differ in their first column.
+    let caption = text::joined([heading, table.header.first().map_or("", String::as_str)]);
     let is_right = |column: &usize| table.right.contains(column);
     let head = table.header.iter().enumerate().map(|(column, name)| {
         let class = text::some(is_right(&column).then_some(" class=\"n\""), str::to_owned);
@@ -81,7 +83,7 @@ fn html_table(table: &Table, caption: &str, is_heat: bool) -> String {
         "<div class=\"t\" tabindex=\"0\"><table{}><caption>{}</caption>\n<thead><tr>{}</tr></thead>\n\
          <tbody>\n{}</tbody></table></div>\n",
         if is_heat { " class=\"heat\"" } else { "" },
-        html(caption),
+        html(&caption),
         head.collect::<String>(),
         table.rows.iter().map(row).collect::<String>()
     )

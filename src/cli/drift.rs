@@ -141,7 +141,7 @@ fn rated(report: &DriftReport, all: bool) -> Table {
         (">error", |r| scientific(r.error)),
         (">time per step", |r| time_plus_minus(r.time_per_step)),
         ("", |r| if r.qualifies { "yes" } else { "no" }.to_owned()),
-        ("", |r| r.summary.to_owned()),
+        ("description", |r| r.summary.to_owned()),
     ];
     let shown = if all { columns.len() } else { 4 };
     let mut table = Table::with(&report.rotation_methods, &columns[..shown]);
@@ -188,7 +188,8 @@ fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
     }
     if all {
         blocks.push(Block::line(
-            "Orders are the powers of the step by which a method's own error falls from each \
+            "xN: N steps per frame, then the error and the time; no: even the least error is larger. \
+             Orders are the powers of the step by which a method's own error falls from each \
              number of steps to the next. They are not the classical ones where steps are not far \
              below 1/omega, and where the arm meets the stop.",
         ));

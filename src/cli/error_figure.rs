@@ -91,9 +91,9 @@ impl Against {
         // From nothing to a hundredth at least.
         let errors = places().map(|p| p.at[1]).chain([self.none, 1.0]);
         let mut y = Axis::log("", errors, 1.5, &error);
-        // Powers above zero, whose place is no step of the axis.
+        // Powers above zero, whose place is half a step below the last.
         y.ticks = y.powers(10.0);
-        y.ticks.retain(|tick| *tick > self.none * 5.0);
+        y.ticks.retain(|tick| *tick > self.none * 2.0);
         y.ticks.push(self.none);
         let x = Axis::log(self.axes[0], places().map(|p| p.at[0]), 1.5, &text::time);
         let (caption, error, rest) = (&self.caption, self.axes[1], left_out(beyond));
@@ -104,5 +104,43 @@ impl Against {
             ..Diagram::of(caption, [x, y], Joined::Apart, series)
         }
         .draw()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::diagram::Point;
+    use super::*;
+
+    #[test]
+    fn zero_is_no_step_of_the_axis() {
+        for none in [3e-5, 3e-3] {
+            let point = |error: f64| Measured {
+                structure: "bvh".to_owned(),
+                test: error.to_string(),
+                point: Point::new([100.0, error]),
+            };
+            let points = vec![point(0.0), point(1.0)];
+            let axes = ["time", "error"];
+            let caption = String::new();
+            let drawn = Against {
+                caption,
+                axes,
+                none,
+                points,
+            }
+            .draw()
+            .parts;
+            let lines = drawn
+                .split("<line class=\"grid\" x1=\"0.00%\" x2=\"100.00%\" y1=\"")
+                .skip(1);
+            let heights = lines.filter_map(|line| line.split('"').next()?.parse::<f64>().ok());
+            let heights: Vec<f64> = heights.collect();
+            let [first, second, .., zero] = heights[..] else {
+                panic!("{heights:?}")
+            };
+            let step = first - second;
+            assert!((0.4..0.7).contains(&((zero - first) / step)), "{heights:?}");
+        }
     }
 }

@@ -4,6 +4,7 @@ use super::cell_names::question;
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, to_html};
 use super::figure::{Axis, ends, is_drawn};
+use super::page::glossary;
 use super::run_table::distinct;
 use super::table::{Column, Table};
 use super::{program, text};
@@ -104,8 +105,9 @@ pub fn page(mut reports: Vec<Report>) -> String {
         });
         blocks.push(Block::Heading(2, heading.clone()));
         if !series.is_empty() {
-            let commit = |run: f64| run_names.get(run as usize).cloned().unwrap_or_default();
-            let mut x = Axis::linear("run", 0.0..(reports.len() - 1) as f64, &commit);
+            // Their names would overlap.
+            let number = |run: f64| (run + 1.0).to_string();
+            let mut x = Axis::linear("run", 0.0..(reports.len() - 1) as f64, &number);
             x.ticks = (0..reports.len()).map(|run| run as f64).collect();
             let points = series.iter().flat_map(|s| s.points.iter());
             let values = points.flat_map(|p| p.ends.unwrap_or([p.at[1]; 2]));
@@ -123,7 +125,11 @@ pub fn page(mut reports: Vec<Report>) -> String {
         Block::Line(conclusion(&reports, compared, &changed)),
     ];
     all.extend(blocks);
-    all.extend([Block::heading("Runs"), Block::Table(runs(&reports))]);
+    all.extend([
+        Block::heading("Runs"),
+        Block::Table(runs(&reports, &run_names)),
+    ]);
+    all.extend(glossary(&all));
     to_html(&title, &all)
 }
 
@@ -153,21 +159,24 @@ fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<Strin
     )
 }
 
-fn runs(reports: &[Report]) -> Table {
-    let columns: &[Column<&Report>] = &[
-        ("run", |report| name(report)),
-        ("started", |report| {
+fn runs(reports: &[Report], names: &[String]) -> Table {
+    let columns: &[Column<(usize, (&Report, &String))>] = &[
+        ("run", |(run, _)| (run + 1).to_string()),
+        ("name", |(_, (_, name))| name.to_string()),
+        ("started", |(_, (report, _))| {
             let unfinished = report.run.finished_at.is_none().then_some("not finished");
             text::joined([&report.run.started_at, unfinished.unwrap_or_default()])
         }),
-        ("version", |report| report.source.version.clone()),
-        (">cells", |report| text::count(report.cells.len())),
-        (">processes", |report| report.run.processes.to_string()),
-        ("machine", |report| {
+        ("version", |(_, (report, _))| report.source.version.clone()),
+        (">cells", |(_, (report, _))| text::count(report.cells.len())),
+        (">processes", |(_, (report, _))| {
+            report.run.processes.to_string()
+        }),
+        ("machine", |(_, (report, _))| {
             let cpu = report.machine.cpu.as_deref().unwrap_or("unknown");
             format!("{cpu}, {}", text::counted(report.machine.cores, "core"))
         }),
-        ("command", |report| report.run.command.clone()),
+        ("command", |(_, (report, _))| report.run.command.clone()),
     ];
-    Table::with(reports, columns)
+    Table::with(reports.iter().zip(names).enumerate(), columns)
 }

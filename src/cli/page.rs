@@ -78,24 +78,24 @@ pub fn glossary(blocks: &[Block]) -> Vec<Block> {
     let rows = tables.flat_map(|table| table.rows.iter().chain([&table.header]));
     let texts: BTreeSet<&String> = rows.flatten().collect();
     let is_of = |text: &str, name: &str| {
-        text.split(", ").next() == Some(name) || name.contains('[') && text.contains(" [")
+        text.split(", ").next() == Some(name) || name.starts_with('±') && text.contains(['[', '±'])
     };
     let occurs = |name: &str| texts.iter().any(|text| is_of(text, name));
     let figures = run_table::OF_QUERIES.iter().chain(&run_table::OF_FRAMES);
-    let figures = figures.map(|figure| (figure.0, figure.1));
-    let figures = figures.map(|(column, metric)| {
-        let info = METRICS.iter().find(|info| info.name == metric);
-        [column, info.map_or("", |info| info.summary)]
+    let figures = figures.map(|(column, metric, _)| {
+        let info = METRICS.iter().find(|info| info.name == *metric);
+        [*column, info.map_or("", |info| info.summary)]
     });
     let bounds = BOUNDS.iter().map(|bound| [bound.name, bound.summary]);
     let meanings = MEANINGS.lines().filter_map(|line| line.split_once(" | "));
     let meanings = meanings.map(<[&str; 2]>::from).chain(figures).chain(bounds);
-    let speedups = texts
-        .iter()
-        .filter(|text| text.starts_with("vs ") && **text != PEER);
+    let speedups = texts.iter().filter(|text| text.starts_with("vs "));
     let speedups = speedups.map(|name| [name, "time of that structure / time of this one"]);
     let mut table = Table::of("column | meaning");
-    for row in meanings.filter(|row| occurs(row[0])).chain(speedups) {
+    // The first meaning of a name is that of pages.
+    let mut known = BTreeSet::new();
+    let rows = meanings.filter(|row| occurs(row[0])).chain(speedups);
+    for row in rows.filter(|row| known.insert(row[0])) {
         table.add_row(row);
     }
     match table.rows.is_empty() {
@@ -103,8 +103,6 @@ pub fn glossary(blocks: &[Block]) -> Vec<Block> {
         false => vec![Block::heading("Columns"), Block::Table(table)],
     }
 }
-
-const PEER: &str = "vs fastest peer";
 
 /// Columns that are no metrics, and their meanings.
 const MEANINGS: &str = include_str!("assets/meanings.txt");

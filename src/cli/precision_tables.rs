@@ -136,7 +136,7 @@ fn errors_table(points: &[&CullingPoint]) -> Table {
 
 fn times_table(points: &[&CullingPoint]) -> Table {
     let columns: &[Column<&&CullingPoint>] = &[
-        ("", |p| mark(p.on_front, p.is_tie).to_owned()),
+        ("front", |p| mark(p.on_front, p.is_tie).to_owned()),
         ("culling", |p| culling(p)),
         ("structure", |p| structure(p)),
         (">query", |p| time_plus_minus(p.time)),
@@ -178,7 +178,7 @@ fn structure(point: &CullingPoint) -> String {
 fn regions_table(p: &Precision) -> Table {
     let all = grouped(p.region_points.iter().map(|p| (p.errors.numbers, p)));
     let columns: &[Column<&Point<RegionErrors>>] = &[
-        ("", |r| mark(r.on_front, r.is_tie).to_owned()),
+        ("front", |r| mark(r.on_front, r.is_tie).to_owned()),
         ("numbers", |r| r.errors.numbers.to_owned()),
         ("structure", |r| r.structure.clone()),
         (">points", |r| r.errors.points.to_string()),

@@ -172,6 +172,9 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     );
     let plots = between(&page, "<svg class=\"plot\"", "</figure>");
     assert_eq!(plots.len(), 1);
+    assert_eq!(plots[0].matches("class=\"tick\"").count(), 2, "a run each");
+    assert!(page.contains("<th scope=\"row\">2</th><td>fedcba9</td>"));
+    assert!(page.contains("<th scope=\"row\">last / first</th>"));
     assert_eq!(plots[0].matches("<polygon class=\"mark").count(), 4);
     assert_eq!(plots[0].matches("class=\"interval\"").count(), 4);
     // Another question of the same name is left out, and says so.
@@ -208,6 +211,41 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     all_refused(&folder, &["report old new.json".to_owned()], wanted);
 }
 
+/// Headings of tables that say all by themselves.
+const PLAIN: [&str; 19] = [
+    "bound",
+    "boxes",
+    "cameras",
+    "column",
+    "CPU time",
+    "description",
+    "found in",
+    "linear, observed order",
+    "meaning",
+    "method",
+    "of the volume, %",
+    "order",
+    "points",
+    "question",
+    "scene and path",
+    "stage",
+    "visible",
+    "where",
+    "why",
+];
+
+/// Headings without a number that the glossary does not explain.
+fn unexplained(page: &str) -> BTreeSet<&str> {
+    let (_, glossary) = page.split_once("<h2>Columns</h2>").expect("a glossary");
+    let known = between(glossary, "<th scope=\"row\">", "</th>");
+    let heads = between(page, "<th scope=\"col\"", "</th>").into_iter();
+    let heads = heads.filter_map(|head| head.split('>').nth(1));
+    let heads = heads.filter(|head| !head.contains(|own: char| own.is_ascii_digit()));
+    heads
+        .filter(|head| !known.contains(head) && !PLAIN.contains(head))
+        .collect()
+}
+
 /// The conclusion, then figures with marks, then tables.
 #[test]
 fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
@@ -226,6 +264,26 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
             "{label}: {page}"
         );
     }
+    assert!(
+        page.contains("Change from OLD to NEW, 4 of 4 figures; "),
+        "{page}"
+    );
+    let meaning =
+        "<th scope=\"row\">vs the others [95 %]</th><td>change of the time from OLD to NEW";
+    assert!(page.contains(meaning) && !page.contains("time of that structure"));
+    // Counts have no intervals; each row names its own.
+    works(
+        folder.path(),
+        "compare run run --gate work --html work.html",
+    );
+    let work = fs::read_to_string(folder.path().join("work.html")).expect("a page");
+    for label in ["bvh items_tested +0.0 %", "bvh nodes_tested +0.0 %"] {
+        assert!(
+            work.contains(&format!(">{label}</text>")),
+            "{label}: {work}"
+        );
+    }
+    assert!(work.contains("Change from OLD to NEW, ") && !work.contains("the worst "));
     // The three limits have lines, and the axis its own ticks.
     assert_eq!(page.matches("<line class=\"tie\"").count(), 2);
     assert!(page.matches("class=\"tick\"").count() > 2, "{page}");
@@ -261,6 +319,7 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
         let [figure, table] = ["<figure>", "<table>"].map(|tag| page.find(tag));
         assert!(figure.is_some() && figure < table, "{line}");
         assert!(page.contains(marks), "{line}");
+        assert_eq!(unexplained(&page), set(""), "{line}");
         assert!(page.contains("svg.plot") && page.contains("aria-sort"));
     }
 }

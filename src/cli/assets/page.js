@@ -6,7 +6,9 @@
   const marks = new Map();
   for (const g of all("g[data-s]")) {
     const name = g.dataset.s;
-    if (!marks.has(name) && g.querySelector(".mark")) marks.set(name, g);
+    // Grey in one chart, a structure may have its colour in another.
+    const is_better = !marks.has(name) || marks.get(name).matches(".weak");
+    if (is_better && g.querySelector(".mark")) marks.set(name, g);
   }
   const tables = all("table");
   const off = new Set();
@@ -15,7 +17,7 @@
   // Numbers with a unit, such as "1.81 us [1.75, 1.90]"; text otherwise.
   const UNITS = { ns: 1, us: 1e3, ms: 1e6, s: 1e9 };
   const value = (cell) => {
-    const found = /^[<>~= ]*(-?[\d,]*\.?\d+(?:e-?\d+)?)(?:±[\d.]+| \[[^\]]*\])?\s*(ns|us|ms|s)?\b/.exec(cell.textContent);
+    const found = /^[*<>~= ]*(-?[\d,]*\.?\d+(?:e-?\d+)?)(?:±[\d.]+| \[[^\]]*\])?\s*(ns|us|ms|s)?\b/.exec(cell.textContent);
     return found ? Number(found[1].replaceAll(",", "")) * (UNITS[found[2]] || 1) : NaN;
   };
   const order = (a, b, column) => {
@@ -113,6 +115,7 @@
 
   tables.forEach((table, t) => {
     all("thead th", table).forEach((th, column) => {
+      if (!th.textContent) return;
       const button = el("button", th.textContent, { type: "button", title: "sort" });
       button.addEventListener("click", () => {
         const [before, down] = sorts.get(t) || [];
@@ -157,6 +160,7 @@
   const over = (event) => emphasise(event.target.closest?.("[data-s]")?.dataset.s ?? null);
   document.addEventListener("mouseover", over);
   document.addEventListener("focusin", over);
-  addEventListener("hashchange", read);
+  // Rows keep no order from before they were sorted.
+  addEventListener("hashchange", () => location.reload());
   read();
 })();
