@@ -269,8 +269,8 @@ fn picks(report: &FunnelReport) -> Table {
     let columns: &[Column<&PickRow>] = &[
         ("question", |row| row.question.name().to_owned()),
         ("by", |row| format!("{}{}", row.name, doubt(row.guarantee))),
-        (">cursors", |row| row.ray_count.to_string()),
-        (">wrong", |row| row.wrong_count.to_string()),
+        (">cursors", |row| text::count(row.ray_count)),
+        (">wrong", |row| text::count(row.wrong_count)),
         (">time per cursor", |row| some(row.ns_per_ray, text::time)),
     ];
     Table::with(&report.picks, columns)

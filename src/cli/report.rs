@@ -253,9 +253,10 @@ pub fn close(
     let mut told = vec![String::new(), text::wrapped(basis, text::width())];
     told.extend(lines);
     told.push(format!("report  {}", folder.join("report.html").display()));
-    let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg".to_owned();
-    let others = [others].into_iter().chain(other);
-    told.extend(others.map(|line| format!("        {line}")));
+    let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg";
+    let others = text::wrapped(others, text::width().saturating_sub(8)) + "\n";
+    let others = others + &other.unwrap_or_default();
+    told.extend(others.lines().map(|line| format!("        {line}")));
     text::print(&told)
 }
 

@@ -101,7 +101,9 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         let counts = labels.histogram();
         let one = |(label, count): &(&str, usize)| {
             let label = if label.is_empty() { "(none)" } else { label };
-            format!("{label} {}", text::count(*count))
+            // Beside a count and commas.
+            let quote = ["", "'"][usize::from(label.contains([',', ' ']))];
+            format!("{quote}{label}{quote} {}", text::count(*count))
         };
         let shown: Vec<String> = counts.iter().take(8).map(one).collect();
         let mut shown = shown.join(", ");

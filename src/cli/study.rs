@@ -25,9 +25,12 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
     let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}{{left}}  {{wide_msg}}");
     let style = ProgressStyle::with_template(&template);
     let left = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
-        // Before the first part is done nothing is known.
+        // Parts differ too much for the speed of the last seconds. Before the first part is
+        // done nothing is known.
+        let undone = state.len().unwrap_or(0).saturating_sub(state.pos());
         if state.pos() > 0 {
-            let _ = write!(out, ", {:#} left", HumanDuration(state.eta()));
+            let left = state.elapsed().mul_f64(undone as f64 / state.pos() as f64);
+            let _ = write!(out, ", {:#} left", HumanDuration(left));
         }
     };
     let bar = ProgressBar::new(parts);
