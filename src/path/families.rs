@@ -193,7 +193,7 @@ pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     let pose = |time: f64| match animation.at(time) {
         Some(place) => Ok(pose(stage, &place)),
         None => Err(unfit(format!(
-            "no direction of view at {time} s; expected a rotation that is not zero"
+            "no direction of view at {time} s; expected a transform with one"
         ))),
     };
     times.map(pose).collect()

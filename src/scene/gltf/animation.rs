@@ -125,11 +125,13 @@ pub fn transform([moved, turned, scaled]: Parts) -> DAffine3 {
 fn lens(camera: &Value) -> Option<PlaceView> {
     let lens = &camera[camera["type"].as_str()?];
     let number = |name: &str| lens[name].as_f64();
-    let aspect = || Some(number("xmag")? / number("ymag")?);
+    // A sign mirrors the view: the volume is the same.
+    let half = |name: &str| number(name).map(f64::abs);
+    let aspect = || Some(half("xmag")? / half("ymag")?);
     Some(PlaceView {
         up: DVec3::Y,
         fovy_deg: number("yfov").map(f64::to_degrees),
-        ortho_height: number("ymag").map(|half| 2.0 * half),
+        ortho_height: half("ymag").map(|half| 2.0 * half),
         aspect: number("aspectRatio").or_else(aspect),
         near: number("znear")?,
         far: number("zfar"),
@@ -144,7 +146,11 @@ impl File<'_> {
         };
         let place = format!("nodes[{node}].camera");
         self.get(&self.root.cameras, camera, &place)?;
-        Ok(lens(&self.exact.cameras[camera.value()]))
+        let lens = lens(&self.exact.cameras[camera.value()]);
+        let place = || format!("cameras[{}]", camera.value());
+        let expected = "type 'perspective' or 'orthographic', with the object of that name";
+        let error = || self.error(place(), "no lens", expected);
+        lens.map(Some).ok_or_else(error)
     }
 
     /// The first camera that an animation moves, by its first animation.

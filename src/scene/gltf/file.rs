@@ -6,24 +6,31 @@ use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
-use glam::DVec4;
+use glam::{DMat4, DVec3, DVec4};
 use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Root, Value};
+use gltf::json::{Index, Node, Root, Value};
 use serde::Deserialize;
 
 use crate::input::{InputError, Result, read_file};
+use crate::scene::memory;
 use crate::shown::{message, plain, shortened};
+
+/// Bytes of a node, the most common object, as it is parsed.
+const BYTES_PER_OBJECT: u64 = (size_of::<Node>() + size_of::<ExactNode>()) as u64;
 
 /// JSON and binary chunk of a GLB of version 2; `None` if they are cut off.
 fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
-    let number = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    let number = |at: usize| {
+        let bytes = bytes.get(at..at + 4)?.try_into().ok()?;
+        Some(u32::from_le_bytes(bytes) as usize)
+    };
+    let bytes = bytes.get(..number(8)?)?;
     let chunk = |at: usize| {
-        let end = at + 8 + number(at)? as usize;
+        let end = at + 8 + number(at)?;
         Some((bytes.get(at + 4..at + 8)?, bytes.get(at + 8..end)?))
     };
-    let is_whole = number(4)? == 2 && number(8)? as usize <= bytes.len();
-    let (_, json) = chunk(12).filter(|(kind, _)| *kind == b"JSON" && is_whole)?;
+    let (_, json) = chunk(12).filter(|(kind, _)| *kind == b"JSON")?;
     let mut at = 20 + json.len();
     while at + 8 <= bytes.len() {
         let (kind, body) = chunk(at)?;
@@ -56,9 +63,18 @@ fn lenient(mut json: Value) -> Option<Root> {
 #[derive(Deserialize)]
 pub struct Exact {
     #[serde(default)]
-    pub nodes: Vec<Value>,
+    pub nodes: Vec<ExactNode>,
     #[serde(default)]
     pub cameras: Vec<Value>,
+}
+
+/// The transform of a node.
+#[derive(Deserialize)]
+pub struct ExactNode {
+    pub matrix: Option<Box<DMat4>>,
+    pub translation: Option<DVec3>,
+    pub rotation: Option<DVec4>,
+    pub scale: Option<DVec3>,
 }
 
 /// Reads a file that a scene names relative to itself.
@@ -67,7 +83,8 @@ pub type Beside<'b> = &'b dyn Fn(&str) -> Result<Vec<u8>>;
 /// The file in the folder of a scene.
 pub fn beside(file: &str, name: &str) -> Result<Vec<u8>> {
     let folder = Path::new(file).parent().unwrap_or(Path::new(""));
-    let path = folder.join(name);
+    // `-` alone is standard input.
+    let path = folder.join(if name == "-" { "./-" } else { name });
     match path.is_file() || !path.exists() {
         true => Ok(read_file(&path)?.to_vec()),
         false => Err(InputError::at(file, "buffers", plain(name), "a plain file")),
@@ -107,8 +124,11 @@ impl<'f> File<'f> {
         let error = |found: String| InputError::at(name, "JSON", found, "glTF 2.0");
         let (json, mut bin) = match bytes.starts_with(b"glTF") {
             true => glb(bytes).ok_or_else(|| {
-                let found = "a GLB of another version, or with a length or chunks beyond its end";
-                InputError::byte(name, 4, found, "a GLB of version 2, its first chunk JSON")
+                let found = match bytes.get(4..8) {
+                    Some([2, 0, 0, 0]) => "a length or chunk beyond the end, or no JSON in front",
+                    _ => "a GLB of another version",
+                };
+                InputError::byte(name, 4, found, "a whole GLB of version 2, JSON first")
             })?,
             false => (bytes, None),
         };
@@ -116,6 +136,8 @@ impl<'f> File<'f> {
         // Some exporters pad with zero bytes in the place of spaces.
         let last = json.iter().rposition(|byte| *byte != 0);
         let json = &json[..last.map_or(0, |last| last + 1)];
+        let objects = json.iter().filter(|byte| **byte == b'{').count() as u64;
+        memory::check_fits(name, objects * BYTES_PER_OBJECT, 0, objects)?;
         let root = serde_json::from_slice(json).or_else(|e| {
             let json: Value = serde_json::from_slice(json).unwrap_or_default();
             // In glTF 1.0, what 2.0 numbers has names.
@@ -174,7 +196,10 @@ impl<'f> File<'f> {
     pub fn get<'s, T>(&self, all: &'s [T], index: Index<T>, place: &str) -> Result<&'s T> {
         let index = index.value();
         all.get(index).ok_or_else(|| {
-            let expected = format!("an index below {}", all.len());
+            let expected = match all.len() {
+                0 => "no index, as there is nothing to name".to_owned(),
+                count => format!("an index below {count}"),
+            };
             self.error(place.to_owned(), format!("index {index}"), &expected)
         })
     }
@@ -219,6 +244,10 @@ impl<'f> File<'f> {
         }
         let buffer = Index::new(view.buffer.value() as u32);
         let buffer = self.get(&self.buffers, buffer, &place)?;
+        if buffer.is_empty() {
+            let place = format!("buffers[{}]", view.buffer.value());
+            return Err(self.error(place, "no bytes", "a uri, or the BIN chunk of a GLB"));
+        }
         let size = kind.size() * width;
         let stride = view.byte_stride.filter(|_| accessor.count.0 > 1);
         let stride = stride.map_or(size, |stride| stride.0);

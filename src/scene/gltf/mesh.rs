@@ -1,13 +1,13 @@
 //! Meshes of a glTF file as triangles.
 
 use glam::DVec3;
-use gltf::json::Index;
-use gltf::json::accessor::Accessor;
+use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::material::{AlphaMode, Material};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
+use gltf::json::{Index, Value};
 
-use super::file::File;
+use super::file::{File, component};
 use crate::input::Result;
 use crate::scene::SurfaceKind;
 use crate::shown::shortened;
@@ -25,11 +25,21 @@ pub struct Triangles {
     pub two_sided: Vec<bool>,
 }
 
-/// Returns false for a mask that is opaque everywhere: no texture, no low alpha.
-fn has_holes(material: &Material) -> bool {
+/// Returns false for a mask that is opaque everywhere.
+///
+/// It has no texture, colours of vertices, other kind of colour or low alpha.
+fn has_holes(material: &Material, primitive: &Primitive) -> bool {
     let own = &material.pbr_metallic_roughness;
     let cutoff = material.alpha_cutoff.unwrap_or_default();
-    own.base_color_texture.is_some() || own.base_color_factor.0[3] < cutoff.0
+    let colours = Checked::Valid(Semantic::Colors(0));
+    own.base_color_texture.is_some()
+        || own.base_color_factor.0[3] < cutoff.0
+        || primitive.attributes.contains_key(&colours)
+        || extension(material, "KHR_materials_pbrSpecularGlossiness").is_some()
+}
+
+fn extension<'m>(material: &'m Material, name: &str) -> Option<&'m Value> {
+    material.extensions.as_ref()?.others.get(name)
 }
 
 impl Triangles {
@@ -77,16 +87,14 @@ impl File<'_> {
             if let Some(material) = primitive.material {
                 let material = self.get(&self.root.materials, material, &place)?;
                 two_sided = material.double_sided;
-                let extensions = material.extensions.as_ref();
-                let transmission =
-                    extensions.and_then(|e| e.others.get("KHR_materials_transmission"));
+                let transmission = extension(material, "KHR_materials_transmission");
                 // The factor's default is 0: opaque.
                 let factor = transmission.and_then(|t| t["transmissionFactor"].as_f64());
                 let is_glass = factor.is_some_and(|factor| factor > 0.0);
                 match material.alpha_mode {
                     _ if is_glass => kind = SurfaceKind::Clear,
                     Checked::Valid(AlphaMode::Blend) => kind = SurfaceKind::Clear,
-                    Checked::Valid(AlphaMode::Mask) if has_holes(material) => {
+                    Checked::Valid(AlphaMode::Mask) if has_holes(material, primitive) => {
                         kind = SurfaceKind::CutOut;
                     }
                     _ => {}
@@ -112,6 +120,23 @@ impl File<'_> {
         }))
     }
 
+    /// Refuses indices that are no whole numbers.
+    fn check_indices(&self, index: Index<Accessor>) -> Result<()> {
+        use ComponentType::{U8, U16, U32};
+        let accessor = &self.root.accessors[index.value()];
+        let kind = component(accessor).filter(|_| !accessor.normalized);
+        if matches!(kind, Some(U8 | U16 | U32)) {
+            return Ok(());
+        }
+        let number = component(accessor).map_or(0, ComponentType::as_gl_enum);
+        let found = match accessor.normalized {
+            true => "normalized indices".to_owned(),
+            false => format!("indices of type {number}"),
+        };
+        let expected = "5121, 5123 or 5125, not normalized";
+        Err(self.error(format!("accessors[{}]", index.value()), found, expected))
+    }
+
     fn primitive(
         &self,
         primitive: &Primitive,
@@ -130,7 +155,10 @@ impl File<'_> {
         let order: Vec<u32> = match primitive.indices {
             None => (0..points.len() as u32).collect(),
             Some(indices) => match self.values(indices, 1, place)? {
-                Ok(values) => values.into_iter().map(|v| v as u32).collect(),
+                Ok(values) => {
+                    self.check_indices(indices)?;
+                    values.into_iter().map(|v| v as u32).collect()
+                }
                 Err(reason) => return Ok(Err(reason)),
             },
         };
@@ -153,7 +181,10 @@ impl File<'_> {
                 let rim = order.get(1..).unwrap_or_default().windows(2);
                 rim.map(|c| [order[0], c[0], c[1]]).collect()
             }
-            _ => return Ok(Err("has points or lines".to_owned())),
+            Checked::Valid(_) => return Ok(Err("has points or lines".to_owned())),
+            Checked::Invalid => {
+                return Err(self.error(place.to_owned(), "an unknown mode", "a mode of 0 to 6"));
+            }
         };
         Ok(Ok(Triangles {
             points,

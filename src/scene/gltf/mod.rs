@@ -14,7 +14,7 @@ mod notes;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use glam::{BVec3, DAffine3, DMat4, DVec3, DVec4};
+use glam::{BVec3, DAffine3, DVec3, DVec4};
 use gltf::json::{Index, Value};
 use serde::Deserialize;
 use serde_json::Map;
@@ -82,10 +82,11 @@ pub(super) fn read_beside(
         None if placed.is_empty() => Scene::from_boxes(name, &[])?,
         None => file.triangles(&placed, &meshes, name, options)?,
         Some((mesh, reason)) => {
+            let boxes: Result<Vec<_>, _> = placed.iter().map(|i| file.bounds(i)).collect();
+            let scene = Scene::from_boxes(name, &boxes?)?;
             let what = format!("items are boxes without triangles: meshes[{mesh}] {reason}");
             note(&format!("{}: {what}", file.name));
-            let boxes: Result<Vec<_>, _> = placed.iter().map(|i| file.bounds(i)).collect();
-            Scene::from_boxes(name, &boxes?)?
+            scene
         }
     };
     Ok(Scene {
@@ -160,35 +161,32 @@ impl File<'_> {
 
     /// Transform of a node relative to its parent.
     fn local(&self, index: usize) -> Result<DAffine3> {
-        let found = match <[f64; 16]>::deserialize(&self.exact.nodes[index]["matrix"]) {
-            Ok(matrix) => {
-                let matrix = DMat4::from_cols_array(&matrix);
+        let found = match &self.exact.nodes[index].matrix {
+            Some(matrix) => {
                 let last = matrix.row(3);
                 if last.is_finite() && !last.abs_diff_eq(DVec4::W, 1e-6) {
                     let place = format!("nodes[{index}].matrix");
                     let found = format!("a last row of {last}");
                     return Err(self.error(place, found, "[0, 0, 0, 1]"));
                 }
-                DAffine3::from_mat4(matrix)
+                DAffine3::from_mat4(**matrix)
             }
-            Err(_) => transform(self.parts(index)),
+            None => transform(self.parts(index)),
         };
-        if found.is_finite() {
-            return Ok(found);
-        }
-        let (place, found) = (format!("nodes[{index}]"), "a transform that is not finite");
+        self.finite(found, || format!("nodes[{index}]"))
+    }
+
+    fn finite(&self, transform: DAffine3, place: impl Fn() -> String) -> Result<DAffine3> {
         let expected = "finite numbers and a rotation that is not zero";
-        Err(self.error(place, found, expected))
+        let error = || self.error(place(), "a transform that is not finite", expected);
+        transform.is_finite().then_some(transform).ok_or_else(error)
     }
 
     /// The parts of the transform of a node that it states.
     fn parts(&self, index: usize) -> Parts {
         let node = &self.exact.nodes[index];
-        ["translation", "rotation", "scale"].map(|name| {
-            let mut numbers = Vec::<f64>::deserialize(&node[name]).ok()?;
-            numbers.resize(4, 0.0);
-            Some(DVec4::from_slice(&numbers))
-        })
+        let [moved, scaled] = [node.translation, node.scale].map(|v| Some(v?.extend(0.0)));
+        [moved, node.rotation, scaled]
     }
 
     /// Instances of a node by EXT_mesh_gpu_instancing; the node itself without them.
@@ -225,7 +223,9 @@ impl File<'_> {
             [("TRANSLATION", 3), ("ROTATION", 4), ("SCALE", 3)].map(column);
         let columns = [moved?, turned?, scaled?];
         let of = |i: usize| columns.each_ref().map(|column| Some(column.as_ref()?[i]));
-        Ok((0..count as usize).map(|i| transform(of(i))).collect())
+        let all = (0..count as usize)
+            .map(|i| self.finite(transform(of(i)), || format!("{place}, instance {i}")));
+        all.collect()
     }
 
     /// The scene of all triangles.

@@ -35,8 +35,10 @@ impl File<'_> {
             channels.into_iter().map(|c| c.target.node.value()).collect()
         });
         let moved = self.below(order, |node| moving.contains(&node));
-        let extensions = |node: usize| &self.exact.nodes[node]["extensions"];
-        let hidden = self.below(order, |n| extensions(n)["KHR_node_visibility"]["visible"] == false);
+        let hidden = self.below(order, |node| {
+            let own = nodes[node].extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
+            own.is_some_and(|own| own["visible"] == false)
+        });
         let is_morphed = |item: &Placed| {
             let own = nodes[item.node].weights.as_ref();
             let mut weights = own.or(root.meshes[item.mesh].weights.as_ref()).into_iter().flatten();

@@ -251,6 +251,10 @@ fn cameras_have_their_lens_and_move_as_animated() {
     let view = read(&parallel).unwrap().places[0].view.expect("a lens");
     let numbers = [view.ortho_height, view.aspect, view.far];
     assert_eq!(numbers, [Some(4.0), Some(1.5), Some(9.0)]);
+    // A sign mirrors the view.
+    parallel["cameras"][0]["orthographic"]["xmag"] = json!(-3);
+    let mirrored = read(&parallel).unwrap().places[0].view;
+    assert_eq!(mirrored, Some(view));
     for (place, value, wanted) in [
         (
             "/accessors/2/count",
@@ -347,12 +351,23 @@ fn unknown_chunks_of_a_glb_are_passed_over() {
     let json = chunk(b"JSON", json.as_bytes());
     let [odd, bin] = [chunk(b"ODD\0", &[1; 9]), chunk(b"BIN\0", &bin)];
     let read = |chunks: &[&[u8]]| {
-        let bytes = [&b"glTF\x02\0\0\0\0\0\0\0"[..], &chunks.concat()].concat();
+        let length = 12 + chunks.concat().len() as u32;
+        let bytes = [
+            &b"glTF\x02\0\0\0"[..],
+            &length.to_le_bytes(),
+            &chunks.concat(),
+        ]
+        .concat();
         read_gltf(&bytes, "t.glb", "t", &LoadOptions::default()).map(|scene| scene.items.len())
     };
     assert_eq!(read(&[&json, &odd, &bin]).unwrap(), 2);
     assert_eq!(read(&[&json, &bin, &odd]).unwrap(), 2);
     assert!(read(&[&json, &odd[..12], &bin]).is_err());
+    let error = read(&[&json]).unwrap_err().to_string();
+    assert!(
+        error.contains("buffers[0]: no bytes; expected a uri"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -405,65 +420,15 @@ fn instances_are_items() {
         error.contains("73 elements; expected as many of each, 1 to 72"),
         "{error}"
     );
-}
-
-#[test]
-fn glass_is_clear() {
-    let mut glass = file();
-    let transmission = json!({"KHR_materials_transmission": {"transmissionFactor": 1}});
-    glass["materials"][0] = json!({"extensions": transmission});
-    let surfaces = read(&glass).unwrap().surfaces.expect("triangles");
-    assert_eq!(surfaces.kinds, [SurfaceKind::Clear; 8]);
-    // The factor is 0 unless it is said.
-    glass["materials"][0] = json!({"extensions": {"KHR_materials_transmission": {}}});
-    let surfaces = read(&glass).unwrap().surfaces.expect("triangles");
-    assert_eq!(surfaces.kinds, [SurfaceKind::Opaque; 8]);
-}
-
-#[test]
-fn a_mask_hides_where_nothing_can_be_cut_out() {
-    let mut mask = file();
-    for (alpha, kind) in [(1.0, SurfaceKind::Opaque), (0.4, SurfaceKind::CutOut)] {
-        let own = json!({"baseColorFactor": [1, 1, 1, alpha]});
-        mask["materials"][0] = json!({"alphaMode": "MASK", "pbrMetallicRoughness": own});
-        let surfaces = read(&mask).unwrap().surfaces.expect("triangles");
-        assert_eq!(surfaces.kinds, [kind; 8]);
-    }
-}
-
-#[test]
-fn each_triangle_has_the_material_of_its_primitive() {
-    let mut file = file();
-    let mask =
-        json!({"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}});
-    file["materials"] = json!([mask, {"doubleSided": true}, {"alphaMode": "BLEND"}]);
-    let primitive = &file["meshes"][0]["primitives"][0];
-    let all = [Some(1), Some(0), None, Some(2)].map(|material| {
-        let mut own = primitive.clone();
-        own["material"] = json!(material);
-        own
-    });
-    file["meshes"][0]["primitives"] = json!(all);
-    let scene = read(&file).unwrap();
-    let single = scene.clone().by_triangle(&LoadOptions::default()).unwrap();
-    let alone = scene.surfaces.as_ref().expect("triangles").some(&[1]);
-    for surfaces in [scene.surfaces, single.surfaces, Some(alone.into())] {
-        let surfaces = surfaces.expect("triangles");
-        let (kinds, two_sided) = (surfaces.kinds.chunks(4), surfaces.two_sided.chunks(4));
-        let facts = kinds.zip(two_sided).zip((0..4).cycle());
-        for ((kinds, two_sided), primitive) in facts {
-            let kind = [
-                SurfaceKind::Opaque,
-                SurfaceKind::CutOut,
-                SurfaceKind::Opaque,
-                SurfaceKind::Clear,
-            ][primitive];
-            assert_eq!(
-                (kinds, two_sided),
-                (&[kind; 4][..], &[primitive == 0; 4][..])
-            );
-        }
-    }
+    // Four zero bytes, which are no rotation.
+    let zero = json!({"bufferView": 0, "componentType": 5121, "count": 1, "type": "VEC4"});
+    file["accessors"].as_array_mut().unwrap().push(zero);
+    file["nodes"][1]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] =
+        json!({"ROTATION": 2});
+    let error = read(&file).map(|_| ()).unwrap_err().to_string();
+    let wanted = "EXT_mesh_gpu_instancing, instance 0: a transform that is not finite";
+    assert!(error.contains(wanted), "{error}");
 }
 
 mod damaged;
+mod materials;

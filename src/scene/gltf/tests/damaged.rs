@@ -10,7 +10,7 @@ fn what_is_wrong_is_named_with_its_place() {
     let bytes = STANDARD.decode(uri.split_once(',').unwrap().1).unwrap();
     let bytes = [&bytes[..12], &[0xff; 4], &bytes[16..]].concat();
     let nan = format!("data:;base64,{}", STANDARD.encode(bytes));
-    let cases: [(&str, Value, &str); 17] = [
+    let cases: [(&str, Value, &str); 23] = [
         ("/nodes/2/camera", json!(1), "nodes[2].camera: index 1"),
         (
             "/buffers/0/uri",
@@ -45,6 +45,28 @@ fn what_is_wrong_is_named_with_its_place() {
             "expected a smaller input",
         ),
         ("/accessors/1/count", json!(13), "accessors[1]: 13 elements"),
+        (
+            "/accessors/1/componentType",
+            json!(5122),
+            "accessors[1]: indices of type 5122; expected 5121, 5123 or 5125",
+        ),
+        (
+            "/accessors/1/normalized",
+            json!(true),
+            "accessors[1]: normalized indices; expected 5121",
+        ),
+        (
+            "/meshes/0/primitives/0/mode",
+            json!(7),
+            "meshes[0].primitives[0]: an unknown mode",
+        ),
+        (
+            "/cameras/0/type",
+            json!("orthographic"),
+            "cameras[0]: no lens; expected type 'perspective'",
+        ),
+        ("/scenes", json!([]), "scene: index 0; expected no index"),
+        ("/buffers/0/uri", json!("-"), "./-: "),
         (
             "/accessors/0/type",
             json!("VEC2"),
