@@ -1,15 +1,23 @@
-//! Further columns of a boxes file, kept as labels: each distinct text once
-//! and a number per item.
+//! Further columns of a boxes file, kept as labels: texts and a number per item.
+//!
+//! Each of a few distinct texts is kept once. Where they are many, as names and ids are, further
+//! ones are not looked up.
 
 use std::collections::HashMap;
+
+/// Texts that are looked up.
+const MOST_KNOWN: usize = 4096;
 
 /// One labelled column, such as `kind`.
 #[derive(Clone, Default, Debug)]
 pub struct Labels {
     /// Name of the column.
     pub column: String,
-    values: Vec<String>,
-    numbers: HashMap<String, u32>,
+    /// The texts, one behind the other, and the end of each.
+    texts: String,
+    ends: Vec<usize>,
+    /// Numbers of the first texts.
+    numbers: HashMap<Box<str>, u32>,
     of_item: Vec<u32>,
 }
 
@@ -23,30 +31,47 @@ impl Labels {
     }
 
     /// Labels the next item.
+    ///
+    /// Zero bytes, which no CSV file may have, become replacement characters.
     pub fn push(&mut self, value: &str) {
         let known = self.numbers.get(value).copied();
         let number = known.unwrap_or_else(|| {
-            let number = self.values.len() as u32;
-            self.values.push(value.to_owned());
-            self.numbers.insert(value.to_owned(), number);
+            let number = self.ends.len() as u32;
+            self.texts += &value.replace('\0', "\u{fffd}");
+            self.ends.push(self.texts.len());
+            if self.numbers.len() < MOST_KNOWN {
+                self.numbers.insert(value.into(), number);
+            }
             number
         });
         self.of_item.push(number);
     }
 
+    fn text(&self, number: usize) -> &str {
+        let start = number.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.texts[start..self.ends[number]]
+    }
+
     /// The label of an item; empty if it has none.
     pub fn get(&self, item: usize) -> &str {
         let number = self.of_item.get(item);
-        number.map_or("", |&number| &self.values[number as usize])
+        number.map_or("", |&number| self.text(number as usize))
     }
 
     /// Each distinct label with its number of items, most frequent first.
     pub fn histogram(&self) -> Vec<(&str, usize)> {
-        let mut counts = vec![0; self.values.len()];
+        let mut counts = vec![0; self.ends.len()];
         for &number in &self.of_item {
             counts[number as usize] += 1;
         }
-        let mut rows: Vec<_> = self.values.iter().map(String::as_str).zip(counts).collect();
+        let texts = (0..self.ends.len()).map(|number| self.text(number));
+        let mut rows: Vec<(&str, usize)> = texts.zip(counts).collect();
+        rows.sort_unstable();
+        rows.dedup_by(|next, kept| {
+            let is_same = next.0 == kept.0;
+            kept.1 += if is_same { next.1 } else { 0 };
+            is_same
+        });
         rows.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(b.0)));
         rows
     }
@@ -64,5 +89,20 @@ mod tests {
         }
         assert_eq!((kind.get(1), kind.get(9)), ("road", ""));
         assert_eq!(kind.histogram(), [("tree", 2), ("road", 1)]);
+    }
+
+    #[test]
+    fn many_distinct_labels_are_counted_alike_and_have_no_zero_bytes() {
+        let mut id = Labels::new("id");
+        let count = 2 * MOST_KNOWN;
+        (0..count).for_each(|i| id.push(&i.to_string()));
+        for value in ["a\0b", "8000", "8000"] {
+            id.push(value);
+        }
+        let own = [id.get(count - 1), id.get(count), id.get(count + 1)];
+        assert_eq!(own, ["8191", "a\u{fffd}b", "8000"]);
+        let histogram = id.histogram();
+        assert_eq!(histogram.len(), count + 1);
+        assert_eq!(histogram[..2], [("8000", 3), ("0", 1)]);
     }
 }
