@@ -261,7 +261,8 @@ ROWS.append(cones("several-cones", 28.5, "four cones per cluster"))
 HEAD = """# Published figures, reproduced
 
 Written by `scripts/external.py` on a shared {machine}. Times are CPU time per query on one
-thread. Ratios are to the newest processor's figure where theirs is a range.
+thread, if not said otherwise. Ratios are to the newest processor's figure where theirs is a range,
+or to its middle.
 
 | figure | theirs | ours | ours / theirs | why it differs |
 |---|---|---|---|---|

@@ -84,9 +84,11 @@ fn kind_of(error: &io::Error) -> io::ErrorKind {
 
 /// The expectation of a message about a file with several parts.
 pub(crate) fn part_hint(file: &str, name: &str) -> String {
-    // A value that begins with a minus needs the sign.
-    let option = if file == "-" { "--scene=" } else { "" };
-    format!("one of them by name, as in '{option}{file}#{name}'")
+    // A value that begins with a minus needs the sign, a word of its own the dashes.
+    if file == "-" || file.starts_with("-#") {
+        return format!("one of them by name, as in '--scene={file}#{name}' or '-- {file}#{name}'");
+    }
+    format!("one of them by name, as in '{file}#{name}'")
 }
 
 /// Nanoseconds with three significant digits and a fitting unit.

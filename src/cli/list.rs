@@ -19,7 +19,7 @@ use crate::scene::{FAMILIES, FETCHED, MESHES, SAMPLES, SCENE_PARAMS};
 use crate::suite::SUITES;
 
 /// Further columns of rows, in the order of the tables.
-const COLUMNS: &str = "kind origin capabilities timed params licence unit";
+const COLUMNS: &str = "kind origin capabilities timed params licence state unit";
 
 pub fn list(registry: &Registry, args: &ListArgs) -> Result<Ending> {
     let topics = ListTopic::value_variants().to_vec();
@@ -127,10 +127,12 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
             let fetched = FETCHED.iter().map(|f| {
                 let state = match f.is_there() {
                     true => "fetched".to_owned(),
-                    false => format!("missing: scripts/fetch.py {}", f.name),
+                    false => format!("missing, scripts/fetch.py {}", f.name),
                 };
-                let licence = format!("{} ({state})", f.licence);
-                row(&f.path().to_string_lossy(), "licence", &licence, &f.summary)
+                let path = f.path();
+                let mut row = row(&path.to_string_lossy(), "licence", &f.licence, &f.summary);
+                row["state"] = state.into();
+                row
             });
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, \

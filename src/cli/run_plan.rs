@@ -16,7 +16,7 @@ use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
 use crate::motion::Motion;
 use crate::path::{self, LensDefaults};
 use crate::report::{KeptPart, Stream};
-use crate::scene::{self, FETCHED, Scene, every_part, split_part};
+use crate::scene::{self, FETCHED, LoadOptions, Scene, every_part, split_part};
 use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES, Suite, SuiteScene};
 
 /// A plan with where it comes from.
@@ -255,14 +255,23 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputErro
             scenes.extend(parts.map(|source| SuiteScene::new(source, &[DEFAULT_PATH])));
         }
     } else if suite.name == REAL {
-        let (there, missing): (Vec<_>, Vec<_>) = FETCHED.iter().partition(|row| row.is_there());
-        let fetched = there.iter().flat_map(|row| row.scenes());
-        scenes.extend(fetched.map(|source| SuiteScene::new(source, REAL_PATHS)));
+        let mut missing = Vec::new();
+        for row in &*FETCHED {
+            let own = row.scenes();
+            let read = |source: &String| scene::load(source, &LoadOptions::default()).map(drop);
+            let unknown = if row.is_converted() { &own[..] } else { &[] };
+            match unknown.iter().try_for_each(read) {
+                _ if !row.is_there() => missing.push(row.name.as_str()),
+                _ if own.is_empty() => note(&format!("not part of the suite: {}", row.name)),
+                Err(error) => note(&format!("left out: {error}")),
+                Ok(()) => scenes.extend(own.into_iter().map(|s| SuiteScene::new(s, REAL_PATHS))),
+            }
+        }
         if !missing.is_empty() {
-            let names: Vec<&str> = missing.iter().map(|row| row.name.as_str()).collect();
-            let names = names.join(" ");
+            let names = missing.join(" ");
+            let how = format!("to fetch them: scripts/fetch.py {names}");
             note(&format!(
-                "left out, as not fetched: {names}; to fetch them: scripts/fetch.py {names}"
+                "left out, as not fetched or damaged: {names}; {how}"
             ));
         }
     }

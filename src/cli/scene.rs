@@ -134,6 +134,9 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.scene_args.options(0))?;
     let (origin, lost) = (scene.origin, left_behind(&scene));
     let kept = scene.settled()?;
+    if kept.skipped_items > 0 {
+        tell("note: ids of the new file are its own rows, without the bad items");
+    }
     if !lost.is_empty() {
         let what = "not written; boxes CSV has boxes and labels only";
         tell(&format!("note: {} {what}", lost.join(", ")));

@@ -15,6 +15,9 @@ const LABELS: [&str; 9] = [
     "camera", "comment", "frame", "id", "label", "name", "note", "time", "time_s",
 ];
 
+/// Bytes of the first line.
+const MOST_HEADER: usize = 1_000_000;
+
 /// A CSV file with its header read.
 pub struct TableReader<'b> {
     file: String,
@@ -53,7 +56,12 @@ impl<'b> TableReader<'b> {
         }
         let text = str::from_utf8(bytes);
         text.map_err(|error| no_text(error.valid_up_to(), "a byte that is no UTF-8"))?;
-        let delimiter = delimiter(bytes, names);
+        let head = first_line(bytes);
+        if head.len() > MOST_HEADER {
+            let found = format!("a header of {}", counted(head.len(), "byte"));
+            return Err(InputError::line(file, 1, found, "at most a million"));
+        }
+        let delimiter = delimiter(head, names);
         let mut csv = csv::ReaderBuilder::new()
             .flexible(true)
             .delimiter(delimiter)
@@ -225,13 +233,17 @@ impl Row<'_> {
     }
 }
 
-/// Delimiter of the first line that is not empty.
+/// The first line that is not empty.
+fn first_line(bytes: &[u8]) -> &[u8] {
+    let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
+    let mut lines = text.split(is_end);
+    lines.find(|line| !line.is_empty()).unwrap_or_default()
+}
+
+/// Delimiter of a first line.
 ///
 /// The one that gives most of the names; outside of quotes the most frequent if none does.
-fn delimiter(head: &[u8], names: &[&str]) -> u8 {
-    let head = head.strip_prefix("\u{feff}".as_bytes()).unwrap_or(head);
-    let mut lines = head.split(|byte| matches!(byte, b'\n' | b'\r'));
-    let header = lines.find(|line| !line.is_empty()).unwrap_or_default();
+fn delimiter(header: &[u8], names: &[&str]) -> u8 {
     let unquoted = header.split(|byte| *byte == b'"').step_by(2);
     let rank = |one: &u8| {
         let mut csv = csv::ReaderBuilder::new();

@@ -27,7 +27,7 @@ const MOST_UNREAD: usize = 100;
 
 /// Tells OBJ by the first word that is no comment and no header of boxes CSV.
 pub fn is_obj(bytes: &[u8]) -> bool {
-    let lines = text(bytes).split(|byte| *byte == b'\n');
+    let lines = text(bytes).split(|byte| matches!(byte, b'\n' | b'\r'));
     let mut lines = lines.map(|line| line.trim_ascii());
     let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"));
     first.is_some_and(|line| {
@@ -99,8 +99,12 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// A comment ends with its line.
 fn first_line(text: &[u8]) -> (&[u8], u64) {
     let (mut end, mut lines) = (0, 0);
-    while let Some(length) = text[end..].iter().position(|byte| *byte == b'\n') {
-        let own = &text[end..=end + length];
+    let is_end = |at: usize| match text[at] {
+        b'\r' => text.get(at + 1) != Some(&b'\n'),
+        byte => byte == b'\n',
+    };
+    while let Some(last) = (end..text.len()).find(|at| is_end(*at)) {
+        let own = &text[end..=last];
         (end, lines) = (end + own.len(), lines + 1);
         let is_continued = own.trim_ascii_end().ends_with(b"\\");
         if !is_continued || words(own).any(|word| word.starts_with(b"#")) {
@@ -330,6 +334,21 @@ f 1 2 3 4";
         let boxes = Scene::from_boxes("b", &[]).unwrap().by_triangle(&options);
         let error = boxes.map(|_| ()).unwrap_err().to_string();
         assert!(error.contains("no triangles; expected"), "{error}");
+    }
+
+    #[test]
+    fn lines_end_as_an_editor_counts_them() {
+        let text = "# old\nv 0 0 0\nv 1 0 0\nv 0 1 \\\n0\nf 1 2 3\n";
+        for end in ["\n", "\r", "\r\n"] {
+            let bytes = text.replace('\n', end);
+            let read = |bytes: &str| {
+                assert!(is_obj(bytes.as_bytes()), "{end:?}");
+                read_obj(bytes.as_bytes(), "t.obj", "t", &LoadOptions::default())
+            };
+            assert_eq!(read(&bytes).unwrap().items.len(), 1);
+            let error = read(&(bytes + "v 1")).map(|_| ()).unwrap_err().to_string();
+            assert!(error.starts_with("t.obj, line 7: "), "{end:?}: {error}");
+        }
     }
 
     #[test]

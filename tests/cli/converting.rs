@@ -192,3 +192,22 @@ fn what_cannot_be_converted_leaves_no_trace() {
     assert_eq!((both.code, both.out.as_str()), (Some(2), ""));
     assert!(both.err.contains("cannot be used with"), "{}", both.err);
 }
+
+#[test]
+fn a_note_tells_that_rows_are_counted_anew_without_bad_items() {
+    let text = format!("{BOXES}\n0,0,0,1,1,1\n0,0,0,-1,1,1\n2,2,2,3,3,3\n");
+    let folder = folder(&[("bad.csv", text.as_bytes())]);
+    let (_, told) = convert(
+        folder.path(),
+        "bad.csv good.csv --skip-bad-items",
+        "good.csv",
+    );
+    let note = "note: ids of the new file are its own rows, without the bad items\n";
+    assert!(told.contains(note), "{told}");
+    let (_, told) = convert(
+        folder.path(),
+        "good.csv again.csv --skip-bad-items",
+        "again.csv",
+    );
+    assert!(!told.contains("note"), "{told}");
+}

@@ -231,3 +231,35 @@ fn every_command_has_help() {
         assert!(licences.contains(owner), "{owner}");
     }
 }
+
+#[test]
+fn damaged_files_and_those_without_a_scene_of_the_suite_are_named() {
+    let folder = folder(&[]);
+    let fetched = folder.path().join("datasets/fetched");
+    fs::create_dir_all(&fetched).expect("a folder");
+    for file in ["engine.glb", "cities.csv"] {
+        fs::write(fetched.join(file), "garbage").expect("writable");
+    }
+    let list = json(&works(folder.path(), "list scenes --format json"));
+    let rows = list.as_array().expect("rows").iter();
+    let row = |name: &str| {
+        let mut rows = rows.clone();
+        let found = rows.find(|row| row["name"] == format!("datasets/fetched/{name}"));
+        found.expect("a row")
+    };
+    assert_eq!(
+        row("engine.glb")["state"],
+        "missing, scripts/fetch.py engine"
+    );
+    assert_eq!(row("cities.csv")["state"], "fetched");
+    assert_eq!(row("engine.glb")["licence"], "BSD-3-Clause");
+    let done = cullbench(folder.path(), "run --suite real --path none.csv");
+    assert_eq!(done.code, Some(2));
+    for told in [
+        "note: left out: datasets/fetched/cities.csv, line 1: ",
+        "note: left out, as not fetched or damaged: freedm freedoom2 engine stars ",
+        "none.csv: No such file",
+    ] {
+        assert!(done.err.contains(told), "{told}: {}", done.err);
+    }
+}

@@ -229,3 +229,14 @@ fn bytes_that_are_no_utf_8_are_refused_with_their_line() {
     let told = told(b"x,y,kind\n1,2,a\0b\n");
     assert!(told.starts_with("t.csv, line 2: zero bytes"), "{told}");
 }
+
+#[test]
+fn a_header_of_megabytes_is_refused() {
+    let text = "\n".to_owned() + &"0".repeat(MOST_HEADER + 1);
+    let error = TableReader::open(text.as_bytes(), "t.csv", &NAMES).err();
+    let error = error.expect("an error").to_string();
+    assert_eq!(
+        error,
+        "t.csv, line 1: a header of 1,000,001 bytes; expected at most a million"
+    );
+}

@@ -19,12 +19,17 @@ const LUMPS: [(usize, &str, usize); 11] = [
 ];
 
 /// Formats of other engines, by magic and version.
-const OTHERS: [(&[u8], &str); 7] = [
+pub const OTHERS: [(&[u8], &str); 12] = [
     (b"IBSP\x26", "Quake II"),
     (b"IBSP\x2f", "Return to Castle Wolfenstein or Quake Live"),
     (b"VBSP", "Source"),
     (b"RBSP", "Raven"),
     (b"FBSP", "QFusion"),
+    (b"BSP2", "Quake (BSP2)"),
+    (b"2PSB", "Quake (2PSB)"),
+    (b"FAKK", "Heavy Metal: FAKK 2"),
+    (b"EF2!", "Elite Force II"),
+    (b"2015\x13\0\0\0", "Medal of Honor: Allied Assault"),
     (b"\x1d\0\0\0", "Quake"),
     (b"\x1e\0\0\0", "Half-Life"),
 ];
@@ -43,7 +48,7 @@ pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'
             Some((_, engine)) => format!("a map of {engine}"),
             None => format!("'{start}'"),
         };
-        let expected = "IBSP of version 46 (Quake III)";
+        let expected = "IBSP of version 46 (Quake III), or the map as glTF or OBJ";
         return Err(InputError::byte(file, 0, found, expected));
     }
     let entry = 8 + 8 * number;

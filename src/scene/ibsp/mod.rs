@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use self::faces::{Faces, PER_PATCH, brush, brush_box, patch};
-use self::lumps::lump;
+use self::lumps::{OTHERS, lump};
 pub use self::tree::{LeafNode, LeafTree};
 use super::records::Table;
 use super::{
@@ -46,9 +46,10 @@ pub struct QuakeMap {
     seen: Option<(usize, Vec<u8>)>,
 }
 
-/// Tells a map by its magic.
+/// Tells a map by its magic; those of other engines are refused by name.
 pub fn is_ibsp(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"IBSP")
+    let mut others = OTHERS.iter().map(|other| other.0);
+    bytes.starts_with(b"IBSP") || others.any(|magic| bytes.starts_with(magic))
 }
 
 impl QuakeMap {

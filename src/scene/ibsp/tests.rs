@@ -177,7 +177,11 @@ fn other_formats_are_named() {
     for (magic, wanted) in [
         (&b"IBSP\x26\0\0\0"[..], "a map of Quake II;"),
         (b"VBSP\x14\0\0\0", "a map of Source;"),
-        (b"\x1d\0\0\0", "a map of Quake;"),
+        (
+            b"\x1d\0\0\0",
+            "a map of Quake; expected IBSP of version 46 (Quake III), or",
+        ),
+        (b"BSP2\0\0\0\0", "a map of Quake (BSP2);"),
         (
             b"IBSP\x2e\0\0\x01",
             "'IBSP.\\x00\\x00\\x01'; expected IBSP of version 46",
@@ -185,6 +189,7 @@ fn other_formats_are_named() {
         (b"", "''; expected IBSP"),
     ] {
         refused(magic, wanted);
+        assert_eq!(is_ibsp(magic), !magic.is_empty());
     }
 }
 
