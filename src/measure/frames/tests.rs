@@ -283,7 +283,10 @@ fn new_builds_in_place_of_refits_are_said() {
     };
     let all = "built again in 12 of 12 frames, which it cannot refit".to_owned();
     let scalar = ("linear-scalar".to_owned(), all.clone());
-    assert_eq!(noted("drift:share=0.2,frames=12"), [scalar.clone()]);
+    assert_eq!(
+        noted("drift:share=0.2,frames=12"),
+        std::slice::from_ref(&scalar)
+    );
     // Lanes of absent items take them when they return.
     let spawn = noted("spawn:share=0.2,frames=12");
     assert_eq!(spawn, [("bvh".to_owned(), all), scalar]);
