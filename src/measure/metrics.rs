@@ -66,10 +66,10 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "visible_count", "items", Of::Count, "items returned per query, mean over the path: the visible ones and the false positives of the test (excess)";
     "cull_rate", "1", Of::Count, "1 - returned/total, mean over the path";
     "query_ns", "ns", Of::Time(TaskKind::Query), "thread CPU time per frustum query, mean over the timed cameras: trimmed mean over the processes, each the interquartile mean over its rounds; interval over the processes";
-    "query_ns_p5", "ns", Of::Tail(0.05), "5th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
-    "query_ns_p95", "ns", Of::Tail(0.95), "95th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
-    "query_ns_p99", "ns", Of::Tail(0.99), "99th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
-    "query_ns_max", "ns", Of::Tail(1.0), "slowest group of cameras, at least query_ns";
+    "query_ns_p5", "ns", Of::Tail(0.05), "as query_ns_p95, 5th percentile";
+    "query_ns_p95", "ns", Of::Tail(0.95), "95th percentile over groups of cameras that are the same for all structures, of the median of each group, times query_ns / the mean over the groups; absent below twenty groups, as of short queries, of which many make a group";
+    "query_ns_p99", "ns", Of::Tail(0.99), "as query_ns_p95, 99th percentile";
+    "query_ns_max", "ns", Of::Tail(1.0), "slowest group of cameras";
     "query_wall_ns", "ns", Of::Wall(TaskKind::Query), "as query_ns, wall time";
     "ns_per_visible", "ns", Of::TimePerVisible, "query_ns / items returned to a timed query, mean; interval scaled likewise";
     "speedup", "1", Of::Speedup(None), "time of linear / time of this structure: above 1 is faster; the ratio of the two query_ns, of motions that of the two frame_ns";
@@ -106,7 +106,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "fat_excess", "1", Of::Count, "items that enlarged bounds (--update fat=M) return in excess / items that exact bounds return";
     "update_ns", "ns", Of::Time(TaskKind::Update), "CPU time of the update of a frame, mean over the frames; as query_ns";
     "further_query_ns", "ns", Of::Time(TaskKind::Further), "thread CPU time of a query after the first one of a frame; as query_ns";
-    "worst_frame_ns", "ns", Of::WorstFrame, "slowest frame: median over processes of the median of each frame over rounds, then the maximum over the frames, at least frame_ns; absent below three readings per frame, where an interruption would be the worst frame";
+    "worst_frame_ns", "ns", Of::WorstFrame, "slowest frame: median over processes of the median of each frame over rounds, then the maximum over the frames, times frame_ns / the mean over the frames; absent below three readings per frame, where an interruption would be the worst frame";
     "ageing_1", "1", Of::Log(|s| s.ageing_ln.get(&1).copied()), "time per query after 1 frame / time per query on a fresh build of the same boxes";
     "ageing_10", "1", Of::Log(|s| s.ageing_ln.get(&10).copied()), "time per query after 10 frames / time per query on a fresh build of the same boxes";
     "ageing_100", "1", Of::Log(|s| s.ageing_ln.get(&100).copied()), "time per query after 100 frames / time per query on a fresh build of the same boxes";

@@ -326,20 +326,14 @@ impl<'p> MergedParts<'p> {
                 logs(tasks.filter_map(|task| task.wall_ln_ns).collect())
             }
             Of::Tail(q) => {
-                let all = self.tail(label, TaskKind::Query);
+                let all = self.tail(label, TaskKind::Query)?;
                 let all = Some(all).filter(|all| all.len() >= LEAST_TAIL)?;
-                let found = quantile(&all, q)?;
-                // The mean has another estimator.
-                let mean = self.ns(label, TaskKind::Query)?.value;
-                let least = if q == 1.0 { mean } else { found };
-                Some(Estimate::exact(found.max(least)))
+                Some(Estimate::exact(quantile(&all, q)?))
             }
             Of::WorstFrame => {
-                let worst = *self.tail(label, TaskKind::Frame).last()?;
-                let mean = self.ns(label, TaskKind::Frame)?.value;
+                let worst = *self.tail(label, TaskKind::Frame)?.last()?;
                 let is_known = self.readings(label) >= LEAST_READINGS;
-                // The mean has another estimator.
-                is_known.then(|| Estimate::exact(worst.max(mean)))
+                is_known.then(|| Estimate::exact(worst))
             }
             Of::Speedup(task) => {
                 let [yardstick, own] = self.paired(label, task.unwrap_or(self.ranked()))?;
@@ -363,11 +357,16 @@ impl<'p> MergedParts<'p> {
     }
 
     /// Median times of each group of cameras or each frame, ns, ascending.
-    fn tail(&self, label: &str, task: TaskKind) -> Vec<f64> {
+    ///
+    /// Brought to the time that is shown, which has another estimator: their mean is that time.
+    fn tail(&self, label: &str, task: TaskKind) -> Option<Vec<f64>> {
+        let shown = self.ns(label, task)?.value;
         let tails: Vec<&[f64]> = self.tasks(label, task).map(|t| &t.tail_ns[..]).collect();
         let groups = tails.iter().map(|tail| tail.len()).min().unwrap_or(0);
         let of_group = |g: usize| median(&tails.iter().map(|t| t[g]).collect::<Vec<_>>());
-        sorted((0..groups).filter_map(of_group).collect())
+        let all = sorted((0..groups).filter_map(of_group).collect());
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        Some(all.iter().map(|ns| ns / mean * shown).collect())
     }
 
     /// Queries after which the build is repaid against the yardstick; `None` if never.
