@@ -41,7 +41,8 @@ pub fn comparisons(report: &Report) -> Vec<Comparison<'_>> {
 /// Those without a time, and those among no items, where nothing is found faster.
 pub(super) fn without_false_ranks(cells: &mut [ReportCell]) {
     for cell in cells {
-        let is_timed = cell.time().is_some_and(|time| time.value.is_finite());
+        let is_time = |ns: f64| ns.is_finite() && ns > 0.0;
+        let is_timed = cell.time().is_some_and(|time| is_time(time.value));
         let is_sound = is_timed && cell.scene.total_count > 0 && cell.status == Status::Ok;
         cell.rank = cell.rank.filter(|_| is_sound);
     }
@@ -155,19 +156,15 @@ pub fn unique<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
     groups.into_iter().map(|(value, _)| value).collect()
 }
 
-/// Group, structure, and number of cells before it that have both.
-/// A report that holds a cell twice loses none of them.
-type Numbered<'r> = (String, &'r str, usize);
+/// Group and structure, which a report has once.
+type Named<'r> = (String, &'r str);
 
-fn keyed(cells: &[ReportCell]) -> Vec<(Numbered<'_>, &ReportCell)> {
-    let mut seen = BTreeMap::new();
-    let keys = cells.iter().map(|cell| {
-        let key = (cell.key().group.id(), cell.structure.as_str());
-        let before = seen.entry(key.clone()).or_insert(0);
-        *before += 1;
-        ((key.0, key.1, *before), cell)
-    });
-    keys.collect()
+fn keyed(cells: &[ReportCell]) -> Vec<(Named<'_>, &ReportCell)> {
+    let key = |cell: &ReportCell| cell.key().group.id();
+    let all = cells
+        .iter()
+        .map(|cell| ((key(cell), &*cell.structure), cell));
+    all.collect()
 }
 
 /// A cell in both reports.
@@ -178,8 +175,8 @@ pub(super) type Matched<'r> = (Vec<Pair<'r>>, [Vec<&'r ReportCell>; 2]);
 
 pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Matched<'r> {
     let (old, new) = (keyed(old), keyed(new));
-    let known: BTreeSet<Numbered> = old.iter().map(|(key, _)| key.clone()).collect();
-    let partners: BTreeMap<Numbered, &ReportCell> = new.iter().cloned().collect();
+    let known: BTreeSet<Named> = old.iter().map(|(key, _)| key.clone()).collect();
+    let partners: BTreeMap<Named, &ReportCell> = new.iter().cloned().collect();
     let (mut pairs, mut only_old) = (Vec::new(), Vec::new());
     for (key, cell) in old {
         match partners.get(&key) {

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use super::ranking::without_false_ranks;
 use super::stream::{Header, KeptPart, Stream};
 use super::writing::{self, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM};
-use super::{Report, SCHEMA_VERSION};
+use super::{Report, ReportCell, SCHEMA_VERSION};
 use crate::input::InputError;
 use crate::json::{JsonError, from_json};
 use crate::measure::{GroupKey, Part, TaskKind};
@@ -50,6 +50,13 @@ fn read_json(path: PathBuf) -> Result<Report, InputError> {
     }
     let mut report: Report = from_json(&bytes).map_err(bad)?;
     without_false_ranks(&mut report.cells);
+    let mut seen = BTreeSet::new();
+    let mut keys = report.cells.iter().map(ReportCell::key);
+    if let Some(twice) = keys.find(|key| !seen.insert((key.group.id(), key.structure.clone()))) {
+        let (file, group) = (path.display().to_string(), twice.group);
+        let found = format!("{} on {} a second time", twice.structure, group.path);
+        return Err(InputError::at(&file, group.scene, found, "each cell once"));
+    }
     Ok(report)
 }
 
@@ -114,6 +121,10 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
                 // Counted twice, it would be a process more than there was.
                 if !seen.insert((*group, *process)) {
                     return bad(&format!("{found} a second time"), "each part once");
+                }
+                // Only the first has the answers and the plan.
+                if !seen.contains(&(*group, 0)) {
+                    return bad(&found, "the part of its process 1 before it");
                 }
                 let before = stream.parts.last().map(|kept| kept.samples_end);
                 if kept.samples_end < before.unwrap_or(SAMPLE_COLUMNS.len() as u64) {

@@ -93,9 +93,17 @@ fn cells_are_matched_by_their_whole_name_each_once() {
     }
     // What was measured and found is no part of the name.
     assert_eq!(changed(|c| c.scene.digest.push('x')), (1, [0, 0]));
-    let (old, new) = (vec![one.clone(); 3], vec![one.clone(); 2]);
-    let (pairs, alone) = matched(&old, &new);
-    assert_eq!((pairs.len(), alone.map(|cells| cells.len())), (2, [1, 0]));
+}
+
+#[test]
+fn no_time_of_zero_or_below_has_a_rank() {
+    for (ns, wanted) in [(7.0, Some(1)), (0.0, None), (-5.0, None), (f64::NAN, None)] {
+        let mut cells = [cell("s", 10, "p", "a", 1.0)];
+        cells[0].rank = Some(1);
+        cells[0].metrics.get_mut("query_ns").unwrap().value = ns;
+        without_false_ranks(&mut cells);
+        assert_eq!(cells[0].rank, wanted, "{ns}");
+    }
 }
 
 /// Two paths with times of each structure, ranked by them.
