@@ -43,8 +43,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
     let cells = cells.flat_map(|(run, report)| report.cells.iter().map(move |cell| (run, cell)));
     let cells = cells.map(|(run, cell)| (cell.key().group, (cell.structure.as_str(), (run, cell))));
     let mut blocks = Vec::new();
-    let mut changed = [Vec::new(), Vec::new()];
-    let mut compared = 0;
+    let mut ratios = Vec::new();
     for (group, cells) in grouped(cells) {
         let heading = format!("{}, {}", group.scene, question(&group));
         let per = ["query", "frame"][usize::from(!group.motion.is_empty())];
@@ -65,14 +64,9 @@ pub fn page(mut reports: Vec<Report>) -> String {
             let times: Vec<(usize, &Metric)> = times.collect();
             let mut change = String::new();
             if let [(_, first), .., (_, last)] = times[..] {
-                change = format!("{} x", text::significant(last.value / first.value));
-                compared += 1;
-                let line = || format!("{structure} on {heading} ({change})");
-                match (ends(first.estimate()), ends(last.estimate())) {
-                    (Some(a), Some(b)) if b[0] > a[1] => changed[0].push(line()),
-                    (Some(a), Some(b)) if b[1] < a[0] => changed[1].push(line()),
-                    _ => {}
-                }
+                let ratio = last.value / first.value;
+                change = format!("{} x", text::significant(ratio));
+                ratios.push(ratio);
             }
             let shown = (0..reports.len()).map(|run| {
                 let cell = cells.iter().find(|cell| cell.0 == run);
@@ -122,7 +116,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
     let title = format!("{} history of {runs_shown}", program::name());
     let mut all = vec![
         Block::Heading(1, title.clone()),
-        Block::Line(conclusion(&reports, compared, &changed)),
+        Block::Line(conclusion(&reports, &ratios)),
     ];
     all.extend(blocks);
     all.extend([
@@ -134,13 +128,13 @@ pub fn page(mut reports: Vec<Report>) -> String {
 }
 
 /// Changes from the first to the last run, and what else differs between them.
-fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<String>; 2]) -> String {
-    let listed = |names: &[String]| match names {
-        [] => String::new(),
-        [first, rest @ ..] if rest.len() > 2 => format!(": {first} and {} others", rest.len()),
-        names => format!(": {}", names.join("; ")),
-    };
-    let ([first, .., last], 1..) = (reports, compared) else {
+///
+/// Times of two runs one after the other differ for the machine's sake alone: no change is
+/// counted or named.
+fn conclusion(reports: &[Report], ratios: &[f64]) -> String {
+    let end = |of: fn(f64, f64) -> f64| ratios.iter().copied().reduce(of);
+    let ends = end(f64::min).zip(end(f64::max));
+    let ([first, .., last], Some((least, most))) = (reports, ends) else {
         return "No structure has times in two runs that can be compared.".to_owned();
     };
     let settings = settings(first, last);
@@ -150,12 +144,11 @@ fn conclusion(reports: &[Report], compared: usize, [slower, faster]: &[Vec<Strin
         format!(" They differ in the {differ}: not all of a change is the program's own.")
     });
     let runs = text::counted(reports.len(), "run");
-    let times = text::counted(compared, "time");
-    let (longer, less) = (slower.len(), faster.len());
-    let changed = listed(slower) + &listed(faster);
+    let times = text::counted(ratios.len(), "time");
+    let [least, most] = [least, most].map(text::significant);
     format!(
-        "From the first to the last of {runs}, {longer} of {times} took longer and {less} took \
-         less time (intervals apart){changed}. compare judges two runs.{note}"
+        "From the first to the last of {runs}, {times} became {least} to {most} x as long, by \
+         program and machine together. compare judges two runs.{note}"
     )
 }
 

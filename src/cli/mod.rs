@@ -74,7 +74,7 @@ use crate::input::{InputError, hold_files, tell_notes, tell_warnings};
 use crate::report::{folder_of, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene, split_part};
 use crate::shown::expected_by;
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::{CommandFactory, Parser};
 use interrupt::Interrupted;
 use serde::Serialize;
@@ -145,6 +145,9 @@ pub fn main_as(program: (&'static str, &'static str), registry: Registry) -> Exi
     start(registry)
 }
 
+/// Place of an error that no file has.
+const OUTPUT: &str = "standard output: ";
+
 fn start(registry: Registry) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
@@ -186,7 +189,7 @@ fn refused(error: &clap::Error) -> ExitCode {
     match error.print().and_then(|()| io::stdout().flush()) {
         Ok(()) => ExitCode::from(u8::from(error.use_stderr()) * 2),
         Err(unread) if is_broken_pipe(&unread) => ExitCode::SUCCESS,
-        Err(full) => failed(format!("{full}{}", expected_by(&full, "file"))),
+        Err(full) => failed(format!("{OUTPUT}{full}{}", expected_by(&full, "file"))),
     }
 }
 
@@ -239,8 +242,9 @@ fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
         }
         Command::Man { folder: Some(to) } => {
             expect_folder("man", Some(&to))?;
-            fs::create_dir_all(&to)?;
-            clap_mangen::generate_to(Cli::command(), &to)?;
+            let made = fs::create_dir_all(&to);
+            let written = made.and_then(|()| clap_mangen::generate_to(Cli::command(), &to));
+            written.with_context(|| to.display().to_string())?;
             Ok(Ending::Ok)
         }
         Command::Licences => print_all(NOTICE.as_bytes()),
@@ -386,9 +390,15 @@ fn told_once(error: &anyhow::Error) -> String {
             text = format!("{text}: {cause}");
         }
     }
-    let mut of_system = error.chain().filter_map(|cause| cause.downcast_ref());
+    let mut of_system = error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<io::Error>());
     match of_system.next() {
-        Some(error) if !text.contains("expected") => text + &expected_by(error, "file or folder"),
+        Some(error) if !text.contains("expected") => {
+            // Files are named in the context.
+            let place = ["", OUTPUT][usize::from(text == error.to_string())];
+            format!("{place}{text}{}", expected_by(error, "file or folder"))
+        }
         _ => text,
     }
 }
@@ -417,7 +427,6 @@ mod tests {
     use super::*;
     use crate::camera::PLANE_METHODS;
     use crate::culling::{ARITHMETICS, TESTS};
-    use anyhow::Context;
 
     fn broken() -> io::Error {
         io::ErrorKind::BrokenPipe.into()

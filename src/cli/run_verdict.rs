@@ -145,7 +145,7 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
 /// The base of speed-ups, where it is not the usual one.
 fn fallback(base: &str) -> Option<String> {
     let other = base != YARDSTICK;
-    other.then(|| format!("Speed-ups refer to {base}, the slowest: {YARDSTICK} has no times."))
+    other.then(|| format!("Speed-ups refer to {base}, the slowest: {YARDSTICK} lacks times."))
 }
 
 /// The queries after which the build of the fastest has paid.
@@ -276,7 +276,7 @@ fn standing(all: usize, overall: &Overall) -> String {
     let apart = apart.map(|s| format!("{} (first or tied in {})", s.structure, s.first_in));
     let apart = text::joined(apart);
     if !apart.is_empty() {
-        told += &format!(" Without a mean, as not right everywhere: {apart}.");
+        told += &format!(" Without a mean, as without times somewhere: {apart}.");
     }
     told
 }

@@ -120,7 +120,8 @@ fn a_full_disk_is_one_error_line() {
             out: String::new(),
             err: besides_work(&err).to_owned(),
         };
-        assert_refused(&done, "No space left | expected room on the disk", line);
+        let wanted = "standard output: No space left | expected room on the disk";
+        assert_refused(&done, wanted, line);
     }
     // The table is lost, the cells are not.
     check_run(&folder.path().join("run"));

@@ -135,7 +135,7 @@ fn several_paths_have_a_row_each_and_a_geometric_mean() {
     let told = prose(&out);
     let bases = ["bvh", "uniform-grid"].map(|base| {
         told.contains(&format!(
-            "Speed-ups refer to {base}, the slowest: linear has no times."
+            "Speed-ups refer to {base}, the slowest: linear lacks times."
         )) && told.contains(&format!("geometric mean, x {base} 1.00 "))
     });
     assert!(bases.contains(&true), "{told}");
