@@ -60,9 +60,13 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
             text::plain(&new.run.id)
         );
     }
+    let moving = new.cells.iter().find(|cell| !cell.path.motion.is_empty());
     if args.gate == Gate::Time && args.metric.is_empty() {
-        let moving = new.cells.iter().filter(|cell| !cell.path.motion.is_empty());
-        metrics.extend(moving.map(ReportCell::ranked_by).take(1));
+        metrics.extend(moving.map(ReportCell::ranked_by));
+    }
+    let of_frames = |name: &&&str| ["frame_ns", "update_ns"].contains(*name);
+    if let (Some(name), None) = (metrics.iter().find(of_frames), moving) {
+        bail!("--metric {name}: nothing moves in NEW; expected a run with --motion");
     }
     let cells = [&old.cells[..], &new.cells];
     let changes = changes(Basis::Reports, cells, args.threshold, &metrics);

@@ -133,14 +133,14 @@ impl CompareTable<'_> {
     /// The document for Markdown, or with a table for a terminal of some `room`.
     pub fn blocks(&self, all: bool, room: Option<usize>) -> Vec<Block> {
         let changes = &self.changes;
-        let (head, threshold) = (self.head(), text::percent(changes.threshold));
+        let (head, threshold) = (self.head(), text::significant(changes.threshold * 100.0));
         let mut lines = vec![
             format!("OLD  {}", self.old.line),
             format!("NEW  {}", self.new.line),
-            format!("{head}, threshold {threshold}"),
+            format!("{head}, threshold {threshold} %"),
         ];
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
-        lines.extend(changes.common_shift.map(shift_line));
+        lines.extend(changes.common_shifts.iter().map(shift_line));
         let mut blocks: Vec<Block> = lines.drain(..).map(Block::Line).collect();
         let shown = changes.rows.iter().filter(|row| all || row.is_news());
         let rows: Vec<&JudgedRow> = shown.collect();
@@ -297,8 +297,8 @@ impl CompareTable<'_> {
         if undecided == 0 {
             return None;
         }
-        let cells = text::counted(undecided, "inconclusive cell");
         let more = self.changes.more_pairs();
+        let inconclusive = text::count(undecided);
         let mut rows = self.changes.rows.iter();
         let lacks_others = rows.any(|row| row.reason.iter().any(|why| why.contains(FEW_OTHERS)));
         let judged = self.changes.rows.iter().filter_map(|row| row.judgement);
@@ -334,7 +334,7 @@ impl CompareTable<'_> {
                 )
             }
         };
-        Some(format!("{cells}: {told}"))
+        Some(format!("{inconclusive} inconclusive: {told}"))
     }
 }
 
@@ -353,7 +353,7 @@ pub fn change_of(ratio: f64, interval: Option<(f64, f64)>) -> String {
 }
 
 /// Line on the change that all cells share.
-fn shift_line(shift: CommonShift) -> String {
+fn shift_line(shift: &CommonShift) -> String {
     let percent = |ratio: f64| format!("{:.1}", ratio * 100.0);
     let interval = text::some(shift.lower.zip(shift.upper), |(lower, upper)| {
         format!(" [{}, {}]", percent(lower), percent(upper))

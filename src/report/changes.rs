@@ -28,7 +28,7 @@ pub enum Basis {
     ///
     /// Per process, ln(time) of a structure minus the median of the other structures that
     /// both reports have in the group, each about its mean in the old report; old and new
-    /// by [`judge_unpaired`]. What moved everything at once is [`Changes::common_shift`].
+    /// by [`judge_unpaired`]. What moved everything at once is [`Changes::common_shifts`].
     Reports,
     /// Pairs of processes in turns: times as they are, by [`judge`].
     Pairs,
@@ -63,17 +63,13 @@ pub fn changes(
         }
     }
     for &metric in metrics {
+        let own = of_metric(&comparable, metric);
         found.rows.extend(match WORK.contains(&metric) {
-            true => by_work(&comparable, metric, threshold),
-            false => by_metric(basis, &comparable, metric, threshold),
+            true => by_work(&own, metric, threshold),
+            false => by_metric(basis, &own, metric, threshold),
         });
-    }
-    if basis == Basis::Reports {
-        // Structures that move are ranked by their frames.
-        let frames = metrics.iter().find(|metric| **metric == "frame_ns");
-        let metric = frames.or(metrics.first());
-        let metric = metric.filter(|metric| !WORK.contains(metric));
-        found.common_shift = metric.and_then(|metric| common_shift(&comparable, metric));
+        let shift = common_shift(&own, metric).filter(|_| basis == Basis::Reports);
+        found.common_shifts.extend(shift);
     }
     found.rows.sort_by(JudgedRow::order);
     found
@@ -181,12 +177,28 @@ fn logs((old, new): Pair, metric: &str) -> Option<Logs> {
 /// A cell on its way to a verdict: its row and its times.
 type Candidate<'r> = (&'r mut JudgedRow, Logs);
 
+/// The pairs that have a figure of their own.
+///
+/// Only what moves has frames, and paths of a scene share its build.
+fn of_metric<'r>(pairs: &[Pair<'r>], metric: &str) -> Vec<Pair<'r>> {
+    let all = pairs.iter().copied();
+    let times = |cell: &'r ReportCell| cell.times.by_process.get(metric);
+    match metric {
+        "frame_ns" | "update_ns" => all.filter(|(_, new)| !new.path.motion.is_empty()).collect(),
+        "build_ms" => {
+            let of =
+                |(old, new): Pair<'r>| (&new.scene.name, &new.structure, times(old), times(new));
+            let builds = grouped(all.map(|pair| (of(pair), pair)));
+            builds.iter().map(|(_, same)| same[0]).collect()
+        }
+        _ => all.collect(),
+    }
+}
+
 /// The rows of one metric, in the order of the pairs.
 fn by_metric(basis: Basis, pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<JudgedRow> {
     let (mut rows, mut timed) = (Vec::new(), Vec::new());
-    let is_of_frames = ["frame_ns", "update_ns"].contains(&metric);
-    let moves = |pair: &&Pair| !pair.1.path.motion.is_empty();
-    for &pair in pairs.iter().filter(|pair| !is_of_frames || moves(pair)) {
+    for &pair in pairs {
         let sound = |value: Option<f64>| value.is_some_and(is_sound);
         let mut row = valued(pair, metric);
         let mut own = logs(pair, metric).filter(|_| sound(row.old) && sound(row.new));
@@ -227,7 +239,8 @@ fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
     for ((row, _), relative) in timed.into_iter().zip(relative) {
         let judgement = relative.as_ref().and_then(|_| judged.next().flatten());
         row.reason = why_inconclusive(relative.is_some(), row.processes);
-        conclude(row, judgement);
+        let ratio = relative.and_then(|[old, new]| Some((median(&new)? - median(&old)?).exp()));
+        conclude(row, judgement, ratio);
     }
 }
 
@@ -244,20 +257,18 @@ fn judge_pairs(timed: Vec<Candidate>, threshold: f64) {
         row.new = new.or(row.new);
         row.reason = why_inconclusive(true, row.processes);
         row.pairs_ln_ns = Some(logs);
-        conclude(row, judgement);
+        let ratio = row.new.zip(row.old).map(|(new, old)| new / old);
+        conclude(row, judgement, ratio);
     }
 }
 
-/// Enters a judgement, or else the quotient of the values, which decides nothing.
-fn conclude(row: &mut JudgedRow, judgement: Option<Judgement>) {
-    let by_values = || {
-        let ratio = Some(row.new? / row.old?).filter(|ratio| is_sound(*ratio))?;
-        let pairs = row.processes[0].min(row.processes[1]);
-        Some(Judgement::without_interval(ratio, pairs))
-    };
-    row.judgement = judgement.or_else(by_values);
+/// Enters a judgement, or else a ratio, which decides nothing.
+fn conclude(row: &mut JudgedRow, judgement: Option<Judgement>, ratio: Option<f64>) {
+    let pairs = row.processes[0].min(row.processes[1]);
+    let plain = || Some(Judgement::without_interval(ratio?, pairs));
+    row.judgement = judgement.or_else(plain);
     let change = row.judgement.map(|found| found.change.into());
-    row.outcome = change.unwrap_or(Outcome::Unmeasured);
+    row.outcome = change.unwrap_or(Outcome::Inconclusive);
 }
 
 /// The rows of one counter, which is exact, where a side has it.

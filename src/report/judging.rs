@@ -229,8 +229,8 @@ pub struct Changes {
     pub only_in_old: Vec<Lone>,
     /// Cells that only the new report has.
     pub only_in_new: Vec<Lone>,
-    /// Shift between two reports; `None` for programs that ran in turns.
-    pub common_shift: Option<CommonShift>,
+    /// Shift of each metric between two reports; none of programs that ran in turns.
+    pub common_shifts: Vec<CommonShift>,
 }
 
 impl Changes {
@@ -240,12 +240,12 @@ impl Changes {
         rows.filter(|row| row.outcome == outcome).count()
     }
 
-    /// The common shift, if its interval lies beyond the threshold.
+    /// The first common shift whose interval lies beyond the threshold.
     pub fn proven_shift(&self) -> Option<CommonShift> {
         let most = 1.0 + self.threshold;
         let is_faster = |upper: f64| upper * most < 1.0;
         let is_beyond = |s: &CommonShift| s.lower > Some(most) || s.upper.is_some_and(is_faster);
-        self.common_shift.filter(is_beyond)
+        self.common_shifts.iter().copied().find(is_beyond)
     }
 
     /// Returns true if NEW holds a wrong answer, with or without a partner in OLD.

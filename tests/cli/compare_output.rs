@@ -17,7 +17,7 @@ fn json_says_the_same_with_types() {
     });
     let done = json(&compare(folder.path(), "--format json", 3));
     let fields = "old new verdict gate counts head notes settings advice threshold cells_in_common rows \
-        work_changed only_in_old only_in_new common_shift";
+        work_changed only_in_old only_in_new common_shifts";
     assert_eq!(keys(&done), set(fields));
     assert_eq!(done["verdict"], "regression");
     let head = "id started_at finished_at command version commit dirty cells";
@@ -67,7 +67,7 @@ fn json_says_the_same_with_types() {
         (&json!("bsp"), &json!("ok"))
     );
     assert_eq!(done["only_in_new"], json!([]));
-    let shift = &done["common_shift"];
+    let shift = &done["common_shifts"][0];
     assert_eq!(keys(shift), set("metric ratio lower upper cells"));
     assert_eq!(shift["cells"], json!(9));
     let same = json(&works(
@@ -87,10 +87,14 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
     for cell in cells(&mut other) {
         cell["scene"]["name"] = json!("another");
     }
+    let mut twice = measured().clone();
+    let again = cells(&mut twice)[1].clone();
+    cells(&mut twice).push(again);
     let half = &measured().to_string()[..3000];
     for (file, text) in [
         ("half.json", half),
         ("other.json", &other.to_string()),
+        ("twice.json", &twice.to_string()),
         ("noise.json", "\u{1}{"),
     ] {
         fs::write(folder.path().join(file), text).expect("writable");
@@ -99,6 +103,10 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
         ("missing.json", "missing.json: No such file"),
         ("half.json", "half.json | expected the report of a run"),
         ("noise.json", "noise.json | expected the report of a run"),
+        (
+            "twice.json",
+            "twice.json, uniform:n=300: linear on orbit:frames=8 a second time; expected each cell once",
+        ),
         (
             "other.json",
             "no cell in common | OLD has | NEW has | another | expected runs of the same scenes",
@@ -126,6 +134,11 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
             "--metric build_ms --metric build_ms",
             "'build_ms' is named twice",
         ),
+        (
+            "--metric query_ns,frame_ns",
+            "--metric frame_ns: nothing moves in NEW; expected a run with --motion",
+        ),
+        ("--metric update_ns", "--metric update_ns: nothing moves"),
         ("--metric ,", "unknown metric '' | known: query_ns"),
         ("--threshold nan", "--threshold is 'nan' | expected | 5%"),
         ("--threshold -5%", "--threshold is '-5%'"),

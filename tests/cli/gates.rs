@@ -42,8 +42,8 @@ fn work_beyond_the_threshold_is_a_regression() {
     let done = json(&compare(more.path(), "--gate work --format json", 3));
     assert_eq!(done["verdict"], "regression");
     assert_eq!(
-        (&done["gate"], &done["common_shift"]),
-        (&json!("work"), &json!(null))
+        (&done["gate"], &done["common_shifts"]),
+        (&json!("work"), &json!([]))
     );
     let worst = &done["rows"][0];
     assert_eq!(worst["verdict"], "more_work");
@@ -100,7 +100,7 @@ fn inconclusive_fails_where_it_shall() {
     let few = with_change(|new| cells(new).retain(|cell| cell["structure"] == "bvh"));
     compare(few.path(), "", 0);
     let text = compare(few.path(), "--fail-inconclusive", 3);
-    assert!(text.contains("2 inconclusive cells: "), "{text}");
+    assert!(text.contains("2 inconclusive: "), "{text}");
     let done = json(&compare(few.path(), "--fail-inconclusive --format json", 3));
     assert_eq!(done["verdict"], "inconclusive");
     let text = compare(few.path(), "--fail-inconclusive --markdown", 3);
@@ -141,6 +141,13 @@ fn a_shift_of_most_structures_is_no_bare_verdict() {
         let text = compare(most.path(), &format!("{options} --markdown"), code);
         let wanted = format!("<summary>cullbench: {words}");
         assert!(text.contains(&wanted) && text.contains(counts), "{text}");
+    }
+    // Each metric has a shift of its own.
+    for metrics in ["locate_ns,query_ns", "query_ns,build_ms"] {
+        let options = format!("--fail-inconclusive --metric {metrics}");
+        let text = unwrapped(&compare(most.path(), &options, 3));
+        assert!(text.contains("as a whole; query_ns changed by +"), "{text}");
+        assert_eq!(text.matches("or the program as a whole: ").count(), 2);
     }
     let one = with_change(|new| scale(bvh(new), "query_ns", 0.5));
     let text = compare(one.path(), "--fail-inconclusive", 0);
@@ -254,7 +261,7 @@ fn two_programs_are_compared_by_their_counters_alone() {
     let text = works(folder.path(), &format!("{line} {}", super::PROGRAM));
     let verdict = "0 more work, 0 less work, 8 same of 8 figures of 2 cells";
     assert_eq!(last_line(&text), verdict, "{text}");
-    assert!(unwrapped(&text).contains("bounds per region search, threshold 0.00 %"));
+    assert!(unwrapped(&text).contains("bounds per region search, threshold 0 %"));
     assert!(!text.contains("not compared"), "{text}");
     let line = line.replace(" --structure linear,bvh", "");
     let text = works(folder.path(), &format!("{line} {}", super::PROGRAM));
