@@ -252,8 +252,8 @@ fn unexplained(page: &str) -> BTreeSet<&str> {
 #[test]
 fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
     let folder = folder(&[]);
-    let run = "run --scene city:n=300 --path orbit:frames=4 --structure linear,bvh --no-bounds \
-        --processes 3 --out run";
+    let run = "run --scene city:n=300 --path orbit:frames=4 --structure linear,bvh,octree,bsp \
+        --no-bounds --processes 3 --out run";
     works(folder.path(), run);
     // Rows of several scenes name theirs.
     let two = format!("{run}2 --scene city:n=400");
@@ -267,7 +267,7 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
         );
     }
     assert!(
-        page.contains("Change from OLD to NEW, 4 of 4 figures; "),
+        page.contains("Change from OLD to NEW, 8 of 8 figures; "),
         "{page}"
     );
     let meaning =
