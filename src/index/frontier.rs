@@ -9,7 +9,7 @@ use std::thread::LocalKey;
 
 use crate::geometry::{LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, pairs};
-use crate::query::{ItemId, Recorder, Sink};
+use crate::query::{Context, ItemId, Recorder, Sink};
 
 /// Distance of prefetches, in blocks.
 ///
@@ -188,16 +188,11 @@ impl Merger {
 
 /// Passes a run of items that are wholly inside to the sink, unless it is empty.
 #[inline(always)]
-pub fn pass_run<I: Isa, S: Sink, R: Recorder>(
-    isa: I,
-    places: Range<usize>,
-    ids: &[ItemId],
-    sink: &mut S,
-    recorder: &mut R,
-) -> ControlFlow<()> {
+pub fn pass_run<C: Context>(places: Range<usize>, ids: &[ItemId], cx: &mut C) -> ControlFlow<()> {
     if places.is_empty() {
         return ControlFlow::Continue(());
     }
-    recorder.subtree_accepted(places.len());
-    sink.accept_range(isa, ids, places)
+    let isa = cx.isa();
+    cx.recorder().subtree_accepted(places.len());
+    cx.sink().accept_range(isa, ids, places)
 }

@@ -241,10 +241,7 @@ impl RegionIndex for Linear {
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if Q::IS_POINT {
             let blocks = self.boxes.range(0, self.ids.len());
-            let isa = cx.isa();
-            let (sink, recorder) = cx.parts();
-            let asked = (volume, volume.mask());
-            return scan_blocks(isa, blocks, &self.ids, asked, sink, recorder);
+            return scan_blocks(blocks, &self.ids, (volume, volume.mask()), cx);
         }
         let blocks = self.boxes.blocks().len();
         // Counted queries are not shared: one recorder, one thread. Nor is a single part.
@@ -353,14 +350,14 @@ impl<const VACANT: bool, I: Isa, P: Planes<I>, R: Recorder> Tests<I>
 /// Each block comes with the position of its lane 0 and a mask of the lanes in use.
 /// The leaf test of the packed trees and the region search of `linear`.
 #[inline(always)]
-pub fn scan_blocks<'b, I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
-    isa: I,
+pub fn scan_blocks<'b, Q: QueryVolume, C: Context>(
     blocks: impl Iterator<Item = (usize, LaneMask, &'b BoxBlock)>,
     ids: &[ItemId],
     (volume, mask): (&Q, PlaneMask),
-    sink: &mut S,
-    recorder: &mut R,
+    cx: &mut C,
 ) -> ControlFlow<()> {
+    let isa = cx.isa();
+    let (sink, recorder) = cx.parts();
     for (start, lanes, block) in blocks {
         let tested = lanes.count_ones();
         recorder.items_tested(tested);

@@ -75,25 +75,24 @@ impl Node {
     /// outside, all of one that lies inside; else it tests the node's own items one by
     /// one, and then its children in the same way. O(log n + answers) where the
     /// volume and the items are small.
-    fn walk<Q: QueryVolume, S: Sink, R: Recorder>(
+    fn walk<Q: QueryVolume, C: Context>(
         &self,
         volume: &Q,
         mask: PlaneMask,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
-        recorder.nodes_tested(1);
-        let (verdict, mask) = volume.classify(&self.bounds, mask, recorder);
+        cx.recorder().nodes_tested(1);
+        let (verdict, mask) = volume.classify(&self.bounds, mask, cx.recorder());
         match verdict {
-            Containment::Outside => recorder.subtrees_rejected(1),
+            Containment::Outside => cx.recorder().subtrees_rejected(1),
             Containment::Inside => {
-                let count = self.report(sink)?;
-                recorder.subtree_accepted(count);
+                let count = self.report(cx.sink())?;
+                cx.recorder().subtree_accepted(count);
             }
             Containment::Straddles => {
-                self.test_items(volume, mask, sink, recorder)?;
+                self.test_items(volume, mask, cx)?;
                 for child in &self.children {
-                    child.walk(volume, mask, sink, recorder)?;
+                    child.walk(volume, mask, cx)?;
                 }
             }
         }
@@ -102,18 +101,13 @@ impl Node {
 
     /// Region search by dividing planes. An item in front of a plane has no point
     /// behind it, by the same arithmetic that decides the point's side: it is monotone.
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        recorder.nodes_tested(1);
-        self.test_items(&p, p.mask(), sink, recorder)?;
+    fn locate<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
+        cx.recorder().nodes_tested(1);
+        self.test_items(&p, p.mask(), cx)?;
         for child in &self.children {
             // A point on the plane is on both sides; a NaN (coordinates beyond f32) on none.
             if child.half_space.is_none_or(|side| side.value_at(p) >= 0.0) {
-                child.locate(p, sink, recorder)?;
+                child.locate(p, cx)?;
             }
         }
         ControlFlow::Continue(())
@@ -132,17 +126,16 @@ impl Node {
     }
 
     /// Tests the node's own items one by one.
-    fn test_items<Q: QueryVolume, S: Sink, R: Recorder>(
+    fn test_items<Q: QueryVolume, C: Context>(
         &self,
         volume: &Q,
         mask: PlaneMask,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
         for (bounds, id) in pairs(&self.boxes, &self.ids) {
-            recorder.items_tested(1);
-            if volume.admits(bounds, mask, recorder) {
-                sink.accept(std::slice::from_ref(id))?;
+            cx.recorder().items_tested(1);
+            if volume.admits(bounds, mask, cx.recorder()) {
+                cx.accept(std::slice::from_ref(id))?;
             }
         }
         ControlFlow::Continue(())
@@ -217,10 +210,9 @@ impl<D: Division> RegionIndex for Textbook<D> {
     }
 
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        let (sink, recorder) = cx.parts();
         match (&self.root, volume.as_point()) {
-            (Some(root), Some(p)) if D::BY_HALF_SPACES => root.locate(p, sink, recorder),
-            (Some(root), _) => root.walk(volume, volume.mask(), sink, recorder),
+            (Some(root), Some(p)) if D::BY_HALF_SPACES => root.locate(p, cx),
+            (Some(root), _) => root.walk(volume, volume.mask(), cx),
             (None, _) => ControlFlow::Continue(()),
         }
     }

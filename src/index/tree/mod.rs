@@ -88,11 +88,7 @@ impl<B: TreeBuilder> RegionIndex for Tree<B> {
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         match volume.as_point() {
-            Some(p) if B::BY_PLANES => {
-                let isa = cx.isa();
-                let (sink, recorder) = cx.parts();
-                splits::locate(isa, (&self.tree, &self.splits), p, sink, recorder)
-            }
+            Some(p) if B::BY_PLANES => splits::locate(&self.tree, &self.splits, p, cx),
             _ => self.tree.query(volume, cx),
         }
     }

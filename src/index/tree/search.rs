@@ -16,7 +16,7 @@ use crate::index::frontier::{
 };
 use crate::index::linear::scan_blocks;
 use crate::kernel::{Isa, pairs, prefetch};
-use crate::query::{Containment, Context, Predicate, QueryVolume, Recorder, Sink};
+use crate::query::{Containment, Context, Predicate, QueryVolume, Recorder};
 
 /// Memory of a traversal by level, kept between queries.
 #[derive(Default)]
@@ -39,51 +39,36 @@ impl PackedTree {
     /// tested items of leaves.
     #[inline(always)]
     pub fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        let isa = cx.isa();
-        let (sink, recorder) = cx.parts();
         if !Q::IS_POINT {
-            return self.search(isa, volume, sink, recorder);
+            return self.search(volume, cx);
         }
         match volume.as_point() {
-            Some(p) => self.locate(isa, p, sink, recorder),
+            Some(p) => self.locate(p, cx),
             None => ControlFlow::Continue(()),
         }
     }
 
     /// Searches level by level for the items of a volume.
-    ///
-    /// Sink and recorder are separate parameters here and in all functions that loop
-    /// over nodes or blocks, because the compiler can assume that references passed
-    /// as parameters do not alias.
     #[inline(always)]
-    fn search<I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        volume: &Q,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
+    fn search<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         let (nodes, ids) = (self.nodes(), self.ids());
         let Some(root) = nodes.first() else {
             return ControlFlow::Continue(());
         };
-        recorder.nodes_tested(1);
-        let (containment, mask) = volume.classify(&root.bounds, volume.mask(), recorder);
+        cx.recorder().nodes_tested(1);
+        let (containment, mask) = volume.classify(&root.bounds, volume.mask(), cx.recorder());
         match containment {
             Containment::Outside => {
-                recorder.subtrees_rejected(1);
+                cx.recorder().subtrees_rejected(1);
                 return ControlFlow::Continue(());
             }
-            Containment::Inside => {
-                recorder.subtree_accepted(ids.len());
-                return sink.accept_range(isa, ids, 0..ids.len());
-            }
+            Containment::Inside => return pass_run(0..ids.len(), ids, cx),
             Containment::Straddles => {}
         }
         let mut scratch = take(&SCRATCH);
-        let mut flow = self.search_wide_nodes(isa, (volume, mask), &mut scratch, sink, recorder);
+        let mut flow = self.search_wide_nodes((volume, mask), &mut scratch, cx);
         if flow.is_continue() {
-            flow = self.test_leaves(isa, volume, &scratch.leaves, sink, recorder);
+            flow = self.test_leaves(volume, &scratch.leaves, cx);
         }
         put_back(&SCRATCH, scratch);
         flow
@@ -92,14 +77,13 @@ impl PackedTree {
     /// Passes accepted subtrees to the sink and collects the leaves that straddle
     /// a plane. The root straddles the planes of `mask`.
     #[inline(always)]
-    fn search_wide_nodes<I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
+    fn search_wide_nodes<Q: QueryVolume, C: Context>(
         &self,
-        isa: I,
         (volume, mask): (&Q, PlaneMask),
         scratch: &mut Scratch,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
+        let isa = cx.isa();
         let (wide, ids) = (&self.wide_nodes, self.ids());
         let far = is_far(ids.len());
         let Scratch {
@@ -129,11 +113,12 @@ impl PackedTree {
                 }
                 let links = &wide.links[at as usize];
                 let lanes = links.lanes.count_ones();
-                recorder.nodes_tested(lanes);
-                recorder.planes_tested(lanes * Q::planes_open(mask));
+                cx.recorder().nodes_tested(lanes);
+                cx.recorder().planes_tested(lanes * Q::planes_open(mask));
                 let (kept, open) = volume.sorted_lanes(isa, &wide.blocks[at as usize], mask);
                 let kept = kept & links.lanes;
-                recorder.subtrees_rejected((links.lanes & !kept).count_ones());
+                cx.recorder()
+                    .subtrees_rejected((links.lanes & !kept).count_ones());
                 let inside = isa.zeros(open) & kept;
                 let undecided = kept & !inside;
                 let words = isa.words(&links.below);
@@ -145,11 +130,11 @@ impl PackedTree {
                     left &= left - 1;
                     let items = links.first[lane] as usize..links.end[lane] as usize;
                     if let Some(ended) = run.join(items) {
-                        pass_run(isa, ended, ids, sink, recorder)?;
+                        pass_run(ended, ids, cx)?;
                     }
                 }
             }
-            pass_run(isa, run.take(), ids, sink, recorder)?;
+            pass_run(run.take(), ids, cx)?;
             std::mem::swap(&mut here, &mut below);
         }
         ControlFlow::Continue(())
@@ -157,13 +142,11 @@ impl PackedTree {
 
     /// Tests the items of leaves against the planes that are open for each leaf.
     #[inline(always)]
-    fn test_leaves<I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
+    fn test_leaves<Q: QueryVolume, C: Context>(
         &self,
-        isa: I,
         volume: &Q,
         leaves: &Frontier,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
         let nodes = self.nodes();
         let far = is_far(self.ids().len());
@@ -180,7 +163,7 @@ impl PackedTree {
                 prefetch_leaf(nodes, entries, i + AHEAD);
             }
             let items = nodes[leaf as usize].items();
-            self.test_items(isa, items, (volume, mask), sink, recorder)?;
+            self.test_items(items, (volume, mask), cx)?;
         }
         ControlFlow::Continue(())
     }
@@ -206,25 +189,19 @@ impl PackedTree {
     ///
     /// One pass over the nodes in memory order, which jumps over rejected subtrees.
     #[inline(always)]
-    fn locate<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
+    fn locate<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
         let nodes = self.nodes();
         let mut at = 0;
         while let Some(node) = nodes.get(at) {
-            recorder.nodes_tested(1);
+            cx.recorder().nodes_tested(1);
             if !node.bounds.contains_point(p) {
-                recorder.subtrees_rejected(1);
+                cx.recorder().subtrees_rejected(1);
                 at = node.after();
                 continue;
             }
             at += 1;
             if node.after() == at {
-                self.test_items(isa, node.items(), (&p, p.mask()), sink, recorder)?;
+                self.test_items(node.items(), (&p, p.mask()), cx)?;
             }
         }
         ControlFlow::Continue(())
@@ -232,16 +209,14 @@ impl PackedTree {
 
     /// Tests items block by block and passes those that are kept to the sink.
     #[inline(always)]
-    pub fn test_items<I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
+    pub fn test_items<Q: QueryVolume, C: Context>(
         &self,
-        isa: I,
         items: Range<usize>,
-        (volume, mask): (&Q, PlaneMask),
-        sink: &mut S,
-        recorder: &mut R,
+        asked: (&Q, PlaneMask),
+        cx: &mut C,
     ) -> ControlFlow<()> {
         let blocks = self.boxes().range(items.start, items.end);
-        scan_blocks(isa, blocks, self.ids(), (volume, mask), sink, recorder)
+        scan_blocks(blocks, self.ids(), asked, cx)
     }
 }
 

@@ -9,8 +9,7 @@ use glam::Vec3;
 use super::node::Stack;
 use super::packed::PackedTree;
 use crate::geometry::Plane;
-use crate::kernel::Isa;
-use crate::query::{Predicate, Recorder, Sink};
+use crate::query::{Context, Predicate, Recorder};
 
 /// The direction of a node's plane and how far its two sides reach along it.
 #[derive(Clone, Copy, Debug)]
@@ -59,12 +58,11 @@ impl Split {
 
 /// Passes every item whose closed box holds `p` to the sink, in tree order.
 #[inline(always)]
-pub fn locate<I: Isa, S: Sink, R: Recorder>(
-    isa: I,
-    (tree, splits): (&PackedTree, &[Split]),
+pub fn locate<C: Context>(
+    tree: &PackedTree,
+    splits: &[Split],
     p: Vec3,
-    sink: &mut S,
-    recorder: &mut R,
+    cx: &mut C,
 ) -> ControlFlow<()> {
     let nodes = tree.nodes();
     let mut open = Stack::new(0);
@@ -72,9 +70,9 @@ pub fn locate<I: Isa, S: Sink, R: Recorder>(
         let mut at = at as usize;
         // An empty tree has no node 0.
         while let Some(node) = nodes.get(at) {
-            recorder.nodes_tested(1);
+            cx.recorder().nodes_tested(1);
             if tree.is_leaf(at) {
-                tree.test_items(isa, node.items(), (&p, p.mask()), sink, recorder)?;
+                tree.test_items(node.items(), (&p, p.mask()), cx)?;
                 break;
             }
             let split = &splits[at];

@@ -9,22 +9,20 @@ use crate::geometry::{BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::index::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, pass_run};
 use crate::index::items::PaddedIds;
 use crate::kernel::{Isa, pairs, prefetch};
-use crate::query::{ItemId, Planes, QueryVolume, Recorder, Sink, Tests};
+use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests};
 
 /// A query in progress.
-pub struct LevelTraversal<'a, I, V, S, R> {
+pub struct LevelTraversal<'a, V, C> {
     pub ids: &'a PaddedIds,
     /// The lanes of each leaf that hold an item.
     pub occupied: &'a [LaneMask],
     /// True if lanes before the last item hold none.
     pub has_vacant: bool,
-    pub isa: I,
     pub volume: &'a V,
-    pub sink: &'a mut S,
-    pub recorder: &'a mut R,
+    pub cx: &'a mut C,
 }
 
-impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R> {
+impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
     /// Sorts all blocks of a frontier: straddling children go to the frontier
     /// `below`, runs of items wholly inside to the sink.
     #[inline(always)]
@@ -63,6 +61,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
         below: &mut Frontier,
         whole: &mut NodeList,
     ) -> ControlFlow<()> {
+        let isa = self.cx.isa();
         let (blocks, masks) = here.entries();
         for i in first_ahead(layer.far) {
             layer.prefetch(blocks, i);
@@ -70,7 +69,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
         for (i, (&block, &mask)) in pairs(blocks, masks).enumerate() {
             layer.prefetch(blocks, i + AHEAD);
             let inside = self.sort_lanes(layer, (block, mask), below);
-            whole.push(self.isa, self.isa.iota(block * LANES as u32), inside);
+            whole.push(isa, isa.iota(block * LANES as u32), inside);
         }
         if whole.entries().is_empty() {
             return ControlFlow::Continue(());
@@ -88,9 +87,10 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
         here: &Frontier,
         buckets: &mut SinglePlaneBuckets,
     ) -> ControlFlow<()> {
+        let isa = self.cx.isa();
         let mut rest = here;
         if here.len() >= WORTH_BUCKETS {
-            buckets.distribute(self.isa, here);
+            buckets.distribute(isa, here);
             for plane in 0..BUCKETS {
                 let listed = buckets.bucket(plane);
                 if listed.is_empty() {
@@ -99,7 +99,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
                 let plane = plane as u32;
                 let test = SinglePlane {
                     volume: self.volume,
-                    plane: self.volume.one_plane(self.isa, plane),
+                    plane: self.volume.one_plane(isa, plane),
                     mask: 1 << plane,
                 };
                 self.test_listed(leaves, listed, test)?;
@@ -113,24 +113,26 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
 
     /// Tests listed leaves in order and passes their items to the sink.
     #[inline(always)]
-    fn test_listed<T: LeafTest<I>>(
+    fn test_listed<T: LeafTest<C::Isa>>(
         &mut self,
         leaves: &Layer,
         listed: &[u32],
         test: T,
     ) -> ControlFlow<()> {
+        let isa = self.cx.isa();
+        let (sink, recorder) = self.cx.parts();
         let tests = ListedLeaves {
             leaves,
             listed,
             test,
             ids: self.ids.rows(),
             occupied: self.occupied,
-            recorder: &mut *self.recorder,
+            recorder,
         };
         for i in first_ahead(leaves.far) {
             tests.prefetch(i);
         }
-        self.sink.accept_tested(self.isa, self.ids.rows(), tests)
+        sink.accept_tested(isa, self.ids.rows(), tests)
     }
 
     /// Sorts the lanes of a block: straddling ones go to the frontier `below`; returns
@@ -144,17 +146,16 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
     ) -> LaneMask {
         let at = block as usize;
         let lanes = layer.level.lanes(at);
-        self.recorder.nodes_tested(lanes.count_ones());
-        self.recorder
-            .planes_tested(lanes.count_ones() * V::planes_open(mask));
-        let (kept, open) = self.volume.sorted_lanes(self.isa, &layer.blocks[at], mask);
+        let (isa, recorder) = (self.cx.isa(), self.cx.recorder());
+        recorder.nodes_tested(lanes.count_ones());
+        recorder.planes_tested(lanes.count_ones() * V::planes_open(mask));
+        let (kept, open) = self.volume.sorted_lanes(isa, &layer.blocks[at], mask);
         let kept = kept & lanes;
-        self.recorder
-            .subtrees_rejected((lanes & !kept).count_ones());
-        let inside = self.isa.zeros(open) & kept;
+        recorder.subtrees_rejected((lanes & !kept).count_ones());
+        let inside = isa.zeros(open) & kept;
         let undecided = kept & !inside;
         let first = at * LANES;
-        below.push(self.isa, self.isa.iota(first as u32), open, undecided);
+        below.push(isa, isa.iota(first as u32), open, undecided);
         inside
     }
 
@@ -163,17 +164,18 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R
     pub fn pass_run(&mut self, items: Range<usize>) -> ControlFlow<()> {
         if self.has_vacant {
             let ids = self.ids.rows().as_flattened();
+            let isa = self.cx.isa();
+            let (sink, recorder) = self.cx.parts();
             for leaf in items.start / LANES..items.end.div_ceil(LANES) {
                 let lanes = self.occupied[leaf];
-                self.recorder.subtree_accepted(lanes.count_ones() as usize);
+                recorder.subtree_accepted(lanes.count_ones() as usize);
                 if lanes != 0 {
-                    let first = leaf * LANES;
-                    self.sink.accept_lanes(self.isa, ids, first, lanes)?;
+                    sink.accept_lanes(isa, ids, leaf * LANES, lanes)?;
                 }
             }
             return ControlFlow::Continue(());
         }
-        pass_run(self.isa, items, self.ids, self.sink, self.recorder)
+        pass_run(items, self.ids, self.cx)
     }
 }
 

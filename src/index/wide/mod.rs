@@ -25,7 +25,7 @@ use super::items::{ABSENT, PaddedIds, Positions, indexable};
 use super::linear::{ScannedBlocks, scan_blocks, seen_by};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES, LaneMask};
-use crate::kernel::{Isa, pairs, prefetch};
+use crate::kernel::{pairs, prefetch};
 use crate::query::{Bits, Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
 
@@ -222,8 +222,6 @@ impl Wide {
         let Some(top) = self.levels.len().checked_sub(1) else {
             return ControlFlow::Continue(());
         };
-        let isa = cx.isa();
-        let (sink, recorder) = cx.parts();
         let leaves = Layer {
             balls: seen_by(self.balls.as_ref(), volume),
             ..self.layer(0)
@@ -239,15 +237,13 @@ impl Wide {
             ids: &self.ids,
             occupied: &self.occupied,
             has_vacant: self.vacant > 0,
-            isa,
             volume,
-            sink,
-            recorder,
+            cx,
         };
         if volume.mask() == 0 {
             return traversal.pass_run(0..self.ids.len());
         }
-        here.start(isa, volume.mask());
+        here.start(traversal.cx.isa(), volume.mask());
         for level in (1..=top).rev() {
             below.clear(here.len());
             let layer = self.layer(level);
@@ -276,10 +272,7 @@ impl Wide {
         }
         let blocks = pairs(leaves.blocks, &self.occupied).enumerate();
         let blocks = blocks.map(|(at, (block, lanes))| (at * LANES, *lanes, block));
-        let isa = cx.isa();
-        let (sink, recorder) = cx.parts();
-        let asked = (volume, volume.mask());
-        scan_blocks(isa, blocks, &self.ids, asked, sink, recorder)
+        scan_blocks(blocks, &self.ids, (volume, volume.mask()), cx)
     }
 
     /// The whole query where the bounds of all items decide it.
@@ -293,14 +286,11 @@ impl Wide {
         cx: &mut C,
     ) -> Option<ControlFlow<()>> {
         let is_counted = size_of::<C::Recorder>() > 0;
-        let isa = cx.isa();
-        let (sink, recorder) = cx.parts();
-        let all = 0..self.ids.len();
         match self.root_verdict(volume) {
             _ if is_counted => None,
             Containment::Outside => Some(ControlFlow::Continue(())),
             Containment::Inside if self.vacant == 0 => {
-                Some(pass_run(isa, all, &self.ids, sink, recorder))
+                Some(pass_run(0..self.ids.len(), &self.ids, cx))
             }
             _ => None,
         }
@@ -321,19 +311,15 @@ impl Wide {
 
     /// Region search: descends from the root, one block at a time.
     #[inline(always)]
-    fn descend<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
+    fn descend<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
+        let isa = cx.isa();
+        let (sink, recorder) = cx.parts();
         // Depth first: at most one lane of each level is left open on a tiling.
         let Some(top) = self.levels.len().checked_sub(1) else {
             return ControlFlow::Continue(());
         };
         let mut open = [(0, 0); MOST_LEVELS];
-        let holding = |level: usize, block: usize, recorder: &mut R| {
+        let mut holding = |level: usize, block: usize| {
             let lanes = if level == 0 {
                 recorder.items_tested(self.occupied[block].count_ones());
                 self.occupied[block]
@@ -345,7 +331,7 @@ impl Wide {
             self.blocks[self.levels[level].first + block].holding(p) & lanes
         };
         let mut level = top;
-        open[level] = (0, holding(level, 0, recorder));
+        open[level] = (0, holding(level, 0));
         loop {
             let (block, left) = open[level];
             if level == 0 {
@@ -361,7 +347,7 @@ impl Wide {
             open[level].1 &= left - 1;
             level -= 1;
             let child = block * LANES + left.trailing_zeros() as usize;
-            open[level] = (child, holding(level, child, recorder));
+            open[level] = (child, holding(level, child));
         }
     }
 
@@ -430,10 +416,8 @@ impl RegionIndex for Wide {
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if Q::IS_POINT {
-            let isa = cx.isa();
-            let (sink, recorder) = cx.parts();
             return match volume.as_point() {
-                Some(p) => self.descend(isa, p, sink, recorder),
+                Some(p) => self.descend(p, cx),
                 None => ControlFlow::Continue(()),
             };
         }
