@@ -2,7 +2,6 @@
 //! crates; prepared once per query. Structures that test plane by plane with masks use
 //! [`QueryVolume`] itself.
 
-use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use glam::Vec3;
@@ -12,7 +11,7 @@ use serde::de::DeserializeOwned;
 use super::items::Record;
 use super::{BuildError, Info, Input, MemoryUsage, RegionIndex, centre_bounds};
 use crate::geometry::{Aabb, PlaneRows};
-use crate::query::{Bits, Context, ItemId, NoRecorder, QueryVolume, Recorder, Sink};
+use crate::query::{Bits, Context, ItemId, NoRecorder, QueryVolume, Recorder};
 
 /// A query as a test of one box at a time. Boxes are finite and not empty.
 pub trait BoxTest {
@@ -119,37 +118,55 @@ impl BoxTest for Holding {
     }
 }
 
-/// A recorder that several closures of a foreign call share. Counts of a recorder
-/// without state are dropped, and nothing is borrowed.
-pub struct Tally<'a, R>(RefCell<&'a mut R>);
+/// A query in progress: its test, and the context for its answers and counts.
+pub struct BoxQuery<'a, T: ?Sized, C> {
+    pub test: &'a T,
+    pub cx: &'a mut C,
+}
 
-impl<'a, R: Recorder> Tally<'a, R> {
+impl<T: BoxTest + ?Sized, C: Context> BoxQuery<'_, T, C> {
+    /// Counts tests of nodes.
     #[inline(always)]
-    pub fn new(recorder: &'a mut R) -> Self {
-        Tally(RefCell::new(recorder))
-    }
-
-    #[inline(always)]
-    pub fn count(&self, note: impl FnOnce(&mut R)) {
-        if size_of::<R>() != 0 {
-            note(&mut self.0.borrow_mut());
+    pub fn count_nodes(&mut self, count: u32) {
+        // Not without counters: the planes of a `dyn` test take a call.
+        if size_of::<C::Recorder>() != 0 {
+            self.cx.recorder().nodes_tested(count);
+            let planes = count * self.test.planes();
+            self.cx.recorder().planes_tested(planes);
         }
     }
 
+    /// [`BoxTest::rejects`], counted.
     #[inline(always)]
-    pub fn node(&self, test: &(impl BoxTest + ?Sized)) {
-        self.count(|recorder| {
-            recorder.nodes_tested(1);
-            recorder.planes_tested(test.planes());
-        });
+    pub fn rejects(&mut self, node: &Aabb) -> bool {
+        self.count_nodes(1);
+        self.test.rejects(node)
     }
 
+    /// [`BoxTest::rejects_accepts`], counted.
     #[inline(always)]
-    pub fn item(&self, test: &(impl BoxTest + ?Sized)) {
-        self.count(|recorder| {
-            recorder.items_tested(1);
-            recorder.planes_tested(test.planes());
-        });
+    pub fn rejects_accepts(&mut self, node: &Aabb) -> (bool, bool) {
+        self.count_nodes(1);
+        self.test.rejects_accepts(node)
+    }
+
+    /// [`BoxTest::admits`], counted.
+    #[inline(always)]
+    pub fn admits(&mut self, item: &Aabb) -> bool {
+        if size_of::<C::Recorder>() != 0 {
+            self.cx.recorder().items_tested(1);
+            self.cx.recorder().planes_tested(self.test.planes());
+        }
+        self.test.admits(item)
+    }
+
+    /// Tests an item and passes it to the sink if it belongs to the answer.
+    #[inline(always)]
+    pub fn item(&mut self, item: &Aabb, id: &ItemId) -> ControlFlow<()> {
+        if self.admits(item) {
+            self.cx.accept(std::slice::from_ref(id))?;
+        }
+        ControlFlow::Continue(())
     }
 }
 
@@ -175,12 +192,7 @@ pub trait BoxTested: Sized + Send + Sync {
     fn used(&self) -> MemoryUsage;
 
     /// Passes every item that the test admits to the sink.
-    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
-    ) -> ControlFlow<()>;
+    fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()>;
 }
 
 impl<X: BoxTested> RegionIndex for X {
@@ -201,17 +213,18 @@ impl<X: BoxTested> RegionIndex for X {
 
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        let (sink, recorder) = cx.parts();
-        let tally = &Tally::new(recorder);
         if Q::IS_POINT {
-            return match volume.as_point() {
-                Some(p) => self.search(&Holding(p), sink, tally),
+            return match volume.as_point().map(Holding) {
+                Some(test) => self.search(&mut BoxQuery { test: &test, cx }),
                 None => ControlFlow::Continue(()),
             };
         }
-        match volume.rows() {
-            Some(rows) => self.search(&AtOnce(rows), sink, tally),
-            None => self.search::<dyn BoxTest, _, _>(&PlaneByPlane(volume), sink, tally),
+        match volume.rows().map(AtOnce) {
+            Some(test) => self.search(&mut BoxQuery { test: &test, cx }),
+            None => {
+                let test: &dyn BoxTest = &PlaneByPlane(volume);
+                self.search(&mut BoxQuery { test, cx })
+            }
         }
     }
 }

@@ -8,11 +8,11 @@ use std::ops::{ControlFlow, Range};
 
 use glam::{UVec3, Vec3};
 
-use super::box_test::{BoxTest, BoxTested, Tally};
+use super::box_test::{BoxQuery, BoxTest, BoxTested};
 use super::items::Record;
 use super::{BuildError, Info, Kind, MemoryUsage, NoParams};
 use crate::geometry::Aabb;
-use crate::query::{Bits, ItemId, Recorder, Sink};
+use crate::query::{Bits, Context, ItemId, Recorder};
 
 /// Average number of items per cell.
 const ITEMS_PER_CELL: f64 = 8.0;
@@ -90,12 +90,10 @@ impl UniformGrid {
     }
 
     #[inline(always)]
-    fn cell<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
+    fn cell<T: BoxTest + ?Sized, C: Context>(
         &self,
         cell: usize,
-        test: &T,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
+        ask: &mut BoxQuery<T, C>,
     ) -> ControlFlow<()> {
         let items = self.starts[cell] as usize..self.starts[cell + 1] as usize;
         if items.is_empty() {
@@ -103,29 +101,27 @@ impl UniformGrid {
         }
         // Opaque, so that each cell reads the planes again: kept in registers from cell to cell,
         // they are saved and restored around each call of the sink.
-        let test = black_box(test);
-        tally.node(test);
-        let bounds = &self.bounds[cell];
-        let (rejected, accepted) = test.rejects_accepts(bounds);
+        let (test, cx) = (black_box(ask.test), &mut *ask.cx);
+        let mut ask = BoxQuery { test, cx };
+        let (rejected, accepted) = ask.rejects_accepts(&self.bounds[cell]);
         if rejected {
-            tally.count(|recorder| recorder.subtrees_rejected(1));
+            ask.cx.recorder().subtrees_rejected(1);
             return ControlFlow::Continue(());
         }
         if accepted {
-            tally.count(|recorder| recorder.subtree_accepted(items.len()));
-            return sink.accept(&self.ids[items]);
+            ask.cx.recorder().subtree_accepted(items.len());
+            return ask.cx.accept(&self.ids[items]);
         }
         // All tests before the first answer: a call between two of them would cost the
         // registers that hold the planes.
         for (start, boxes) in items.clone().step_by(64).zip(self.boxes[items].chunks(64)) {
             let mut admitted = 0_u64;
             for (i, b) in boxes.iter().enumerate() {
-                tally.item(test);
-                admitted |= u64::from(test.admits(b)) << i;
+                admitted |= u64::from(ask.admits(b)) << i;
             }
             for bit in Bits(admitted) {
                 let place = start + bit as usize;
-                sink.accept(&self.ids[place..=place])?;
+                ask.cx.accept(&self.ids[place..=place])?;
             }
         }
         ControlFlow::Continue(())
@@ -186,20 +182,14 @@ impl BoxTested for UniformGrid {
     }
 
     #[inline(always)]
-    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
-    ) -> ControlFlow<()> {
-        tally.node(test);
-        if self.ids.is_empty() || test.rejects(&self.scene) {
+    fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
+        if ask.rejects(&self.scene) || self.ids.is_empty() {
             return ControlFlow::Continue(());
         }
         // Few cells are tested sooner than the bounds of centres that matter are known.
         let asked = match self.bounds.len() {
             0..=FEW_CELLS => self.centres,
-            _ => test.centres(self.half, &self.scene),
+            _ => ask.test.centres(self.half, &self.scene),
         };
         if asked.is_empty() {
             return ControlFlow::Continue(());
@@ -213,7 +203,7 @@ impl BoxTested for UniformGrid {
             for y in ys.clone() {
                 let row = self.row(y, z).start;
                 for cell in row + xs.start..row + xs.end {
-                    self.cell(cell, test, sink, tally)?;
+                    self.cell(cell, ask)?;
                 }
             }
         }

@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::place_of;
 use crate::geometry::Aabb;
-use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::Record;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
-use crate::query::{ItemId, Recorder, Sink};
+use crate::query::{Context, ItemId};
 
 /// The components of an entity that the system reads and writes.
 struct Entity {
@@ -81,21 +81,15 @@ impl BoxTested for PeerBevyStyle {
     }
 
     #[inline(always)]
-    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
-    ) -> ControlFlow<()> {
+    fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
         for entity in &self.entities {
             if !entity.inherited_visibility || entity.layers & LAYER == 0 {
                 continue;
             }
-            tally.item(test);
-            let seen = entity.no_frustum_culling || test.admits(&entity.item.bounds);
+            let seen = entity.no_frustum_culling || ask.admits(&entity.item.bounds);
             entity.view_visibility.store(seen, Ordering::Relaxed);
             if seen {
-                sink.accept(std::slice::from_ref(&entity.item.id))?;
+                ask.cx.accept(std::slice::from_ref(&entity.item.id))?;
             }
         }
         ControlFlow::Continue(())

@@ -1,5 +1,7 @@
 //! The crate bvh: its tree queried through `Bvh::traverse`, which returns shapes.
 
+use std::cell::Cell;
+use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
 use ::bvh::aabb::{Aabb as CrateAabb, Bounded, IntersectsAabb};
@@ -10,10 +12,10 @@ use nalgebra::Point3;
 
 use super::placed;
 use crate::geometry::Aabb;
-use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::Record;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
-use crate::query::{ItemId, Recorder, Sink};
+use crate::query::{Context, ItemId, Recorder};
 
 /// An item with its node, which the crate writes.
 #[derive(Clone, Copy)]
@@ -52,15 +54,18 @@ fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
 
 /// A test for the crate, which does not distinguish boxes of nodes and items.
 /// Returned items are tested once more if the two tests can differ.
-struct Query<'a, 'r, T: ?Sized, R> {
+struct Query<'a, T: ?Sized, R> {
     test: &'a T,
-    tally: &'a Tally<'r, R>,
+    nodes_tested: Cell<u32>,
+    recorder: PhantomData<R>,
 }
 
-impl<T: BoxTest + ?Sized, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, '_, T, R> {
+impl<T: BoxTest + ?Sized, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, T, R> {
     #[inline(always)]
     fn intersects_aabb(&self, b: &CrateAabb<f32, 3>) -> bool {
-        self.tally.node(self.test);
+        if size_of::<R>() != 0 {
+            self.nodes_tested.update(|count| count + 1);
+        }
         !self.test.rejects(&bounds_of(b))
     }
 }
@@ -174,17 +179,18 @@ impl BoxTested for PeerBvh {
     }
 
     #[inline(always)]
-    fn search<Q: BoxTest + ?Sized, S: Sink, R: Recorder>(
-        &self,
-        test: &Q,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
-    ) -> ControlFlow<()> {
-        let query = Query { test, tally };
-        for shape in self.tree.traverse(&query, &self.shapes) {
-            tally.count(|recorder| recorder.items_tested(1));
-            if test.nodes_as_items() || test.admits(&shape.item.bounds) {
-                sink.accept(std::slice::from_ref(&shape.item.id))?;
+    fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
+        let query = Query::<_, C::Recorder> {
+            test: ask.test,
+            nodes_tested: Cell::new(0),
+            recorder: PhantomData,
+        };
+        let found = self.tree.traverse(&query, &self.shapes);
+        ask.count_nodes(query.nodes_tested.get());
+        for shape in found {
+            ask.cx.recorder().items_tested(1);
+            if ask.test.nodes_as_items() || ask.test.admits(&shape.item.bounds) {
+                ask.cx.accept(std::slice::from_ref(&shape.item.id))?;
             }
         }
         ControlFlow::Continue(())

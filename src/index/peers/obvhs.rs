@@ -10,11 +10,11 @@ use obvhs::bvh2::node::Bvh2Node;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Aabb;
-use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::{Positions, Record};
 use crate::index::tree::node::Stack;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
-use crate::query::{ItemId, Recorder, Sink};
+use crate::query::{Context, ItemId};
 
 /// Parameters: `peer-obvhs:update=move`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -57,22 +57,17 @@ fn bounds_of(node: &Bvh2Node) -> Aabb {
 impl PeerObvhs {
     /// Tests the items of a leaf that was not rejected.
     #[inline(always)]
-    fn leaf<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
+    fn leaf<T: BoxTest + ?Sized, C: Context>(
         &self,
         node: &Bvh2Node,
-        test: &T,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
+        ask: &mut BoxQuery<T, C>,
     ) -> ControlFlow<()> {
         let first = node.first_index as usize;
         for place in first..first + node.prim_count as usize {
-            tally.item(test);
-            let admitted = match self.boxes.get(place) {
-                Some(b) => test.admits(b),
-                None => test.admits(&bounds_of(node)),
-            };
-            if admitted {
-                sink.accept(&self.ids[place..=place])?;
+            let id = &self.ids[place];
+            match self.boxes.get(place) {
+                Some(b) => ask.item(b, id)?,
+                None => ask.item(&bounds_of(node), id)?,
             }
         }
         ControlFlow::Continue(())
@@ -171,36 +166,26 @@ impl BoxTested for PeerObvhs {
 
     /// Pops pairs of children from a stack, as the crate's own `point_traverse` does.
     #[inline(always)]
-    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
-    ) -> ControlFlow<()> {
+    fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
         let nodes = &self.bvh.nodes[..];
         let Some(root) = nodes.first() else {
             return ControlFlow::Continue(());
         };
         if root.is_leaf() {
-            return self.leaf(root, test, sink, tally);
+            return self.leaf(root, ask);
         }
-        tally.node(test);
-        if test.rejects(&bounds_of(root)) {
+        if ask.rejects(&bounds_of(root)) {
             return ControlFlow::Continue(());
         }
         let mut open = Stack::new(root.first_index);
         while let Some(first) = open.pop() {
             for node in [&nodes[first as usize], &nodes[first as usize + 1]] {
                 // A leaf of one item has the bounds of the item: it needs no second test.
-                let single = node.prim_count == 1;
-                if !single {
-                    tally.node(test);
-                    if test.rejects(&bounds_of(node)) {
-                        continue;
-                    }
+                if node.prim_count != 1 && ask.rejects(&bounds_of(node)) {
+                    continue;
                 }
                 if node.is_leaf() {
-                    self.leaf(node, test, sink, tally)?;
+                    self.leaf(node, ask)?;
                 } else {
                     open.push(node.first_index);
                 }

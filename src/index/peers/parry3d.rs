@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 
 use super::placed;
 use crate::geometry::Aabb;
-use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::Record;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
-use crate::query::{ItemId, Recorder, Sink};
+use crate::query::{Context, ItemId, Recorder};
 
 /// Parameters: `peer-parry3d:update=reinsert`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -154,29 +154,19 @@ impl BoxTested for PeerParry3d {
 
     /// Traverses an accepted subtree once more, without tests.
     #[inline(always)]
-    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
-    ) -> ControlFlow<()> {
+    fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
         let mut flow = ControlFlow::Continue(());
         self.bvh.traverse_indexed(None, |node, at| {
             if let Some(place) = node.leaf_data() {
-                tally.item(test);
-                if test.admits(&bounds_of(node)) {
-                    flow = sink.accept(&self.ids[place as usize..=place as usize]);
-                }
+                flow = ask.item(&bounds_of(node), &self.ids[place as usize]);
                 return match flow {
                     ControlFlow::Continue(()) => TraversalAction::Continue,
                     ControlFlow::Break(()) => TraversalAction::EarlyExit,
                 };
             }
-            tally.node(test);
-            let bounds = bounds_of(node);
-            let (rejected, accepted) = test.rejects_accepts(&bounds);
+            let (rejected, accepted) = ask.rejects_accepts(&bounds_of(node));
             if rejected {
-                tally.count(|recorder| recorder.subtrees_rejected(1));
+                ask.cx.recorder().subtrees_rejected(1);
                 return TraversalAction::Prune;
             }
             if !accepted {
@@ -186,14 +176,14 @@ impl BoxTested for PeerParry3d {
             self.bvh.traverse_indexed(Some(at), |node, _| {
                 if let Some(place) = node.leaf_data() {
                     accepted += 1;
-                    flow = sink.accept(&self.ids[place as usize..=place as usize]);
+                    flow = ask.cx.accept(&self.ids[place as usize..=place as usize]);
                     if flow.is_break() {
                         return TraversalAction::EarlyExit;
                     }
                 }
                 TraversalAction::Continue
             });
-            tally.count(|recorder| recorder.subtree_accepted(accepted));
+            ask.cx.recorder().subtree_accepted(accepted);
             match flow {
                 ControlFlow::Continue(()) => TraversalAction::Prune,
                 ControlFlow::Break(()) => TraversalAction::EarlyExit,

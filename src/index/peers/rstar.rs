@@ -7,10 +7,10 @@ use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 
 use super::placed;
 use crate::geometry::Aabb;
-use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::Record;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
-use crate::query::{ItemId, Recorder, Sink};
+use crate::query::{Context, ItemId, Recorder};
 
 impl RTreeObject for Record {
     type Envelope = AABB<[f32; 3]>;
@@ -96,15 +96,9 @@ impl BoxTested for PeerRstar {
     /// Walks the nodes in the order of the crate's iterator; the subtree of an accepted
     /// node is not tested further.
     #[inline(always)]
-    fn search<T: BoxTest + ?Sized, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        tally: &Tally<'_, R>,
-    ) -> ControlFlow<()> {
+    fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
         let root = self.tree.root();
-        tally.node(test);
-        if root.children().is_empty() || test.rejects(&bounds_of(&root.envelope())) {
+        if ask.rejects(&bounds_of(&root.envelope())) || root.children().is_empty() {
             return ControlFlow::Continue(());
         }
         let mut open = vec![(root, false)];
@@ -112,20 +106,14 @@ impl BoxTested for PeerRstar {
             for child in parent.children() {
                 match child {
                     RTreeNode::Leaf(item) if inside => {
-                        tally.count(|recorder| recorder.subtree_accepted(1));
-                        sink.accept(std::slice::from_ref(&item.id))?;
+                        ask.cx.recorder().subtree_accepted(1);
+                        ask.cx.accept(std::slice::from_ref(&item.id))?;
                     }
-                    RTreeNode::Leaf(item) => {
-                        tally.item(test);
-                        if test.admits(&item.bounds) {
-                            sink.accept(std::slice::from_ref(&item.id))?;
-                        }
-                    }
+                    RTreeNode::Leaf(item) => ask.item(&item.bounds, &item.id)?,
                     RTreeNode::Parent(node) if inside => open.push((node, true)),
                     RTreeNode::Parent(node) => {
-                        tally.node(test);
                         let bounds = bounds_of(&node.envelope());
-                        let (rejected, accepted) = test.rejects_accepts(&bounds);
+                        let (rejected, accepted) = ask.rejects_accepts(&bounds);
                         if !rejected {
                             open.push((node, accepted));
                         }
