@@ -9,7 +9,8 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use crate::input::{InputError, read_file};
-use crate::measure::Effort;
+use crate::measure::{Effort, PlannedScene};
+use crate::path::DEFAULT_PATH;
 use crate::scene::every_part;
 use crate::shown::plain;
 use crate::spec::SpecError;
@@ -27,22 +28,7 @@ pub struct Suite {
     /// Processes, rounds and times.
     pub effort: Effort,
     /// Scenes with their paths, in the order in which they are measured.
-    pub scenes: Vec<SuiteScene>,
-}
-
-/// A scene of a suite with the ways through it.
-#[derive(Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct SuiteScene {
-    /// File or spec of the scene.
-    pub scene: String,
-    /// Files or specs of the paths.
-    #[serde(default = "default_paths")]
-    pub paths: Vec<String>,
-    /// Measured with cold caches as well as with warm ones.
-    #[serde(default)]
-    pub cold: bool,
+    pub scenes: Vec<PlannedScene>,
 }
 
 /// A suite as a user writes it; a field that is not known is refused.
@@ -53,7 +39,7 @@ struct Written {
     like: Option<String>,
     structures: Option<String>,
     processes: Option<u32>,
-    scenes: Vec<SuiteScene>,
+    scenes: Vec<PlannedScene>,
 }
 
 /// All suites. The first one is what `cullbench run` does by itself.
@@ -71,24 +57,6 @@ pub const REAL: &str = "real";
 
 /// The ways through a fetched scene in that suite.
 pub const REAL_PATHS: &[&str] = &["flythrough:frames=128", "outside:frames=64"];
-
-/// The way through a scene when none is named.
-pub const DEFAULT_PATH: &str = "flythrough";
-
-fn default_paths() -> Vec<String> {
-    vec![DEFAULT_PATH.to_owned()]
-}
-
-impl SuiteScene {
-    /// A scene with its ways, and warm caches only.
-    pub fn new(scene: String, paths: &[&str]) -> SuiteScene {
-        SuiteScene {
-            scene,
-            paths: paths.iter().map(|&path| path.to_owned()).collect(),
-            cold: false,
-        }
-    }
-}
 
 impl Suite {
     /// The suite of a name or a TOML file, with structures where that states none.
@@ -146,14 +114,14 @@ fn written(file: &str, default: Option<&str>) -> Result<Suite, InputError> {
     suite.scenes.clear();
     for row in written.scenes {
         if row.paths.is_empty() {
-            let scene = plain(&row.scene);
+            let scene = plain(&row.source);
             return Err(bad(&format_args!(
                 "'{scene}' has no paths; expected one or more, or no line 'paths' for {DEFAULT_PATH}"
             )));
         }
-        let parts = every_part(&row.scene)?.into_iter();
-        suite.scenes.extend(parts.map(|scene| SuiteScene {
-            scene,
+        let parts = every_part(&row.source)?.into_iter();
+        suite.scenes.extend(parts.map(|source| PlannedScene {
+            source,
             ..row.clone()
         }));
     }
@@ -178,7 +146,7 @@ mod tests {
         let ranks = |name: &str| !["growth", "compare"].contains(&name);
         for suite in SUITES.iter() {
             for row in &suite.scenes {
-                let scene = Spec::parse(&row.scene).unwrap();
+                let scene = Spec::parse(&row.source).unwrap();
                 let families = FAMILIES.iter().map(|f| f.name);
                 assert!(
                     families
@@ -192,7 +160,7 @@ mod tests {
             }
             for sample in SAMPLES.iter().filter(|_| ranks(&suite.name)) {
                 assert!(
-                    suite.scenes.iter().any(|row| row.scene == sample.name),
+                    suite.scenes.iter().any(|row| row.source == sample.name),
                     "{}",
                     suite.name
                 );

@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::program;
 use super::shared_args::{CullingArgs, LensArgs, SceneArgs, StudyArgs, TableFormat, WhatArgs};
+use crate::path::DEFAULT_PATH;
 use crate::query::ItemId;
 use crate::report::JUDGED_METRICS;
 use crate::spec::{SpecError, values};
-use crate::suite::DEFAULT_PATH;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::inscribed::MOST_BOXES;

@@ -23,8 +23,8 @@ use crate::input;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, Status, SubjectPart, Verdict,
 };
+use crate::path::DEFAULT_PATH;
 use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_report, utc};
-use crate::suite::DEFAULT_PATH;
 
 pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
     if args.plan {

@@ -14,10 +14,10 @@ use crate::index::Registry;
 use crate::input::{InputError, is_readable, names_file, note, tell_warnings};
 use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
 use crate::motion::Motion;
-use crate::path::{self, LensDefaults};
+use crate::path::{self, DEFAULT_PATH, LensDefaults};
 use crate::report::{KeptPart, Stream};
 use crate::scene::{self, FETCHED, LoadOptions, Scene, every_part, split_part};
-use crate::suite::{DEFAULT_PATH, REAL, REAL_PATHS, SUITES, Suite, SuiteScene};
+use crate::suite::{REAL, REAL_PATHS, SUITES, Suite};
 
 /// A plan with where it comes from.
 pub struct RunPlan {
@@ -120,7 +120,7 @@ pub fn each_once(what: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -
 fn check_motions(plan: &Plan, suite: &str) -> Result<()> {
     each_once("motion", &plan.motions)?;
     let mut scenes = plan.scenes.iter();
-    if !plan.motions.is_empty() && scenes.any(|scene| scene.caches.contains(&true)) {
+    if !plan.motions.is_empty() && scenes.any(|scene| scene.cold) {
         bail!(
             "suite '{suite}' has cold caches, --motion has none; expected another suite, or --scene"
         );
@@ -252,7 +252,7 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputErro
         scenes.clear();
         for source in &args.scene {
             let parts = every_part(source)?.into_iter();
-            scenes.extend(parts.map(|source| SuiteScene::new(source, &[DEFAULT_PATH])));
+            scenes.extend(parts.map(|source| PlannedScene::new(&source, &[DEFAULT_PATH])));
         }
     } else if suite.name == REAL {
         let mut missing = Vec::new();
@@ -264,7 +264,7 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputErro
                 _ if !row.is_there() => missing.push(row.name.as_str()),
                 _ if own.is_empty() => note(&format!("not part of the suite: {}", row.name)),
                 Err(error) => note(&format!("left out: {error}")),
-                Ok(()) => scenes.extend(own.into_iter().map(|s| SuiteScene::new(s, REAL_PATHS))),
+                Ok(()) => scenes.extend(own.iter().map(|s| PlannedScene::new(s, REAL_PATHS))),
             }
         }
         if !missing.is_empty() {
@@ -275,16 +275,11 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputErro
             ));
         }
     }
-    let planned = scenes.into_iter().map(|row| PlannedScene {
-        source: row.scene,
-        paths: match args.path.is_empty() {
-            true => row.paths,
-            false => args.path.clone(),
-        },
-        caches: match row.cold || args.cold {
-            true => vec![false, true],
-            false => vec![false],
-        },
-    });
-    Ok(planned.collect())
+    for scene in &mut scenes {
+        scene.cold |= args.cold;
+        if !args.path.is_empty() {
+            scene.paths.clone_from(&args.path);
+        }
+    }
+    Ok(scenes)
 }

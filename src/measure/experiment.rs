@@ -57,14 +57,33 @@ pub enum Extras {
 }
 
 /// A scene of a plan with its camera paths.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PlannedScene {
     /// File, sample or spec, as [`crate::scene::load`] takes it.
+    #[serde(rename = "scene")]
     pub source: String,
     /// Files or specs, as [`crate::path::load`] takes them.
+    #[serde(default = "default_paths")]
     pub paths: Vec<String>,
-    /// Cache states to measure: true is cold.
-    pub caches: Vec<bool>,
+    /// True if it is measured with cold caches as well as with warm ones.
+    #[serde(default)]
+    pub cold: bool,
+}
+
+fn default_paths() -> Vec<String> {
+    vec![path::DEFAULT_PATH.to_owned()]
+}
+
+impl PlannedScene {
+    /// A scene with its camera paths, and warm caches only.
+    pub fn new(source: &str, paths: &[&str]) -> PlannedScene {
+        PlannedScene {
+            source: source.to_owned(),
+            paths: paths.iter().map(|&path| path.to_owned()).collect(),
+            cold: false,
+        }
+    }
 }
 
 /// Plan of a run: data, complete before anything runs.
@@ -118,7 +137,8 @@ impl Plan {
         };
         let mut groups = Vec::new();
         for path in &scene.paths {
-            for &cold in &scene.caches {
+            let caches = 1 + usize::from(scene.cold);
+            for cold in [false, true].into_iter().take(caches) {
                 for motion in motions {
                     groups.extend(self.cullings.iter().map(|&culling| SceneGroup {
                         path: path.clone(),

@@ -24,6 +24,9 @@ use crate::spec::{Spec, SpecError};
 pub use facts::{CameraFacts, MatrixFacts, warnings};
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
 
+/// The path through a scene when none is named.
+pub(crate) const DEFAULT_PATH: &str = "flythrough";
+
 /// A named sequence of cameras.
 #[derive(Clone, Default, Debug)]
 pub struct CameraPath {

@@ -39,11 +39,7 @@ impl Experiment {
     pub fn new(scene: &str) -> Experiment {
         Experiment {
             plan: Plan {
-                scenes: vec![PlannedScene {
-                    source: scene.to_owned(),
-                    paths: Vec::new(),
-                    caches: vec![false],
-                }],
+                scenes: vec![PlannedScene::new(scene, &[])],
                 structures: Vec::new(),
                 cullings: vec![Default::default()],
                 lens: Default::default(),
@@ -115,7 +111,7 @@ impl Experiment {
         let is_time = |ns: f64| (0.0..f64::INFINITY).contains(&ns);
         // What is named twice would count as two processes.
         let once = |names: Vec<&String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
-        let is_warm = |s: &PlannedScene| plan.motions.is_empty() || s.caches == [false];
+        let is_warm = |s: &PlannedScene| plan.motions.is_empty() || !s.cold;
         let rules = [
             (
                 once(scenes.iter().map(|s| &s.source).collect()),
@@ -129,7 +125,6 @@ impl Experiment {
             (scenes.iter().all(is_warm), "cold caches of items that move"),
             (!scenes.is_empty(), "no scene"),
             (scenes.iter().all(|s| !s.paths.is_empty()), "no path"),
-            (scenes.iter().all(|s| !s.caches.is_empty()), "no caches"),
             (!labels.is_empty(), "no structure"),
             (!plan.cullings.is_empty(), "no culling"),
             (plan.views_per_frame > 0, "no views_per_frame"),
@@ -160,7 +155,7 @@ mod tests {
         assert!(twice.contains("a path twice"), "{twice}");
         let mut cold = named(["spin:frames=2", "orbit:frames=2"]);
         cold.plan.motions.push("drift".to_owned());
-        cold.plan.scenes[0].caches = vec![false, true];
+        cold.plan.scenes[0].cold = true;
         let cold = cold.check().unwrap_err().to_string();
         assert!(cold.contains("cold caches"), "{cold}");
     }
@@ -175,10 +170,9 @@ mod tests {
         };
         assert_eq!(sound().check().map_err(|e| e.to_string()), Ok(()));
         type Break = fn(&mut Plan);
-        let breaks: [(Break, &str); 14] = [
+        let breaks: [(Break, &str); 13] = [
             (|p| p.scenes.clear(), "no scene"),
             (|p| p.scenes[0].paths.clear(), "no path"),
-            (|p| p.scenes[0].caches.clear(), "no caches"),
             (|p| p.structures.clear(), "no structure"),
             (|p| p.cullings.clear(), "no culling"),
             (|p| p.views_per_frame = 0, "no views_per_frame"),

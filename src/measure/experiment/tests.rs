@@ -4,11 +4,10 @@ use super::super::Group;
 use super::*;
 use crate::index::Registry;
 
-fn planned(source: &str, paths: &[&str], caches: &[bool]) -> PlannedScene {
+fn planned(source: &str, paths: &[&str], cold: bool) -> PlannedScene {
     PlannedScene {
-        source: source.to_owned(),
-        paths: paths.iter().map(|&path| path.to_owned()).collect(),
-        caches: caches.to_vec(),
+        cold,
+        ..PlannedScene::new(source, paths)
     }
 }
 
@@ -19,9 +18,9 @@ fn plan() -> Plan {
     };
     Plan {
         scenes: vec![
-            planned("city:n=100", &["orbit:frames=8", "spin"], &[false, true]),
-            planned("uniform:n=50", &["outside:frames=4"], &[false]),
-            planned("city:n=200", &["orbit:frames=8", "spin", "zoom"], &[true]),
+            planned("city:n=100", &["orbit:frames=8", "spin"], true),
+            planned("uniform:n=50", &["outside:frames=4"], false),
+            planned("city:n=200", &["orbit:frames=8", "spin", "zoom"], false),
         ],
         structures: Registry::builtin().structures("linear,bvh,octree").unwrap(),
         cullings: vec![sphere, Culling::default()],
