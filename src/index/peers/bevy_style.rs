@@ -58,17 +58,20 @@ impl BoxTested for PeerBevyStyle {
 
     /// Overwrites the bounds; an entity that is gone is hidden.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
+        let mut held = Vec::with_capacity(moved.len());
         for &id in moved {
             let bounds = items[id as usize];
-            let is_there = !bounds.is_empty();
             match place_of(&self.entities, |e| e.item.id, id) {
-                Ok(at) => {
-                    let entity = &mut self.entities[at];
-                    (entity.item.bounds, entity.inherited_visibility) = (bounds, is_there);
-                }
-                Err(_) if is_there => return None,
+                Ok(at) => held.push((at, bounds)),
+                // An entity that is not held appears. Nothing has changed yet.
+                Err(_) if !bounds.is_empty() => return None,
                 Err(_) => {}
             }
+        }
+        for (at, bounds) in held {
+            let entity = &mut self.entities[at];
+            entity.item.bounds = bounds;
+            entity.inherited_visibility = !bounds.is_empty();
         }
         Some(())
     }
