@@ -167,7 +167,8 @@ pub fn some_of(count: usize, most: usize) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{path, scene};
+    use crate::path;
+    use crate::scene;
 
     #[test]
     fn the_tree_of_the_sphere_test_has_spheres() {

@@ -401,11 +401,11 @@ fn several_bad_rows_are_counted_and_skipped_on_request() {
 fn a_column_twice_is_found_among_very_many() {
     use std::fmt::Write;
     let mut header = BOXES.to_owned();
-    for column in 0..300_000 {
+    for column in 0..60_000 {
         write!(header, ",column_{column}").expect("a string");
     }
-    let text = format!("{header},column_299999\n");
+    let text = format!("{header},column_59999\n");
     let folder = with_good_files(&[("wide.csv", text.as_bytes())]);
-    let wanted = "wide.csv, line 1 | column 'column_299999' twice | expected each column once";
+    let wanted = "wide.csv, line 1 | column 'column_59999' twice | expected each column once";
     all_refused(&folder, &["scene info wide.csv"], wanted);
 }

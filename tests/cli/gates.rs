@@ -277,7 +277,7 @@ fn two_programs_are_compared_by_their_counters_alone() {
 fn two_programs_are_compared_by_their_frames() {
     let folder = folder(&[]);
     let line = format!(
-        "compare --scene uniform:n=300 --path orbit:frames=4 --structure linear,wide \
+        "compare --scene uniform:n=300 --path orbit:frames=3 --structure linear,wide \
          --motion drift:share=0.1,frames=3 --update refit,rebuild --threshold 90% --format json --against {}",
         super::PROGRAM
     );

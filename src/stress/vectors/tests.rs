@@ -25,7 +25,7 @@ fn every_mistake_is_one_line_that_says_where() {
     let boxed = |b: &str| format!(r#"[{{"id":"v","boxes":[{b}]}}]"#);
     let with = |field: &str| format!(r#"[{{"id":"v",{field}}}]"#);
     let cases = [
-        (String::new(), "f.json, line 1, column 0: the text ends"),
+        (String::new(), "f.json, line 1, column 1: the text ends"),
         (
             "{\"vectors\":[}".into(),
             "f.json, line 1, column 13, vectors[0]: no JSON (expected value)",
