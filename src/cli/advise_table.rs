@@ -198,9 +198,11 @@ fn rule_table(advice: &Advice) -> Table {
             };
             let finite = |x: f64| Some(x).filter(|x| x.is_finite());
             let shown = |ns| some(finite(ns), text::time);
-            let is_decided = rule.is_chosen && ratio < 1.0;
-            let decided = is_decided.then_some("the choice above decides");
-            let note = decided.unwrap_or(&rule.note);
+            let note = match rule.note.as_str() {
+                _ if rule.is_chosen && ratio < 1.0 => "the choice above decides",
+                "" if rule.is_tie => "its statistic decides",
+                note => note,
+            };
             let ratio = match rule.is_tie {
                 true => "tie".to_owned(),
                 false => some(finite(ratio), times),

@@ -1,6 +1,8 @@
 //! `cullbench drift`: tables of the errors of camera bases and spring arms, of the
 //! cost of a step of each, and recommendations.
 
+use anyhow::ensure;
+
 use super::args::DriftArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, show};
@@ -18,6 +20,9 @@ use crate::drift::{
 use crate::measure::ProcessTimes;
 use crate::report::grouped;
 
+/// Most steps of the reference behind one arm: about a minute.
+const MOST_STEPS: f64 = 1e9;
+
 /// Rounds of what is timed, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
 
@@ -25,9 +30,17 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
     expect_places(&outputs, &[""; 0])?;
     let options = &args.options;
+    let arms = &options.arms;
+    let reference = drift::reference_steps(arms);
+    ensure!(
+        reference <= MOST_STEPS,
+        "--stiffness of {:?} over --seconds {}: {reference:.0e} steps of the reference; expected at most {MOST_STEPS:e}",
+        arms.stiffness,
+        arms.seconds
+    );
     let jobs = drift::jobs(options);
     let study = Study::new(String::new(), jobs as u64, &args.spread)?;
-    let (steps, seconds) = (options.steps as f64, options.arms.seconds);
+    let (steps, seconds) = (options.steps as f64, arms.seconds);
     let work = text::counted(jobs, "study");
     let work = format!("{work}, up to {steps:e} steps or {seconds} s each");
     study.announce(&work, "about half a minute");

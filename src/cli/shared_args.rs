@@ -277,8 +277,8 @@ pub struct LensArgs {
     /// Width / height for cameras without one
     #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero)]
     pub aspect: f64,
-    /// Near plane for cameras without one [default: far / 1000, for recorded cameras
-    /// at most twice the scene's diagonal / 1000]
+    /// Near plane for cameras without one [default: far / 1000, 0.1 for street, for
+    /// recorded cameras at most twice the scene's diagonal / 1000]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf; beyond 1.7e38 counts as inf [default:

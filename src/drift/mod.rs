@@ -12,7 +12,7 @@ use clap::Args;
 use serde::Serialize;
 
 pub use arm::{ARMS, ArmKind, Method as ArmMethod};
-pub use arm_study::{ArmChoice, ArmOptions, ArmPoint, StabilityLimit};
+pub use arm_study::{ArmChoice, ArmOptions, ArmPoint, StabilityLimit, reference_steps};
 pub use frames::Turn;
 pub use rated::Recommendation;
 pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};

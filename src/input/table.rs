@@ -11,8 +11,8 @@ use crate::shown::{counted, first_of, shortened};
 use crate::spec::nearest;
 
 /// Columns that say which row it is, and nothing else.
-const LABELS: [&str; 9] = [
-    "camera", "comment", "frame", "id", "label", "name", "note", "time", "time_s",
+const LABELS: [&str; 8] = [
+    "camera", "comment", "frame", "id", "label", "name", "note", "time_s",
 ];
 
 /// Bytes of the first line.

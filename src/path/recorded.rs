@@ -117,7 +117,7 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
     .into_iter()
     .unzip();
     match is_matrix {
-        true => table.note_unread(&MATRIX_ENTRIES, &[]),
+        true => table.note_unread(&MATRIX_ENTRIES, &SYNONYMS[..1]),
         false => table.note_unread(&OF_EYES, &SYNONYMS),
     }
     let (all, empty) = (cameras.len(), cameras.len() - times.len());
@@ -180,7 +180,8 @@ const OF_EYES: [&str; 17] = [
 ];
 
 /// Angles that other programs write, and the columns that say the same.
-const SYNONYMS: [(&str, &str); 3] = [
+const SYNONYMS: [(&str, &str); 4] = [
+    ("time", "time_s"),
     ("roll", "up_x,up_y,up_z"),
     ("pitch", "forward_x,forward_y,forward_z"),
     ("yaw", "forward_x,forward_y,forward_z"),

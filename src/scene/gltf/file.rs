@@ -1,8 +1,10 @@
 //! A glTF file with its buffers: what its indices and accessors refer to.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::fmt;
 use std::path::Path;
+use std::rc::Rc;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
@@ -116,7 +118,7 @@ pub struct File<'f> {
     pub name: &'f str,
     pub root: Root,
     pub exact: Exact,
-    pub buffers: Vec<Cow<'f, [u8]>>,
+    pub buffers: Vec<Rc<Cow<'f, [u8]>>>,
 }
 
 impl<'f> File<'f> {
@@ -161,14 +163,23 @@ impl<'f> File<'f> {
             exact,
             buffers: Vec::new(),
         };
-        for index in 0..file.root.buffers.len() {
-            let buffer = &file.root.buffers[index];
+        let listed = std::mem::take(&mut file.root.buffers);
+        // Thousands of buffers may be one file.
+        let mut linked: HashMap<&str, Rc<Cow<[u8]>>> = HashMap::new();
+        for (index, buffer) in listed.iter().enumerate() {
             let bytes = match &buffer.uri {
-                None => Cow::Borrowed(bin.take().unwrap_or_default()),
-                Some(uri) => Cow::Owned(file.linked(index, uri, beside)?),
+                None => Rc::new(Cow::Borrowed(bin.take().unwrap_or_default())),
+                Some(uri) => match linked.get(uri.as_str()) {
+                    Some(known) => known.clone(),
+                    None => Rc::new(Cow::Owned(file.linked(index, uri, beside)?)),
+                },
             };
+            if let Some(uri) = &buffer.uri {
+                linked.insert(uri, bytes.clone());
+            }
             file.buffers.push(bytes);
         }
+        file.root.buffers = listed;
         Ok(file)
     }
 

@@ -432,3 +432,24 @@ fn instances_are_items() {
 
 mod damaged;
 mod materials;
+
+#[test]
+fn a_file_that_many_buffers_name_is_read_once() {
+    let mut file = file();
+    let own = file["buffers"][0]["uri"].as_str().unwrap();
+    let bytes = STANDARD.decode(own.split_once(',').unwrap().1).unwrap();
+    let buffer = json!({"byteLength": bytes.len(), "uri": "b.bin"});
+    file["buffers"] = json!(vec![buffer; 1000]);
+    file["bufferViews"][1]["buffer"] = json!(999);
+    let reads = std::cell::Cell::new(0);
+    let beside = |uri: &str| {
+        assert_eq!(uri, "b.bin");
+        reads.set(reads.get() + 1);
+        Ok(bytes.clone())
+    };
+    let text = file.to_string();
+    let options = LoadOptions::default();
+    let scene = read_beside(text.as_bytes(), ["t.gltf", "t"], &options, &beside).unwrap();
+    assert_eq!((scene.items.len(), reads.get()), (2, 1));
+    assert_eq!(scene.items, read(&self::file()).unwrap().items);
+}
