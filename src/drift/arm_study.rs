@@ -194,10 +194,9 @@ const BLOWN_UP: f64 = 1e3;
 /// Errors below this are rounding and have no order.
 const LEAST_ORDERED: f64 = 1e-11;
 
-/// Steps of the reference behind the stiffest arm.
-pub fn reference_steps(options: &ArmOptions) -> f64 {
-    let stiffest = options.stiffness.iter().copied().fold(0.0, f64::max);
-    stiffest.sqrt() * options.seconds / REFERENCE_STEP
+/// Steps of the reference behind an arm.
+pub fn reference_steps(stiffness: f64, seconds: f64) -> f64 {
+    stiffness.sqrt() * seconds / REFERENCE_STEP
 }
 
 /// The errors of all points of a setting.

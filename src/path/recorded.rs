@@ -117,7 +117,7 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
     .into_iter()
     .unzip();
     match is_matrix {
-        true => table.note_unread(&MATRIX_ENTRIES, &SYNONYMS[..1]),
+        true => table.note_unread(&MATRIX_ENTRIES, &[TIME]),
         false => table.note_unread(&OF_EYES, &SYNONYMS),
     }
     let (all, empty) = (cameras.len(), cameras.len() - times.len());
@@ -179,9 +179,12 @@ const OF_EYES: [&str; 17] = [
     "up_x", "up_y", "up_z", "fovy_deg", "ortho_height", "aspect", "near", "far",
 ];
 
-/// Angles that other programs write, and the columns that say the same.
+/// The column of seconds as other programs write it.
+const TIME: (&str, &str) = ("time", "time_s");
+
+/// Columns that other programs write, and those that say the same.
 const SYNONYMS: [(&str, &str); 4] = [
-    ("time", "time_s"),
+    TIME,
     ("roll", "up_x,up_y,up_z"),
     ("pitch", "forward_x,forward_y,forward_z"),
     ("yaw", "forward_x,forward_y,forward_z"),

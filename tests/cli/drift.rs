@@ -308,7 +308,7 @@ fn what_cannot_be_drifted_is_refused() {
             all_refused(&folder, &[format!("drift --steps {steps}")], &wanted);
         }
     }
-    let wanted = "--stiffness of [100.0, 100000000.0] over --seconds 1000 | 1e10 steps | expected at most 1e9";
+    let wanted = "--stiffness 1e8 over --seconds 1000 | 1e10 steps | expected at most 1e9";
     let line = "drift --stiffness 1e2,1e8 --seconds 1000";
     all_refused(&folder, &[line], wanted);
     for tolerance in ["0", "-1e-6", "nan", "inf"] {

@@ -430,9 +430,6 @@ fn instances_are_items() {
     assert!(error.contains(wanted), "{error}");
 }
 
-mod damaged;
-mod materials;
-
 #[test]
 fn a_file_that_many_buffers_name_is_read_once() {
     let mut file = file();
@@ -453,3 +450,6 @@ fn a_file_that_many_buffers_name_is_read_once() {
     assert_eq!((scene.items.len(), reads.get()), (2, 1));
     assert_eq!(scene.items, read(&self::file()).unwrap().items);
 }
+
+mod damaged;
+mod materials;
