@@ -32,9 +32,6 @@ pub struct StructureChoice {
     /// `true` if the one to take is a scan.
     #[serde(skip)]
     pub is_scan: bool,
-    /// `true` if a scan and another structure tie.
-    #[serde(skip)]
-    pub(super) is_mixed: bool,
 }
 
 /// Metrics of a structure in the advice.
@@ -76,11 +73,8 @@ impl StructureChoice {
         let mut first_located = first(Some("locate_ns")).map(|cell| cell.structure.clone());
         let mut first = first(None).map(|cell| cell.structure.clone());
         let [name, ties]: [Vec<String>; 2] = [first.by_ref().take(1).collect(), first.collect()];
-        let is_tied = |row: &&ReportCell| [&name, &ties].iter().any(|n| n.contains(&row.structure));
-        let tied = |is_scan| (rows.iter().filter(is_tied)).any(|row| row.is_scan() == is_scan);
         StructureChoice {
             is_scan: matches!(rows.first(), Some(row) if row.is_scan() && row.rank.is_some()),
-            is_mixed: tied(false) && tied(true),
             name: name.into_iter().next(),
             ties,
             region_search: first_located.next(),
@@ -109,6 +103,12 @@ impl StructureChoice {
     pub(super) fn tree_and_scan_ns(&self) -> Option<[f64; 2]> {
         let [tree, scan] = [false, true].map(|is_scan| ns(self.fastest(is_scan)?));
         Some([tree?, scan?])
+    }
+
+    /// Returns true if the processes do not tell these two times apart.
+    pub(super) fn tree_and_scan_tie(&self) -> Option<bool> {
+        let [tree, scan] = [false, true].map(|is_scan| self.fastest(is_scan));
+        over(tree?, scan?, None).map(|ratio| is_longer(ratio).is_none())
     }
 
     /// Labels of the structure that is taken and of those that may replace it.

@@ -25,6 +25,10 @@ use crate::report::{
     Basis, Changes, JUDGED_METRICS, JudgedRow, Outcome, Report, ReportCell, Setting, WORK, changes,
     read_report, settings, unique, write_atomically,
 };
+use crate::shown::shortened;
+
+/// Characters of a metric's name and of a change in a chart.
+const METRIC: usize = 12;
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
     let page = [("--html", &args.html)];
@@ -168,7 +172,7 @@ fn show(table: &CompareTable) -> anyhow::Result<Ending> {
     let shown = unread_is_fine(table.print());
     if let Some(file) = &table.args.html {
         let blocks = table.blocks(true, Some(usize::MAX));
-        let changes = figure(&table.changes).map(Block::Figure);
+        let changes = figure(table).map(Block::Figure);
         write_text(file, &to_page("compare", 1, changes, blocks))?;
     }
     shown?;
@@ -176,12 +180,17 @@ fn show(table: &CompareTable) -> anyhow::Result<Ending> {
 }
 
 /// The changes with intervals, the worst first.
-fn figure(changes: &Changes) -> Option<Figure> {
+fn figure(table: &CompareTable) -> Option<Figure> {
+    let changes = &table.changes;
     let groups = unique(changes.rows.iter().map(|row| &row.cell.group));
     let metrics = unique(changes.rows.iter().filter_map(|row| row.metric));
     let all = changes.rows.iter().filter_map(|row| {
         let (group, structure) = (&row.cell.group, &row.cell.structure);
-        let at = text::some(groups.get(1), |_| format!(" {}", place(group, 36, short)));
+        let structure = &shortened(structure, 24);
+        // As much as the narrowest page shows.
+        let used = structure.chars().count() + metrics.get(1).map_or(0, |_| METRIC);
+        let room = 52_usize.saturating_sub(used).min(36);
+        let at = text::some(groups.get(1), |_| format!(" {}", place(group, room, short)));
         let metric = row.metric.filter(|_| metrics.len() > 1);
         let metric = text::some(metric, |metric| format!(" {metric}"));
         let ratio = row.ratio().filter(|ratio| is_drawn(*ratio))?;
@@ -209,8 +218,9 @@ fn figure(changes: &Changes) -> Option<Figure> {
     let axis = Axis::log("", values.chain(limits), 1.05, &change);
     let (count, all) = (shown.len(), text::counted(changes.rows.len(), "figure"));
     let caption = format!(
-        "Change from OLD to NEW{interval}, {worst}{count} of {all}; strong line: no change, \
-         dotted: the threshold"
+        "{}{interval}, {worst}{count} of {all}; strong line: no change, \
+         dotted: the threshold",
+        table.measure()
     );
     let mut figure = rows(caption, &axis, Some(1.0), &shown);
     let height = [0.0, figure.height - 1.5 * LINE];

@@ -49,8 +49,8 @@ pub struct CompareTable<'a> {
 impl CompareTable<'_> {
     /// 1 for a wrong answer, otherwise 3 for a regression; and its name in JSON.
     pub fn verdict(&self) -> (Ending, &'static str) {
-        let is_undecided =
-            self.changes.count(Outcome::Inconclusive) > 0 || self.changes.proven_shift().is_some();
+        let is_undecided = self.changes.count(Outcome::Inconclusive) > 0
+            || !self.changes.proven_shifts().is_empty();
         match (self.changes.is_wrong(), self.changes.is_regression()) {
             (true, _) => (Ending::WrongAnswer, "wrong_answer"),
             (false, true) => (Ending::Regression, "regression"),
@@ -67,15 +67,22 @@ impl CompareTable<'_> {
             "ok" => "no regression".to_owned(),
             other => other.replace('_', " "),
         };
-        let shift = text::some(self.changes.proven_shift(), |shift| {
-            let (metric, much) = (shift.metric, change_of(shift.ratio, None));
+        let shifts = self.changes.proven_shifts();
+        let shift = text::some(shifts.first(), |first| {
+            let metric = first.metric;
             // The shift alone may leave it open.
             let is_open = verdict == "inconclusive";
             let whole = match is_open && self.changes.count(Outcome::Inconclusive) == 0 {
-                true => format!("as a whole; {metric}"),
-                false => format!("among the structures; {metric} as a whole"),
+                true => format!("as a whole; {metric} changed"),
+                false => format!("among the structures; {metric} as a whole changed"),
             };
-            format!(" {whole} changed by {much}, which is not judged here (use compare --against)")
+            let of = |(n, shift): (usize, &&CommonShift)| {
+                let metric = if n == 0 { &whole } else { shift.metric };
+                format!("{metric} by {}", change_of(shift.ratio, None))
+            };
+            let all: Vec<String> = shifts.iter().enumerate().map(of).collect();
+            let all = all.join(" and ");
+            format!(" {all}, which is not judged here (use compare --against)")
         });
         let worst = self.changes.rows.first();
         let worst = worst.filter(|_| self.verdict().0 != Ending::Ok);
@@ -181,6 +188,16 @@ impl CompareTable<'_> {
         blocks
     }
 
+    /// The change that is judged, as a caption has it.
+    pub fn measure(&self) -> &'static str {
+        match (self.args.gate, self.basis) {
+            (Gate::Time, Basis::Reports) => {
+                "Change from OLD to NEW relative to the other structures"
+            }
+            _ => "Change from OLD to NEW",
+        }
+    }
+
     /// One row per figure; for a terminal the columns that `room` holds.
     fn table(&self, rows: &[&JudgedRow], room: Option<usize>) -> Table {
         let (change, processes) = match (self.args.gate, self.basis) {
@@ -212,7 +229,7 @@ impl CompareTable<'_> {
         let full = |group: &&GroupKey| place(group, usize::MAX, plain);
         let places = distinct(&groups, short, full);
         // Beside a common shift a verdict is no more than a place among the others.
-        let than = text::some(changes.proven_shift(), |_| " than the others".to_owned());
+        let shifts = changes.proven_shifts();
         for row in rows {
             let at = groups.iter().position(|group| **group == row.cell.group);
             let place = text::some(at, |at| places[at].clone());
@@ -240,7 +257,11 @@ impl CompareTable<'_> {
                 },
                 row.outcome.name().replace('_', " ")
                     + match row.outcome {
-                        Outcome::Slower | Outcome::Faster => &than,
+                        Outcome::Slower | Outcome::Faster
+                            if shifts.iter().any(|shift| Some(shift.metric) == row.metric) =>
+                        {
+                            " than the others"
+                        }
                         _ => "",
                     },
                 text::some(room.is_none().then_some(row), |row| reason(row)),

@@ -7,7 +7,7 @@ use anyhow::Context;
 use super::args::MergeArgs;
 use super::document::show;
 use super::report::{close, shown, write_page};
-use super::run_resume::same_recorded;
+use super::run_resume::{command_line, same_recorded};
 use super::{Ending, expect_folder, interrupt, tell, text, unread_is_fine};
 use crate::report::{Stream, merge as join, read_stream};
 
@@ -21,7 +21,8 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
         let other = recorded(path)?.header.args;
         same_recorded(&first, &other).with_context(|| path.display().to_string())?;
     }
-    let merged = join(&args.runs, &without_place(&first), args.partial)?;
+    let kept = without_place(&first);
+    let merged = join(&args.runs, (&kept, &command_line(&kept)), args.partial)?;
     interrupt::from_now_on_finish();
     if !merged.write(&args.out, &interrupt::asked)? {
         return Ok(Ending::Interrupted);

@@ -28,6 +28,8 @@ const ROUNDS: [usize; 2] = [5, 15];
 /// Cubes for each camera of the other sweeps, and the most cameras of each value.
 const CUBES_PER_CAMERA: usize = 10_000;
 const SWEEP_CAMERAS: usize = 200;
+/// Fewer cameras give no interval that holds, as items of one share its planes.
+const LEAST_CAMERAS: usize = 32;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
@@ -48,7 +50,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
         study.begin("the sweep over sizes");
         sizes = size_sweep(args.cubes, spread.seed)?;
         let cameras = args.cubes.div_ceil(CUBES_PER_CAMERA);
-        let cameras = cameras.clamp(2, SWEEP_CAMERAS);
+        let cameras = cameras.clamp(LEAST_CAMERAS, SWEEP_CAMERAS);
         for (which, name, _) in SWEEPS {
             study.begin(&format!("the sweep over {name}"));
             sweeps.extend(sweep(which, cameras, spread.seed));

@@ -90,6 +90,8 @@ struct Run<'a> {
     workers: Workers,
     bar: ProgressBar,
     started: Instant,
+    /// True where a part of the run was there before.
+    resumes: bool,
 }
 
 impl<'a> Run<'a> {
@@ -102,6 +104,7 @@ impl<'a> Run<'a> {
             // the next.
             workers: Workers::new(stream.header.args.clone(), patience, folder.path())?,
             started: Instant::now(),
+            resumes: !stream.parts.is_empty(),
             args,
             plan,
             folder,
@@ -283,7 +286,8 @@ impl<'a> Run<'a> {
         let (failed, seconds) = (failed.count(), self.started.elapsed().as_secs_f64());
         let how = ["failed", "wrong"][usize::from(is_wrong)];
         let basis = text::conclusion(report);
-        let basis = format!("{cells} in {seconds:.1} s, {failed} {how}; {basis}");
+        let time = [" in", ", resumed for"][usize::from(self.resumes)];
+        let basis = format!("{cells}{time} {seconds:.1} s, {failed} {how}; {basis}");
         let warnings = report.noise.warnings.iter();
         let warnings = warnings.map(|said| text::wrapped(&format!("warning: {said}"), width));
         let kept = save.map(|name| {

@@ -70,9 +70,14 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     });
     // Sets of a coarse test are larger than what is visible.
     let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);
-    let visible = comparison.of_any("cull_rate").map(|culled| {
-        let returned = text::short_percent(1.0 - culled);
-        let seen = excess.map(|excess| text::short_percent((1.0 - culled) / (1.0 + excess)));
+    let counted = comparison.cells.iter().find_map(|cell| {
+        // Fat bounds return more than the test does.
+        let exact = 1.0 + cell.value("fat_excess").unwrap_or(0.0);
+        Some((1.0 - cell.value("cull_rate")?) / exact)
+    });
+    let visible = counted.map(|share| {
+        let returned = text::short_percent(share);
+        let seen = excess.map(|excess| text::short_percent(share / (1.0 + excess)));
         match seen {
             None => format!("{returned} of the items are visible"),
             Some(seen) => format!("{returned} of the items are returned, about {seen} visible"),
@@ -315,8 +320,8 @@ pub fn short(source: &str) -> String {
 fn short_count(typed: &str) -> String {
     let count = parse_number(typed).unwrap_or(f64::NAN);
     match (count % 1e6 == 0.0, count % 1e3 == 0.0) {
-        (true, _) => format!("{}M", count / 1e6),
-        (_, true) => format!("{}k", count / 1e3),
+        (true, _) if count > 0.0 => format!("{}M", count / 1e6),
+        (false, true) => format!("{}k", count / 1e3),
         _ => typed.to_owned(),
     }
 }

@@ -70,7 +70,7 @@ fn caveats(all: &[&Comparison]) -> Vec<String> {
 }
 
 /// Returns true for enlarged bounds that have returned more than exact ones.
-fn is_fat(cell: &&ReportCell) -> bool {
+pub fn is_fat(cell: &&ReportCell) -> bool {
     cell.value("fat_excess") > Some(0.0)
 }
 

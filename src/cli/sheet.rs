@@ -97,7 +97,7 @@ impl Sheet {
         notes: &[String],
     ) -> String {
         let [w, h] = self.size.to_array().map(px);
-        let width = LEFT + w.max(0.6 * SIDE) + 20.0;
+        let width = LEFT + w.max(0.85 * SIDE) + 20.0;
         let rows = legend.len().div_ceil(2);
         let below = TOP + h + 56.0;
         let height = below + LINE * (rows + notes.len()) as f64 + 6.0;

@@ -263,11 +263,13 @@ pub fn basis(comparison: &Comparison) -> String {
     let of = |number: fn(&ReportCell) -> usize, shown: &dyn Fn(usize) -> String| {
         range(comparison.range(number).unwrap_or_default(), shown)
     };
+    let is_of_frames = !comparison.about().path.motion.is_empty();
+    let asked = ["camera", "query"][usize::from(is_of_frames)];
     format!(
         "{}, {} each; {} timed, {} checked, {} of them against the oracle",
         of(|cell| cell.times.processes, &|n| counted(n, "process")),
         of(|cell| cell.times.rounds, &|n| counted(n, "round")),
-        of(|cell| cell.times.cameras_timed, &|n| counted(n, "camera")),
+        of(|cell| cell.times.cameras_timed, &|n| counted(n, asked)),
         of(|cell| cell.times.cameras_checked, &count),
         count(comparison.of_any("judged_queries").unwrap_or(0.0) as usize)
     )

@@ -283,7 +283,7 @@ impl Room {
 /// Items in a mirror. Counts are means per view.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MirrorRow {
-    /// The item whose face it is.
+    /// Data row of the item whose face it is.
     pub item: ItemId,
     /// The axis that the face is across: that of the item's shortest edge.
     pub axis: char,
@@ -303,17 +303,18 @@ pub struct MirrorRow {
 
 /// The mirror in every view, behind the items that `steps` leave.
 ///
-/// It shows every other item of the scene. `None` without views or for triangles.
+/// It is the item of this data row, and shows every other. `None` without views or for
+/// triangles.
 ///
 /// # Errors
 /// Items that cover too many samples.
 pub fn mirrored(
-    item: ItemId,
+    row: ItemId,
     world: &World,
     stages: &ItemStages,
     steps: &[Step],
 ) -> Result<Option<MirrorRow>, String> {
-    let Some(solids) = world.shape.boxes() else {
+    let (Some(solids), Some(item)) = (world.shape.boxes(), world.scene.item_of(row)) else {
         return Ok(None);
     };
     let own = &solids.boxes[item as usize];
@@ -357,7 +358,7 @@ pub fn mirrored(
     let mean = |sum: usize| sum as f64 / world.views.len() as f64;
     let counts = FragmentCounts::of(&with).zip(FragmentCounts::of(&without));
     Ok(counts.map(|(with_stencil, without_stencil)| MirrorRow {
-        item,
+        item: row,
         axis: ['x', 'y', 'z'][axis],
         view_count: views,
         marked_count: mean(marked),

@@ -158,10 +158,15 @@ pub const NEEDS: [[&str; 2]; 2] = [
 
 /// The region stage as left out, if the sectors of a map do not divide the plane.
 ///
-/// Else the map's REJECT table, if it is too short.
+/// Else the map's REJECT table, if it is too short, or a table that a map lacks.
 pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
-    let Regions::Bsp(map) = &scene.regions else {
-        return None;
+    let map = match &scene.regions {
+        Regions::Bsp(map) => map,
+        Regions::Leaves(map) if map.sees().is_none() => {
+            let reason = "the map has no table of which cluster sees which";
+            return Some(LeftOutRow::new(["stages", "stored-pvs"], reason));
+        }
+        _ => return None,
     };
     if let Some(dispute) = map.disputes().first() {
         return Some(LeftOutRow::new(["stages", "region"], dispute));

@@ -29,6 +29,9 @@ use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_
 /// 730 were measured of boxes with one structure.
 const BYTES_PER_ITEM: u64 = 750;
 
+/// Bytes per pair of regions of a table, which may be of all, with its list.
+const BYTES_PER_PAIR: u64 = 8;
+
 /// Most that f32 may move corners without a warning, of an item's longest edge.
 const MOST_MOVED: f64 = 1.0 / 64.0;
 
@@ -43,7 +46,7 @@ pub struct FunnelInput<'a> {
     pub samples: SampleGrid,
     /// Items that have holes.
     pub cut_outs: Option<&'a CutOuts>,
-    /// The item whose face is a mirror.
+    /// Data row of the item whose face is a mirror.
     pub mirror: Option<ItemId>,
     /// Back end of each stage.
     pub chain: &'a Chain,
@@ -236,7 +239,8 @@ impl<'a> World<'a> {
         let surfaces = self.scene.surfaces.as_ref()?;
         let share = |(item, b): (usize, WorldBox)| {
             let own = WorldBox::of(&surfaces.bounds(item), surfaces.origin);
-            let moved = (own.min - b.min).abs().max((own.max - b.max).abs());
+            // A box may be wider than its triangles, as that of a patch's control points is.
+            let moved = (b.min - own.min).max(own.max - b.max);
             let share = moved.max_element() / (b.max - b.min).max_element();
             let is_seen = |view: &View| view.volume.sees(&self.scene.items[item]);
             (share > MOST_MOVED && self.views.iter().any(is_seen)).then_some(share)
@@ -352,10 +356,9 @@ fn check_options(input: &FunnelInput) -> Result<()> {
             expected.name()
         );
     }
-    let items = scene.items.len();
-    if let Some(item) = mirror.filter(|item| *item as usize >= items) {
-        let last = items - 1;
-        bail!("--mirror {item}: '{name}' has {items} items; expected one from 0 to {last}");
+    if let Some(row) = mirror.filter(|&row| scene.item_of(row).is_none()) {
+        let (items, ids) = (scene.items.len(), scene.ids());
+        bail!("--mirror {row}: '{name}' has {items} items; expected one from {ids}");
     }
     Ok(())
 }
@@ -364,6 +367,12 @@ fn check_options(input: &FunnelInput) -> Result<()> {
 fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
     let scene = &input.setting.scene;
     let name = &scene.name;
+    let listed = match &scene.regions {
+        scene::Regions::Bsp(map) if !map.reject.is_empty() => map.sectors.len() as u64,
+        scene::Regions::Leaves(map) if map.sees().is_some() => map.clusters as u64,
+        _ => 0,
+    };
+    check_memory(name, BYTES_PER_PAIR * listed.saturating_pow(2))?;
     match (Regions::of(scene), input.claim) {
         (Ok(mut regions), Some(claim)) => {
             let (own, all) = (claim.len(), regions.graph.len());

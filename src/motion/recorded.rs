@@ -143,16 +143,14 @@ pub(super) fn read_motion_csv(
 }
 
 fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
-    let (text, items) = (row.text(column), scene.items.len());
+    let text = row.text(column);
     let id = text.parse::<ItemId>().ok();
     id.and_then(|id| scene.item_of(id)).ok_or_else(|| {
         let found = format!("id '{}'", crate::shown::shortened(text, 60));
-        let left_out = ["", " without the rows left out"][usize::from(scene.skipped_items > 0)];
-        let ids = match items.checked_sub(1) {
-            Some(last) => format!("0 to {}{left_out}", scene.row_of(last as ItemId)),
-            None => "which has none".to_owned(),
-        };
-        row.error(found, format!("an item of '{}', {ids}", scene.name))
+        row.error(
+            found,
+            format!("an item of '{}', {}", scene.name, scene.ids()),
+        )
     })
 }
 

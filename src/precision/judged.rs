@@ -3,6 +3,7 @@
 
 use std::ops::Add;
 
+use glam::DVec3;
 use serde::ser::Error as _;
 use serde::{Serialize, Serializer};
 
@@ -12,7 +13,7 @@ use crate::culling::{CameraView, Culling};
 use crate::measure::{Status, blamed};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::Scene;
+use crate::scene::{Scene, WorldBox};
 use crate::statistics::{Rate, rate_of};
 use crate::verify::{ErrorCount, Truth, scan};
 
@@ -244,12 +245,11 @@ fn worst_miss_px(camera: &Camera, scene: &Scene, truth: &Truth, answer: &[ItemId
     camera.lens.height_at(camera.lens.near())?;
     let misses = truth.misses(&scene.items, answer);
     let in_pixels = misses.into_iter().filter_map(|(id, depth)| {
-        let item = &scene.items[id as usize];
-        let ahead = |i| {
-            let corner = item.corner(i).as_dvec3() + scene.origin;
-            (corner - camera.frame.eye).dot(camera.frame.forward())
-        };
-        let nearest = (0..8).map(ahead).fold(f64::INFINITY, f64::min);
+        let stored = WorldBox::of(&scene.items[id as usize], scene.origin);
+        let b = truth.original(id as usize).unwrap_or(&stored);
+        let forward = camera.frame.forward();
+        let near = DVec3::select(forward.cmpgt(DVec3::ZERO), b.min, b.max);
+        let nearest = (near - camera.frame.eye).dot(forward);
         let height = camera.lens.height_at(nearest.max(camera.lens.near()))?;
         Some(depth / height * PIXELS)
     });

@@ -178,7 +178,7 @@ impl<'a> Built<'a> {
     }
 
     /// All ways to cull, then all ways to search for a region: f32 by every structure,
-    /// the other numbers by a loop.
+    /// the other numbers by a loop, where the regions are their boxes.
     fn ways(&self) -> Vec<Way<'_>> {
         use RegionNumbers::{Checked, Exact, F32, F64};
         let structures = self.structures.iter();
@@ -189,7 +189,9 @@ impl<'a> Built<'a> {
         let searched = structures.map(Some);
         let searched = searched.flat_map(|own| [F32, Checked].map(|n| Way::Region(own, n)));
         let scans = [F64, Exact].map(|numbers| Way::Region(None, numbers));
-        culled.chain(searched).chain(scans).collect()
+        let is_fair = |way: &Way| !matches!(way, Way::Region(_, n) if !self.queries.compares(*n));
+        let searched = searched.chain(scans).filter(is_fair);
+        culled.chain(searched).collect()
     }
 
     /// Appends the answer to the query of a camera.

@@ -113,6 +113,14 @@ impl RegionQueries<'_> {
         }
     }
 
+    /// Returns whether a search in these numbers may be compared with the exact one.
+    ///
+    /// Boxes of a map's leaves are candidates: in one and not in its leaf is no rounding.
+    pub fn compares(&self, numbers: RegionNumbers) -> bool {
+        let is_checked = matches!(numbers, RegionNumbers::Checked | RegionNumbers::Exact);
+        is_checked || matches!(self.scene.regions, Regions::Items | Regions::Tiling(_))
+    }
+
     /// Appends the regions that are found for a point.
     fn find(&self, by: By, p: &Sought, out: &mut Vec<ItemId>) {
         let scene = self.scene;
@@ -131,10 +139,7 @@ impl RegionQueries<'_> {
     /// stored: a scan.
     fn find_in_f64(&self, p: &Sought, out: &mut Vec<ItemId>) {
         let scene = self.scene;
-        let mut local = p.world - scene.origin;
-        if let Regions::Bsp(_) = scene.regions {
-            local.z = 0.0;
-        }
+        let local = p.world - scene.origin;
         let boxes = scene.regions.boxes(&scene.items).iter().zip(0..);
         out.extend(boxes.filter_map(|(b, id)| {
             let within = local.cmpge(b.min.as_dvec3()) & local.cmple(b.max.as_dvec3());

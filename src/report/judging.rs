@@ -240,12 +240,12 @@ impl Changes {
         rows.filter(|row| row.outcome == outcome).count()
     }
 
-    /// The first common shift whose interval lies beyond the threshold.
-    pub fn proven_shift(&self) -> Option<CommonShift> {
+    /// The common shifts whose intervals lie beyond the threshold.
+    pub fn proven_shifts(&self) -> Vec<&CommonShift> {
         let most = 1.0 + self.threshold;
         let is_faster = |upper: f64| upper * most < 1.0;
-        let is_beyond = |s: &CommonShift| s.lower > Some(most) || s.upper.is_some_and(is_faster);
-        self.common_shifts.iter().copied().find(is_beyond)
+        let is_beyond = |s: &&CommonShift| s.lower > Some(most) || s.upper.is_some_and(is_faster);
+        self.common_shifts.iter().filter(is_beyond).collect()
     }
 
     /// Returns true if NEW holds a wrong answer, with or without a partner in OLD.

@@ -27,13 +27,17 @@ pub struct Merged {
     samples: Vec<(PathBuf, [u64; 2])>,
 }
 
-/// Joins the folders of shards. `args` are the options that the shards have in
-/// common; what they are is the caller's to compare.
+/// Joins the folders of shards. `line` has the options that the shards have in
+/// common, and the command that they make; what they are is the caller's to compare.
 ///
 /// # Errors
 /// An unfinished shard; another seed, suite, structure, machine, build or
 /// source; a cell in two shards; without `partial` a group in none.
-pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merged, InputError> {
+pub fn merge(
+    folders: &[PathBuf],
+    line: (&[String], &str),
+    partial: bool,
+) -> Result<Merged, InputError> {
     let mut shards = Vec::new();
     for path in folders {
         let (stream, _) = read_stream(&path.join(STREAM))?;
@@ -98,7 +102,7 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
     let streams: Vec<&Stream> = shards.iter().map(|(_, stream)| stream).collect();
     Ok(Merged {
         stream: Stream {
-            header: joined(&streams, args, groups),
+            header: joined(&streams, line, groups),
             parts: kept,
             finished_at: streams.iter().filter_map(|s| s.finished_at.clone()).max(),
         },
@@ -215,7 +219,7 @@ fn overlap<'s>(own: &'s Stream, other: &'s Stream, first: &Path) -> Option<Strin
 const NAMED: usize = 4;
 
 /// The header of the run that the shards are together.
-fn joined(shards: &[&Stream], args: &[String], groups: Vec<GroupKey>) -> Header {
+fn joined(shards: &[&Stream], (args, command): (&[String], &str), groups: Vec<GroupKey>) -> Header {
     let headers = || shards.iter().map(|stream| &stream.header);
     let mut header = shards[0].header.clone();
     let loads = headers().filter_map(|h| h.machine.load);
@@ -223,8 +227,7 @@ fn joined(shards: &[&Stream], args: &[String], groups: Vec<GroupKey>) -> Header 
     let begun = headers().map(|h| &h.run.started_at).min();
     header.run.started_at = begun.cloned().unwrap_or_default();
     header.run.id = format!("{}-of-{}", header.run.id, shards.len());
-    let program = header.run.command.split(' ').next().unwrap_or_default();
-    header.run.command = [&[program.to_owned()], args].concat().join(" ");
+    header.run.command = command.to_owned();
     header.args = args.to_vec();
     let whole = header.whole().to_vec();
     let shards: Vec<&str> = headers().filter_map(|h| h.run.shard.as_deref()).collect();

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Report, ReportCell};
-use crate::measure::{Judged, Metric, Status, YARDSTICK};
+use crate::measure::{CellTimes, Judged, Metric, Status, YARDSTICK};
 use crate::statistics::{ALPHA, geometric_mean, is_less, speedup};
 
 /// Cells of one scene, path, cache state and culling test.
@@ -218,6 +218,12 @@ pub fn timed_otherwise((old, new): Pair) -> Option<String> {
     if was.cameras_timed != is.cameras_timed {
         let (was, is) = (was.cameras_timed, is.cameras_timed);
         return Some(format!("{was} cameras timed and {is}"));
+    }
+    let has_views = |times: &CellTimes| times.by_process.contains_key("views_ns");
+    match (has_views(was), has_views(is)) {
+        (false, true) => return Some("one thread, and threads that share views".to_owned()),
+        (true, false) => return Some("threads that share views, and one thread".to_owned()),
+        _ => {}
     }
     (was.batch != is.batch).then(|| format!("batches of {} and {} queries", was.batch, is.batch))
 }

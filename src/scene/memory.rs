@@ -19,7 +19,7 @@ const INDEXED: u64 = 40;
 /// Bytes of an item that a build needs beside its structure.
 const BUILT: u64 = 64;
 /// Scenes of fewer items, and meshes of fewer triangles, are made without a check.
-const ANYWHERE: u64 = 10_000;
+pub const ANYWHERE: u64 = 10_000;
 /// Bytes of a triangle while a mesh is made: 117 were measured of the statue, which
 /// finds its points in a table, 20 to 24 of the others.
 const MESHED: u64 = 120;

@@ -229,6 +229,15 @@ impl Scene {
         self.rows.get(item as usize).copied().unwrap_or(item)
     }
 
+    /// The ids that items have in files, in words: `0 to 9`.
+    pub fn ids(&self) -> String {
+        let left_out = ["", " without the rows left out"][usize::from(self.skipped_items > 0)];
+        match self.items.len().checked_sub(1) {
+            Some(last) => format!("0 to {}{left_out}", self.row_of(last as ItemId)),
+            None => "which has none".to_owned(),
+        }
+    }
+
     /// The item of a data row, if it has one. O(log n).
     pub fn item_of(&self, row: ItemId) -> Option<ItemId> {
         if self.rows.is_empty() {

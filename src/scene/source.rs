@@ -52,12 +52,19 @@ pub fn every_part(source: &str) -> Result<Vec<String>> {
     })
 }
 
+/// Tells a zip archive by its beginning, or with bytes in front by its name.
+fn is_archive(bytes: &[u8], file: &str) -> bool {
+    let has_name = [".zip", ".pk3"].map(|end| file.to_ascii_lowercase().ends_with(end));
+    let is_other = || is_wad(bytes) || is_ibsp(bytes) || is_gltf(bytes);
+    is_zip(bytes) || has_name.contains(&true) && !is_other()
+}
+
 /// Names of the maps of a WAD or the scenes of a zip archive; none of others.
 ///
 /// # Errors
 /// A directory that is damaged.
 pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
-    match (is_wad(bytes), is_zip(bytes)) {
+    match (is_wad(bytes), is_archive(bytes, file)) {
         (true, _) => map_names(bytes, file),
         (_, true) => zip::scene_names(bytes, file),
         _ => Ok(Vec::new()),
@@ -171,7 +178,7 @@ fn read_beside(
     beside: Beside,
 ) -> Result<Scene> {
     refuse(bytes, file)?;
-    if is_zip(bytes) {
+    if is_archive(bytes, file) {
         let archive = zip::open(bytes, file)?;
         // Read once: a glTF may have a buffer in each of thousands of entries.
         let entries = zip::entries(&archive, file)?;
@@ -187,10 +194,15 @@ fn read_beside(
                 }
             }
             let wanted = parts.join("/");
-            let entry = zip::unpack(&archive, &entries, file, Some(&wanted))?;
-            let found = format!("no '{}'", shortened(&wanted, 80));
-            let other = InputError::at(file, "directory", found, "the name of an entry");
-            entry.map.map_or(Ok(entry.bytes), |_| Err(other))
+            if !entries
+                .iter()
+                .any(|(name, _)| name.eq_ignore_ascii_case(&wanted))
+            {
+                let found = format!("no '{}' beside it", shortened(&wanted, 80));
+                let expected = "the files that it names";
+                return Err(InputError::at(names[0], "buffers", found, expected));
+            }
+            Ok(zip::unpack(&archive, &entries, file, Some(&wanted))?.bytes)
         };
         return read_beside(&entry.bytes, names, entry.map, options, &beside);
     }

@@ -1,7 +1,7 @@
 //! Zip archives (zip, pk3), read in place: one entry is unpacked at a time.
 //!
-//! No size is believed before the bytes are there. Buffers of a glTF are entries in its
-//! folder or below: `..` leads nowhere. Source: PKWARE, APPNOTE.TXT 6.3.
+//! No size is believed before the bytes are there. Buffers of a glTF are entries beside it:
+//! `..` leads no farther than the archive. Source: PKWARE, APPNOTE.TXT 6.3.
 
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -114,7 +114,8 @@ pub fn entries<'a>(archive: &'a Archive, file: &str) -> Result<Vec<Named<'a>>> {
     while let Some(record) = records.next_entry().map_err(|error| damaged(file, error))? {
         let path = record.file_path();
         if !record.is_dir() {
-            let name = String::from_utf8_lossy(path.as_ref()).into_owned();
+            // Zips of old .NET programs have backslashes.
+            let name = String::from_utf8_lossy(path.as_ref()).replace('\\', "/");
             all.push((name, record));
         }
     }
@@ -246,6 +247,11 @@ pub mod tests {
         for part in [None, Some("in/one.csv"), Some("IN/One.csv")] {
             assert_eq!(read(&one, part), Ok(1));
         }
+        let in_front = [b"#!/bin/sh\n", &one[..]].concat();
+        assert_eq!(read(&in_front, None), Ok(1));
+        assert_eq!(part_names(&in_front, "a.pk3").unwrap(), ["in/one.csv"]);
+        let of_net = packed(&[("in\\one.csv", BOX, 8)]);
+        assert_eq!(read(&of_net, Some("in/one.csv")), Ok(1));
         let wad = packed(&[("maps/d.wad", MAP12, 8), ("two.csv", BOX, 0)]);
         let alone = read(MAP12, None);
         for part in ["maps/d.wad", "maps/d.wad#map12"] {
@@ -320,7 +326,11 @@ pub mod tests {
         ] {
             assert_eq!(read(&with(uri, name), None), Ok(1), "{uri}");
         }
-        refused(&with("b.bin", "b.bin"), None, "no 'in/b.bin' among");
+        refused(
+            &with("b.bin", "b.bin"),
+            None,
+            "in/s.gltf, buffers: no 'in/b.bin' beside it",
+        );
         // No map in the entry before the sign.
         refused(&with("b%231.bin", "in/b"), None, "no 'in/b#1.bin'");
     }

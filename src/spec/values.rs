@@ -88,7 +88,7 @@ pub fn threshold(typed: &str) -> Result<f64, SpecError> {
         Some(percents) => parse_number(&format!("{}%", percents.trim_end())),
         None => parse_number(typed).filter(|share| *share < 1.0),
     };
-    let what = "a percentage of any size such as 5%, or a share from 0 to below 1 such as 0.05";
+    let what = "a percentage of 0 or more such as 5%, or a share from 0 to below 1 such as 0.05";
     // Zero has two signs and one meaning.
     expected(share.filter(|share| *share >= 0.0), what).map(f64::abs)
 }

@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::geometry::Aabb;
 use crate::oracle::{Judgement, Oracle, Pose, Verdict};
 use crate::query::ItemId;
-use crate::scene::{Originals, Scene};
+use crate::scene::{Originals, Scene, WorldBox};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +49,7 @@ pub struct ErrorCount {
     #[serde(rename = "excess_by_storage_count", default)]
     pub by_storage: u64,
     /// Other false positives, dropped by the six-plane test if the camera's planes
-    /// were neither rounded nor moved. The rest is the test's own.
+    /// were neither rounded nor moved; of the exact test all. The rest is the test's own.
     #[serde(rename = "excess_by_planes_count", default)]
     pub by_planes: u64,
     /// How deep the deepest false negative reaches into the volume, world
@@ -150,12 +150,15 @@ impl Truth {
 
     /// How deep item `id` reaches into the volume, as it was written.
     pub fn depth(&self, id: usize, item: &Aabb) -> f64 {
-        let written = self.written.as_ref();
-        let b = written.and_then(|(world, boxes)| Some((world, boxes.boxes()?.get(id)?)));
-        match b {
-            Some((world, b)) => world.depth_wide(b.min, b.max),
+        match self.written.as_ref().zip(self.original(id)) {
+            Some(((world, _), b)) => world.depth_wide(b.min, b.max),
             None => self.oracle.depth(item),
         }
+    }
+
+    /// The box of item `id` as it was written, where f32 has changed boxes.
+    pub fn original(&self, id: usize) -> Option<&WorldBox> {
+        self.written.as_ref()?.1.boxes()?.get(id)
     }
 
     /// About every item, by id.

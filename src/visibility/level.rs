@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -13,6 +13,8 @@ use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
 
 /// Rounds of decoding the other maps of a file, so that the time has an interval.
 const ROUNDS: usize = 7;
+/// Longest first round that others follow.
+const LONGEST: Duration = Duration::from_secs(1);
 
 /// The level stage.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -25,7 +27,7 @@ pub struct Level {
     pub input_count: usize,
     /// Items of the selected map.
     pub output_count: usize,
-    /// Wall time of decoding the other maps; null without others.
+    /// Wall time of decoding the other maps; null without others, or if they take long.
     #[serde(flatten, serialize_with = "flat::saved_load_ns")]
     pub saved_load: Option<Estimate>,
 }
@@ -56,6 +58,7 @@ impl Level {
             let map = read_bytes(&bytes, [file, name], Some(name), options).ok()?;
             Some((map.items.len(), begun.elapsed().as_nanos() as f64))
         };
+        let begun = Instant::now();
         // The first time is of memory that has not been read yet, and not used.
         let names = part_names(&bytes, file)?.into_iter();
         let maps: Vec<(String, usize)> = names
@@ -72,7 +75,8 @@ impl Level {
             let times = others.filter_map(|(_, (name, _))| decode(name));
             times.map(|(_, ns)| ns).sum()
         };
-        let rounds = if maps.len() > 1 { ROUNDS } else { 0 };
+        let is_timed = maps.len() > 1 && begun.elapsed() < LONGEST;
+        let rounds = if is_timed { ROUNDS } else { 0 };
         let sums: Vec<f64> = (0..rounds).map(load_others).collect();
         Ok(Level {
             map_count: maps.len(),

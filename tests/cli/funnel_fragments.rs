@@ -36,6 +36,23 @@ fn a_mirror_shows_what_is_before_it_on_its_own_samples() {
     // On the whole image the box before the plane is drawn too, beside the wall.
     assert!(number(with, "kept_out_count") > 0.0, "{mirror}");
     assert_eq!(number(without, "kept_out_count"), 0.0);
+    // Ids are the rows of the file, whatever is left out of it.
+    fs::write(
+        folder.path().join("scene.csv"),
+        format!("{BOXES}\n1,nan,1,2,2,2\n{scene}"),
+    )
+    .expect("written");
+    let line = format!("{LINE} --skip-bad-items --mirror");
+    let other = json(&cullbench(folder.path(), &format!("{line} 1")).out);
+    assert_eq!(number(&other["mirror"], "item"), 1.0);
+    assert_eq!(other["mirror"]["with_stencil"], mirror["with_stencil"]);
+    let refused = cullbench(folder.path(), &format!("{line} 0"));
+    let wanted = "expected one from 0 to 4 without the rows left out";
+    assert!(
+        refused.code == Some(2) && refused.err.contains(wanted),
+        "{refused:?}"
+    );
+    fs::write(folder.path().join("scene.csv"), format!("{BOXES}\n{scene}")).expect("written");
     // From behind the wall nothing of what is before it: the camera is at the other side.
     let behind = json(&works(folder.path(), &format!("{LINE} --mirror 3")));
     assert_eq!(number(&behind["mirror"], "view_count"), 0.0);

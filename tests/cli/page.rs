@@ -267,7 +267,9 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
         );
     }
     assert!(
-        page.contains("Change from OLD to NEW with its 95 % interval, 8 of 8 figures; "),
+        page.contains(
+            "NEW relative to the other structures with its 95 % interval, 8 of 8 figures; "
+        ),
         "{page}"
     );
     let meaning =

@@ -295,6 +295,18 @@ fn region_search_is_a_diagram_of_its_own() {
     assert!(points.iter().any(|p| p["on_front"] == true));
 }
 
+/// Boxes of a map's leaves hold points that the leaves do not: no error of f32.
+#[test]
+fn region_search_in_maps_is_checked_or_exact() {
+    let line = "precision --scene freedm-map12 --path places --frames 2 --cubes 0 --processes 1 \
+                --structure linear --format json";
+    let outcome = json(&works(Path::new("."), line));
+    let points = array(&outcome, "region_points").iter();
+    let numbers: Vec<_> = points.map(|p| p["numbers"].as_str()).collect();
+    assert_eq!(numbers.len(), 2);
+    assert!(numbers.contains(&Some("f32 + check")) && numbers.contains(&Some("exact")));
+}
+
 #[test]
 fn where_nothing_is_visible_no_share_is_printed() {
     let folder = tempfile::tempdir().expect("a folder");

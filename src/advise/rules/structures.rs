@@ -31,27 +31,39 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
             None => 0.0,
         };
         let least = change.map_or(all, |change| change.measured[0]);
-        let reason = format!(
-            "{scan} is faster than {tree} up to {} items, of parts of {} to {} items",
-            count(crossing as usize),
-            count(least as usize),
-            count(all as usize)
-        );
         // Follows the structure taken, wherever there was a choice.
         let costs = taken.tree_and_scan_ns();
+        let is_tie = taken.tree_and_scan_tie();
+        // A scan that ties with a tree wins nowhere.
+        let ties = taken.is_scan && is_tie == Some(true);
+        let reason = match costs {
+            None => format!("no part was measured with both {scan} and {tree}: their times decide"),
+            Some(_) if ties => format!("{scan} and {tree} tie at {} items", count(all as usize)),
+            Some(_) => format!(
+                "{scan} is faster than {tree} up to {} items, of parts of {} to {} items",
+                count(crossing as usize),
+                count(least as usize),
+                count(all as usize)
+            ),
+        };
+        let pays = facts.checks.first().and_then(|check| check.pays);
         let saving = costs.map(|[tree, scan]| 1.0 - scan / tree);
         Finding {
             saving: saving.or(facts.saving()),
             cost_ns: costs,
             decision: costs.map(|_| Decision::of(taken.is_scan)),
-            is_tie: costs.map(|_| taken.is_mixed),
+            is_tie,
+            measured: pays.filter(|_| costs.is_none()),
             note: match crossing {
                 // Parts are measured with the structures that there were.
                 _ if costs.is_none() => String::new(),
+                _ if ties => "a scan and a tree tie".to_owned(),
                 0.0 => format!("no scan wins from {} items on", count(least as usize)),
                 _ => format!("a scan wins up to {} items", count(crossing as usize)),
             },
-            ..Finding::new(all, crossing, reason)
+            compared: costs.map(|_| [all, crossing]),
+            reason,
+            ..Finding::default()
         }
     }))
 }

@@ -366,7 +366,7 @@
   document.addEventListener("keydown", (event) => {
     const act = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     const isOwn = event.target.matches?.("button,summary,input[type=checkbox]") && event.key === " ";
-    const isSlider = event.target === $("frame") && event.key.length > 1;
+    const isSlider = event.target === $("frame") && event.key.length > 1 && !event.shiftKey;
     if (!act || isOwn || isSlider || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     act(event);

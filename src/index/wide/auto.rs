@@ -37,7 +37,7 @@ const PART: usize = 3;
 
 // Times in ns, measured on one processor (AVX-512). Only their ratios choose.
 /// A query, besides what it tests, by search.
-const QUERY_NS: [f64; 2] = [100.0, 51.0];
+const QUERY_NS: [f64; 2] = [51.0, 51.0];
 /// A tested node, item, plane of an item, and an item passed with its subtree.
 const TREE_NS: [f64; 4] = [1.5, 0.12, 0.15, 0.03];
 /// An item of a scan, in the nearest cache.
@@ -441,7 +441,8 @@ impl RegionIndex for Auto {
     fn chose(&self) -> Option<String> {
         let others = |names: &[&str], costs: &[f64], taken: usize| {
             let others = (0..names.len()).filter(|&i| i != taken && costs[i].is_finite());
-            let ratio = |i: usize| format!("{} ({:.3} x)", names[i], costs[i] / costs[taken]);
+            let ratio =
+                |i: usize| format!("{} (modelled {:.3} x)", names[i], costs[i] / costs[taken]);
             let others = others.map(ratio).collect::<Vec<_>>().join(", ");
             let not = if others.is_empty() { "" } else { ", not " };
             format!("{not}{others}")

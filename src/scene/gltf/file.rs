@@ -119,6 +119,8 @@ pub struct File<'f> {
     pub root: Root,
     pub exact: Exact,
     pub buffers: Vec<Rc<Cow<'f, [u8]>>>,
+    /// Bytes of all buffers.
+    pub bytes: usize,
 }
 
 impl<'f> File<'f> {
@@ -162,6 +164,7 @@ impl<'f> File<'f> {
             root,
             exact,
             buffers: Vec::new(),
+            bytes: 0,
         };
         let listed = std::mem::take(&mut file.root.buffers);
         // Thousands of buffers may be one file.
@@ -177,6 +180,7 @@ impl<'f> File<'f> {
             if let Some(uri) = &buffer.uri {
                 linked.insert(uri, bytes.clone());
             }
+            file.bytes += bytes.len();
             file.buffers.push(bytes);
         }
         file.root.buffers = listed;

@@ -245,17 +245,18 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
             let pair = pairs.find(|pair| pair[0].eq_ignore_ascii_case(key));
             pair.map(|pair| pair[1])
         };
-        let class = value("classname").unwrap_or_default();
-        let is_of_team = class.ends_with("spawn") || class.ends_with("player");
-        if !(class.starts_with("info_player_") || class.starts_with("team_CTF_") && is_of_team) {
-            let is_part = value("model").is_some_and(|model| model.starts_with('*'));
-            moved += usize::from(is_part && value("origin").is_some_and(|at| at != "0 0 0"));
-            continue;
-        }
         let numbers = |key: &str| -> Option<Vec<f64>> {
             let number = |word: &str| word.parse::<f32>().ok().map(f64::from);
             value(key)?.split_whitespace().map(number).collect()
         };
+        let class = value("classname").unwrap_or_default();
+        let is_of_team = class.ends_with("spawn") || class.ends_with("player");
+        if !(class.starts_with("info_player_") || class.starts_with("team_CTF_") && is_of_team) {
+            let is_part = value("model").is_some_and(|model| model.starts_with('*'));
+            let has_origin = numbers("origin").is_some_and(|at| at.iter().any(|x| *x != 0.0));
+            moved += usize::from(is_part && has_origin);
+            continue;
+        }
         let of_three = |key| <[f64; 3]>::try_from(numbers(key)?).ok().map(DVec3::from);
         let yaw = || numbers("angle")?.first().copied();
         let angles = of_three("angles").or_else(|| Some(DVec3::Y * yaw()?));
@@ -267,8 +268,11 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
         };
         let [pitch, yaw] = [angles.x, angles.y].map(f64::to_radians);
         let level = libm::cos(pitch);
+        // The camera of the scores stands at its very place.
+        let is_camera = class == "info_player_intermission";
+        let height = if is_camera { 0.0 } else { EYE_HEIGHT };
         places.push(CameraPlace {
-            eye: origin + DVec3::Z * EYE_HEIGHT,
+            eye: origin + DVec3::Z * height,
             forward: DVec3::new(
                 libm::cos(yaw) * level,
                 libm::sin(yaw) * level,
@@ -295,6 +299,7 @@ fn entities_of(mut text: &str) -> Vec<Vec<&str>> {
                 rest
             }
             b'/' if rest.starts_with('/') => rest.trim_start_matches(|c| c != '\n'),
+            b'/' if rest.starts_with('*') => rest.split_once("*/").map_or("", |(_, rest)| rest),
             b'}' => {
                 all.push(std::mem::take(&mut words));
                 rest

@@ -100,6 +100,7 @@ fn entities_are_read_as_the_engine_reads_them() {
             format!("{{{}}}", spawn.replace("classname", "ClassName")),
             1,
         ),
+        (format!("/* {{{spawn}}} */{{{spawn}}}"), 1),
         (format!("{{{spawn}"), 1),
         ("\"".to_owned(), 0),
     ] {
@@ -114,13 +115,16 @@ fn each_spawn_point_lies_in_an_open_leaf_and_its_box() {
     let at = |x: f64, y: f64, z: f64| found(DVec3::new(x, y, z));
     let map = map_of(&scene);
     for (place, leaf) in scene.places.iter().zip([0, 1, 2]) {
-        for height in [0.0, EYE_HEIGHT] {
-            let p = place.eye - DVec3::Z * height;
+        for p in [place.eye, place.eye.with_z(20.0)] {
             assert_eq!(found(p), [leaf]);
             let grown = &map.tree.boxes[leaf as usize];
             assert!(grown.contains_point(p.as_vec3()));
         }
     }
+    // Players have eyes, and the camera of the scores is where it is.
+    let heights = scene.places.iter().map(|place| place.eye.z);
+    let standing = 24.0 + EYE_HEIGHT;
+    assert_eq!(heights.collect::<Vec<_>>(), [standing, standing, 20.0]);
     // On a plane, just before it, in a wall, and beyond the map.
     assert_eq!(at(128.0, 64.0, 9.0), [2]);
     assert_eq!(at(128f64.next_down(), 64.0, 9.0), [0]);

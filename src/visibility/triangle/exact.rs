@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::arithmetic::exact::{self, ExactVector};
 use crate::arithmetic::{Expansion, cross, two_sum};
-use crate::camera::Camera;
+use crate::camera::{Camera, Pose};
 use crate::kernel::each;
 
 /// An eye in scene-local coordinates, as an exact sum of two f64 per axis, beside
@@ -30,9 +30,22 @@ pub struct Eye {
 impl Eye {
     /// The eye of a camera on surfaces about an origin.
     pub fn of(camera: &Camera, origin: DVec3) -> Eye {
-        match camera.lens.is_orthographic() {
-            true => Eye::along(camera.frame.forward()),
-            false => Eye::at(camera.frame.eye, origin),
+        if !camera.lens.is_orthographic() {
+            return Eye::at(camera.frame.eye, origin);
+        }
+        // As written: a direction, or a difference of two points, which has two terms.
+        match Pose::of(camera).direction() {
+            Some(exact) => {
+                let term = |n| {
+                    exact
+                        .each_ref()
+                        .map(|x| x.terms().iter().nth_back(n).copied())
+                };
+                let [high, low] =
+                    [0, 1].map(|n| DVec3::from(term(n).map(Option::unwrap_or_default)));
+                Eye::new(-high, -low, 0.0)
+            }
+            None => Eye::along(camera.frame.forward()),
         }
     }
 

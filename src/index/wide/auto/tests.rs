@@ -130,8 +130,8 @@ fn what_is_forced_is_taken_and_said() {
     let mut rng = Pcg64::seed_from_u64(6);
     let mut items = cubes(&mut rng, 2000);
     let (scan, tree) = (
-        "scan of all items, not tree (",
-        "tree, not scan of all items (",
+        "scan of all items, not tree (modelled ",
+        "tree, not scan of all items (modelled ",
     );
     for (params, search, update) in [
         (":use=linear", scan, "scan of overwritten leaves"),
@@ -318,5 +318,19 @@ fn queries_between_updates_are_counted_up_to_a_number() {
         }
         assert_eq!(index.asked.load(Relaxed), queries.min(MOST_ASKED));
         assert!(index.refit(&items, &[1]));
+    }
+}
+
+/// A tree of few leaves costs more than it saves.
+#[test]
+fn few_items_are_scanned_and_many_searched() {
+    let mut rng = Pcg64::seed_from_u64(9);
+    for (count, search) in [
+        (16, "scan of all"),
+        (50, "scan of all"),
+        (2000, "tree, not"),
+    ] {
+        let told = built(&cubes(&mut rng, count), "").chose().unwrap();
+        assert!(told.starts_with(search), "{count}: {told}");
     }
 }

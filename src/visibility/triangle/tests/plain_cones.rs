@@ -121,7 +121,8 @@ impl TriangleCull for PlainCones {
         let each = self.cones.iter().zip(kept.words_mut());
         if eye.weight == 0.0 {
             // `dot(view, cone_axis) >= cone_cutoff` for a parallel lens.
-            let gone = each.filter(|(cone, _)| (-eye.nearest).dot(cone.axis) >= cone.cutoff);
+            let gone =
+                each.filter(|(cone, _)| (-eye.nearest).normalize().dot(cone.axis) >= cone.cutoff);
             gone.for_each(|(_, word)| *word = 0);
         } else {
             let gone = each.filter(|(cone, _)| cone.rejects(eye.nearest));
