@@ -72,7 +72,10 @@ pub fn time(args: &DriftArgs, timing: &Timing) -> anyhow::Result<ProcessTimes> {
 
 /// A number of steps.
 fn steps(count: u64) -> String {
-    format!("{:e}", count as f64)
+    match count < 1000 {
+        true => count.to_string(),
+        false => format!("{:e}", count as f64),
+    }
 }
 
 /// Two digits of something that spans many powers of ten.

@@ -192,7 +192,7 @@ impl KernelArgs {
 
     /// The instruction set, and the largest number of threads.
     ///
-    /// Fails if this machine lacks the instruction set.
+    /// Fails if this machine lacks the instruction set, or for a number named twice.
     pub fn execution(&self) -> Result<Execution, SpecError> {
         let kernel = self.name.unwrap_or_else(Kernel::best);
         if !kernel.is_available() {
@@ -202,6 +202,11 @@ impl KernelArgs {
                  available: {}",
                 here.join(", ")
             )));
+        }
+        let again = |n: &usize| self.threads.iter().filter(|other| *other == n).count() > 1;
+        if let Some(n) = self.threads.iter().copied().find(again) {
+            let message = format!("--threads: {n} is named twice; expected each once");
+            return Err(SpecError::new(message));
         }
         Ok(Execution {
             kernel,

@@ -56,9 +56,7 @@ fn missed(camera: Camera) -> [bool; 4] {
     let path = CameraPath {
         name: "one".to_owned(),
         cameras: vec![camera],
-        lines: Vec::new(),
-        times: Vec::new(),
-        lens_scale: None,
+        ..CameraPath::default()
     };
     let structures = Registry::builtin().structures("linear");
     let structures = structures.expect("a structure");

@@ -40,12 +40,16 @@ pub struct CameraPath {
     pub times: Vec<f64>,
     /// Scale of far that `visible=` has found.
     pub lens_scale: Option<f64>,
+    /// Cameras of the whole path that are not among these.
+    pub left_out: usize,
 }
 
 impl CameraPath {
     /// At most `most` of the cameras, evenly spread from the first on.
     pub fn at_most(mut self, most: usize) -> CameraPath {
+        let all = self.cameras.len();
         thin(&mut self.cameras, most);
+        self.left_out += all - self.cameras.len();
         thin(&mut self.lines, most);
         thin(&mut self.times, most);
         self

@@ -128,6 +128,7 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
     }
     Ok(CameraPath {
         lens_scale: None,
+        left_out: 0,
         name: file.to_owned(),
         times,
         cameras,

@@ -330,4 +330,5 @@ fn a_long_path_is_thinned_evenly() {
     assert_eq!(some.lines, [2, 4, 7, 9]);
     assert_eq!(some.times, [0.0, 2.0, 5.0, 7.0]);
     assert_eq!(some.cameras[3], all.cameras[7]);
+    assert_eq!((all.left_out, some.left_out), (0, 6));
 }

@@ -69,6 +69,12 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         &[twice],
         "scene 'scene.csv' is named twice; expected each once",
     );
+    let twice = "run --scene scene.csv --path orbit --threads 1,2,1";
+    all_refused(
+        &folder,
+        &[twice],
+        "--threads: 1 is named twice; expected each once",
+    );
 }
 
 #[test]

@@ -172,7 +172,8 @@ const METHODS: [&str; 2] = ["f32", "f32-polar-100"];
 /// that is built for each camera, or takes few steps, does not need it. Checked by walking.
 pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
     let tolerance = trials.case.options.tolerance;
-    let steps = trials.case.workload.cameras.len() as u64;
+    let path = trials.case.path;
+    let steps = (path.cameras.len() + path.left_out) as u64;
     let rotations = rotations(&METHODS, steps);
     let &[(left_out, left_out_ns), (kept, kept_ns)] = &rotations[..] else {
         return Err(not_applicable("no such method"));
