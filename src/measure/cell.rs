@@ -195,9 +195,9 @@ pub struct SceneInfo {
     pub unit: Option<String>,
     /// Scene-local zero in world coordinates.
     pub origin: [f64; 3],
-    /// Smallest corner of all items, scene-local.
+    /// Smallest corner of all items, in world coordinates.
     pub bounds_min: [f64; 3],
-    /// Largest corner of all items, scene-local.
+    /// Largest corner of all items, in world coordinates.
     pub bounds_max: [f64; 3],
     /// Items that were left out because they could not be read.
     pub skipped_items: usize,

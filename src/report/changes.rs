@@ -375,7 +375,7 @@ mod tests;
 /// A fact that differs.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Setting {
-    /// "machine" or "toolchain"; between shards "program" or "plan" as well.
+    /// "machine", "toolchain" or "run"; between shards "program" or "plan" as well.
     pub of: &'static str,
     /// Name of the fact.
     pub what: &'static str,
@@ -431,6 +431,11 @@ pub(super) fn differences(old: Vec<Fact>, new: Vec<Fact>) -> impl Iterator<Item 
 
 /// Differing facts, in the order of the report.
 pub fn settings(old: &Report, new: &Report) -> Vec<Setting> {
-    let [old, new] = [old, new].map(|report| facts(&report.machine, &report.toolchain));
+    let [old, new] = [old, new].map(|report| {
+        let threads = ("run", "threads", false, report.run.threads.to_string());
+        let mut all = facts(&report.machine, &report.toolchain);
+        all.push(threads);
+        all
+    });
     differences(old, new).collect()
 }

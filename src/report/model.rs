@@ -75,6 +75,9 @@ pub struct RunInfo {
     /// Processes that the rounds were spread over, as planned.
     #[serde(default = "one")]
     pub processes: u32,
+    /// Threads of a build, and of views that are shared.
+    #[serde(default = "one")]
+    pub threads: u32,
     /// `i/n` where only a share of the plan was run.
     #[serde(default)]
     pub shard: Option<String>,

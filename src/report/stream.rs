@@ -78,6 +78,7 @@ impl Line<'_> {
 impl Header {
     /// Header of a plan that begins here and now, without a command line.
     pub fn of(plan: &Plan, machine: Machine, id: String, started_at: String) -> Header {
+        let threads = plan.structures.iter().map(|s| s.execution.threads);
         Header {
             schema_version: SCHEMA_VERSION,
             run: RunInfo {
@@ -86,6 +87,7 @@ impl Header {
                 seed: plan.seed,
                 generator: GENERATOR_NAME.to_owned(),
                 processes: plan.effort.processes,
+                threads: threads.max().unwrap_or(1) as u32,
                 ..RunInfo::default()
             },
             args: Vec::new(),

@@ -131,6 +131,7 @@ fn other_cameras_or_batches_are_another_measurement() {
     for change in [
         (|cell| cell.times.cameras_timed = 128) as fn(&mut ReportCell),
         |cell| cell.times.batch = 8,
+        |cell| drop(cell.times.by_process.insert("views_ns".into(), vec![1.0])),
         |cell| cell.scene.digest.push('x'),
         |cell| cell.path.camera_count += 1,
     ] {
@@ -349,7 +350,8 @@ fn facts_of_machine_and_build_that_differ_are_named() {
     assert!(settings(&old, &new).is_empty());
     new.machine.cpu = None;
     new.toolchain.flags = "-O".to_owned();
+    new.run.threads = 2;
     let found = settings(&old, &new);
     let found: Vec<_> = found.iter().map(|s| (s.what, s.is_machine)).collect();
-    assert_eq!(found, [("cpu", true), ("flags", false)]);
+    assert_eq!(found, [("cpu", true), ("flags", false), ("threads", false)]);
 }
