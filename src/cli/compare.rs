@@ -189,7 +189,7 @@ fn figure(table: &CompareTable) -> Option<Figure> {
         let structure = &shortened(structure, 24);
         // As much as the narrowest page shows.
         let used = structure.chars().count() + metrics.get(1).map_or(0, |_| METRIC);
-        let room = 52_usize.saturating_sub(used).min(36);
+        let room = 48_usize.saturating_sub(used).min(36);
         let at = text::some(groups.get(1), |_| format!(" {}", place(group, room, short)));
         let metric = row.metric.filter(|_| metrics.len() > 1);
         let metric = text::some(metric, |metric| format!(" {metric}"));
