@@ -120,12 +120,12 @@ pub mod visibility;
 /// A structure of one's own takes more, of [`index`] and [`query`]: see
 /// `examples/enter_your_crate.rs`.
 pub mod prelude {
-    pub use crate::camera::{Camera, Lens, PlaneOptions, look_at};
+    pub use crate::camera::{Camera, Lens, PlaneOptions, Surroundings, look_at};
     pub use crate::culling::{Culling, CullingTest};
     pub use crate::geometry::{Aabb, ConvexVolume, Plane};
     pub use crate::index::{
-        Bsp, Bvh, FrustumQuery, Input, Linear, Octree, Quadtree, RegionIndex, Registry,
-        StructureSpec, UniformGrid, Wide,
+        Bsp, BuildError, Bvh, FrustumQuery, Input, Linear, Moving, Octree, Quadtree, RegionIndex,
+        Registry, StructureSpec, UniformGrid, Wide,
     };
     pub use crate::measure::Status;
     pub use crate::path::{self, CameraPath};

@@ -48,6 +48,10 @@ pub enum LensKind {
 }
 
 impl Lens {
+    /// A lens by its full vertical angle in degrees and width / height.
+    ///
+    /// Without `far` what is visible has no end.
+    ///
     /// # Errors
     /// fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0 or, as far,
     /// beyond 1e100, near >= far, a value that is not finite. A far plane beyond
@@ -56,12 +60,16 @@ impl Lens {
         Lens::new(LensKind::Perspective { fovy_deg, aspect }, near, far)
     }
 
+    /// A lens of parallel rays by its height in world units and width / height.
+    ///
     /// # Errors
     /// Height or aspect outside 1e-100 to 1e100, near >= far, a value that is not finite.
     pub fn orthographic(height: f64, aspect: f64, near: f64, far: f64) -> Result<Lens> {
         Lens::new(LensKind::Orthographic { height, aspect }, near, Some(far))
     }
 
+    /// A lens by its window on the near plane: left, right, bottom, top.
+    ///
     /// # Errors
     /// An empty window or one outside 1e-100 to 1e100 of near, near not above 0,
     /// near >= far, a value that is not finite.

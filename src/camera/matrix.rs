@@ -79,6 +79,8 @@ pub struct ViewProjection {
 }
 
 impl ViewProjection {
+    /// A camera by its rows as written on paper: of an array by columns its transpose.
+    ///
     /// # Errors
     /// An entry that is not finite, or neither zero nor of a size from 1e-60 to
     /// 1e60; a singular matrix; one whose clip volume is empty.

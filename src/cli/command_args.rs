@@ -82,7 +82,7 @@ pub struct FunnelArgs {
     /// reflection with and without a stencil
     #[arg(long, value_name = "ITEM", value_parser = values::whole(0..=ItemId::MAX))]
     pub mirror: Option<ItemId>,
-    /// Back end of the region stage [default: the best for the regions of the scene]
+    /// Back end of the region stage [default: the safe one that removes the most]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,
     /// Back end of the occlusion stage

@@ -326,7 +326,7 @@ fn short_count(typed: &str) -> String {
     }
 }
 
-/// Reasons why cells are not ok, each once with the number of its paths.
+/// Reasons why cells are not ok, each once with the number of its measurements.
 pub fn reasons(group: &[&Comparison]) -> Vec<String> {
     notes(group, |cell| {
         let reason = cell.reason.as_ref()?;
@@ -334,7 +334,7 @@ pub fn reasons(group: &[&Comparison]) -> Vec<String> {
     })
 }
 
-/// Choices of structures, each once with the number of its paths.
+/// Choices of structures, each once with the number of its measurements.
 pub fn choices(group: &[&Comparison]) -> Vec<String> {
     notes(group, |cell| cell.chose.clone())
 }
@@ -346,7 +346,7 @@ fn notes(group: &[&Comparison], of: impl Fn(&ReportCell) -> Option<String>) -> V
     let lines = grouped(notes).into_iter().map(|(line, found)| {
         let count = match group.len() {
             1 => String::new(),
-            all => format!(" ({} of {all} paths)", found.len()),
+            all => format!(" ({} of {all} measurements)", found.len()),
         };
         text::plain(&line) + &count
     });

@@ -365,8 +365,7 @@ fn check_options(input: &FunnelInput) -> Result<()> {
 
 /// Regions of the scene, with the claimed table.
 fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
-    let scene = &input.setting.scene;
-    let name = &scene.name;
+    let (scene, name) = (&input.setting.scene, &input.setting.scene.name);
     let listed = match &scene.regions {
         scene::Regions::Bsp(map) if !map.reject.is_empty() => map.sectors.len() as u64,
         scene::Regions::Leaves(map) if map.sees().is_some() => map.clusters as u64,
@@ -378,7 +377,8 @@ fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
             let (own, all) = (claim.len(), regions.graph.len());
             ensure!(
                 regions.store(claim.clone(), Source::Claim),
-                "the potentially visible set has {own} regions; expected the scene's {all}"
+                "--pvs: {}; expected the scene's {all}",
+                counted(own, "region")
             );
             Ok(Some(regions))
         }

@@ -217,6 +217,8 @@ pub struct ConvexVolumeF64 {
 }
 
 impl ConvexVolumeF64 {
+    /// The volume on the inner side of all planes; without any it is all of space.
+    ///
     /// # Errors
     /// More than 32 planes, or a plane with a NaN or infinite number.
     pub fn from_planes(planes: &[PlaneF64]) -> Result<Self, VolumeError> {

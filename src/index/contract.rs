@@ -86,7 +86,7 @@ pub struct MemoryUsage {
 impl MemoryUsage {
     /// Sum of nodes and items.
     pub fn total(&self) -> usize {
-        self.node_bytes + self.item_bytes
+        self.node_bytes.saturating_add(self.item_bytes)
     }
 }
 

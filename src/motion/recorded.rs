@@ -23,6 +23,8 @@ pub(super) struct Recorded {
     ends: Vec<usize>,
     /// Time of each frame, s.
     times: Vec<f64>,
+    /// Reach of a whole file of which these frames are a part.
+    reach: Vec3,
 }
 
 impl Recorded {
@@ -47,6 +49,8 @@ impl Recorded {
     /// An item's last row counts.
     pub(super) fn at<'t>(&self, times: impl Iterator<Item = &'t f64>) -> (Recorded, usize) {
         let (mut paced, mut next) = (Recorded::default(), 0);
+        // The margin of a frame depends on the file alone.
+        paced.reach = self.reach();
         for time in times {
             let first = next;
             next += self.times[first..].partition_point(|own| own <= time);
@@ -63,7 +67,7 @@ impl Recorded {
     }
 
     pub(super) fn reach(&self) -> Vec3 {
-        Aabb::union_of(&self.boxes).reach()
+        Aabb::union_of(&self.boxes).reach().max(self.reach)
     }
 
     pub(super) fn digest(&self, hash: &mut hmac_sha256::Hash) {

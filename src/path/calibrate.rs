@@ -4,6 +4,7 @@ use super::unfit;
 use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions};
 use crate::input::Result;
 use crate::scene::Scene;
+use crate::shown::significant;
 
 /// Maximum numbers of items and cameras sampled per step of the search.
 const MOST_ITEMS: usize = 8_000;
@@ -65,15 +66,16 @@ pub(super) fn for_visible_share(
     let unreached = |found: &str, wanted: &str| {
         let scene = &scene.name;
         let reason = format!(
-            "visible={share} cannot be reached: six planes return {found} of '{scene}' along \
-             it; expected a {wanted} share"
+            "visible={}% cannot be reached: six planes return {found} of '{scene}' along \
+             it; expected a {wanted} share",
+            significant(share * 100.0)
         );
         unfit(path, reason)
     };
     let (mut low, mut high) = (1e-4, 4.0);
     let most = visible(high)?;
     if most < share {
-        let found = format!("at most {:.2}%", most * 100.0);
+        let found = format!("at most {}%", significant(most * 100.0));
         return Err(unreached(&found, "smaller"));
     }
     let mut reached = [visible(low)?, most];
@@ -87,10 +89,10 @@ pub(super) fn for_visible_share(
         }
     }
     if reached[1] > share * MOST_ABOVE {
-        let [below, above] = reached.map(|share| share * 100.0);
-        let found = match below < share * 100.0 {
-            true => format!("{below:.2}% or {above:.2}%, and no share between,"),
-            false => format!("at least {above:.2}%"),
+        let [below, above] = reached.map(|share| significant(share * 100.0));
+        let found = match reached[0] < share {
+            true => format!("{below}% or {above}%, and no share between,"),
+            false => format!("at least {above}%"),
         };
         return Err(unreached(&found, "larger"));
     }

@@ -142,8 +142,8 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
     "outside", "the whole scene from outside, from all around", "", families::outside;
     "street", "eyes outside of every item, above the ground, looking level",
         "height=1.7 (above the ground), near=0.1", street::frames;
-    "walk", "through the doors of rooms or a Doom map at constant height above the floors",
-        "height=1.7 (eyes above the floor; 41 in a Doom map), doors=32 (passed)", walk::frames;
+    "walk", "through the doors of rooms or a Doom map at constant height; posts and furniture are no obstacle",
+        "height=1.7 (above a room's lower face; 41 above the floor in a Doom map), doors=32 (passed)", walk::frames;
     "places", "the scene's own camera places (things of a Doom map, cameras of glTF)",
         "frames=1000 (at most as many, evenly spread; all without it)", families::places;
     "animation", "the camera that the animation of a glTF file moves, at even times", "", families::animation;

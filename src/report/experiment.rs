@@ -83,7 +83,9 @@ impl Experiment {
     pub fn run(&self) -> Result<Report, ExperimentError> {
         self.check()?;
         let started_at = utc(SystemTime::now());
-        let (machine, id) = (Machine::capture(), started_at.clone());
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        let digits = now.map_or(0, |now| now.subsec_nanos() ^ std::process::id()) & 0xFFFF;
+        let (machine, id) = (Machine::capture(), format!("{started_at}-{digits:04x}"));
         let mut header = Header::of(&self.plan, machine, id, started_at);
         header.run.processes = 1;
         let mut stream = Stream::of(header);

@@ -31,7 +31,7 @@ pub struct Merged {
 /// common, and the command that they make; what they are is the caller's to compare.
 ///
 /// # Errors
-/// An unfinished shard; another seed, suite, structure, machine, build or
+/// No shard or an unfinished one; another seed, suite, structure, machine, build or
 /// source; a cell in two shards; without `partial` a group in none.
 pub fn merge(
     folders: &[PathBuf],
@@ -49,7 +49,9 @@ pub fn merge(
         }
         shards.push((path, stream));
     }
-    let (first, begin) = &shards[0];
+    let Some((first, begin)) = shards.first() else {
+        return Err(InputError::new("no shard; expected one or more"));
+    };
     for (n, (path, stream)) in shards.iter().enumerate() {
         let is_whole = stream.header.run.shard.is_none();
         let mut before = shards[..n].iter();

@@ -77,7 +77,7 @@ pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyVolume<'v>>) -> Strin
     let values = planes.map(|plane| plane.value_at(plane.p_vertex(b)));
     let lowest = values.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
     let Some((index, value)) = lowest else {
-        return format!("{bounds}: the volume has no plane");
+        return format!("{bounds}: the volume has no plane, so it sees every box");
     };
     let (plane, label) = (volume.planes()[index], volume.plane_label(index));
     let ([x, y, z], d) = (plane.normal.to_array(), plane.d);

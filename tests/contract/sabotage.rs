@@ -53,6 +53,9 @@ const FAR_ITEMS_ARE_NOT_REFITTED: Fault = 32;
 const MEMORY_PANICS: Fault = 33;
 const CHOICE_PANICS: Fault = 34;
 const CELLS_PANICS: Fault = 35;
+const REFIT_KEEPS_SIZES: Fault = 36;
+const LOSES_ONE_IF_ITEMS_COME: Fault = 37;
+const ACCEPTS_TOO_MANY: Fault = 38;
 
 const CLAIMS_TO_REFIT: Fault = 21;
 const REFITS_UNDECLARED: Fault = 22;
@@ -176,7 +179,8 @@ impl<const CLAIMS: Claims> Toy<CLAIMS> {
             return ControlFlow::Continue(());
         }
         if verdict == Containment::Inside {
-            recorder.subtree_accepted(node.items.len());
+            let times = if self.fault == ACCEPTS_TOO_MANY { 8 } else { 1 };
+            recorder.subtree_accepted(times * node.items.len());
             return self.hand_over(node.items.clone(), sink);
         }
         if self.fault == MASK_LOSES_AN_OPEN_PLANE && !Q::IS_POINT && node.items.len() < 64 {
@@ -242,7 +246,8 @@ impl<const CLAIMS: Claims> RegionIndex for Toy<CLAIMS> {
             (INVERTED_BOXES_ARE_SOUND, Ok(_)) => (0..items.len() as ItemId).collect(),
             (_, ids) => ids?,
         };
-        if fault == DROPS_AN_ITEM && ids.len() > 100 {
+        let is_less = fault == LOSES_ONE_IF_ITEMS_COME && input.come_and_go;
+        if is_less || fault == DROPS_AN_ITEM && ids.len() > 100 {
             ids.pop();
         }
         let x = |id: &ItemId| items[*id as usize].centre().x;
@@ -357,7 +362,11 @@ impl<const CLAIMS: Claims> RegionIndex for Toy<CLAIMS> {
                 continue;
             }
             if !items[id as usize].is_empty() {
+                let size = b.max - b.min;
                 *b = items[id as usize];
+                if self.fault == REFIT_KEEPS_SIZES {
+                    b.max = b.min + size;
+                }
             }
         }
         if let Some(root) = &mut self.root
@@ -437,6 +446,9 @@ fn every_fault_is_caught_and_every_property_catches_one() {
         MEMORY_PANICS: "declared_capabilities_are_true";
         CHOICE_PANICS: "declared_capabilities_are_true";
         CELLS_PANICS: "declared_capabilities_are_true";
+        REFIT_KEEPS_SIZES: "refit_equals_a_fresh_build";
+        LOSES_ONE_IF_ITEMS_COME: "declared_capabilities_are_true";
+        ACCEPTS_TOO_MANY: "every_view_sees_what_the_scan_sees";
         ITEMS_ARE_TESTED_LIKE_NODES: "every_view_sees_what_the_scan_sees";
     };
     let mut useful = BTreeSet::new();

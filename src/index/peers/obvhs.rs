@@ -132,9 +132,9 @@ impl BoxTested for PeerObvhs {
                 let all = Aabb::union_of(&self.boxes[first..first + count]);
                 bounds = obvhs::aabb::Aabb::new(all.min.into(), all.max.into());
             }
-            self.bvh.nodes[node].set_aabb(bounds);
-            if !all {
-                self.bvh.refit_from(node);
+            match all {
+                true => self.bvh.nodes[node].set_aabb(bounds),
+                false => self.bvh.resize_node(node, bounds),
             }
         }
         if all && !moves {

@@ -8,7 +8,6 @@ use parry3d::bounding_volume::Aabb as ParryAabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace, TraversalAction};
 use serde::{Deserialize, Serialize};
 
-use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::Record;
@@ -40,12 +39,11 @@ pub enum Parry3dUpdate {
     Reinsert,
 }
 
-/// The crate's tree by its binned builder, whose leaves are indices of items.
+/// The crate's tree by its binned builder, whose leaves are ids.
 ///
 /// Subtrees that are wholly inside are not tested further.
 pub struct PeerParry3d {
     bvh: Bvh,
-    ids: Vec<ItemId>,
     update: Parry3dUpdate,
     workspace: BvhWorkspace,
 }
@@ -104,19 +102,35 @@ impl BoxTested for PeerParry3d {
 
     fn of(items: Vec<Record>, params: &Parry3dParams) -> Result<Self, BuildError> {
         refuse_narrow(Self::ABOUT.name, &items)?;
-        let leaves: Vec<ParryAabb> = items.iter().map(|item| crate_box(&item.bounds)).collect();
+        let leaves = items
+            .iter()
+            .map(|item| (item.id as usize, crate_box(&item.bounds)));
+        let bvh = match items.len() {
+            // The builder takes these for the leaves 0 and 1.
+            0..=2 => {
+                let mut bvh = Bvh::new();
+                leaves.for_each(|(id, bounds)| bvh.insert(bounds, id as u32));
+                bvh
+            }
+            _ => Bvh::from_iter(BvhBuildStrategy::Binned, leaves),
+        };
         Ok(PeerParry3d {
-            bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves),
-            ids: items.iter().map(|item| item.id).collect(),
+            bvh,
             update: params.update,
             workspace: BvhWorkspace::default(),
         })
     }
 
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        let placed = placed(&self.ids, |id| *id, items, moved)?;
-        for (leaf, bounds) in &placed {
-            let (leaf, bounds) = (*leaf as u32, crate_box(bounds));
+        // After a removal the crate allows no `refit_partial`.
+        let mut removes = false;
+        for &leaf in moved {
+            if items[leaf as usize].is_empty() {
+                removes |= self.bvh.leaf_node(leaf).is_some();
+                self.bvh.remove(leaf);
+                continue;
+            }
+            let bounds = crate_box(&items[leaf as usize]);
             // A leaf that holds the new bounds would keep its old ones.
             let holds = || (self.bvh.leaf_node(leaf)).is_some_and(|n| n.contains_aabb(&bounds));
             if self.update == Parry3dUpdate::Reinsert && !holds() {
@@ -129,9 +143,8 @@ impl BoxTested for PeerParry3d {
             return Some(());
         }
         let is_refit = self.update == Parry3dUpdate::Refit;
-        if is_refit && placed.len() * ALL_SHARE < self.ids.len() {
-            let leaves: Vec<u32> = placed.iter().map(|(leaf, _)| *leaf as u32).collect();
-            self.bvh.refit_partial(&[], &leaves);
+        if is_refit && !removes && moved.len() * ALL_SHARE < self.bvh.leaf_count() as usize {
+            self.bvh.refit_partial(&[], moved);
         } else {
             self.bvh.refit(&mut self.workspace);
         }
@@ -143,12 +156,13 @@ impl BoxTested for PeerParry3d {
 
     fn used(&self) -> MemoryUsage {
         // The crate counts the index of a leaf as a number; it stores an Option.
-        let uncounted = self.ids.len() * (size_of::<Option<usize>>() - size_of::<usize>());
+        let held = self.bvh.leaf_count() as usize;
+        let uncounted = held * (size_of::<Option<usize>>() - size_of::<usize>());
         // Half of the nodes are the leaves.
-        let leaves = self.ids.len() * size_of::<BvhNode>();
+        let leaves = held * size_of::<BvhNode>();
         MemoryUsage {
             node_bytes: (self.bvh.heap_memory_size() + uncounted).saturating_sub(leaves),
-            item_bytes: leaves + size_of_val(&self.ids[..]),
+            item_bytes: leaves,
         }
     }
 
@@ -157,8 +171,8 @@ impl BoxTested for PeerParry3d {
     fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
         let mut flow = ControlFlow::Continue(());
         self.bvh.traverse_indexed(None, |node, at| {
-            if let Some(place) = node.leaf_data() {
-                flow = ask.item(&bounds_of(node), &self.ids[place as usize]);
+            if let Some(id) = node.leaf_data() {
+                flow = ask.item(&bounds_of(node), &id);
                 return match flow {
                     ControlFlow::Continue(()) => TraversalAction::Continue,
                     ControlFlow::Break(()) => TraversalAction::EarlyExit,
@@ -174,9 +188,9 @@ impl BoxTested for PeerParry3d {
             }
             let mut accepted = 0;
             self.bvh.traverse_indexed(Some(at), |node, _| {
-                if let Some(place) = node.leaf_data() {
+                if let Some(id) = node.leaf_data() {
                     accepted += 1;
-                    flow = ask.cx.accept(&self.ids[place as usize..=place as usize]);
+                    flow = ask.cx.accept(&[id]);
                     if flow.is_break() {
                         return TraversalAction::EarlyExit;
                     }

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 
-use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::Record;
@@ -41,8 +40,8 @@ fn slots(node: &ParentNode<Record>) -> usize {
 /// The crate's tree, with the items in its leaves.
 pub struct PeerRstar {
     tree: RTree<Record>,
-    /// The same items by ascending id, by which moved ones are found.
-    items: Vec<Record>,
+    /// Bounds in the tree by id, empty for others; none before the first update.
+    bounds: Vec<Aabb>,
 }
 
 /// An update bulk-loads from one moved item in as many on.
@@ -59,27 +58,40 @@ impl BoxTested for PeerRstar {
     type Params = NoParams;
 
     fn of(items: Vec<Record>, _: &NoParams) -> Result<Self, BuildError> {
-        let tree = RTree::bulk_load(items.clone());
-        Ok(PeerRstar { tree, items })
+        Ok(PeerRstar {
+            tree: RTree::bulk_load(items),
+            bounds: Vec::new(),
+        })
     }
 
     /// `remove` and `insert`, item by item; `bulk_load` from a quarter moved on.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        let placed = placed(&self.items, |item| item.id, items, moved)?;
-        let bulk = placed.len() * BULK_SHARE >= self.items.len();
-        for (at, bounds) in placed {
-            let item = &mut self.items[at];
-            let old = std::mem::replace(&mut item.bounds, bounds);
-            if !bulk {
-                self.tree.remove(&Record {
-                    bounds: old,
-                    ..*item
-                });
-                self.tree.insert(*item);
+        if self.bounds.is_empty() {
+            self.bounds = vec![Aabb::EMPTY; items.len()];
+            for record in &self.tree {
+                self.bounds[record.id as usize] = record.bounds;
+            }
+        }
+        let bulk = moved.len() * BULK_SHARE >= self.tree.size();
+        for &id in moved {
+            let own = &mut self.bounds[id as usize];
+            let old = std::mem::replace(own, items[id as usize]);
+            if bulk {
+                continue;
+            }
+            if !old.is_empty() {
+                self.tree.remove(&Record { bounds: old, id });
+            }
+            if !own.is_empty() {
+                self.tree.insert(Record { bounds: *own, id });
             }
         }
         if bulk {
-            self.tree = RTree::bulk_load(self.items.clone());
+            let held = (0..)
+                .zip(&self.bounds)
+                .filter(|(_, bounds)| !bounds.is_empty());
+            let held = held.map(|(id, &bounds)| Record { bounds, id });
+            self.tree = RTree::bulk_load(held.collect());
         }
         Some(())
     }
@@ -89,7 +101,7 @@ impl BoxTested for PeerRstar {
         let item_bytes = self.tree.size() * slot;
         MemoryUsage {
             node_bytes: (slots(self.tree.root()) * slot).saturating_sub(item_bytes),
-            item_bytes: item_bytes + size_of_val(&self.items[..]),
+            item_bytes: item_bytes + size_of_val(&self.bounds[..]),
         }
     }
 

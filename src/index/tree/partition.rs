@@ -22,6 +22,7 @@ pub trait Splitter {
 
     /// Reorders the records so that the parts are contiguous, and pushes the parts.
     ///
+    /// At most sixteen, which add up to the records; more make the build panic.
     /// No part, or a single one, means that the group cannot be divided in this
     /// way. `node` is the index of the group's node.
     fn split(
@@ -36,7 +37,7 @@ pub trait Splitter {
     fn arrange(&mut self, _records: &mut [Record]) {}
 }
 
-/// Builds a tree over items, with at most `leaf` items per leaf.
+/// Builds a tree over items, with at most `leaf` items per leaf, and at least one.
 ///
 /// Groups that the splitter cannot divide (coincident items, say) are halved
 /// by size, so that no leaf exceeds its limit and the depth stays bounded.
@@ -50,7 +51,7 @@ pub fn build_top_down<S: Splitter>(
     if records.is_empty() {
         return PackedTree::default();
     }
-    let count = records.len();
+    let (count, leaf) = (records.len(), leaf.max(1));
     let mut parts = Vec::new();
     PackedTree::grow(
         count,

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::super::edge_volumes;
 use super::*;
-use crate::geometry::{ConvexVolumeF64, PlaneF64, RelativeVolume, Spheres, sphere_cube};
+use crate::geometry::{ConvexVolumeF64, PlaneF64, PlaneTree, RelativeVolume, Spheres, sphere_cube};
 use crate::index::QueryMany;
 use crate::kernel::Kernel;
 use crate::query::{Located, QueryVolume, Ranges};
@@ -54,6 +54,7 @@ fn views_are_right<T: RegionIndex>(
         let spheres = Spheres::new(volume);
         for index in of_cubes {
             right("spheres", index, &cubes, &spheres)?;
+            right("planes, built of spheres", index, &cubes, volume)?;
         }
         right("f64 planes", index, items, &wide)?;
         let eye = items.first().map_or(Vec3::ONE, |b| b.max);
@@ -132,10 +133,11 @@ fn many_are_right<T: RegionIndex>(items: &[Aabb], index: &T, points: &[Vec3]) ->
             let alone = seen(index, &p);
             let answer = trial.ask(|ids| ids.extend_from_slice(found));
             let fault = answer.err().map(|fault| fault.explained(|_| None));
+            let fault = fault.unwrap_or_default();
             // Another kernel may find them in another order.
             let in_order = found == alone || kernel != Kernel::Portable;
-            ensure(fault.is_none() && in_order, || {
-                format!("{p} among {count} points: {fault:?}; {found:?}, alone {alone:?}")
+            ensure(fault.is_empty() && in_order, || {
+                format!("{p} among {count} points: {fault}; {found:?}, alone {alone:?}")
             })?;
         }
     }
@@ -199,7 +201,13 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
                 let far = if at % 5 == 0 { 0.5 } else { 0.01 };
                 let by = (rng.normal3() * width * far + away).as_vec3();
                 let b = &mut asked.items[id as usize];
-                *b = Aabb::new(b.min + by, b.max + by);
+                // Every third grows too.
+                let grown = if at % 3 == 0 {
+                    b.max - b.min
+                } else {
+                    Vec3::ZERO
+                };
+                *b = Aabb::new(b.min + by, b.max + by + grown.max(Vec3::ZERO));
             }
             // In any order, and more than once.
             let told: Vec<ItemId> = moved.iter().rev().chain(moved.first()).copied().collect();
@@ -298,6 +306,14 @@ pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
         ensure(asked.answers(&shared) == asked.answers(index), || {
             "built on three threads, answered differently".to_owned()
         })?;
+        let input = Input::new(&asked.items).come_and_go(true);
+        let changing = T::build(
+            &input.own_tree(Some(&PlaneTree::default())),
+            &Default::default(),
+        );
+        asked
+            .both_are_right(&changing.map_err(|error| error.to_string())?)
+            .map_err(|error| format!("built for items that come and go: {error}"))?;
         let moved: Vec<ItemId> = (0..asked.items.len() as ItemId).step_by(7).collect();
         for &id in &moved {
             let b = &mut asked.items[id as usize];

@@ -180,11 +180,20 @@ pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     let planes = Q::planes_open(volume.mask());
     let looked_at = cost.items_tested + cost.items_accepted_untested;
     let most = cost.comparisons() * u64::from(planes);
-    let right = ids == plain && looked_at >= ids.len() as u64 && cost.planes_tested <= most;
-    ensure(right, || {
-        let (plain, ids) = (plain.len(), ids.len());
-        format!("{kind}: {plain} ids, {ids} when counted, {planes} planes: {cost:?}")
-    })
+    let count = ids.len() as u64;
+    let is_counted = looked_at >= count && cost.items_accepted_untested <= count;
+    ensure(
+        ids == plain && is_counted && cost.planes_tested <= most,
+        || {
+            let plain = plain.len();
+            format!(
+                "{kind}: {count} ids when counted, expected {plain}; {looked_at} items tested or accepted, \
+             expected {count} or more, of which {} accepted, expected {count} at most; {} planes, \
+             expected {most} at most",
+                cost.items_accepted_untested, cost.planes_tested
+            )
+        },
+    )
 }
 
 /// Corners and centres of some boxes, and points one step of a float beside.

@@ -104,9 +104,14 @@ pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
         u.z * v.x + u.x * v.z,
         u.x * v.y + u.y * v.x,
     );
+    let (size, low) = (w.dot(minors), eye.low.abs().dot(minors));
+    // Every product is zero: in the plane of a view along an axis.
+    if size + low == 0.0 {
+        return false;
+    }
     // Adds the share of the low part of the eye, doubled for the roundings here, and what
     // underflow may take.
-    let bound = FILTER * w.dot(minors) + 2.0 * eye.low.abs().dot(minors) + 1e-300;
+    let bound = FILTER * size + 2.0 * low + 1e-300;
     if determinant.abs() > bound {
         return determinant > 0.0;
     }
