@@ -11,8 +11,10 @@ use crate::index::{MemoryUsage, TreeCell};
 use crate::kernel::prefetch;
 use crate::query::ItemId;
 
-/// A tree packed for queries: 28 bytes per item. Nodes have at most sixteen children,
-/// and 110 to 160 bytes each, with their blocks of sixteen.
+/// A tree packed for queries.
+///
+/// 28 bytes per item; nodes have at most sixteen children, and 110 to 160 bytes each
+/// with their blocks of sixteen.
 #[derive(Default)]
 pub struct PackedTree {
     /// In depth-first order.
