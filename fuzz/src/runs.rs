@@ -64,7 +64,7 @@ fn written(stream: &Stream) -> Vec<u8> {
 
 /// Joins the run with nothing, and continues it.
 fn go_on(folder: &Path) {
-    if let Some(merged) = read(merge(&[folder.to_owned()], &[], true)) {
+    if let Some(merged) = read(merge(&[folder.to_owned()], (&[], ""), true)) {
         merged.missing_named();
         read(merged.write(&folder.join("merged"), &|| false));
     }
