@@ -170,15 +170,15 @@ fn the_last_view_of_a_zoom_has_its_power() {
 fn a_share_below_all_that_can_be_reached_is_refused() {
     let boxes = |n| vec![WorldBox::new(DVec3::ZERO, DVec3::ONE); n];
     for (n, path, wanted) in [
-        (1, "orbit:frames=8,visible=2%", "at least 100.00% of 'b'"),
-        (100, "orbit:frames=8,visible=5", "at least 100.00% of 'b'"),
+        (1, "orbit:frames=8,visible=2%", "at least 100% of 'b'"),
+        (100, "orbit:frames=8,visible=5", "at least 100% of 'b'"),
         (
             100,
             "outside:frames=4,visible=2%",
-            "0.00% or 25.00%, and no share between, of 'b'",
+            "0% or 25.0%, and no share between, of 'b'",
         ),
         (100, "outside:frames=4,visible=20%", ""),
-        (0, "orbit:frames=8,visible=2%", "at most 0.00% of 'b'"),
+        (0, "orbit:frames=8,visible=2%", "at most 0% of 'b'"),
         (1, "orbit:visible=1", "(2%); no count is possible of 1 item"),
         (
             2,
