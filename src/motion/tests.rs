@@ -176,7 +176,10 @@ fn frames_are_those_of_cameras_with_times() {
             times.split(' ').map(row).collect::<String>()
         );
         let path = read_cameras_csv(csv.as_bytes(), "c.csv", &Default::default()).unwrap();
+        let whole = recorded_motion(&text, &scene).reach();
         let motion = recorded_motion(&text, &scene).seen_by(&path, views);
+        // Whichever rows are seen, the margin is that of all.
+        assert_eq!(motion.reach(), whole);
         let again = recorded_motion(&text, &scene).seen_by(&path, views);
         assert_eq!(motion.digest(), again.seen_by(&path, views).digest());
         let frames = frames(&motion, &scene).into_iter();
