@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::parser::ValueSource;
@@ -16,8 +16,8 @@ use super::run_plan::{RunPlan, same_digest};
 use super::{program, tell, text};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
-    Header, RunFolder, RunInfo, SCHEMA_VERSION, Setting, StoppedRun, Stream, dated, read_report,
-    read_stream, utc,
+    Header, RunFolder, RunInfo, SCHEMA_VERSION, Setting, StoppedRun, Stream, dated, digits,
+    read_report, read_stream, utc,
 };
 use crate::scene;
 
@@ -31,9 +31,7 @@ pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFo
              from 1970 to 9999"
         ));
     }
-    // Distinguishes runs of the same second.
-    let nanos = (clock.duration_since(UNIX_EPOCH)).map_or(0, |since| since.subsec_nanos());
-    let id = format!("{:04x}", (nanos ^ std::process::id()) & 0xFFFF);
+    let id = digits(clock);
     let stamp: String = now.chars().filter(|c| !matches!(c, '-' | ':')).collect();
     let path = match &args.out {
         Some(path) => path.clone(),
@@ -319,8 +317,8 @@ mod tests {
     #[test]
     fn any_clock_dates_a_run() {
         let at = |seconds: i64| match u64::try_from(seconds) {
-            Ok(after) => UNIX_EPOCH + Duration::from_secs(after),
-            Err(_) => UNIX_EPOCH - Duration::from_secs(seconds.unsigned_abs()),
+            Ok(after) => SystemTime::UNIX_EPOCH + Duration::from_secs(after),
+            Err(_) => SystemTime::UNIX_EPOCH - Duration::from_secs(seconds.unsigned_abs()),
         };
         for (seconds, wanted) in [
             (-1, "1970-01-01T00:00:00Z"),

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::SystemTime;
 
 use super::Report;
-use super::stream::{Header, KeptPart, Stream, utc};
+use super::stream::{Header, KeptPart, Stream, digits, utc};
 use crate::index::StructureSpec;
 use crate::measure::{
     Effort, ExperimentError, Extras, Machine, Part, Plan, PlannedScene, Share, measure_scene,
@@ -83,9 +83,8 @@ impl Experiment {
     pub fn run(&self) -> Result<Report, ExperimentError> {
         self.check()?;
         let started_at = utc(SystemTime::now());
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-        let digits = now.map_or(0, |now| now.subsec_nanos() ^ std::process::id()) & 0xFFFF;
-        let (machine, id) = (Machine::capture(), format!("{started_at}-{digits:04x}"));
+        let id = format!("{started_at}-{}", digits(SystemTime::now()));
+        let machine = Machine::capture();
         let mut header = Header::of(&self.plan, machine, id, started_at);
         header.run.processes = 1;
         let mut stream = Stream::of(header);

@@ -27,7 +27,7 @@ pub use ranking::{Comparison, Mean, Overall, Speedup, comparisons, times_as_fast
 pub use ranking::{asked_otherwise, grouped, timed_otherwise, unique};
 pub use reading::{Reading, Views, views};
 pub use reading::{read_report, read_stream};
-pub use stream::{Header, KeptPart, Line, Stream, dated, utc};
+pub use stream::{Header, KeptPart, Line, Stream, dated, digits, utc};
 pub use surface::{Crossing, Place, Surface, surfaces};
 pub use surface::{Growth, growths};
 pub use writing::{folder_of, temporary_in, try_folder, try_place, write_atomically};

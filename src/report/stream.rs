@@ -272,6 +272,13 @@ pub(super) fn pairs<'k>(groups: impl IntoIterator<Item = &'k GroupKey>) -> Vec<S
     unique(pairs.map(|key| format!("{} along {}", key.scene, key.path)))
 }
 
+/// Four digits that distinguish runs of the same second.
+pub fn digits(clock: SystemTime) -> String {
+    let since = clock.duration_since(SystemTime::UNIX_EPOCH);
+    let nanos = since.map_or(0, |since| since.subsec_nanos());
+    format!("{:04x}", (nanos ^ std::process::id()) & 0xFFFF)
+}
+
 /// RFC 3339 in UTC, to the second. A clock out of range gives the nearest time
 /// that a report can be dated with: it is no reason not to measure.
 pub fn utc(clock: SystemTime) -> String {
