@@ -63,7 +63,8 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
 /// The plan of a run of the scene and path: a structure has the same times there.
 pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
     let study = &args.study;
-    let structures = study.kernel.structures(registry, &study.structure)?;
+    let list = args.moves.list(&study.structure);
+    let structures = study.kernel.structures(registry, list)?;
     let alone = Experiment::new(&study.scene).path(&study.path);
     if let [_, second, ..] = &args.moves.motion[..] {
         anyhow::bail!("--motion '{second}' is a second one; expected one motion");

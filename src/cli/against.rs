@@ -18,9 +18,10 @@ use super::compare_table::{CompareTable, Side};
 use super::interrupt::{self, Interrupted};
 use super::processes::{Job, Message, Request, Worker, processors, see_through};
 use super::run_resume::TypedOptions;
+use super::shared_args::WhatArgs;
 use super::study::progress;
 use super::{run_plan, text};
-use crate::index::Registry;
+use crate::index::{DEFAULT, Registry};
 use crate::input;
 use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Schedule, Share};
 use crate::report::{Basis, Changes, ReportCell, WORK, changes};
@@ -82,7 +83,7 @@ pub fn compare_against<'a>(
         )
     };
     let left_out = match plan.structures == STRUCTURES {
-        true => left_out(registry, &plan.plan)?,
+        true => left_out(registry, &args.what, &plan.plan)?,
         false => None,
     };
     let [old, new] = sides;
@@ -99,8 +100,8 @@ pub fn compare_against<'a>(
 }
 
 /// Line on the default structures of a run that a comparison lacks.
-fn left_out(registry: &Registry, plan: &Plan) -> anyhow::Result<Option<String>> {
-    let default = registry.structures("default")?.into_iter();
+fn left_out(registry: &Registry, args: &WhatArgs, plan: &Plan) -> anyhow::Result<Option<String>> {
+    let default = registry.structures(args.moves.list(DEFAULT))?.into_iter();
     // As labels stand before a policy of updates.
     let compared = plan.structures.iter();
     let compared: Vec<_> = compared.map(|s| s.label.split('@').next()).collect();

@@ -103,15 +103,19 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
                     "kind": info.kind.name(),
                     "origin": info.origin.to_string(),
                     "capabilities": info.capabilities(),
-                    "timed": if info.on_request { "if named" } else { "by default" },
+                    "timed": match (info.on_request, info.for_motion) {
+                        (true, _) => "if named",
+                        (_, true) => "with --motion",
+                        _ => "by default",
+                    },
                     "params": params.to_string(),
                     "summary": info.summary,
                 }))
             };
             let rows = registry.rows().iter().map(|own| row(&own.info));
             let note = "Parameters follow the name: bvh:leaf=4,preset=medium\nLists of \
-                        structures: all, default (those timed by default) or names separated by \
-                        commas";
+                        structures: all, default (those timed by default), motion (these and \
+                        those with --motion) or names separated by commas";
             let rows = rows.collect::<Result<_>>()?;
             ("structures", note.to_owned(), rows)
         }

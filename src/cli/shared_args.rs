@@ -6,7 +6,7 @@ use crate::camera::{
     DEFAULT_EPSILON, MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod, PlaneOptions,
 };
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, TESTS};
-use crate::index::{Execution, Registry, StructureSpec, UpdatePolicy};
+use crate::index::{DEFAULT, Execution, MOTION, Registry, StructureSpec, UpdatePolicy};
 use crate::kernel::Kernel;
 use crate::measure::{Machine, Plan, Protocol};
 use crate::path::{DEFAULT_PATH, LensDefaults};
@@ -60,8 +60,8 @@ pub struct WhatArgs {
     /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
     #[arg(long, visible_alias = "cameras", value_name = "PATH")]
     pub path: Vec<String>,
-    /// Structures, e.g. linear,bvh:leaf=4, or all, or default (all but auto and
-    /// the textbook forms); may be repeated [default: all for the suite standard, else default;
+    /// Structures, e.g. linear,bvh:leaf=4, or all, or default (all but auto, the
+    /// textbook forms and, in still scenes, moving); may be repeated [default: all for the suite standard, else default;
     /// compare --against: the trees, linear and wide]
     #[arg(long, value_name = "LIST")]
     pub structure: Vec<String>,
@@ -105,6 +105,14 @@ pub struct MotionArgs {
 }
 
 impl MotionArgs {
+    /// The list of structures, with `default` as it is where items move.
+    pub fn list<'l>(&self, list: &'l str) -> &'l str {
+        match list == DEFAULT && !self.motion.is_empty() {
+            true => MOTION,
+            false => list,
+        }
+    }
+
     /// Enters motions, queries per frame and policies into a plan.
     pub fn enter(&self, plan: &mut Plan) -> Result<()> {
         plan.motions.clone_from(&self.motion);

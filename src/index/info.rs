@@ -35,6 +35,8 @@ pub struct Info {
     /// Timed if named, or with `all`, and not part of the list `default`: a form for
     /// comparison, or one that is always another of the list.
     pub on_request: bool,
+    /// Timed if named, or by default where items move: its one advantage.
+    pub for_motion: bool,
 }
 
 named! {
@@ -95,6 +97,7 @@ impl Info {
             ranges: false,
             threaded_build: false,
             on_request: false,
+            for_motion: false,
         }
     }
 
@@ -124,6 +127,12 @@ impl Info {
     /// Declares [`Info::on_request`].
     pub const fn on_request(mut self) -> Info {
         self.on_request = true;
+        self
+    }
+
+    /// Declares [`Info::for_motion`].
+    pub const fn for_motion(mut self) -> Info {
+        self.for_motion = true;
         self
     }
 

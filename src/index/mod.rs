@@ -73,6 +73,7 @@ pub use grid::UniformGrid;
 pub use info::{Info, Kind, Origin};
 pub use items::{IdSet, Record, indexable};
 pub use linear::{Linear, LinearParams, LinearScalar};
+pub(crate) use registry::{DEFAULT, MOTION};
 pub use registry::{Registry, Row, StructureSpec};
 pub use shared_query::QueryThreads;
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};

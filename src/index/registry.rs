@@ -23,8 +23,10 @@ use crate::threads::Pool;
 
 /// Name in a list that stands for all structures.
 const ALL: &str = "all";
-/// Name in a list that stands for all but those [on request](Info::on_request).
-const DEFAULT: &str = "default";
+/// Name in a list that stands for those timed by default in still scenes.
+pub const DEFAULT: &str = "default";
+/// Name in a list that stands for those timed by default where items move.
+pub const MOTION: &str = "motion";
 
 /// A build without the structure's type; parameters are JSON.
 type Build = fn(Execution, &Input<'_>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;
@@ -179,9 +181,9 @@ impl Registry {
         assert!(
             name.starts_with(|c: char| c.is_ascii_alphanumeric())
                 && name.chars().all(is_plain)
-                && ![ALL, DEFAULT].contains(&name),
+                && ![ALL, DEFAULT, MOTION].contains(&name),
             "structure '{name}' cannot be typed; expected a name of letters, digits, '-', '_' \
-             and '.' other than '{ALL}' and '{DEFAULT}'"
+             and '.' other than '{ALL}', '{DEFAULT}' and '{MOTION}'"
         );
         assert!(
             self.named(name).is_none(),
@@ -249,7 +251,8 @@ impl Registry {
     }
 
     /// The structures of a comma-separated list, in which `all` are all of them and
-    /// `default` those that are not [on request](Info::on_request).
+    /// `motion` those that are not [on request](Info::on_request), and `default` those of
+    /// them that are of use in [still scenes](Info::for_motion) too.
     ///
     /// # Errors
     /// The errors of [`Registry::structure`]; an empty list, a structure named twice.
@@ -258,7 +261,8 @@ impl Registry {
         for text in Spec::split_list(list) {
             let more = match text.as_str() {
                 ALL => self.specs(|_| true)?,
-                DEFAULT => self.specs(|info| !info.on_request)?,
+                DEFAULT => self.specs(|info| !info.on_request && !info.for_motion)?,
+                MOTION => self.specs(|info| !info.on_request)?,
                 _ => vec![self.structure(&text)?],
             };
             for spec in more {
@@ -273,7 +277,7 @@ impl Registry {
         }
         if chosen.is_empty() {
             return Err(SpecError::new(
-                "no structure is named; expected 'all', 'default' or a list such as linear,bvh",
+                "no structure is named; expected 'all', 'default', 'motion' or a list such as linear,bvh",
             ));
         }
         Ok(chosen)

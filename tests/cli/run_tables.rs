@@ -158,6 +158,10 @@ fn textbook_forms_are_timed_where_they_are_named_and_by_the_suite_standard() {
     for options in ["--suite standard", "--structure all"] {
         assert_eq!(planned(options), all, "{options}");
     }
+    let mut moving = timed.clone();
+    moving.insert("moving".to_owned());
+    let drift = "--scene uniform:n=9 --path flythrough:frames=9 --motion drift";
+    assert_eq!(planned(drift), moving);
     let mut named = timed;
     named.insert(name.to_owned());
     assert_eq!(planned(&format!("--structure default,{name}")), named);

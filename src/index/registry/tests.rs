@@ -233,7 +233,9 @@ fn a_name_comes_once() {
 
 #[test]
 fn names_that_cannot_be_typed_are_refused() {
-    for name in ["", "all", "default", "a:b", "a,b", "a b", "a=b", "-a"] {
+    for name in [
+        "", "all", "default", "motion", "a:b", "a,b", "a b", "a=b", "-a",
+    ] {
         let row = Row {
             info: Wide::INFO.named(name),
             ..Row::of::<Wide>()

@@ -412,7 +412,8 @@ impl RegionIndex for Moving {
         Origin::Ours,
     )
     .refits()
-    .threaded_build();
+    .threaded_build()
+    .for_motion();
     type Params = WideParams;
 
     /// O(n log n), that of [`Wide`].
