@@ -128,6 +128,14 @@ impl Lens {
         &self.kind
     }
 
+    /// The matrix, where that stands for a lens.
+    pub fn matrix(&self) -> Option<&ViewProjection> {
+        match &self.kind {
+            LensKind::Matrix(matrix) => Some(matrix),
+            _ => None,
+        }
+    }
+
     /// Distance of the near plane along the direction of view.
     pub fn near(&self) -> f64 {
         self.near

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::matrix::{about, unprojected};
-use super::{Camera, CameraError, Lens, LensKind, Pose, Result, ViewProjection, require};
+use super::{Camera, CameraError, Lens, Pose, Result, ViewProjection, require};
 use crate::geometry::FrustumPlane;
 
 /// A view whose depth is a smaller share of its distance from the eye counts as
@@ -29,8 +29,8 @@ pub struct Unprojected {
     /// True if the image is mirrored: y points down (Vulkan), or the world is
     /// left-handed.
     pub is_mirrored: bool,
-    /// True if `is_mirrored` is of a clip space that may have y downward (Vulkan).
-    pub is_downward: bool,
+    /// Directions of clip-space x and y in the world, of unit length.
+    pub image: [DVec3; 2],
     /// Cosine of the angle between the image's axes; 0 for a camera.
     pub shear: f64,
     /// Change of clip-space depth across the axis of view, relative to the change of w
@@ -60,9 +60,12 @@ impl ViewProjection {
         let aside = |row: DVec3| row - forward * row.dot(forward);
         let (across, upward) = (aside(x), aside(y));
         let is_mirrored = across.cross(upward).dot(forward) > 0.0;
+        let image = [across, upward].map(DVec3::normalize);
         // Only Vulkan's clip space has y downward.
-        let is_downward = is_mirrored && self.is_vulkan();
-        let up = if is_downward { -upward } else { upward };
+        let up = match is_mirrored && self.is_vulkan() {
+            true => -upward,
+            false => upward,
+        };
         let frame = Pose::Forward { eye, forward, up }.frame()?;
         let axes = [(x, frame.u()), (y, frame.v())];
         let lens = match parallel {
@@ -78,8 +81,8 @@ impl ViewProjection {
             camera: Camera { frame, lens },
             depths,
             is_mirrored,
-            is_downward,
-            shear: across.normalize().dot(upward.normalize()).abs(),
+            image,
+            shear: image[0].dot(image[1]).abs(),
             tilt: aside(z).length() / change.length(),
         })
     }
@@ -141,10 +144,10 @@ impl ViewProjection {
 impl Camera {
     /// Returns `true` for an orthographic matrix, mirrored or with reversed depth.
     pub fn may_be_reversed(&self) -> bool {
-        let LensKind::Matrix(matrix) = self.lens.kind() else {
-            return false;
+        let is_doubtful = |matrix: &ViewProjection| {
+            matrix.is_parallel && matrix.unprojected().is_ok_and(|found| found.is_mirrored)
         };
-        matrix.is_parallel && matrix.unprojected().is_ok_and(|found| found.is_mirrored)
+        self.lens.matrix().is_some_and(is_doubtful)
     }
 
     /// This camera with a frame and a lens of its own, whose rays are known.
@@ -153,7 +156,7 @@ impl Camera {
     /// A matrix whose image is sheared or whose near plane is oblique; an orthographic
     /// one that does not say which end is near.
     pub fn unprojected(&self) -> Result<Camera> {
-        let LensKind::Matrix(matrix) = self.lens.kind() else {
+        let Some(matrix) = self.lens.matrix() else {
             return Ok(*self);
         };
         let found = matrix.unprojected()?;
@@ -201,9 +204,7 @@ mod tests {
     }
 
     fn taken_apart(camera: &Camera) -> Unprojected {
-        let LensKind::Matrix(matrix) = camera.lens.kind() else {
-            panic!("a matrix stays one");
-        };
+        let matrix = camera.lens.matrix().expect("a matrix stays one");
         matrix.unprojected().expect("a lens")
     }
 

@@ -22,7 +22,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     let path = args.path.as_ref();
     let path = path.map(|path| path::load(path, &scene, &defaults));
     let cameras = path.transpose()?.map_or(Vec::new(), |path| path.cameras);
-    let facts = (!cameras.is_empty()).then(|| CameraFacts::of(&cameras));
+    let facts = (!cameras.is_empty()).then(|| CameraFacts::of(&cameras, scene.up));
     let info = SceneInfo::of(&scene);
     let figures = SceneFacts::of(&scene)?;
     let portals = match &scene.regions {

@@ -18,7 +18,7 @@ use super::text::html;
 use super::{
     Ending, expect_places, load_scene, program, scene_facts, tell, text, unread_is_fine, write_text,
 };
-use crate::camera::{Camera, ClipSpace, LensKind};
+use crate::camera::{Camera, ClipSpace};
 use crate::funnel::{RaysEnd, Shape};
 use crate::index::Registry;
 use crate::input::tell_warnings;
@@ -73,6 +73,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let threads = args.culling.kernel.execution()?.threads;
     let samples = args.samples;
     let surfaces = samples.map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
+    let downward = path::is_downward(&cameras.cameras, scene.up);
     let mut totals = [0; FATES];
     for (view, answer) in answers.iter().enumerate() {
         let camera = &cameras.cameras[view];
@@ -89,13 +90,13 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         fates.iter().for_each(|fate| totals[*fate as usize] += 1);
         let index = if all > most { view * all / most } else { view };
         bar.inc(1);
-        data.frames
-            .push(Frame::of(index, camera, scene.origin, &fates));
+        let clip = clip_matrix(camera, scene.origin, downward);
+        data.frames.push(Frame::of(index, clip, &fates));
     }
     bar.finish_and_clear();
     data.samples = samples.map(|grid| format!("{}x{}", grid.width, grid.height));
     let told = conclusion(&data, totals, agree);
-    let facts = CameraFacts::of(&cameras.cameras);
+    let facts = CameraFacts::of(&cameras.cameras, scene.up);
     let axes = scene_facts::axes(&SceneInfo::of(&scene));
     let lens = scene_facts::lens(&facts);
     let matrix = text::some(facts.matrix.as_ref(), |matrix| {
@@ -375,11 +376,11 @@ impl ViewData {
 
 impl Frame {
     /// A view with the fates of all items, in the order of the curve.
-    pub fn of(index: usize, camera: &Camera, origin: DVec3, fates: &[Fate]) -> Frame {
+    pub fn of(index: usize, clip: DMat4, fates: &[Fate]) -> Frame {
         let set = |fate: Fate| runs(fates.iter().map(|own| *own == fate));
         Frame {
             camera: index,
-            clip: clip_matrix(camera, origin).to_cols_array(),
+            clip: clip.to_cols_array(),
             visible: set(Fate::Visible),
             false_positive: set(Fate::FalsePositive),
             hidden: set(Fate::Hidden),
@@ -389,8 +390,8 @@ impl Frame {
 }
 
 /// Scene-local to clip coordinates; near depth is -1, far depth 1.
-fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
-    let LensKind::Matrix(matrix) = camera.lens.kind() else {
+fn clip_matrix(camera: &Camera, origin: DVec3, is_downward: bool) -> DMat4 {
+    let Some(matrix) = camera.lens.matrix() else {
         let view = camera.frame.relative_to(origin).world_to_eye();
         return camera.lens.projection(ClipSpace::OpenGl) * view;
     };
@@ -400,11 +401,7 @@ fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
     let [near, far] = found.as_ref().map_or([lowest, 1.0], |found| found.depths);
     let z = (2.0 * z - (near + far) * w) / (far - near);
     // The page draws y upward, also for Vulkan.
-    let y = if found.is_ok_and(|found| found.is_downward) {
-        -y
-    } else {
-        y
-    };
+    let y = if is_downward { -y } else { y };
     DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
 }
 
@@ -412,19 +409,31 @@ fn clip_matrix(camera: &Camera, origin: DVec3) -> DMat4 {
 mod tests {
     use super::*;
     use crate::camera::{Lens, MatrixConvention};
+    use crate::scene::UpAxis;
 
     #[test]
     fn the_view_of_a_vulkan_matrix_is_upright() {
         let frame = crate::camera::look_at(DVec3::X, DVec3::ZERO, DVec3::Z).unwrap();
         let lens = Lens::perspective(60.0, 1.5, 0.5, Some(40.0)).unwrap();
         let above = DVec4::new(0.0, 0.0, 0.1, 1.0);
-        for side in [1.0, -1.0] {
-            let flip = DMat4::from_scale(DVec3::new(1.0, side, 1.0));
+        // As it is, with y downward (Vulkan), and in a left-handed world.
+        for (x, y) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0)] {
+            let flip = DMat4::from_scale(DVec3::new(x, y, 1.0));
             let matrix = flip * lens.projection(ClipSpace::D3d) * frame.world_to_eye();
-            let rows = matrix.transpose().to_cols_array_2d();
-            let camera = Camera::of_matrix(rows, MatrixConvention::ColumnD3d).unwrap();
-            let seen = clip_matrix(&camera, DVec3::ZERO) * above;
-            assert!(seen.y > 0.0, "{side}: {seen}");
+            let [by_rows, by_columns] = [matrix, matrix.transpose()].map(|m| m.to_cols_array_2d());
+            for (entries, convention) in [
+                (by_columns, MatrixConvention::ColumnD3d),
+                (by_rows, MatrixConvention::RowD3d),
+            ] {
+                let camera = [Camera::of_matrix(entries, convention).unwrap()];
+                let downward = path::is_downward(&camera, UpAxis::Z);
+                let seen = clip_matrix(&camera[0], DVec3::ZERO, downward) * above;
+                assert!(seen.y > 0.0, "{x}, {y}: {seen}");
+                let matrix = CameraFacts::of(&camera, UpAxis::Z).matrix.unwrap();
+                let right = frame.u() * x;
+                assert!(DVec3::from(matrix.up).z > 0.9, "{matrix:?}");
+                assert!(DVec3::from(matrix.right).dot(right) > 0.9, "{matrix:?}");
+            }
         }
     }
 

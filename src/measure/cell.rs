@@ -294,7 +294,7 @@ impl PathInfo {
             camera_count: workload.cameras.len(),
             digest: Some(workload.digest()),
             views_per_frame,
-            lens: Some(CameraFacts::of(&workload.cameras)),
+            lens: Some(CameraFacts::of(&workload.cameras, workload.scene.up)),
             warnings: path::warnings(workload.scene, path, &workload.cameras),
             ..PathInfo::unknown(&key)
         }

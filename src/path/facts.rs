@@ -52,8 +52,8 @@ pub struct MatrixFacts {
 }
 
 impl CameraFacts {
-    /// Facts of the cameras of a path.
-    pub fn of(cameras: &[Camera]) -> CameraFacts {
+    /// Facts of the cameras of a path, in a scene with an up axis.
+    pub fn of(cameras: &[Camera], up: UpAxis) -> CameraFacts {
         let lenses: Vec<Lens> = cameras.iter().map(plain_lens).collect();
         let all = |of: &dyn Fn(&Lens) -> Option<f64>| range(lenses.iter().filter_map(of));
         let fars = all(&|lens| Some(lens.far().unwrap_or(f64::INFINITY)));
@@ -63,7 +63,7 @@ impl CameraFacts {
             aspect: all(&aspect),
             near: all(&|lens| Some(lens.near())),
             far: finite(fars),
-            matrix: cameras.first().and_then(MatrixFacts::of),
+            matrix: MatrixFacts::of(cameras, up),
         }
     }
 
@@ -83,14 +83,19 @@ impl CameraFacts {
 }
 
 impl MatrixFacts {
-    fn of(camera: &Camera) -> Option<MatrixFacts> {
-        let LensKind::Matrix(matrix) = camera.lens.kind() else {
-            return None;
-        };
+    fn of(cameras: &[Camera], up: UpAxis) -> Option<MatrixFacts> {
+        let matrix = cameras.first()?.lens.matrix()?;
         let found = matrix.unprojected().ok()?;
-        let frame = found.camera.frame;
-        let [eye, right, up, forward] =
-            [frame.eye, frame.u(), frame.v(), frame.forward()].map(|v: DVec3| v.to_array());
+        let (frame, [x, y]) = (found.camera.frame, found.image);
+        let y = if is_downward(cameras, up) { -y } else { y };
+        let along = |axis: DVec3, image: DVec3| axis * axis.dot(image).signum();
+        let axes = [
+            frame.eye,
+            along(frame.u(), x),
+            along(frame.v(), y),
+            frame.forward(),
+        ];
+        let [eye, right, up, forward] = axes.map(|v| v.to_array());
         Some(MatrixFacts {
             convention: matrix.convention().name().to_owned(),
             depth: found.depths,
@@ -103,6 +108,16 @@ impl MatrixFacts {
     }
 }
 
+/// Returns whether y points down in the images of matrices (Vulkan), by the up axis of
+/// their scene: an image is mirrored in a left-handed world too.
+pub fn is_downward(cameras: &[Camera], up: UpAxis) -> bool {
+    let along = |camera: &Camera| {
+        let found = camera.lens.matrix()?.unprojected().ok()?;
+        found.is_mirrored.then(|| found.image[1].dot(up.vector()))
+    };
+    cameras.iter().filter_map(along).sum::<f64>() < 0.0
+}
+
 /// A range with `None` for what is infinite.
 fn finite(range: Option<[f64; 2]>) -> [Option<f64>; 2] {
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
@@ -111,11 +126,10 @@ fn finite(range: Option<[f64; 2]>) -> [Option<f64>; 2] {
 
 /// Lens of a camera; that of a matrix without one stays the matrix.
 fn plain_lens(camera: &Camera) -> Lens {
-    let LensKind::Matrix(matrix) = camera.lens.kind() else {
-        return camera.lens;
-    };
-    let found = matrix.unprojected();
-    found.map_or(camera.lens, |found| found.camera.lens)
+    let found = camera.lens.matrix().map(ViewProjection::unprojected);
+    found.map_or(camera.lens, |found| {
+        found.map_or(camera.lens, |found| found.camera.lens)
+    })
 }
 
 fn fovy_deg(lens: &Lens) -> Option<f64> {
@@ -190,7 +204,7 @@ impl LensDefaults {
             let what = "not used, its cameras have their own";
             note(&format!("{}: {what}: {}", path.name, unused.join(", ")));
         }
-        if self.matrix.is_some() && !has(&|lens| matches!(lens.kind(), LensKind::Matrix(_))) {
+        if self.matrix.is_some() && !has(&|lens| lens.matrix().is_some()) {
             let what = "--matrix-convention is for cameras that are matrices";
             note(&format!("{}: {what}", path.name));
         }
@@ -255,12 +269,12 @@ fn rolled_up(up: UpAxis, camera: &Camera) -> Option<DVec3> {
 
 /// Parts of an axis along right and up in the image, and the vector up there.
 fn upward(axis: UpAxis, camera: &Camera) -> Option<([f64; 2], DVec3)> {
-    let (frame, is_mirrored): (Frame, bool) = match camera.lens.kind() {
-        LensKind::Matrix(matrix) => {
+    let (frame, is_mirrored): (Frame, bool) = match camera.lens.matrix() {
+        Some(matrix) => {
             let found = matrix.unprojected().ok()?;
             (found.camera.frame, found.is_mirrored)
         }
-        _ => (camera.frame, false),
+        None => (camera.frame, false),
     };
     let [across, along] = [frame.u(), frame.v()].map(|own| own.dot(axis.vector()));
     // A mirrored image may have y downward.
@@ -270,10 +284,8 @@ fn upward(axis: UpAxis, camera: &Camera) -> Option<([f64; 2], DVec3)> {
 
 /// Matrices that are no camera's, and those whose transposes are.
 fn unstraight(_: &Scene, cameras: &[Camera]) -> Option<String> {
-    let matrices = cameras.iter().filter_map(|c| match c.lens.kind() {
-        LensKind::Matrix(matrix) if !matrix.is_straight() => Some(matrix),
-        _ => None,
-    });
+    let matrices = cameras.iter().filter_map(|c| c.lens.matrix());
+    let matrices = matrices.filter(|matrix| !matrix.is_straight());
     let matrices: Vec<&ViewProjection> = matrices.collect();
     let first = matrices.first()?;
     let what = share(matrices.len(), cameras);

@@ -21,7 +21,7 @@ use crate::scene::{self, PlaceView, Scene, SeededRng, UpAxis, WorldBox, memory};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
-pub use facts::{CameraFacts, MatrixFacts, warnings};
+pub use facts::{CameraFacts, MatrixFacts, is_downward, warnings};
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
 
 /// The path through a scene when none is named.
