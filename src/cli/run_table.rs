@@ -64,9 +64,12 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     let motion = text::some(path.views_per_frame.checked_sub(1), |queries| {
         let checked = comparison.range(|cell| cell.times.cameras_checked);
         let frames = checked.unwrap_or_default().1 / (queries + 1);
-        let frames = text::counted(frames, "frame");
         let queries = text::counted(queries + 1, "query");
-        format!("{}: {frames}, {queries} each", path.motion)
+        // Cells without times say nothing of frames.
+        match text::counted(frames, "frame") {
+            _ if frames == 0 => format!("{}: {queries} per frame", path.motion),
+            frames => format!("{}: {frames}, {queries} each", path.motion),
+        }
     });
     // Sets of a coarse test are larger than what is visible.
     let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);

@@ -67,6 +67,13 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
             let counted = guarded(|| entry.count(frames, stop));
             let failed = counted.unwrap_or_else(Err).err();
             let missed = frames.judged.and_then(|judged| judged.unsafe_verdict());
+            let missed = missed.map(|missed| match (subject.spec.policy, missed.reason) {
+                (UpdatePolicy::Fat(_), Some(reason)) => {
+                    let what = "by the items' own bounds; fat ones are not judged";
+                    Verdict::new(missed.status, format!("{reason}, {what}"))
+                }
+                (_, reason) => Verdict { reason, ..missed },
+            });
             entry.part.verdict = failed.or(missed).unwrap_or_default();
         }
         if stop() {

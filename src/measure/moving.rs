@@ -18,6 +18,7 @@ use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec, UpdatePolicy};
 use crate::motion::{Motion, Replay};
 use crate::query::ItemId;
+use crate::scene::{Originals, WorldBox};
 use crate::verify::{Truth, scan};
 
 /// Number of updates before queries are timed.
@@ -57,7 +58,10 @@ impl<'w> Frames<'w> {
             return Some(frames);
         }
         let (mut items, mut replay) = (workload.items.to_vec(), motion.replay());
-        let (mut boxes, mut shown) = (workload.scene.items.to_vec(), motion.replay());
+        let scene = workload.scene;
+        let (mut boxes, mut shown) = (scene.items.to_vec(), motion.replay());
+        let written = scene.originals.boxes().map(<[_]>::to_vec);
+        let mut written = written.unwrap_or_else(|| vec![WorldBox::AS_STORED; boxes.len()]);
         let (mut judging, cameras) = (Judging::default(), &workload.cameras);
         let due = spread(items.len(), MOST_JUDGED, motion.frames());
         let (mut due, views) = (due.enumerate().peekable(), workload.views_per_frame);
@@ -67,13 +71,13 @@ impl<'w> Frames<'w> {
             }
             advance(&mut replay, workload, &mut items);
             if due.peek().is_some() {
-                shown.advance(&mut boxes);
+                shown.advance_written(&mut boxes, &mut written);
             }
             if let Some((n, _)) = due.next_if(|(_, due)| *due == frame) {
                 // Each view of a frame in turn.
                 let camera = (frame * views + n % views) % cameras.len();
-                let origin = workload.scene.origin;
-                let truth = Truth::of_camera(&cameras[camera], origin, &boxes);
+                let written = Originals::listed(&written);
+                let truth = Truth::of_written(&cameras[camera], scene.origin, &boxes, &written);
                 judging.add(workload, camera, truth, &boxes, &items);
             }
             for (_, view) in frames.views(frame) {

@@ -14,7 +14,7 @@ use crate::geometry::Aabb;
 use crate::input::{InputError, names_file, note, read_file};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::{Scene, SeededRng, hex};
+use crate::scene::{Scene, SeededRng, WorldBox, hex};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
@@ -281,6 +281,18 @@ pub struct Replay<'m> {
 }
 
 impl Replay<'_> {
+    /// The same with the boxes as written, NaN for what is as it is stored.
+    pub(crate) fn advance_written(&mut self, items: &mut [Aabb], written: &mut [WorldBox]) {
+        let (motion, frame) = (self.motion, self.frame);
+        let moved = self.advance(items).unwrap_or_default();
+        for (n, &id) in moved.iter().enumerate() {
+            written[id as usize] = match &motion.source {
+                Source::Recorded(recorded) => recorded.frame(frame).1[n].written,
+                Source::Generated { .. } => WorldBox::AS_STORED,
+            };
+        }
+    }
+
     /// Writes the bounds of the next frame; returns the movers, ascending.
     ///
     /// `items` are those of the frame before. `None` after the last frame.
@@ -292,9 +304,9 @@ impl Replay<'_> {
         self.frame += 1;
         match &self.motion.source {
             Source::Recorded(recorded) => {
-                let (ids, boxes) = recorded.frame(frame);
-                for (&id, b) in ids.iter().zip(boxes) {
-                    items[id as usize] = *b;
+                let (ids, rows) = recorded.frame(frame);
+                for (&id, row) in ids.iter().zip(rows) {
+                    items[id as usize] = row.stored;
                 }
                 Some(ids)
             }

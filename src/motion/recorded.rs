@@ -8,17 +8,25 @@ use super::laws::REMOVED;
 use crate::geometry::Aabb;
 use crate::input::{InputError, Row, TableReader};
 use crate::query::ItemId;
-use crate::scene::Scene;
+use crate::scene::{Scene, WorldBox};
 
 const COLUMNS: [&str; 8] = [
     "time_s", "id", "min_x", "min_y", "min_z", "max_x", "max_y", "max_z",
 ];
 
+/// Bounds of a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    pub(super) stored: Aabb,
+    /// NaN where the stored box is the very same.
+    pub(super) written: WorldBox,
+}
+
 /// Frames one after another.
 #[derive(Default, Debug)]
 pub(super) struct Recorded {
     ids: Vec<ItemId>,
-    boxes: Vec<Aabb>,
+    rows: Vec<Bounds>,
     /// Number of rows up to the end of each frame.
     ends: Vec<usize>,
     /// Time of each frame, s.
@@ -38,10 +46,10 @@ impl Recorded {
     }
 
     /// Ids, ascending, and their bounds.
-    pub(super) fn frame(&self, n: usize) -> (&[ItemId], &[Aabb]) {
+    pub(super) fn frame(&self, n: usize) -> (&[ItemId], &[Bounds]) {
         let first = n.checked_sub(1).map_or(0, |before| self.ends[before]);
         let rows = first..self.ends[n];
-        (&self.ids[rows.clone()], &self.boxes[rows])
+        (&self.ids[rows.clone()], &self.rows[rows])
     }
 
     /// A frame for each time with all rows since the one before; the rows left over.
@@ -55,10 +63,10 @@ impl Recorded {
             let first = next;
             next += self.times[first..].partition_point(|own| own <= time);
             let frames = (first..next).map(|n| self.frame(n));
-            let rows = frames.flat_map(|(ids, boxes)| ids.iter().zip(boxes));
-            let rows: BTreeMap<ItemId, Aabb> = rows.map(|(id, b)| (*id, *b)).collect();
+            let rows = frames.flat_map(|(ids, rows)| ids.iter().zip(rows));
+            let rows: BTreeMap<ItemId, Bounds> = rows.map(|(id, b)| (*id, *b)).collect();
             paced.ids.extend(rows.keys());
-            paced.boxes.extend(rows.values());
+            paced.rows.extend(rows.values());
             paced.ends.push(paced.ids.len());
             paced.times.push(*time);
         }
@@ -67,16 +75,17 @@ impl Recorded {
     }
 
     pub(super) fn reach(&self) -> Vec3 {
-        Aabb::union_of(&self.boxes).reach().max(self.reach)
+        let reaches = self.rows.iter().map(|row| row.stored.reach());
+        reaches.fold(self.reach, Vec3::max)
     }
 
     pub(super) fn digest(&self, hash: &mut hmac_sha256::Hash) {
         for end in &self.ends {
             hash.update((*end as u64).to_le_bytes());
         }
-        for (id, b) in self.ids.iter().zip(&self.boxes) {
+        for (id, row) in self.ids.iter().zip(&self.rows) {
             hash.update(id.to_le_bytes());
-            for v in b.bits().as_flattened() {
+            for v in row.stored.bits().as_flattened() {
                 hash.update(v.to_le_bytes());
             }
         }
@@ -85,7 +94,7 @@ impl Recorded {
     /// Ends a frame of rows, each with its line.
     fn end_frame(
         &mut self,
-        rows: &mut Vec<(ItemId, u64, Aabb)>,
+        rows: &mut Vec<(ItemId, u64, Bounds)>,
         file: &str,
     ) -> Result<(), InputError> {
         rows.sort_by_key(|row| (row.0, row.1));
@@ -94,7 +103,7 @@ impl Recorded {
             return Err(InputError::line(file, twice[1].1, found, "each item once"));
         }
         self.ids.extend(rows.iter().map(|row| row.0));
-        self.boxes.extend(rows.iter().map(|row| row.2));
+        self.rows.extend(rows.iter().map(|row| row.2));
         self.ends.push(self.ids.len());
         rows.clear();
         Ok(())
@@ -158,10 +167,13 @@ fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
     })
 }
 
-fn bounds(row: &Row, columns: &[usize; 8], scene: &Scene) -> Result<Aabb, InputError> {
+fn bounds(row: &Row, columns: &[usize; 8], scene: &Scene) -> Result<Bounds, InputError> {
     let mut own = columns[2..].iter();
     if own.clone().all(|&column| row.text(column).is_empty()) {
-        return Ok(REMOVED);
+        return Ok(Bounds {
+            stored: REMOVED,
+            written: WorldBox::AS_STORED,
+        });
     }
     let mut values = [0.0; 6];
     for (value, &column) in values.iter_mut().zip(&mut own) {
@@ -170,7 +182,14 @@ fn bounds(row: &Row, columns: &[usize; 8], scene: &Scene) -> Result<Aabb, InputE
     let [min, max] = [&values[..3], &values[3..]].map(DVec3::from_slice);
     let b = Aabb::rounded_outward(min, max, scene.origin);
     if b.is_finite() && min.cmple(max).all() {
-        return Ok(b);
+        let own = WorldBox::new(min, max);
+        return Ok(Bounds {
+            stored: b,
+            written: match own.is_stored_as(&b, scene.origin) {
+                true => WorldBox::AS_STORED,
+                false => own,
+            },
+        });
     }
     let found = format!("a box from {:?} to {:?}", min.to_array(), max.to_array());
     let expected = "min <= max within the range of f32, or no bounds to remove the item";

@@ -34,6 +34,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use crate::arithmetic::rounding::{sum_down, sum_up};
+use crate::arithmetic::two_sum;
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::input::{InputError, Result};
@@ -78,9 +79,23 @@ pub struct WorldBox {
 }
 
 impl WorldBox {
+    /// No box of its own: that of an item as it is stored.
+    pub(crate) const AS_STORED: WorldBox = WorldBox {
+        min: DVec3::NAN,
+        max: DVec3::NAN,
+    };
+
     /// The box between two corners; empty where `min` is above `max`.
     pub fn new(min: DVec3, max: DVec3) -> Self {
         WorldBox { min, max }
+    }
+
+    /// Tests whether a box about `origin` is this very box.
+    pub(crate) fn is_stored_as(&self, stored: &Aabb, origin: DVec3) -> bool {
+        let corners = [(self.min, stored.min), (self.max, stored.max)];
+        corners.into_iter().all(|(written, stored)| {
+            (0..3).all(|k| two_sum(origin[k], f64::from(stored[k])) == (written[k], 0.0))
+        })
     }
 
     /// The smallest box that holds all of some: inverted for none.
@@ -310,7 +325,7 @@ impl Scene {
 
 /// The origin that suits the boxes, by the finite ones.
 ///
-/// Zero on every axis where moving the boxes would gain less than two bits:
+/// Zero on every axis where moving the boxes would gain no more than some three bits:
 /// their coordinates then stay as written and exact ties stay ties. Otherwise
 /// the centre, rounded to a power of two near the width, so that round
 /// coordinates stay round.

@@ -13,6 +13,8 @@ use crate::input::Result;
 use crate::query::ItemId;
 
 /// The boxes as written, kept only where f32 holds one of them otherwise.
+///
+/// One of NaN is as its item is stored, such as an item that a generated motion moves.
 #[derive(Clone, Default, Debug)]
 pub struct Originals {
     boxes: Arc<[WorldBox]>,
@@ -21,16 +23,22 @@ pub struct Originals {
 impl Originals {
     /// `stored` are the same boxes as indexes have them, about `origin`.
     pub(super) fn of(written: &[WorldBox], stored: &[Aabb], origin: DVec3) -> Originals {
-        let same = |written: f64, stored: f32, origin: f64| {
-            two_sum(origin, f64::from(stored)) == (written, 0.0)
-        };
-        let exact = written.iter().zip(stored).all(|(w, s)| {
-            (0..3)
-                .all(|k| same(w.min[k], s.min[k], origin[k]) && same(w.max[k], s.max[k], origin[k]))
-        });
+        let mut both = written.iter().zip(stored);
+        let exact = both.all(|(written, stored)| written.is_stored_as(stored, origin));
+        Originals::listed(if exact { &[] } else { written })
+    }
+
+    /// The boxes by id; none where all are as they are stored.
+    pub(crate) fn listed(boxes: &[WorldBox]) -> Originals {
+        let all_stored = boxes.iter().all(|b| b.min.is_nan());
         Originals {
-            boxes: if exact { &[] } else { written }.into(),
+            boxes: if all_stored { &[] } else { boxes }.into(),
         }
+    }
+
+    /// The box of an item where it is known apart from the stored one.
+    pub fn of_item(&self, id: usize) -> Option<&WorldBox> {
+        self.boxes.get(id).filter(|b| !b.min.is_nan())
     }
 
     /// In world coordinates; `None` if the stored boxes are the very same.

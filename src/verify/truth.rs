@@ -115,15 +115,29 @@ impl Truth {
     /// Camera level, about the boxes of a scene as they were written. O(items).
     /// `None` if the pose makes no frame.
     pub fn of_scene(camera: &Camera, scene: &Scene) -> Option<Truth> {
+        Truth::of_written(camera, scene.origin, &scene.items, &scene.originals)
+    }
+
+    /// The same about items that may have moved, about `origin`, and as written.
+    pub fn of_written(
+        camera: &Camera,
+        origin: DVec3,
+        items: &[Aabb],
+        originals: &Originals,
+    ) -> Option<Truth> {
         let of = |origin| Oracle::of_camera(&Pose::of(camera), &camera.lens, origin);
-        let stored = of(scene.origin)?;
-        let Some(boxes) = scene.originals.boxes() else {
-            return Some(Truth::new(stored, &scene.items));
-        };
+        let stored = of(origin)?;
+        if originals.boxes().is_none() {
+            return Some(Truth::new(stored, items));
+        }
         let world = of(DVec3::ZERO)?;
-        let judgements = boxes.iter().map(|b| world.judge_wide(b.min, b.max));
-        let mut truth = Truth::of_judgements(stored, judgements.collect());
-        truth.written = Some((world, scene.originals.clone()));
+        let judge = |(id, item): (usize, &Aabb)| match originals.of_item(id) {
+            Some(b) => world.judge_wide(b.min, b.max),
+            None => stored.judge(item),
+        };
+        let judgements = items.iter().enumerate().map(judge).collect();
+        let mut truth = Truth::of_judgements(stored, judgements);
+        truth.written = Some((world, originals.clone()));
         Some(truth)
     }
 
@@ -158,7 +172,7 @@ impl Truth {
 
     /// The box of item `id` as it was written, where f32 has changed boxes.
     pub fn original(&self, id: usize) -> Option<&WorldBox> {
-        self.written.as_ref()?.1.boxes()?.get(id)
+        self.written.as_ref()?.1.of_item(id)
     }
 
     /// About every item, by id.

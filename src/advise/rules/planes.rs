@@ -272,12 +272,18 @@ pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
     let other = part_of(scene, elsewhere, scene.items.len()).map_err(not_applicable)?;
     let workload = Workload::new(&other, case.path, &Culling::default());
     let views = workload.map_err(not_applicable)?.views;
-    let there = trials.index(case.spec.build(&other.items)?, views);
-    let (at_zero, moved, sides) = match is_moved {
-        true => (&other, scene, [BASE, there]),
-        false => (scene, &other, [there, BASE]),
+    let (at_zero, moved) = match is_moved {
+        true => (&other, scene),
+        false => (scene, &other),
     };
     let [margin, better] = [at_zero, moved].map(|scene| case.margin(&scene.surroundings()));
+    if margin > case.options.tolerance && better > margin / 2.0 {
+        return Err(not_applicable(
+            "about no origin are coordinates much smaller",
+        ));
+    }
+    let there = trials.index(case.spec.build(&other.items)?, views);
+    let sides = [[there, BASE], [BASE, there]][usize::from(is_moved)];
     let [x, y, z] = moved.origin.to_array().map(significant);
     let reason = format!(
         "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({x}, {y}, {z}); this scene {}",

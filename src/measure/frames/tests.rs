@@ -291,3 +291,43 @@ fn new_builds_in_place_of_refits_are_said() {
     let spawn = noted("spawn:share=0.2,frames=12");
     assert_eq!(spawn, [("bvh".to_owned(), all), scalar]);
 }
+
+/// Boxes where f32 has steps of 0.5, and a motion that states them again.
+#[test]
+fn recorded_frames_are_judged_by_the_boxes_as_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = "min_x,min_y,min_z,max_x,max_y,max_z\n";
+    let (mut boxes, mut moves) = (header.to_owned(), format!("time_s,id,{header}"));
+    let far = |n: u32| 8e6 + f64::from(n) * 0.37 % 12.0;
+    for n in 0..200_u32 {
+        let [x, y, z] = [far(n), far(7 * n), far(31 * n)];
+        let row = match n {
+            // No origin suits them all.
+            0 => "-8e6,-8e6,-8e6,-8e6,-8e6,-8e6".to_owned(),
+            _ => format!("{x},{y},{z},{},{},{}", x + 0.2, y + 0.1, z + 0.05),
+        };
+        boxes += &format!("{row}\n");
+        moves += &format!("0,{n},{row}\n");
+    }
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let [boxes, moves] = [("b.csv", boxes), ("m.csv", moves)].map(|(name, text)| file(name, &text));
+    let eye = "eye_x,eye_y,eye_z,look_x,look_y,look_z,near,far\n\
+               7999992,8000001,7999999,8e6,8e6,8000004,0.5,40\n";
+    let scene = scene::load(&boxes, &Default::default()).unwrap();
+    let way = path::load(&file("c.csv", eye), &scene, &Default::default()).unwrap();
+    let mut culling = Culling::default();
+    culling.planes.epsilon = 0.0;
+    let still = Workload::new(&scene, &way, &culling).unwrap();
+    let motion = Motion::load(&moves, &scene).unwrap();
+    let moving = Workload::moving(&scene, &way, &culling, Some(motion), 1).unwrap();
+    let motion = moving.motion.as_ref().unwrap();
+    let frames = Frames::new(&moving, motion, None, &|| false).unwrap();
+    let wanted = crate::measure::count::judge(&still, 10_000);
+    let found = frames.judged.unwrap();
+    assert_eq!(found.errors, wanted.errors);
+    assert!(wanted.errors.by_storage > 0, "{wanted:?}");
+}
