@@ -49,7 +49,8 @@ pub struct Turn {
     /// The fastest structure there.
     pub structure: String,
     /// Value on the axis at which both take the same time, between the two measured
-    /// values `lower` and `upper`: on one side of them the advice holds.
+    /// values `lower` and `upper`: on one side of them the structure taken is ahead, on the
+    /// other it is shown not to be.
     pub at: f64,
     /// Smaller of the two.
     pub lower: f64,
@@ -201,23 +202,29 @@ fn share_in_view(known: &Known, items: usize) -> f64 {
 
 /// The first of the points at which another structure is faster than the one taken.
 fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
-    points.windows(2).find_map(|pair| {
-        let [&(before, cells), &(value, there)] = [pair[0], pair[1]];
+    (1..points.len()).find_map(|n| {
+        let (value, there) = *points[n];
         let first = fastest(there, None);
         let winner = first.first()?;
         let ratio_at = |cells| time_over(cells, taken, &winner.structure);
-        let ratio = ratio_at(there)?;
-        if is_longer(ratio) != Some(true) {
+        if is_longer(ratio_at(there)?) != Some(true) {
             return None;
         }
-        // Between both values by the logarithms of value and ratio.
-        let earlier = ratio_at(cells).map_or(0.0, |ratio| ratio.value.ln());
-        let along = (earlier / (earlier - ratio.value.ln())).clamp(0.0, 1.0);
+        // The last at which the one taken is ahead; ties from the start have none.
+        let ln = |at: usize| ratio_at(points[at].1).map_or(0.0, |ratio| ratio.value.ln());
+        let ahead = (0..n).rev().find(|&at| ln(at) <= 0.0);
+        let before = points[ahead.unwrap_or(0)].0;
+        // Between two values by the logarithms of value and ratio.
+        let at = ahead.map_or(before, |at| {
+            let along = ln(at) / (ln(at) - ln(at + 1));
+            before * (points[at + 1].0 / before).powf(along)
+        });
+        let (lower, upper) = (before.min(value), before.max(value));
         Some(Turn {
             structure: winner.structure.clone(),
-            at: (before * (value / before).powf(along)).clamp(before.min(value), before.max(value)),
-            lower: before.min(value),
-            upper: before.max(value),
+            at: at.clamp(lower, upper),
+            lower,
+            upper,
         })
     })
 }
@@ -311,11 +318,14 @@ mod tests {
             ("linear", 100.0, 400.0)
         );
         assert!((first.at / 200.0 - 1.0).abs() < 0.01, "{first:?}");
-        // A tie is no other advice; what was slower from the start is its own end.
+        // A tie is no other advice: equal between it and where the tree is ahead.
         assert_eq!(found(&[(400.0, &here), (100.0, &tie)]), None);
         let late = found(&[(400.0, &here), (100.0, &tie), (25.0, &slower)]).unwrap();
-        assert_eq!((late.lower, late.upper), (25.0, 100.0));
-        assert!(25.0 < late.at && late.at <= 100.0, "{late:?}");
+        assert_eq!((late.lower, late.upper), (25.0, 400.0));
+        assert!(100.0 < late.at && late.at < 110.0, "{late:?}");
+        // Behind from the start, which was no proof.
+        let early = found(&[(400.0, &tie), (100.0, &slower)]).unwrap();
+        assert_eq!((early.at, early.lower), (400.0, 100.0));
         assert_eq!(found(&[(400.0, &here)]), None);
     }
 

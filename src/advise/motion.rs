@@ -56,7 +56,7 @@ impl MotionChoice {
         let are_rows = all.clone().any(|s| s.policy != UpdatePolicy::Refit);
         let spec = all.find(|s| structure.name.as_ref() == Some(&s.label));
         let refits = spec.is_none_or(|spec| spec.info().refits);
-        let spec = spec.filter(|_| refits && !structure.is_scan);
+        let spec = spec.filter(|_| refits);
         for policy in POLICIES.into_iter().filter(|_| !are_rows) {
             let frames = match policy {
                 UpdatePolicy::Every(frames) if 2 * frames as usize > motion.frames() => continue,

@@ -227,7 +227,11 @@ impl Rule {
         if let Some(leaves_out) = finding.measured.or(predicted) {
             omission.decide(leaves_out);
         }
-        omission.decision = finding.decision.unwrap_or(omission.decision);
+        if let Some(chosen) = finding.decision {
+            omission.decision = chosen;
+            let foreseen = predicted.filter(|_| !omission.is_tie);
+            omission.confirmed = foreseen.map(|leaves_out| Decision::of(leaves_out) == chosen);
+        }
         omission
     }
 }

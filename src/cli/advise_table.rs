@@ -10,7 +10,7 @@ use crate::statistics::Estimate;
 
 /// The advice, with the evidence if it is wanted, for `width` characters.
 pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
-    let items = text::counted(advice.items, "item");
+    let items = text::items(advice.items, advice.skipped_items);
     let cameras = text::counted(advice.cameras, "camera");
     let (scene, path) = (&advice.scene, &advice.path);
     let mut blocks = vec![
@@ -38,9 +38,11 @@ pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
     let no = |rule: &Omission| not_for(advice, rule);
     type Holds<'h> = &'h dyn Fn(&Omission) -> bool;
     let lines: [(&str, Holds); 4] = [
-        ("Does not apply: ", &|rule| no(rule).is_some()),
+        ("Does not apply, or was not measured: ", &|rule| {
+            no(rule).is_some()
+        }),
         (
-            "Pays from: each stage beside the others, as funnel measures it: ",
+            "Gains and pays from: each stage beside all others, needed or not, as in funnel: ",
             &|rule| rule.note.contains("pays from"),
         ),
         ("WRONG: answers with and without differ: ", &|rule| {
@@ -162,7 +164,7 @@ fn changes(advice: &Advice) -> Vec<String> {
         let turns = text::joined(turns);
         told.push(match turns.is_empty() {
             true if low == high => format!("  {what}: only {low} was measured"),
-            true => format!("  {what}: not within {low} to {high}, which were measured"),
+            true => format!("  {what}: not shown within {low} to {high}, which were measured"),
             false => format!("  {what}: {turns}; measured from {low} to {high}"),
         });
     }

@@ -139,7 +139,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "STRUCTURE", conflicts_with = "plan")]
     pub why: Option<String>,
     /// Print the cells as JSON lines instead of measuring them
-    #[arg(long, conflicts_with = "resume")]
+    #[arg(long, conflicts_with_all = ["resume", "out", "all_columns"])]
     pub plan: bool,
     /// Measure share i of n of the plan only; `merge` joins the reports
     #[arg(long, value_name = "i/n")]
@@ -268,9 +268,9 @@ pub struct VerifyArgs {
     /// Random differential cases [default: 20000, or 0 if scenes or paths are named]
     #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX))]
     pub cases: Option<u64>,
-    /// Seed of the first case; case i has seed N + i
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
-    pub seed: u64,
+    /// Seed of the first case; case i has seed N + i [default: 1]
+    #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX))]
+    pub seed: Option<u64>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
     #[command(flatten)]

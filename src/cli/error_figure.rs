@@ -66,7 +66,9 @@ impl Against {
     pub fn draw(mut self) -> Figure {
         let all = self.points.len();
         for own in &mut self.points {
-            own.point.at[1] = own.point.at[1].max(self.none);
+            let point = &mut own.point;
+            point.at[1] = point.at[1].max(self.none);
+            point.ends = point.ends.map(|ends| ends.map(|end| end.max(self.none)));
         }
         let is_drawn = |own: &Measured| own.point.at.iter().all(|value| is_drawn(*value));
         self.points.retain(is_drawn);
@@ -78,6 +80,7 @@ impl Against {
             let points = own.into_iter().map(|mut point| {
                 point.is_large = front.contains(&point.at);
                 point.wide = point.wide.filter(|_| point.is_large);
+                point.ends = point.ends.filter(|_| point.is_large);
                 point
             });
             let is_scan = structure.starts_with("linear");
@@ -89,7 +92,8 @@ impl Against {
             false => text::significant(error),
         };
         // From nothing to a hundredth at least.
-        let errors = places().map(|p| p.at[1]).chain([self.none, 1.0]);
+        let errors = places().flat_map(|p| p.ends.unwrap_or([p.at[1]; 2]));
+        let errors = errors.chain([self.none, 1.0]);
         let mut y = Axis::log("", errors, 1.5, &error);
         // Powers above zero, whose place is half a step below the last.
         y.ticks = y.powers(10.0);

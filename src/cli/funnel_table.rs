@@ -20,7 +20,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
             format!("; --frames {} takes all", report.cameras),
         ],
     };
-    let items = text::counted(report.items, "item");
+    let items = text::items(report.items, report.skipped_items);
     let times = text::over(report.processes, None);
     let [width, height] = report.samples;
     let mut blocks = vec![
@@ -155,7 +155,7 @@ fn worth(gain: &Gain) -> String {
         return if never { "never" } else { "" }.to_owned();
     };
     match (ns.value, ns.lower, ns.upper) {
-        (0.0, ..) => "always".to_owned(),
+        (0.0, _, None | Some(0.0)) => "always".to_owned(),
         // Within noise of saving time as well.
         (_, Some(0.0), Some(most)) => format!("<{}/{unit}", text::time(most)),
         (ns, ..) => format!("{}/{unit}", text::time(ns)),
@@ -217,7 +217,7 @@ pub fn doubt(guarantee: Guarantee) -> &'static str {
 /// A mean of counts.
 pub fn count(mean: f64) -> String {
     match mean {
-        mean if mean >= 100.0 || mean.fract() == 0.0 => text::count(mean.round() as usize),
+        mean if mean.fract() == 0.0 => text::count(mean as usize),
         mean => text::significant(mean),
     }
 }

@@ -128,7 +128,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
     to_html(&title, &all)
 }
 
-/// Changes from the first to the last run, and what else differs between them.
+/// Changes from first to last times, and what else differs between the ends of the history.
 ///
 /// Times of two runs one after the other differ for the machine's sake alone: no change is
 /// counted or named.
@@ -145,11 +145,14 @@ fn conclusion(reports: &[Report], ratios: &[f64]) -> String {
         format!(" They differ in the {differ}: not all of a change is the program's own.")
     });
     let runs = text::counted(reports.len(), "run");
-    let times = text::counted(ratios.len(), "time");
+    let cells = text::counted(ratios.len(), "cell");
     let [least, most] = [least, most].map(text::significant);
+    let all = format!("{least} to {most}");
+    let factor = if least == most { least } else { all };
+    let take = ["takes", "take"][usize::from(ratios.len() > 1)];
     format!(
-        "From the first to the last of {runs}, {times} became {least} to {most} x as long, by \
-         program and machine together. compare judges two runs.{note}"
+        "Over {runs} {cells} {take} {factor} x as long in the last run that has times of them as in \
+         the first, by program and machine together. compare judges two runs.{note}"
     )
 }
 

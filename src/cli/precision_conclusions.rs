@@ -174,6 +174,7 @@ fn measured<E>(
         test: test.to_owned(),
         point: diagram::Point {
             at: [point.query_ns()?, error?.value * 100.0],
+            ends: error.and_then(|rate| Some([rate.lower? * 100.0, rate.upper? * 100.0])),
             wide: point.time.and_then(ends),
             note,
             is_cross,

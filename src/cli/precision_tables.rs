@@ -19,7 +19,7 @@ pub type CullingPoint = Point<CullingErrors>;
 pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     let visible = p.points.iter().find_map(|point| point.errors.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
-    let items = text::counted(p.items, "item");
+    let items = text::items(p.items, p.skipped_items);
     let cameras = text::counted(p.cameras, "camera");
     let rounds = text::counted(p.rounds, "round");
     let visible = text::count(visible as usize);
@@ -41,8 +41,17 @@ pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
         add(title, times_table(&fastest), "");
     }
     let title = "Pareto front of error, memory and time, fastest first";
-    let front = front_table(p).within(room, &["tie", "B/item", "FN ppm"]);
-    add(title, front, FRONT_NOTE);
+    let whole = front_table(p);
+    let front = whole.within(room, &["tie", "B/item", "FN ppm"]);
+    let gone = whole
+        .header
+        .iter()
+        .filter(|head| !front.header.contains(head));
+    let gone = text::some(
+        Some(text::joined(gone)).filter(|gone| !gone.is_empty()),
+        |gone| format!(" Columns that do not fit here: {gone}."),
+    );
+    add(title, front, &(FRONT_NOTE.to_owned() + &gone));
     if all {
         let title = "Region search, the fastest structure for each";
         add(title, regions_table(p), "");

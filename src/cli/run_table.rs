@@ -46,13 +46,11 @@ fn key<'r>(comparison: &Comparison<'r>) -> [&'r str; 3] {
 pub fn heads(comparison: &Comparison) -> Vec<String> {
     let cell = comparison.about();
     let (scene, path) = (&cell.scene, &cell.path);
-    let bad = (scene.skipped_items > 0).then(|| text::counted(scene.skipped_items, "bad item"));
     let axes = (!scene.up.is_empty()).then(|| scene_facts::axes(scene));
     let of_scene = text::joined([
-        text::counted(scene.total_count, "item"),
+        text::items(scene.total_count, scene.skipped_items),
         text::counted(scene.region_count, "region"),
         axes.unwrap_or_default(),
-        text::some(bad, |bad| format!("{bad} left out")),
     ]);
     let of_scene = match scene.total_count {
         0 if scene.digest.is_empty() => "no process finished".to_owned(),

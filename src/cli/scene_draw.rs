@@ -62,6 +62,9 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     let loading = args.lens.scene_args.options(structure.iter().len());
     let scene = load_scene(&args.scene, &loading)?;
     let mut caption = vec![scene.name.clone()];
+    if scene.skipped_items > 0 {
+        caption.push(text::items(scene.items.len(), scene.skipped_items));
+    }
     let camera = match &args.camera {
         None => None,
         Some(source) => {
@@ -121,7 +124,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
         }),
     };
     write_text(&args.out, &plan.svg())?;
-    let mut told = text::counted(scene.items.len(), "item");
+    let mut told = text::items(scene.items.len(), scene.skipped_items);
     if index.is_some() {
         told += &format!(", {}", text::counted(cells.len(), "cell"));
     }

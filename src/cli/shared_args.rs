@@ -104,6 +104,16 @@ pub struct MotionArgs {
     pub update: Option<String>,
 }
 
+/// Seed of the first of some generated cases.
+pub fn first_seed(seed: Option<u64>, cases: u64) -> Result<u64> {
+    let is_used = seed.is_none() || cases > 0;
+    ensure!(
+        is_used,
+        "--seed is for generated cases, of which there are none; expected --cases above 0 with it"
+    );
+    Ok(seed.unwrap_or(1))
+}
+
 impl MotionArgs {
     /// The list of structures, with `default` as it is where items move.
     pub fn list<'l>(&self, list: &'l str) -> &'l str {

@@ -10,6 +10,7 @@ use anyhow::bail;
 use indicatif::ProgressBar;
 
 use super::args::StressArgs;
+use super::shared_args::first_seed;
 use super::table::{Column, Table};
 use super::{Ending, interrupt, print, tell, text};
 use crate::index::{Registry, StructureSpec};
@@ -41,16 +42,12 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         vectors = built_in()?;
     }
     let cases = args.cases;
-    if args.seed.is_some() && cases == 0 {
-        bail!(
-            "--seed is for generated cases, of which there are none; expected --cases above 0 with it"
-        );
-    }
+    let seed = first_seed(args.seed, cases)?;
     interrupt::from_now_on_finish();
     let started = Instant::now();
     let extremes = Extremes {
         structures: &structures,
-        seed: args.seed.unwrap_or(1),
+        seed,
         cases,
         threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
     };

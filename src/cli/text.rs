@@ -9,6 +9,12 @@ pub use crate::shown::{count, counted, first_of, lines, message, plain, signific
 use crate::statistics::{Estimate, Rate};
 use crate::verify::ErrorCount;
 
+/// "698 items, 2 bad items left out".
+pub fn items(count: usize, left_out: usize) -> String {
+    let bad = (left_out > 0).then(|| counted(left_out, "bad item") + " left out");
+    joined([counted(count, "item"), bad.unwrap_or_default()])
+}
+
 /// A figure as text; nothing if there is none.
 pub fn some<T>(value: Option<T>, show: impl FnOnce(T) -> String) -> String {
     value.map(show).unwrap_or_default()

@@ -10,6 +10,7 @@ use indicatif::ProgressBar;
 
 use super::args::VerifyArgs;
 use super::run_resume::TypedOptions;
+use super::shared_args::first_seed;
 use super::verify_table::{Check, Outcome, RANDOM, show};
 use super::{Ending, interrupt, load_scene, print, program, tell, text};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
@@ -55,6 +56,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     if scenes.is_empty() && cases == 0 {
         bail!("nothing to verify: no scene and --cases 0; expected one or the other");
     }
+    let seed = first_seed(args.seed, cases)?;
     interrupt::from_now_on_finish();
     let started = Instant::now();
     let bar = ProgressBar::new(scenes.len() as u64 + 1);
@@ -80,7 +82,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     }
     if cases > 0 && !interrupted {
         bar.set_message(text::counted(cases as usize, "random case"));
-        let checked = random_cases(&structures, args.seed, cases);
+        let checked = random_cases(&structures, seed, cases);
         interrupted = checked.first().is_some_and(|c| (c.volumes as u64) < cases);
         checks.extend(checked);
     }
@@ -92,7 +94,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         mismatches: checks.iter().filter(|c| c.difference.is_some()).count(),
         against_cameras: is_safe(&culling),
         seconds: started.elapsed().as_secs_f64(),
-        seed: args.seed,
+        seed,
         cases,
         checks,
     };

@@ -103,7 +103,8 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         format!("; matrices: {}", scene_facts::matrices(matrix))
     });
     let test = culling.test.name();
-    let about = format!("Scene: {axes}. Lens: {lens}{matrix}. Test: {test}.");
+    let items = text::items(scene.items.len(), scene.skipped_items);
+    let about = format!("Scene: {items}, {axes}. Lens: {lens}{matrix}. Test: {test}.");
     let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
     let title = format!("{} view {}", program::name(), data.scene);
     let body = format!(

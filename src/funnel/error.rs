@@ -54,7 +54,7 @@ pub fn fits_drawing(
     match samples > most {
         true => Err(format!(
             "{samples} samples drawn in a view, summed over its items; expected at most {most}: \
-             fewer --samples or fewer items"
+             fewer samples or fewer items"
         )),
         false => Ok(()),
     }

@@ -307,7 +307,9 @@ fn of_gain(gain: &Gain, stages: &[StageRow]) -> Option<String> {
     Some(match gain.break_even {
         None if gain.removed() > 0.0 => return None,
         None => format!("{what} is not needed: it removes nothing that the other stages leave."),
-        Some(Estimate { value: 0.0, .. }) => format!("Use {what}: it saves time as well."),
+        Some(ns) if ns.upper.unwrap_or(ns.value) == 0.0 => {
+            format!("Use {what}: it saves time as well.")
+        }
         Some(ns) => {
             // Within noise of saving time as well.
             let most = ns.upper.filter(|_| ns.lower == Some(0.0));
@@ -418,6 +420,7 @@ mod tests {
         let other = lossy(StageKind::Occlusion, 5.0);
         let own = of_gain(&gain(350.0, 300.0, 734.0), &[other]);
         assert_eq!(own.expect("one"), format!("{wanted}."));
-        assert!(advice(0.0, 0.0, 9.0).ends_with("saves time as well."));
+        assert!(advice(0.0, 0.0, 9.0).ends_with("more than 0 ns (0 to 9.00 ns)."));
+        assert!(advice(0.0, 0.0, 0.0).ends_with("saves time as well."));
     }
 }

@@ -111,14 +111,24 @@ impl<'w> Study<'w> {
     /// The chain without each of its stages, from the rows of all stages.
     fn gains(&self, rows: &[StageRow]) -> Vec<Gain> {
         let timed = self.items.timed(self.chain);
-        let of_items = StageKind::OF_ITEMS
-            .into_iter()
-            .filter(|&stage| self.chain.of(stage) != NONE && self.chain.is_separate(stage));
-        let of_items = of_items.map(|stage| {
-            let without = self.chain.clone().with(stage, NONE);
-            let counts = [&self.steps, &without.steps()].map(|steps| self.items.mean_count(steps));
-            let tasks = [timed.clone(), self.items.timed(&without)];
-            Gain::new(stage, (self.chain.of(stage), stage.unit()), counts, tasks)
+        let of_items = StageKind::OF_ITEMS.into_iter();
+        let of_items = of_items.filter(|&stage| self.chain.of(stage) != NONE);
+        let gain = |with: &Chain, stage| {
+            let chains = [with.clone(), with.clone().with(stage, NONE)];
+            let counts = chains
+                .each_ref()
+                .map(|chain| self.items.mean_count(&chain.steps()));
+            let tasks = chains.each_ref().map(|chain| self.items.timed(chain));
+            Gain::new(stage, (with.of(stage), stage.unit()), counts, tasks)
+        };
+        let of_items = of_items.filter_map(|stage| {
+            if self.chain.is_separate(stage) {
+                return Some(gain(self.chain, stage));
+            }
+            // A traversal that does it as well, and is worth nothing.
+            let is_vain = gain(self.chain, StageKind::Occlusion).removed() == 0.0;
+            let alone = self.chain.clone().with(StageKind::Occlusion, NONE);
+            is_vain.then(|| gain(&alone, stage))
         });
         let behind = rows.iter().filter(|row| row.is_chosen).filter_map(|row| {
             let stage = row.back_end.stage;

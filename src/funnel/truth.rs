@@ -95,7 +95,7 @@ impl RaysEnd<'_> {
             if all > most {
                 return Err(format!(
                     "about {all} {what}, summed over the samples; expected at most {most}: \
-                     fewer --samples or fewer items {fewer}"
+                     fewer samples or fewer items {fewer}"
                 ));
             }
         }

@@ -51,6 +51,9 @@ impl<'b> TableReader<'b> {
         let no_text = |at: usize, found: &str| {
             InputError::line(file, lines(&bytes[..at]) + 1, found, "UTF-8 text")
         };
+        if bytes.starts_with(b"\x1f\x8b") {
+            return Err(no_text(0, "gzip, which is not read"));
+        }
         if let Some(zero) = bytes.iter().position(|byte| *byte == 0) {
             return Err(no_text(zero, "zero bytes, as in UTF-16 text"));
         }

@@ -93,7 +93,9 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
             let timed = entry.timed(key.1, frames);
             let tail_of = (key.1 == TaskKind::Frame).then_some(1);
             tasks.push(task_part(key, &timed, &planned.schedule, tail_of));
-            let is_kept = [TaskKind::Frame, TaskKind::Update].contains(&key.1);
+            // Of one view the queries are the difference of the two.
+            let is_kept = [TaskKind::Frame, TaskKind::Update].contains(&key.1)
+                || workload.views_per_frame > 1;
             let mut kept = timed.ok().filter(|_| is_kept).unwrap_or_default();
             // Checks go by the right answers; fat bounds return more.
             let frames = entry.rounds.iter().flatten();

@@ -89,7 +89,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "judged_queries", "queries", Of::Judged(|j| Some(Estimate::exact(j.judged_queries as f64))), "cameras of the path whose answers were checked against the oracle";
     "build_ms", "ms", Of::Process(|s| s.build_ms), "CPU time of one build; wall time with --threads above 1";
     "update_ms_0_1_percent", "ms", Of::Process(|s| s.update_ms.first().copied()), "as update_ms, after 0.1 % have moved";
-    "update_ms", "ms", Of::Process(|s| s.update_ms.get(1).copied()), "CPU time of an update after 1 % of the items have moved (scenes of up to 2 million)";
+    "update_ms", "ms", Of::Process(|s| s.update_ms.get(1).copied()), "CPU time of an update after 1 % of the items, at least one, have moved (scenes of up to 2 million)";
     "update_ms_10_percent", "ms", Of::Process(|s| s.update_ms.get(2).copied()), "as update_ms, after 10 % have moved";
     "update_ms_100_percent", "ms", Of::Process(|s| s.update_ms.get(3).copied()), "as update_ms, after all have moved";
     "refitted_over_rebuilt", "1", Of::Log(|s| s.refitted_ln), "time per query after 32 refits, each after 1 % of the items have moved / time per query on a fresh build of the same boxes (query after 32 in tables); only structures that refit";

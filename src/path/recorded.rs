@@ -9,6 +9,7 @@ use crate::camera::{
 };
 use crate::input::{InputError, Result, Row, TableReader, note};
 use crate::scene::{Scene, WorldBox, memory};
+use crate::shown::shortened;
 
 /// Values for columns that a file does not have, and lenses of generated paths.
 /// `None` leaves the choice to the path.
@@ -239,13 +240,18 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
         let eye = point(row, eye)?;
         let target = point(row, target)?;
         let up = up.map_or(Ok(defaults.up), |columns| point(row, columns))?;
-        let is_infinite = |column| {
-            let text = row.text(column).to_lowercase();
-            ["", "inf", "+inf", "infinity", "+infinity"].contains(&text.as_str())
-        };
-        let far = match far {
-            Some(column) if is_infinite(column) => None,
-            Some(column) => Some(row.finite_number(column)?),
+        let far = match far.map(|column| row.text(column)) {
+            Some("") => None,
+            Some(text) => {
+                let far = text
+                    .parse::<f64>()
+                    .ok()
+                    .filter(|far| *far > f64::NEG_INFINITY);
+                let expected = "a number above 0, inf or nothing";
+                let found = || format!("far '{}'", shortened(text, 60));
+                let far = far.ok_or_else(|| row.error(found(), expected))?;
+                Some(far).filter(|far| far.is_finite())
+            }
             None => defaults.depths(eye).1,
         };
         let is_filled = |column: &usize| !row.text(*column).is_empty();

@@ -319,7 +319,9 @@ pub fn refuse(bytes: &[u8], file: &str) -> Result<()> {
     let is_json = matches!(text.trim_ascii_start().first(), Some(b'{' | b'['));
     let begins = |start: &[u8]| !start.is_empty() && text.starts_with(start);
     let by_start = FORMATS.iter().find(|row| begins(row.1));
-    let by_name = FORMATS.iter().find(|row| is_named(row.2));
+    // A download may have been unpacked under its name.
+    let mut named = FORMATS.iter().filter(|row| is_named(row.2));
+    let by_name = named.find(|row| row.3 != PACKED || begins(row.1));
     let stl = || bytes.starts_with(b"solid ") && holds(b"facet") || is_binary_stl(bytes);
     let (name, expected) = match by_name.or(by_start) {
         Some(row) => (row.0, row.3),

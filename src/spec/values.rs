@@ -28,15 +28,8 @@ pub fn whole<N: FromStr + PartialOrd + Display + Clone>(
 ) -> impl Fn(&str) -> Result<N, SpecError> + Clone {
     move |text| {
         let sound = text.parse().ok().filter(|n| range.contains(n));
-        let (least, most) = (range.start(), range.end().to_string());
-        // Twenty digits are no bound in practice.
-        expected(
-            sound,
-            match most == u64::MAX.to_string() {
-                true => format!("a whole number of at least {least}"),
-                false => format!("a whole number from {least} to {most}"),
-            },
-        )
+        let (least, most) = (range.start(), range.end());
+        expected(sound, format!("a whole number from {least} to {most}"))
     }
 }
 
@@ -65,9 +58,9 @@ pub fn field_of_view(text: &str) -> Result<f64, SpecError> {
 
 /// A far plane; `inf` is none.
 pub fn far(text: &str) -> Result<f64, SpecError> {
-    match text.eq_ignore_ascii_case("inf") {
-        true => Ok(f64::INFINITY),
-        false => number(text, "a number above 0 or inf", |n| n > 0.0),
+    match text.parse() {
+        Ok(f64::INFINITY) => Ok(f64::INFINITY),
+        _ => number(text, "a number above 0 or inf", |n| n > 0.0),
     }
 }
 

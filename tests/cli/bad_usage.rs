@@ -90,7 +90,7 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ("run --sead 3", "'--sead' | did you mean '--seed'"),
         (
             "run --seed x --out new",
-            "--seed is 'x'; expected a whole number of at least 0",
+            "--seed is 'x'; expected a whole number from 0 to 18446744073709551615",
         ),
         (
             "run --plan --resume",
@@ -98,7 +98,7 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         (
             "run --seed -1 --out new",
-            "--seed is '-1'; expected a whole number of at least 0",
+            "--seed is '-1'; expected a whole number from 0 to 18446744073709551615",
         ),
         (
             "run --processes 0 --out new",
@@ -106,11 +106,11 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         (
             "run --timeout -3 --out new",
-            "--timeout is '-3'; expected a whole number of at least 1",
+            "--timeout is '-3'; expected a whole number from 1 to 18446744073709551615",
         ),
         (
             "verify --cases -1",
-            "--cases is '-1'; expected a whole number of at least 0",
+            "--cases is '-1'; expected a whole number from 0 to 18446744073709551615",
         ),
         (
             "precision --scene scene.csv --frames 0",

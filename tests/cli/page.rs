@@ -164,9 +164,9 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     assert_refused(&twice, "run | is named twice; expected each once", "twice");
     let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
     assert_well_formed(&page);
-    assert!(
-        page.contains("of 2 runs, 2 times became 1,000 to 1,000 x as long, by program and machine")
-    );
+    assert!(page.contains(
+        "Over 2 runs 2 cells take 1,000 x as long in the last run that has times of them"
+    ));
     assert_eq!(page.matches("1,000 x</td>").count(), 2, "last / first");
     assert!(
         page.find("fedcba9") > page.find("class=\"tick\""),

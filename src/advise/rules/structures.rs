@@ -19,7 +19,8 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
     let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
     let items = &case.scene().items;
     let whole = trials.index(case.scan.build(items)?, case.views());
-    let sides = Sides::same(format!("{tree} against {scan}"), BASE, whole);
+    let place = ["", ", at rest"][usize::from(case.workload.motion.is_some())];
+    let sides = Sides::same(format!("{tree} against {scan}{place}"), BASE, whole);
     let all = items.len() as f64;
     Ok(Draft::concluded(vec![sides], move |facts| {
         let taken = facts.structure;
@@ -134,7 +135,8 @@ pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
         .map(|index| trials.unjudged(move |n, out| index.query(case.views()[n].as_any(), out)));
     let on = format!("{}, queries after an update", case.spec.label);
     let queries = case.options.queries_per_update;
-    let (share, count) = (case.options.moved, moved.len());
+    let count = moved.len();
+    let share = significant(count as f64 / items.len() as f64 * 100.0);
     let mut draft = Draft::concluded(vec![Sides::same(on, kept, left_out)], move |facts| {
         let (check, [refit_ns, rebuild_ns]) = (&facts.checks[0], facts.once_ns);
         let slower = queries * (check.left_out_ns - check.kept_ns);
@@ -145,14 +147,14 @@ pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
             more => format!("{more} queries"),
         };
         let reason = format!(
-            "{} moved by their own size ({} %), {many} an update: refit {:.0} us, rebuild {:.0} us",
+            "{} moved by {} own size ({share} %), {many} an update: refit {:.0} us, rebuild {:.0} us",
             counted(count, "item"),
-            share * 100.0,
+            if count == 1 { "its" } else { "their" },
             refit_ns / 1e3,
             rebuild_ns / 1e3
         );
         Finding::new(slower, rebuild_ns - refit_ns, reason)
-            .noted(format!("{} % moved, {many} each", share * 100.0))
+            .noted(format!("{share} % moved, {many} each"))
             .costing([kept, left_out])
     });
     draft.once = Some(trials.once_ns.len());

@@ -104,7 +104,7 @@ impl ErrorCount {
         if self.looked_at > MOST_PAIRS {
             return Err(format!(
                 "more than {MOST_PAIRS} pairs of layers at the samples of a view; \
-                 expected fewer --samples or fewer items behind each other"
+                 expected fewer samples or fewer items behind each other"
             ));
         }
         let all: Vec<(ItemId, ItemId)> = self.right.union(&self.wrong).copied().collect();
