@@ -107,28 +107,6 @@ impl Linear {
         }
     }
 
-    /// The blocks, all lanes of which hold an item up to the last one.
-    #[inline(always)]
-    fn blocks(&self) -> ScannedBlocks<'_, false> {
-        ScannedBlocks {
-            blocks: self.boxes.blocks(),
-            ids: &self.ids,
-            balls: self.balls.as_ref(),
-            occupied: &[],
-        }
-    }
-}
-
-/// Blocks of items to be scanned.
-pub(super) struct ScannedBlocks<'a, const VACANT: bool> {
-    pub blocks: &'a [BoxBlock],
-    pub ids: &'a PaddedIds,
-    pub balls: Option<&'a BallBlocks>,
-    /// If there are `VACANT` lanes, those of each block that hold an item.
-    pub occupied: &'a [LaneMask],
-}
-
-impl<const VACANT: bool> ScannedBlocks<'_, VACANT> {
     /// Tests a range of blocks against all planes; `open` is their number.
     #[inline(always)]
     fn scan_all<P: Planes<C::Isa>, C: Context>(
@@ -147,16 +125,11 @@ impl<const VACANT: bool> ScannedBlocks<'_, VACANT> {
                 blocks: &blocks[here.clone()],
                 doubt,
             });
-            let tests = BlockTests::<VACANT, _, _> {
-                blocks: &self.blocks[here.clone()],
+            let tests = BlockTests {
+                blocks: &self.boxes.blocks()[here.clone()],
                 planes,
                 balls,
                 items: self.ids.len() - first * LANES,
-                occupied: if VACANT {
-                    &self.occupied[here.clone()]
-                } else {
-                    &[]
-                },
                 open,
                 recorder: &mut *recorder,
                 four: [0; 4],
@@ -168,14 +141,14 @@ impl<const VACANT: bool> ScannedBlocks<'_, VACANT> {
 
     /// Tests a range of blocks, on this thread.
     #[inline(always)]
-    pub fn scan<Q: QueryVolume, C: Context>(
+    fn scan<Q: QueryVolume, C: Context>(
         &self,
         range: Range<usize>,
         volume: &Q,
         cx: &mut C,
     ) -> ControlFlow<()> {
         let open = Q::planes_open(volume.mask());
-        let balls = seen_by(self.balls, volume);
+        let balls = seen_by(self.balls.as_ref(), volume);
         if C::Isa::MANY_REGISTERS
             && let Some(planes) = volume.all_planes(cx.isa())
         {
@@ -199,7 +172,7 @@ impl<I: Isa, Q: QueryVolume> QueryInParts<I> for SharedScan<'_, Q> {
         let recorder = &mut NoRecorder;
         let mut cx = QueryContext::new(isa, ids, recorder);
         // A Vec never breaks off.
-        let _ = self.scan.blocks().scan(first..end, self.volume, &mut cx);
+        let _ = self.scan.scan(first..end, self.volume, &mut cx);
     }
 }
 
@@ -252,7 +225,7 @@ impl RegionIndex for Linear {
             let work = SharedScan { scan: self, volume };
             return in_parts(workers, blocks.div_ceil(BLOCKS_PER_CALL), &work, cx);
         }
-        self.blocks().scan(0..blocks, volume, cx)
+        self.scan(0..blocks, volume, cx)
     }
 
     /// O(moved): overwrites their lanes. Items may become or cease to be empty.
@@ -287,13 +260,12 @@ pub fn seen_by<'t, Q: QueryVolume>(balls: Option<&'t BallBlocks>, volume: &Q) ->
 }
 
 /// The tests of consecutive blocks against all planes, run by the sink.
-struct BlockTests<'a, const VACANT: bool, P, R> {
+struct BlockTests<'a, P, R> {
     blocks: &'a [BoxBlock],
     planes: P,
     balls: Option<Balls<'a>>,
     /// Number of items in these blocks and the following ones.
     items: usize,
-    occupied: &'a [LaneMask],
     /// Number of open planes.
     open: u32,
     recorder: &'a mut R,
@@ -301,9 +273,7 @@ struct BlockTests<'a, const VACANT: bool, P, R> {
     four: [LaneMask; 4],
 }
 
-impl<const VACANT: bool, I: Isa, P: Planes<I>, R: Recorder> Tests<I>
-    for BlockTests<'_, VACANT, P, R>
-{
+impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for BlockTests<'_, P, R> {
     const SPARSE: bool = true;
 
     #[inline(always)]
@@ -313,10 +283,7 @@ impl<const VACANT: bool, I: Isa, P: Planes<I>, R: Recorder> Tests<I>
 
     #[inline(always)]
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
-        let lanes = match VACANT {
-            true => self.occupied[i],
-            false => first_lanes(self.items - i * LANES),
-        };
+        let lanes = first_lanes(self.items - i * LANES);
         self.recorder.items_tested(lanes.count_ones());
         let tests = lanes.count_ones() * self.open;
         self.recorder.planes_tested(tests);

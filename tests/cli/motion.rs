@@ -307,7 +307,7 @@ fn what_auto_has_chosen_stands_in_cell_summary_and_notes() {
         "built as ",
         [
             "; refit in 6 of 6 updates, not",
-            "; scan of overwritten leaves in 6 of 6 updates, not",
+            "; scan of overwritten boxes in 6 of 6 updates, not",
         ],
     );
 }

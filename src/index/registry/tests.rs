@@ -11,7 +11,7 @@ fn structures_are_found_with_their_parameters() {
     assert_eq!(all.len(), registry.rows().len());
     let named = registry.structures("default,octree-textbook").unwrap();
     assert_eq!(named.iter().filter(|s| s.info().on_request).count(), 1);
-    assert_eq!(named.len(), all.len() - 4);
+    assert_eq!(named.len(), all.len() - 5);
     let two = registry
         .structures("bvh:leaf=4,preset=medium,linear")
         .unwrap();

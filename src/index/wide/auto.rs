@@ -14,7 +14,9 @@ pub use self::params::AutoParams;
 use self::params::{Update, Use};
 use super::{Moving, WideParams};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::index::{
+    BuildError, Info, Input, Kind, Linear, LinearParams, MemoryUsage, Origin, RegionIndex,
+};
 use crate::kernel::Plain;
 use crate::query::{Context, Count, ItemId, QueryContext, QueryCost, QueryVolume};
 
@@ -24,12 +26,7 @@ const SCAN: usize = 0;
 const TREE: usize = 1;
 
 /// Kinds of updates by their index in [`Auto::updates`].
-const UPDATES: [&str; 4] = [
-    "scan of overwritten leaves",
-    "refit",
-    "rebuild",
-    "two trees",
-];
+const UPDATES: [&str; 4] = ["scan of overwritten boxes", "refit", "rebuild", "two trees"];
 const OVERWRITE: usize = 0;
 const REFIT: usize = 1;
 const REBUILD: usize = 2;
@@ -46,8 +43,8 @@ const SCAN_NS: f64 = 0.5;
 ///
 /// Beyond it the time of an item grows with the cube root of their number.
 const NEAR: f64 = 65_536.0;
-/// An overwritten item.
-const MOVE_NS: f64 = 8.0;
+/// An overwritten item, by search: a scan has them in the order of their ids.
+const MOVE_NS: [f64; 2] = [4.0, 8.0];
 /// A refit, and a leaf whose bounds it fits.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
 /// The same of two trees, of a moved item.
@@ -80,8 +77,8 @@ const MOST_ASKED: u32 = 256;
 #[derive(Default)]
 pub struct Auto {
     trees: Moving,
-    /// Queries test all leaves; the blocks above them are as they were before.
-    scans: bool,
+    /// Answers in place of the trees, which are as they were before its first update.
+    scan: Option<Linear>,
     /// Movers have a tree of their own.
     is_parted: bool,
     params: AutoParams,
@@ -196,7 +193,17 @@ impl Auto {
             Use::Auto if scan < tree => SCAN,
             _ => TREE,
         };
-        self.scans = self.built == SCAN;
+        self.scan = self.built_scan(items);
+    }
+
+    /// The scan of a new tree that is built as one.
+    fn built_scan(&self, items: &[Aabb]) -> Option<Linear> {
+        (self.built == SCAN && !self.is_parted).then(|| self.scan_of(items))?
+    }
+
+    fn scan_of(&self, items: &[Aabb]) -> Option<Linear> {
+        let input = Input::new(items).spheres(self.trees.still.balls.is_some());
+        Linear::build(&input, &LinearParams::default()).ok()
     }
 
     /// Replaces the trees; false with nothing changed if they cannot be built.
@@ -210,7 +217,7 @@ impl Auto {
         };
         self.trees = trees;
         self.is_parted = self.update == PART;
-        self.scans = self.built == SCAN && !self.is_parted;
+        self.scan = self.built_scan(items);
         if matches!(self.update, REFIT | PART) {
             self.costs[TREE] = self.count(items);
             let new = self.costs[TREE];
@@ -232,14 +239,17 @@ impl Auto {
         self.patience = 0.25;
     }
 
-    /// The leaves alone; the blocks above them are stale from then on.
+    /// New bounds in a scan; the tree is stale from then on.
     fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        if self.trees.still.overwrite(items, moved).is_none() {
-            return self.rebuild(items);
-        }
-        self.scans = true;
-        self.updates[OVERWRITE] += 1;
-        true
+        let is_held = match &mut self.scan {
+            Some(scan) => scan.refit(items, moved),
+            None => {
+                self.scan = self.scan_of(items);
+                self.scan.is_some()
+            }
+        };
+        self.updates[OVERWRITE] += u32::from(is_held);
+        is_held
     }
 
     /// New bounds in the trees; false if they cannot take them over.
@@ -251,11 +261,17 @@ impl Auto {
     }
 
     fn refit_trees(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let is_held = match self.scans {
-            true => !self.is_aged() && self.trees.still.overwrite(items, moved).is_some(),
+        let scans = self.scan.is_some();
+        let is_held = match scans {
+            // What has moved meanwhile is not known.
+            true => {
+                let all: Vec<ItemId> = (0..items.len() as ItemId).collect();
+                !self.is_aged() && self.trees.still.overwrite(items, &all).is_some()
+            }
             false => self.refit_held(items, moved),
         };
-        if is_held && std::mem::take(&mut self.scans) {
+        if is_held && scans {
+            self.scan = None;
             self.trees.still.fit();
             self.aged[0] = self.age(items, 0..VIEWS);
             self.start();
@@ -317,12 +333,13 @@ impl Auto {
         let fitted = moved * leaves / (moved / updates).hypot(leaves);
         let fit = REFIT_NS[1] * fitted;
         self.costs[SCAN] = self.scan_ns();
-        if self.scans || self.is_parted {
+        let scans = self.scan.is_some();
+        if scans || self.is_parted {
             self.aged[0] += (self.costs[TREE] - self.aged[0]) / FORGETS;
         }
-        let taken = MOVE_NS * moved;
+        let [overwritten, taken] = MOVE_NS.map(|ns| ns * moved);
         let costs = [
-            taken + asked * self.costs[SCAN],
+            overwritten + asked * self.costs[SCAN],
             taken + REFIT_NS[0] * updates + fit + asked * self.aged[0],
             BUILD_NS * all * updates + asked * self.costs[self.built],
             taken + REFIT_NS[0] * updates + PART_NS * moved + asked * self.aged[1],
@@ -340,13 +357,12 @@ impl Auto {
             _ if before == 0 => REFIT.min(self.built),
             _ => (0..4).fold(0, |best, i| if costs[i] < costs[best] { i } else { best }),
         };
-        let is_new =
-            (best == PART) != self.is_parted || self.scans && best == REFIT && self.is_aged();
-        // A build, or there and back.
-        let change = if is_new {
-            BUILD_NS * all
-        } else {
-            2.0 * REFIT_NS[1] * leaves
+        let is_new = (best == PART) != self.is_parted || scans && best == REFIT && self.is_aged();
+        // A build, a scan for a tree or the other way round, or a tree that is left alone.
+        let change = match (is_new, best == OVERWRITE || scans) {
+            (true, _) => BUILD_NS * all,
+            (_, true) => MOVE_NS[TREE] * all + REFIT_NS[1] * leaves,
+            _ => 2.0 * REFIT_NS[1] * leaves,
         };
         self.regret += costs[self.update] - costs[best];
         // The second knows the queries of a frame.
@@ -394,7 +410,15 @@ impl RegionIndex for Auto {
     }
 
     fn memory(&self) -> MemoryUsage {
-        self.trees.memory()
+        let scan = self
+            .scan
+            .as_ref()
+            .map_or(MemoryUsage::default(), Linear::memory);
+        let trees = self.trees.memory();
+        MemoryUsage {
+            node_bytes: trees.node_bytes + scan.node_bytes,
+            item_bytes: trees.item_bytes + scan.item_bytes,
+        }
     }
 
     #[inline(always)]
@@ -406,24 +430,26 @@ impl RegionIndex for Auto {
                 self.asked.store(asked + 1, Relaxed);
             }
         }
-        if !self.scans {
+        let Some(scan) = &self.scan else {
             return self.trees.query(volume, cx);
-        }
-        let tree = &self.trees.still;
+        };
         // Nothing has moved: the tree's root holds all items.
         if self.updates[OVERWRITE] == 0
-            && let Some(flow) = tree.query_root(volume, cx)
+            && let Some(flow) = self.trees.still.query_root(volume, cx)
         {
             return flow;
         }
-        tree.scan(volume, cx)
+        scan.query(volume, cx)
     }
 
     /// O(moved), or a new build. Items may become or cease to be empty.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         if moved.is_empty() {
             // Tables for the updates that follow.
-            return self.refit_held(items, moved) || self.rebuild(items);
+            return match &mut self.scan {
+                Some(scan) => scan.refit(items, moved),
+                None => self.refit_held(items, moved) || self.rebuild(items),
+            };
         }
         self.weighing += 1;
         self.moved += moved.len() as f64;

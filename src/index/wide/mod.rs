@@ -22,10 +22,10 @@ use self::levels::{Layer, Level};
 use self::single_plane_buckets::SinglePlaneBuckets;
 use super::frontier::{Frontier, NodeList, is_far, pass_run, put_back, take};
 use super::items::{ABSENT, PaddedIds, Positions, indexable};
-use super::linear::{ScannedBlocks, scan_blocks, seen_by};
+use super::linear::seen_by;
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES, LaneMask};
-use crate::kernel::{pairs, prefetch};
+use crate::kernel::prefetch;
 use crate::query::{Bits, Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
 
@@ -256,23 +256,6 @@ impl Wide {
             std::mem::swap(&mut here, &mut below);
         }
         traversal.test_leaves(&leaves, here, buckets)
-    }
-
-    /// A query that tests all leaves, whatever the blocks above them hold.
-    #[inline(always)]
-    fn scan<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        let leaves = ScannedBlocks::<true> {
-            blocks: &self.blocks[..self.occupied.len()],
-            ids: &self.ids,
-            balls: self.balls.as_ref(),
-            occupied: &self.occupied,
-        };
-        if !Q::IS_POINT {
-            return leaves.scan(0..self.occupied.len(), volume, cx);
-        }
-        let blocks = pairs(leaves.blocks, &self.occupied).enumerate();
-        let blocks = blocks.map(|(at, (block, lanes))| (at * LANES, *lanes, block));
-        scan_blocks(blocks, &self.ids, (volume, volume.mask()), cx)
     }
 
     /// The whole query where the bounds of all items decide it.

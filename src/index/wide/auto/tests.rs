@@ -122,7 +122,7 @@ fn answers_are_right_through_every_change_of_kind() {
         assert_right(&index, &items, &mut rng, &told);
         assert_eq!(index.is_parted, kind == PART, "{told}");
     }
-    assert!(index.scans && index.updates.iter().all(|&count| count > 0));
+    assert!(index.scan.is_some() && index.updates.iter().all(|&count| count > 0));
 }
 
 #[test]
@@ -134,11 +134,11 @@ fn what_is_forced_is_taken_and_said() {
         "tree, not scan of all items (modelled ",
     );
     for (params, search, update) in [
-        (":use=linear", scan, "scan of overwritten leaves"),
+        (":use=linear", scan, "scan of overwritten boxes"),
         (
             ":use=linear,update=refit",
             scan,
-            "scan of overwritten leaves",
+            "scan of overwritten boxes",
         ),
         (":use=linear,update=rebuild", scan, "rebuild"),
         (":use=wide", tree, "refit"),
@@ -220,7 +220,7 @@ fn all_moving_is_overwritten_few_are_refitted_and_an_exception_changes_nothing()
     assert_eq!(update(20, 3), "refit");
     assert_eq!(update(20_000, 1), "refit");
     assert_eq!(update(20, 16), "refit");
-    assert_eq!(update(20_000, 50), "scan of overwritten leaves");
+    assert_eq!(update(20_000, 50), "scan of overwritten boxes");
     assert_eq!(update(20, 90), "refit");
     let told = index.chose().unwrap();
     assert!(
@@ -237,9 +237,9 @@ fn many_queries_between_updates_keep_the_tree() {
     let mut index = built(&items, "");
     let wedge = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -60.0)]).unwrap();
     for (queries, wanted) in [
-        (1, "scan of overwritten leaves"),
+        (1, "scan of overwritten boxes"),
         (20, "refit"),
-        (1, "scan of overwritten leaves"),
+        (1, "scan of overwritten boxes"),
     ] {
         for _ in 0..40 {
             assert!(index.refit(&items, &all));
