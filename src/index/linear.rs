@@ -67,7 +67,7 @@ const BLOCKS_PER_CALL: usize = 1024;
 /// O(n) per query, with a constant several times smaller.
 pub struct Linear {
     boxes: BoxBlocks,
-    ids: PaddedIds,
+    pub(super) ids: PaddedIds,
     positions: Positions,
     /// Spheres of the items, if they are [spheres](Input::spheres).
     balls: Option<BallBlocks>,

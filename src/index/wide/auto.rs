@@ -435,7 +435,7 @@ impl RegionIndex for Auto {
         };
         // Nothing has moved: the tree's root holds all items.
         if self.updates[OVERWRITE] == 0
-            && let Some(flow) = self.trees.still.query_root(volume, cx)
+            && let Some(flow) = self.trees.still.query_root(volume, &scan.ids, cx)
         {
             return flow;
         }

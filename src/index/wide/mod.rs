@@ -260,12 +260,13 @@ impl Wide {
 
     /// The whole query where the bounds of all items decide it.
     ///
-    /// It finds nothing or, without vacant lanes, everything. `None` for a query that counts
-    /// its work, that of blocks.
+    /// It finds nothing or, without vacant lanes, everything, in the order of `ids`. `None` for
+    /// a query that counts its work, that of blocks.
     #[inline(always)]
     fn query_root<Q: QueryVolume, C: Context>(
         &self,
         volume: &Q,
+        ids: &PaddedIds,
         cx: &mut C,
     ) -> Option<ControlFlow<()>> {
         let is_counted = size_of::<C::Recorder>() > 0;
@@ -273,7 +274,7 @@ impl Wide {
             _ if is_counted => None,
             Containment::Outside => Some(ControlFlow::Continue(())),
             Containment::Inside if self.vacant == 0 => {
-                Some(pass_run(0..self.ids.len(), &self.ids, cx))
+                Some(pass_run(0..ids.len(), ids, cx))
             }
             _ => None,
         }
@@ -404,7 +405,7 @@ impl RegionIndex for Wide {
                 None => ControlFlow::Continue(()),
             };
         }
-        if let Some(flow) = self.query_root(volume, cx) {
+        if let Some(flow) = self.query_root(volume, &self.ids, cx) {
             return flow;
         }
         let mut scratch = take(&SCRATCH);
