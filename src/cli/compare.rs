@@ -13,12 +13,11 @@ use super::cell_names::{name, place};
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{CompareTable, Side, change_of, counted, reason};
 use super::diagram::{Row, rows};
-use super::document::Block;
 use super::figure::{Axis, Figure, LINE, is_drawn, line};
 use super::page::to_page;
 use super::run_resume::newest_run;
 use super::run_table::short;
-use super::{Ending, expect_places, run_plan, text, unread_is_fine, write_text};
+use super::{Ending, expect_places, run_plan, text, unread_is_fine, write_if};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
@@ -170,11 +169,10 @@ fn expect_judged(changes: &Changes) -> anyhow::Result<()> {
 fn show(table: &CompareTable) -> anyhow::Result<Ending> {
     expect_judged(&table.changes)?;
     let shown = unread_is_fine(table.print());
-    if let Some(file) = &table.args.html {
-        let blocks = table.blocks(true, Some(usize::MAX));
-        let changes = figure(table).map(Block::Figure);
-        write_text(file, &to_page("compare", 1, changes, blocks))?;
-    }
+    write_if(&table.args.html, || {
+        let mut blocks = table.blocks(true, Some(usize::MAX));
+        to_page("compare", blocks.pop(), figure(table), blocks)
+    })?;
     shown?;
     Ok(table.verdict().0)
 }

@@ -12,7 +12,7 @@ use super::processes::Timing;
 use super::study::Study;
 use super::table::{Column, Table};
 use super::text::{self, some, time_plus_minus};
-use super::{Ending, expect_places, print, write_text};
+use super::{Ending, expect_places, print, write_if};
 use crate::drift::{
     self, ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, DriftReport, ORBIT_RADIUS, Rated,
     Recommendation, RotationDrift, StabilityLimit,
@@ -53,14 +53,11 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let times = study.times("everything, timed", None, &schedule)?;
     report.conclude(&times, schedule.rounds);
     print(args.format, &report, || show(&blocks(&report, args.all)))?;
-    if let Some(file) = &args.svg {
-        write_text(file, &draw(&report.arm))?;
-    }
-    if let Some(file) = &args.html {
-        let figures = arm_figures(&report.arm).into_iter();
-        let (figures, blocks) = (figures.map(Block::Figure), blocks(&report, true));
-        write_text(file, &to_page("drift", usize::MAX, figures, blocks))?;
-    }
+    write_if(&args.svg, || draw(&report.arm))?;
+    write_if(&args.html, || {
+        let (told, figures) = (conclusions(&report), arm_figures(&report.arm));
+        to_page("drift", told, figures, tables(&report, true))
+    })?;
     Ok(Ending::Ok)
 }
 
@@ -87,9 +84,19 @@ fn scientific(value: f64) -> String {
 }
 
 /// Tables and recommendations.
-///
-/// With `all` the errors after each number of steps too.
 fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
+    let mut blocks = tables(report, all);
+    blocks.push(Block::heading("Conclusions:"));
+    blocks.extend(conclusions(report));
+    if !all {
+        let more = "errors by number of steps, orders, stability: --all";
+        blocks.extend(["", more].map(Block::line));
+    }
+    blocks
+}
+
+/// The tables; with `all` the errors after each number of steps too.
+fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
     let [yaw, pitch, roll] = report.turn_per_step;
     let (steps, rounds) = (steps(report.steps), text::counted(report.rounds, "round"));
     let over = text::over(report.processes, None);
@@ -106,13 +113,6 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
     }
     blocks.push(Block::Table(rated(report, all)));
     blocks.extend(arm_blocks(&report.arm, all));
-    blocks.push(Block::heading("Conclusions:"));
-    blocks.push(Block::Line(recommended(report)));
-    blocks.extend(arm_conclusions(&report.arm).map(Block::Line));
-    if !all {
-        let more = "errors by number of steps, orders, stability: --all";
-        blocks.extend(["", more].map(Block::line));
-    }
     blocks
 }
 
@@ -216,18 +216,20 @@ fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
     blocks
 }
 
-/// The method to take for each stiffness of each arm.
-fn arm_conclusions(report: &ArmReport) -> impl Iterator<Item = String> {
-    let choices = report.choices.iter();
+/// The way to turn, and the method to take for each stiffness of each arm.
+fn conclusions(report: &DriftReport) -> impl Iterator<Item = Block> {
+    let choices = report.arm.choices.iter();
     let arms = grouped(choices.map(|c| (c.setting.arm.name(), c))).into_iter();
-    arms.map(|(arm, own)| {
+    let of_arms = arms.map(|(arm, own)| {
         let each = own.iter();
         let each = each.map(|c| format!("{} at k={:e}", chosen(&c.choice), c.setting.stiffness));
-        let (each, within) = (text::joined(each), report.tolerance);
+        let (each, within) = (text::joined(each), report.arm.tolerance);
         format!(
             "Recommended for a {arm} arm: {each}, the cheapest with an error within {within:e}."
         )
-    })
+    });
+    let told = [recommended(report)].into_iter().chain(of_arms);
+    told.map(Block::Line)
 }
 
 /// A table of an arm: a row per method, a column per stiffness.

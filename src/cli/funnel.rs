@@ -20,7 +20,9 @@ use super::processes::Timing;
 use super::shared_args::TableFormat;
 use super::sheet::Class;
 use super::study::{Study, load, note_solid};
-use super::{Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_text};
+use super::{
+    Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_if, write_text,
+};
 use crate::funnel::{
     self, Chain, Fate, FunnelInput, FunnelReport, NONE, OrderRow, PickRow, StageKind, StageRow,
 };
@@ -83,22 +85,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     if let Some(folder) = &args.csv {
         write(&report, folder)?;
     }
-    if let Some(file) = &args.svg {
-        write_text(file, &draw(&report, &stages.setting.scene))?;
-    }
-    if let Some(file) = &args.html {
-        // Beside the picture's own, which narrow pages make small.
-        let key = FATE_CLASSES.iter().map(|Class { colour, words, .. }| {
-            format!("<span><i style=\"background:{colour}\"></i>{words}</span> ")
-        });
-        let key = format!("<figcaption>{}</figcaption>", key.collect::<String>());
-        let picture = Block::Picture(draw(&report, &stages.setting.scene) + &key);
-        let figures = [Block::Figure(passed(&report)), picture];
-        let title = format!("funnel {}, {}", report.scene, report.path);
-        let blocks = funnel_table::blocks(&report, true);
-        let page = to_page(&title, report.conclusions.len(), figures, blocks);
-        write_text(file, &page)?;
-    }
+    write_if(&args.svg, || draw(&report, &stages.setting.scene))?;
+    write_if(&args.html, || page(&report, &stages.setting.scene))?;
     shown?;
     let (stages, orders, picks) = (&report.stages, &report.orders, &report.picks);
     let mirror = report.mirror.as_ref();
@@ -301,6 +289,21 @@ fn passed(report: &FunnelReport) -> Figure {
     let (scene, path) = (&report.scene, &report.path);
     let caption = format!("{scene}, {path}: what each stage leaves per view (logarithmic)");
     rows(caption, &axis, None, &stages)
+}
+
+/// Tables, figures and the picture as one page.
+fn page(report: &FunnelReport, scene: &Scene) -> String {
+    // Beside the picture's own, which narrow pages make small.
+    let key = FATE_CLASSES.iter().map(|Class { colour, words, .. }| {
+        format!("<span><i style=\"background:{colour}\"></i>{words}</span> ")
+    });
+    let key = format!("<figcaption>{}</figcaption>", key.collect::<String>());
+    let mut blocks = vec![Block::Picture(draw(report, scene) + &key)];
+    blocks.extend(funnel_table::blocks(report, true));
+    blocks.truncate(blocks.len() - report.conclusions.len());
+    let told = report.conclusions.iter().filter(|told| !told.is_empty());
+    let title = format!("funnel {}, {}", report.scene, report.path);
+    to_page(&title, told.map(Block::line), [passed(report)], blocks)
 }
 
 /// Classes of items by the stage that removed them, then the others.

@@ -370,6 +370,11 @@ fn write_text(file: &Path, text: &str) -> Result<(), InputError> {
     write_atomically(file, |out| out.write_all(text.as_bytes()))
 }
 
+/// Writes a text as a file, if one is named for it.
+fn write_if(file: &Option<PathBuf>, text: impl FnOnce() -> String) -> Result<(), InputError> {
+    (file.as_ref()).map_or(Ok(()), |file| write_text(file, &text()))
+}
+
 /// For output that comes after the work: a reader who leaves early changes
 /// neither what was done nor the exit code.
 fn unread_is_fine(written: io::Result<()>) -> io::Result<()> {

@@ -3,39 +3,26 @@
 use std::collections::BTreeSet;
 
 use super::document::{Block, to_html};
+use super::figure::Figure;
 use super::run_resume::{command_line, typed_args};
 use super::table::Table;
 use super::{program, run_table, text};
 use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
 
-/// A page of what a terminal shows, with figures after its conclusions.
-///
-/// Those are the last `most` lines of the document, behind all tables.
+/// A page of what a terminal shows: conclusions, figures, and the other blocks.
 pub fn to_page(
     about: &str,
-    most: usize,
-    figures: impl IntoIterator<Item = Block>,
-    mut blocks: Vec<Block>,
+    conclusions: impl IntoIterator<Item = Block>,
+    figures: impl IntoIterator<Item = Figure>,
+    blocks: Vec<Block>,
 ) -> String {
-    let is_line = |block: &Block| matches!(block, Block::Line(_));
-    let lines = blocks.iter().rev().take_while(|block| is_line(block));
-    let mut told = blocks.split_off(blocks.len() - lines.count().min(most));
-    told.retain(|block| !matches!(block, Block::Line(text) if text.is_empty()));
-    for block in &mut told {
-        if let Block::Line(text) = block {
-            *text = text.trim_start_matches("- ").to_owned();
-        }
-    }
-    // The heading of the conclusions, and the title of a terminal.
-    if matches!(blocks.last(), Some(Block::Heading(..))) {
-        blocks.pop();
-    }
-    blocks.retain(|block| !matches!(block, Block::Heading(1, _)));
     let title = format!("{} {about}", program::name());
     let mut all = vec![Block::Heading(1, title.clone())];
-    all.extend(told);
-    all.extend(figures);
-    all.extend(blocks);
+    all.extend(conclusions);
+    all.extend(figures.into_iter().map(Block::Figure));
+    // But for the title of a terminal.
+    let is_title = |block: &Block| matches!(block, Block::Heading(1, _));
+    all.extend(blocks.into_iter().filter(|block| !is_title(block)));
     all.extend(glossary(&all));
     all.push(Block::heading("Machine and command"));
     let command = command_line(&typed_args().unwrap_or_default());

@@ -15,7 +15,7 @@ use super::study::{Study, load};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time_plus_minus};
 use super::{
-    Ending, expect_places, funnel_table, precision_conclusions, precision_tables, print, write_text,
+    Ending, expect_places, funnel_table, precision_conclusions, precision_tables, print, write_if,
 };
 use crate::funnel::{self, Chain, FunnelInput, NONE, StageKind, StageSweep, SweepPoint};
 use crate::index::Registry;
@@ -70,15 +70,13 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
         show(&blocks(&outcome, args.all, room))
     });
     let figures = precision_conclusions::figures(&outcome);
-    if let Some(file) = &args.svg {
-        write_text(file, &picture(&figures, 1))?;
-    }
-    if let Some(file) = &args.html {
+    write_if(&args.svg, || picture(&figures, 1))?;
+    write_if(&args.html, || {
         let title = format!("precision {}, {}", args.study.scene, args.study.path);
-        let blocks = blocks(&outcome, true, usize::MAX);
-        let figures = figures.into_iter().map(Block::Figure);
-        write_text(file, &to_page(&title, usize::MAX, figures, blocks))?;
-    }
+        let told = precision_conclusions::conclusions(&outcome).into_iter();
+        let tables = precision_tables::blocks(&outcome, true, usize::MAX);
+        to_page(&title, told.map(Block::Line), figures, tables)
+    })?;
     shown?;
     Ok(Ending::of(!wrong))
 }

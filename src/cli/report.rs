@@ -14,7 +14,7 @@ use super::page::{glossary, origin};
 use super::surface_tables::Picture;
 use super::{
     Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_plan,
-    run_table, surface_tables, tell, text, write_text,
+    run_table, surface_tables, tell, text, write_if, write_text,
 };
 use crate::index::Registry;
 use crate::report::{
@@ -44,9 +44,8 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     };
     let mut report = read_report(path)?;
     declare(&mut report, registry);
-    if let Some(path) = &args.markdown {
-        write_text(path, &to_markdown(&blocks(&report, &BTreeMap::new())))?;
-    }
+    let markdown = || to_markdown(&blocks(&report, &BTreeMap::new()));
+    write_if(&args.markdown, markdown)?;
     if let Some(path) = &args.bencher {
         if report.run.finished_at.is_none() {
             tell("note: the run was not finished; its cells have fewer processes or are missing");
@@ -66,7 +65,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         let folder = if path.is_dir() { path } else { folder_of(path) };
         write_text(file, &page(&report, folder, Vec::new()))?;
     } else if args.markdown.is_none() && args.svg.is_none() && args.bencher.is_none() {
-        io::stdout().write_all(to_markdown(&blocks(&report, &BTreeMap::new())).as_bytes())?;
+        io::stdout().write_all(markdown().as_bytes())?;
     }
     Ok(Ending::Ok)
 }
