@@ -2,7 +2,7 @@
 //! the figures alone.
 
 use super::diagram;
-use super::error_figure::{Against, Measured};
+use super::error_figure::{Measured, against};
 use super::figure::{Figure, ends};
 use super::precision_tables::{CullingPoint, elsewhere, named, numbers, percent, swept};
 use super::text;
@@ -202,19 +202,13 @@ fn of_region(point: &Point<RegionErrors>) -> Option<Measured> {
 /// Frustum queries, then region search where it was measured.
 pub fn figures(precision: &Precision) -> Vec<Figure> {
     let about = format!("{}, {}", precision.scene, precision.path);
-    let queries = Against {
-        caption: format!("{about}: error against run time; dashed: misses visible items"),
-        axes: ["time per query", "false positives, % of visible"],
-        none: 3e-5,
-        points: precision.points.iter().filter_map(of).collect(),
-    };
-    let regions = Against {
-        caption: format!("{about}: region search; dashed: misses regions"),
-        axes: ["time per point", "points with a wrong answer, %"],
-        none: 3e-3,
-        points: (precision.region_points.iter().filter_map(of_region)).collect(),
-    };
-    let all = [queries, regions];
-    let drawn = all.into_iter().filter(|one| !one.points.is_empty());
-    drawn.map(Against::draw).collect()
+    let caption = format!("{about}: error against run time; dashed: misses visible items");
+    let axes = ["time per query", "false positives, % of visible"];
+    let points = precision.points.iter().filter_map(of);
+    let queries = against(&caption, axes, 3e-5, points.collect());
+    let caption = format!("{about}: region search; dashed: misses regions");
+    let axes = ["time per point", "points with a wrong answer, %"];
+    let points = precision.region_points.iter().filter_map(of_region);
+    let regions = against(&caption, axes, 3e-3, points.collect());
+    queries.into_iter().chain(regions).collect()
 }

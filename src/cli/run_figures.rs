@@ -2,7 +2,7 @@
 
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::diagram::{Row, rows};
-use super::error_figure::{Against, Measured};
+use super::error_figure::{Measured, against};
 use super::figure::{Axis, Figure, Look, ends, is_drawn, left_out};
 use super::run_verdict::times;
 use super::text;
@@ -170,6 +170,7 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
 /// `None` for a single test.
 pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     let first = comparisons.first()?;
+    comparisons.get(1)?;
     let measured = |cell: &ReportCell| {
         let (time, error) = (cell.metrics.get("query_ns")?, cell.value("excess")?);
         let (structure, test) = (cell.structure.clone(), cell.test.clone());
@@ -191,13 +192,9 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     let cells = comparisons.iter().flat_map(|comparison| comparison.sound());
     let mut points: Vec<Measured> = cells.filter_map(measured).collect();
     points.sort_by(|a, b| a.point.at[0].total_cmp(&b.point.at[0]));
-    let against = Against {
-        caption: format!("{}: error against run time, by test", of(first)),
-        axes: ["time per query", "false positives, % of visible"],
-        none: 1e-4,
-        points,
-    };
-    (comparisons.len() > 1 && !against.points.is_empty()).then(|| against.draw())
+    let caption = format!("{}: error against run time, by test", of(first));
+    let axes = ["time per query", "false positives, % of visible"];
+    against(&caption, axes, 1e-4, points)
 }
 
 #[cfg(test)]
