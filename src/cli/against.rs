@@ -229,9 +229,7 @@ impl Duel<'_> {
                     let known = seen[NEW].iter().filter_map(|part| part.known.as_ref());
                     let plans = known.filter_map(|known| Some(&known.query.as_ref()?.schedule));
                     let range = |of: fn(&Schedule) -> usize| {
-                        let all = || plans.clone().map(of);
-                        let ends = (all().min().unwrap_or(0), all().max().unwrap_or(0));
-                        text::range(ends, |most| most.to_string())
+                        text::range(plans.clone().map(of), |most| most.to_string())
                     };
                     let head = format!(
                         "{} × {} rounds × {} cameras in {:.0} s",

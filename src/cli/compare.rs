@@ -115,9 +115,8 @@ fn notes(old: &Report, new: &Report, settings: &[Setting], gate: Gate) -> Vec<St
 /// "10 processes", or the fewest and the most where cells differ.
 fn processes(report: &Report) -> String {
     let cells = report.cells.iter().filter(|cell| cell.status == Status::Ok);
-    let counts = || cells.clone().map(|cell| cell.times.processes);
-    let ends = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
-    text::range(ends, |most| text::counted(most, "process"))
+    let counts = cells.map(|cell| cell.times.processes);
+    text::range(counts, |most| text::counted(most, "process"))
 }
 
 fn side(report: &Report) -> Side {

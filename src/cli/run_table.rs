@@ -60,8 +60,8 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     let views = text::counted(path.camera_count, "view");
     let cache = Some(&*path.cache).filter(|cache| *cache != "warm");
     let motion = text::some(path.views_per_frame.checked_sub(1), |queries| {
-        let checked = comparison.range(|cell| cell.times.cameras_checked);
-        let frames = checked.unwrap_or_default().1 / (queries + 1);
+        let checked = comparison.timed(|cell| cell.times.cameras_checked).max();
+        let frames = checked.unwrap_or(0) / (queries + 1);
         let queries = text::counted(queries + 1, "query");
         // Cells without times say nothing of frames.
         match text::counted(frames, "frame") {

@@ -173,8 +173,8 @@ fn checked(all: &[&Comparison]) -> Option<String> {
     let tried = cells().filter(|c| c.status != Status::LeftOut).count();
     let right = cells().filter(|cell| cell.status == Status::Ok).count();
     let most = |of: fn(&ReportCell) -> usize| {
-        let of_each = all.iter().filter_map(|c| c.range(of));
-        of_each.map(|(_, most)| most).sum::<usize>()
+        let of_each = all.iter().filter_map(|c| c.timed(of).max());
+        of_each.sum::<usize>()
     };
     let views = most(|cell| cell.times.cameras_checked);
     let timed = most(|cell| cell.times.cameras_timed);

@@ -37,7 +37,8 @@ pub fn labelled(name: &str, sentence: &str) -> String {
 }
 
 /// "10 processes", or the fewest and the most: "3 to 10 processes".
-pub fn range((least, most): (usize, usize), shown: impl Fn(usize) -> String) -> String {
+pub fn range(all: impl Iterator<Item = usize> + Clone, shown: impl Fn(usize) -> String) -> String {
+    let (least, most) = (all.clone().min().unwrap_or(0), all.max().unwrap_or(0));
     match least == most {
         true => shown(most),
         false => format!("{} to {}", count(least), shown(most)),
@@ -263,11 +264,11 @@ pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
 /// Basis of the times of a table: "10 processes, 100 rounds each; 64 cameras timed,
 /// 128 checked, 8 of them against the oracle".
 pub fn basis(comparison: &Comparison) -> String {
-    if comparison.range(|_| 0).is_none() {
+    if comparison.timed(|_| 0).next().is_none() {
         return "no times".to_owned();
     }
     let of = |number: fn(&ReportCell) -> usize, shown: &dyn Fn(usize) -> String| {
-        range(comparison.range(number).unwrap_or_default(), shown)
+        range(comparison.timed(number), shown)
     };
     let is_of_frames = !comparison.about().path.motion.is_empty();
     let asked = ["camera", "query"][usize::from(is_of_frames)];

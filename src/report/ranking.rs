@@ -109,11 +109,10 @@ impl<'r> Comparison<'r> {
         sound.find(|cell| cell.origin.as_ref().is_some_and(|origin| !origin.is_ours()))
     }
 
-    /// The fewest and the most of a number, over the cells that were timed.
-    pub fn range(&self, of: impl Fn(&ReportCell) -> usize) -> Option<(usize, usize)> {
+    /// A number of each cell that was timed.
+    pub fn timed(&self, of: fn(&ReportCell) -> usize) -> impl Iterator<Item = usize> + Clone {
         let timed = self.cells.iter().filter(|cell| cell.times.processes > 0);
-        let timed = || timed.clone().map(|cell| of(cell));
-        Some((timed().min()?, timed().max()?))
+        timed.map(move |cell| of(cell))
     }
 
     /// How the answers differ from the truth: all that are right do alike.
