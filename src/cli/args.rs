@@ -25,8 +25,8 @@ const STREET: &str = "street:frames=32";
 /// Benchmarks spatial indexes: frustum culling, region search, checked answers
 #[derive(Parser, Debug)]
 #[command(name = program::name(), bin_name = program::name(), version = program::version())]
-#[command(about, term_width = text::width().min(100), after_help = program::named(EXAMPLES))]
-#[command(mut_subcommands(taking_negative_numbers))]
+#[command(about, term_width = text::width().min(100), mut_subcommands(taking_negative_numbers))]
+#[command(after_help = program::named(include_str!("assets/help/examples.txt")))]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
@@ -40,8 +40,6 @@ fn taking_negative_numbers(command: clap::Command) -> clap::Command {
         arg.allow_negative_numbers(has_value)
     })
 }
-
-const EXAMPLES: &str = include_str!("assets/help/examples.txt");
 
 #[derive(Subcommand, Debug)]
 pub enum Command {
@@ -112,10 +110,9 @@ pub struct ListArgs {
     pub format: TableFormat,
 }
 
-const RUN_HELP: &str = include_str!("assets/help/run.txt");
-
 #[derive(Args, Debug)]
-#[command(after_help = RUN_HELP, mut_arg("motion", |arg| arg.conflicts_with("cold")))]
+#[command(after_help = include_str!("assets/help/run.txt"))]
+#[command(mut_arg("motion", |arg| arg.conflicts_with("cold")))]
 pub struct RunArgs {
     #[command(flatten)]
     pub what: WhatArgs,
@@ -150,10 +147,8 @@ pub struct RunArgs {
     pub save: Option<String>,
 }
 
-const MERGE_HELP: &str = include_str!("assets/help/merge.txt");
-
 #[derive(Args, Debug)]
-#[command(after_help = program::named(MERGE_HELP))]
+#[command(after_help = program::named(include_str!("assets/help/merge.txt")))]
 pub struct MergeArgs {
     /// Folders of finished shards
     #[arg(value_name = "RUN", required = true)]

@@ -15,10 +15,8 @@ use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::inscribed::MOST_BOXES;
 
-const VIEW_HELP: &str = include_str!("assets/help/view.txt");
-
 #[derive(Args, Debug)]
-#[command(after_help = program::named(VIEW_HELP))]
+#[command(after_help = program::named(include_str!("assets/help/view.txt")))]
 pub struct ViewArgs {
     /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(long)]
@@ -57,10 +55,8 @@ fn samples(text: &str) -> Result<SampleGrid, SpecError> {
     values::expected(grid, what)
 }
 
-const FUNNEL_HELP: &str = include_str!("assets/help/funnel.txt");
-
 #[derive(Args, Debug)]
-#[command(after_help = FUNNEL_HELP)]
+#[command(after_help = include_str!("assets/help/funnel.txt"))]
 #[command(mut_arg("path", |arg| arg.default_value("street:frames=32")))]
 #[command(mut_arg("structure", |arg| arg
     .default_value("wide,bvh,linear")
@@ -160,10 +156,8 @@ pub struct SceneGenerateArgs {
     pub scene_args: SceneArgs,
 }
 
-const CONVERT_HELP: &str = include_str!("assets/help/convert.txt");
-
 #[derive(Args, Debug)]
-#[command(after_help = program::named(CONVERT_HELP))]
+#[command(after_help = program::named(include_str!("assets/help/convert.txt")))]
 pub struct SceneConvertArgs {
     /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(value_name = "INPUT")]
@@ -181,10 +175,8 @@ pub struct SceneConvertArgs {
     pub scene_args: SceneArgs,
 }
 
-const DRAW_HELP: &str = include_str!("assets/help/draw.txt");
-
 #[derive(Args, Debug)]
-#[command(after_help = program::named(DRAW_HELP))]
+#[command(after_help = program::named(include_str!("assets/help/draw.txt")))]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "frame" | "fovy" | "aspect" | "near" | "far" | "matrix_convention" => arg.requires("camera"),
     _ => arg,
@@ -219,8 +211,6 @@ fn metric(name: &str) -> Result<&'static str, SpecError> {
     metric.ok_or_else(|| SpecError::unknown("metric", name, known))
 }
 
-const COMPARE_HELP: &str = include_str!("assets/help/compare.txt");
-
 /// Measure of a regression; an answer that is not given any more is one by each.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -232,7 +222,8 @@ pub enum Gate {
 }
 
 #[derive(Args, Debug)]
-#[command(after_help = program::named(COMPARE_HELP), mut_arg("motion", |arg| arg.conflicts_with("cold")))]
+#[command(after_help = program::named(include_str!("assets/help/compare.txt")))]
+#[command(mut_arg("motion", |arg| arg.conflicts_with("cold")))]
 pub struct CompareArgs {
     /// report.json of the older run, or the folder it is in; with --baseline NEW alone
     #[arg(value_name = "OLD.json", required_unless_present_any = ["against", "baseline"])]
