@@ -15,12 +15,11 @@ use serde_json::json;
 
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{CompareTable, Side};
-use super::interrupt::{self, Interrupted};
 use super::processes::{Job, Message, Request, Worker, processors, see_through};
 use super::run_resume::TypedOptions;
 use super::shared_args::WhatArgs;
 use super::study::progress;
-use super::{run_plan, text};
+use super::{interrupt, run_plan, text};
 use crate::index::{DEFAULT, Registry};
 use crate::input;
 use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Schedule, Share};
@@ -352,9 +351,7 @@ impl Duel<'_> {
         let other = workers[1 - begins].iter();
         other.for_each(|other| other.hold(true));
         while workers.iter().any(Option::is_some) {
-            if interrupt::asked() {
-                return Err(Interrupted.into());
-            }
+            interrupt::check()?;
             let mut side = (begins + usize::div_ceil(turn, 2)) % 2;
             turn += 1;
             if workers[side].is_none() {

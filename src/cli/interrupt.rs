@@ -22,6 +22,12 @@ pub fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 
+/// # Errors
+/// [`Interrupted`] after a request to stop.
+pub fn check() -> Result<(), Interrupted> {
+    (!asked()).then_some(()).ok_or(Interrupted)
+}
+
 /// For a worker: a terminal sends Ctrl-C to the whole group, and it is the
 /// parent that decides what becomes of its workers.
 pub fn leave_to_the_parent() {

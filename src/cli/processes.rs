@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tempfile::NamedTempFile;
 
-use super::interrupt::{self, Interrupted};
+use super::interrupt;
 use super::run_resume::typed_args;
 use crate::input;
 use crate::measure::{Part, ProcessTimes, Share, Status, TaskSamples, Verdict};
@@ -265,7 +265,7 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
 ///
 /// # Errors
 /// The program cannot be started or is of another version; what `keep` says;
-/// [`Interrupted`].
+/// [`interrupt::Interrupted`].
 pub fn see_through(
     program: &Path,
     request: &Request,
@@ -275,9 +275,7 @@ pub fn see_through(
 ) -> anyhow::Result<Ended> {
     let mut worker = Worker::start(program, request, patience)?;
     loop {
-        if interrupt::asked() {
-            return Err(Interrupted.into());
-        }
+        interrupt::check()?;
         match worker
             .listen(GLANCE)
             .with_context(|| program.display().to_string())?

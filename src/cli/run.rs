@@ -169,9 +169,7 @@ impl<'a> Run<'a> {
         let mut failed = self.failed_before(&planned.source);
         for process in 0..self.plan.plan.effort.processes {
             loop {
-                if interrupt::asked() {
-                    return Err(Interrupted.into());
-                }
+                interrupt::check()?;
                 let share = self.share(&keys, process, &failed);
                 if !share.wanted.contains(&true) {
                     self.bar.inc(0);
