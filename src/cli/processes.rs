@@ -16,7 +16,6 @@ use serde_json::Value;
 use tempfile::NamedTempFile;
 
 use super::interrupt;
-use super::run_resume::typed_args;
 use crate::input;
 use crate::measure::{Part, ProcessTimes, Share, Status, TaskSamples, Verdict};
 use crate::report::temporary_in;
@@ -168,10 +167,8 @@ impl Worker {
             let text = String::from_utf8_lossy(&line[..line.len().min(300)]);
             let text = shortened(text.trim_end(), 60);
             // A worker that has told what it does speaks the protocol.
-            let why = match self.doing.1 == STARTING {
-                true => ": the program is of another version",
-                false => "",
-            };
+            let is_first = self.doing.1 == STARTING;
+            let why = ["", ": the program is of another version"][usize::from(is_first)];
             anyhow::anyhow!(
                 "a worker printed '{text}'; expected a message of protocol {PROTOCOL}{why}"
             )
@@ -276,10 +273,8 @@ pub fn see_through(
     let mut worker = Worker::start(program, request, patience)?;
     loop {
         interrupt::check()?;
-        match worker
-            .listen(GLANCE)
-            .with_context(|| program.display().to_string())?
-        {
+        let place = || program.display().to_string();
+        match worker.listen(GLANCE).with_context(place)? {
             Some(Ok(Message::Ready { .. })) => tell("started"),
             Some(Ok(Message::Doing { structure, step })) => {
                 tell(format!("{step} {}", structure.unwrap_or_default()).trim_end());
@@ -303,14 +298,6 @@ pub struct Workers {
 }
 
 impl Workers {
-    /// Workers of a study, which waits as long as they take.
-    ///
-    /// # Errors
-    /// The errors of [`Workers::new`]; an argument that is no text.
-    pub fn of_study() -> anyhow::Result<Workers> {
-        Workers::new(typed_args()?, Duration::MAX, &std::env::temp_dir())
-    }
-
     /// Files in `folder` stand for pipes.
     ///
     /// # Errors
@@ -448,18 +435,17 @@ pub enum Job {
         /// True to receive samples beside the parts.
         samples: bool,
     },
-    /// All that a study times, by its own plan.
-    Times(Value, Timing),
+    /// All that a study times.
+    Times(Timing),
 }
 
-/// Parameters of a process beside its plan.
-#[derive(Clone, Default, Serialize, Deserialize)]
+/// Parameters of a process of a study.
+#[derive(Clone, Serialize, Deserialize)]
 pub struct Timing {
     pub process: u32,
     /// Scale of the lens of a path with a given visible share.
     pub lens_scale: Option<f64>,
-    /// The plan, in a worker.
-    #[serde(skip)]
+    /// The study's own plan.
     pub plan: Value,
 }
 

@@ -11,6 +11,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::processes::{Job, Message, Timing, Workers};
+use super::run_resume::typed_args;
 use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
 use super::{Ending, interrupt, load_scene, print, tell, text};
 use crate::index::Registry;
@@ -129,7 +130,7 @@ impl Study {
     /// A study of `before` steps and then of the processes that take the times.
     ///
     /// # Errors
-    /// See [`Workers::of_study`].
+    /// The errors of [`Workers::new`]; an argument that is no text.
     pub fn new(about: String, before: u64, spread: &SpreadArgs) -> anyhow::Result<Study> {
         let processes = spread.processes;
         let bar = progress(before + u64::from(processes), "");
@@ -138,7 +139,8 @@ impl Study {
             bar.enable_steady_tick(Duration::from_secs(1));
         }
         Ok(Study {
-            workers: Workers::of_study()?,
+            // They take as long as they take.
+            workers: Workers::new(typed_args()?, Duration::MAX, &std::env::temp_dir())?,
             bar,
             about,
             before,
@@ -192,7 +194,7 @@ impl Study {
             let timing = Timing {
                 process,
                 lens_scale,
-                ..Timing::default()
+                plan: plan.clone(),
             };
             let told = |_: &str| {
                 self.bar.set_position(self.before + u64::from(process));
@@ -202,7 +204,7 @@ impl Study {
                 Message::Times(times) => Some(times),
                 _ => None,
             };
-            let job = Job::Times(plan.clone(), timing);
+            let job = Job::Times(timing);
             all.extend(self.workers.found(process, job, &told, times)?);
         }
         self.bar.finish_and_clear();

@@ -73,8 +73,7 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
             }
             at.scene(&plan, scene, &share, samples)?;
         }
-        Job::Times(plan, mut timing) => {
-            timing.plan = plan;
+        Job::Times(timing) => {
             stay_on(request.cpu);
             at.set(None, TIMING);
             tell(&at.message());
