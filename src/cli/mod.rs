@@ -102,8 +102,11 @@ impl Ending {
         Ending::of_checks(is_right, false)
     }
 
-    /// Ending of checks: a wrong answer counts before an interrupt.
+    /// Ending of checks, told if they were interrupted: a wrong answer counts before that.
     fn of_checks(is_right: bool, interrupted: bool) -> Ending {
+        if interrupted {
+            tell("interrupted: only the cases shown were checked");
+        }
         match (is_right, interrupted) {
             (false, _) => Ending::WrongAnswer,
             (true, true) => Ending::Interrupted,

@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 use super::args::StressArgs;
 use super::shared_args::first_seed;
 use super::table::{Column, Table};
-use super::{Ending, interrupt, print, tell, text};
+use super::{Ending, interrupt, print, text};
 use crate::index::{Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::report::grouped;
@@ -120,9 +120,6 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         };
         table(&sections, started.elapsed().as_secs_f64(), &note)
     })?;
-    if interrupted {
-        tell("interrupted: only the cases shown were checked");
-    }
     let has_failed = |section: &Section| section.count(Status::Fail) > 0;
     let is_right = !sections.iter().any(has_failed);
     Ok(Ending::of_checks(is_right, interrupted))
