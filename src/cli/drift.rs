@@ -9,7 +9,7 @@ use super::document::{Block, show};
 use super::figure::{Axis, Figure, Look, is_drawn, picture};
 use super::page::to_page;
 use super::processes::Timing;
-use super::study::Study;
+use super::study::{ROUNDS, Study};
 use super::table::{Column, Table};
 use super::text::{self, some, time_plus_minus};
 use super::{Ending, expect_places, print, write_if};
@@ -22,9 +22,6 @@ use crate::report::grouped;
 
 /// Most steps of the reference behind one arm: about a minute.
 const MOST_STEPS: f64 = 1e9;
-
-/// Rounds of what is timed, if one process has them all.
-const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];

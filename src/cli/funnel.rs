@@ -19,7 +19,7 @@ use super::plan::Plan;
 use super::processes::Timing;
 use super::shared_args::TableFormat;
 use super::sheet::Class;
-use super::study::{Study, load, note_solid};
+use super::study::{ROUNDS, Study, load, note_solid};
 use super::{
     Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_if, write_text,
 };
@@ -34,9 +34,6 @@ use crate::shown::lines;
 use crate::spec::SpecError;
 use crate::visibility::region::Pvs;
 use crate::visibility::{Guarantee, SampleGrid};
-
-/// Rounds of a stage, if one process has them all.
-const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];

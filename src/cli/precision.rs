@@ -11,7 +11,7 @@ use super::funnel::nothing_for_it;
 use super::page::to_page;
 use super::precision_conclusions::is_wrong;
 use super::processes::Timing;
-use super::study::{Study, load};
+use super::study::{ROUNDS, Study, load};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time_plus_minus};
 use super::{
@@ -23,8 +23,6 @@ use crate::measure::{ProcessTimes, Setting};
 use crate::precision::{self, Precision, SWEEPS, size_sweep, sweep};
 use crate::visibility::{Guarantee, SampleGrid};
 
-/// Rounds of a point, if one process has them all.
-const ROUNDS: [usize; 2] = [5, 15];
 /// Cubes for each camera of the other sweeps, and the most cameras of each value.
 const CUBES_PER_CAMERA: usize = 10_000;
 const SWEEP_CAMERAS: usize = 200;

@@ -20,6 +20,9 @@ use crate::measure::{NO_ITEMS, ProcessTimes, Setting, Status};
 use crate::path;
 use crate::scene::{self, LoadOptions, Scene, split_part};
 
+/// Rounds of what is timed, at least and at most, if one process has them all.
+pub const ROUNDS: [usize; 2] = [5, 15];
+
 /// A progress bar of `parts` parts, with a word for them.
 pub fn progress(parts: u64, word: &str) -> ProgressBar {
     // Drawn on stderr, and only if that is a terminal.
