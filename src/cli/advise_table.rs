@@ -232,26 +232,23 @@ fn evidence(advice: &Advice) -> Vec<Block> {
     let tests = format!("Culling tests on {on}, with {ns} ns to draw an item that cannot be seen:");
     let note = "The statistic decides; where both sides answer the same, the clock does if a \
                 paired test over the processes tells them apart.";
-    let mut blocks = vec![
-        Block::heading("Structures, all answers checked:"),
-        Block::Table(structure_table(&advice.structure.rows)),
-    ];
+    let structures = structure_table(&advice.structure.rows);
+    let mut blocks = Vec::new();
+    blocks.extend(Block::section(
+        "Structures, all answers checked:",
+        structures,
+    ));
     let motion = advice.motion.as_ref();
     if let Some(motion) = motion.filter(|motion| !motion.policies.is_empty()) {
-        blocks.extend([
-            Block::heading("Update policies, side by side:"),
-            Block::Table(structure_table(&motion.policies)),
-        ]);
+        let policies = structure_table(&motion.policies);
+        blocks.extend(Block::section("Update policies, side by side:", policies));
     }
+    blocks.extend(Block::section(tests, test_table(&advice.test)));
     let scene = some(motion, |_| " on the still scene".to_owned());
-    blocks.extend([
-        Block::heading(tests),
-        Block::Table(test_table(&advice.test)),
-        Block::heading(format!("Features, measured with and without{scene}:")),
-        Block::Table(check_table(&advice.omissions)),
-        Block::line(note),
-        Block::Table(Table::with(&advice.omissions, &columns)),
-    ]);
+    let features = format!("Features, measured with and without{scene}:");
+    blocks.extend(Block::section(features, check_table(&advice.omissions)));
+    let reasons = Table::with(&advice.omissions, &columns);
+    blocks.extend([Block::line(note), Block::Table(reasons)]);
     blocks
 }
 

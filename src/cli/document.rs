@@ -29,6 +29,11 @@ impl Block {
     pub fn heading(text: impl Into<String>) -> Block {
         Block::Heading(2, text.into())
     }
+
+    /// A table below a heading of the second level.
+    pub fn section(heading: impl Into<String>, table: Table) -> [Block; 2] {
+        [Block::heading(heading), Block::Table(table)]
+    }
 }
 
 fn markdown_table(table: &Table) -> String {

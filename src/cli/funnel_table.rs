@@ -53,8 +53,8 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         blocks.extend([Block::line(""), Block::Line(line)]);
     }
     if all {
-        blocks.push(Block::heading("Every back end of every stage"));
-        blocks.push(Block::Table(stages(report, true)));
+        let stages = stages(report, true);
+        blocks.extend(Block::section("Every back end of every stage", stages));
     }
     blocks.extend(loss.into_iter().flatten());
     // Not every scene has all of them.
@@ -74,7 +74,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         ("With and without each stage of the chain", gains(report)),
     ] {
         if !table.rows.is_empty() && (all || heading.contains("mirror")) {
-            blocks.extend([Block::heading(heading), Block::Table(table)]);
+            blocks.extend(Block::section(heading, table));
         }
     }
     blocks.push(Block::line(""));

@@ -120,10 +120,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
         Block::Line(conclusion(&reports, &ratios)),
     ];
     all.extend(blocks);
-    all.extend([
-        Block::heading("Runs"),
-        Block::Table(runs(&reports, &run_names)),
-    ]);
+    all.extend(Block::section("Runs", runs(&reports, &run_names)));
     all.extend(glossary(&all));
     to_html(&title, &all)
 }

@@ -87,7 +87,7 @@ pub fn glossary(blocks: &[Block]) -> Vec<Block> {
     }
     match table.rows.is_empty() {
         true => Vec::new(),
-        false => vec![Block::heading("Columns"), Block::Table(table)],
+        false => Block::section("Columns", table).into(),
     }
 }
 

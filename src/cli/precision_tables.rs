@@ -30,7 +30,7 @@ pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     );
     let mut blocks = vec![Block::Line(head)];
     let mut add = |title: &str, table: Table, note: &str| {
-        blocks.extend([Block::heading(title), Block::Table(table)]);
+        blocks.extend(Block::section(title, table));
         blocks.extend((!note.is_empty()).then(|| Block::line(note)));
     };
     if all {
