@@ -26,12 +26,8 @@ pub fn to_page(
     all.extend(glossary(&all));
     all.push(Block::heading("Machine and command"));
     let command = command_line(&typed_args().unwrap_or_default());
-    let lines = origin(
-        &command,
-        &Machine::capture(),
-        &Toolchain::capture(),
-        &Source::capture(),
-    );
+    let (machine, source) = (Machine::capture(), Source::capture());
+    let lines = origin(&command, &machine, &Toolchain::capture(), &source);
     all.extend(lines.map(Block::Line));
     to_html(&title, &all)
 }

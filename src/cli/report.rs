@@ -225,17 +225,12 @@ fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Vie
 
 /// Origin of the figures, in lines.
 fn about(report: &Report) -> Vec<String> {
-    let (run, machine) = (&report.run, &report.machine);
+    let (run, machine, source) = (&report.run, &report.machine, &report.source);
     let suite = run.suite.as_deref().unwrap_or("chosen by hand");
     let (start, seed) = (&run.started_at, run.seed);
     let unfinished = ["", "; not finished"][usize::from(run.finished_at.is_none())];
     let mut lines = vec![format!("{start}, suite: {suite}, seed {seed}{unfinished}.")];
-    lines.extend(origin(
-        &run.command,
-        machine,
-        &report.toolchain,
-        &report.source,
-    ));
+    lines.extend(origin(&run.command, machine, &report.toolchain, source));
     lines.push(format!("{}.", text::conclusion(report)));
     lines.extend(report.noise.warnings.iter().cloned());
     lines.extend(report.input_warnings().into_iter().map(str::to_owned));
