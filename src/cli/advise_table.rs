@@ -1,7 +1,7 @@
 //! Advice on a terminal: structure, policy, test, features, and the evidence.
 
 use super::document::Block;
-use super::run_verdict::{gains, times};
+use super::run_verdict::{gains, is_fat, times};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time, time_within};
 use crate::advise::{Advice, Axis, Check, Omission, TestChoice, TestRow, ns, policy_of};
@@ -69,11 +69,7 @@ pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
 fn taken(advice: &Advice) -> String {
     let choice = &advice.structure;
     let Some(name) = &choice.name else {
-        let why = match choice
-            .rows
-            .iter()
-            .any(|row| row.value("fat_excess") > Some(0.0))
-        {
+        let why = match choice.rows.iter().any(|row| is_fat(&row)) {
             true => "No structure with exact bounds was measured",
             false => "No structure answered right",
         };
@@ -117,8 +113,7 @@ fn in_motion(advice: &Advice) -> Option<String> {
     let frame = ns(row)?;
     let longer = others.iter().filter_map(|row| {
         let (policy, longer) = (policy_of(&row.structure), times(ns(row)? / frame));
-        let fat = row.value("fat_excess") > Some(0.0);
-        let more = if fat { " and returns more" } else { "" };
+        let more = ["", " and returns more"][usize::from(is_fat(&row))];
         Some(format!("{policy} takes {longer} as long{more}"))
     });
     let ruled_out = motion.ruled_out.iter().map(|(policy, builds)| {
