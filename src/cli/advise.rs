@@ -54,9 +54,8 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
     let times = study.times(step, setting.path.lens_scale, &prepared.plan)?;
     let advice = prepared.conclude(&input, &times);
     note_solid(&setting.scene, args.format);
-    print(args.format, &advice, || {
-        show(&blocks(&advice, args.all_columns, text::width()))
-    })?;
+    let table = || show(&blocks(&advice, args.all_columns, text::width()));
+    print(args.format, &advice, table)?;
     Ok(Ending::of(!advice.found_wrong_answers()))
 }
 

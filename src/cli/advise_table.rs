@@ -188,11 +188,7 @@ fn rule_table(advice: &Advice) -> Table {
                 table.add_row([title, "with", "without", ratio, ""]);
             }
             let [with, without] = rule.sides_ns();
-            let ratio = if needed {
-                without / with
-            } else {
-                with / without
-            };
+            let ratio = [with / without, without / with][usize::from(needed)];
             let finite = |x: f64| Some(x).filter(|x| x.is_finite());
             let shown = |ns| some(finite(ns), text::time);
             let note = match rule.note.as_str() {
@@ -248,9 +244,8 @@ fn evidence(advice: &Advice) -> Vec<Block> {
 }
 
 fn ties(names: &[impl AsRef<str>]) -> String {
-    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
-    let tie = (!names.is_empty()).then(|| format!("a tie with {}", names.join(", ")));
-    bracketed(tie.into_iter(), "")
+    let tied = |_| format!(" (a tie with {})", text::joined(names));
+    some(names.first(), tied)
 }
 
 /// Texts in brackets, if there are any.
@@ -337,11 +332,8 @@ fn check_table(features: &[Omission]) -> Table {
             })
         }),
         ("answers", |(_, check)| {
-            let missed = [
-                check.kept_false_negative_ppm,
-                check.left_out_false_negative_ppm,
-            ];
-            let missed = missed.into_iter().flatten().any(|ppm| ppm > 0.0);
+            let missed = check.kept_false_negative_ppm > Some(0.0)
+                || check.left_out_false_negative_ppm > Some(0.0);
             match (check.same_answers, check.is_wrong(), missed) {
                 (_, true, _) => "WRONG: not the same",
                 (_, _, true) => "some missed",

@@ -179,9 +179,10 @@ const NEW: usize = 1;
 const MORE: usize = 2;
 
 /// The first and the most pairs of a comparison: ten for a threshold of 5 %, more
-/// for less, as such a change needs on a shared machine.
-fn pairs(threshold: f64) -> (usize, usize) {
-    match threshold {
+/// for less, as such a change needs on a shared machine. Work is counted without any.
+fn pairs(args: &CompareArgs) -> (usize, usize) {
+    match args.threshold {
+        _ if args.gate == Gate::Work => (0, 0),
         t if t >= 0.1 => (6, 32),
         t if t > 0.04 => (10, 32),
         _ => (16, 64),
@@ -209,10 +210,7 @@ impl Duel<'_> {
     /// it cannot read.
     fn run(&self) -> anyhow::Result<(Changes, String)> {
         let started = Instant::now();
-        let (first, most) = match self.args.gate {
-            Gate::Time => pairs(self.args.threshold),
-            Gate::Work => (0, 0),
-        };
+        let (first, most) = pairs(self.args);
         self.bar.set_length(most as u64);
         self.bar.set_message("counting and checking answers");
         let mut seen = self.count()?;

@@ -38,11 +38,8 @@ pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String
 
 /// All of a key that is no default, but for the scene.
 pub fn question(group: &GroupKey) -> String {
-    let cold = match group.cache.as_str() {
-        "warm" => String::new(),
-        cache => format!(" ({cache})"),
-    };
-    let test = format!("{}{cold}", group.test);
+    let cold = Some(&group.cache).filter(|cache| *cache != "warm");
+    let test = group.test.clone() + &text::some(cold, |cache| format!(" ({cache})"));
     let asked = [group.path.clone(), test, group.motion.clone()];
     text::joined(asked.into_iter().chain(unusual(group)))
 }

@@ -13,7 +13,7 @@ use super::shared_args::RowFormat;
 use super::unread_is_fine;
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::measure::{Answer, Verdict, guarded, input_of};
+use crate::measure::{Answer, guarded, input_of};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::{Scene, available_bytes};
 use crate::shown::lines;
@@ -84,7 +84,6 @@ pub fn ask_all(
         let mut answers: Vec<Vec<Row>> = Vec::new();
         for spec in structures {
             let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
-            let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
             let build = || spec.build(input_of(scene, boxes));
             let index = match only.take().map_or_else(build, Ok) {
                 Ok(index) => index,
@@ -128,7 +127,7 @@ pub fn ask_all(
                         });
                     });
                 });
-                asked.map_err(panicked)?;
+                asked.map_err(|verdict| failed(verdict.reason.unwrap_or_default()))?;
                 let rows = answers[next - from..].iter().filter_map(|row| row.last());
                 held += rows.map(Row::bytes).sum::<usize>() * structures.len();
                 next += count;

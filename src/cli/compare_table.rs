@@ -242,6 +242,11 @@ impl CompareTable<'_> {
                 Some(usize::MAX) => vec![structure.clone(), place],
                 Some(_) => vec![short_structure(structure), place],
             };
+            let is_shifted = shifts.iter().any(|shift| Some(shift.metric) == row.metric);
+            let than_what = match row.outcome {
+                Outcome::Slower | Outcome::Faster if is_shifted => " than the others",
+                _ => "",
+            };
             let figures = [
                 metric.to_owned(),
                 text::some(row.old, |value| shown(metric, value)),
@@ -255,15 +260,7 @@ impl CompareTable<'_> {
                     (Basis::Pairs, [pairs, _]) => pairs.to_string(),
                     (Basis::Reports, [old, new]) => format!("{old} vs {new}"),
                 },
-                row.outcome.name().replace('_', " ")
-                    + match row.outcome {
-                        Outcome::Slower | Outcome::Faster
-                            if shifts.iter().any(|shift| Some(shift.metric) == row.metric) =>
-                        {
-                            " than the others"
-                        }
-                        _ => "",
-                    },
+                row.outcome.name().replace('_', " ") + than_what,
                 text::some(room.is_none().then_some(row), |row| reason(row)),
             ];
             table.add_row(places.into_iter().chain(figures));
@@ -298,7 +295,6 @@ impl CompareTable<'_> {
             let count = text::count(changes.count(outcome));
             format!("{count} {}", outcome.name().replace('_', " "))
         });
-        let counts: Vec<String> = counts.collect();
         let cells = text::counted(changes.cells_in_common, "cell");
         let rows = match changes.rows.len() {
             rows if rows == changes.cells_in_common => cells,
@@ -309,7 +305,7 @@ impl CompareTable<'_> {
             0 => String::new(),
             wrong => format!("; {} only in NEW", text::counted(wrong, "wrong answer")),
         };
-        format!("{} of {rows}{alone}", counts.join(", "))
+        format!("{} of {rows}{alone}", text::joined(counts))
     }
 
     /// Advice on inconclusive cells, if there are any.
@@ -408,9 +404,7 @@ pub fn reason(row: &JudgedRow) -> String {
         true if old == new => Some(new.name().to_owned()),
         _ => (old != new).then(|| format!("{} to {}", old.name(), new.name())),
     };
-    let parts = became.into_iter().chain(row.reason.clone());
-    let told: Vec<String> = parts.filter(|part| !part.is_empty()).collect();
-    told.join(", ")
+    text::joined(became.into_iter().chain(row.reason.clone()))
 }
 
 /// Every reason once, with the only cell of it or their number.

@@ -62,10 +62,8 @@ fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
     let row = |row: &Vec<String>| {
         // Without the mark of the fastest.
         let number = |cell: &String| {
-            cell.trim_start_matches('*')
-                .replace(',', "")
-                .parse::<f64>()
-                .ok()
+            let digits = cell.trim_start_matches('*').replace(',', "");
+            digits.parse::<f64>().ok()
         };
         let most = row.iter().filter_map(number).fold(0.0, f64::max);
         let cells = row.iter().enumerate().map(|(column, cell)| {

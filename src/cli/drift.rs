@@ -348,7 +348,6 @@ fn arm_figures(report: &ArmReport) -> Vec<Figure> {
 
 /// All as one picture: a row per arm, a column per stiffness.
 fn draw(report: &ArmReport) -> String {
-    let of_first = |c: &&ArmChoice| c.setting.arm == report.choices[0].setting.arm;
-    let linear = report.choices.iter().filter(of_first);
-    picture(&arm_figures(report), linear.count().max(1))
+    let mut arms = (report.choices).chunk_by(|a, b| a.setting.arm == b.setting.arm);
+    picture(&arm_figures(report), arms.next().map_or(1, <[_]>::len))
 }

@@ -4,6 +4,7 @@
 //! width; margins beside the plot are in pixels. Marks carry their figures as `data-`
 //! attributes. The same figure stands on a page or, with its style, in a file of its own.
 
+use std::iter::successors;
 use std::ops::Range;
 
 use super::text;
@@ -107,13 +108,10 @@ impl<'t> Axis<'t> {
     pub fn powers(&self, base: f64) -> Vec<f64> {
         let [first, last] = [self.values.start, self.values.end].map(|v| v.log(base));
         let step = ((last - first) / 7.0).ceil().max(1.0);
-        let mut power = (first / step).ceil() * step;
-        let mut ticks = Vec::new();
-        while power <= last {
-            ticks.push(base.powf(power));
-            power += step;
-        }
-        ticks
+        let least = (first / step).ceil() * step;
+        let powers = successors(Some(least), |power| Some(power + step));
+        let powers = powers.take_while(|power| *power <= last);
+        powers.map(|power| base.powf(power)).collect()
     }
 
     /// The given ticks, or powers of ten.

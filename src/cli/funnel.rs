@@ -76,9 +76,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     }
     let report = prepared.conclude(&times);
     note_solid(&stages.setting.scene, args.format);
-    let shown = print(args.format, &report, || {
-        show(&funnel_table::blocks(&report, args.all))
-    });
+    let table = || show(&funnel_table::blocks(&report, args.all));
+    let shown = print(args.format, &report, table);
     if let Some(folder) = &args.csv {
         write(&report, folder)?;
     }
@@ -135,23 +134,22 @@ fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Resu
     ];
     let mut chain = Chain::for_scene(scene, args.cut_out.is_some()).with(StageKind::Object, object);
     for (stage, name) in typed {
-        if let Some(name) = name {
-            let known = funnel::back_ends(stage, scene, args.cut_out.is_some());
-            if !known.iter().any(|row| row.name == name) {
-                let stage = stage.name();
-                if let [_] = known[..] {
-                    let nothing = nothing_for_it(scene);
-                    bail!("--{stage} is '{name}'; expected none: {nothing}");
-                }
-                if let Some([_, need]) = funnel::NEEDS.iter().find(|[own, _]| own == name) {
-                    bail!("--{stage} is '{name}'; expected {need}");
-                }
-                let names = known.iter().map(|row| row.name);
-                let what = format!("back end of the {stage} stage");
-                return Err(SpecError::unknown(&what, name, names).into());
+        let Some(name) = name else { continue };
+        let known = funnel::back_ends(stage, scene, args.cut_out.is_some());
+        if !known.iter().any(|row| row.name == name) {
+            let stage = stage.name();
+            if let [_] = known[..] {
+                let nothing = nothing_for_it(scene);
+                bail!("--{stage} is '{name}'; expected none: {nothing}");
             }
-            chain = chain.with(stage, name);
+            if let Some([_, need]) = funnel::NEEDS.iter().find(|[own, _]| own == name) {
+                bail!("--{stage} is '{name}'; expected {need}");
+            }
+            let names = known.iter().map(|row| row.name);
+            let what = format!("back end of the {stage} stage");
+            return Err(SpecError::unknown(&what, name, names).into());
         }
+        chain = chain.with(stage, name);
     }
     Ok(chain)
 }

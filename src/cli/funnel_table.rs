@@ -151,8 +151,7 @@ fn gain(report: &FunnelReport, stage: StageKind) -> Option<&Gain> {
 fn worth(gain: &Gain) -> String {
     let unit = gain.unit.trim_end_matches('s');
     let Some(ns) = gain.break_even else {
-        let never = gain.removed() <= 0.0;
-        return if never { "never" } else { "" }.to_owned();
+        return ["", "never"][usize::from(gain.removed() <= 0.0)].to_owned();
     };
     match (ns.value, ns.lower, ns.upper) {
         (0.0, _, None | Some(0.0)) => "always".to_owned(),

@@ -136,9 +136,8 @@ fn conclusion(reports: &[Report], ratios: &[f64]) -> String {
         return "No structure has times in two runs that can be compared.".to_owned();
     };
     let settings = settings(first, last);
-    let differ: Vec<&str> = settings.iter().map(|setting| setting.what).collect();
-    let note = text::some(differ.first(), |_| {
-        let differ = differ.join(", ");
+    let note = text::some(settings.first(), |_| {
+        let differ = text::joined(settings.iter().map(|setting| setting.what));
         format!(" They differ in the {differ}: not all of a change is the program's own.")
     });
     let runs = text::counted(reports.len(), "run");

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::args::{EnvArgs, ListArgs, ListTopic};
 use super::shared_args::TableFormat;
 use super::table::Table;
-use super::{Ending, print_json, program, text};
+use super::{Ending, print, print_json, program, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
@@ -92,10 +92,8 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
             let row = |info: &Info| {
                 let mut params = registry.structure(info.name)?.params;
                 // One thread, the default, is in no label.
-                if registry
-                    .structure(&format!("{}:threads=2", info.name))
-                    .is_ok()
-                {
+                let threaded = format!("{}:threads=2", info.name);
+                if registry.structure(&threaded).is_ok() {
                     params["threads"] = 1.into();
                 }
                 Ok(json!({
@@ -189,18 +187,15 @@ pub fn env(args: &EnvArgs) -> Result<Ending> {
         "toolchain": Toolchain::capture(),
         "source": Source::capture(),
     });
-    match args.format {
-        TableFormat::Json => print_json(&facts)?,
-        TableFormat::Table => {
-            let mut table = Table::of("fact | value");
-            for (group, facts) in facts.as_object().into_iter().flatten() {
-                for (name, value) in facts.as_object().into_iter().flatten() {
-                    table.add_row([format!("{group}.{name}"), plain(value)]);
-                }
+    print(args.format, &facts, || {
+        let mut table = Table::of("fact | value");
+        for (group, facts) in facts.as_object().into_iter().flatten() {
+            for (name, value) in facts.as_object().into_iter().flatten() {
+                table.add_row([format!("{group}.{name}"), plain(value)]);
             }
-            write!(io::stdout(), "{}", table.fitted(text::width()))?;
         }
-    }
+        write!(io::stdout(), "{}", table.fitted(text::width()))
+    })?;
     Ok(Ending::Ok)
 }
 
@@ -211,10 +206,7 @@ fn plain(value: &Value) -> String {
         Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(" "),
         Value::Object(fields) => {
             let field = |(name, value)| format!("{name}={}", plain(value));
-            format!(
-                "({})",
-                fields.iter().map(field).collect::<Vec<_>>().join(", ")
-            )
+            format!("({})", text::joined(fields.iter().map(field)))
         }
         other => other.to_string(),
     }

@@ -398,10 +398,8 @@ fn told_once(error: &anyhow::Error) -> String {
             text = format!("{text}: {cause}");
         }
     }
-    let mut of_system = error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<io::Error>());
-    match of_system.next() {
+    let mut causes = error.chain();
+    match causes.find_map(|cause| cause.downcast_ref::<io::Error>()) {
         Some(error) if !text.contains("expected") => {
             // Files are named in the context.
             let place = ["", OUTPUT][usize::from(text == error.to_string())];

@@ -94,9 +94,8 @@ fn blocks(outcome: &Precision, all: bool, room: usize) -> Vec<Block> {
 
 /// The inputs of the command itself, or of a worker.
 fn setting(registry: &Registry, args: &PrecisionArgs, timing: Option<&Timing>) -> Result<Setting> {
-    load(registry, &args.study, ROUNDS, timing, |structures| {
-        [2 * structures as u64, 0]
-    })
+    let held = |structures| [2 * structures as u64, 0];
+    load(registry, &args.study, ROUNDS, timing, held)
 }
 
 /// Times all points in one process.

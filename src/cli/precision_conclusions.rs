@@ -12,13 +12,8 @@ use crate::statistics::Rate;
 
 pub fn conclusions(p: &Precision) -> Vec<String> {
     let (sizes, sweeps) = (of_sizes(&p.size_sweep), of_sweeps(&p.sweeps));
-    let mut told = of_points(p);
-    told.extend(
-        [of_storage(p), of_regions(p), sizes, sweeps]
-            .into_iter()
-            .flatten(),
-    );
-    told
+    let others = [of_storage(p), of_regions(p), sizes, sweeps].into_iter();
+    of_points(p).into_iter().chain(others.flatten()).collect()
 }
 
 /// No visible item missed, a margin that is proven (docs/NUMERICS.md), and a time.
@@ -59,9 +54,8 @@ fn of_points(p: &Precision) -> Vec<String> {
     let tight = sound.find(|point| extra(point) < extra(fastest));
     if let Some(tight) = tight {
         let (times, name, extra) = (ratio(tight, fastest), named(tight), extras(tight));
-        let fewer = "Fewer false positives take";
         all.push(format!(
-            "{fewer} {times} times as long or more: {name}, {extra}."
+            "Fewer false positives take {times} times as long or more: {name}, {extra}."
         ));
     }
     let depth = |point: &CullingPoint| point.errors.worst_miss_px.unwrap_or(0.0);
@@ -149,10 +143,9 @@ fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
         let lost = text::count(lost);
         Some(format!("{name} {value} ({numbers}, {lost} ppm)"))
     });
-    let worst: Vec<String> = worst.collect();
-    let others = match worst.is_empty() {
-        true => "no other numbers do either".to_owned(),
-        false => format!("others miss items, most at {}", worst.join(", ")),
+    let others = match text::joined(worst) {
+        none if none.is_empty() => "no other numbers do either".to_owned(),
+        worst => format!("others miss items, most at {worst}"),
     };
     (!rows.is_empty()).then(|| {
         let names: Vec<&str> = SWEEPS.iter().map(|sweep| sweep.1).collect();

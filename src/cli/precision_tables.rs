@@ -43,14 +43,11 @@ pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     let title = "Pareto front of error, memory and time, fastest first";
     let whole = front_table(p);
     let front = whole.within(room, &["tie", "B/item", "FN ppm"]);
-    let gone = whole
-        .header
-        .iter()
-        .filter(|head| !front.header.contains(head));
-    let gone = text::some(
-        Some(text::joined(gone)).filter(|gone| !gone.is_empty()),
-        |gone| format!(" Columns that do not fit here: {gone}."),
-    );
+    let heads = whole.header.iter();
+    let gone = match text::joined(heads.filter(|head| !front.header.contains(head))) {
+        none if none.is_empty() => none,
+        gone => format!(" Columns that do not fit here: {gone}."),
+    };
     add(title, front, &(FRONT_NOTE.to_owned() + &gone));
     if all {
         let title = "Region search, the fastest structure for each";
@@ -107,14 +104,10 @@ fn culling(point: &CullingPoint) -> String {
 /// Numbers, planes where they are not the frame's, and epsilon.
 pub fn numbers(names: &Names) -> String {
     let arithmetic = names.arithmetic;
-    let planes = match names.planes {
-        "frame" => String::new(),
-        planes => format!(" {planes}"),
-    };
-    let epsilon = match arithmetic {
-        "f64" => String::new(),
-        _ => format!(" c={}", names.epsilon),
-    };
+    let planes = Some(names.planes).filter(|planes| *planes != "frame");
+    let planes = some(planes, |planes| format!(" {planes}"));
+    let epsilon = (arithmetic != "f64").then_some(names.epsilon);
+    let epsilon = some(epsilon, |c| format!(" c={c}"));
     format!("{arithmetic}{planes}{epsilon}")
 }
 
