@@ -133,6 +133,7 @@ fn stages(report: &FunnelReport, all: bool) -> Table {
             _ if all => some(row.ns_per_removed, text::time),
             // Another stage does it in its own traversal.
             None if stage == StageKind::Object => "in occlusion".to_owned(),
+            Some(_) if errors.false_negative_count > 0.0 => "loses visible".to_owned(),
             gain => some(gain, worth),
         });
         table.add_row(cells);

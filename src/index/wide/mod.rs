@@ -273,9 +273,7 @@ impl Wide {
         match self.root_verdict(volume) {
             _ if is_counted => None,
             Containment::Outside => Some(ControlFlow::Continue(())),
-            Containment::Inside if self.vacant == 0 => {
-                Some(pass_run(0..ids.len(), ids, cx))
-            }
+            Containment::Inside if self.vacant == 0 => Some(pass_run(0..ids.len(), ids, cx)),
             _ => None,
         }
     }
