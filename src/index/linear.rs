@@ -8,10 +8,10 @@ use std::ops::{ControlFlow, Range};
 use serde::{Deserialize, Serialize};
 
 use super::items::{ABSENT, PaddedIds, Positions, indexable};
-use super::shared_query::{QueryInParts, QueryThreads, in_parts};
+use super::shared_query::{QueryThreads, in_parts};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, RegionIndex};
 use crate::geometry::{Aabb, BallBlocks, Balls, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
-use crate::kernel::{Isa, first_lanes, pairs};
+use crate::kernel::{Isa, Piece, first_lanes, pairs};
 use crate::query::{
     Context, ItemId, NoRecorder, Planes, QueryContext, QueryVolume, Recorder, Sink, Tests,
     UnpreparedPlanes,
@@ -158,21 +158,21 @@ impl Linear {
     }
 }
 
-/// A scan in parts of [`BLOCKS_PER_CALL`] blocks.
-struct SharedScan<'a, Q> {
-    scan: &'a Linear,
-    volume: &'a Q,
-}
+/// One part of a scan, [`BLOCKS_PER_CALL`] blocks, compiled for the query's instruction set.
+struct PartOfScan<'a, Q>(&'a Linear, &'a Q, usize, &'a mut Vec<ItemId>);
 
-impl<I: Isa, Q: QueryVolume> QueryInParts<I> for SharedScan<'_, Q> {
+impl<I: Isa, Q: QueryVolume> Piece<I> for PartOfScan<'_, Q> {
+    type Output = ();
+
     #[inline(always)]
-    fn part(&self, isa: I, index: usize, ids: &mut Vec<ItemId>) {
+    fn run(self, isa: I) {
+        let PartOfScan(scan, volume, index, ids) = self;
         let first = index * BLOCKS_PER_CALL;
-        let end = (first + BLOCKS_PER_CALL).min(self.scan.boxes.blocks().len());
+        let end = (first + BLOCKS_PER_CALL).min(scan.boxes.blocks().len());
         let recorder = &mut NoRecorder;
         let mut cx = QueryContext::new(isa, ids, recorder);
         // A Vec never breaks off.
-        let _ = self.scan.scan(first..end, self.volume, &mut cx);
+        let _ = scan.scan(first..end, volume, &mut cx);
     }
 }
 
@@ -222,8 +222,11 @@ impl RegionIndex for Linear {
             && blocks > BLOCKS_PER_CALL
             && let Some(workers) = &self.workers
         {
-            let work = SharedScan { scan: self, volume };
-            return in_parts(workers, blocks.div_ceil(BLOCKS_PER_CALL), &work, cx);
+            let (isa, parts) = (cx.isa(), blocks.div_ceil(BLOCKS_PER_CALL));
+            let part = |index: usize, ids: &mut Vec<ItemId>| {
+                isa.apart(PartOfScan(self, volume, index, ids));
+            };
+            return in_parts(workers, parts, part, cx);
         }
         self.scan(0..blocks, volume, cx)
     }

@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 
 use super::frontier::{put_back, take};
 use super::{BuildError, check_range};
-use crate::kernel::{Isa, Piece};
 use crate::query::{Context, ItemId};
 use crate::threads::{MOST_THREADS, Workers};
 
@@ -55,43 +54,21 @@ thread_local! {
     static PARTS: Cell<Option<Box<Lists>>> = const { Cell::new(None) };
 }
 
-/// A query in parts, each answered into its own list.
-pub trait QueryInParts<I>: Sync {
-    /// Appends the ids of one part. Mark it `#[inline(always)]`.
-    fn part(&self, isa: I, index: usize, ids: &mut Vec<ItemId>);
-}
-
-/// One part, compiled for the query's instruction set.
-struct OnePart<'a, W> {
-    work: &'a W,
-    index: usize,
-    ids: &'a mut Vec<ItemId>,
-}
-
-impl<I: Isa, W: QueryInParts<I>> Piece<I> for OnePart<'_, W> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self, isa: I) {
-        self.work.part(isa, self.index, self.ids);
-    }
-}
-
-/// Answers the parts of a query on the threads; ids go to the sink in order.
+/// Answers the parts of a query on the threads, each into its own list; ids go to the sink
+/// in order.
 pub fn in_parts<C: Context>(
     workers: &Workers,
     parts: usize,
-    work: &impl QueryInParts<C::Isa>,
+    answer: impl Fn(usize, &mut Vec<ItemId>) + Sync,
     cx: &mut C,
 ) -> ControlFlow<()> {
-    let isa = cx.isa();
     let mut lists = take(&PARTS);
     if lists.0.len() < parts {
         lists.0.resize_with(parts, Vec::new);
     }
     workers.share(lists.0[..parts].iter_mut().enumerate(), |(index, ids)| {
         ids.clear();
-        isa.apart(OnePart { work, index, ids });
+        answer(index, ids);
     });
     let flow = lists.0[..parts].iter().try_for_each(|ids| cx.accept(ids));
     put_back(&PARTS, lists);
