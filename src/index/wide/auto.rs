@@ -15,7 +15,7 @@ use self::params::{Update, Use};
 use super::{Moving, WideParams};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{
-    BuildError, Info, Input, Kind, Linear, LinearParams, MemoryUsage, Origin, RegionIndex,
+    BuildError, Info, Input, Kind, Linear, LinearParams, MemoryUsage, RegionIndex,
 };
 use crate::kernel::Plain;
 use crate::query::{Context, Count, ItemId, QueryContext, QueryCost, QueryVolume};
@@ -374,12 +374,11 @@ impl Auto {
 }
 
 impl RegionIndex for Auto {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "auto",
         "a tree or a scan, and its updates, by counted work; use=wide, moving or linear \
          and update=refit or rebuild force them",
         Kind::Tree,
-        Origin::Ours,
     )
     .refits()
     .threaded_build()

@@ -23,7 +23,7 @@ use self::single_plane_buckets::SinglePlaneBuckets;
 use super::frontier::{Frontier, NodeList, is_far, pass_run, put_back, take};
 use super::items::{ABSENT, PaddedIds, Positions, indexable};
 use super::linear::seen_by;
-use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, TreeCell};
+use super::{BuildError, Info, Input, Kind, MemoryUsage, RegionIndex, TreeCell};
 use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES, LaneMask};
 use crate::kernel::prefetch;
 use crate::query::{Bits, Containment, Context, ItemId, QueryVolume, Recorder, Sink};
@@ -356,11 +356,10 @@ impl Wide {
 }
 
 impl RegionIndex for Wide {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "wide",
         "16-ary implicit tree of blocks, level by level with plane masks and prefetch",
         Kind::Tree,
-        Origin::Ours,
     )
     .refits()
     .ranges()

@@ -16,7 +16,7 @@ use glam::Vec3;
 use super::{Wide, WideParams};
 use crate::geometry::{Aabb, BallBlocks, BoxBlock, LANES};
 use crate::index::items::{ABSENT, Dirty, Positions};
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, RegionIndex};
 use crate::kernel::prefetch;
 use crate::query::{Context, ItemId, QueryVolume};
 
@@ -405,11 +405,10 @@ impl Moving {
 }
 
 impl RegionIndex for Moving {
-    const INFO: Info = Info::new(
+    const INFO: Info = Info::ours(
         "moving",
         "two wide trees: of what rests, and of what moves by regions of the first",
         Kind::Tree,
-        Origin::Ours,
     )
     .refits()
     .threaded_build()
