@@ -78,13 +78,11 @@ pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
             Ok(()) => return Ok(value),
             Err(error) => (String::new(), error),
         },
-        Err(error) => match error.path().to_string() {
-            top if top == "." => (String::new(), error.into_inner()),
-            inside => {
-                let inside = inside.trim_end_matches(['?', '.']).to_owned();
-                (inside, error.into_inner())
-            }
-        },
+        Err(error) => {
+            let path = error.path().to_string();
+            let path = path.trim_end_matches(['?', '.']).to_owned();
+            (path, error.into_inner())
+        }
     };
     let count = error.is_syntax().then(|| too_long(text, &path)).flatten();
     let (found, expected) = match count {
