@@ -225,6 +225,15 @@ impl Row<'_> {
         })
     }
 
+    /// Finite f64s, one of each column.
+    pub fn finite_numbers<const N: usize>(&self, columns: &[usize; N]) -> Result<[f64; N]> {
+        let mut numbers = [0.0; N];
+        for (number, &column) in numbers.iter_mut().zip(columns) {
+            *number = self.finite_number(column)?;
+        }
+        Ok(numbers)
+    }
+
     /// Its line in the file, from 1.
     pub fn line(&self) -> u64 {
         self.line

@@ -124,12 +124,12 @@ pub(super) fn read_motion_csv(
     scene: &Scene,
 ) -> Result<Recorded, InputError> {
     let mut table = TableReader::open(bytes, file, &COLUMNS)?;
-    let columns = table.columns(&COLUMNS)?;
+    let [time_at, id_at, bounds_at @ ..] = table.columns(&COLUMNS)?;
     table.note_unread(&COLUMNS, &[]);
     let (mut recorded, mut rows) = (Recorded::default(), Vec::new());
     while let Some(row) = table.next_row() {
         let row = row?;
-        let time = row.finite_number(columns[0])?;
+        let time = row.finite_number(time_at)?;
         match recorded.times.last() {
             Some(&before) if time < before => {
                 let found = format!("time_s {time} after {before}");
@@ -142,9 +142,9 @@ pub(super) fn read_motion_csv(
             recorded.times.push(time);
         }
         rows.push((
-            item(&row, columns[1], scene)?,
+            item(&row, id_at, scene)?,
             row.line(),
-            bounds(&row, &columns, scene)?,
+            bounds(&row, &bounds_at, scene)?,
         ));
     }
     if recorded.times.is_empty() {
@@ -160,25 +160,19 @@ fn item(row: &Row, column: usize, scene: &Scene) -> Result<ItemId, InputError> {
     let id = text.parse::<ItemId>().ok();
     id.and_then(|id| scene.item_of(id)).ok_or_else(|| {
         let found = format!("id '{}'", crate::shown::shortened(text, 60));
-        row.error(
-            found,
-            format!("an item of '{}', {}", scene.name, scene.ids()),
-        )
+        let expected = format!("an item of '{}', {}", scene.name, scene.ids());
+        row.error(found, expected)
     })
 }
 
-fn bounds(row: &Row, columns: &[usize; 8], scene: &Scene) -> Result<Bounds, InputError> {
-    let mut own = columns[2..].iter();
-    if own.clone().all(|&column| row.text(column).is_empty()) {
+fn bounds(row: &Row, columns: &[usize; 6], scene: &Scene) -> Result<Bounds, InputError> {
+    if columns.iter().all(|&column| row.text(column).is_empty()) {
         return Ok(Bounds {
             stored: REMOVED,
             written: WorldBox::AS_STORED,
         });
     }
-    let mut values = [0.0; 6];
-    for (value, &column) in values.iter_mut().zip(&mut own) {
-        *value = row.finite_number(column)?;
-    }
+    let values = row.finite_numbers(columns)?;
     let [min, max] = [&values[..3], &values[3..]].map(DVec3::from_slice);
     let b = Aabb::rounded_outward(min, max, scene.origin);
     if b.is_finite() && min.cmple(max).all() {

@@ -128,12 +128,11 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
         note(&format!("{file}: time_s is empty in {of}; no time is used"));
     }
     Ok(CameraPath {
-        lens_scale: None,
-        left_out: 0,
         name: file.to_owned(),
         times,
         cameras,
         lines,
+        ..CameraPath::default()
     })
 }
 
@@ -207,10 +206,7 @@ fn matrices<'a>(
         table.error("matrices, but not how to read them", expected)
     })?;
     Ok(Box::new(move |row| {
-        let mut entries = [[0.0; 4]; 4];
-        for (entry, &column) in entries.as_flattened_mut().iter_mut().zip(&columns) {
-            *entry = row.finite_number(column)?;
-        }
+        let entries = bytemuck::cast(row.finite_numbers(&columns)?);
         Ok(Camera::of_matrix(entries, convention))
     }))
 }
@@ -243,10 +239,8 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
         let far = match far.map(|column| row.text(column)) {
             Some("") => None,
             Some(text) => {
-                let far = text
-                    .parse::<f64>()
-                    .ok()
-                    .filter(|far| *far > f64::NEG_INFINITY);
+                let far = text.parse::<f64>().ok();
+                let far = far.filter(|far| *far > f64::NEG_INFINITY);
                 let expected = "a number above 0, inf or nothing";
                 let found = || format!("far '{}'", shortened(text, 60));
                 let far = far.ok_or_else(|| row.error(found(), expected))?;
@@ -298,9 +292,8 @@ pub fn read_points_csv(bytes: &[u8], file: &str) -> Result<Vec<DVec3>> {
     Ok(points)
 }
 
-fn point(row: &Row, [x, y, z]: [usize; 3]) -> Result<DVec3> {
-    let of = |column| row.finite_number(column);
-    Ok(DVec3::new(of(x)?, of(y)?, of(z)?))
+fn point(row: &Row, columns: [usize; 3]) -> Result<DVec3> {
+    Ok(row.finite_numbers(&columns)?.into())
 }
 
 #[cfg(test)]

@@ -105,10 +105,7 @@ fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
     let mut rows = Rows::default();
     while let Some(row) = table.next_row() {
         let checked = row.and_then(|row| {
-            let mut bounds = [0.0; 6];
-            for (bound, &column) in bounds.iter_mut().zip(&columns) {
-                *bound = row.finite_number(column)?;
-            }
+            let bounds = row.finite_numbers(&columns)?;
             let [min, max] = [&bounds[..3], &bounds[3..]].map(DVec3::from_slice);
             let b = WorldBox::new(min, max);
             for axis in 0..3 {
