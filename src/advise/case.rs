@@ -8,7 +8,7 @@ use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::input::InputError;
-use crate::measure::{Setting, Workload, WorkloadError, input_for, input_of};
+use crate::measure::{Workload, WorkloadError, input_for, input_of};
 use crate::path::CameraPath;
 use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
@@ -35,17 +35,12 @@ impl<'a> Case<'a> {
         workload: &'a Workload<'a>,
         [tree, scan]: &[String; 2],
     ) -> Result<Case<'a>, BuildError> {
-        let Setting {
-            scene,
-            path,
-            structures,
-            ..
-        } = all.setting;
-        let [spec, scan] = [tree, scan].map(|label| planned(structures, label));
+        let setting = all.setting;
+        let [spec, scan] = [tree, scan].map(|label| planned(&setting.structures, label));
         Ok(Case {
-            index: spec.build(input_of(scene, &scene.items))?,
+            index: spec.build(input_of(workload.scene, &workload.scene.items))?,
             workload,
-            path,
+            path: &setting.path,
             spec,
             scan,
             options: *all.options,

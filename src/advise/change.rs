@@ -157,12 +157,8 @@ impl Beside {
     /// The group of each workload, from the count pass and all processes.
     pub(super) fn groups(&self, counted: Vec<Part>, processes: &[ProcessTimes]) -> Vec<Group> {
         let groups = counted.into_iter().enumerate().map(|(n, counted)| {
-            let mut parts = vec![counted];
-            parts.extend(
-                processes
-                    .iter()
-                    .filter_map(|times| times.parts.get(n).cloned()),
-            );
+            let timed = processes.iter().filter_map(|times| times.parts.get(n));
+            let parts: Vec<Part> = [&counted].into_iter().chain(timed).cloned().collect();
             Group::of(&parts)
         });
         groups.collect()

@@ -72,11 +72,10 @@ impl StructureChoice {
         let first = |metric| fastest(cells, metric).into_iter();
         let mut first_located = first(Some("locate_ns")).map(|cell| cell.structure.clone());
         let mut first = first(None).map(|cell| cell.structure.clone());
-        let [name, ties]: [Vec<String>; 2] = [first.by_ref().take(1).collect(), first.collect()];
         StructureChoice {
             is_scan: matches!(rows.first(), Some(row) if row.is_scan() && row.rank.is_some()),
-            name: name.into_iter().next(),
-            ties,
+            name: first.next(),
+            ties: first.collect(),
             region_search: first_located.next(),
             region_search_ties: first_located.collect(),
             rows,

@@ -225,14 +225,11 @@ impl Prepared {
             changes: &changes,
             funnel: &funnel,
         };
-        let settled = self
-            .entered
-            .rules
-            .into_iter()
-            .map(|(rule, draft)| match draft {
-                Ok(draft) => rule.settled(draft, answered, &times, choices()),
-                Err(reason) => rule.not_applicable(reason),
-            });
+        let rules = self.entered.rules.into_iter();
+        let settled = rules.map(|(rule, draft)| match draft {
+            Ok(draft) => rule.settled(draft, answered, &times, choices()),
+            Err(reason) => rule.not_applicable(reason),
+        });
         Advice {
             scene: scene.name.clone(),
             path: path.name.clone(),
