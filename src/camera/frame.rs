@@ -160,7 +160,18 @@ impl Pose {
     /// The errors of [`look_at`] and [`Frame::looking_along`].
     pub fn frame(&self) -> Result<Frame> {
         let [u, n] = self.axes()?;
-        Ok(Frame::of_axes(*self, u, n))
+        let mut frame = Frame {
+            eye: self.eye(),
+            u,
+            v: n.cross(u),
+            n,
+            rotations: 0,
+            written: None,
+        };
+        // The last digit or two of orthogonality.
+        frame.orthonormalise();
+        frame.written = Some(*self);
+        Ok(frame)
     }
 }
 
@@ -171,23 +182,6 @@ impl Frame {
     /// The errors of [`look_at`], but for `forward` zero.
     pub fn looking_along(eye: DVec3, forward: DVec3, up: DVec3) -> Result<Frame> {
         Pose::Forward { eye, forward, up }.frame()
-    }
-
-    /// The frame of a pose from two of its axes, which are true but for their
-    /// rounding.
-    pub(super) fn of_axes(pose: Pose, u: DVec3, n: DVec3) -> Frame {
-        let mut frame = Frame {
-            eye: pose.eye(),
-            u,
-            v: n.cross(u),
-            n,
-            rotations: 0,
-            written: None,
-        };
-        // The last digit or two of orthogonality.
-        frame.orthonormalise();
-        frame.written = Some(pose);
-        frame
     }
 
     /// Right.
