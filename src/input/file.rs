@@ -59,17 +59,18 @@ pub fn read_file(path: &Path) -> Result<Arc<[u8]>> {
         false => fs::read(path),
     };
     let bytes = bytes.map_err(io)?;
-    if is_file {
-        expect_same(path, &bytes)?;
+    let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(held) = held.as_mut().filter(|_| is_file) {
+        hold(held, path, &bytes)?;
     }
+    drop(held);
     // To be shared they are copied: room that is not there would end the program.
     let room = Vec::<u8>::new().try_reserve_exact(bytes.len());
     room.map_err(|_| io(std::io::ErrorKind::OutOfMemory.into()))?;
-    let bytes = Arc::from(bytes);
-    if is_file {
-        return Ok(bytes);
+    let bytes: Arc<[u8]> = Arc::from(bytes);
+    if !is_file {
+        pipes.insert(path.to_owned(), bytes.clone());
     }
-    pipes.insert(path.to_owned(), bytes.clone());
     Ok(bytes)
 }
 
@@ -83,11 +84,6 @@ pub fn hold_files(known: BTreeMap<String, String>) {
 pub fn held_files() -> BTreeMap<String, String> {
     let held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
     held.clone().unwrap_or_default()
-}
-
-fn expect_same(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
-    held.as_mut().map_or(Ok(()), |held| hold(held, path, bytes))
 }
 
 /// Keeps a file's digest, or compares it with the one that is kept.
