@@ -72,17 +72,20 @@ pub struct Motion {
 
 #[derive(Debug)]
 enum Source {
-    Generated {
-        law: Law,
-        world: World,
-        /// Items that can move, in random order.
-        order: Vec<ItemId>,
-        /// Number of movers per frame.
-        movers: usize,
-        /// True if they are the same in every frame.
-        same: bool,
-    },
+    Generated(Generated),
     Recorded(Recorded),
+}
+
+#[derive(Debug)]
+struct Generated {
+    law: Law,
+    world: World,
+    /// Items that can move, in random order.
+    order: Vec<ItemId>,
+    /// Number of movers per frame.
+    movers: usize,
+    /// True if they are the same in every frame.
+    same: bool,
 }
 
 impl Motion {
@@ -138,14 +141,14 @@ impl Motion {
             order.swap(i, rng.below(i + 1));
         }
         let movers = ((order.len() as f64 * share).round() as usize).clamp(1, order.len());
-        let source = Source::Generated {
+        let generated = Generated {
             law,
             world,
             order,
             movers,
             same,
         };
-        Ok(motion(frames, source))
+        Ok(motion(frames, Source::Generated(generated)))
     }
 
     /// The frames that the cameras of a path see, `views` of them each.
@@ -215,7 +218,7 @@ impl Motion {
     /// Share of the items that move in a frame, mean.
     pub fn share(&self) -> f64 {
         let moves = match &self.source {
-            Source::Generated { movers, .. } => (self.frames * movers) as f64,
+            Source::Generated(own) => (self.frames * own.movers) as f64,
             Source::Recorded(recorded) => recorded.moves() as f64,
         };
         moves / (self.frames * self.items).max(1) as f64
@@ -226,7 +229,7 @@ impl Motion {
     /// Zero of a generated motion, which stays within the scene.
     pub fn reach(&self) -> Vec3 {
         match &self.source {
-            Source::Generated { .. } => Vec3::ZERO,
+            Source::Generated(_) => Vec3::ZERO,
             Source::Recorded(recorded) => recorded.reach(),
         }
     }
@@ -236,7 +239,7 @@ impl Motion {
     /// With another share of movers if given; `None` of a recorded motion.
     pub fn respecified(&self, share: Option<f64>, frames: usize) -> Option<String> {
         let spec = match self.source {
-            Source::Generated { .. } => Spec::parse(&self.name).ok()?,
+            Source::Generated(_) => Spec::parse(&self.name).ok()?,
             Source::Recorded(_) => return None,
         };
         let is_kept = |key: &str| key != "frames" && (share.is_none() || key != "share");
@@ -250,7 +253,7 @@ impl Motion {
     pub fn digest(&self) -> String {
         let mut hash = hmac_sha256::Hash::new();
         match &self.source {
-            Source::Generated { .. } => hash.update(&self.name),
+            Source::Generated(_) => hash.update(&self.name),
             Source::Recorded(recorded) => recorded.digest(&mut hash),
         }
         hex(&hash.finalize())
@@ -259,7 +262,7 @@ impl Motion {
     /// The motion from its first frame on.
     pub fn replay(&self) -> Replay<'_> {
         let counted = match self.source {
-            Source::Generated { .. } => self.items,
+            Source::Generated(_) => self.items,
             Source::Recorded(_) => 0,
         };
         Replay {
@@ -288,7 +291,7 @@ impl Replay<'_> {
         for (n, &id) in moved.iter().enumerate() {
             written[id as usize] = match &motion.source {
                 Source::Recorded(recorded) => recorded.frame(frame).1[n].written,
-                Source::Generated { .. } => WorldBox::AS_STORED,
+                Source::Generated(_) => WorldBox::AS_STORED,
             };
         }
     }
@@ -310,24 +313,19 @@ impl Replay<'_> {
                 }
                 Some(ids)
             }
-            Source::Generated {
-                law,
-                world,
-                order,
-                movers,
-                same,
-            } => {
-                if frame == 0 || !same {
-                    let first = frame * movers % order.len();
+            Source::Generated(own) => {
+                let order = &own.order;
+                if frame == 0 || !own.same {
+                    let first = frame * own.movers % order.len();
                     self.ids.clear();
                     let from = order[first..].iter().chain(&order[..first]);
-                    self.ids.extend(from.take(*movers));
+                    self.ids.extend(from.take(own.movers));
                     self.ids.sort_unstable();
                 }
                 for &id in &self.ids {
                     let moves = &mut self.moves[id as usize];
                     *moves += 1;
-                    if let Some(b) = law(world, id, *moves) {
+                    if let Some(b) = (own.law)(&own.world, id, *moves) {
                         items[id as usize] = b;
                     }
                 }
