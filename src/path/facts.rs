@@ -157,9 +157,8 @@ fn aspect(lens: &Lens) -> Option<f64> {
 
 /// Least and largest of some values; `None` for none.
 fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
-    values
-        .map(|value| [value; 2])
-        .reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
+    let ends = values.map(|value| [value; 2]);
+    ends.reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
 }
 
 /// Scene diagonals from the scene to an eye that is far outside.
@@ -319,11 +318,8 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     };
     let far: Vec<f64> = cameras.iter().filter_map(outside).collect();
     // A scene of no items is nowhere.
-    let farthest = far
-        .iter()
-        .copied()
-        .reduce(f64::max)
-        .filter(|_| !scene.items.is_empty())?;
+    let farthest = far.iter().copied().reduce(f64::max);
+    let farthest = farthest.filter(|_| !scene.items.is_empty())?;
     Some(format!(
         "{} more than {FAR_OUTSIDE} scene diagonals outside of {} as loaded, up to {}; expected the \
          scene's unit and axes",

@@ -145,11 +145,8 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
 pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     if stage.scene.places.is_empty() {
         let wanted = "expected one with places, such as a Doom map";
-        let found = format!(
-            "scene '{}' has no camera places of its own",
-            stage.scene.name
-        );
-        return Err(unfit("places", format_args!("{found}; {wanted}")));
+        let found = format_args!("'{}' has no camera places of its own", stage.scene.name);
+        return Err(unfit("places", format_args!("scene {found}; {wanted}")));
     }
     let places = stage.scene.places.iter();
     let mut poses: Vec<Pose> = places.map(|place| pose(stage, place)).collect();

@@ -145,9 +145,8 @@ impl<'s> Plan<'s> {
             let exits = &self.exits[side as usize];
             let mut drawn = (0..DRAWN).map(|_| exits[rng.below(exits.len())]);
             // Back through the same door if there is no way on.
-            here = drawn
-                .find(|&next| self.is_free(side, here, next))
-                .unwrap_or(here);
+            let free = drawn.find(|&next| self.is_free(side, here, next));
+            here = free.unwrap_or(here);
             way.push(eye(here));
             let [a, b] = self.doors[here].sides;
             side = if side == a { b } else { a };

@@ -88,13 +88,12 @@ pub(crate) fn fits_into(
 pub(crate) fn available_bytes() -> Option<u64> {
     let wanted = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
     let system = System::new_with_specifics(wanted).ok();
+    let free = system.map(|system| system.available_memory());
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let [limits, status] = ["limits", "status"]
         .map(|file| fs::read_to_string(format!("/proc/self/{file}")).unwrap_or_default());
     let left = [
-        system
-            .map(|system| system.available_memory())
-            .filter(|bytes| *bytes > 0),
+        free.filter(|bytes| *bytes > 0),
         left_in_groups(Path::new("/sys/fs/cgroup"), &groups),
         left_of_limits(&limits, &status),
     ];

@@ -194,10 +194,8 @@ fn read_beside(
                 }
             }
             let wanted = parts.join("/");
-            if !entries
-                .iter()
-                .any(|(name, _)| name.eq_ignore_ascii_case(&wanted))
-            {
+            let mut names = entries.iter().map(|(name, _)| name);
+            if !names.any(|name| name.eq_ignore_ascii_case(&wanted)) {
                 let found = format!("no '{}' beside it", shortened(&wanted, 80));
                 let expected = "the files that it names";
                 return Err(InputError::at(names[0], "buffers", found, expected));

@@ -148,10 +148,9 @@ fn chosen<'e, 'r, 'w>(
         last(&|name| name == wanted).or_else(|| last(&|name| name.eq_ignore_ascii_case(wanted)))
     };
     let whole = wanted.map(|wanted| (wanted, None));
-    let signs = wanted
-        .into_iter()
-        .flat_map(|wanted| wanted.rmatch_indices('#'));
-    let parts = signs.filter_map(|(at, _)| Some((&wanted?[..at], Some(&wanted?[at + 1..]))));
+    let text = wanted.unwrap_or_default();
+    let signs = text.rmatch_indices('#');
+    let parts = signs.map(|(at, _)| (&text[..at], Some(&text[at + 1..])));
     for (entry, map) in whole.into_iter().chain(parts) {
         if let Some((name, record)) = named(entry) {
             return Ok((name, record, map));
@@ -165,7 +164,7 @@ fn chosen<'e, 'r, 'w>(
     let names: Vec<String> = scenes.iter().map(|(name, _)| shortened(name, 80)).collect();
     let listed = first_of(&names, MOST_NAMED);
     let all = counted(entries.len(), "entry");
-    let sought = shortened(wanted.unwrap_or_default(), 80);
+    let sought = shortened(text, 80);
     let refused = |found, expected: &str| InputError::at(file, "directory", found, expected);
     Err(match (wanted, &scenes[..]) {
         (None, [(name, record)]) => return Ok((name, record, None)),

@@ -124,9 +124,8 @@ impl Splitter for PlaneSplitter<'_> {
                 PlaneSource::Auto | PlaneSource::Median => None,
             };
             let divides = |&(_, back): &(Vec3, usize)| (1..count).contains(&back);
-            let (normal, back) = chosen
-                .filter(divides)
-                .unwrap_or_else(|| between_layers(records));
+            let chosen = chosen.filter(divides);
+            let (normal, back) = chosen.unwrap_or_else(|| between_layers(records));
             (normal, back, [None; 2])
         });
         if self.normals.len() <= node {

@@ -102,9 +102,8 @@ impl BoxTested for PeerParry3d {
 
     fn of(items: Vec<Record>, params: &Parry3dParams) -> Result<Self, BuildError> {
         refuse_narrow(Self::ABOUT.name, &items)?;
-        let leaves = items
-            .iter()
-            .map(|item| (item.id as usize, crate_box(&item.bounds)));
+        let leaf = |item: &Record| (item.id as usize, crate_box(&item.bounds));
+        let leaves = items.iter().map(leaf);
         let bvh = match items.len() {
             // The builder takes these for the leaves 0 and 1.
             0..=2 => {

@@ -87,11 +87,9 @@ impl BoxTested for PeerRstar {
             }
         }
         if bulk {
-            let held = (0..)
-                .zip(&self.bounds)
-                .filter(|(_, bounds)| !bounds.is_empty());
-            let held = held.map(|(id, &bounds)| Record { bounds, id });
-            self.tree = RTree::bulk_load(held.collect());
+            let mut held = Record::numbered(&self.bounds);
+            held.retain(|record| !record.bounds.is_empty());
+            self.tree = RTree::bulk_load(held);
         }
         Some(())
     }

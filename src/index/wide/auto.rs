@@ -116,12 +116,10 @@ impl Auto {
     fn view(&self, items: &[Aabb], i: usize) -> Option<ConvexVolume> {
         let ids = &self.trees.still.ids[..];
         let centre = |at: usize| {
-            let from = ids
-                .iter()
-                .cycle()
-                .skip(at % ids.len().max(1))
-                .take(ids.len());
-            let mut present = from.filter_map(|&id| items.get(id as usize));
+            let from = ids.iter().cycle().skip(at % ids.len().max(1));
+            let mut present = from
+                .take(ids.len())
+                .filter_map(|&id| items.get(id as usize));
             Some(present.find(|b| !b.is_empty())?.centre())
         };
         // Tree order is spread over space: half, a quarter, .. of the items between.
