@@ -204,10 +204,9 @@ impl Spec {
         // Plain digits first: a 64-bit seed does not fit an f64.
         let exact = text.replace('_', "").parse::<u64>().ok();
         // No part of anything: 200 % are not two items.
-        let rounded = parse_number(&text)
-            .filter(|_| !text.ends_with('%'))
-            .filter(|v| v.fract() == 0.0 && (0.0..9e15).contains(v))
-            .map(|v| v as u64);
+        let is_part = text.ends_with('%');
+        let is_whole = |v: &f64| !is_part && v.fract() == 0.0 && (0.0..9e15).contains(v);
+        let rounded = parse_number(&text).filter(is_whole).map(|v| v as u64);
         let sound = exact.or(rounded).filter(|v| range.contains(v));
         sound.ok_or_else(|| {
             let (least, most) = (range.start(), range.end());

@@ -102,12 +102,8 @@ impl Lens {
             LensKind::Matrix(_) => return Err(CameraError::of_matrix("near and far planes")),
         }
         finite("near", near)?;
-        let found = format_args!("near is {near:e}");
-        require(
-            near.abs() <= *EXACT.end(),
-            found,
-            "at most 1e100 from the eye",
-        )?;
+        let (found, is_held) = (format_args!("near is {near:e}"), near.abs() <= *EXACT.end());
+        require(is_held, found, "at most 1e100 from the eye")?;
         let parallel = matches!(kind, LensKind::Orthographic { .. });
         let rule = "near > 0 for a perspective lens";
         require(parallel || near > 0.0, format_args!("near is {near}"), rule)?;
@@ -233,11 +229,8 @@ fn check_window(name: &str, [low, high]: [f64; 2], unit: f64) -> Result<()> {
     let far_out = low.abs().max(high.abs()) / unit;
     let is_held = EXACT.contains(&((high - low) / unit)) && far_out <= *EXACT.end();
     let found = format_args!("the window is {low:e} to {high:e} ({name})");
-    require(
-        is_held,
-        found,
-        "sizes from 1e-100 to 1e100 (off axis, times near)",
-    )
+    let rule = "sizes from 1e-100 to 1e100 (off axis, times near)";
+    require(is_held, found, rule)
 }
 
 impl Camera {

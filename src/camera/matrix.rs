@@ -115,10 +115,8 @@ impl ViewProjection {
         let centre = || matrix.axis().map(|[near, _]| near);
         matrix.eye = eye.or_else(centre).ok_or_else(|| {
             let found = "the matrix has its near plane at infinity";
-            CameraError::invalid(
-                found,
-                "a view that f64 holds, or another --matrix-convention if it is transposed",
-            )
+            let rule = "a view that f64 holds, or another --matrix-convention if it is transposed";
+            CameraError::invalid(found, rule)
         })?;
         let is_bounded = ahead.iter().all(|&sign| sign > 0);
         for (name, plane) in matrix.planes_about(&[matrix.eye]) {

@@ -85,10 +85,8 @@ impl CameraError {
 
     /// Matrix cameras cannot be moved or given a lens.
     fn of_matrix(what: &str) -> CameraError {
-        CameraError::invalid(
-            format!("the camera is a matrix, which has {what} of its own"),
-            "an eye and a lens for another",
-        )
+        let found = format!("the camera is a matrix, which has {what} of its own");
+        CameraError::invalid(found, "an eye and a lens for another")
     }
 }
 

@@ -267,10 +267,8 @@ impl Registry {
             };
             for spec in more {
                 if chosen.iter().any(|c| c.label == spec.label) {
-                    return Err(SpecError::new(format_args!(
-                        "structure '{}' is named twice; expected each once",
-                        spec.label
-                    )));
+                    let found = format_args!("structure '{}' is named twice", spec.label);
+                    return Err(SpecError::new(format_args!("{found}; expected each once")));
                 }
                 chosen.push(spec);
             }

@@ -177,9 +177,8 @@ impl Motion {
         }
         if late > 0 {
             let of = format!("{late} of {} moves", recorded.moves());
-            note(&format!(
-                "{name}: {of} come after the last frame of '{path_name}' and are not used"
-            ));
+            let what = format_args!("come after the last frame of '{path_name}' and are not used");
+            note(&format!("{name}: {of} {what}"));
         }
         Motion {
             frames: paced.frames(),
@@ -203,10 +202,8 @@ impl Motion {
             ));
         } else if !is_recorded && seen < cameras {
             let all = counted(cameras, "camera");
-            note(&format!(
-                "{frames}: the last {} of {all} of '{path_name}' are not used",
-                cameras - seen
-            ));
+            let what = format_args!("the last {} of {all} of '{path_name}'", cameras - seen);
+            note(&format!("{frames}: {what} are not used"));
         }
     }
 

@@ -348,9 +348,7 @@ fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {
             (_, all) => all,
         };
         // Items may come into view once they move.
-        format!(
-            "nothing of {} as loaded is visible in any of {views}",
-            scene.name
-        )
+        let name = &scene.name;
+        format!("nothing of {name} as loaded is visible in any of {views}")
     })
 }

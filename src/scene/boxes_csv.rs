@@ -77,9 +77,8 @@ impl Rows {
         for name in self.labels.iter().map(|label| &label.column) {
             if let Some(bound) = BOUNDS.iter().find(|bound| letters(bound) == letters(name)) {
                 let name = shortened(name, 60);
-                note(&format!(
-                    "{file}: column '{name}' is kept as a label beside '{bound}'"
-                ));
+                let what = format_args!("column '{name}' is kept as a label beside '{bound}'");
+                note(&format!("{file}: {what}"));
             }
         }
         let own = self.labels.iter().find(|label| label.column == "id");
@@ -87,9 +86,8 @@ impl Rows {
             own.is_none_or(|label| label.get(item).parse() == Ok(*row))
         };
         if !self.kept.iter().enumerate().all(is_row) {
-            note(&format!(
-                "{file}: ids are data rows from 0; column 'id' is a label"
-            ));
+            let what = "ids are data rows from 0; column 'id' is a label";
+            note(&format!("{file}: {what}"));
         }
     }
 }

@@ -24,10 +24,8 @@ pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> 
         return Ok(());
     };
     if face.len() > MOST_CONCAVE {
-        return Err(format!(
-            "a concave face of {}",
-            counted(face.len(), "corner")
-        ));
+        let corners = counted(face.len(), "corner");
+        return Err(format!("a concave face of {corners}"));
     }
     let mut ears: Vec<u32> = Vec::new();
     Earcut::new().earcut(flat, &[], &mut ears);

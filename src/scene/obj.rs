@@ -73,10 +73,8 @@ pub fn read_obj(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> 
     options.check_fits(name, None, triangles)?;
     if !obj.unread.is_empty() {
         let unread = first_of(&obj.unread.iter().collect::<Vec<_>>(), 8);
-        let what = "all surfaces are opaque";
-        note(&format!(
-            "{file}: lines that are not read: {unread}; {what}"
-        ));
+        let what = format_args!("lines that are not read: {unread}; all surfaces are opaque");
+        note(&format!("{file}: {what}"));
     }
     Ok(Scene {
         up: options.up.unwrap_or(UpAxis::Y),

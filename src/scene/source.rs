@@ -93,9 +93,8 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
     }
     if let Some(up) = options.up.filter(|up| *up != scene.up) {
         let (name, own, up) = (&scene.name, scene.up.name(), up.name());
-        note(&format!(
-            "{name}: {own} is up by its format; --up {up} is for boxes CSV and OBJ"
-        ));
+        let what = format_args!("{own} is up by its format; --up {up} is for boxes CSV and OBJ");
+        note(&format!("{name}: {what}"));
     }
     Ok(scene)
 }

@@ -238,13 +238,12 @@ impl Planes<'_> {
         let mut node = Node::with(bounds, &cut);
         let half_spaces = [plane, Plane::new(-plane.normal, -plane.d)];
         let sides = of.iter().zip(own).zip(half_spaces);
-        node.children = sides
-            .filter(|((records, _), _)| !records.is_empty())
-            .map(|((records, at), half_space)| Node {
-                half_space: Some(half_space),
-                ..self.divided(records, at, level + 1)
-            })
-            .collect();
+        let sides = sides.filter(|((records, _), _)| !records.is_empty());
+        let children = sides.map(|((records, at), half_space)| Node {
+            half_space: Some(half_space),
+            ..self.divided(records, at, level + 1)
+        });
+        node.children = children.collect();
         node
     }
 }

@@ -308,19 +308,14 @@ impl Moving {
             self.crowded += usize::from(movers / LANES >= CROWDED);
         }
         self.regions[region].movers += 1;
-        self.put(
-            self.regions[region].last * LANES + movers % LANES,
-            id,
-            bounds,
-        );
+        let at = self.regions[region].last * LANES + movers % LANES;
+        self.put(at, id, bounds);
     }
 
     /// Halves a region of a single leaf of movers.
     fn split(&mut self, region: usize) {
-        let Region {
-            first, span, last, ..
-        } = self.regions[region];
-        let half = span / 2;
+        let own = self.regions[region];
+        let (first, last, half) = (own.first, own.last, own.span / 2);
         self.regions[region].span = half;
         self.regions[region].cell = grown(self.home(first, half), REGION_GROWTH);
         if first + half >= self.region_of.len() {
