@@ -8,7 +8,7 @@ use std::ops::{ControlFlow, Range};
 use serde::{Deserialize, Serialize};
 
 use super::items::{ABSENT, PaddedIds, Positions, indexable};
-use super::shared_query::{QueryThreads, in_parts};
+use super::shared_query::{in_parts, workers};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, RegionIndex};
 use crate::geometry::{Aabb, BallBlocks, Balls, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, Piece, first_lanes, pairs};
@@ -75,12 +75,22 @@ pub struct Linear {
 }
 
 /// Parameters: `linear:threads=2`.
-#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LinearParams {
     /// Threads per frustum query, which share the blocks.
-    #[serde(skip_serializing_if = "QueryThreads::is_one")]
-    pub threads: QueryThreads,
+    #[serde(skip_serializing_if = "is_one")]
+    pub threads: usize,
+}
+
+impl Default for LinearParams {
+    fn default() -> Self {
+        LinearParams { threads: 1 }
+    }
+}
+
+fn is_one(threads: &usize) -> bool {
+    *threads == 1
 }
 
 impl Linear {
@@ -196,7 +206,7 @@ impl RegionIndex for Linear {
             boxes,
             ids: ids[..].into(),
             positions: Positions::default(),
-            workers: params.threads.workers(Self::INFO.name)?,
+            workers: workers(params.threads, Self::INFO.name)?,
         })
     }
 

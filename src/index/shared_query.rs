@@ -5,45 +5,24 @@
 use std::cell::Cell;
 use std::ops::ControlFlow;
 
-use serde::{Deserialize, Serialize};
-
 use super::frontier::{put_back, take};
 use super::{BuildError, check_range};
 use crate::query::{Context, ItemId};
 use crate::threads::{MOST_THREADS, Workers};
 
-/// Threads per query, a parameter of structures that share one.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct QueryThreads(usize);
-
-impl Default for QueryThreads {
-    fn default() -> Self {
-        QueryThreads(1)
-    }
-}
-
-impl QueryThreads {
-    /// Returns true for one thread, the default.
-    pub fn is_one(&self) -> bool {
-        self.0 == 1
-    }
-
-    /// The threads of a structure; `None` for one.
-    ///
-    /// # Errors
-    /// A number out of range, or one that the system does not give.
-    pub fn workers(self, structure: &'static str) -> Result<Option<Workers>, BuildError> {
-        let most = MOST_THREADS as f64;
-        check_range(structure, "threads", self.0 as f64, 1.0, most)?;
-        let refused = |error| BuildError::Refused {
-            structure,
-            reason: format!("{} threads: {error}", self.0),
-        };
-        let more = !self.is_one();
-        more.then(|| Workers::new(self.0).map_err(refused))
-            .transpose()
-    }
+/// The threads of a structure's queries; `None` for one.
+///
+/// # Errors
+/// A number out of range, or one that the system does not give.
+pub fn workers(threads: usize, structure: &'static str) -> Result<Option<Workers>, BuildError> {
+    let most = MOST_THREADS as f64;
+    check_range(structure, "threads", threads as f64, 1.0, most)?;
+    let refused = |error| BuildError::Refused {
+        structure,
+        reason: format!("{threads} threads: {error}"),
+    };
+    let more = (threads > 1).then(|| Workers::new(threads).map_err(refused));
+    more.transpose()
 }
 
 /// A list of ids per part, kept from query to query.
