@@ -217,13 +217,9 @@ impl Auto {
         self.is_parted = self.update == PART;
         self.scan = self.built_scan(items);
         if matches!(self.update, REFIT | PART) {
-            self.costs[TREE] = self.count(items);
-            let new = self.costs[TREE];
-            self.aged = if self.is_parted {
-                [self.aged[0], TWO * new]
-            } else {
-                [new, self.aged[1]]
-            };
+            let new = self.count(items);
+            self.costs[TREE] = new;
+            self.aged[usize::from(self.is_parted)] = if self.is_parted { TWO * new } else { new };
         }
         self.start();
         self.updates[REBUILD] += 1;
