@@ -149,24 +149,21 @@ impl BspTree {
         let mut open = vec![(root, square)];
         while let Some((child, polygon)) = open.pop() {
             let (of, index) = match child {
-                BspChild::Node(node) => (0, node),
-                BspChild::Leaf(leaf) => (1, leaf),
+                BspChild::Node(node) => (0, node as usize),
+                BspChild::Leaf(leaf) => (1, leaf as usize),
                 BspChild::Solid => continue,
             };
-            match reached[of].get_mut(index as usize) {
+            match reached[of].get_mut(index) {
                 None => return Err(format!("{child:?} does not exist")),
                 Some(true) => return Err(format!("{child:?} is reached twice")),
                 Some(fresh) => *fresh = true,
             }
-            match child {
-                BspChild::Node(node) => {
-                    let node = &nodes[node as usize];
-                    let parts =
-                        [1, 0].map(|side| (node.children[side], clip(&polygon, node, side)));
-                    open.extend(parts);
-                }
-                _ => boxes[index as usize] = planar_bounds(&polygon),
+            if let BspChild::Leaf(_) = child {
+                boxes[index] = planar_bounds(&polygon);
+                continue;
             }
+            let node = &nodes[index];
+            open.extend([1, 0].map(|side| (node.children[side], clip(&polygon, node, side))));
         }
         Ok(BspTree {
             nodes,
