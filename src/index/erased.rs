@@ -63,11 +63,10 @@ impl FromStr for UpdatePolicy {
         let whole = || value.parse().ok().filter(|n| (2..=1_000_000).contains(n));
         let margin = || parse_number(value).filter(|m| *m > 0.0 && *m <= 100.0);
         let found = match name {
-            "refit" | "rebuild" if text != name => None,
-            "refit" => Some(UpdatePolicy::Refit),
-            "rebuild" => Some(UpdatePolicy::Rebuild),
             "every" => whole().map(UpdatePolicy::Every),
             "fat" => margin().map(UpdatePolicy::Fat),
+            _ if text == "refit" => Some(UpdatePolicy::Refit),
+            _ if text == "rebuild" => Some(UpdatePolicy::Rebuild),
             _ => None,
         };
         found.ok_or_else(|| {
