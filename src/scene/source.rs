@@ -193,8 +193,8 @@ fn read_beside(
                 }
             }
             let wanted = parts.join("/");
-            let mut names = entries.iter().map(|(name, _)| name);
-            if !names.any(|name| name.eq_ignore_ascii_case(&wanted)) {
+            let mut listed = entries.iter().map(|(name, _)| name);
+            if !listed.any(|name| name.eq_ignore_ascii_case(&wanted)) {
                 let found = format!("no '{}' beside it", shortened(&wanted, 80));
                 let expected = "the files that it names";
                 return Err(InputError::at(names[0], "buffers", found, expected));
@@ -242,8 +242,7 @@ pub fn is_wad(bytes: &[u8]) -> bool {
 }
 
 fn unknown_scene(word: &str) -> SpecError {
-    let families = FAMILIES.iter().map(|f| f.name);
-    let generated = families.chain(MESHES.iter().map(|m| m.name));
+    let generated = FAMILIES.iter().chain(MESHES).map(|f| f.name);
     let known = generated.chain(SAMPLES.iter().map(|s| s.name));
     let guess = nearest(word, known.clone());
     let hint = guess.map_or(String::new(), |guess| format!("; did you mean '{guess}'?"));
