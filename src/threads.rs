@@ -20,10 +20,8 @@ pub struct Pool {
 impl Pool {
     /// A pool of at least 1, at most [`MOST_THREADS`] threads.
     pub fn new(threads: usize) -> Pool {
-        Pool {
-            threads: threads.clamp(1, MOST_THREADS),
-            asked: AtomicBool::new(false),
-        }
+        let (threads, asked) = (threads.clamp(1, MOST_THREADS), AtomicBool::new(false));
+        Pool { threads, asked }
     }
 
     /// How many there are to [`share`] work among.

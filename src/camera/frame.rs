@@ -206,10 +206,8 @@ impl Frame {
 
     /// The same frame seen from another origin.
     pub fn relative_to(&self, origin: DVec3) -> Frame {
-        Frame {
-            eye: self.eye - origin,
-            ..*self
-        }
+        let eye = self.eye - origin;
+        Frame { eye, ..*self }
     }
 
     /// One Newton step towards the nearest orthonormal frame (polar factor;

@@ -251,14 +251,9 @@ impl Camera {
         // Visibility does not depend on the camera basis, so any up vector will do.
         let with = |up: DVec3| Pose::Forward { eye, forward, up }.frame();
         let frame = with(up).or_else(|_| with(forward.any_orthogonal_vector()))?;
-        Ok(Camera {
-            frame,
-            lens: Lens {
-                kind: LensKind::Matrix(matrix),
-                near: matrix.near,
-                far: matrix.far,
-            },
-        })
+        let (kind, near, far) = (LensKind::Matrix(matrix), matrix.near, matrix.far);
+        let lens = Lens { kind, near, far };
+        Ok(Camera { frame, lens })
     }
 }
 

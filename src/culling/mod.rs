@@ -168,10 +168,8 @@ impl Culling {
     pub fn check(&self) -> Result<(), CullingError> {
         if self.arithmetic != Arithmetic::F32 {
             if self.planes.method != PlaneMethod::Frame {
-                return Err(CullingError::Method {
-                    arithmetic: self.arithmetic.name(),
-                    method: self.planes.method.name(),
-                });
+                let (arithmetic, method) = (self.arithmetic.name(), self.planes.method.name());
+                return Err(CullingError::Method { arithmetic, method });
             }
             if self.test == CullingTest::Sphere {
                 return Err(CullingError::Sphere);

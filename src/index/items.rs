@@ -18,12 +18,9 @@ use crate::query::{Bits, ItemId};
 /// An item with a NaN or infinite bound; more items than ids.
 pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
     // The top id stays free as a mark of "none".
-    let most = ItemId::MAX as usize - 1;
-    if items.len() > most {
-        return Err(BuildError::TooManyItems {
-            count: items.len(),
-            most,
-        });
+    let (count, most) = (items.len(), ItemId::MAX as usize - 1);
+    if count > most {
+        return Err(BuildError::TooManyItems { count, most });
     }
     // One look at each item: large scenes do not fit the cache.
     let (mut count, mut all_finite) = (0, true);
@@ -32,10 +29,8 @@ pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
         all_finite &= b.is_finite();
     }
     if !all_finite && let Some(item) = items.iter().position(|b| !b.is_finite()) {
-        return Err(BuildError::NonFiniteItem {
-            item,
-            bounds: items[item],
-        });
+        let bounds = items[item];
+        return Err(BuildError::NonFiniteItem { item, bounds });
     }
     if count == items.len() {
         return Ok((0..count as ItemId).collect());
@@ -212,12 +207,10 @@ pub struct PaddedIds {
 impl From<&[ItemId]> for PaddedIds {
     /// O(ids).
     fn from(ids: &[ItemId]) -> Self {
-        let mut lines = vec![Line::zeroed(); ids.len().div_ceil(LANES)];
-        bytemuck::cast_slice_mut(&mut lines)[..ids.len()].copy_from_slice(ids);
-        PaddedIds {
-            lines,
-            len: ids.len(),
-        }
+        let len = ids.len();
+        let mut lines = vec![Line::zeroed(); len.div_ceil(LANES)];
+        bytemuck::cast_slice_mut(&mut lines)[..len].copy_from_slice(ids);
+        PaddedIds { lines, len }
     }
 }
 

@@ -232,10 +232,8 @@ impl Stage<'_> {
 impl Scene {
     /// Origin and extent of this scene, for camera planes.
     pub fn surroundings(&self) -> Surroundings {
-        Surroundings {
-            origin: self.origin,
-            reach: self.bounds.reach(),
-        }
+        let (origin, reach) = (self.origin, self.bounds.reach());
+        Surroundings { origin, reach }
     }
 }
 

@@ -134,11 +134,8 @@ impl Sink for Vec<ItemId> {
         ids: &[[ItemId; LANES]],
         tests: T,
     ) -> ControlFlow<()> {
-        isa.apart(Gather {
-            out: self,
-            ids,
-            tests,
-        });
+        let out = self;
+        isa.apart(Gather { out, ids, tests });
         ControlFlow::Continue(())
     }
 }

@@ -84,10 +84,8 @@ impl Scene {
     /// A box of the world as this scene's indexes take it.
     pub fn sought_box(&self, world: WorldBox) -> SoughtBox {
         let local = Aabb::rounded_outward(world.min, world.max, self.origin);
-        SoughtBox {
-            volume: ConvexVolume::of_box(&local),
-            world,
-        }
+        let volume = ConvexVolume::of_box(&local);
+        SoughtBox { world, volume }
     }
 
     /// Region search: `ask` appends the candidates of an index; those that hold the

@@ -97,23 +97,20 @@ struct Stacks {
 const STACK_SAMPLE: usize = 4096;
 
 impl Stacks {
-    fn of(items: &[Aabb], mut ids: Vec<ItemId>) -> Stacks {
+    fn of(items: &[Aabb], mut members: Vec<ItemId>) -> Stacks {
         let key = |&id: &ItemId| items[id as usize].bits();
-        let step = ids.len().div_ceil(STACK_SAMPLE).max(1);
-        let mut sample: Vec<_> = ids.iter().step_by(step).map(key).collect();
+        let step = members.len().div_ceil(STACK_SAMPLE).max(1);
+        let mut sample: Vec<_> = members.iter().step_by(step).map(key).collect();
         sample.sort_unstable();
         let mut starts = Vec::new();
         if sample.windows(2).any(|pair| pair[0] == pair[1]) {
-            ids.sort_unstable_by_key(|id| (key(id), *id));
+            members.sort_unstable_by_key(|id| (key(id), *id));
             starts.push(0);
-            for stack in ids.chunk_by(|a, b| key(a) == key(b)) {
+            for stack in members.chunk_by(|a, b| key(a) == key(b)) {
                 starts.push(starts[starts.len() - 1] + stack.len() as u32);
             }
         }
-        Stacks {
-            members: ids,
-            starts,
-        }
+        Stacks { members, starts }
     }
 
     /// Item ids of a stack.

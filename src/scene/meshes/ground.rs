@@ -29,10 +29,8 @@ impl Ground {
     /// A square of about `triangles` triangles, one tile at least.
     pub fn of(triangles: usize, seed: u64) -> Ground {
         let tiles = libm::round(libm::sqrt(triangles as f64 / TILE as f64)) as usize;
-        Ground {
-            seed,
-            tiles: tiles.max(1),
-        }
+        let tiles = tiles.max(1);
+        Ground { seed, tiles }
     }
 
     /// Length of a side, world units.
@@ -176,25 +174,22 @@ pub fn cone(base: Vec3, radius: f32, height: f32, sides: u32) -> Shape {
     points.push(base + Vec3::Z * height);
     let side = (0..sides).map(|i| [i, (i + 1) % sides, sides]);
     let floor = cap(0, sides).map(|[a, b, c]| [a, c, b]);
-    Shape {
-        triangles: side.chain(floor).collect(),
-        points,
-    }
+    let triangles = side.chain(floor).collect();
+    Shape { points, triangles }
 }
 
 /// A closed column standing on the disc about `base`: 4 `sides` - 4 triangles.
 pub fn column(base: Vec3, radius: f32, height: f32, sides: u32) -> Shape {
     let top = base + Vec3::Z * height;
     let points = ring(base, radius, sides).chain(ring(top, radius, sides));
+    let points = points.collect();
     let side = (0..sides).flat_map(|i| {
         let (a, b) = (i, (i + 1) % sides);
         [[a, b, sides + b], [a, sides + b, sides + a]]
     });
     let floor = cap(0, sides).map(|[a, b, c]| [a, c, b]);
-    Shape {
-        triangles: side.chain(floor).chain(cap(sides, sides)).collect(),
-        points: points.collect(),
-    }
+    let triangles = side.chain(floor).chain(cap(sides, sides)).collect();
+    Shape { points, triangles }
 }
 
 /// A rectangle about `centre` with two half edges: two triangles.

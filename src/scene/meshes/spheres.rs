@@ -71,10 +71,8 @@ impl Body {
             let direction = rng.normal3().normalize_or(DVec3::Z);
             (direction, rng.between(-0.3, 0.6), rng.between(4.0, 30.0))
         });
-        Body {
-            seed,
-            lobes: lobes.collect(),
-        }
+        let lobes = lobes.collect();
+        Body { seed, lobes }
     }
 
     /// Between 0.2 and some units.
