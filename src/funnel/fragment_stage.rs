@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::error::fits_drawing;
 use super::item_stages::ItemStages;
-use super::stage::{BackEnd, NONE, STENCIL, StageKind, Step, Z};
+use super::stage::{BackEnd, NONE, STENCIL, StageKind, Z};
 use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, count_items};
@@ -93,20 +93,16 @@ impl Left<'_> {
 }
 
 impl<'w> FragmentStage<'w> {
-    /// Items behind `steps`, of whose triangles the back end `triangle` removes some.
+    /// The remaining items, of whose triangles the back end `triangle` removes some.
     pub fn new(
-        world: &'w World<'w>,
-        stages: &ItemStages,
-        steps: &[Step],
+        stages: &ItemStages<'w>,
         (triangles, triangle): (&TriangleStage, &str),
     ) -> FragmentStage<'w> {
+        let world = stages.world;
         let left = match &world.shape {
             Shape::Boxes(solids) => {
-                let boxes = world.views().map(|view| {
-                    let items = world.listed(stages.items(steps, view));
-                    Boxes::of(world, solids, view, &items)
-                });
-                Left::Boxes(boxes.collect(), RefCell::new(None))
+                let of = |view| Boxes::of(world, solids, view, &stages.listed(view));
+                Left::Boxes(world.views().map(of).collect(), RefCell::new(None))
             }
             Shape::Triangles(surfaces) => {
                 let beyond = surfaces.of_item.get(world.items()..).unwrap_or_default();
@@ -174,20 +170,15 @@ impl<'w> FragmentStage<'w> {
         })
     }
 
-    /// No test and every test behind `steps`; with tallies of the views drawn.
-    pub fn tested(
-        &self,
-        stages: &ItemStages,
-        steps: &[Step],
-        truth: &Truth,
-    ) -> Vec<(BackEnd, Errors, Vec<Tally>)> {
+    /// No test and every test of the remaining items; with tallies of the views drawn.
+    pub fn tested(&self, stages: &ItemStages, truth: &Truth) -> Vec<(BackEnd, Errors, Vec<Tally>)> {
         let world = self.world;
         let rows = world.back_ends(StageKind::Fragment).into_iter();
         let drawn = rows.filter(|row| row.name == NONE || self.too_much.is_none());
         let tested = drawn.map(|back_end| {
             let (mut counts, mut tallies) = (Vec::new(), Vec::new());
             for view in world.views() {
-                let given = stages.items(steps, view);
+                let given = stages.remaining(view);
                 let mut output = Vec::new();
                 match back_end.name {
                     NONE => output.extend_from_slice(&world.listed(given)),
@@ -301,19 +292,15 @@ pub struct MirrorRow {
     pub wrong_sample_count: u64,
 }
 
-/// The mirror in every view, behind the items that `steps` leave.
+/// The mirror in every view, behind the remaining items.
 ///
 /// It is the item of this data row, and shows every other. `None` without views or for
 /// triangles.
 ///
 /// # Errors
 /// Items that cover too many samples.
-pub fn mirrored(
-    row: ItemId,
-    world: &World,
-    stages: &ItemStages,
-    steps: &[Step],
-) -> Result<Option<MirrorRow>, String> {
+pub fn mirrored(row: ItemId, stages: &ItemStages) -> Result<Option<MirrorRow>, String> {
+    let world = stages.world;
     let (Some(solids), Some(item)) = (world.shape.boxes(), world.scene.item_of(row)) else {
         return Ok(None);
     };
@@ -331,7 +318,7 @@ pub fn mirrored(
             continue;
         };
         let canvas = Canvas::of(rays, world.samples);
-        let left = world.listed(stages.items(steps, view));
+        let left = stages.listed(view);
         let direct = draw(&canvas, bodies(solids, &left), &Tests::default());
         let stencil = direct.stencil(&canvas, &[face]);
         let reflected = canvas.mirrored(axis, face.min[axis]);

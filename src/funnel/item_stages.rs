@@ -1,5 +1,6 @@
 //! Stages of whole items: their back ends, and the items that chains of them leave.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 
 use super::stage::{Chain, NONE, OCCLUSION_ROWS, StageKind, Step};
@@ -81,21 +82,28 @@ impl World<'_> {
 
 /// Items that the back ends of the item stages leave of each view.
 pub struct ItemStages<'w> {
-    world: &'w World<'w>,
+    pub world: &'w World<'w>,
+    /// The stages whose items remain.
+    steps: Vec<Step>,
     /// Ascending ids of every view, with the steps behind which they are left.
     left: Vec<(Vec<Step>, Vec<Vec<ItemId>>)>,
 }
 
 impl<'w> ItemStages<'w> {
-    pub fn new(world: &'w World<'w>) -> ItemStages<'w> {
-        let left = Vec::new();
-        ItemStages { world, left }
+    /// Runs stages one after the other; what they leave remains.
+    pub fn of(world: &'w World<'w>, steps: &[Step]) -> ItemStages<'w> {
+        let mut stages = ItemStages {
+            world,
+            steps: steps.to_vec(),
+            left: Vec::new(),
+        };
+        stages.run(steps);
+        stages
     }
 
-    /// Runs a chain and all that differ from it in one stage.
+    /// Runs a chain, which leaves what remains, and all that differ from it in one stage.
     pub fn all(world: &'w World<'w>, chain: &Chain) -> ItemStages<'w> {
-        let mut all = ItemStages::new(world);
-        all.run(&chain.steps());
+        let mut all = ItemStages::of(world, &chain.steps());
         for stage in StageKind::OF_ITEMS {
             for (_, name) in world.rows(stage) {
                 all.run(&chain.steps_with(stage, &name));
@@ -108,7 +116,7 @@ impl<'w> ItemStages<'w> {
     }
 
     /// Runs stages one after the other, those that were run before only once.
-    pub fn run(&mut self, steps: &[Step]) {
+    fn run(&mut self, steps: &[Step]) {
         let Some(((stage, name), before)) = steps.split_last() else {
             return;
         };
@@ -138,6 +146,16 @@ impl<'w> ItemStages<'w> {
     /// Items of a view behind some steps; `None` for all items, without steps.
     pub fn items(&self, steps: &[Step], view: usize) -> Option<&[ItemId]> {
         self.behind(steps).map(|left| &left[view][..])
+    }
+
+    /// Remaining items of a view; `None` for all items.
+    pub fn remaining(&self, view: usize) -> Option<&[ItemId]> {
+        self.items(&self.steps, view)
+    }
+
+    /// Ids of the remaining items of a view.
+    pub fn listed(&self, view: usize) -> Cow<'_, [ItemId]> {
+        self.world.listed(self.remaining(view))
     }
 
     /// Mean number of items behind some steps, over the views.

@@ -6,24 +6,21 @@
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use serde::Serialize;
 
 use super::item_stages::ItemStages;
-use super::stage::Step;
 use super::task::{FunnelKey, KeyedTask};
 use super::world::World;
 use crate::measure::Ask;
 use crate::query::ItemId;
-use crate::scene::Surfaces;
 use crate::statistics::{Estimate, flat};
 use crate::visibility::fragment::order::{self, ORDERS};
 use crate::visibility::fragment::{
     self, DepthOrder, OrderErrors, Piece, Tally, ToOrder, draw_orders,
 };
 use crate::visibility::truth::{Crossing, Probe, RayIndex, SurfaceIndex};
-use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
+use crate::visibility::{Guarantee, Rays, Solids};
 
 /// Items as listed, and from front to back.
 pub const SORTED: [&str; 2] = ["none", "box-distance"];
@@ -67,20 +64,17 @@ struct Left {
     /// Solid boxes, or the boxes about the items.
     boxes: Solids,
     cut_outs: Option<fragment::Holes>,
-    rays: Rays,
     orders: Vec<(&'static order::OrderRow, Box<dyn DepthOrder>)>,
 }
 
 /// Items that the chain leaves of every view, to be ordered.
-pub struct Orders {
+pub struct Orders<'w> {
+    world: &'w World<'w>,
     views: Vec<Left>,
-    /// Drawn triangles of a scene whose items are no solid boxes.
-    triangles: Option<Arc<Surfaces>>,
-    samples: SampleGrid,
 }
 
 impl Left {
-    fn of(world: &World, all: &Solids, rays: &Rays, items: &[ItemId], is_all: bool) -> Left {
+    fn of(world: &World, all: &Solids, items: &[ItemId], is_all: bool) -> Left {
         let boxes = all.some(items);
         let triangles = world.shape.triangles().map(|surfaces| surfaces.some(items));
         let to_order = ToOrder {
@@ -93,34 +87,24 @@ impl Left {
         let built = wanted.filter_map(|row| Some((row, (row.build)(&to_order)?)));
         Left {
             orders: built.collect(),
-            rays: *rays,
             cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),
             items: items.to_vec(),
             boxes,
         }
     }
-
-    fn sort(&self, order: usize, pieces: &mut Vec<Piece>) {
-        self.orders[order].1.order(&self.rays.camera, pieces);
-    }
 }
 
-impl Orders {
-    /// Orders of the items behind `steps`, all or [`SORTED`].
-    pub fn new(world: &World, stages: &ItemStages, steps: &[Step], is_all: bool) -> Orders {
+impl<'w> Orders<'w> {
+    /// Orders of the remaining items, all or [`SORTED`].
+    pub fn new(stages: &ItemStages<'w>, is_all: bool) -> Orders<'w> {
+        let world = stages.world;
         let all = match world.shape.boxes() {
             Some(solids) => Cow::Borrowed(solids),
             None => Cow::Owned(Solids::of(world.scene)),
         };
-        let views = world.views().map(|view| {
-            let items = world.listed(stages.items(steps, view));
-            Left::of(world, &all, world.rays(view), &items, is_all)
-        });
-        Orders {
-            views: views.collect(),
-            triangles: world.shape.triangles().cloned(),
-            samples: world.samples,
-        }
+        let of = |view| Left::of(world, &all, &stages.listed(view), is_all);
+        let views = world.views().map(of).collect();
+        Orders { world, views }
     }
 
     /// The rows, the same in every view.
@@ -134,7 +118,8 @@ impl Orders {
             let pieces = RefCell::new(Vec::new());
             let ask: Ask = Box::new(move |view, out| {
                 let pieces = &mut *pieces.borrow_mut();
-                self.views[view].sort(order, pieces);
+                let (_, order) = &self.views[view].orders[order];
+                order.order(&self.world.rays(view).camera, pieces);
                 out.extend(pieces.iter().map(|piece| piece.item));
             });
             (FunnelKey::Order(row.name.to_owned()), ask)
@@ -148,14 +133,16 @@ impl Orders {
     pub fn drawn(&self) -> Result<Vec<OrderRow>, String> {
         let mut rows: Vec<OrderRow> = self.rows().map(OrderRow::new).collect();
         // Processes that only time need no tree of the triangles.
-        let index = self.triangles.as_deref().map(SurfaceIndex::build);
-        for left in &self.views {
-            let counts = self.counted(left, index.as_ref());
+        let triangles = self.world.shape.triangles();
+        let index = triangles.map(|surfaces| SurfaceIndex::build(surfaces));
+        for (view, left) in self.views.iter().enumerate() {
+            let rays = self.world.rays(view);
+            let counts = self.counted(left, rays, index.as_ref());
             for ((row, (_, order)), (tally, errors)) in
                 rows.iter_mut().zip(&left.orders).zip(counts)
             {
                 row.add(&tally, &errors?, self.views.len() as f64);
-                if let Some(reason) = order.exception(&left.rays.camera) {
+                if let Some(reason) = order.exception(&rays.camera) {
                     *row.exceptions.entry(reason).or_default() += 1;
                 }
             }
@@ -171,12 +158,13 @@ impl Orders {
     fn counted(
         &self,
         left: &Left,
+        rays: &Rays,
         index: Option<&SurfaceIndex>,
     ) -> Vec<(Tally, Result<OrderErrors, String>)> {
-        let (rays, samples, items) = (&left.rays, self.samples, &left.items);
-        let sorted = left.orders.iter().enumerate().map(|(index, (_, order))| {
+        let (samples, items) = (self.world.samples, &left.items);
+        let sorted = left.orders.iter().map(|(_, order)| {
             let mut pieces = Vec::new();
-            left.sort(index, &mut pieces);
+            order.order(&rays.camera, &mut pieces);
             (&**order, pieces)
         });
         let sorted: Vec<(&dyn DepthOrder, Vec<Piece>)> = sorted.collect();

@@ -11,7 +11,7 @@ use super::item_stages::{ItemStages, PlanView};
 use super::orders::{OrderRow, Orders, SORTED};
 use super::picks::Picks;
 use super::report::{CutOutRow, FunnelReport, Gain, StageRow, conclusions};
-use super::stage::{Chain, NONE, StageKind, Step, Z, default_test, left_out_of};
+use super::stage::{Chain, NONE, StageKind, Z, default_test, left_out_of};
 use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, visible};
@@ -44,11 +44,10 @@ fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), InputError> {
 struct Study<'w> {
     world: &'w World<'w>,
     chain: &'w Chain,
-    steps: Vec<Step>,
     items: ItemStages<'w>,
     triangles: TriangleStage,
     fragments: FragmentStage<'w>,
-    orders: Option<Orders>,
+    orders: Option<Orders<'w>>,
     picks: Option<Picks<'w>>,
 }
 
@@ -56,22 +55,20 @@ impl<'w> Study<'w> {
     fn new(world: &'w World<'w>, input: &FunnelInput<'w>) -> Result<Study<'w>> {
         let chain = input.chain;
         let items = ItemStages::all(world, chain);
-        let steps = chain.steps();
         if world.shape.boxes().is_some() {
-            let left = items.mean_count(&steps) * world.views.len() as f64;
+            let left = items.mean_count(&chain.steps()) * world.views.len() as f64;
             check_memory(&world.scene.name, (left * BYTES_PER_LEFT) as u64)?;
         }
-        let triangles = TriangleStage::new(world, &items, &steps);
+        let triangles = TriangleStage::new(&items);
         let culled = (&triangles, chain.of(StageKind::Triangle));
-        let fragments = FragmentStage::new(world, &items, &steps, culled);
+        let fragments = FragmentStage::new(&items, culled);
         let is_ordered = input.all || input.sorted;
         let is_ordered = is_ordered && fragments.too_much.is_none();
         Ok(Study {
-            orders: is_ordered.then(|| Orders::new(world, &items, &steps, input.all)),
+            orders: is_ordered.then(|| Orders::new(&items, input.all)),
             picks: (input.all && input.picks).then(|| Picks::new(world)),
             world,
             chain,
-            steps,
             items,
             triangles,
             fragments,
@@ -192,7 +189,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     let study = Study::new(&world, input)?;
     let mut rows = study.rows(&truth);
     let mut covered: Vec<u64> = Vec::new();
-    for (back_end, errors, tallies) in study.fragments.tested(&study.items, &study.steps, &truth) {
+    for (back_end, errors, tallies) in study.fragments.tested(&study.items, &truth) {
         if back_end.name == Z {
             covered = tallies.iter().map(|tally| tally.covered_count).collect();
         }
@@ -207,9 +204,8 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         let orders = (input.all || input.sorted).then_some("orders");
         left_out.extend(orders.map(|orders| LeftOutRow::new([orders, "all"], reason)));
     }
-    let mirror = input.mirror.map_or(Ok(None), |item| {
-        mirrored(item, &world, &study.items, &study.steps)
-    });
+    let mirror = input.mirror;
+    let mirror = mirror.map_or(Ok(None), |item| mirrored(item, &study.items));
     let mirror = mirror.unwrap_or_else(|reason| {
         left_out.push(LeftOutRow::new(["mirror", "all"], reason));
         None

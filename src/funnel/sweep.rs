@@ -8,13 +8,12 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::item_stages::ItemStages;
-use super::stage::{BackEnd, Chain, NONE, StageKind, Step};
+use super::stage::{BackEnd, Chain, NONE, StageKind};
 use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, ViewCounts, count_items, visible};
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, ProcessTimes, Setting};
-use crate::query::ItemId;
 use crate::statistics::{Estimate, dominance, flat};
 use crate::visibility::SampleGrid;
 
@@ -95,7 +94,6 @@ struct Swept<'w> {
     stage: StageKind,
     /// Items that the frustum meets.
     items: ItemStages<'w>,
-    steps: Vec<Step>,
     /// Triangles of the items that occlusion leaves, of the triangle stage.
     triangles: Option<TriangleStage>,
 }
@@ -107,15 +105,13 @@ impl<'w> Swept<'w> {
             StageKind::Triangle => chain.steps(),
             _ => Chain::empty().steps_with(StageKind::Object, chain.of(StageKind::Object)),
         };
-        let mut items = ItemStages::new(world);
-        items.run(&steps);
+        let items = ItemStages::of(world, &steps);
         let is_of_triangles = stage == StageKind::Triangle;
         Swept {
-            triangles: is_of_triangles.then(|| TriangleStage::new(world, &items, &steps)),
+            triangles: is_of_triangles.then(|| TriangleStage::new(&items)),
             world,
             stage,
             items,
-            steps,
         }
     }
 
@@ -143,18 +139,12 @@ impl<'w> Swept<'w> {
     }
 
     fn with_task(&self, point: SweepPoint) -> (SweepPoint, KeyedTask<'_>) {
-        let buffer = point
-            .buffer
-            .map(|[width, height]| SampleGrid::new(width, height));
-        let buffer = buffer.unwrap_or(self.world.samples);
+        let sized = |[width, height]: [u32; 2]| SampleGrid::new(width, height);
+        let buffer = point.buffer.map_or(self.world.samples, sized);
         let run = self.world.run(self.stage, point.back_end.name, buffer);
-        let ask: Ask = Box::new(move |view, out| run(view, self.given(view), out));
+        let ask: Ask = Box::new(move |view, out| run(view, self.items.remaining(view), out));
         let task = (point.key(), ask);
         (point, task)
-    }
-
-    fn given(&self, view: usize) -> Option<&[ItemId]> {
-        self.items.items(&self.steps, view)
     }
 
     fn counts(&self, back_end: &BackEnd, ask: &Ask, truth: &Truth) -> Vec<ViewCounts> {
@@ -165,7 +155,12 @@ impl<'w> Swept<'w> {
             let mut out = Vec::new();
             ask(view, &mut out);
             out.sort_unstable();
-            count_items(self.given(view), self.world.items(), &out, &truth[view])
+            count_items(
+                self.items.remaining(view),
+                self.world.items(),
+                &out,
+                &truth[view],
+            )
         };
         self.world.views().map(count).collect()
     }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::item_stages::ItemStages;
-use super::stage::{StageKind, Step};
+use super::stage::StageKind;
 use super::task::{FunnelKey, KeyedTask};
 use super::truth::ViewCounts;
 use super::world::{Shape, World};
@@ -76,16 +76,17 @@ pub struct TriangleStage {
 }
 
 impl TriangleStage {
-    /// Clusters of the items behind `steps`.
+    /// Clusters of the remaining items.
     ///
     /// A box takes 12 triangles, which is much memory where a stage before is left out.
-    pub fn new(world: &World, stages: &ItemStages, steps: &[Step]) -> TriangleStage {
+    pub fn new(stages: &ItemStages) -> TriangleStage {
+        let world = stages.world;
         let whole = match &world.shape {
             Shape::Triangles(all) => Ok(Built::of(world, all.clone())),
             Shape::Boxes(solids) => Err(solids),
         };
         let views = world.views().map(|view| {
-            let items = world.listed(stages.items(steps, view));
+            let items = stages.listed(view);
             let camera = &world.rays(view).camera;
             let built = whole.clone().unwrap_or_else(|solids| {
                 let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
