@@ -138,7 +138,7 @@ impl Number {
 /// A certificate in f64, each coefficient rounded once.
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
-    pub normal: [f64; 3],
+    pub normal: DVec3,
     d: f64,
 }
 
@@ -148,8 +148,9 @@ pub(super) struct Exact {
     /// Axis and term of its coefficient, smallest first.
     terms: Vec<(usize, f64)>,
     d: Vec<f64>,
-    /// Magnitudes before cancellation, per axis and of d.
-    size: [f64; 4],
+    /// Magnitudes before cancellation, per axis.
+    size: DVec3,
+    size_of_d: f64,
 }
 
 /// The filter errs by less than this part of its magnitude: three coefficients
@@ -158,28 +159,20 @@ const FILTER_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// The bounds of a box in f64.
 pub(super) struct Corners {
-    pub low: [f64; 3],
-    pub high: [f64; 3],
+    pub min: DVec3,
+    pub max: DVec3,
 }
 
 impl Corners {
-    #[inline]
-    pub fn between(min: DVec3, max: DVec3) -> Corners {
-        Corners {
-            low: min.to_array(),
-            high: max.to_array(),
-        }
-    }
-
     pub fn is_empty(&self) -> bool {
-        !(0..3).all(|k| self.low[k] <= self.high[k])
+        !self.min.cmple(self.max).all()
     }
 }
 
 impl Filter {
     pub fn new(certificate: &HalfSpace) -> Filter {
         Filter {
-            normal: [0, 1, 2].map(|k| certificate.normal[k].estimate()),
+            normal: certificate.normal.each_ref().map(Number::estimate).into(),
             d: certificate.d.estimate(),
         }
     }
@@ -187,19 +180,15 @@ impl Filter {
     /// Value at the p-vertex and a bound of its error.
     #[inline(always)]
     pub fn at_p_vertex(&self, b: &Corners) -> (f64, f64) {
-        let vertex = |k: usize| match self.normal[k] >= 0.0 {
-            true => b.high[k],
-            false => b.low[k],
-        };
-        self.at([vertex(0), vertex(1), vertex(2)])
+        let looks_up = self.normal.cmpge(DVec3::ZERO);
+        self.at(DVec3::select(looks_up, b.max, b.min))
     }
 
     #[inline(always)]
-    pub fn at(&self, point: [f64; 3]) -> (f64, f64) {
-        let [a, b, c] = self.normal;
-        let (x, y, z) = (a * point[0], b * point[1], c * point[2]);
-        let magnitude = x.abs() + y.abs() + z.abs() + self.d.abs();
-        (((x + y) + z) + self.d, FILTER_ERROR * magnitude)
+    pub fn at(&self, point: DVec3) -> (f64, f64) {
+        let along = self.normal * point;
+        let magnitude = along.abs().element_sum() + self.d.abs();
+        (along.element_sum() + self.d, FILTER_ERROR * magnitude)
     }
 }
 
@@ -209,20 +198,20 @@ impl Exact {
         for (axis, n) in certificate.normal.iter().enumerate() {
             terms.extend(n.value.terms().iter().map(|&term| (axis, term)));
         }
-        let [x, y, z] = [0, 1, 2].map(|k| certificate.normal[k].size);
         Exact {
             terms,
             d: certificate.d.value.terms().to_vec(),
-            size: [x, y, z, certificate.d.size],
+            size: certificate.normal.each_ref().map(|n| n.size).into(),
+            size_of_d: certificate.d.size,
         }
     }
 
     /// The value at the p-vertex, rounded; its sign is exact. Noise is zero.
     pub fn at_p_vertex(&self, b: &Corners, precision: Precision) -> f64 {
         // The sign of a coefficient is that of its largest, last term.
-        let mut corner = b.high;
+        let mut corner = b.max;
         for &(k, term) in &self.terms {
-            corner[k] = if term >= 0.0 { b.high[k] } else { b.low[k] };
+            corner[k] = if term >= 0.0 { b.max[k] } else { b.min[k] };
         }
         let products = self.terms.iter().flat_map(|&(k, term)| {
             let (product, rest) = two_product(term, corner[k]);
@@ -242,8 +231,7 @@ impl Exact {
             value = total.estimate();
         }
         if !precision.is_exact() {
-            let [x, y, z, d] = self.size;
-            let size = x * corner[0].abs() + y * corner[1].abs() + z * corner[2].abs() + d;
+            let size = self.size.dot(corner.abs()) + self.size_of_d;
             if precision.is_noise(value, size) {
                 return 0.0;
             }
@@ -254,8 +242,8 @@ impl Exact {
 
 /// A point inside all faces: the mean of the corners. None without at least
 /// four corners; only a hint, so f64 will do.
-pub(super) fn inner_point(faces: &[Filter]) -> Option<[f64; 3]> {
-    let mut sum = [0.0; 3];
+pub(super) fn inner_point(faces: &[Filter]) -> Option<DVec3> {
+    let mut sum = DVec3::ZERO;
     let mut count = 0.0;
     for triple in combinations(faces.len()) {
         let Some(corner) = meeting_point(triple.map(|face| &faces[face])) else {
@@ -266,18 +254,18 @@ pub(super) fn inner_point(faces: &[Filter]) -> Option<[f64; 3]> {
             value >= -1e6 * error
         });
         if within {
-            (0..3).for_each(|k| sum[k] += corner[k]);
+            sum += corner;
             count += 1.0;
         }
     }
-    (count >= 4.0).then(|| sum.map(|s| s / count))
+    (count >= 4.0).then(|| sum / count)
 }
 
 /// The point that three planes share, by Cramer's rule.
-fn meeting_point(planes: [&Filter; 3]) -> Option<[f64; 3]> {
-    let [a, b, c] = planes.map(|plane| DVec3::from_array(plane.normal));
+fn meeting_point(planes: [&Filter; 3]) -> Option<DVec3> {
+    let [a, b, c] = planes.map(|plane| plane.normal);
     let determinant = a.dot(b.cross(c));
     let sum = b.cross(c) * planes[0].d + c.cross(a) * planes[1].d + a.cross(b) * planes[2].d;
     let point = -sum / determinant;
-    point.is_finite().then(|| point.to_array())
+    point.is_finite().then_some(point)
 }

@@ -70,7 +70,7 @@ pub struct Oracle {
     filter: Vec<Filter>,
     exact: Vec<Exact>,
     /// A point well inside the volume, to prove overlaps with.
-    inner: Option<[f64; 3]>,
+    inner: Option<DVec3>,
 }
 
 impl Oracle {
@@ -111,7 +111,7 @@ impl Oracle {
 
     /// The same about a box in f64, between finite corners of at most 1e60.
     pub fn judge_wide(&self, min: DVec3, max: DVec3) -> Judgement {
-        let corners = &Corners::between(min, max);
+        let corners = &Corners { min, max };
         let judged = |verdict, undecided| Judgement { verdict, undecided };
         if corners.is_empty() || self.extent == Extent::Empty {
             return judged(Verdict::Out, false);
@@ -162,13 +162,12 @@ impl Oracle {
 
     /// The same of a box in f64.
     pub fn depth_wide(&self, min: DVec3, max: DVec3) -> f64 {
-        let corners = &Corners::between(min, max);
+        let corners = &Corners { min, max };
         if corners.is_empty() || self.extent == Extent::Empty {
             return f64::NEG_INFINITY;
         }
         let depths = self.filter.iter().zip(&self.exact).map(|(filter, exact)| {
-            let [x, y, z] = filter.normal;
-            let length = (x * x + y * y + z * z).sqrt();
+            let length = filter.normal.length();
             let (value, error) = filter.at_p_vertex(corners);
             match error > value.abs() * 1e-6 {
                 true => exact.at_p_vertex(corners, self.precision) / length,
@@ -181,7 +180,8 @@ impl Oracle {
     /// Returns whether one plane has the whole box on its outer side, exactly: a
     /// six-plane test without any error.
     pub fn faces_exclude(&self, b: &Aabb) -> bool {
-        let corners = Corners::between(b.min.as_dvec3(), b.max.as_dvec3());
+        let [min, max] = [b.min, b.max].map(|corner| corner.as_dvec3());
+        let corners = Corners { min, max };
         self.extent == Extent::Empty || (0..self.faces).any(|face| self.sign(face, &corners) < 0)
     }
 
@@ -203,15 +203,13 @@ impl Oracle {
     /// Returns whether a point of the box lies strictly inside all planes for certain:
     /// the one nearest to the volume's inner point, or the box's centre.
     fn witnessed(&self, b: &Corners) -> bool {
-        let is_inside = |point: [f64; 3]| {
+        let is_inside = |point: DVec3| {
             self.filter[..self.faces].iter().all(|face| {
                 let (value, error) = face.at(point);
                 value > error
             })
         };
-        let axes = [0, 1, 2];
-        let nearest = |inner: [f64; 3]| axes.map(|k| inner[k].clamp(b.low[k], b.high[k]));
-        self.inner.is_some_and(|inner| is_inside(nearest(inner)))
-            || is_inside(axes.map(|k| (b.high[k] + b.low[k]) * 0.5))
+        let nearest = self.inner.map(|inner| inner.clamp(b.min, b.max));
+        nearest.is_some_and(is_inside) || is_inside((b.max + b.min) * 0.5)
     }
 }
