@@ -59,9 +59,7 @@ pub fn pi() -> Expansion {
         1.2246467991473532e-16,
         std::f64::consts::PI,
     ];
-    let mut pi = Expansion::ZERO;
-    TERMS.into_iter().for_each(|term| pi.grow(term));
-    pi
+    Expansion::sum(TERMS)
 }
 
 /// Sum of `first factor^n / (d(1) d(2) ... d(n))` over all n from 0 on.

@@ -68,6 +68,13 @@ impl Expansion {
     /// The sum of no terms.
     pub const ZERO: Expansion = Expansion { terms: Vec::new() };
 
+    /// The exact sum of some doubles.
+    pub fn sum(terms: impl IntoIterator<Item = f64>) -> Expansion {
+        let mut sum = Expansion::ZERO;
+        terms.into_iter().for_each(|term| sum.grow(term));
+        sum
+    }
+
     /// The exact product of two doubles (bounds as [`two_product`]).
     pub fn product(a: f64, b: f64) -> Expansion {
         let (product, rest) = two_product(a, b);

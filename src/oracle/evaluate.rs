@@ -226,9 +226,7 @@ impl Exact {
             lost += error.abs();
         }
         if lost != 0.0 {
-            let mut total = Expansion::default();
-            parts.for_each(|part| total.grow(part));
-            value = total.estimate();
+            value = Expansion::sum(parts).estimate();
         }
         if !precision.is_exact() {
             let size = self.size.dot(corner.abs()) + self.size_of_d;

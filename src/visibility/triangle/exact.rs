@@ -36,13 +36,9 @@ impl Eye {
         // As written: a direction, or a difference of two points, which has two terms.
         match Pose::of(camera).direction() {
             Some(exact) => {
-                let term = |n| {
-                    exact
-                        .each_ref()
-                        .map(|x| x.terms().iter().nth_back(n).copied())
-                };
-                let [high, low] =
-                    [0, 1].map(|n| DVec3::from(term(n).map(Option::unwrap_or_default)));
+                let term = |k: usize, n| exact[k].terms().iter().nth_back(n).copied();
+                let vector = |n| [0, 1, 2].map(|k| term(k, n).unwrap_or_default());
+                let [high, low] = [0, 1].map(|n| DVec3::from(vector(n)));
                 Eye::new(-high, -low, 0.0)
             }
             None => Eye::along(camera.frame.forward()),
@@ -122,12 +118,7 @@ pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
 #[cold]
 fn orientation(eye: &Eye, corners: [Vec3; 3]) -> i32 {
     let a = corners[0] * eye.weight;
-    let way = [0, 1, 2].map(|k| {
-        let mut sum = Expansion::from(eye.low[k]);
-        sum.grow(eye.high[k]);
-        sum.grow(f64::from(-a[k]));
-        sum
-    });
+    let way = [0, 1, 2].map(|k| Expansion::sum([eye.low[k], eye.high[k], f64::from(-a[k])]));
     exact::dot(&way, &exact_normal(corners)).sign()
 }
 

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use super::super::rays::Along;
-use crate::arithmetic::{Expansion, two_sum};
+use crate::arithmetic::Expansion;
 use crate::kernel::each;
 use crate::scene::WorldBox;
 use crate::visibility::Ray;
@@ -221,10 +221,7 @@ impl Probe {
 
     /// `plane - origin`, exactly.
     fn numerator(&self, a: &Crossing) -> Expansion {
-        let (sum, lost) = two_sum(a.plane, -self.ray.origin[a.axis]);
-        let mut exact = Expansion::from(lost);
-        exact.grow(sum);
-        exact
+        Expansion::sum([a.plane, -self.ray.origin[a.axis]])
     }
 }
 

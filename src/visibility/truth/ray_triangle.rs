@@ -233,12 +233,7 @@ impl TriangleProbe {
 
     /// A scene-local point about the ray's origin.
     fn about(&self, p: Vec3) -> ExactVector {
-        [0, 1, 2].map(|k| {
-            let mut sum = Expansion::from(self.rest[k]);
-            sum.grow(self.shift[k]);
-            sum.grow(f64::from(p[k]));
-            sum
-        })
+        [0, 1, 2].map(|k| Expansion::sum([self.rest[k], self.shift[k], p[k].into()]))
     }
 }
 
