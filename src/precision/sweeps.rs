@@ -76,12 +76,14 @@ const DEPTH: f64 = 100.0;
 /// Boxes of each camera.
 const BOXES: usize = 500;
 
-/// A culling, by the toolkit's frame or by a plain one.
-#[derive(Clone, Copy)]
+/// A culling, by the toolkit's frame or by a plain one, and its errors.
 struct SweptTest {
     culling: Culling,
     /// Axes are cross products in f64, rounded as they come.
     has_plain_frame: bool,
+    /// By camera.
+    errors: Vec<ErrorCount>,
+    refused: Option<String>,
 }
 
 /// The f32 default, with a plain frame as well; f64, f32 about the eye and every
@@ -98,6 +100,8 @@ fn tests() -> Vec<SweptTest> {
     let tests = all.into_iter().enumerate().map(|(n, culling)| SweptTest {
         culling,
         has_plain_frame: n == 1,
+        errors: Vec::new(),
+        refused: None,
     });
     tests.collect()
 }
@@ -115,6 +119,21 @@ impl SweptTest {
         match self.has_plain_frame {
             true => self.culling.view(&with_plain_frame(camera)?, around),
             false => self.culling.view(camera, around),
+        }
+    }
+
+    fn row(self, sweep: Sweep, value: f64) -> SweepRow {
+        let known = self.refused.is_none();
+        let judged = if known { &self.errors[..] } else { &[] };
+        let missed = rate_of(judged, |e| [e.false_negatives, e.visible]);
+        SweepRow {
+            sweep,
+            value,
+            names: self.names(),
+            false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
+            excess: rate_of(judged, |e| [e.false_positives, e.visible]),
+            errors: known.then(|| judged.iter().copied().sum()),
+            refused: self.refused,
         }
     }
 }
@@ -135,39 +154,12 @@ fn with_plain_frame(camera: &Camera) -> Result<Camera, CameraError> {
 /// Judges `cameras` random cameras at every value with every test; the same
 /// cameras for each.
 pub fn sweep(sweep: Sweep, cameras: usize, seed: u64) -> Vec<SweepRow> {
-    let tests = tests();
     let at = |value| {
-        let mut own: Vec<Judged> = tests.iter().map(|_| Judged::default()).collect();
-        let mut rng = SeededRng::new(seed);
-        (0..cameras).for_each(|_| judge(&mut rng, sweep, value, &tests, &mut own));
-        let judged = tests.iter().zip(own);
-        judged.map(move |(test, judged)| judged.row(sweep, value, test))
+        let (mut tests, mut rng) = (tests(), SeededRng::new(seed));
+        (0..cameras).for_each(|_| judge(&mut rng, sweep, value, &mut tests));
+        tests.into_iter().map(move |test| test.row(sweep, value))
     };
     sweep.values().into_iter().flat_map(at).collect()
-}
-
-/// Errors of one test, by camera.
-#[derive(Default)]
-struct Judged {
-    errors: Vec<ErrorCount>,
-    refused: Option<String>,
-}
-
-impl Judged {
-    fn row(self, sweep: Sweep, value: f64, test: &SweptTest) -> SweepRow {
-        let known = self.refused.is_none();
-        let judged = if known { &self.errors[..] } else { &[] };
-        let missed = rate_of(judged, |e| [e.false_negatives, e.visible]);
-        SweepRow {
-            sweep,
-            value,
-            names: test.names(),
-            false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
-            excess: rate_of(judged, |e| [e.false_positives, e.visible]),
-            errors: known.then(|| judged.iter().copied().sum()),
-            refused: self.refused,
-        }
-    }
 }
 
 fn camera_at(rng: &mut SeededRng, sweep: Sweep, value: f64) -> Option<Camera> {
@@ -209,7 +201,7 @@ fn boxes_about(rng: &mut SeededRng, camera: &Camera) -> Vec<Aabb> {
     (0..BOXES).map(|_| one(rng)).collect()
 }
 
-fn judge(rng: &mut SeededRng, sweep: Sweep, value: f64, tests: &[SweptTest], all: &mut [Judged]) {
+fn judge(rng: &mut SeededRng, sweep: Sweep, value: f64, tests: &mut [SweptTest]) {
     let Some(camera) = camera_at(rng, sweep, value) else {
         return;
     };
@@ -218,14 +210,14 @@ fn judge(rng: &mut SeededRng, sweep: Sweep, value: f64, tests: &[SweptTest], all
     let Some(truth) = Truth::of_camera(&camera, DVec3::ZERO, &boxes) else {
         return;
     };
-    for (test, judged) in tests.iter().zip(all) {
+    for test in tests {
         match test.view(&camera, &around) {
             Ok(view) => {
                 let view = view.as_any();
                 let answer: Vec<ItemId> = scan(&boxes, |b| view.sees(b)).collect();
-                judged.errors.push(truth.errors(&boxes, &answer));
+                test.errors.push(truth.errors(&boxes, &answer));
             }
-            Err(error) => judged.refused = Some(error.to_string()),
+            Err(error) => test.refused = Some(error.to_string()),
         }
     }
 }
