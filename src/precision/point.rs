@@ -114,11 +114,7 @@ impl<E> Point<E> {
 
 /// Sorts the points by time, what has none last, and marks the front of the others:
 /// errors are compared camera by camera, times process by process.
-pub(super) fn conclude<E>(points: &mut [Point<E>], times: &OverProcesses) {
-    sort_and_mark(points, &|a, b| times.is_faster(a, b));
-}
-
-fn sort_and_mark<E>(points: &mut [Point<E>], is_faster: &dyn Fn(usize, usize) -> bool) {
+pub(super) fn sort_and_mark<E>(points: &mut [Point<E>], is_faster: &dyn Fn(usize, usize) -> bool) {
     let order = |p: &Point<E>| p.query_ns().unwrap_or(f64::INFINITY);
     points.sort_by(|a, b| order(a).total_cmp(&order(b)));
     let timed = points.partition_point(|p| p.time.is_some());

@@ -5,7 +5,7 @@
 use serde::Serialize;
 
 use super::judged::{CullingErrors, Judged, Shots, Truths};
-use super::point::{self, Point, StableAfter, by_camera, stability};
+use super::point::{Point, StableAfter, by_camera, sort_and_mark, stability};
 use super::region_search::{POINTS_PER_CAMERA, RegionErrors, RegionNumbers, RegionQueries};
 use super::size_sweep::SizeRow;
 use super::sweeps::SweepRow;
@@ -356,10 +356,11 @@ impl Prepared {
         }
         culled.retain(|&task| times.failure(task).is_none());
         precision.stability = stability(&culled, processes, precision.cameras, precision.rounds);
+        let is_faster = |a: usize, b: usize| times.is_faster(a, b);
         let points = &mut precision.points;
-        point::conclude(points, &times);
+        sort_and_mark(points, &is_faster);
         precision.front = (0..points.len()).filter(|&i| points[i].on_front).collect();
-        point::conclude(&mut precision.region_points, &times);
+        sort_and_mark(&mut precision.region_points, &is_faster);
         precision.processes = processes.len();
         precision
     }
