@@ -95,6 +95,12 @@ impl Rays {
         }
     }
 
+    /// The corners of the image at the near plane.
+    pub fn near_corners(&self) -> [DVec3; 4] {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        corners.map(|[x, y]| self.through(x, y).at(self.camera.lens.near()))
+    }
+
     /// The ray of a sample: the centre of a pixel, column from the left and row
     /// from the top.
     pub fn sample(&self, grid: SampleGrid, column: u32, row: u32) -> Ray {

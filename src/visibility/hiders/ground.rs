@@ -17,7 +17,7 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::geometry::Aabb;
-use crate::scene::{Scene, SurfaceKind, UpAxis};
+use crate::scene::{Scene, SurfaceKind, UpAxis, WorldBox};
 use crate::visibility::Rays;
 use crate::visibility::inscribed::{Cells, turn};
 
@@ -115,15 +115,13 @@ impl Ground {
     /// Returns `true` if all rays are above the ground at the near plane. O(t).
     pub fn is_below(&self, rays: &Rays) -> bool {
         let near = rays.camera.lens.near();
-        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-        let corners =
-            corners.map(|[x, y]| self.up.to_z_up(rays.through(x, y).at(near)) - self.origin);
-        let low = corners.into_iter().reduce(DVec3::min).unwrap_or_default();
-        let high = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
+        let corners = rays.near_corners();
+        let corners = corners.map(|p| WorldBox::at(self.up.to_z_up(p) - self.origin));
+        let WorldBox { min, max } = WorldBox::union_of(corners);
         // More than rounding of the corners, and of what begins at them, can be.
-        let size = low.abs().max(high.abs()).max(self.origin.abs());
-        let slack = 1e-9 * size.max_element() + 1e-6 * (high - low).max_element() + 1e-8 * near;
-        let (low, high) = (low - slack, high + slack);
+        let size = min.abs().max(max.abs()).max(self.origin.abs());
+        let slack = 1e-9 * size.max_element() + 1e-6 * (max - min).max_element() + 1e-8 * near;
+        let (low, high) = (min - slack, max + slack);
         let [least, most] = [self.bounds.min, self.bounds.max].map(Vec3::as_dvec3);
         let is_over = low.x >= least.x && high.x <= most.x && low.y >= least.y && high.y <= most.y;
         let mut below = self.triangles.iter().filter(|corners| {

@@ -67,21 +67,16 @@ impl RegionGraph {
     /// the lens is orthographic.
     pub fn homes(&self, rays: &Rays, homes: &mut Vec<RegionId>) -> bool {
         homes.clear();
-        let lens = &rays.camera.lens;
-        if lens.is_orthographic() {
+        if rays.camera.lens.is_orthographic() {
             return false;
         }
         let eye = rays.camera.frame.eye;
-        let (mut low, mut high) = (eye, eye);
-        for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-            let corner = rays.through(x, y).at(lens.near());
-            (low, high) = (low.min(corner), high.max(corner));
-        }
+        let corners = rays.near_corners().into_iter().chain([eye]);
+        let WorldBox { min, max } = WorldBox::union_of(corners.map(WorldBox::at));
         // Corners are rounded, by less than this.
-        let slack = (eye.abs() + (high - low)) * f64::EPSILON * 8.0;
-        let inside = self
-            .ground
-            .regions_at(&WorldBox::new(low - slack, high + slack), homes);
+        let slack = (eye.abs() + (max - min)) * f64::EPSILON * 8.0;
+        let about = WorldBox::new(min - slack, max + slack);
+        let inside = self.ground.regions_at(&about, homes);
         homes.sort_unstable();
         homes.dedup();
         inside
