@@ -203,26 +203,24 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
     rows
 }
 
-fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> impl Iterator<Item = BackEnd> {
+fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
     let (exact, unproven) = (Guarantee::SampleExact, Guarantee::Unproven);
-    let beyond = "the same, but beyond the eye's room only at samples that see its portals";
-    let has_rooms = matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty());
-    let rows = [
-        (
-            !has_cut_outs,
+    let test = |declared, guarantee| BackEnd::new(StageKind::Fragment, declared, guarantee);
+    let mut tests = match has_cut_outs {
+        true => vec![
+            test([Z, "the nearest fragment, holes or not"], unproven),
+            test([ALPHA, "the nearest opaque fragment"], exact),
+        ],
+        false => vec![test(
             [Z, "the nearest fragment of each sample, exactly"],
             exact,
-        ),
-        (
-            has_cut_outs,
-            [Z, "the nearest fragment, holes or not"],
-            unproven,
-        ),
-        (has_cut_outs, [ALPHA, "the nearest opaque fragment"], exact),
-        (has_rooms, [STENCIL, beyond], exact),
-    ];
-    let there = rows.into_iter().filter(|(is_there, ..)| *is_there);
-    there.map(|(_, declared, guarantee)| BackEnd::new(StageKind::Fragment, declared, guarantee))
+        )],
+    };
+    if matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty()) {
+        let beyond = "the same, but beyond the eye's room only at samples that see its portals";
+        tests.push(test([STENCIL, beyond], exact));
+    }
+    tests
 }
 
 /// Default test of the fragment stage.
