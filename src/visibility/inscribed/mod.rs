@@ -126,8 +126,7 @@ fn proven(part: &[[Vec3; 3]], mut tried: Aabb) -> Option<Aabb> {
 }
 
 fn volume(b: &WorldBox) -> f64 {
-    let size = b.max - b.min;
-    size.x * size.y * size.z
+    (b.max - b.min).element_product()
 }
 
 /// The triangles of an only item, apart where they have no point in common.

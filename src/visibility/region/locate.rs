@@ -28,8 +28,7 @@ impl BoxGrid {
         let size = (max - low).max(DVec3::ZERO);
         // Cubes: the edge that gives one bucket for each box.
         let solid = size.max(DVec3::splat(size.max_element() * 1e-3));
-        let volume = solid.x * solid.y * solid.z;
-        let edge = libm::cbrt(volume / boxes.len().max(1) as f64);
+        let edge = libm::cbrt(solid.element_product() / boxes.len().max(1) as f64);
         let count = (solid / edge)
             .to_array()
             .map(|cells| (cells as usize).clamp(1, 1024));

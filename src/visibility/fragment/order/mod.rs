@@ -147,11 +147,7 @@ fn distance(camera: &Camera, point: DVec3) -> f64 {
 /// Squared from the eye; the depth for an orthographic lens.
 pub fn nearest(camera: &Camera, b: &WorldBox) -> f64 {
     let point = match camera.lens.is_orthographic() {
-        true => {
-            let forward = camera.frame.forward();
-            let pick = |k: usize| if forward[k] > 0.0 { b.min[k] } else { b.max[k] };
-            DVec3::new(pick(0), pick(1), pick(2))
-        }
+        true => DVec3::select(camera.frame.forward().cmpgt(DVec3::ZERO), b.min, b.max),
         false => camera.frame.eye.max(b.min).min(b.max),
     };
     distance(camera, point)
