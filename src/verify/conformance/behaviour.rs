@@ -35,8 +35,7 @@ fn cubes(asked: &Questions) -> Vec<Aabb> {
 }
 
 fn build_of_spheres<T: RegionIndex>(cubes: &[Aabb]) -> Result<T, String> {
-    let input = Input::new(cubes).spheres(true);
-    T::build(&input, &T::Params::default()).map_err(|error| error.to_string())
+    build_from(&Input::new(cubes).spheres(true))
 }
 
 fn views_are_right<T: RegionIndex>(
@@ -296,8 +295,7 @@ pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
             }
         }
         let pool = Pool::new(3);
-        let shared = T::build(&Input::new(&asked.items).pool(&pool), &T::Params::default());
-        let shared = shared.map_err(|error| error.to_string())?;
+        let shared: T = build_from(&Input::new(&asked.items).pool(&pool))?;
         let was_asked = pool.was_asked();
         ensure(was_asked == says.threaded_build, || {
             let says = says.threaded_build;
@@ -306,14 +304,10 @@ pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
         ensure(asked.answers(&shared) == asked.answers(index), || {
             "built on three threads, answered differently".to_owned()
         })?;
-        let input = Input::new(&asked.items).come_and_go(true);
-        let changing = T::build(
-            &input.own_tree(Some(&PlaneTree::default())),
-            &Default::default(),
-        );
-        asked
-            .both_are_right(&changing.map_err(|error| error.to_string())?)
-            .map_err(|error| format!("built for items that come and go: {error}"))?;
+        let (input, tree) = (Input::new(&asked.items), PlaneTree::default());
+        let changing: T = build_from(&input.come_and_go(true).own_tree(Some(&tree)))?;
+        let right = asked.both_are_right(&changing);
+        right.map_err(|error| format!("built for items that come and go: {error}"))?;
         let moved: Vec<ItemId> = (0..asked.items.len() as ItemId).step_by(7).collect();
         for &id in &moved {
             let b = &mut asked.items[id as usize];

@@ -16,8 +16,8 @@ use crate::query::{ItemId, NoRecorder, Sink};
 use crate::scene::SeededRng;
 
 use questions::{
-    Outcome, Questions, ask, build, cases, each, edges, ensure, generated_scenes, is_right, points,
-    seen, sorted,
+    Outcome, Questions, ask, build, build_from, cases, each, edges, ensure, generated_scenes,
+    is_right, points, seen, sorted,
 };
 
 pub use behaviour::{

@@ -18,7 +18,11 @@ use crate::scene;
 pub(super) type Outcome = Result<(), String>;
 
 pub(super) fn build<T: RegionIndex>(items: &[Aabb]) -> Result<T, String> {
-    T::build(&Input::new(items), &T::Params::default()).map_err(|error| error.to_string())
+    build_from(&Input::new(items))
+}
+
+pub(super) fn build_from<T: RegionIndex>(input: &Input) -> Result<T, String> {
+    T::build(input, &T::Params::default()).map_err(|error| error.to_string())
 }
 
 /// Queries by the portable instruction set; `Break` if the sink broke off.
