@@ -154,14 +154,15 @@ impl<'w> FragmentStage<'w> {
         }
     }
 
-    /// Tests that are drawn.
+    /// No test, and those that are drawn.
     fn tests(&self) -> impl Iterator<Item = BackEnd> {
         let rows = self.world.back_ends(StageKind::Fragment).into_iter();
-        rows.filter(|row| row.name != NONE && self.too_much.is_none())
+        rows.filter(|row| row.name == NONE || self.too_much.is_none())
     }
 
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
-        self.tests().map(move |row| {
+        let drawn = self.tests().filter(|row| row.name != NONE);
+        drawn.map(move |row| {
             let ask: Ask = Box::new(move |view, out| {
                 self.draw(row.name, view, out);
             });
@@ -173,9 +174,7 @@ impl<'w> FragmentStage<'w> {
     /// No test and every test of the remaining items; with tallies of the views drawn.
     pub fn tested(&self, stages: &ItemStages, truth: &Truth) -> Vec<(BackEnd, Errors, Vec<Tally>)> {
         let world = self.world;
-        let rows = world.back_ends(StageKind::Fragment).into_iter();
-        let drawn = rows.filter(|row| row.name == NONE || self.too_much.is_none());
-        let tested = drawn.map(|back_end| {
+        let tested = self.tests().map(|back_end| {
             let (mut counts, mut tallies) = (Vec::new(), Vec::new());
             for view in world.views() {
                 let given = stages.remaining(view);
@@ -211,10 +210,8 @@ struct Room {
 
 impl Boxes {
     fn of(world: &World, solids: &Solids, view: usize, items: &[ItemId]) -> Boxes {
-        let bodies = bodies(solids, items).zip(0..);
-        let bodies: Vec<SolidBox> = bodies
-            .map(|(body, item)| SolidBox { item, ..body })
-            .collect();
+        let numbered = |(body, item)| SolidBox { item, ..body };
+        let bodies: Vec<SolidBox> = bodies(solids, items).zip(0..).map(numbered).collect();
         Boxes {
             items: items.to_vec(),
             cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),

@@ -158,9 +158,10 @@ impl<'w> ItemStages<'w> {
         self.world.listed(self.remaining(view))
     }
 
-    /// Mean number of items behind some steps, over the views.
-    pub fn mean_count(&self, steps: &[Step]) -> f64 {
-        let left = self.world.views().map(|view| self.items(steps, view));
+    /// Mean number of items that a chain leaves, over the views.
+    pub fn mean_count(&self, chain: &Chain) -> f64 {
+        let steps = chain.steps();
+        let left = self.world.views().map(|view| self.items(&steps, view));
         let counts = left.map(|left| left.map_or(self.world.items(), <[ItemId]>::len) as f64);
         counts.sum::<f64>() / self.world.views.len().max(1) as f64
     }

@@ -56,7 +56,7 @@ impl<'w> Study<'w> {
         let chain = input.chain;
         let items = ItemStages::all(world, chain);
         if world.shape.boxes().is_some() {
-            let left = items.mean_count(&chain.steps()) * world.views.len() as f64;
+            let left = items.mean_count(chain) * world.views.len() as f64;
             check_memory(&world.scene.name, (left * BYTES_PER_LEFT) as u64)?;
         }
         let triangles = TriangleStage::new(&items);
@@ -112,9 +112,7 @@ impl<'w> Study<'w> {
         let of_items = of_items.filter(|&stage| self.chain.of(stage) != NONE);
         let gain = |with: &Chain, stage| {
             let chains = [with.clone(), with.clone().with(stage, NONE)];
-            let counts = chains
-                .each_ref()
-                .map(|chain| self.items.mean_count(&chain.steps()));
+            let counts = chains.each_ref().map(|chain| self.items.mean_count(chain));
             let tasks = chains.each_ref().map(|chain| self.items.timed(chain));
             Gain::new(stage, (with.of(stage), stage.unit()), counts, tasks)
         };
@@ -229,9 +227,8 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
             "not asked for: --no-picks",
         ));
     }
-    let bounds = input
-        .all
-        .then(|| bounds(&world, &study.triangles, &covered));
+    let bounds = || bounds(&world, &study.triangles, &covered);
+    let bounds = input.all.then(bounds);
     let (bounds, bound_tasks): (Vec<_>, Vec<_>) = bounds.into_iter().flatten().unzip();
     let mut gains = study.gains(&rows);
     gains.extend(study.gain_of_sorting(&orders).filter(|_| input.sorted));
