@@ -87,13 +87,11 @@ pub struct Picks<'w> {
 impl<'w> Picks<'w> {
     /// Builds every back end that can hold the scene.
     pub fn new(world: &'w World<'w>) -> Picks<'w> {
-        let cursors = world
-            .views()
-            .map(|view| cursors(world.rays(view), world.samples));
+        let of_view = |view| cursors(world.rays(view), world.samples);
         let mut picks = Picks {
             world,
             pickers: Vec::new(),
-            cursors: cursors.collect(),
+            cursors: world.views().map(of_view).collect(),
             left_out: Vec::new(),
         };
         picks.add_rays();

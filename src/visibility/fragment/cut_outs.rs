@@ -111,12 +111,8 @@ pub struct CutOuts {
 /// The text as typed.
 impl Display for CutOuts {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let (mask, share) = (self.mask.name(), self.share);
-        write!(
-            f,
-            "{mask}:share={share},tile={},seed={}",
-            self.tile, self.seed
-        )
+        let (mask, tile, seed) = (self.mask.name(), self.tile, self.seed);
+        write!(f, "{mask}:share={},tile={tile},seed={seed}", self.share)
     }
 }
 

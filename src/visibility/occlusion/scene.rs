@@ -102,10 +102,8 @@ impl OccluderScene {
         for &id in &ids {
             let first = by_number.partition_point(|(number, _)| *number < id);
             let own = by_number[first..].iter();
-            occluders.extend(
-                own.take_while(|(number, _)| *number == id)
-                    .map(|(_, occluder)| *occluder),
-            );
+            let own = own.take_while(|(number, _)| *number == id);
+            occluders.extend(own.map(|(_, occluder)| *occluder));
             first_occluders.push(occluders.len() as u32);
         }
         OccluderScene {

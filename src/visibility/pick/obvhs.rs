@@ -197,11 +197,9 @@ impl<B: Primitive> Obvhs<B> {
         let panicked = |message: String| Err(format!("'{NAME}' panicked: {message}"));
         let tree = caught(build).unwrap_or_else(panicked)?;
         let order = tree.primitive_indices.iter().map(|&place| place as usize);
+        let rounded = |place: usize| all.all[place].rounded(&all.bounds[place], &about);
         Ok(Box::new(Obvhs::<B> {
-            bodies: order
-                .clone()
-                .map(|place| all.all[place].rounded(&all.bounds[place], &about))
-                .collect(),
+            bodies: order.clone().map(rounded).collect(),
             ids: order.map(|place| all.all[place].item()).collect(),
             about,
             items: all.items,

@@ -29,9 +29,8 @@ impl BoxGrid {
         // Cubes: the edge that gives one bucket for each box.
         let solid = size.max(DVec3::splat(size.max_element() * 1e-3));
         let edge = libm::cbrt(solid.element_product() / boxes.len().max(1) as f64);
-        let count = (solid / edge)
-            .to_array()
-            .map(|cells| (cells as usize).clamp(1, 1024));
+        let count = (solid / edge).to_array();
+        let count = count.map(|cells| (cells as usize).clamp(1, 1024));
         let mut grid = BoxGrid {
             boxes,
             low,

@@ -108,10 +108,8 @@ impl View {
     /// The corners of an opening in camera coordinates, and the largest size of one.
     fn corners(&self, opening: &Opening) -> ([DVec3; 4], f64) {
         let corners = opening.corners.map(|c| self.turned(c - self.eye));
-        let reach = corners
-            .iter()
-            .fold(0.0, |most: f64, c| most.max(c.abs().element_sum()));
-        (corners, reach)
+        let sizes = corners.map(|c| c.abs().element_sum());
+        (corners, sizes.into_iter().fold(0.0, f64::max))
     }
 
     /// Left, right, bottom and top of the smallest rectangle of the image that

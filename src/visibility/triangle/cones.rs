@@ -62,11 +62,10 @@ impl Cone {
     /// The cone of some triangles; `None` if every eye may see one of them.
     pub fn fit(triangles: &[[Vec3; 3]]) -> Option<Cone> {
         // A triangle without area is never seen.
-        let with_area = triangles.iter().map(|corners| (*corners, normal(*corners)));
-        let planes: Vec<([Vec3; 3], DVec3)> = with_area
-            .filter(|(_, n)| *n != DVec3::ZERO)
-            .map(|(corners, n)| (corners, n.normalize()))
-            .collect();
+        let planes = triangles.iter().map(|corners| (*corners, normal(*corners)));
+        let with_area = planes.filter(|(_, n)| *n != DVec3::ZERO);
+        let planes = with_area.map(|(corners, n)| (corners, n.normalize()));
+        let planes: Vec<([Vec3; 3], DVec3)> = planes.collect();
         let axis = axis_of(planes.iter().map(|(_, n)| *n))?.as_vec3();
         let exact = axis.as_dvec3();
         let length = exact.length();
@@ -241,11 +240,8 @@ fn groups<const N: usize>(triangles: &[[Vec3; 3]]) -> [u64; N] {
         let known = &means[..k.max(1)];
         let nearest = |n: &DVec3| known.iter().map(|m| m.dot(*n)).fold(-2.0, f64::max);
         let by_nearest = |a: &DVec3, b: &DVec3| nearest(a).total_cmp(&nearest(b));
-        means[k] = normals
-            .iter()
-            .copied()
-            .min_by(by_nearest)
-            .unwrap_or(DVec3::Z);
+        let farthest = normals.iter().copied().min_by(by_nearest);
+        means[k] = farthest.unwrap_or(DVec3::Z);
     }
     let mut words = [0u64; N];
     for _ in 0..ROUNDS {

@@ -106,10 +106,8 @@ fn counted(
     let seen = front.iter().copied().filter(|&item| item != NO_ITEM);
     seen.chain(ties)
         .for_each(|item| samples[item as usize] += 1);
-    let occurring = samples.iter().enumerate().filter(|(_, count)| **count > 0);
-    occurring
-        .map(|(item, &count)| (item as ItemId, count))
-        .unzip()
+    let counts = (0..).zip(samples);
+    counts.filter(|(_, count)| *count > 0).unzip()
 }
 
 /// Items visible along any of `count` seeded random rays through the window.

@@ -213,9 +213,8 @@ impl Probe {
             return 0.0_f64.total_cmp(&depth);
         }
         let d = self.ray.direction[a.axis];
-        let order = (&self.numerator(a) - &Expansion::product(depth, d))
-            .sign()
-            .cmp(&0);
+        let difference = &self.numerator(a) - &Expansion::product(depth, d);
+        let order = difference.sign().cmp(&0);
         if d > 0.0 { order } else { order.reverse() }
     }
 

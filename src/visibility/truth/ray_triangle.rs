@@ -199,9 +199,8 @@ impl TriangleProbe {
             return 0.0_f64.total_cmp(&depth);
         }
         let (above, below) = self.fraction(a.corners);
-        (&above - &(&below * &Expansion::from(depth)))
-            .sign()
-            .cmp(&0)
+        let difference = &above - &(&below * &Expansion::from(depth));
+        difference.sign().cmp(&0)
     }
 
     /// Returns `true` if the ray's line meets the closed triangle on a visible side.
