@@ -55,9 +55,7 @@ impl World<'_> {
             found.clear();
             index.visible(volume, found);
             marks.clear(self.items());
-            for &id in found.iter() {
-                marks.insert(id);
-            }
+            marks.insert_all(found.iter());
             out.extend(items.iter().filter(|&&id| marks.holds(id)));
         })
     }

@@ -167,6 +167,11 @@ impl IdSet {
         self.mark(id as usize)
     }
 
+    /// Adds some ids.
+    pub fn insert_all<'i>(&mut self, ids: impl IntoIterator<Item = &'i u32>) {
+        ids.into_iter().for_each(|&id| _ = self.mark(id as usize));
+    }
+
     /// Tests whether the id is in the set.
     pub fn holds(&self, id: u32) -> bool {
         self.0[id as usize / 64] >> (id % 64) & 1 != 0

@@ -170,9 +170,7 @@ impl RegionItems {
         }
         marks.clear(self.items);
         for &region in regions {
-            for &item in self.of_region(region) {
-                marks.insert(item);
-            }
+            marks.insert_all(self.of_region(region));
         }
         marks.list(out);
     }

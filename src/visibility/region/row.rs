@@ -226,11 +226,7 @@ impl RegionRow {
         }
         seen.clear(graph.len());
         match (&self.pvs, self.back_end.build) {
-            (Some(pvs), _) => {
-                for &region in homes.iter().flat_map(|&home| pvs.row(home)) {
-                    seen.insert(region);
-                }
-            }
+            (Some(pvs), _) => seen.insert_all(homes.iter().flat_map(|&home| pvs.row(home))),
             (None, Source::Flood) => scratch.flood.run(graph, rays, homes, seen),
             (None, Source::PortalRect) => scratch.portal_rect.run(graph, rays, homes, seen),
             (None, _) => scratch.portal_clip.run(graph, rays, homes, seen),
