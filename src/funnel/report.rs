@@ -13,7 +13,7 @@ use super::task::FunnelKey;
 use super::truth::Errors;
 use crate::measure::OverProcesses;
 use crate::shown::{counted, significant, time};
-use crate::statistics::{ALPHA, Estimate, flat, ratio, trimmed_mean};
+use crate::statistics::{ALPHA, Estimate, centre, flat, ratio, trimmed_mean};
 use crate::visibility::Level;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
@@ -252,12 +252,6 @@ fn sums(times: &OverProcesses<FunnelKey>, tasks: &[FunnelKey]) -> Vec<f64> {
     };
     let sums: Option<Vec<f64>> = (0..times.processes()).map(sum).collect();
     sums.unwrap_or_default()
-}
-
-/// The trimmed mean, or below three values the plain one.
-fn centre(values: &[f64]) -> Option<f64> {
-    let plain = || values.iter().sum::<f64>() / values.len() as f64;
-    (!values.is_empty()).then(|| trimmed_mean(values).map_or_else(plain, |mean| mean.mean))
 }
 
 /// Remaining items and the worth of each stage in a paragraph, then sentences.

@@ -23,5 +23,5 @@ pub use ranking::{ALPHA, is_less, ranks};
 pub use ranking::{Standing, dominance};
 pub use rate::{Rate, rate, rate_of, shows_less, shows_less_in_sum};
 pub use student::slope;
-pub use trimmed::{Trimmed, trimmed_mean};
+pub use trimmed::{Trimmed, centre, trimmed_mean};
 pub use unpaired::judge_unpaired;

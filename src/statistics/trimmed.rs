@@ -89,7 +89,7 @@ pub fn trimmed_mean(values: &[f64]) -> Option<Trimmed> {
 
 /// The trimmed mean alone, of any number of values. `None` for none, a NaN or
 /// an infinity.
-pub(super) fn centre(values: &[f64]) -> Option<f64> {
+pub fn centre(values: &[f64]) -> Option<f64> {
     if values.is_empty() || !values.iter().all(|value| value.is_finite()) {
         return None;
     }
