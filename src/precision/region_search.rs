@@ -16,6 +16,7 @@ use crate::measure::Status;
 use crate::query::ItemId;
 use crate::scene::{Regions, Scene, SeededRng, Sought};
 use crate::statistics::{Rate, rate};
+use crate::verify::scan;
 
 named! {
     /// In which numbers a point and a region are compared.
@@ -140,10 +141,8 @@ impl RegionQueries<'_> {
     fn find_in_f64(&self, p: &Sought, out: &mut Vec<ItemId>) {
         let scene = self.scene;
         let local = p.world - scene.origin;
-        let boxes = scene.regions.boxes(&scene.items).iter().zip(0..);
-        out.extend(boxes.filter_map(|(b, id)| {
-            let within = local.cmpge(b.min.as_dvec3()) & local.cmple(b.max.as_dvec3());
-            within.all().then_some(id)
+        out.extend(scan(scene.regions.boxes(&scene.items), |b| {
+            (local.cmpge(b.min.as_dvec3()) & local.cmple(b.max.as_dvec3())).all()
         }));
     }
 

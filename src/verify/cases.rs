@@ -6,6 +6,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::scan;
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
 use crate::geometry::{Aabb, ConvexVolume, Plane, PlaneF64};
 use crate::query::ItemId;
@@ -69,9 +70,7 @@ impl RandomCase {
 
     /// The items that overlap the region, by the six comparisons.
     pub fn overlapping(&self) -> impl Iterator<Item = ItemId> {
-        let items = (0..).zip(&self.items);
-        let found = items.filter(|(_, b)| !b.is_empty() && self.region.intersects(b));
-        found.map(|(id, _)| id)
+        scan(&self.items, |b| !b.is_empty() && self.region.intersects(b))
     }
 }
 
@@ -195,9 +194,8 @@ fn cube(x: f32, y: f32, z: f32, half: f32) -> Aabb {
 
 fn row(count: u16, scale: f32) -> Vec<Aabb> {
     let at = |i| f32::from(i) * scale;
-    (0..count)
-        .map(|i| cube(at(i), 0.0, 0.0, 0.4 * scale))
-        .collect()
+    let cubes = (0..count).map(|i| cube(at(i), 0.0, 0.0, 0.4 * scale));
+    cubes.collect()
 }
 
 /// The scenes with their names: nothing, points, coincident and nested boxes,
