@@ -340,14 +340,11 @@ fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<()> {
 fn check_options(input: &FunnelInput) -> Result<()> {
     let (scene, mirror) = (&input.setting.scene, input.mirror);
     let (name, shape) = (&scene.name, scene.item_shape());
+    let inner_boxes = input.inner_boxes.is_some();
     for (option, is_given, expected) in [
         ("--cut-out", input.cut_outs.is_some(), ItemShape::Box),
         ("--mirror", mirror.is_some(), ItemShape::Box),
-        (
-            "--inner-boxes",
-            input.inner_boxes.is_some(),
-            ItemShape::Mesh,
-        ),
+        ("--inner-boxes", inner_boxes, ItemShape::Mesh),
     ] {
         ensure!(
             !is_given || shape == expected,

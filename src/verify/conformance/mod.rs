@@ -136,9 +136,8 @@ pub fn building_again_gives_the_same_structure<T: RegionIndex>() -> Outcome {
 /// A NaN or infinite bound makes the build fail and is named, whatever box
 /// and coordinate it stands in; the first one, if there are more.
 pub fn bad_items_are_refused_and_named<T: RegionIndex>() -> Outcome {
-    let sound: Vec<Aabb> = (0..40u8)
-        .map(|i| Aabb::around(Vec3::splat(f32::from(i)), Vec3::ONE))
-        .collect();
+    let cube = |i: u8| Aabb::around(Vec3::splat(f32::from(i)), Vec3::ONE);
+    let sound: Vec<Aabb> = (0..40).map(cube).collect();
     for item in [0, 17, sound.len() - 1] {
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             for coordinate in 0..6 {

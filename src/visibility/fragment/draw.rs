@@ -274,11 +274,10 @@ impl Drawn<Facet> {
         surfaces: &Surfaces,
         triangles: &[u32],
     ) {
+        let facet = |&triangle: &u32| Facet::of(surfaces, surfaces.item_of(triangle), triangle);
         self.clear();
         for opaque in [true, false] {
-            let facets = triangles
-                .iter()
-                .map(|&triangle| Facet::of(surfaces, surfaces.item_of(triangle), triangle));
+            let facets = triangles.iter().map(facet);
             let facets = facets.filter(|facet| facet.hides == opaque);
             self.draw(canvas, facets, &Tests::default());
         }

@@ -229,9 +229,8 @@ impl Windows for PortalClip {
             let shared = self.current.iter().any(|plane| plane.number == old.number);
             shared || self.polygon.is_within(old)
         };
-        self.planes[first as usize..end as usize]
-            .iter()
-            .all(implied)
+        let mut earlier = self.planes[first as usize..end as usize].iter();
+        earlier.all(implied)
     }
 
     fn keep(&mut self) -> [u32; 2] {

@@ -182,10 +182,7 @@ impl Probe {
     /// Returns `true` if the ray leaves a slab before it enters the last one.
     #[cold]
     fn leaves_before(&self, b: &WorldBox, enters: &Crossing) -> bool {
-        let mirrored = WorldBox {
-            min: b.max,
-            max: b.min,
-        };
+        let mirrored = WorldBox::new(b.max, b.min);
         self.crossed().any(|axis| {
             let left = self.crossing(axis, self.entered(&mirrored, axis));
             self.compare(enters, &left).is_gt()

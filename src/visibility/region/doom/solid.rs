@@ -175,10 +175,9 @@ impl Plan {
             let [width, depth] = self.size(&[[column, column + 1], [row, row + 1]]);
             width * depth
         };
-        let whole = free.iter().enumerate().filter(|(_, free)| **free);
-        let mut left: f64 = whole
-            .map(|(cell, _)| area(cell % self.columns, cell / self.columns))
-            .sum();
+        let whole = (0..free.len()).filter(|&cell| free[cell]);
+        let areas = whole.map(|cell| area(cell % self.columns, cell / self.columns));
+        let mut left: f64 = areas.sum();
         let mut found = Vec::new();
         for ([long, short], cells) in all {
             let least = long * short * LEAST_NEW;
