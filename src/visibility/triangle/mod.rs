@@ -44,11 +44,7 @@ pub struct Selection {
 impl Selection {
     /// All triangles.
     pub fn all(clusters: &Clusters) -> Selection {
-        let mut selection = Selection::none(clusters);
-        for (cluster, word) in selection.words_mut().iter_mut().enumerate() {
-            *word = clusters.word(cluster);
-        }
-        selection
+        Selection::of_items(clusters, 0..clusters.of_item.len() as u32)
     }
 
     /// All triangles of these items: what the object stage left.
