@@ -15,16 +15,16 @@ use crate::camera::{Lens, LensKind, Pose, ViewProjection};
 const PRECISION: Precision = Precision::CAMERA;
 
 fn times(a: &Expansion, b: &Expansion) -> Expansion {
-    (a * b).leading(PRECISION.terms() + 1)
+    (a * b).leading(PRECISION.terms + 1)
 }
 
 /// The cross product to the terms that are carried.
 fn cross(a: &ExactVector, b: &ExactVector) -> ExactVector {
-    exact::cross(a, b).map(|component| component.leading(PRECISION.terms() + 1))
+    exact::cross(a, b).map(|component| component.leading(PRECISION.terms + 1))
 }
 
 fn unit(v: &ExactVector) -> ExactVector {
-    let terms = PRECISION.terms() + 1;
+    let terms = PRECISION.terms + 1;
     let squares = exact::dot(v, v).leading(terms);
     let inverse = squares.sqrt(terms).reciprocal(terms);
     [0, 1, 2].map(|k| times(&v[k], &inverse))
@@ -88,7 +88,7 @@ impl View {
         let sizes = normal.iter().map(|n| n.estimate().abs());
         let size = sizes.fold(0.0, f64::max);
         let normal = normal.map(|n| {
-            let value = n.leading(p.terms());
+            let value = n.leading(p.terms);
             p.cleaned(Number { value, size })
         });
         let along = (0..3).map(|k| p.multiply(&normal[k], &Number::from(self.eye[k].clone())));
@@ -103,8 +103,8 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
     // Left, right, bottom and top edges of the window and how far ahead it is.
     let (edges, depth) = match *lens.kind() {
         LensKind::Perspective { fovy_deg, aspect } => {
-            let half = times(&exact::pi(), &number(fovy_deg)).over(360.0, PRECISION.terms() + 1);
-            let (sine, cosine) = exact::sin_cos(&half, PRECISION.terms() + 1);
+            let half = times(&exact::pi(), &number(fovy_deg)).over(360.0, PRECISION.terms + 1);
+            let (sine, cosine) = exact::sin_cos(&half, PRECISION.terms + 1);
             let wide = times(&sine, &number(aspect));
             ([-&wide, wide, -&sine, sine], cosine)
         }

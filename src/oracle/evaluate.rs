@@ -11,8 +11,8 @@ use crate::arithmetic::{Expansion, combinations, two_product, two_sum};
 /// How exactly to calculate.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Precision {
-    /// Leading terms kept of every result.
-    terms: usize,
+    /// Leading terms kept of every result, also by calculations with roots and series.
+    pub terms: usize,
     /// A number not above this part of its size is taken for zero.
     tolerance: f64,
 }
@@ -33,11 +33,6 @@ impl Precision {
 
     pub fn is_exact(self) -> bool {
         self.tolerance == 0.0
-    }
-
-    /// The terms that calculations with roots and series should keep.
-    pub fn terms(self) -> usize {
-        self.terms
     }
 
     fn cut(self, value: Expansion) -> Expansion {

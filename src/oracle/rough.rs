@@ -124,17 +124,13 @@ impl RoughSpaces {
         }
     }
 
-    fn count(&self) -> usize {
-        self.normals.len()
-    }
-
     fn cross(&self, i: usize, j: usize) -> &Vector {
-        &self.crosses[i * self.count() + j]
+        &self.crosses[i * self.normals.len() + j]
     }
 
     /// Determinant of three normals in ascending order.
     fn determinant(&self, i: usize, j: usize, l: usize) -> Rough {
-        self.determinants[(i * self.count() + j) * self.count() + l]
+        self.determinants[(i * self.normals.len() + j) * self.normals.len() + l]
     }
 
     /// The sign of the offset of a combination of four that leaves no normal,
@@ -203,7 +199,7 @@ impl RoughSpaces {
         let (n, m) = (&self.normals[i], &self.normals[j]);
         let lean = [0, 1, 2].map(|k| e.times(n[k]).plus(d.times(m[k]).negated()));
         let base = cross(&lean, along);
-        let others = (0..self.count()).filter(|&c| c != i && c != j);
+        let others = (0..self.normals.len()).filter(|&c| c != i && c != j);
         let on_line = others.map(|c| {
             let normal = &self.normals[c];
             let a = dot(normal, &base).plus(self.offsets[c].times(weight));
