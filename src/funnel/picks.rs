@@ -14,7 +14,7 @@ use super::task::{FunnelKey, KeyedTask, PickQuestion};
 use super::world::{Shape, World};
 use crate::index::caught;
 use crate::measure::Ask;
-use crate::query::ItemId;
+use crate::query::{ItemId, distinct};
 use crate::shown::{count, counted};
 use crate::statistics::{Estimate, flat};
 use crate::visibility::pick::{BACK_ENDS, BackEnd, CursorRectangle, Pick};
@@ -326,9 +326,7 @@ fn met_within(exact: &dyn Pick, rays: &Rays, rectangle: &CursorRectangle) -> Vec
             met.extend(nearest(exact, &rays.through(x, y), usize::MAX));
         }
     }
-    met.sort_unstable();
-    met.dedup();
-    met
+    distinct(met)
 }
 
 #[cfg(test)]

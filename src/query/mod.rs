@@ -24,3 +24,11 @@ pub use volume::{AnyVolume, QueryVolume, UnpreparedPlanes};
 
 /// An item's number: its zero-based index in the scene.
 pub type ItemId = u32;
+
+/// Every value once, ascending.
+#[cfg(feature = "cli")]
+pub(crate) fn distinct<T: Ord>(mut values: Vec<T>) -> Vec<T> {
+    values.sort_unstable();
+    values.dedup();
+    values
+}

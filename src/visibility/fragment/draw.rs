@@ -8,7 +8,7 @@ use super::canvas::{Canvas, Rectangle, Stencil};
 use super::cut_outs::Holes;
 use super::order::{DepthOrder, Part};
 use crate::kernel::each;
-use crate::query::ItemId;
+use crate::query::{ItemId, distinct};
 use crate::scene::{Surfaces, WorldBox};
 use crate::visibility::truth::{
     Along, Body, Crossing, Facet, Meeting, NO_ITEM, Probe, SolidBox, TriangleProbe,
@@ -235,9 +235,7 @@ impl<B: Drawable> Drawn<B> {
         let mut visible: Vec<ItemId> = self.front.iter().flatten().map(|front| front.1).collect();
         visible.extend(ties);
         visible.extend_from_slice(&self.before);
-        visible.sort_unstable();
-        visible.dedup();
-        visible
+        distinct(visible)
     }
 }
 

@@ -9,7 +9,7 @@ use std::collections::HashSet;
 use super::canvas::{Rectangle, Screen};
 use super::draw::{Drawable, Tally};
 use super::order::{DepthOrder, Part, Piece};
-use crate::query::ItemId;
+use crate::query::{ItemId, distinct};
 use crate::visibility::truth::{Along, BodyIndex};
 use crate::visibility::{Rays, SampleGrid};
 
@@ -236,9 +236,7 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
 ///
 /// Those of strongly connected components of more than one item (Kosaraju; Sharir 1981). O(pairs log pairs).
 pub(super) fn items_in_cycles(before: &[(ItemId, ItemId)]) -> usize {
-    let mut items: Vec<ItemId> = before.iter().flat_map(|&(a, b)| [a, b]).collect();
-    items.sort_unstable();
-    items.dedup();
+    let items = distinct(before.iter().flat_map(|&(a, b)| [a, b]).collect());
     let node = |item| items.binary_search(&item).expect("an item of a pair");
     let (mut next, mut previous) = (vec![Vec::new(); items.len()], vec![Vec::new(); items.len()]);
     for &(a, b) in before {

@@ -12,6 +12,7 @@ use crate::index::IdSet;
 use crate::input::{InputError, Result};
 use crate::json::from_json;
 use crate::kernel::extend;
+use crate::query::distinct;
 use crate::scene::{Regions, Scene};
 use crate::visibility::{Guarantee, Rays, Row};
 
@@ -43,9 +44,7 @@ impl Pvs {
     fn of(rows: Vec<Vec<RegionId>>) -> Pvs {
         let row = |(mut row, own): (Vec<RegionId>, RegionId)| {
             row.push(own);
-            row.sort_unstable();
-            row.dedup();
-            row.into_boxed_slice()
+            distinct(row).into_boxed_slice()
         };
         Pvs {
             rows: rows.into_iter().zip(0..).map(row).collect(),

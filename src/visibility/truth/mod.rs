@@ -11,7 +11,7 @@ mod slabs;
 #[cfg(test)]
 pub(super) mod tests;
 
-use crate::query::ItemId;
+use crate::query::{ItemId, distinct};
 use crate::scene::SeededRng;
 use crate::threads;
 use crate::visibility::{Rays, SampleGrid};
@@ -136,8 +136,5 @@ pub fn visible_by_random_rays<B: Body>(
         found.sort_unstable();
         found.dedup();
     });
-    let mut all = found.concat();
-    all.sort_unstable();
-    all.dedup();
-    all
+    distinct(found.concat())
 }

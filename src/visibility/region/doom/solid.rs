@@ -11,6 +11,7 @@ use glam::DVec3;
 
 use super::DoomMap;
 use super::surfaces::{Point, turn};
+use crate::query::distinct;
 use crate::scene::WorldBox;
 
 /// Most columns, and most rows, of the plan.
@@ -87,9 +88,7 @@ impl Plan {
     fn of(map: &DoomMap) -> Option<Plan> {
         let lines = [0, 1].map(|axis| {
             let ends = map.lines.iter().flat_map(|line| line.ends);
-            let mut lines: Vec<i32> = ends.map(|end| end[axis]).collect();
-            lines.sort_unstable();
-            lines.dedup();
+            let lines = distinct(ends.map(|end| end[axis]).collect());
             let step = lines.len().div_ceil(MOST_CELLS).max(1);
             lines.into_iter().step_by(step).collect::<Vec<_>>()
         });
