@@ -206,15 +206,13 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
 fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
     let (exact, unproven) = (Guarantee::SampleExact, Guarantee::Unproven);
     let test = |declared, guarantee| BackEnd::new(StageKind::Fragment, declared, guarantee);
+    let whole = "the nearest fragment of each sample, exactly";
     let mut tests = match has_cut_outs {
         true => vec![
             test([Z, "the nearest fragment, holes or not"], unproven),
             test([ALPHA, "the nearest opaque fragment"], exact),
         ],
-        false => vec![test(
-            [Z, "the nearest fragment of each sample, exactly"],
-            exact,
-        )],
+        false => vec![test([Z, whole], exact)],
     };
     if matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty()) {
         let beyond = "the same, but beyond the eye's room only at samples that see its portals";

@@ -42,7 +42,6 @@ fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), InputError> {
 
 /// Everything that is timed, on the items that the chain leaves.
 struct Study<'w> {
-    world: &'w World<'w>,
     chain: &'w Chain,
     items: ItemStages<'w>,
     triangles: TriangleStage,
@@ -67,7 +66,6 @@ impl<'w> Study<'w> {
         Ok(Study {
             orders: is_ordered.then(|| Orders::new(&items, input.all)),
             picks: (input.all && input.picks).then(|| Picks::new(world)),
-            world,
             chain,
             items,
             triangles,
@@ -89,7 +87,7 @@ impl<'w> Study<'w> {
     fn rows(&self, truth: &Truth) -> Vec<StageRow> {
         let mut rows = Vec::new();
         for stage in [&StageKind::OF_ITEMS[..], &[StageKind::Triangle]].concat() {
-            for (back_end, name) in self.world.rows(stage) {
+            for (back_end, name) in self.items.world.rows(stage) {
                 let counts = match stage {
                     StageKind::Triangle => self.triangles.counts(&name),
                     _ => {
@@ -152,7 +150,7 @@ impl<'w> Study<'w> {
     /// Unit and counts with and without a stage behind those of whole items. Without a
     /// test every fragment of the remaining items is shaded.
     fn counts_behind(&self, row: &StageRow, rows: &[StageRow]) -> (&'static str, [f64; 2]) {
-        let default = default_test(self.world.cut_outs.is_some());
+        let default = default_test(self.items.world.cut_outs.is_some());
         let every = rows.iter().find(|row| row.back_end.name == default);
         match row.fragments.zip(every.and_then(|row| row.fragments)) {
             Some((own, every)) => ("fragments", [own.shaded_count, every.fragment_count]),
@@ -222,10 +220,8 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         picks = all.compared();
         left_out.extend_from_slice(&all.left_out);
     } else if input.all {
-        left_out.push(LeftOutRow::new(
-            ["picks", "all"],
-            "not asked for: --no-picks",
-        ));
+        let reason = "not asked for: --no-picks";
+        left_out.push(LeftOutRow::new(["picks", "all"], reason));
     }
     let bounds = || bounds(&world, &study.triangles, &covered);
     let bounds = input.all.then(bounds);

@@ -155,12 +155,8 @@ impl<'w> Swept<'w> {
             let mut out = Vec::new();
             ask(view, &mut out);
             out.sort_unstable();
-            count_items(
-                self.items.remaining(view),
-                self.world.items(),
-                &out,
-                &truth[view],
-            )
+            let given = self.items.remaining(view);
+            count_items(given, self.world.items(), &out, &truth[view])
         };
         self.world.views().map(count).collect()
     }
