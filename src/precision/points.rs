@@ -152,12 +152,11 @@ enum Way<'b> {
 
 impl<'a> Built<'a> {
     fn new(
-        Setting {
-            scene, structures, ..
-        }: &'a Setting,
+        setting: &'a Setting,
         shots: &Shots,
         truths: Option<&Truths>,
     ) -> Result<Built<'a>, BuildError> {
+        let (scene, structures) = (&setting.scene, &setting.structures);
         let judge = |culling| Judged::new(scene, shots, truths, culling);
         let (mut built, mut refused) = (Vec::new(), Vec::new());
         for spec in structures {

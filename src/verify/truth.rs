@@ -108,8 +108,7 @@ impl Truth {
     /// Camera level: the camera's numbers are exact, items are boxes about
     /// `origin`. O(items), some 50 ns each. `None` if the pose makes no frame.
     pub fn of_camera(camera: &Camera, origin: DVec3, items: &[Aabb]) -> Option<Truth> {
-        let oracle = Oracle::of_camera(&Pose::of(camera), &camera.lens, origin)?;
-        Some(Truth::new(oracle, items))
+        Truth::of_written(camera, origin, items, &Originals::default())
     }
 
     /// Camera level, about the boxes of a scene as they were written. O(items).
