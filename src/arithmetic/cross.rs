@@ -1,7 +1,7 @@
 //! The cross product without cancellation: for vectors that are nearly
 //! parallel, or products of which little is left.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3Swizzles};
 
 /// `a x b`, each component true to about an ulp however much cancels
 /// (Kahan's difference of products; Jeannerod, Louvet and Muller 2013,
@@ -17,6 +17,13 @@ pub fn cross(a: DVec3, b: DVec3) -> DVec3 {
         difference(a.z, b.x, a.x, b.z),
         difference(a.x, b.y, a.y, b.x),
     )
+}
+
+/// The sizes that components of `a x b` have at most, from those of both: sums of the
+/// products, not differences.
+#[inline(always)]
+pub fn cross_sizes(a: DVec3, b: DVec3) -> DVec3 {
+    a.yzx() * b.zxy() + a.zxy() * b.yzx()
 }
 
 #[cfg(test)]

@@ -10,5 +10,5 @@ mod expansion;
 pub mod rounding;
 
 pub use combinations::combinations;
-pub use cross::cross;
+pub use cross::{cross, cross_sizes};
 pub use expansion::{Expansion, two_product, two_sum};

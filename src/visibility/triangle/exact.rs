@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::arithmetic::exact::{self, ExactVector};
-use crate::arithmetic::{Expansion, cross, two_sum};
+use crate::arithmetic::{Expansion, cross, cross_sizes, two_sum};
 use crate::camera::{Camera, Pose};
 use crate::kernel::each;
 
@@ -94,13 +94,8 @@ pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
     let (u, v) = (b - a, c - a);
     let w = eye.high - a * f64::from(eye.weight);
     let determinant = w.dot(u.cross(v));
-    let (w, u, v) = (w.abs(), u.abs(), v.abs());
-    let minors = DVec3::new(
-        u.y * v.z + u.z * v.y,
-        u.z * v.x + u.x * v.z,
-        u.x * v.y + u.y * v.x,
-    );
-    let (size, low) = (w.dot(minors), eye.low.abs().dot(minors));
+    let minors = cross_sizes(u.abs(), v.abs());
+    let (size, low) = (w.abs().dot(minors), eye.low.abs().dot(minors));
     // Every product is zero: in the plane of a view along an axis.
     if size + low == 0.0 {
         return false;

@@ -12,6 +12,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::slabs::Slabs;
+use crate::arithmetic::cross_sizes;
 use crate::geometry::{Aabb, BoxBlock};
 use crate::index::{Record, by_surface_area};
 use crate::kernel::{Isa, LANES, LaneMask};
@@ -151,13 +152,8 @@ fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
         return true;
     }
     let (half, from) = ((max - min) * 0.5 + slack, start - (min + max) * 0.5);
-    let (turned, d) = (from.cross(d).abs(), d.abs());
-    let reach = DVec3::new(
-        half.y * d.z + half.z * d.y,
-        half.z * d.x + half.x * d.z,
-        half.x * d.y + half.y * d.x,
-    );
-    turned.cmpgt(reach).any()
+    let turned = from.cross(d).abs();
+    turned.cmpgt(cross_sizes(half, d.abs())).any()
 }
 
 /// Candidates that a search collects.
