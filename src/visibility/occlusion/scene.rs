@@ -2,7 +2,7 @@
 //!
 //! They are in a packed tree of blocks of sixteen, each with its occluders.
 
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks};
 use crate::kernel::{LANES, LaneMask, first_lanes};
@@ -175,10 +175,11 @@ fn sort_into(ids: &mut [ItemId], capacity: usize, centre: &impl Fn(ItemId, usize
     sort_into(behind, capacity, centre);
 }
 
+/// The lower faces of some axes, and the upper faces of some.
+pub fn faces(low: BVec3, high: BVec3) -> Faces {
+    (low.bitmask() | high.bitmask() << 3) as Faces
+}
+
 fn faces_reached(b: &WorldBox, bounds: &WorldBox) -> Faces {
-    (0..3).fold(0, |faces, axis| {
-        let low = Faces::from(b.min[axis] <= bounds.min[axis]);
-        let high = Faces::from(b.max[axis] >= bounds.max[axis]);
-        faces | low << axis | high << (3 + axis)
-    })
+    faces(b.min.cmple(bounds.min), b.max.cmpge(bounds.max))
 }

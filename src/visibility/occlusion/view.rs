@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use super::scene::{Faces, OccluderScene};
+use super::scene::{Faces, OccluderScene, faces};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::visibility::{Rays, SampleGrid};
 
@@ -224,13 +224,10 @@ fn before_near(rays: &Rays, near: f64, eye: DVec3, far_from_zero: f64) -> [DVec3
 /// those that the eye is not beyond, or that parallel rays do not leave by.
 fn open_faces(eye: DVec3, forward: DVec3, parallel: bool, scene: &OccluderScene) -> Faces {
     let bounds = &scene.bounds;
-    (0..3).fold(0, |faces, axis| {
-        let (low, high) = match parallel {
-            true => (forward[axis] <= 0.0, forward[axis] >= 0.0),
-            false => (eye[axis] >= bounds.min[axis], eye[axis] <= bounds.max[axis]),
-        };
-        faces | Faces::from(low) << axis | Faces::from(high) << (3 + axis)
-    })
+    match parallel {
+        true => faces(forward.cmple(DVec3::ZERO), forward.cmpge(DVec3::ZERO)),
+        false => faces(eye.cmpge(bounds.min), eye.cmple(bounds.max)),
+    }
 }
 
 impl Projection {
