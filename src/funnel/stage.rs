@@ -103,6 +103,26 @@ impl Chain {
         }
     }
 
+    /// Default chain of a scene, without an object stage.
+    ///
+    /// It has the safe back end of every stage that removes the most.
+    pub fn for_scene(scene: &Scene, has_cut_outs: bool) -> Chain {
+        let wanted = [
+            (StageKind::Region, PORTAL_CLIP),
+            (StageKind::Occlusion, MASKED_INNER),
+            (StageKind::Triangle, "per-triangle"),
+            (StageKind::Fragment, default_test(has_cut_outs)),
+        ];
+        let is_there = |(stage, name): &(StageKind, &str)| {
+            let mut rows = back_ends(*stage, scene, has_cut_outs).into_iter();
+            rows.any(|row| row.name == *name)
+        };
+        let known = wanted.into_iter().filter(is_there);
+        known.fold(Chain::empty(), |chain, (stage, name)| {
+            chain.with(stage, name)
+        })
+    }
+
     /// Name of the back end of a stage.
     pub fn of(&self, stage: StageKind) -> &str {
         &self.names[stage as usize]
@@ -224,28 +244,6 @@ fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
 /// Default test of the fragment stage.
 pub fn default_test(has_cut_outs: bool) -> &'static str {
     if has_cut_outs { ALPHA } else { Z }
-}
-
-impl Chain {
-    /// Default chain of a scene, without an object stage.
-    ///
-    /// It has the safe back end of every stage that removes the most.
-    pub fn for_scene(scene: &Scene, has_cut_outs: bool) -> Chain {
-        let wanted = [
-            (StageKind::Region, PORTAL_CLIP),
-            (StageKind::Occlusion, MASKED_INNER),
-            (StageKind::Triangle, "per-triangle"),
-            (StageKind::Fragment, default_test(has_cut_outs)),
-        ];
-        let is_there = |(stage, name): &(StageKind, &str)| {
-            let mut rows = back_ends(*stage, scene, has_cut_outs).into_iter();
-            rows.any(|row| row.name == *name)
-        };
-        let known = wanted.into_iter().filter(is_there);
-        known.fold(Chain::empty(), |chain, (stage, name)| {
-            chain.with(stage, name)
-        })
-    }
 }
 
 /// Appends the items of a view that are not hidden.
