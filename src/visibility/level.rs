@@ -61,9 +61,8 @@ impl Level {
         let begun = Instant::now();
         // The first time is of memory that has not been read yet, and not used.
         let names = part_names(&bytes, file)?.into_iter();
-        let maps: Vec<(String, usize)> = names
-            .filter_map(|name| decode(&name).map(|(items, _)| (name, items)))
-            .collect();
+        let sized = |name: String| decode(&name).map(|(items, _)| (name, items));
+        let maps: Vec<(String, usize)> = names.filter_map(sized).collect();
         let is_selected = |(name, _): &(String, usize)| {
             selected.is_none_or(|selected| name.eq_ignore_ascii_case(selected))
         };

@@ -187,8 +187,7 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
     };
     let parts = orders.iter().map(|(_, pieces)| parts_of(pieces));
     let mut parts: Vec<Vec<Parts>> = parts.collect();
-    let mut counts: Vec<(Tally, ErrorCount)> = Vec::new();
-    counts.resize_with(orders.len(), Default::default);
+    let mut counts: Vec<(Tally, ErrorCount)> = orders.iter().map(|_| Default::default()).collect();
     let mut layers: Vec<Layer<B::At>> = Vec::new();
     for sample in (0..grid.height).flat_map(|row| (0..grid.width).map(move |c| (row, c))) {
         let ray = rays.sample(grid, sample.1, sample.0);

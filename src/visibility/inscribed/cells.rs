@@ -146,9 +146,8 @@ impl Cells {
             let mut rows = vec![u64::MAX; n];
             for high in low + 1..=n {
                 let slab = &self.inside[(high - 1) * n..high * n];
-                rows.iter_mut()
-                    .zip(slab)
-                    .for_each(|(row, next)| *row &= next);
+                let pairs = rows.iter_mut().zip(slab);
+                pairs.for_each(|(row, next)| *row &= next);
                 if rows.iter().all(|&row| row == 0) {
                     break;
                 }

@@ -85,9 +85,8 @@ pub(super) fn nearest<B: Body>(
         met.dedup_by_key(|(item, _)| *item);
     }
     met.sort_unstable_by(|a, b| order::<B>(probe, a, b));
-    met.truncate(kept(&met, count, |a, last| {
-        probe.compare(&a.1, &last.1).is_le()
-    }));
+    let is_within = |a: &Met<B>, last: &Met<B>| probe.compare(&a.1, &last.1).is_le();
+    met.truncate(kept(&met, count, is_within));
     hits.clear();
     hits.extend(met.into_iter().filter_map(|met| hit::<B>(met, usize::MAX)));
 }
@@ -97,10 +96,8 @@ pub(super) fn kept<T>(sorted: &[T], count: usize, is_within: impl Fn(&T, &T) -> 
     let Some(last) = count.checked_sub(1) else {
         return 0;
     };
-    let last = sorted.get(last);
-    last.map_or(sorted.len(), |last| {
-        sorted.partition_point(|met| is_within(met, last))
-    })
+    let end = |last| sorted.partition_point(|met| is_within(met, last));
+    sorted.get(last).map_or(sorted.len(), end)
 }
 
 /// The truth of picking, by the tree of the truth of samples.
