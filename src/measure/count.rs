@@ -60,10 +60,6 @@ impl Counted {
         let queries = self.answers[pass as usize].len().max(1) as f64;
         20.0 + 0.1 * self.costs[pass as usize].comparisons() as f64 / queries
     }
-
-    fn is_ok(&self) -> bool {
-        self.verdict.status == Status::Ok
-    }
 }
 
 /// Most verdicts of the oracle per group; one takes about 50 ns.
@@ -99,7 +95,7 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 let (counted, Ok(built)) = (&mut all[i], &subject.built) else {
                     continue;
                 };
-                if !counted.is_ok() {
+                if !counted.verdict.is_ok() {
                     continue;
                 }
                 notice(Some(&labels[i]), "counting");
@@ -123,7 +119,7 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
         }
     }
     for (counted, subject) in all.iter_mut().zip(subjects) {
-        if let (true, Ok(built)) = (counted.is_ok(), &subject.built) {
+        if let (true, Ok(built)) = (counted.verdict.is_ok(), &subject.built) {
             counted.verdict = compare_batch(workload, built).err().unwrap_or_default();
             if subject.spec.info().kind != Kind::Scan {
                 note_scan(counted, workload.items.len());
@@ -284,7 +280,7 @@ fn note_scan(counted: &mut Counted, items: usize) {
     let visible: u64 = answers.iter().map(|f| f.count).sum();
     let is_sliver = visible * 1000 <= queries * items as u64;
     let compared = counted.costs[Pass::Queries as usize].comparisons() / queries;
-    if counted.is_ok() && items >= 1000 && is_sliver && compared * 10 >= 9 * items as u64 {
+    if counted.verdict.is_ok() && items >= 1000 && is_sliver && compared * 10 >= 9 * items as u64 {
         counted.verdict.reason = Some(format!(
             "tests {compared} bounds per query for {items} items, as a scan does"
         ));

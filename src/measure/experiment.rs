@@ -14,8 +14,7 @@ use super::moving::refitted_ln;
 use super::process_result::{Known, Part, TaskSamples};
 use super::schedule::cameras_within;
 use super::{
-    Machine, Notice, Protocol, SceneInfo, Status, Subject, Verdict, Workload, WorkloadError,
-    guarded,
+    Machine, Notice, Protocol, SceneInfo, Subject, Verdict, Workload, WorkloadError, guarded,
 };
 use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
@@ -359,7 +358,7 @@ pub fn measure_scene(
         if first && plan.has_updates(share) {
             for subject in &mut part.subjects {
                 let spec = plan.structures.iter().find(|s| s.label == subject.label);
-                if let Some(spec) = spec.filter(|_| subject.verdict.status == Status::Ok) {
+                if let Some(spec) = spec.filter(|_| subject.verdict.is_ok()) {
                     notice(Some(&spec.label), "refitting");
                     let found = guarded(|| refitted_ln(spec, &workload, &protocol));
                     match found.unwrap_or_else(Err) {

@@ -62,7 +62,7 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
             replay_ns: 1.0,
             rounds: Vec::new(),
         };
-        if answered.is_none() && entry.runs() {
+        if answered.is_none() && entry.part.verdict.is_ok() {
             notice(Some(&entry.part.label), "counting");
             let counted = guarded(|| entry.count(frames, stop));
             let failed = counted.unwrap_or_else(Err).err();
@@ -108,7 +108,7 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
     if plan.process.is_multiple_of(AGES_EVERY) && !plan.plan_only {
         for entry in &mut entries {
             let Subject { spec, is_twin, .. } = entry.subject;
-            if entry.runs() && !is_twin && ages(spec) {
+            if entry.part.verdict.is_ok() && !is_twin && ages(spec) {
                 notice(Some(&entry.part.label), "ageing");
                 let found = guarded(|| ageing(spec, frames, &plan.protocol, stop));
                 match found.unwrap_or_else(Err) {
@@ -143,10 +143,6 @@ fn ages(spec: &StructureSpec) -> bool {
 }
 
 impl Entry<'_> {
-    fn runs(&self) -> bool {
-        self.part.verdict.status == Status::Ok
-    }
-
     /// Counts and verifies all queries, and measures the time of one replay.
     fn count(&mut self, frames: &Frames, stop: &dyn Fn() -> bool) -> Result<(), Verdict> {
         let mut moving = Moving::build(frames, &self.subject.spec)?;
@@ -207,7 +203,7 @@ impl Entry<'_> {
 
     /// A sample of a kind of task per frame and round; its ids are those of all views.
     fn timed(&self, kind: TaskKind, frames: &Frames) -> Result<Timed, Verdict> {
-        if !self.runs() {
+        if !self.part.verdict.is_ok() {
             return Err(self.part.verdict.clone());
         }
         let workload = frames.workload;
@@ -234,7 +230,7 @@ impl Entry<'_> {
 /// Rounds of each structure, from the time of its replay in the count pass.
 fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSchedule {
     let own = |e: &Entry| ((protocol.task_ns / e.replay_ns) as usize).clamp(1, protocol.rounds[1]);
-    let timed = entries.iter().filter(|entry| entry.runs());
+    let timed = entries.iter().filter(|entry| entry.part.verdict.is_ok());
     let rounds = timed.clone().map(own).max().unwrap_or(0);
     let several = frames.workload.views_per_frame > 1;
     let mut kinds = KINDS.to_vec();
@@ -272,7 +268,7 @@ fn time(
             let mut tasks = planned.keys.iter().zip(&planned.schedule.tasks);
             let own = tasks.find(|(key, _)| key.0 == entry.part.label);
             let is_due = own.is_some_and(|(_, task)| round.is_multiple_of(task.every.max(1)));
-            if !is_due || !entry.runs() {
+            if !is_due || !entry.part.verdict.is_ok() {
                 continue;
             }
             (plan.notice)(Some(&entry.subject.spec.label), TIMING);

@@ -88,12 +88,6 @@ struct Entry<'a> {
     counted: Option<Counted>,
 }
 
-impl Entry<'_> {
-    fn runs(&self) -> bool {
-        self.part.verdict.status == Status::Ok
-    }
-}
-
 /// Measures a group of queries of a still scene; `None` if stopped.
 pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Option<Measured> {
     let (notice, stop) = (plan.notice, plan.stop);
@@ -192,7 +186,7 @@ fn tasks_of<'a>(
 ) -> Tasks<'a> {
     let mut keyed = Tasks::default();
     for &kind in pass.tasks() {
-        for entry in entries.iter().filter(|entry| entry.runs()) {
+        for entry in entries.iter().filter(|entry| entry.part.verdict.is_ok()) {
             let Ok(built) = &entry.subject.built else {
                 continue;
             };
@@ -294,7 +288,7 @@ fn count<'a>(workload: &Workload, subjects: &'a [Subject], notice: Notice) -> Co
     };
     let entries = subjects.iter().zip(counted);
     let entries = entries.map(|(subject, counted)| {
-        let is_ok = counted.verdict.status == Status::Ok;
+        let is_ok = counted.verdict.is_ok();
         let verdict = of_all.clone().filter(|_| is_ok);
         let verdict = verdict.unwrap_or_else(|| counted.verdict.clone());
         Entry {
@@ -307,7 +301,7 @@ fn count<'a>(workload: &Workload, subjects: &'a [Subject], notice: Notice) -> Co
         }
     });
     let entries: Vec<Entry> = entries.collect();
-    let right = entries.iter().find(|entry| entry.runs());
+    let right = entries.iter().find(|entry| entry.part.verdict.is_ok());
     let right = right.and_then(|entry| Some(entry.counted.as_ref()?.answers.clone()));
     (entries, Some(judged), right.unwrap_or_default())
 }

@@ -138,6 +138,11 @@ pub struct Verdict {
 }
 
 impl Verdict {
+    /// Returns true for a right answer.
+    pub fn is_ok(&self) -> bool {
+        self.status == Status::Ok
+    }
+
     /// A status other than [`Status::Ok`], with its reason.
     pub fn new(status: Status, reason: impl Into<String>) -> Self {
         let reason: String = reason.into();

@@ -199,7 +199,7 @@ impl Part {
                 let is_bound = self.bounds.contains(&task.label);
                 let reason = match rounds {
                     None => "not in its place in the plan of the first process".to_owned(),
-                    Some(_) if task.verdict.status != Status::Ok => continue,
+                    Some(_) if !task.verdict.is_ok() => continue,
                     Some(rounds) if task.rounds_ns.len() > rounds as usize => {
                         format!("{} rounds; the plan has {rounds}", task.rounds_ns.len())
                     }

@@ -106,7 +106,7 @@ impl<'p> MergedParts<'p> {
         let labels = parts[0].subjects.iter().map(|s| s.label.as_str());
         merged.reference = std::iter::once(YARDSTICK).chain(labels).find(|label| {
             let is_timed = merged.ln_ns.contains_key(&(*label, TaskKind::Query));
-            is_timed && merged.verdict(label).status == Status::Ok
+            is_timed && merged.verdict(label).is_ok()
         });
         merged
     }
@@ -148,7 +148,7 @@ impl<'p> MergedParts<'p> {
         let contradicted = contradictions.filter(|c| c.0 == label).map(|c| &c.1);
         let mut all = own.chain(timed).chain(contradicted);
         let first = all.clone().next();
-        let failed = all.find(|v| v.status != Status::Ok);
+        let failed = all.find(|v| !v.is_ok());
         failed.or(first).cloned().unwrap_or_default()
     }
 
@@ -187,7 +187,7 @@ impl<'p> MergedParts<'p> {
     fn cell(&self, label: &str, subject: Option<&SubjectPart>) -> ReportCell {
         let first = &self.parts[0];
         let verdict = self.verdict(label);
-        let is_right = verdict.status == Status::Ok;
+        let is_right = verdict.is_ok();
         let is_answered = is_right || verdict.status == Status::Unsafe;
         // Errors are of the scan's answers, which fat bounds do not give.
         let is_fat = subject.is_some_and(|s| s.counts.contains_key("fat_excess"));
