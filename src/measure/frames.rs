@@ -9,7 +9,7 @@ use super::clock::Stopwatch;
 use super::group::{GroupPlan, counts, queries, task_part};
 use super::key::TaskKey;
 use super::moving::{Frames, Laps, Moving, ageing, replay, times_of};
-use super::process_result::{Known, Measured, Part, SubjectPart};
+use super::process_result::{Measured, Part, SubjectPart};
 use super::schedule::Orders;
 use super::{
     Answer, Counted, KeyedSchedule, Protocol, Sample, Schedule, Status, Subject, TIMING, TaskKind,
@@ -45,7 +45,7 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
         return queries(workload, subjects, plan);
     };
     let (notice, stop) = (plan.notice, plan.stop);
-    let answered = plan.known.filter(|known| !known.visible.is_empty());
+    let answered = plan.answered();
     if answered.is_none() {
         notice(None, "scanning the frames");
     }
@@ -121,18 +121,12 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
             return None;
         }
     }
-    let known = Known {
-        visible: frames.right.clone(),
-        located: Vec::new(),
-        query: Some(planned),
-        locate: None,
-        lens_scale: workload.lens_scale,
-    };
+    let answers = [frames.right.clone(), Vec::new()];
     let part = Part {
         judged: frames.judged,
         subjects: entries.into_iter().map(|entry| entry.part).collect(),
         tasks,
-        ..plan.part(workload, answered.is_none().then_some(known))
+        ..plan.part(workload, answers, [Some(planned), None])
     };
     Some((part, samples))
 }

@@ -67,8 +67,26 @@ impl<'a> GroupPlan<'a> {
         }
     }
 
-    /// The part of this process without results.
-    pub(super) fn part(self, workload: &Workload, known: Option<Known>) -> Part {
+    /// The answers of the first process, if it had any.
+    pub(super) fn answered(&self) -> Option<&'a Known> {
+        self.known.filter(|known| !known.visible.is_empty())
+    }
+
+    /// The part of this process without results; with its answers and schedules where
+    /// none were known.
+    pub(super) fn part(
+        self,
+        workload: &Workload,
+        [visible, located]: [Vec<Answer>; 2],
+        [query, locate]: [Option<KeyedSchedule>; 2],
+    ) -> Part {
+        let known = self.answered().is_none().then_some(Known {
+            visible,
+            located,
+            query,
+            locate,
+            lens_scale: workload.lens_scale,
+        });
         Part {
             key: GroupKey::new(&self.scene.name, &self.path, workload.culling.test.name()),
             process: self.process,
@@ -91,8 +109,7 @@ struct Entry<'a> {
 /// Measures a group of queries of a still scene; `None` if stopped.
 pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Option<Measured> {
     let (notice, stop) = (plan.notice, plan.stop);
-    let answered = plan.known.filter(|known| !known.visible.is_empty());
-    let (mut entries, judged, answers) = match answered {
+    let (mut entries, judged, answers) = match plan.answered() {
         None => count(workload, subjects, notice),
         Some(known) => {
             let entry = |subject| {
@@ -158,21 +175,12 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
         let keys = keyed.keys;
         schedules[pass as usize] = Some(KeyedSchedule { keys, schedule });
     }
-    let [visible, located] = answers;
-    let [query, locate] = schedules;
-    let known = Known {
-        visible,
-        located,
-        query,
-        locate,
-        lens_scale: workload.lens_scale,
-    };
     let part = Part {
         judged,
         subjects: entries.into_iter().map(|entry| entry.part).collect(),
         bounds,
         tasks,
-        ..plan.part(workload, answered.is_none().then_some(known))
+        ..plan.part(workload, answers, schedules)
     };
     Some((part, samples))
 }
