@@ -8,7 +8,7 @@ use crate::geometry::Aabb;
 use crate::index::{
     BuildError, Info, Input, Linear, MemoryUsage, NoParams, RegionIndex, Registry, StructureSpec,
 };
-use crate::measure::{Group, SceneInfo};
+use crate::measure::{Group, Known, SceneInfo};
 use crate::motion::Motion;
 use crate::path;
 use crate::query::{Context, ItemId, QueryVolume};
