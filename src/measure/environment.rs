@@ -152,22 +152,19 @@ fn caches(folder: &Path) -> Vec<Cache> {
         let text = fs::read_to_string(folder.join(format!("index{index}/{name}"))).ok()?;
         Some(text.trim().to_owned())
     };
-    (0..8)
-        .filter_map(|index| {
-            if read(index, "type")? == "Instruction" {
-                return None;
-            }
-            let size = read(index, "size")?;
-            let bytes = match size.strip_suffix('K') {
-                Some(kilo) => kilo.parse::<u64>().ok()? << 10,
-                None => size.strip_suffix('M')?.parse::<u64>().ok()? << 20,
-            };
-            Some(Cache {
-                level: read(index, "level")?.parse().ok()?,
-                bytes,
-            })
-        })
-        .collect()
+    let cache = |index: usize| -> Option<Cache> {
+        if read(index, "type")? == "Instruction" {
+            return None;
+        }
+        let size = read(index, "size")?;
+        let bytes = match size.strip_suffix('K') {
+            Some(kilo) => kilo.parse::<u64>().ok()? << 10,
+            None => size.strip_suffix('M')?.parse::<u64>().ok()? << 20,
+        };
+        let level = read(index, "level")?.parse().ok()?;
+        Some(Cache { level, bytes })
+    };
+    (0..8).filter_map(cache).collect()
 }
 
 /// A value that build.rs left in the environment; empty means unknown.
@@ -179,9 +176,8 @@ impl Toolchain {
     /// The facts that the build script left in this program.
     pub fn capture() -> Toolchain {
         let lock = include_bytes!("../../Cargo.lock");
-        let features = env!("CULLBENCH_FEATURES")
-            .split(',')
-            .filter(|f| !f.is_empty());
+        let features = env!("CULLBENCH_FEATURES").split(',');
+        let features = features.filter(|f| !f.is_empty());
         Toolchain {
             rustc: built_with(env!("CULLBENCH_RUSTC")),
             target: built_with(env!("CULLBENCH_TARGET")),

@@ -130,12 +130,8 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
     let (mut bounds, mut tasks, mut samples) = (Vec::new(), Vec::new(), Vec::new());
     let mut schedules = [None, None];
     for &pass in &Pass::ALL[..1 + usize::from(plan.locate)] {
-        let mut keyed = tasks_of(
-            workload,
-            &entries,
-            (pass, plan.protocol.cold),
-            &answers[pass as usize],
-        );
+        let (own, cold) = (&answers[pass as usize], plan.protocol.cold);
+        let mut keyed = tasks_of(workload, &entries, (pass, cold), own);
         if pass == Pass::Queries {
             bounds = add_bounds(&mut keyed, workload, subjects, &answers[0], plan.bounds);
         }

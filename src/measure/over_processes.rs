@@ -76,13 +76,12 @@ impl<K: PartialEq> OverProcesses<K> {
         let once = processes.first().map_or(0, |first| first.once_ns.len());
         // Below the resolution of a clock there may be 0.
         let ln = |process: &ProcessTimes, i: usize| process.once_ns[i].max(1.0).ln();
+        let of_once = |i: usize| processes.iter().map(|process| ln(process, i)).collect();
         OverProcesses {
             keys,
             reference: timed.cloned().unwrap_or_default(),
             logs,
-            once: (0..once)
-                .map(|i| processes.iter().map(|process| ln(process, i)).collect())
-                .collect(),
+            once: (0..once).map(of_once).collect(),
         }
     }
 

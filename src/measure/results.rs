@@ -192,6 +192,8 @@ impl<'p> MergedParts<'p> {
         // Errors are of the scan's answers, which fat bounds do not give.
         let is_fat = subject.is_some_and(|s| s.counts.contains_key("fat_excess"));
         let judged = subject.and(first.judged).filter(|_| is_answered && !is_fat);
+        let bare = |why: String| why.trim_start_matches("panicked: ").to_owned();
+        let left_out = subject.filter(|_| is_right).map(|_| self.left_out(label));
         ReportCell {
             scene: self.loaded.scene.clone(),
             path: self.loaded.path.clone(),
@@ -202,16 +204,12 @@ impl<'p> MergedParts<'p> {
             test: first.key.test.clone(),
             status: verdict.status,
             // The status says that it panicked.
-            reason: verdict
-                .reason
-                .map(|why| why.trim_start_matches("panicked: ").to_owned()),
+            reason: verdict.reason.map(bare),
             rank: None,
             times: self.times(label),
             metrics: self.metrics(label, subject, judged.as_ref(), is_right),
             error: judged,
-            left_out: subject
-                .filter(|_| is_right)
-                .map_or(Vec::new(), |_| self.left_out(label)),
+            left_out: left_out.unwrap_or_default(),
             samples_ref: None,
             chose: self.subjects(label).find_map(|s| s.chose.clone()),
         }

@@ -52,14 +52,13 @@ impl Timed {
 
     /// Mean time per query of each round, by one of the clocks, ns.
     pub fn round_means(&self, clock: impl Fn(&Sample) -> f64) -> Vec<f64> {
-        self.rounds()
-            .map(|round| {
-                let queries: f64 = round.iter().map(|s| f64::from(s.queries)).sum();
-                let spent: f64 = round.iter().map(|s| clock(s) * f64::from(s.queries)).sum();
-                spent / queries
-            })
-            .filter(|mean| mean.is_finite() && *mean > 0.0)
-            .collect()
+        let means = self.rounds().map(|round| {
+            let queries: f64 = round.iter().map(|s| f64::from(s.queries)).sum();
+            let spent: f64 = round.iter().map(|s| clock(s) * f64::from(s.queries)).sum();
+            spent / queries
+        });
+        let sound = means.filter(|mean| mean.is_finite() && *mean > 0.0);
+        sound.collect()
     }
 
     /// Time of the task in this process: ln of the CPU ns per query.

@@ -345,9 +345,8 @@ fn common_shift(pairs: &[Pair], metric: &'static str) -> Option<CommonShift> {
     let all = || groups.iter().flat_map(|group| &group.1);
     let counts = [0, 1].map(|side| all().map(|logs| logs[side].len()).max().unwrap_or(0));
     let is_whole = |logs: &&Logs| [0, 1].iter().all(|&s| logs[s].len() == counts[s]);
-    let whole = groups
-        .iter()
-        .map(|group| group.1.iter().filter(is_whole).collect());
+    let whole = groups.iter();
+    let whole = whole.map(|group| group.1.iter().filter(is_whole).collect());
     let whole: Vec<Vec<&Logs>> = whole.filter(|cells: &Vec<_>| !cells.is_empty()).collect();
     let of = |side: usize| -> Vec<f64> {
         let process = |process: usize| -> f64 {

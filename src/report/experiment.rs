@@ -84,9 +84,7 @@ impl Experiment {
         self.check()?;
         let started_at = utc(SystemTime::now());
         let id = format!("{started_at}-{}", digits(SystemTime::now()));
-        let machine = Machine::capture();
-        let mut header = Header::of(&self.plan, machine, id, started_at);
-        header.run.processes = 1;
+        let header = Header::of(&self.plan, Machine::capture(), id, started_at);
         let mut stream = Stream::of(header);
         for planned in &self.plan.scenes {
             let share = Share::first(self.plan.groups_of(planned).len());
@@ -112,16 +110,12 @@ impl Experiment {
         let is_time = |ns: f64| (0.0..f64::INFINITY).contains(&ns);
         // What is named twice would count as two processes.
         let once = |names: Vec<&String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
+        let sources = scenes.iter().map(|s| &s.source);
+        let has_each_once = |s: &PlannedScene| once(s.paths.iter().collect());
         let is_warm = |s: &PlannedScene| plan.motions.is_empty() || !s.cold;
         let rules = [
-            (
-                once(scenes.iter().map(|s| &s.source).collect()),
-                "a scene twice",
-            ),
-            (
-                scenes.iter().all(|s| once(s.paths.iter().collect())),
-                "a path twice",
-            ),
+            (once(sources.collect()), "a scene twice"),
+            (scenes.iter().all(has_each_once), "a path twice"),
             (once(plan.motions.iter().collect()), "a motion twice"),
             (scenes.iter().all(is_warm), "cold caches of items that move"),
             (!scenes.is_empty(), "no scene"),

@@ -160,10 +160,9 @@ type Named<'r> = (String, &'r str);
 
 fn keyed(cells: &[ReportCell]) -> Vec<(Named<'_>, &ReportCell)> {
     let key = |cell: &ReportCell| cell.key().group.id();
-    let all = cells
-        .iter()
-        .map(|cell| ((key(cell), &*cell.structure), cell));
-    all.collect()
+    let cells = cells.iter();
+    let keyed = cells.map(|cell| ((key(cell), &*cell.structure), cell));
+    keyed.collect()
 }
 
 /// A cell in both reports.

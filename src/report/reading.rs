@@ -198,14 +198,12 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
     };
     let mut cells: BTreeMap<[String; 5], Readings> = BTreeMap::new();
     let samples = csv::Reader::from_path(folder.join(SAMPLES));
+    let ranked = [TaskKind::Query, TaskKind::Frame].map(TaskKind::name);
     for row in samples.into_iter().flat_map(csv::Reader::into_deserialize) {
         let Ok(row): Result<SampleRow, _> = row else {
             break;
         };
-        if [TaskKind::Query, TaskKind::Frame]
-            .map(TaskKind::name)
-            .contains(&row.task.as_str())
-        {
+        if ranked.contains(&row.task.as_str()) {
             let key = [row.scene, row.path, row.cache, row.test, row.structure];
             let readings = cells.entry(key).or_default();
             let times = readings.entry((row.frame, row.queries)).or_default();

@@ -48,10 +48,8 @@ pub fn world_of(scene: &str) -> String {
     let Some((name, parameters)) = scene.rsplit_once(':') else {
         return scene.to_owned();
     };
-    let others = parameters
-        .split(',')
-        .filter(|pair| !pair.trim_start().starts_with("n="));
-    let others: Vec<&str> = others.collect();
+    let is_other = |pair: &&str| !pair.trim_start().starts_with("n=");
+    let others: Vec<&str> = parameters.split(',').filter(is_other).collect();
     match others.is_empty() {
         true => name.to_owned(),
         false => format!("{name}:{}", others.join(",")),

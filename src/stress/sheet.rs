@@ -39,9 +39,8 @@ pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     // A scene without extent has the volume's.
     let mut reach = around.reach.as_dvec3();
     if let (DVec3::ZERO, Some(corners)) = (reach, camera.lens.corners(&camera.frame)) {
-        reach = corners
-            .iter()
-            .fold(reach, |r, corner| r.max((*corner - around.origin).abs()));
+        let away = corners.map(|corner| (corner - around.origin).abs());
+        reach = away.into_iter().fold(reach, DVec3::max);
     }
     let size = reach.max(b.reach().as_dvec3()).element_sum();
     let eye = camera.frame.eye;

@@ -164,14 +164,11 @@ impl Vector {
     /// Planes in f32, bit for bit.
     pub fn planes(&self) -> Option<Vec<Plane>> {
         let plane = |[x, y, z, d]: [f32; 4]| Plane::new(Vec3::new(x, y, z), d);
-        let bits = self.planes_f32_hex.as_ref().map(|rows| {
-            let rows = rows.iter().map(|row| plane(row.0.map(|x| x.0)));
-            rows.collect()
-        });
-        bits.or_else(|| {
-            let rows = self.planes.as_ref()?.iter();
-            Some(rows.map(|row| plane(row.0.map(|x| x.0))).collect())
-        })
+        if let Some(bits) = &self.planes_f32_hex {
+            return Some(bits.iter().map(|row| plane(row.0.map(|x| x.0))).collect());
+        }
+        let rows = self.planes.as_ref()?.iter();
+        Some(rows.map(|row| plane(row.0.map(|x| x.0))).collect())
     }
 
     /// Claims of the vector that no check can judge, in words.

@@ -276,9 +276,8 @@ impl Case {
     fn scalar(&self, culling: &Culling, name: &str, seen: &[ItemId], found: &mut Findings) {
         found.check([SCALAR, name]);
         let errors = self.errors(seen);
-        let ghosts = seen
-            .iter()
-            .filter(|id| self.items[**id as usize].is_empty());
+        let is_ghost = |id: &&ItemId| self.items[**id as usize].is_empty();
+        let ghosts = seen.iter().filter(is_ghost).count();
         let promised = culling.arithmetic != Arithmetic::F64;
         // Without a margin f64 is as good as its own roundings. Planes that
         // are sums of others have lost digits; they are measured, not judged.
@@ -292,7 +291,6 @@ impl Case {
             found.tally.errors.false_negatives += errors.false_negatives;
             found.tally.errors.touch_dropped += errors.touch_dropped;
         }
-        let ghosts = ghosts.count();
         if lost || ghosts > 0 {
             let is_wrong = |&(id, verdict, seen): &(usize, Verdict, bool)| match seen {
                 true => self.items[id].is_empty(),

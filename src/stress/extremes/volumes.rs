@@ -120,13 +120,11 @@ impl PlanesFamily {
         for (i, b) in case.items.iter().enumerate() {
             let seen = case.volume.sees(b);
             let verdict = oracle.verdict(b);
+            let differs = || seen != sees_exactly(&case.volume, b);
             let is_deep =
                 || verdict != Verdict::Out && oracle.depth(b) > roundings(&case.volume, b);
             let (expected, wrong) = match (self.exact, seen) {
-                (true, _) => (
-                    "the answer without any rounding",
-                    seen != sees_exactly(&case.volume, b),
-                ),
+                (true, _) => ("the answer without any rounding", differs()),
                 (false, true) => ("no empty box", b.is_empty()),
                 (false, false) => ("nothing dropped beyond the rounding error", is_deep()),
             };
