@@ -16,8 +16,8 @@ use super::run_plan::{RunPlan, same_digest};
 use super::{program, tell, text};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
-    Header, RunFolder, RunInfo, SCHEMA_VERSION, Setting, StoppedRun, Stream, dated, digits,
-    read_report, read_stream, utc,
+    Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, digits, read_report,
+    read_stream, utc,
 };
 use crate::scene;
 
@@ -240,11 +240,8 @@ fn same_place(header: &Header, begun: &RunArgs) -> Result<()> {
         binary: binary_digest(),
         ..header.clone()
     };
-    if let Some(Setting {
-        of, what, old, new, ..
-    }) = header.differs_in_place(&here)
-    {
-        bail!("{of} differs: {what} '{old}', and '{new}' here; expected the same: begin a new run");
+    if let Some(differs) = header.differs_in_place(&here) {
+        bail!("{differs} here; expected the same: begin a new run");
     }
     Ok(())
 }

@@ -4,6 +4,8 @@
 //! of its group, process by process: what moves a whole process, and most of what tells two days
 //! apart, drops out.
 
+use std::fmt;
+
 use serde::Serialize;
 
 use super::judging::{COUNTERS, Changes, CommonShift, JudgedRow, Lone, Outcome, WORK, WorkChange};
@@ -384,6 +386,13 @@ pub struct Setting {
     pub new: String,
     /// True if it is another machine: absolute times do not compare.
     pub is_machine: bool,
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (of, what, old, new) = (self.of, self.what, &self.old, &self.new);
+        write!(f, "{of} differs: {what} '{old}', and '{new}'")
+    }
 }
 
 /// Whose, name, whether it tells two machines apart, and the fact itself.

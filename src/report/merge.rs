@@ -6,7 +6,6 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::changes::Setting;
 use super::folder::{self, save_report};
 
 use super::reading::read_stream;
@@ -178,14 +177,8 @@ impl Merged {
 /// Why a shard is not one of the same plan, from the same machine and build.
 fn another_plan(begin: &Header, own: &Header, first: &Path) -> Option<String> {
     let first = first.display();
-    let differs = begin.differs(own).map(
-        |Setting {
-             of, what, old, new, ..
-         }| {
-            let differs = format!("{of} differs: {what} '{new}', and '{old}' in {first}");
-            differs + "; expected the same in all shards"
-        },
-    );
+    let told = |differs| format!("{differs} in {first}; expected the same in all shards");
+    let differs = own.differs(begin).map(told);
     let other = "expected the same scenes, paths and tests";
     let other = || format!("a shard of another plan than {first}; {other}");
     differs.or_else(|| (begin.whole() != own.whole()).then(other))
