@@ -261,14 +261,11 @@ impl<'a> Run<'a> {
                 process,
                 scene: before.map_or_else(unknown, |part| part.scene.clone()),
                 path: before.map_or_else(|| PathInfo::unknown(key), |part| part.path.clone()),
-                known: None,
-                judged: None,
                 subjects: structures
                     .map(|spec| SubjectPart::unknown(spec, verdict.clone()))
                     .collect(),
                 failed: failed.clone(),
-                bounds: Vec::new(),
-                tasks: Vec::new(),
+                ..Part::default()
             };
             self.stream.parts.push(self.folder.keep(part, &[])?);
             self.bar.inc(1);

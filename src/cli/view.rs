@@ -257,7 +257,7 @@ pub enum Fate {
 }
 
 /// Everything that the page draws.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct ViewData {
     pub scene: String,
     pub path: String,
@@ -350,9 +350,7 @@ impl ViewData {
             origin: scene.origin.to_array(),
             ids: ids.0,
             boxes: boxes.0,
-            samples: None,
-            frames: Vec::new(),
-            structures: Vec::new(),
+            ..ViewData::default()
         };
         let order = order.into_iter().map(|(_, item)| item as ItemId);
         (data, order.collect())
