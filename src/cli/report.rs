@@ -167,15 +167,12 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
         }
     }
     blocks.extend(details(&all, views));
-    blocks.extend(
-        run_table::choices(&all.iter().collect::<Vec<_>>())
-            .into_iter()
-            .map(Block::Line),
-    );
+    let every: Vec<&Comparison> = all.iter().collect();
+    blocks.extend(run_table::choices(&every).into_iter().map(Block::Line));
     blocks.extend(surface_tables::blocks(report, 1));
     blocks.push(Block::Heading(2, "Statuses".to_owned()));
     let cells = text::counted(report.cells.len(), "cell");
-    let reasons = run_table::reasons(&all.iter().collect::<Vec<_>>());
+    let reasons = run_table::reasons(&every);
     let all_ok = format!("{cells}, all ok{}.", text::missing(report));
     let all_ok = reasons.is_empty().then_some(all_ok);
     blocks.extend(reasons.into_iter().chain(all_ok).map(Block::Line));

@@ -34,10 +34,8 @@ pub fn times(ratio: f64) -> String {
 /// Conclusion of one scene and path.
 pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     let mut told = vec![ranking(comparison, base)];
-    told.extend(
-        base.filter(|_| comparison.sound().nth(1).is_some())
-            .and_then(fallback),
-    );
+    let of_several = base.filter(|_| comparison.sound().nth(1).is_some());
+    told.extend(of_several.and_then(fallback));
     told.extend(repaid(comparison, base));
     told.extend(gains(&SharedWork::of(comparison.sound())));
     told.extend(checked(&[comparison]));
@@ -103,11 +101,8 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     // Noise alone may tie the fastest with what is slower than the next best.
     let is_ahead =
         |cell: &&&ReportCell| next.and_then(|next| times_as_fast(next, cell)) >= next.map(|_| 1.0);
-    let names = winners
-        .iter()
-        .filter(is_ahead)
-        .map(|cell| cell.structure.as_str());
-    let names: Vec<&str> = names.collect();
+    let ahead = winners.iter().filter(is_ahead);
+    let names: Vec<&str> = ahead.map(|cell| cell.structure.as_str()).collect();
     let time = text::some(best.time(), |time| text::time(time.value));
     let per = ["query", "frame"][usize::from(!best.path.motion.is_empty())];
     let lead = |cell: &ReportCell| text::some(times_as_fast(cell, best), times);
@@ -269,10 +264,8 @@ fn standing(all: usize, overall: &Overall) -> String {
     let firsts: Vec<String> = firsts.map(|s| s.first_in.to_string()).collect();
     let firsts: Vec<&str> = firsts.iter().map(String::as_str).collect();
     told += &format!("; first or tied in {} of {all}.", listed(&firsts, "and"));
-    let apart = overall
-        .standings
-        .iter()
-        .filter(|s| s.speedup.is_none() && s.first_in > 0);
+    let apart = overall.standings.iter();
+    let apart = apart.filter(|s| s.speedup.is_none() && s.first_in > 0);
     let apart = apart.map(|s| format!("{} (first or tied in {})", s.structure, s.first_in));
     let apart = text::joined(apart);
     if !apart.is_empty() {

@@ -90,14 +90,12 @@ impl SceneFacts {
         };
         let step = |axis: usize| {
             let farthest = bounds.min[axis].abs().max(bounds.max[axis].abs()) as f32;
+            if !farthest.is_finite() {
+                return f64::INFINITY;
+            }
             // The largest f32 has no finite number above it.
             let low = farthest.min(f32::MAX.next_down());
             f64::from(low.next_up() - low)
-                * if farthest < f32::INFINITY {
-                    1.0
-                } else {
-                    f64::INFINITY
-                }
         };
         let (mut sampled, mut meeting, mut others) = (0, 0, 0);
         if !scene.items.is_empty() {

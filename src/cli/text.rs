@@ -1,7 +1,7 @@
 //! Figures as text.
 
 use std::io::{self, Write};
-use std::iter::repeat;
+use std::iter;
 
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
@@ -229,10 +229,8 @@ pub fn entries(rows: &[[String; 2]], width: usize) -> String {
     let mut all = String::new();
     for [name, text] in rows {
         let text = wrapped(text, width.saturating_sub(names + 4));
-        for (line, name) in text
-            .lines()
-            .zip([name.as_str()].into_iter().chain(repeat("")))
-        {
+        let before = iter::once(name.as_str()).chain(iter::repeat(""));
+        for (line, name) in text.lines().zip(before) {
             all += format!("  {name:<names$}  {line}").trim_end();
             all.push('\n');
         }
@@ -314,9 +312,8 @@ pub fn quoted(word: &str) -> String {
 /// Text of an element or an attribute.
 pub fn html(text: &str) -> String {
     let text = plain(text).replace('&', "&amp;").replace('<', "&lt;");
-    text.replace('>', "&gt;")
-        .replace('"', "&quot;")
-        .replace('\'', "&#39;")
+    let text = text.replace('>', "&gt;").replace('"', "&quot;");
+    text.replace('\'', "&#39;")
 }
 
 /// A share as a percentage, never rounded up to 100.
