@@ -130,9 +130,10 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
 fn of_growths(growths: &[Growth]) -> Table {
     let columns: &[Column<&Growth>] = &[
         ("world, path, cache, test", |g| {
-            text::joined([&g.world, g.path, g.cache, g.test])
+            let (world, path, cache, test, _) = &g.key;
+            text::joined([world, *path, *cache, *test])
         }),
-        ("structure", |g| g.structure.to_owned()),
+        ("structure", |g| g.key.4.to_owned()),
         (">visible", |g| text::count(g.visible.round() as usize)),
         (">items", |g| {
             let sizes = g.sizes.first().zip(g.sizes.last());

@@ -207,16 +207,8 @@ impl Surface<'_> {
 
 /// The growth of one structure.
 pub struct Growth<'r> {
-    /// Name of the scene without its number of items.
-    pub world: String,
-    /// Name of the path family.
-    pub path: &'r str,
-    /// "warm" or "cold".
-    pub cache: &'r str,
-    /// Name of the culling test.
-    pub test: &'r str,
-    /// Label of the structure.
-    pub structure: &'r str,
+    /// What its cells have in common.
+    pub key: SeriesKey<'r>,
     /// Mean over the sizes.
     pub visible: f64,
     /// Ascending.
@@ -258,17 +250,18 @@ pub(super) fn enter_growths(report: &mut Report) {
     }
 }
 
-type Key<'r> = (String, &'r str, &'r str, &'r str, &'r str);
+/// World, kind of path, cache state, culling test and structure.
+pub type SeriesKey<'r> = (String, &'r str, &'r str, &'r str, &'r str);
 /// Items, visible ones, ns, place of the cell.
 type Point = (usize, f64, f64, usize);
 
-fn key(cell: &ReportCell) -> Key<'_> {
+fn key(cell: &ReportCell) -> SeriesKey<'_> {
     let path = cell.path.name.split(':').next().unwrap_or_default();
     let world = world_of(&cell.scene.name);
     (world, path, &cell.path.cache, &cell.test, &cell.structure)
 }
 
-fn of_series<'r>((key, mut points): (Key<'r>, Vec<Point>)) -> Vec<Growth<'r>> {
+fn of_series<'r>((key, mut points): (SeriesKey<'r>, Vec<Point>)) -> Vec<Growth<'r>> {
     points.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut found = Vec::new();
     while let Some(&(_, least, ..)) = points.first() {
@@ -282,11 +275,7 @@ fn of_series<'r>((key, mut points): (Key<'r>, Vec<Point>)) -> Vec<Growth<'r>> {
             continue;
         };
         found.push(Growth {
-            world: key.0.clone(),
-            path: key.1,
-            cache: key.2,
-            test: key.3,
-            structure: key.4,
+            key: key.clone(),
             visible: same.iter().map(|p| p.1).sum::<f64>() / same.len() as f64,
             sizes: same.iter().map(|p| p.0).collect(),
             exponent,
