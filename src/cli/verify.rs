@@ -196,14 +196,9 @@ fn workloads<'a>(
 
 /// Every test and arithmetic but the given one, as far as they go together.
 fn other_cullings(culling: &Culling) -> Vec<Culling> {
-    let mut all = Vec::new();
-    for (test, ..) in TESTS {
-        all.extend(ARITHMETICS.map(|(arithmetic, ..)| Culling {
-            test,
-            arithmetic,
-            ..*culling
-        }));
-    }
+    let planes = culling.planes;
+    let of_test = |test| ARITHMETICS.map(|(numbers, ..)| Culling::new(test, numbers, planes));
+    let mut all: Vec<Culling> = TESTS.iter().flat_map(|row| of_test(row.0)).collect();
     all.retain(|other| other != culling && other.check().is_ok());
     all
 }
@@ -318,13 +313,11 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             break;
         }
         let case = RandomCase::new(case_seed);
-        let mut seen = Trial::new(case.items.len());
+        let mut trials = [(); 3].map(|()| Trial::new(case.items.len()));
+        let [seen, holding, overlapping] = &mut trials;
         seen.see(&case.items, &case.volume);
-        let mut holding = Trial::new(case.items.len());
         holding.expect(Regions::Items.holding(case.point, &case.items));
-        let mut overlapping = Trial::new(case.items.len());
         overlapping.expect(case.overlapping());
-        let mut trials = [seen, holding, overlapping];
         for (spec, check) in structures.iter().zip(&mut checks) {
             check.volumes += 1;
             check.verdicts += 3 * case.items.len() as u64;

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings};
+use crate::camera::{Camera, CameraError, PlaneOptions, Surroundings};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, Input, StructureSpec};
@@ -199,16 +199,14 @@ impl Case {
         let spheres = (&cubes[..], found.built(structures, input));
         for (arithmetic, arithmetic_name, _) in ARITHMETICS {
             for (test, test_name, _) in TESTS {
-                let is_f32 = arithmetic == Arithmetic::F32;
-                let is_frame = self.planes.method == PlaneMethod::Frame;
-                if !is_f32 && (test == CullingTest::Sphere || !is_frame) {
+                let culling = Culling::new(test, arithmetic, self.planes);
+                if culling.check().is_err() {
                     continue;
                 }
                 let name = match arithmetic {
                     Arithmetic::F32 => test_name.to_owned(),
                     _ => format!("{test_name} {arithmetic_name}"),
                 };
-                let culling = Culling::new(test, arithmetic, self.planes);
                 let (items, built) = match test {
                     CullingTest::Sphere => &spheres,
                     _ => &boxes,
