@@ -1,7 +1,6 @@
 //! Figures of a run: speed-ups, growth, views along the path, error against time.
 
-use super::diagram::{Diagram, Joined, Point, Series};
-use super::diagram::{Row, rows};
+use super::diagram::{Diagram, Joined, Point, Row, Series, rows};
 use super::error_figure::{Measured, against};
 use super::figure::{Axis, Figure, Look, ends, is_drawn, left_out};
 use super::run_verdict::times;

@@ -5,8 +5,7 @@ use std::fmt::Write;
 use glam::{DVec2, DVec3};
 
 use super::figure::round_values;
-use super::text;
-use super::text::html;
+use super::text::{self, html};
 use crate::geometry::{Aabb, Plane};
 use crate::index::TreeCell;
 use crate::scene::{Scene, UpAxis, clipped};

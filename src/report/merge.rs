@@ -10,8 +10,7 @@ use super::folder::{self, save_report};
 
 use super::reading::read_stream;
 use super::stream::{Header, Stream, pairs};
-use super::writing::{self, SAMPLE_COLUMNS, SAMPLES, STREAM};
-use super::writing::{folder_of, temporary_folder_in};
+use super::writing::{self, SAMPLE_COLUMNS, SAMPLES, STREAM, folder_of, temporary_folder_in};
 use crate::input::InputError;
 use crate::measure::GroupKey;
 use crate::shown::first_of;
