@@ -255,15 +255,14 @@ impl<'a> Run<'a> {
             let before = self.stream.of_group(key);
             let before = before.first().map(|kept| &kept.part);
             let structures = self.plan.plan.structures.iter();
+            let subjects = structures.map(|spec| SubjectPart::unknown(spec, verdict.clone()));
             let unknown = || SceneInfo::unknown(&planned.source);
             let part = Part {
                 key: key.clone(),
                 process,
                 scene: before.map_or_else(unknown, |part| part.scene.clone()),
                 path: before.map_or_else(|| PathInfo::unknown(key), |part| part.path.clone()),
-                subjects: structures
-                    .map(|spec| SubjectPart::unknown(spec, verdict.clone()))
-                    .collect(),
+                subjects: subjects.collect(),
                 failed: failed.clone(),
                 ..Part::default()
             };

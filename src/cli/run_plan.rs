@@ -65,10 +65,8 @@ pub fn plan_of(
     let cullings: Vec<Culling> = cullings.collect::<Result<_, _>>()?;
     cullings.iter().try_for_each(Culling::check)?;
     each_once("test", tests())?;
-    let structures = args
-        .culling
-        .kernel
-        .structures(registry, args.moves.list(&names))?;
+    let list = args.moves.list(&names);
+    let structures = args.culling.kernel.structures(registry, list)?;
     let mut plan = Plan {
         scenes: scenes(args, &suite)?,
         cullings,

@@ -306,14 +306,13 @@ pub fn short(source: &str) -> String {
         let file = source.rsplit(['/', '\\']).next();
         return shortened(file.unwrap_or(source), 24);
     };
-    let values = parameters
-        .split(',')
-        .filter_map(|pair| match pair.split_once('=')? {
-            ("frames", _) => None,
-            ("n", count) => Some(format!(" {}", short_count(count))),
-            ("visible", share) => Some(format!(" {}", share.replace('%', " %"))),
-            _ => Some(format!(" {pair}")),
-        });
+    let value = |pair: &str| match pair.split_once('=')? {
+        ("frames", _) => None,
+        ("n", count) => Some(format!(" {}", short_count(count))),
+        ("visible", share) => Some(format!(" {}", share.replace('%', " %"))),
+        _ => Some(format!(" {pair}")),
+    };
+    let values = parameters.split(',').filter_map(value);
     shortened(&format!("{name}{}", values.collect::<String>()), 36)
 }
 

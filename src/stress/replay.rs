@@ -98,11 +98,9 @@ impl Replay<'_> {
             for spec in self.structures {
                 let build = |(scene, item): &(Vec<Aabb>, usize)| refused(spec.build(scene), *item);
                 let refusals: Result<Vec<String>, String> = scenes.iter().map(build).collect();
-                let (status, got) = match refusals {
-                    Ok(texts) => match texts.into_iter().next() {
-                        Some(text) => (Status::Refused, text),
-                        None => (Status::Fail, "no such box".to_owned()),
-                    },
+                let (status, got) = match refusals.map(|texts| texts.into_iter().next()) {
+                    Ok(Some(text)) => (Status::Refused, text),
+                    Ok(None) => (Status::Fail, "no such box".to_owned()),
                     Err(text) => (Status::Fail, text),
                 };
                 let expected = format!("refused at load: {}", name.0);
