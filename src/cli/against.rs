@@ -299,19 +299,17 @@ impl Duel<'_> {
     /// One process's share of a scene: the plan of the new side, and the answers of its
     /// own side to be counted.
     fn share(&self, scene: usize, process: u32, [new, own]: [&[Part]; 2]) -> Share {
-        let planned = &self.plan.scenes[scene];
-        let groups = self.plan.groups_of(planned);
-        let keys = groups.iter().map(|group| self.plan.key(planned, group));
-        let known = keys.map(|key| {
-            let mut known = counted(new, &key)?.clone();
-            let answers = counted(own, &key).map(|own| (own.visible.clone(), own.located.clone()));
+        let keys = self.plan.keys_of(&self.plan.scenes[scene]);
+        let known = keys.iter().map(|key| {
+            let mut known = counted(new, key)?.clone();
+            let answers = counted(own, key).map(|own| (own.visible.clone(), own.located.clone()));
             (known.visible, known.located) = answers.unwrap_or_default();
             Some(known)
         });
         Share {
             process,
             known: known.collect(),
-            ..Share::first(groups.len())
+            ..Share::first(keys.len())
         }
     }
 

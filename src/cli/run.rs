@@ -163,9 +163,7 @@ impl<'a> Run<'a> {
     /// All processes of a scene.
     fn scene(&mut self, scene: usize) -> Result<()> {
         let planned = self.plan.plan.scenes[scene].clone();
-        let groups = self.plan.plan.groups_of(&planned).into_iter();
-        let keys = groups.map(|group| self.plan.plan.key(&planned, &group));
-        let keys: Vec<GroupKey> = keys.collect();
+        let keys = self.plan.plan.keys_of(&planned);
         let mut failed = self.failed_before(&planned.source);
         for process in 0..self.plan.plan.effort.processes {
             loop {

@@ -152,19 +152,24 @@ impl Plan {
         groups
     }
 
-    /// The key of a group of a scene.
-    pub fn key(&self, scene: &PlannedScene, group: &SceneGroup) -> GroupKey {
-        let SceneGroup { path, motion, .. } = group;
-        GroupKey::of(&scene.source, path, group.cold, &group.culling, motion)
+    /// Keys of the groups of a scene, in the same order.
+    pub fn keys_of(&self, scene: &PlannedScene) -> Vec<GroupKey> {
+        let key = |own: SceneGroup| {
+            GroupKey::of(
+                &scene.source,
+                &own.path,
+                own.cold,
+                &own.culling,
+                &own.motion,
+            )
+        };
+        self.groups_of(scene).into_iter().map(key).collect()
     }
 
     /// Keys of all groups, in the order in which they are measured.
     pub fn groups(&self) -> Vec<GroupKey> {
-        let of_scene = |scene| {
-            let groups = self.groups_of(scene).into_iter();
-            groups.map(move |group| self.key(scene, &group))
-        };
-        self.scenes.iter().flat_map(of_scene).collect()
+        let keys_of = |scene| self.keys_of(scene);
+        self.scenes.iter().flat_map(keys_of).collect()
     }
 
     /// Keys of all cells: each structure in each group.
@@ -338,12 +343,10 @@ pub fn measure_scene(
             seed: plan.seed.wrapping_add(u64::from(share.process)),
             cache_bytes: sweep,
         };
+        let has_bounds = plan.bounds && plan.has_all();
         let settings = GroupPlan {
             process: share.process,
-            bounds: match plan.bounds && plan.has_all() {
-                true => BOUNDS,
-                false => &[],
-            },
+            bounds: if has_bounds { BOUNDS } else { &[] },
             known,
             plan_only: share.plan_only,
             locate: plan.effort.extras != Extras::Nothing,
