@@ -94,10 +94,7 @@ impl Pass {
 
     /// The pass that times tasks of this kind.
     pub(super) fn of(task: TaskKind) -> Pass {
-        match task {
-            TaskKind::Locate | TaskKind::LocateBatched => Pass::Searches,
-            _ => Pass::Queries,
-        }
+        Pass::ALL[usize::from(Pass::Searches.tasks().contains(&task))]
     }
 
     /// The tasks that this pass times in a still scene.

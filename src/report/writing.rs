@@ -222,10 +222,8 @@ pub(super) fn json(path: &Path, error: &JsonError, whole: &str) -> InputError {
 
 /// A file of another schema version.
 pub(super) fn version(path: &Path, found: u32) -> InputError {
-    at(
-        path,
-        format_args!("schema version {found}; expected {SCHEMA_VERSION}"),
-    )
+    let text = format!("schema version {found}; expected {SCHEMA_VERSION}");
+    at(path, text)
 }
 
 /// A folder that holds a run already.
