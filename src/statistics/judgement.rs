@@ -44,7 +44,7 @@ const MOST_PAIRS: usize = 10_000;
 
 named! {
     /// How the new times stand to the old.
-    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+    #[derive(Clone, Copy, Default, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     #[non_exhaustive]
     pub enum Change {
@@ -55,12 +55,13 @@ named! {
         /// A change of the threshold's size is ruled out.
         Same = "same",
         /// Neither a change nor its absence is proven.
+        #[default]
         Inconclusive = "inconclusive",
     }
 }
 
 /// The verdict on one cell, with the figures it rests on.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Judgement {
     /// Slower, faster, same or inconclusive.
@@ -84,13 +85,9 @@ impl Judgement {
     /// A quotient that decides nothing.
     pub(crate) fn without_interval(ratio: f64, pairs: usize) -> Judgement {
         Judgement {
-            change: Change::Inconclusive,
             ratio,
-            lower: None,
-            upper: None,
-            resolution: None,
-            more_pairs: None,
             pairs,
+            ..Judgement::default()
         }
     }
 }
