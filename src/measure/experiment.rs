@@ -155,13 +155,8 @@ impl Plan {
     /// Keys of the groups of a scene, in the same order.
     pub fn keys_of(&self, scene: &PlannedScene) -> Vec<GroupKey> {
         let key = |own: SceneGroup| {
-            GroupKey::of(
-                &scene.source,
-                &own.path,
-                own.cold,
-                &own.culling,
-                &own.motion,
-            )
+            let (path, motion) = (&own.path, &own.motion);
+            GroupKey::of(&scene.source, path, own.cold, &own.culling, motion)
         };
         self.groups_of(scene).into_iter().map(key).collect()
     }
