@@ -22,8 +22,8 @@ use crate::path::{self, CameraPath};
 use crate::query::{ItemId, Located};
 use crate::scene::{FAMILIES, Regions, SAMPLES, Scene, every_part};
 use crate::verify::{
-    ErrorCount, Fault, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment,
-    explain_visibility, points_on_faces, variants,
+    ErrorCount, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment, explain_visibility,
+    points_on_faces, variants,
 };
 
 /// Verdicts of the oracle for each scene and path.
@@ -357,17 +357,13 @@ fn differ(
     [seen, holding, overlapping]: &mut [Trial; 3],
 ) -> Result<(), Verdict> {
     let item = |id: usize| case.items.get(id);
-    let verdict = |what: &str, fault: &Fault, explain: &dyn Fn(usize) -> Option<String>| {
-        let why = format!("{what}{}", fault.explained(explain));
-        Verdict::new(Status::of(fault), why)
-    };
     let visible = |id| Some(explain_visibility(item(id)?, &case.volume));
     seen.ask(|out| index.visible(&case.volume, out))
-        .map_err(|fault| verdict("", &fault, &visible))?;
+        .map_err(|fault| Verdict::of(&fault, "", visible))?;
     let holds = |id| Some(explain_containment(item(id)?, case.point));
     let out = holding
         .ask(|out| index.locate(case.point, out))
-        .map_err(|fault| verdict("region search: ", &fault, &holds))?;
+        .map_err(|fault| Verdict::of(&fault, "region search: ", holds))?;
     let nowhere = Vec3::new(case.point.x, f32::NAN, case.point.z);
     let mut many = Located::default();
     let points = [case.point, nowhere, case.point];
@@ -386,7 +382,7 @@ fn differ(
     let volume = ConvexVolume::of_box(&case.region);
     let overlaps = |id| Some(format!("{:?} by {:?}", item(id)?, case.region));
     let asked = overlapping.ask(|out| index.visible(&volume, out));
-    asked.map_err(|fault| verdict("search by a box: ", &fault, &overlaps))?;
+    asked.map_err(|fault| Verdict::of(&fault, "search by a box: ", overlaps))?;
     Ok(())
 }
 

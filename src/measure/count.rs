@@ -256,13 +256,8 @@ fn verdict(
     explain: impl FnOnce(usize) -> String,
 ) -> Verdict {
     match answered {
-        Err(fault @ Fault::Panicked(_)) => {
-            Verdict::new(Status::Panicked, fault.explained(|_| None))
-        }
-        Err(fault) => {
-            let told = fault.explained(|id| Some(explain(id)));
-            Verdict::new(Status::of(&fault), format!("{question}: {told}"))
-        }
+        Err(fault @ Fault::Panicked(_)) => Verdict::of(&fault, "", |_| None),
+        Err(fault) => Verdict::of(&fault, &format!("{question}: "), |id| Some(explain(id))),
         Ok(()) if spent > PATIENCE => {
             let reason = format!("the count pass took longer than {} s", PATIENCE.as_secs());
             Verdict::new(Status::TimedOut, reason)

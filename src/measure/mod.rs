@@ -138,6 +138,16 @@ pub struct Verdict {
 }
 
 impl Verdict {
+    /// The verdict on a fault, told behind its place.
+    pub fn of(
+        fault: &Fault,
+        place: &str,
+        explain: impl FnOnce(usize) -> Option<String>,
+    ) -> Verdict {
+        let told = fault.explained(explain);
+        Verdict::new(Status::of(fault), format!("{place}{told}"))
+    }
+
     /// Returns true for a right answer.
     pub fn is_ok(&self) -> bool {
         self.status == Status::Ok
@@ -183,8 +193,7 @@ fn compare_with_scan(
     trial.see(items, volume);
     trial.ask(answer).map(drop).map_err(|fault| {
         let why = |id: usize| Some(explain_visibility(&items[id], volume));
-        let reason = format!("{place}: {}", fault.explained(why));
-        Verdict::new(Status::of(&fault), reason)
+        Verdict::of(&fault, &format!("{place}: "), why)
     })
 }
 
