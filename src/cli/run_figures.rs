@@ -6,7 +6,7 @@ use super::figure::{Axis, Figure, Look, ends, is_drawn, left_out};
 use super::run_verdict::times;
 use super::text;
 use crate::report::{Comparison, Reading, ReportCell, Speedup, Views};
-use crate::statistics::quantile;
+use crate::statistics::{quantile, sorted};
 
 /// Least number of clock readings along a path for a line, and for quantiles.
 const LEAST_READINGS: [usize; 2] = [4, 20];
@@ -103,8 +103,7 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
             series.push(Series::of(&cell.structure, cell.is_scan(), points));
         }
         if readings.len() >= LEAST_READINGS[1] {
-            let mut ns: Vec<f64> = readings.iter().map(|r| r.ns).collect();
-            ns.sort_by(f64::total_cmp);
+            let ns = sorted(readings.iter().map(|r| r.ns).collect());
             let quantiles =
                 [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| quantile(&ns, share).unwrap_or(ns[0]));
             let ([low, first, median, third, high], told) = (quantiles, quantiles.map(text::time));

@@ -11,6 +11,7 @@ use crate::measure::YARDSTICK;
 use crate::report::{
     Crossing, Growth, Overall, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
 };
+use crate::statistics::sorted;
 
 fn title(surface: &Surface) -> String {
     format!("{}, {}, {}", surface.world, surface.cache, surface.test)
@@ -195,8 +196,7 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     let points = || figures.iter().flat_map(|f| &f.1).flat_map(|s| &s.points);
     let values = |place: usize| points().map(move |p| p.at[place]).collect::<Vec<_>>();
     let [items, ns] = [0, 1].map(values);
-    let mut sizes = items.clone();
-    sizes.sort_by(f64::total_cmp);
+    let mut sizes = sorted(items.clone());
     sizes.dedup();
     let size = |items: f64| text::count(items.round() as usize);
     let figure = |(class, series, beyond)| {

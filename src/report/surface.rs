@@ -5,7 +5,7 @@
 use super::ranking::{grouped, unique};
 use super::{Comparison, Report, ReportCell};
 use crate::measure::{Metric, Status, YARDSTICK};
-use crate::statistics::{Estimate, slope};
+use crate::statistics::{Estimate, slope, sorted};
 
 /// One world of several sizes, with one cache state and culling test.
 pub struct Surface<'r> {
@@ -126,8 +126,7 @@ impl Surface<'_> {
 
     /// Ascending, each once.
     pub fn classes(&self) -> Vec<f64> {
-        let mut classes: Vec<f64> = self.places.iter().map(|p| p.class).collect();
-        classes.sort_by(f64::total_cmp);
+        let mut classes = sorted(self.places.iter().map(|p| p.class).collect());
         classes.dedup();
         classes
     }
