@@ -196,17 +196,13 @@ pub fn asked_otherwise((old, new): Pair) -> Option<String> {
     let digests = |what: &str, old: &str, new: &str| {
         (old != new).then(|| format!("{what}: digest {old:.8} and {new:.8}"))
     };
-    if let Some(reason) = digests("other items", &old.scene.digest, &new.scene.digest) {
-        return Some(reason);
-    }
-    let cameras = (old.path.camera_count, new.path.camera_count);
-    if cameras.0 != cameras.1 {
-        return Some(format!("{} cameras and {}", cameras.0, cameras.1));
-    }
+    let items = digests("other items", &old.scene.digest, &new.scene.digest);
+    let (was, is) = (old.path.camera_count, new.path.camera_count);
+    let count = (was != is).then(|| format!("{was} cameras and {is}"));
     // A report may not know its cameras.
-    let (was, is) = (old.path.digest.as_ref(), new.path.digest.as_ref());
-    was.zip(is)
-        .and_then(|(was, is)| digests("other cameras or motions", was, is))
+    let both = old.path.digest.as_ref().zip(new.path.digest.as_ref());
+    let cameras = both.and_then(|(was, is)| digests("other cameras or motions", was, is));
+    items.or(count).or(cameras)
 }
 
 /// Why the times are not of the same work, if they are not: the mean over other
