@@ -91,10 +91,9 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
     let frames = 0.0..visible.len().saturating_sub(1) as f64;
     let x = || Axis::linear(view, frames.clone(), &frame);
     let (mut series, mut spread, mut queries) = (Vec::new(), Vec::new(), 1);
-    for cell in comparison.sound() {
-        let Some(readings) = views.times.get(&cell.structure) else {
-            continue;
-        };
+    let cells = comparison.sound();
+    let timed = cells.filter_map(|cell| Some((cell, views.times.get(&cell.structure)?)));
+    for (cell, readings) in timed {
         let readings: Vec<_> = readings.iter().filter(|r| is_drawn(r.ns)).collect();
         let point = |reading: &&Reading| Point::new([reading.frame, reading.ns]);
         if readings.len() >= LEAST_READINGS[0] {

@@ -92,12 +92,10 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 Pass::Searches => trial.expect(scene.holding(&workload.sought[n])),
             }
             for (i, subject) in subjects.iter().enumerate() {
-                let (counted, Ok(built)) = (&mut all[i], &subject.built) else {
+                let counted = &mut all[i];
+                let (true, Ok(built)) = (counted.verdict.is_ok(), &subject.built) else {
                     continue;
                 };
-                if !counted.verdict.is_ok() {
-                    continue;
-                }
                 notice(Some(&labels[i]), "counting");
                 let start = Instant::now();
                 let cost = &mut counted.costs[pass as usize];
