@@ -149,21 +149,18 @@ fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSp
         );
         policies.push(policy);
     }
-    let mut all = Vec::new();
+    let mut all: Vec<StructureSpec> = Vec::new();
     for spec in specs {
-        let refits = spec.info().refits;
-        let mut has_rebuilt = false;
         for &policy in &policies {
             let mut own = spec.clone();
-            own.policy = policy;
-            match policy {
-                UpdatePolicy::Fat(_) => own.label += &format!("@{policy}"),
-                _ if !refits && has_rebuilt => continue,
-                _ if !refits => (own.policy, has_rebuilt) = (UpdatePolicy::Refit, true),
-                UpdatePolicy::Refit => (),
-                _ => own.label += &format!("@{policy}"),
+            let differs = spec.info().refits || matches!(policy, UpdatePolicy::Fat(_));
+            own.policy = if differs { policy } else { UpdatePolicy::Refit };
+            if own.policy != UpdatePolicy::Refit {
+                own.label += &format!("@{policy}");
             }
-            all.push(own);
+            if all.iter().all(|entered| entered.label != own.label) {
+                all.push(own);
+            }
         }
     }
     Ok(all)
