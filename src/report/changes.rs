@@ -398,14 +398,13 @@ impl fmt::Display for Setting {
 /// Whose, name, whether it tells two machines apart, and the fact itself.
 pub(super) type Fact = (&'static str, &'static str, bool, String);
 
-pub(super) fn known(fact: Option<&str>) -> String {
-    fact.unwrap_or("unknown").to_owned()
+pub(super) fn known(fact: &Option<String>) -> String {
+    fact.as_deref().unwrap_or("unknown").to_owned()
 }
 
 pub(super) fn facts(machine: &Machine, tools: &Toolchain) -> Vec<Fact> {
     let (of_machine, of_tools) = ("machine", "toolchain");
     let (vectors, locked) = (machine.instruction_set.clone(), tools.lock_digest.clone());
-    let known = |fact: &Option<String>| known(fact.as_deref());
     let caches = machine.caches.iter();
     let caches = caches.map(|cache| format!("L{} {} KiB", cache.level, cache.bytes >> 10));
     let caches = caches.collect::<Vec<_>>().join(" ");

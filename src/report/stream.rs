@@ -124,12 +124,12 @@ impl Header {
         all.extend([
             ("program", "schema version", false, version),
             ("machine", "features", true, features),
-            ("machine", "memory", true, known(memory.as_deref())),
-            ("machine", "system", false, known(machine.os.as_deref())),
+            ("machine", "memory", true, known(&memory)),
+            ("machine", "system", false, known(&machine.os)),
             ("program", "version", false, source.version.clone()),
-            ("program", "commit", false, known(source.commit.as_deref())),
-            ("program", "dirty", false, known(dirty.as_deref())),
-            ("program", "digest", false, known(self.binary.as_deref())),
+            ("program", "commit", false, known(&source.commit)),
+            ("program", "dirty", false, known(&dirty)),
+            ("program", "digest", false, known(&self.binary)),
         ]);
         all
     }
@@ -140,7 +140,7 @@ impl Header {
         let files = files.map(|(name, digest)| format!("{name} {digest:.8}"));
         vec![
             ("plan", "seed", false, run.seed.to_string()),
-            ("plan", "suite", false, known(run.suite.as_deref())),
+            ("plan", "suite", false, known(&run.suite)),
             ("plan", "generator", false, run.generator.clone()),
             ("plan", "processes", false, run.processes.to_string()),
             ("plan", "structures", false, self.structures.join(",")),
