@@ -46,10 +46,8 @@ pub fn is_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
 }
 
 fn told_apart(leader: &[f64], other: &[f64], alpha: f64) -> bool {
-    match paired_difference(other, leader) {
-        Some(difference) => difference.p_above(0.0) <= alpha / 2.0,
-        None => true,
-    }
+    let difference = paired_difference(other, leader);
+    difference.is_none_or(|found| found.p_above(0.0) <= alpha / 2.0)
 }
 
 /// How a point stands to the front.

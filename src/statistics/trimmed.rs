@@ -33,17 +33,6 @@ pub struct Trimmed {
 }
 
 impl Trimmed {
-    /// A mean with the error that winsorised values give it.
-    fn of(mean: f64, winsorised: &[f64]) -> Trimmed {
-        let kept = kept(winsorised.len());
-        Trimmed {
-            mean,
-            standard_error: (squares(winsorised) / (kept * (kept - 1.0))).sqrt(),
-            df: kept - 1.0,
-            count: winsorised.len(),
-        }
-    }
-
     /// The two-sided interval of Student's t; `level` such as 0.95.
     pub fn interval(&self, level: f64) -> (f64, f64) {
         let margin = self.margin(0.5 + level / 2.0);
@@ -61,10 +50,8 @@ impl Trimmed {
 
     /// One-sided p of the hypothesis "the mean is at least `x`".
     pub fn p_below(&self, x: f64) -> f64 {
-        let mirrored = Trimmed {
-            mean: -self.mean,
-            ..*self
-        };
+        let mut mirrored = *self;
+        mirrored.mean = -self.mean;
         mirrored.p_above(-x)
     }
 
@@ -83,8 +70,14 @@ impl Trimmed {
 /// assert!((found.mean - 1.0).abs() < 0.02);
 /// ```
 pub fn trimmed_mean(values: &[f64]) -> Option<Trimmed> {
-    let centre = centre(values).filter(|_| values.len() >= 3)?;
-    Some(Trimmed::of(centre, &winsorised(values)))
+    let mean = centre(values).filter(|_| values.len() >= 3)?;
+    let kept = kept(values.len());
+    Some(Trimmed {
+        mean,
+        standard_error: (squares(&winsorised(values)) / (kept * (kept - 1.0))).sqrt(),
+        df: kept - 1.0,
+        count: values.len(),
+    })
 }
 
 /// The trimmed mean alone, of any number of values. `None` for none, a NaN or
