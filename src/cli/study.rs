@@ -18,7 +18,7 @@ use crate::index::Registry;
 use crate::input::{is_readable, tell_warnings};
 use crate::measure::{NO_ITEMS, ProcessTimes, Setting, Status};
 use crate::path;
-use crate::scene::{self, LoadOptions, Scene, split_part};
+use crate::scene::{self, Scene, split_part};
 
 /// Rounds of what is timed, at least and at most, if one process has them all.
 pub const ROUNDS: [usize; 2] = [5, 15];
@@ -57,18 +57,13 @@ pub fn load(
     let structures = args.kernel.structures(registry, &args.structure)?;
     // An impossible lens is reported before anything is loaded.
     let lens = args.lens.defaults()?;
-    let plain = args.lens.scene_args.options(0);
+    let mut options = args.lens.scene_args.options(0);
     let scene = match timing {
         None => {
-            let [structures, per_triangle] = held(structures.len());
-            let options = LoadOptions {
-                structures,
-                per_triangle,
-                ..plain
-            };
+            [options.structures, options.per_triangle] = held(structures.len());
             load_scene(&args.scene, &options)?
         }
-        Some(_) => scene::load(&args.scene, &plain)?,
+        Some(_) => scene::load(&args.scene, &options)?,
     };
     if scene.items.is_empty() {
         return Err(LeftOut(scene.name).into());
