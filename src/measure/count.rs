@@ -234,16 +234,13 @@ impl Judged {
 ///
 /// Those that boxes would have told are the sphere test's own. The exact test tells all there
 /// is to tell: those it returns of the stored boxes are its planes'.
-pub fn blamed(test: CullingTest, errors: ErrorCount) -> ErrorCount {
-    let by_planes = match test {
+pub fn blamed(test: CullingTest, mut errors: ErrorCount) -> ErrorCount {
+    errors.by_planes = match test {
         CullingTest::Sphere => 0,
         CullingTest::Exact => errors.false_positives - errors.by_storage,
         CullingTest::SixPlane | CullingTest::SixBox => errors.by_planes,
     };
-    ErrorCount {
-        by_planes,
-        ..errors
-    }
+    errors
 }
 
 /// Verdict on a structure from one answer and the time spent so far.

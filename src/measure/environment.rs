@@ -103,11 +103,9 @@ impl Machine {
     }
 
     /// The same machine, asked by that kernel.
-    pub fn by(self, kernel: Kernel) -> Machine {
-        Machine {
-            instruction_set: kernel.name().to_owned(),
-            ..self
-        }
+    pub fn by(mut self, kernel: Kernel) -> Machine {
+        self.instruction_set = kernel.name().to_owned();
+        self
     }
 
     /// Bytes that surely push everything else out of the caches: twice the

@@ -136,10 +136,8 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
             bounds = add_bounds(&mut keyed, workload, subjects, &answers[0], plan.bounds);
         }
         let given = plan.known.and_then(|known| known.pass(pass).0);
-        let protocol = Protocol {
-            task_ns: plan.protocol.task_ns * pass.share(),
-            ..plan.protocol
-        };
+        let mut protocol = plan.protocol;
+        protocol.task_ns *= pass.share();
         let mut schedule = keyed.schedule(given, workload.views.len(), &protocol);
         schedule.share_rounds(&keyed.keys);
         let labels = keyed.keys.iter().map(|(label, _)| label);

@@ -27,13 +27,11 @@ pub struct GroupKey {
 impl GroupKey {
     /// Text that is equal for equal keys, as a key of maps.
     pub fn id(&self) -> String {
-        let key = GroupKey {
-            // Zero has two signs and one meaning. Old reports have an epsilon with f64.
-            epsilon: match self.arithmetic.as_str() {
-                "f64" => 0.0,
-                _ => self.epsilon + 0.0,
-            },
-            ..self.clone()
+        let mut key = self.clone();
+        // Zero has two signs and one meaning. Old reports have an epsilon with f64.
+        key.epsilon = match self.arithmetic.as_str() {
+            "f64" => 0.0,
+            _ => self.epsilon + 0.0,
         };
         serde_json::to_string(&key).unwrap_or_default()
     }

@@ -419,11 +419,9 @@ fn over_fresh(
             index.query(workload.views[camera].as_any(), out);
         })
     });
-    let few = Protocol {
-        rounds: [ROUNDS, ROUNDS],
-        cameras: protocol.cameras.min(CAMERAS),
-        ..*protocol
-    };
+    let mut few = *protocol;
+    few.rounds = [ROUNDS, ROUNDS];
+    few.cameras = protocol.cameras.min(CAMERAS);
     let timed = timed_rounds(workload.views.len(), &tasks, &few);
     Ok(match &timed[..] {
         [Ok(refitted), Ok(rebuilt)] => refitted.over(rebuilt).map(f64::ln),

@@ -136,22 +136,19 @@ impl Known {
 impl SubjectPart {
     /// The results of a structure before its queries.
     pub(super) fn of(subject: &Subject, verdict: Verdict) -> SubjectPart {
-        let part = SubjectPart {
-            label: subject.label(),
-            ..SubjectPart::unknown(&subject.spec, verdict)
-        };
+        let mut part = SubjectPart::unknown(&subject.spec, verdict);
+        part.label = subject.label();
         let Ok(built) = &subject.built else {
             return part;
         };
-        let chose = guarded(|| built.items.chose());
-        SubjectPart {
-            build_ms: Some(built.build_ms),
-            memory_bytes: Some(built.memory.total() as u64),
-            update_ms: built.update_ms.clone(),
-            chose: chose.clone().unwrap_or_default(),
-            verdict: chose.err().unwrap_or(part.verdict),
-            ..part
+        part.build_ms = Some(built.build_ms);
+        part.memory_bytes = Some(built.memory.total() as u64);
+        part.update_ms.clone_from(&built.update_ms);
+        match guarded(|| built.items.chose()) {
+            Ok(chose) => part.chose = chose,
+            Err(verdict) => part.verdict = verdict,
         }
+        part
     }
 
     /// The results of a structure that was not tried.
