@@ -53,12 +53,11 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
     let mut entries = Vec::new();
     for subject in subjects {
         let verdict = subject.built.as_ref().err().cloned().unwrap_or_default();
+        let mut part = SubjectPart::of(subject, verdict);
+        part.chose = None;
         let mut entry = Entry {
             subject,
-            part: SubjectPart {
-                chose: None,
-                ..SubjectPart::of(subject, verdict)
-            },
+            part,
             replay_ns: 1.0,
             rounds: Vec::new(),
         };

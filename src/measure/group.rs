@@ -293,12 +293,11 @@ fn count<'a>(workload: &Workload, subjects: &'a [Subject], notice: Notice) -> Co
         let is_ok = counted.verdict.is_ok();
         let verdict = of_all.clone().filter(|_| is_ok);
         let verdict = verdict.unwrap_or_else(|| counted.verdict.clone());
+        let mut part = SubjectPart::of(subject, verdict);
+        part.counts = counts(&counted, workload.scene.items.len());
         Entry {
             subject,
-            part: SubjectPart {
-                counts: counts(&counted, workload.scene.items.len()),
-                ..SubjectPart::of(subject, verdict)
-            },
+            part,
             counted: Some(counted),
         }
     });

@@ -132,12 +132,10 @@ fn as_a_whole(basis: Basis, pair: Pair) -> Option<JudgedRow> {
 
 /// A pair with both values of a metric, not yet judged.
 fn valued(pair: Pair, metric: &'static str) -> JudgedRow {
-    JudgedRow {
-        metric: Some(metric),
-        old: pair.0.value(metric),
-        new: pair.1.value(metric),
-        ..row(pair, Outcome::Unmeasured, None)
-    }
+    let mut row = row(pair, Outcome::Unmeasured, None);
+    row.metric = Some(metric);
+    (row.old, row.new) = (pair.0.value(metric), pair.1.value(metric));
+    row
 }
 
 /// Right answers to one question have the same length.

@@ -191,12 +191,10 @@ fn more_pairs(
     let shrinks = (cell.standard_error.powi(2) - fixed.powi(2)).max(0.0);
     let decides = |count: usize| {
         let shrunk = (shrinks * cell.count as f64 / count as f64).sqrt();
-        let future = Trimmed {
-            standard_error: shrunk.hypot(fixed),
-            df: cell.df + kept(count) - kept(cell.count),
-            count,
-            ..*cell
-        };
+        let mut future = *cell;
+        future.standard_error = shrunk.hypot(fixed);
+        future.df = cell.df + kept(count) - kept(cell.count);
+        future.count = count;
         let margin = future.margin(1.0 - ALPHA / tests as f64);
         margin + floor < future.mean.abs() || is_same(&future, threshold)
     };

@@ -99,10 +99,9 @@ fn differences(own: &[f64], other: &[f64]) -> Option<Vec<f64>> {
 /// Its error is that of the intervals shown: none that holds a ratio of 1 is of two ranks.
 /// `None` below three processes and for a NaN.
 pub(super) fn paired_difference(own: &[f64], other: &[f64]) -> Option<Trimmed> {
-    Some(Trimmed {
-        mean: centre(own)? - centre(other)?,
-        ..estimate(&differences(own, other)?)?
-    })
+    let mut found = estimate(&differences(own, other)?)?;
+    found.mean = centre(own)? - centre(other)?;
+    Some(found)
 }
 
 /// Half the width of the 95 % interval; NaN below three values.
@@ -122,14 +121,12 @@ fn margin(values: &[f64]) -> f64 {
 /// below eight: 99 % (5). Differences of pairs in turns have one heap, and keep
 /// Yuen's: 94 to 95 %.
 fn estimate(values: &[f64]) -> Option<Trimmed> {
-    let trimmed = trimmed_mean(values)?;
+    let mut found = trimmed_mean(values)?;
     let count = values.len() as f64;
     let plain = (squares(values) / (count * (count - 1.0))).sqrt();
-    Some(Trimmed {
-        standard_error: trimmed.standard_error.max(plain),
-        df: (trimmed.df - 1.0).max(1.0),
-        ..trimmed
-    })
+    found.standard_error = found.standard_error.max(plain);
+    found.df = (found.df - 1.0).max(1.0);
+    Some(found)
 }
 
 #[cfg(test)]

@@ -33,12 +33,10 @@ pub struct Rate {
 
 impl Rate {
     /// The same for units of which each has one event at most.
-    pub fn of_share(self) -> Rate {
-        Rate {
-            upper: self.upper.map(|x| x.min(1.0)),
-            elsewhere: self.elsewhere.map(|x| x.min(1.0)),
-            ..self
-        }
+    pub fn of_share(mut self) -> Rate {
+        self.upper = self.upper.map(|x| x.min(1.0));
+        self.elsewhere = self.elsewhere.map(|x| x.min(1.0));
+        self
     }
 
     /// The same for another number of units, such as a million.
