@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::key::{CellKey, GroupKey};
-use super::{Judged, Status, Verdict, Workload};
+use super::{Judged, Status, Workload};
 use crate::culling::Culling;
 use crate::index::{Kind, Origin};
 use crate::path::{self, CameraFacts};
@@ -133,14 +133,6 @@ impl ReportCell {
         CellKey {
             group: GroupKey::new(&self.scene.name, &self.path, &self.test),
             structure: self.structure.clone(),
-        }
-    }
-
-    /// Status with its reason.
-    pub fn verdict(&self) -> Verdict {
-        Verdict {
-            status: self.status,
-            reason: self.reason.clone(),
         }
     }
 
