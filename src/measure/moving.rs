@@ -1,7 +1,6 @@
 //! One structure on its way through the frames of a motion.
 //!
-//! Updates, queries, checks of the answers, and clock readings; the query time after many
-//! updates against that of a fresh build.
+//! Updates, queries, checks of answers, clock readings; queries of old trees and new ones.
 
 use std::collections::BTreeMap;
 
@@ -58,11 +57,13 @@ impl<'w> Frames<'w> {
             return Some(frames);
         }
         let (mut items, mut replay) = (workload.items.to_vec(), motion.replay());
-        let scene = workload.scene;
+        let (scene, mut judging) = (workload.scene, Judging::default());
         let (mut boxes, mut shown) = (scene.items.to_vec(), motion.replay());
-        let written = scene.originals.boxes().map(<[_]>::to_vec);
-        let mut written = written.unwrap_or_else(|| vec![WorldBox::AS_STORED; boxes.len()]);
-        let (mut judging, cameras) = (Judging::default(), &workload.cameras);
+        let as_stored = || vec![WorldBox::AS_STORED; scene.items.len()];
+        let mut written = scene
+            .originals
+            .boxes()
+            .map_or_else(as_stored, <[_]>::to_vec);
         let due = spread(items.len(), MOST_JUDGED, motion.frames());
         let (mut due, views) = (due.enumerate().peekable(), workload.views_per_frame);
         for frame in 0..motion.frames() {
@@ -75,9 +76,10 @@ impl<'w> Frames<'w> {
             }
             if let Some((n, _)) = due.next_if(|(_, due)| *due == frame) {
                 // Each view of a frame in turn.
-                let camera = (frame * views + n % views) % cameras.len();
+                let camera = (frame * views + n % views) % workload.cameras.len();
                 let written = Originals::listed(&written);
-                let truth = Truth::of_written(&cameras[camera], scene.origin, &boxes, &written);
+                let seen = &workload.cameras[camera];
+                let truth = Truth::of_written(seen, scene.origin, &boxes, &written);
                 judging.add(workload, camera, truth, &boxes, &items);
             }
             for (_, view) in frames.views(frame) {

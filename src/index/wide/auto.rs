@@ -14,9 +14,7 @@ pub use self::params::AutoParams;
 use self::params::{Update, Use};
 use super::{Moving, WideParams};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
-use crate::index::{
-    BuildError, Info, Input, Kind, Linear, LinearParams, MemoryUsage, RegionIndex,
-};
+use crate::index::{BuildError, Info, Input, Kind, Linear, LinearParams, MemoryUsage, RegionIndex};
 use crate::kernel::Plain;
 use crate::query::{Context, Count, ItemId, QueryContext, QueryCost, QueryVolume};
 
