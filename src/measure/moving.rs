@@ -59,11 +59,7 @@ impl<'w> Frames<'w> {
         let (mut items, mut replay) = (workload.items.to_vec(), motion.replay());
         let (scene, mut judging) = (workload.scene, Judging::default());
         let (mut boxes, mut shown) = (scene.items.to_vec(), motion.replay());
-        let as_stored = || vec![WorldBox::AS_STORED; scene.items.len()];
-        let mut written = scene
-            .originals
-            .boxes()
-            .map_or_else(as_stored, <[_]>::to_vec);
+        let mut written = scene.originals.or_stored(boxes.len());
         let due = spread(items.len(), MOST_JUDGED, motion.frames());
         let (mut due, views) = (due.enumerate().peekable(), workload.views_per_frame);
         for frame in 0..motion.frames() {

@@ -41,6 +41,12 @@ impl Originals {
         self.boxes.get(id).filter(|b| !b.min.is_nan())
     }
 
+    /// The boxes, or as many that are as they are stored.
+    pub(crate) fn or_stored(&self, count: usize) -> Vec<WorldBox> {
+        let all_stored = || vec![WorldBox::AS_STORED; count];
+        self.boxes().map_or_else(all_stored, <[_]>::to_vec)
+    }
+
     /// In world coordinates; `None` if the stored boxes are the very same.
     pub fn boxes(&self) -> Option<&[WorldBox]> {
         (!self.boxes.is_empty()).then_some(&self.boxes)
