@@ -19,8 +19,9 @@ pub fn cross(a: DVec3, b: DVec3) -> DVec3 {
     )
 }
 
-/// The sizes that components of `a x b` have at most, from those of both: sums of the
-/// products, not differences.
+/// Bounds on the components of `a x b`, from the sizes of those of both.
+///
+/// Sums of the products, not differences.
 #[inline(always)]
 pub fn cross_sizes(a: DVec3, b: DVec3) -> DVec3 {
     a.yzx() * b.zxy() + a.zxy() * b.yzx()

@@ -19,8 +19,9 @@ pub struct Measured {
     pub point: Point,
 }
 
-/// Those of the front that are better the longer they take: the others are on it for
-/// their memory or for what they do not miss.
+/// Points of the front that are better the longer they take.
+///
+/// The others are on it for their memory or for what they do not miss.
 fn front(points: &[Measured]) -> Vec<[f64; 2]> {
     let mut least = f64::INFINITY;
     let points = points.iter().map(|own| &own.point);

@@ -125,7 +125,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
     to_html(&title, &all)
 }
 
-/// Changes from first to last times, and what else differs between the ends of the history.
+/// Changes from first to last times, and what else differs between these runs.
 ///
 /// Times of two runs one after the other differ for the machine's sake alone: no change is
 /// counted or named.

@@ -102,7 +102,7 @@ impl Ending {
         Ending::of_checks(is_right, false)
     }
 
-    /// Ending of checks, told if they were interrupted: a wrong answer counts before that.
+    /// Ending of checks, told if interrupted: a wrong answer counts before that.
     fn of_checks(is_right: bool, interrupted: bool) -> Ending {
         if interrupted {
             tell("interrupted: only the cases shown were checked");

@@ -99,7 +99,7 @@ impl<'w> ItemStages<'w> {
         stages
     }
 
-    /// Runs a chain, which leaves what remains, and all that differ from it in one stage.
+    /// Runs a chain, which leaves what remains, and all chains with one other stage.
     pub fn all(world: &'w World<'w>, chain: &Chain) -> ItemStages<'w> {
         let mut all = ItemStages::of(world, &chain.steps());
         for stage in StageKind::OF_ITEMS {

@@ -168,7 +168,7 @@ impl Linear {
     }
 }
 
-/// One part of a scan, [`BLOCKS_PER_CALL`] blocks, compiled for the query's instruction set.
+/// [`BLOCKS_PER_CALL`] blocks of a scan, compiled for the query's instruction set.
 struct PartOfScan<'a, Q>(&'a Linear, &'a Q, usize, &'a mut Vec<ItemId>);
 
 impl<I: Isa, Q: QueryVolume> Piece<I> for PartOfScan<'_, Q> {

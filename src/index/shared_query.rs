@@ -33,8 +33,9 @@ thread_local! {
     static PARTS: Cell<Option<Box<Lists>>> = const { Cell::new(None) };
 }
 
-/// Answers the parts of a query on the threads, each into its own list; ids go to the sink
-/// in order.
+/// Answers the parts of a query on the threads, each into its own list.
+///
+/// Ids go to the sink in order.
 pub fn in_parts<C: Context>(
     workers: &Workers,
     parts: usize,

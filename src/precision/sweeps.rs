@@ -81,7 +81,7 @@ struct SweptTest {
     culling: Culling,
     /// Axes are cross products in f64, rounded as they come.
     has_plain_frame: bool,
-    /// By camera.
+    /// Errors by camera.
     errors: Vec<ErrorCount>,
     refused: Option<String>,
 }

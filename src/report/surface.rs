@@ -206,7 +206,7 @@ impl Surface<'_> {
 
 /// The growth of one structure.
 pub struct Growth<'r> {
-    /// What its cells have in common.
+    /// Key of the series, which its cells have in common.
     pub key: SeriesKey<'r>,
     /// Mean over the sizes.
     pub visible: f64,
