@@ -110,7 +110,7 @@ impl MatrixFacts {
 
 /// Returns whether y points down in the images of matrices (Vulkan).
 ///
-/// By the up axis of their scene: an image is mirrored in a left-handed world too.
+/// The up axis of their scene decides: an image is mirrored in a left-handed world too.
 pub fn is_downward(cameras: &[Camera], up: UpAxis) -> bool {
     let along = |camera: &Camera| {
         let found = camera.lens.matrix()?.unprojected().ok()?;
