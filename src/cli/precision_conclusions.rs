@@ -172,7 +172,6 @@ fn measured<E>(
             note,
             is_cross,
             is_large: point.on_front,
-            ..Default::default()
         },
     })
 }

@@ -73,6 +73,7 @@ pub use grid::UniformGrid;
 pub use info::{Info, Kind, Origin};
 pub use items::{IdSet, Record, indexable};
 pub use linear::{Linear, LinearParams, LinearScalar};
+#[cfg(feature = "cli")]
 pub(crate) use registry::{DEFAULT, MOTION};
 pub use registry::{Registry, Row, StructureSpec};
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};

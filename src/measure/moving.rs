@@ -17,7 +17,7 @@ use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec, UpdatePolicy};
 use crate::motion::{Motion, Replay};
 use crate::query::ItemId;
-use crate::scene::{Originals, WorldBox};
+use crate::scene::Originals;
 use crate::verify::{Truth, scan};
 
 /// Number of updates before queries are timed.
