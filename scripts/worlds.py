@@ -130,9 +130,8 @@ Written by `scripts/worlds.py` from [results/worlds](../results/worlds) (`run --
 *Sizes*: shortest to longest, of the items' longest edges. *f32 step*: spacing of f32 at the
 farthest coordinate, in the scene's unit. For two paths: share of items outside of the view, the
 fastest structure (`wide` where it ties for it), its time per query, and its speed-up over the SIMD
-scan `linear`. *Regions*:
-their number, and the structure that finds that of the eye first along the first path. `moving` is
-`wide` with a second tree for what moves.
+scan `linear`. *Regions*: their number, and the structure that finds that of the eye first along the
+first path.
 
 | scene | items | extent | sizes | f32 step | first path | second path | regions |
 |---|---|---|---|---|---|---|---|
