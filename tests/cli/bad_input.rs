@@ -199,7 +199,7 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         ("0,0,0,1,0,0,0,0,1,60,1,9,9", "near is 9 and far 9"),
         ("0,0,0,1,0,0,0,0,1,60,1,10,9", "expected near < far"),
         ("0,0,0,1,0,0,0,0,1,60,1,0,9", "near is 0 | near > 0"),
-        ("0,0,0,1,0,0,0,0,1,60,1,1,nan", "far 'nan'"),
+        ("0,0,0,1,0,0,0,0,1,60,1,1,nan", "far 'nan' | inf or nothing"),
         ("0,0,0,0,0,2,0,0,1,60,1,1,9", "up | parallel"),
         ("0,0,0,0,0,0,0,0,1,60,1,1,9", "eye and look | same"),
         ("0,0,0,1,0,0,0,0,1,60,1,1", "12 fields | expected 13"),
@@ -211,8 +211,9 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         all_refused(&folder, &commands_with_cameras("bad.csv"), &wanted);
     }
     let wad = map12();
-    let files: [(&[u8], &str); 12] = [
+    let files: [(&[u8], &str); 13] = [
         (b"", "line 1 | empty file"),
+        (b"\x1f\x8b\x08\0eye", "line 1 | gzip, which is not read"),
         (b"\n\n\n", "empty file"),
         (FULL_CAMERA.as_bytes(), "line 2 | no camera"),
         (b"x,y,z\n1,2,3\n", "line 1 | no column 'eye_x'"),

@@ -97,6 +97,14 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
             "'--plan' cannot be used with '--resume' | expected",
         ),
         (
+            "run --plan --out new",
+            "'--plan' cannot be used with '--out <DIR>' | expected",
+        ),
+        (
+            "verify --scene scene.csv --seed 9",
+            "--seed is for generated cases, of which there are none; expected --cases above 0",
+        ),
+        (
             "run --seed -1 --out new",
             "--seed is '-1'; expected a whole number from 0 to 18446744073709551615",
         ),
