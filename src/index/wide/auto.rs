@@ -68,6 +68,8 @@ const MOST_PATIENCE: f64 = 16.0;
 const FORGETS: f64 = 256.0;
 /// Updates that are weighed at once.
 const TOGETHER: u32 = 8;
+/// Items x updates that are weighed at once where there are few items.
+const FEW: u32 = 2048;
 /// Most queries that are counted between two weighings; then nothing is written.
 const MOST_ASKED: u32 = 256;
 
@@ -77,6 +79,8 @@ pub struct Auto {
     trees: Moving,
     /// Answers in place of the trees, which are as they were before its first update.
     scan: Option<Linear>,
+    /// A scan of the same boxes until the queries of a frame are known.
+    reserve: Option<Linear>,
     /// Movers have a tree of their own.
     is_parted: bool,
     params: AutoParams,
@@ -197,6 +201,12 @@ impl Auto {
         (self.built == SCAN && !self.is_parted).then(|| self.scan_of(items))?
     }
 
+    /// A scan that may be taken at the second update.
+    fn reserve_of(&self, items: &[Aabb]) -> Option<Linear> {
+        let is_free = self.params.structure == Use::Auto && self.params.update == Update::Auto;
+        (is_free && self.updates == [0; 4]).then(|| self.scan_of(items))?
+    }
+
     fn scan_of(&self, items: &[Aabb]) -> Option<Linear> {
         let input = Input::new(items).spheres(self.trees.still.balls.is_some());
         Linear::build(&input, &LinearParams::default()).ok()
@@ -233,6 +243,9 @@ impl Auto {
 
     /// New bounds in a scan; the tree is stale from then on.
     fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        if self.scan.is_none() {
+            self.scan = self.reserve.take();
+        }
         let is_held = match &mut self.scan {
             Some(scan) => scan.refit(items, moved),
             None => {
@@ -401,10 +414,8 @@ impl RegionIndex for Auto {
     }
 
     fn memory(&self) -> MemoryUsage {
-        let scan = self
-            .scan
-            .as_ref()
-            .map_or(MemoryUsage::default(), Linear::memory);
+        let scan = self.scan.as_ref().or(self.reserve.as_ref());
+        let scan = scan.map_or(MemoryUsage::default(), Linear::memory);
         let trees = self.trees.memory();
         MemoryUsage {
             node_bytes: trees.node_bytes + scan.node_bytes,
@@ -439,13 +450,24 @@ impl RegionIndex for Auto {
             // Tables for the updates that follow.
             return match &mut self.scan {
                 Some(scan) => scan.refit(items, moved),
-                None => self.refit_held(items, moved) || self.rebuild(items),
+                None => {
+                    self.reserve = self.reserve_of(items);
+                    self.refit_held(items, moved) || self.rebuild(items)
+                }
             };
         }
         self.weighing += 1;
         self.moved += moved.len() as f64;
-        if self.weighing == TOGETHER || self.updates.iter().sum::<u32>() < 2 {
+        let before = self.updates.iter().sum::<u32>();
+        if before < 2 || self.weighing >= TOGETHER.max(FEW / items.len().max(1) as u32) {
             self.weigh(items);
+        }
+        if before == 0
+            && let Some(scan) = &mut self.reserve
+        {
+            scan.refit(items, moved);
+        } else if self.update != OVERWRITE {
+            self.reserve = None;
         }
         match self.update {
             REBUILD => self.rebuild(items),

@@ -334,3 +334,29 @@ fn few_items_are_scanned_and_many_searched() {
         assert!(told.starts_with(search), "{count}: {told}");
     }
 }
+
+/// The scan in reserve is taken by the second update, or left.
+#[test]
+fn a_scan_in_reserve_answers_from_the_second_update_on() {
+    let rng = &mut Pcg64::seed_from_u64(17);
+    for (share, queries) in [(1, 1), (100, 1), (100, 200)] {
+        let mut items = cubes(rng, 3_000);
+        let mut index = built(&items, "");
+        assert!(index.refit(&items, &[]) && index.reserve.is_some());
+        for update in 0..3 {
+            let moved: Vec<ItemId> = (0..items.len() as ItemId).step_by(share).collect();
+            for &id in &moved {
+                items[id as usize] = Aabb::around(point(rng), Vec3::splat(0.7));
+            }
+            assert!(index.refit(&items, &moved));
+            for volume in views(&index, &items).iter().cycle().take(queries) {
+                index.visible(volume);
+            }
+            let told = format!("every {share}th moved, {queries} queries, update {update}");
+            assert_eq!(index.reserve.is_some(), update == 0, "{told}");
+            let scans = share == 1 && update > 0;
+            assert_eq!(index.scan.is_some(), scans, "{told}");
+            assert_right(&index, &items, rng, &told);
+        }
+    }
+}
