@@ -196,8 +196,8 @@ pub struct QueryArgs {
     pub motion: Option<String>,
     /// Frame of the motion to query, from 1; 0 is the scene as it comes [default: the
     /// last one]
-    #[arg(long, value_name = "K", requires = "motion")]
-    pub frame: Option<usize>,
+    #[arg(long, value_name = "K", requires = "motion", value_parser = values::whole(0..=u32::MAX))]
+    pub frame: Option<u32>,
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,

@@ -192,8 +192,8 @@ pub struct SceneDrawArgs {
     #[arg(long, value_name = "PATH")]
     pub camera: Option<String>,
     /// The camera of the path, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub frame: usize,
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = values::whole(0..=u32::MAX))]
+    pub frame: u32,
     /// Deepest level of cells that is drawn; 0 is the root
     #[arg(long, value_name = "LEVEL", default_value_t = 3, requires = "structure", value_parser = values::whole(0..=1000u32))]
     pub depth: u32,
@@ -241,7 +241,8 @@ pub struct CompareArgs {
     pub against: Option<PathBuf>,
     #[command(flatten)]
     pub what: WhatArgs,
-    /// Largest relative change that counts as no change, of time or work: 5% or 0.05
+    /// Change that "same" rules out, and growth of work that `--gate work` allows: 5% or 0.05;
+    /// a time is slower or faster from 1 % on (5 % in stored runs)
     #[arg(long, value_name = "SHARE", default_value = "5%", value_parser = values::threshold)]
     #[arg(allow_hyphen_values = true)]
     pub threshold: f64,

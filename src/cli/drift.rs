@@ -96,10 +96,11 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
 fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
     let [yaw, pitch, roll] = report.turn_per_step;
     let (steps, rounds) = (steps(report.steps), text::counted(report.rounds, "round"));
+    let unit = ["steps", "step"][usize::from(report.steps == 1)];
     let over = text::over(report.processes, None);
     let mut blocks = vec![
         Block::line(format!(
-            "Camera updates after {steps} steps; {over}; {rounds} in each."
+            "Camera updates after {steps} {unit}; {over}; {rounds} in each."
         )),
         Block::heading(format!(
             "Camera bases turned by yaw {yaw}, pitch {pitch} and roll {roll} degrees per step"
@@ -221,9 +222,11 @@ fn conclusions(report: &DriftReport) -> impl Iterator<Item = Block> {
         let each = own.iter();
         let each = each.map(|c| format!("{} at k={:e}", chosen(&c.choice), c.setting.stiffness));
         let (each, within) = (text::joined(each), report.arm.tolerance);
-        format!(
-            "Recommended for a {arm} arm: {each}, the cheapest with an error within {within:e}."
-        )
+        let what = match own.iter().any(|c| c.choice.name.is_some()) {
+            true => "the cheapest with",
+            false => "no method has",
+        };
+        format!("Recommended for a {arm} arm: {each}, {what} an error within {within:e}.")
     });
     let told = [recommended(report)].into_iter().chain(of_arms);
     told.map(Block::Line)

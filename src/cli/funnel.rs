@@ -322,8 +322,15 @@ pub fn draw(report: &FunnelReport, scene: &Scene) -> String {
         Some(Fate::Lost) => 5,
     };
     let (name, path) = (&report.scene, &report.path);
+    let items = match scene.skipped_items {
+        0 => String::new(),
+        bad => text::items(scene.items.len(), bad),
+    };
     Plan {
-        caption: format!("{name}, {path}: the first view from above"),
+        caption: text::joined([
+            &format!("{name}, {path}: the first view from above"),
+            &items,
+        ]),
         scene,
         camera: view.camera.as_ref(),
         classes: FATE_CLASSES,

@@ -122,10 +122,13 @@ fn of_sizes(rows: &[SizeRow]) -> Option<String> {
     let [planes, more] = [first, last].map(|row| of(row, "six-plane"));
     let [exact, also] = [first, last].map(|row| of(row, "exact + epsilon"));
     let [small, large] = [first, last].map(|row| row.size_over_depth);
+    let is_bounded = [&planes, &more, &exact, &also]
+        .iter()
+        .any(|s| s.contains('±'));
+    let bounds = ["", " (± bounds the result of another seed)"][usize::from(is_bounded)];
     Some(format!(
         "Six planes return {planes} % false positives where a cube's edge is {small} of the \
-         frustum's depth, and {more} % at {large}; the exact test with epsilon {exact} and {also} % (± bounds the result \
-         of another seed)."
+         frustum's depth, and {more} % at {large}; the exact test with c = 8: {exact} and {also} %{bounds}."
     ))
 }
 

@@ -63,9 +63,9 @@ fn shown(scene: &Scene, row: &Row) -> Option<Vec<ItemId>> {
 }
 
 /// Moves items through `frame` frames of a motion, or through all of them.
-fn advance(items: &mut [Aabb], motion: &Motion, frame: Option<usize>) -> anyhow::Result<()> {
+fn advance(items: &mut [Aabb], motion: &Motion, frame: Option<u32>) -> anyhow::Result<()> {
     let (frames, name) = (motion.frames(), &motion.name);
-    let wanted = frame.unwrap_or(frames);
+    let wanted = frame.map_or(frames, |frame| frame as usize);
     anyhow::ensure!(
         wanted <= frames,
         "--frame is {wanted}; expected at most {frames}, the frames of '{name}'"

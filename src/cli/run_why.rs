@@ -56,8 +56,9 @@ pub fn is_named(label: &str, name: &str) -> bool {
 
 /// The structure with that label, or without parameters that name.
 fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, String> {
-    let is_own = |cell: &ReportCell| is_named(&cell.structure, structure);
-    let Some(own) = comparison.cells.iter().copied().find(|cell| is_own(cell)) else {
+    let cells = || comparison.cells.iter().copied();
+    let labelled = cells().find(|cell| cell.structure == structure);
+    let Some(own) = labelled.or_else(|| cells().find(|c| is_named(&c.structure, structure))) else {
         return Err(format!("{structure} was not measured."));
     };
     if query_ns(own).is_none() {
@@ -65,8 +66,10 @@ fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, St
         let reason = some(own.reason.as_ref(), |reason| format!(": {reason}"));
         return Err(format!("{structure} has no times: {status}{reason}."));
     }
-    let mut others = comparison.sound().filter(|cell| !is_own(cell));
-    let other = others.next();
+    let is_other = |cell: &&ReportCell| {
+        cell.structure != own.structure && !is_named(&cell.structure, structure)
+    };
+    let other = comparison.sound().find(is_other);
     let other = other.ok_or_else(|| "No other structure has a time.".to_owned())?;
     let speedup = comparison.speedup(&other.structure, own);
     let ends = speedup.and_then(|found| found.1);

@@ -69,7 +69,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
         None => None,
         Some(source) => {
             let path = path::load(source, &scene, &defaults)?;
-            let (frame, last) = (args.frame, path.cameras.len().saturating_sub(1));
+            let (frame, last) = (args.frame as usize, path.cameras.len().saturating_sub(1));
             let Some(camera) = path.cameras.get(frame) else {
                 let cameras = format!("0 to {last}, the cameras of {}", path.name);
                 bail!("--frame is {frame}; expected {cameras}");

@@ -288,9 +288,10 @@ pub fn lens(facts: &CameraFacts) -> String {
 /// Lens of recorded cameras that state none.
 pub fn default_lens(defaults: &LensDefaults) -> String {
     let (near, far) = defaults.depths(defaults.middle);
+    let [fovy_deg, aspect] = defaults.shape();
     lens(&CameraFacts {
-        fovy_deg: Some([defaults.fovy_deg; 2]),
-        aspect: Some([defaults.aspect; 2]),
+        fovy_deg: Some([fovy_deg; 2]),
+        aspect: Some([aspect; 2]),
         near: Some([near; 2]),
         far: [far; 2],
         ..CameraFacts::default()

@@ -291,12 +291,12 @@ const TASK_NS: f64 = 150e6;
 pub struct LensArgs {
     #[command(flatten)]
     pub scene_args: SceneArgs,
-    /// Vertical field of view in degrees for cameras without one
-    #[arg(long, value_name = "DEG", default_value_t = 60.0, value_parser = values::field_of_view)]
-    pub fovy: f64,
-    /// Width / height for cameras without one
-    #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero)]
-    pub aspect: f64,
+    /// Vertical field of view in degrees for cameras without one [default: 60]
+    #[arg(long, value_name = "DEG", value_parser = values::field_of_view)]
+    pub fovy: Option<f64>,
+    /// Width / height for cameras without one [default: 16/9]
+    #[arg(long, value_parser = values::above_zero)]
+    pub aspect: Option<f64>,
     /// Near plane for cameras without one [default: far / 1000, 0.1 for street, for
     /// recorded cameras at most twice the scene's diagonal / 1000]
     #[arg(long, value_parser = values::above_zero)]

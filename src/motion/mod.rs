@@ -177,7 +177,9 @@ impl Motion {
         }
         if late > 0 {
             let of = format!("{late} of {} moves", recorded.moves());
-            let what = format_args!("come after the last frame of '{path_name}' and are not used");
+            let fate = ["are not used", "only widen the margin of the planes"];
+            let fate = fate[usize::from(paced.is_widened())];
+            let what = format_args!("come after the last frame of '{path_name}' and {fate}");
             note(&format!("{name}: {of} {what}"));
         }
         Motion {

@@ -75,17 +75,36 @@ impl Recorded {
     }
 
     pub(super) fn reach(&self) -> Vec3 {
+        self.own_reach().max(self.reach)
+    }
+
+    fn own_reach(&self) -> Vec3 {
         let reaches = self.rows.iter().map(|row| row.stored.reach());
-        reaches.fold(self.reach, Vec3::max)
+        reaches.fold(Vec3::ZERO, Vec3::max)
+    }
+
+    /// Returns whether rows of the whole file that are in no frame widen the margin.
+    pub(super) fn is_widened(&self) -> bool {
+        !self.reach.cmple(self.own_reach()).all()
     }
 
     pub(super) fn digest(&self, hash: &mut hmac_sha256::Hash) {
+        if self.is_widened() {
+            let reach = self.reach.to_array();
+            hash.update(reach.map(f32::to_le_bytes).concat());
+        }
         for end in &self.ends {
             hash.update((*end as u64).to_le_bytes());
         }
         for (id, row) in self.ids.iter().zip(&self.rows) {
             hash.update(id.to_le_bytes());
             for v in row.stored.bits().as_flattened() {
+                hash.update(v.to_le_bytes());
+            }
+            // A file that f32 holds has the digest of its stored boxes.
+            let WorldBox { min, max } = row.written;
+            let own = [min, max].into_iter().filter(|corner| !corner.is_nan());
+            for v in own.flat_map(|corner| corner.to_array()) {
                 hash.update(v.to_le_bytes());
             }
         }

@@ -202,6 +202,31 @@ fn frames_are_those_of_cameras_with_times() {
     assert_eq!(seen("0  1", 1).len(), 4);
 }
 
+/// Where f32 holds both alike, the truths differ and the digests with them.
+#[test]
+fn files_of_other_truths_have_other_digests() {
+    let scene = scene("uniform:n=5");
+    let digest = |high: &str| {
+        let text = format!("{HEADER}0,1,0,0,0,{high},1,1\n");
+        let motion = recorded::read_motion_csv(text.as_bytes(), "m.csv", &scene).unwrap();
+        let mut hash = hmac_sha256::Hash::new();
+        motion.digest(&mut hash);
+        hash.finalize()
+    };
+    assert_ne!(digest("8.00000000001"), digest("8.00000000002"));
+    assert_eq!(digest("8"), digest("8.0"));
+    // A move after the last camera widens the margin of all frames.
+    let paced = |late: &str| {
+        let text = format!("{HEADER}0,1,0,0,0,1,1,1\n9,2,0,0,0,{late},1,1\n");
+        let motion = recorded::read_motion_csv(text.as_bytes(), "m.csv", &scene).unwrap();
+        let mut hash = hmac_sha256::Hash::new();
+        motion.at([1.0].iter()).0.digest(&mut hash);
+        hash.finalize()
+    };
+    assert_ne!(paced("1e6"), paced("1e7"));
+    assert_eq!(paced("1"), paced("0.5"));
+}
+
 #[test]
 fn errors_of_a_file_name_the_line() {
     let scene = scene("uniform:n=5");

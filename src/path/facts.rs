@@ -189,13 +189,9 @@ impl LensDefaults {
             let depths = [Some(lens.near()), endless(lens.far())];
             [fovy_deg(lens), aspect(lens), depths[0], depths[1]]
         };
-        let (plain, far) = (LensDefaults::default(), self.far);
-        let given = [
-            Some(self.fovy_deg).filter(|fovy| *fovy != plain.fovy_deg),
-            Some(self.aspect).filter(|aspect| *aspect != plain.aspect),
-            self.near,
-            far.and_then(|far| endless(far.filter(|far| *far <= FARTHEST))),
-        ];
+        let endless_far = |far: Option<f64>| endless(far.filter(|far| *far <= FARTHEST));
+        let far = self.far.and_then(endless_far);
+        let given = [self.fovy_deg, self.aspect, self.near, far];
         let has = |is: &dyn Fn(&Lens) -> bool| path.cameras.iter().any(|camera| is(&camera.lens));
         let is_unused =
             |at: &usize| given[*at].is_some() && !has(&|lens| of(lens)[*at] == given[*at]);

@@ -365,9 +365,10 @@ impl Optics {
         }
         let named = ["fovy", "aspect", "near", "far"].map(|name| spec.text(name).is_some());
         let visible = visible.map(|text| visible_share(spec, &text, stage.scene.items.len()));
+        let [fovy_deg, aspect] = defaults.shape();
         Ok(Optics {
-            fovy_deg: spec.number("fovy", defaults.fovy_deg)?,
-            aspect: spec.number("aspect", defaults.aspect)?,
+            fovy_deg: spec.number("fovy", fovy_deg)?,
+            aspect: spec.number("aspect", aspect)?,
             near: near.unwrap_or(far.unwrap_or(natural) / 1000.0),
             far,
             visible: visible.transpose()?,

@@ -15,10 +15,10 @@ use crate::shown::shortened;
 /// `None` leaves the choice to the path.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LensDefaults {
-    /// Full vertical angle of view, 0 < fovy < 180.
-    pub fovy_deg: f64,
-    /// Width / height.
-    pub aspect: f64,
+    /// Full vertical angle of view, 0 < fovy < 180; 60 if nothing is given.
+    pub fovy_deg: Option<f64>,
+    /// Width / height; 16:9 if nothing is given.
+    pub aspect: Option<f64>,
     /// Distance of the near plane.
     pub near: Option<f64>,
     /// `Some(None)` is an infinite far plane.
@@ -36,8 +36,8 @@ pub struct LensDefaults {
 impl Default for LensDefaults {
     fn default() -> Self {
         LensDefaults {
-            fovy_deg: 60.0,
-            aspect: 16.0 / 9.0,
+            fovy_deg: None,
+            aspect: None,
             near: None,
             far: None,
             up: DVec3::Z,
@@ -49,6 +49,14 @@ impl Default for LensDefaults {
 }
 
 impl LensDefaults {
+    /// Angle of view in degrees, and width / height.
+    pub fn shape(&self) -> [f64; 2] {
+        [
+            self.fovy_deg.unwrap_or(60.0),
+            self.aspect.unwrap_or(16.0 / 9.0),
+        ]
+    }
+
     /// Near and far plane of a recorded camera without either.
     ///
     /// Far is twice the scene's diagonal, or the far side of the scene from an eye
@@ -254,8 +262,9 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
             return Err(row.error("fovy_deg and ortho_height", "one of them, not both"));
         }
         let height = height.map(|column| row.finite_number(column)).transpose()?;
-        let fovy_deg = number(fovy.filter(|_| height.is_none()), defaults.fovy_deg)?;
-        let aspect = number(aspect, defaults.aspect)?;
+        let [fovy_deg, wide] = defaults.shape();
+        let fovy_deg = number(fovy.filter(|_| height.is_none()), fovy_deg)?;
+        let aspect = number(aspect, wide)?;
         let near = number(near, defaults.near.unwrap_or_else(|| defaults.near_of(far)))?;
         let looking = match by_forward {
             true => Frame::looking_along,

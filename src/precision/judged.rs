@@ -81,7 +81,7 @@ pub(super) fn counts_or_null<S: Serializer>(
 /// The successors show changes from frame to frame.
 pub(super) struct Shots {
     pub cameras: Vec<Camera>,
-    /// One for each camera, or none for a path of one camera.
+    /// In the same order; the last camera of the path has none.
     neighbours: Vec<Camera>,
 }
 
@@ -90,14 +90,10 @@ impl Shots {
         let count = path.cameras.len();
         let wanted = most.max(1).min(count);
         let chosen = (0..wanted).map(|i| i * count / wanted);
-        // The last one's is the one before it.
-        let beside = |i: usize| match i + 1 < count {
-            true => Some(i + 1),
-            false => i.checked_sub(1),
-        };
+        let next = chosen.clone().map(|i| i + 1).filter(|i| *i < count);
         Shots {
-            cameras: chosen.clone().map(|i| path.cameras[i]).collect(),
-            neighbours: chosen.filter_map(beside).map(|i| path.cameras[i]).collect(),
+            cameras: chosen.map(|i| path.cameras[i]).collect(),
+            neighbours: next.map(|i| path.cameras[i]).collect(),
         }
     }
 
@@ -190,15 +186,14 @@ impl Judged {
         let judged = if is_judged { &self.by_camera[..] } else { &[] };
         let known = || judged.iter();
         let counts: ErrorCount = known().map(|camera| camera.counts).sum();
-        let has_neighbours = self.by_camera.iter().any(|c| c.flicker.is_some());
-        let flicker = rate_of(judged, |c| [c.flicker.unwrap_or(0), c.counts.visible]);
+        let pairs = known().filter_map(|c| Some([c.flicker?, c.counts.visible]));
         let missed = rate_of(judged, |c| [c.counts.false_negatives, c.counts.visible]);
         let in_pixels = || known().filter_map(|c| c.worst_miss_px);
         let errors = CullingErrors {
             names: Names::of(&self.culling),
             excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
             false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
-            flicker: flicker.filter(|_| has_neighbours),
+            flicker: rate_of(&pairs.collect::<Vec<_>>(), |pair| *pair),
             counts: is_judged.then_some(counts),
             worst_miss_px: in_pixels().reduce(f64::max),
             ns_per_item: None,

@@ -196,19 +196,23 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
     let Some((stream, _)) = stream.ok().filter(|s| s.0.header.run.id == report.run.id) else {
         return BTreeMap::new();
     };
-    let mut cells: BTreeMap<[String; 5], Readings> = BTreeMap::new();
+    let mut cells: BTreeMap<[String; 6], Readings> = BTreeMap::new();
     let samples = csv::Reader::from_path(folder.join(SAMPLES));
-    let ranked = [TaskKind::Query, TaskKind::Frame].map(TaskKind::name);
     for row in samples.into_iter().flat_map(csv::Reader::into_deserialize) {
         let Ok(row): Result<SampleRow, _> = row else {
             break;
         };
-        if ranked.contains(&row.task.as_str()) {
-            let key = [row.scene, row.path, row.cache, row.test, row.structure];
-            let readings = cells.entry(key).or_default();
-            let times = readings.entry((row.frame, row.queries)).or_default();
-            times.push(row.cpu_ns);
-        }
+        let key = [
+            row.scene,
+            row.path,
+            row.cache,
+            row.test,
+            row.structure,
+            row.task,
+        ];
+        let readings = cells.entry(key).or_default();
+        let times = readings.entry((row.frame, row.queries)).or_default();
+        times.push(row.cpu_ns);
     }
     let mut all = BTreeMap::new();
     for kept in stream.parts.iter().map(|kept| &kept.part) {
@@ -219,7 +223,11 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
         let own = |label: &str| {
             let key = &kept.key;
             let path = key.samples_path();
-            let names = [&key.scene, &path, &key.cache, &key.test, label];
+            let task = match key.motion.is_empty() {
+                true => TaskKind::Query.name(),
+                false => TaskKind::Frame.name(),
+            };
+            let names = [&key.scene, &path, &key.cache, &key.test, label, task];
             let readings = cells.get(&names.map(lines))?;
             let reading = |(&(frame, queries), ns): (&(u32, u32), &Vec<f64>)| {
                 let mut last = frame;

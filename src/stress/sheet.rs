@@ -238,9 +238,6 @@ impl Sheet<'_> {
 
     /// Adds rows of the oracle's verdicts: visible and touching exactly as declared.
     pub fn verdicts(&mut self, oracle: &Oracle, visible: &Option<Names>, touch: &Option<Names>) {
-        let Some(listed) = visible.as_ref().or(touch.as_ref()) else {
-            return;
-        };
         let mut wrong = Vec::new();
         let boxes = self.names.iter().zip(self.items);
         for (name, b) in boxes.filter(|(_, b)| b.is_finite()) {
@@ -266,8 +263,11 @@ impl Sheet<'_> {
             }
         }
         let subject = [ORACLE, CullingTest::Exact.name()];
-        let got = Ok(self.seen_by(oracle).into_iter().collect());
-        self.answered(None, subject, wrong.is_empty(), listed, &got);
+        if let Some(listed) = visible {
+            let seen = self.seen_by(oracle);
+            let got = Ok(seen.iter().cloned().collect());
+            self.answered(None, subject, seen == *listed, listed, &got);
+        }
         for (name, expected, got) in wrong {
             let expected = format!("{expected:?}").to_lowercase();
             self.row(Some(name), subject, Status::Fail, expected, got);

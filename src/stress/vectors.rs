@@ -270,6 +270,9 @@ pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError>
         if let Some((i, id)) = repeated(vector.boxes().map(|b| &b.id)) {
             return Err(again(format!("vectors[{n}].boxes[{i}]"), id));
         }
+        if let Some((i, id)) = repeated(vector.points().map(|p| &p.id)) {
+            return Err(again(format!("vectors[{n}].points[{i}]"), id));
+        }
     }
     note_unjudged(&vectors, file);
     note_unknown(bytes, file);

@@ -143,6 +143,8 @@ fn options_of_other_cameras_are_told_once() {
             lens("m.csv", "--fovy"),
         ),
         ("eye.csv --near 3".to_owned(), lens("eye.csv", "--near")),
+        // The default, where it is typed.
+        ("eye.csv --fovy 60".to_owned(), lens("eye.csv", "--fovy")),
         (format!("eye.csv {convention}"), of("eye.csv")),
         (format!("orbit:frames=2 {convention}"), of("orbit:frames=2")),
     ] {

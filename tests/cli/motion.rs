@@ -222,6 +222,27 @@ fn a_motion_is_an_axis_of_a_run() {
         assert!(cell["structure"] != "wide" || of("ageing_10") > 0.0);
         assert_eq!(cell["path"]["views_per_frame"], 2);
     }
+    // Of several views samples.csv has rows of queries too: the page's are of frames.
+    let sampled = rows(&fs::read_to_string(at("r/samples.csv")).expect("samples.csv"));
+    let least = |task: &str| {
+        let own = sampled
+            .iter()
+            .filter(|row| row["structure"] == "wide" && row["task"] == task);
+        let ns = own.map(|row| row["cpu_ns"].parse::<f64>().expect("a number"));
+        ns.fold(f64::INFINITY, f64::min)
+    };
+    let read = cullbench::report::read_report(&at("r/report.json")).expect("a report");
+    let views = cullbench::report::views(&at("r"), &read);
+    assert_eq!(views.len(), 2);
+    for group in views.values() {
+        let readings = group.times["wide"].iter();
+        assert!(readings.clone().count() >= 10, "{group:?}");
+        assert!(
+            readings.clone().all(|r| r.ns >= least("frame")),
+            "{group:?}"
+        );
+    }
+    assert!(least("query") < least("frame"));
     let summary = rows(&fs::read_to_string(at("r/summary.csv")).expect("summary.csv"));
     assert_eq!(summary[0]["motion"], "spawn:share=0.1,frames=12");
     assert_eq!(summary[7]["motion"], "swarm:frames=10");

@@ -109,6 +109,13 @@ fn runs_and_comparisons_fit() {
         told.contains("bvh:leaf=4 takes ") && told.contains(" decides."),
         "{told}"
     );
+    // A label as typed comes before the name of another one.
+    let labels = format!("{one} --structure bvh --out labels --why bvh");
+    let told = assert_fits(folder.path(), &labels);
+    assert!(
+        told.contains("bvh takes ") || told.contains("bvh is"),
+        "{told}"
+    );
     let two = "--scene rooms:n=300 --path flythrough:frames=4";
     let told = assert_fits(
         folder.path(),

@@ -164,8 +164,6 @@ pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
 
 /// Drift of an f32 frame per step, radians: docs/NUMERICS.md.
 const DRIFT: f64 = 5e-8;
-/// "Much less than the tolerance" is this share of it.
-const MUCH_LESS: f64 = 0.1;
 const METHODS: [&str; 2] = ["f32", "f32-polar-100"];
 
 /// Correcting a camera's frame.
@@ -182,7 +180,7 @@ pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
     };
     let [kept_error, left_out_error] = [kept, left_out]
         .map(|error| error.map_or("lost".to_owned(), |error| format!("{error:.1e}")));
-    let compared = [steps as f64 * DRIFT, tolerance * MUCH_LESS];
+    let compared = [steps as f64 * DRIFT, tolerance];
     let walked = left_out.is_some_and(|error| error <= tolerance);
     let mut draft = Draft::concluded(Vec::new(), move |facts| {
         let mut finding = Finding {
@@ -196,10 +194,10 @@ pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
         let many = counted(steps as usize, "step");
         finding.reason = format!(
             "{many} of {DRIFT:.0e}; walked: {left_out_error} uncorrected at {left_out_ns:.0} ns a step, \
-             {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns ({}); a tenth of \
+             {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns ({}); \
              {tolerance:.0e} is used up after some {:.0} steps",
             dearer(ratio),
-            tolerance * MUCH_LESS / DRIFT
+            tolerance / DRIFT
         );
         finding.note = format!("{many}: drift of {left_out_error} rad");
         finding.cost_ns = Some([kept_ns, left_out_ns]);

@@ -105,6 +105,14 @@ fn a_touch_that_is_declared_and_not_visible_fails() {
     };
     assert!(wedge(r#"["b"]"#).is_empty());
     assert_eq!(wedge("[]"), ["v", "v/b"]);
+    // The row of what is visible is not about touches.
+    let touches = |list: &str| {
+        failed(&format!(
+            r#"[{{"id":"v","planes":[[1,0,0,0]],"boxes":[{{"id":"b","lo":[-1,0,0],
+            "hi":[0,1,1]}}],"expected_visible_planes":["b"],"touch_planes":{list}}}]"#
+        ))
+    };
+    assert_eq!(touches("[]"), ["v/b"]);
 }
 
 #[test]

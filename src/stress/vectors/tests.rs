@@ -63,6 +63,12 @@ fn every_mistake_is_one_line_that_says_where() {
             "boxes[1]: the id 'b' a second time",
         ),
         (
+            with(
+                r#""points":[{"id":"p","p":[0,0,0],"expected_containing":[]},{"id":"p","p":[0,0,0],"expected_containing":["b"]}]"#,
+            ),
+            "points[1]: the id 'p' a second time",
+        ),
+        (
             with(r#""planes":[[1,2,3]]"#),
             "planes[0]: 3 values; expected four",
         ),
