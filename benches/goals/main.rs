@@ -371,8 +371,7 @@ fn main() -> ExitCode {
                 bounds: BOUNDS,
                 ..GroupPlan::new(&workload, &info, protocol)
             };
-            let measured = measure(&workload, &stay, plan);
-            let group = Group::of(&[measured.expect("not stopped").0]);
+            let group = Group::of(&[measure(&workload, &stay, plan).0]);
             judge_row(&mut judge, world, way, &group);
             subjects = stay.into_iter().chain(out).collect();
             if way.path == ALL && !world.cold {

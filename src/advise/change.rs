@@ -265,8 +265,8 @@ impl Changed {
             locate: false,
             ..GroupPlan::new(&workload, &info, input.setting.protocol)
         };
-        let measured = measure(&workload, &subjects, plan);
-        let (part, items) = (measured?.0, scene.items.len());
+        let (part, _) = measure(&workload, &subjects, plan);
+        let items = scene.items.len();
         let moved = workload.motion.as_ref().map(Motion::share);
         let reached = match self.axis {
             Some(Axis::Items) => Some(items as f64),

@@ -25,7 +25,7 @@ pub use rule::Omission;
 use crate::culling::CullingTest;
 use crate::funnel::{self, FunnelPlan};
 use crate::measure::{
-    OverProcesses, Part, ProcessTimes, ReportCell, Schedule, Setting, SharedWork, timed_to_end,
+    OverProcesses, Part, ProcessTimes, ReportCell, Schedule, Setting, SharedWork, timed,
 };
 use crate::motion::Motion;
 use crate::statistics::Estimate;
@@ -185,7 +185,7 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
     let mut times = ProcessTimes {
         once_ns,
         parts: plan.beside.times(input)?,
-        ..ProcessTimes::of(&timed_to_end(&tasks, &plan.schedule, protocol))
+        ..ProcessTimes::of(&timed(&tasks, &plan.schedule, protocol, &|_| ()))
     };
     if let Some(of_stages) = &plan.stages {
         let stages = Stages::of(input, &plan.structures[0]);

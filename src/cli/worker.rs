@@ -96,9 +96,9 @@ fn times(registry: &Registry, command: &Command, timing: &Timing) -> anyhow::Res
 
 /// Current step of the process.
 ///
-/// Turns of a timed pass are too short to report each: a thread reports the current turn
-/// every second, as long as turns come and go. Then silence means a turn that does not
-/// end, and the parent has its structure.
+/// Turns of a timed pass, and steps that are told again, are too short to report each: a
+/// thread reports the current one every second, as long as they come and go. Then silence
+/// means a turn that does not end, and the parent has its structure.
 #[derive(Default)]
 struct At {
     turns: AtomicU64,
@@ -131,15 +131,11 @@ impl At {
         let notice = |structure: Option<&str>, step: &str| {
             if self.set(structure, step) && step != TIMING {
                 tell(&self.message());
+            } else {
+                self.turns.fetch_add(1, Ordering::Relaxed);
             }
         };
-        // Called before every turn of a timed pass, and elsewhere.
-        let goes_on = || {
-            self.turns.fetch_add(1, Ordering::Relaxed);
-            false
-        };
-        let planned = &plan.scenes[scene];
-        measure_scene(plan, planned, share, &mut keep, &notice, &goes_on)?;
+        measure_scene(plan, &plan.scenes[scene], share, &mut keep, &notice)?;
         Ok(())
     }
 

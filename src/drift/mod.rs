@@ -18,7 +18,7 @@ pub use rated::Recommendation;
 pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 
 use crate::measure::{
-    OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed_rounds, timed_to_end,
+    OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed, timed_rounds,
 };
 use crate::spec::{SpecError, parse_number, values};
 use crate::statistics::{Estimate, flat};
@@ -180,7 +180,7 @@ pub fn plan(options: &DriftOptions, protocol: &Protocol) -> Schedule {
 
 /// Times the planned tasks in this process.
 pub fn time(options: &DriftOptions, schedule: &Schedule, protocol: &Protocol) -> ProcessTimes {
-    ProcessTimes::of(&timed_to_end(&tasks(options), schedule, protocol))
+    ProcessTimes::of(&timed(&tasks(options), schedule, protocol, &|_| ()))
 }
 
 impl DriftReport {

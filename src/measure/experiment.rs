@@ -290,7 +290,7 @@ impl Share {
     }
 }
 
-/// Measures one process's share of one scene; returns false if stopped.
+/// Measures one process's share of one scene.
 ///
 /// Builds the structures, then measures group after group. `keep` gets each part as soon
 /// as its group is finished.
@@ -303,8 +303,7 @@ pub fn measure_scene(
     share: &Share,
     keep: &mut dyn FnMut(Part, Vec<TaskSamples>),
     notice: Notice,
-    stop: &dyn Fn() -> bool,
-) -> Result<bool, ExperimentError> {
+) -> Result<(), ExperimentError> {
     notice(None, "loading the scene");
     let scene = scene::load(&planned.source, &plan.load)?;
     let info = SceneInfo::of(&scene);
@@ -346,12 +345,9 @@ pub fn measure_scene(
             plan_only: share.plan_only,
             locate: plan.effort.extras != Extras::Nothing,
             notice,
-            stop,
             ..GroupPlan::new(&workload, &info, protocol)
         };
-        let Some((mut part, samples)) = measure(&workload, subjects, settings) else {
-            return Ok(false);
-        };
+        let (mut part, samples) = measure(&workload, subjects, settings);
         // In the first group of each scene only.
         if first && plan.has_updates(share) {
             for subject in &mut part.subjects {
@@ -370,7 +366,7 @@ pub fn measure_scene(
         part.failed.clone_from(&share.failed);
         keep(part, samples);
     }
-    Ok(true)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@ use super::moving::{Frames, Laps, Moving, ageing, replay, times_of};
 use super::process_result::{Measured, Part, SubjectPart};
 use super::schedule::Orders;
 use super::{
-    Answer, Counted, KeyedSchedule, Protocol, Sample, Schedule, Status, Subject, TIMING, TaskKind,
-    TaskPlan, Timed, Verdict, Workload, guarded,
+    Answer, Counted, KeyedSchedule, Notice, Protocol, Sample, Schedule, Status, Subject, TIMING,
+    TaskKind, TaskPlan, Timed, Verdict, Workload, guarded,
 };
 use crate::index::{StructureSpec, UpdatePolicy};
 use crate::query::QueryCost;
@@ -38,18 +38,13 @@ struct Entry<'a> {
     rounds: Vec<Vec<(Laps, u64)>>,
 }
 
-/// Measures a group in this process: queries of a still scene, or frames; `None` if
-/// stopped.
-pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Option<Measured> {
+/// Measures a group in this process: queries of a still scene, or frames.
+pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Measured {
     let Some(motion) = &workload.motion else {
         return queries(workload, subjects, plan);
     };
-    let (notice, stop) = (plan.notice, plan.stop);
-    let answered = plan.answered();
-    if answered.is_none() {
-        notice(None, "scanning the frames");
-    }
-    let frames = &Frames::new(workload, motion, answered, stop)?;
+    let (notice, answered) = (plan.notice, plan.answered());
+    let frames = &Frames::new(workload, motion, answered, notice);
     let mut entries = Vec::new();
     for subject in subjects {
         let verdict = subject.built.as_ref().err().cloned().unwrap_or_default();
@@ -62,8 +57,7 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
             rounds: Vec::new(),
         };
         if answered.is_none() && entry.part.verdict.is_ok() {
-            notice(Some(&entry.part.label), "counting");
-            let counted = guarded(|| entry.count(frames, stop));
+            let counted = guarded(|| entry.count(frames, notice));
             let failed = counted.unwrap_or_else(Err).err();
             let missed = frames.judged.and_then(|judged| judged.unsafe_verdict());
             let missed = missed.map(|missed| match (subject.spec.policy, missed.reason) {
@@ -75,15 +69,12 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
             });
             entry.part.verdict = failed.or(missed).unwrap_or_default();
         }
-        if stop() {
-            return None;
-        }
         entries.push(entry);
     }
     let given = plan.known.and_then(|known| known.query.clone());
     let planned = given.unwrap_or_else(|| schedule(&entries, frames, &plan.protocol));
     if !plan.plan_only {
-        time(&mut entries, frames, &planned, &plan)?;
+        time(&mut entries, frames, &planned, &plan);
     }
     let (mut tasks, mut samples) = (Vec::new(), Vec::new());
     for key in planned.keys.iter().filter(|_| !plan.plan_only) {
@@ -108,16 +99,12 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
         for entry in &mut entries {
             let Subject { spec, is_twin, .. } = entry.subject;
             if entry.part.verdict.is_ok() && !is_twin && ages(spec) {
-                notice(Some(&entry.part.label), "ageing");
-                let found = guarded(|| ageing(spec, frames, &plan.protocol, stop));
+                let found = guarded(|| ageing(spec, frames, &plan.protocol, notice));
                 match found.unwrap_or_else(Err) {
                     Ok(ageing_ln) => entry.part.ageing_ln = ageing_ln,
                     Err(verdict) => entry.part.verdict = verdict,
                 }
             }
-        }
-        if stop() {
-            return None;
         }
     }
     let answers = [frames.right.clone(), Vec::new()];
@@ -127,7 +114,7 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
         tasks,
         ..plan.part(workload, answers, [Some(planned), None])
     };
-    Some((part, samples))
+    (part, samples)
 }
 
 /// False for a structure that is built again in every frame or in every n-th.
@@ -137,16 +124,18 @@ fn ages(spec: &StructureSpec) -> bool {
 
 impl Entry<'_> {
     /// Counts and verifies all queries, and measures the time of one replay.
-    fn count(&mut self, frames: &Frames, stop: &dyn Fn() -> bool) -> Result<(), Verdict> {
+    fn count(&mut self, frames: &Frames, notice: Notice) -> Result<(), Verdict> {
+        notice(Some(&self.part.label), "counting");
         let mut moving = Moving::build(frames, &self.subject.spec)?;
         let (mut out, mut cost) = (Vec::new(), QueryCost::default());
         let mut answers = Vec::new();
         self.replay_ns = 0.0;
         let all_threads = self.subject.spec.is_threaded();
         for frame in 0.. {
-            if !moving.take_moves() || stop() {
+            if !moving.take_moves() {
                 break;
             }
+            notice(Some(&self.part.label), "counting");
             let watch = Stopwatch::start_for(all_threads);
             moving.update()?;
             self.replay_ns += watch.lap().cpu_ns;
@@ -246,14 +235,8 @@ fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSch
     KeyedSchedule { keys, schedule }
 }
 
-/// Replays the motion by the schedule; `None` if stopped.
-fn time(
-    entries: &mut [Entry],
-    frames: &Frames,
-    planned: &KeyedSchedule,
-    plan: &GroupPlan,
-) -> Option<()> {
-    let stop = plan.stop;
+/// Replays the motion by the schedule.
+fn time(entries: &mut [Entry], frames: &Frames, planned: &KeyedSchedule, plan: &GroupPlan) {
     let mut orders = Orders::new(entries.len(), plan.protocol.seed);
     for round in 0..planned.schedule.rounds {
         for n in orders.next() {
@@ -264,20 +247,14 @@ fn time(
             if !is_due || !entry.part.verdict.is_ok() {
                 continue;
             }
-            (plan.notice)(Some(&entry.subject.spec.label), TIMING);
-            if stop() {
-                return None;
-            }
-            let is_first = entry.rounds.is_empty();
-            let laps = guarded(|| replay(&entry.subject.spec, frames, is_first, stop));
-            match laps.unwrap_or_else(Err) {
-                Ok(Some(laps)) => entry.rounds.push(laps),
-                Ok(None) => return None,
+            let (spec, is_first) = (&entry.subject.spec, entry.rounds.is_empty());
+            let turn = || (plan.notice)(Some(&spec.label), TIMING);
+            match guarded(|| replay(spec, frames, is_first, &turn)).unwrap_or_else(Err) {
+                Ok(laps) => entry.rounds.push(laps),
                 Err(verdict) => entry.part.verdict = verdict,
             }
         }
     }
-    Some(())
 }
 
 #[cfg(test)]

@@ -44,8 +44,6 @@ pub struct GroupPlan<'a> {
     pub locate: bool,
     /// Gets each step.
     pub notice: Notice<'a>,
-    /// Returns true to stop.
-    pub stop: &'a dyn Fn() -> bool,
 }
 
 impl<'a> GroupPlan<'a> {
@@ -63,7 +61,6 @@ impl<'a> GroupPlan<'a> {
             plan_only: false,
             locate: true,
             notice: &|_, _| (),
-            stop: &|| false,
         }
     }
 
@@ -106,9 +103,9 @@ struct Entry<'a> {
     counted: Option<Counted>,
 }
 
-/// Measures a group of queries of a still scene; `None` if stopped.
-pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Option<Measured> {
-    let (notice, stop) = (plan.notice, plan.stop);
+/// Measures a group of queries of a still scene.
+pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Measured {
+    let notice = plan.notice;
     let (mut entries, judged, answers) = match plan.answered() {
         None => count(workload, subjects, notice),
         Some(known) => {
@@ -124,9 +121,6 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
             (subjects.iter().map(entry).collect(), None, answers)
         }
     };
-    if stop() {
-        return None;
-    }
     let (mut bounds, mut tasks, mut samples) = (Vec::new(), Vec::new(), Vec::new());
     let mut schedules = [None, None];
     for &pass in &Pass::ALL[..1 + usize::from(plan.locate)] {
@@ -143,13 +137,10 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
         let labels = keyed.keys.iter().map(|(label, _)| label);
         let structure = |label| (!bounds.contains(label)).then(|| original(label));
         let structures: Vec<Option<&str>> = labels.map(structure).collect();
-        let turn = |task: usize| {
-            notice(structures[task], TIMING);
-            stop()
-        };
+        let turn = |task: usize| notice(structures[task], TIMING);
         let timed = match plan.plan_only {
             true => Vec::new(),
-            false => timed(&keyed.tasks, &schedule, &plan.protocol, &turn)?,
+            false => timed(&keyed.tasks, &schedule, &plan.protocol, &turn),
         };
         let alone = keyed.keys.iter().zip(&schedule.tasks);
         let alone = alone.filter(|((_, kind), _)| *kind != TaskKind::Views);
@@ -176,7 +167,7 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Op
         tasks,
         ..plan.part(workload, answers, schedules)
     };
-    Some((part, samples))
+    (part, samples)
 }
 
 /// The tasks of a pass, for all structures that are right so far.

@@ -81,7 +81,7 @@ pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, camera
 pub use shared_work::SharedWork;
 pub use study::{Setting, StudyPlan};
 pub use task::{Ask, AskMany, TimedTask};
-pub use timing::{Sample, Timed, timed, timed_rounds, timed_to_end};
+pub use timing::{Sample, Timed, timed, timed_rounds};
 pub(crate) use workload::input_for;
 pub use workload::{Workload, WorkloadError, input_of};
 
@@ -202,5 +202,6 @@ pub const TIMING: &str = "timing";
 
 /// Callback that gets each step of a process, for progress and time limits.
 ///
-/// Its arguments are the structure, `None` for steps without one, and the step.
+/// Its arguments are the structure, `None` for steps without one, and the step. A step that
+/// goes on is told again.
 pub type Notice<'n> = &'n dyn Fn(Option<&str>, &str);

@@ -9,8 +9,8 @@ use super::count::{Judging, MOST_JUDGED, spread};
 use super::index_under_test::{MOST_UPDATED, USUAL_SHARE};
 use super::process_result::Known;
 use super::{
-    Answer, Judged, Protocol, Status, TaskKind, TimedTask, Verdict, Workload, compare_with_scan,
-    guarded, move_share, timed_rounds,
+    Answer, Judged, Notice, Protocol, Status, TaskKind, TimedTask, Verdict, Workload,
+    compare_with_scan, guarded, move_share, timed_rounds,
 };
 use crate::culling::CameraView;
 use crate::geometry::Aabb;
@@ -40,13 +40,13 @@ pub(super) struct Frames<'w> {
 }
 
 impl<'w> Frames<'w> {
-    /// The right answers by the scan, unless they are known; `None` if stopped.
+    /// The right answers by the scan, unless they are known.
     pub(super) fn new(
         workload: &'w Workload<'w>,
         motion: &'w Motion,
         known: Option<&Known>,
-        stop: &dyn Fn() -> bool,
-    ) -> Option<Frames<'w>> {
+        notice: Notice,
+    ) -> Frames<'w> {
         let mut frames = Frames {
             workload,
             motion,
@@ -54,7 +54,7 @@ impl<'w> Frames<'w> {
             judged: None,
         };
         if known.is_some() {
-            return Some(frames);
+            return frames;
         }
         let (mut items, mut replay) = (workload.items.to_vec(), motion.replay());
         let (scene, mut judging) = (workload.scene, Judging::default());
@@ -63,9 +63,7 @@ impl<'w> Frames<'w> {
         let due = spread(items.len(), MOST_JUDGED, motion.frames());
         let (mut due, views) = (due.enumerate().peekable(), workload.views_per_frame);
         for frame in 0..motion.frames() {
-            if stop() {
-                return None;
-            }
+            notice(None, "scanning the frames");
             advance(&mut replay, workload, &mut items);
             if due.peek().is_some() {
                 shown.advance_written(&mut boxes, &mut written);
@@ -84,7 +82,7 @@ impl<'w> Frames<'w> {
             }
         }
         frames.judged = Some(judging.judged());
-        Some(frames)
+        frames
     }
 
     /// Queries of a frame with their numbers; frames repeat the path.
@@ -278,13 +276,14 @@ pub(super) fn times_of(laps: &Laps, kind: TaskKind, workload: &Workload) -> [f64
     })
 }
 
-/// Times and returned items of each frame of a replay; `Ok(None)` if stopped.
+/// Times and returned items of each frame of a replay.
 pub(super) fn replay(
     spec: &StructureSpec,
     frames: &Frames,
     compares_sets: bool,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<Vec<(Laps, u64)>>, Verdict> {
+    turn: &dyn Fn(),
+) -> Result<Vec<(Laps, u64)>, Verdict> {
+    turn();
     let mut moving = Moving::build(frames, spec)?;
     let mut outs = vec![Vec::new(); frames.workload.views_per_frame];
     let mut all = Vec::with_capacity(frames.motion.frames());
@@ -298,9 +297,7 @@ pub(super) fn replay(
         if !moving.take_moves() {
             break;
         }
-        if stop() {
-            return Ok(None);
-        }
+        turn();
         outs.iter_mut().for_each(Vec::clear);
         let watch = Stopwatch::start_for(all_threads);
         moving.update()?;
@@ -326,7 +323,7 @@ pub(super) fn replay(
             }
         }
     }
-    Ok(Some(all))
+    Ok(all)
 }
 
 /// ln of (query time / query time on a fresh build of the same boxes), by frame.
@@ -337,15 +334,17 @@ pub(super) fn ageing(
     spec: &StructureSpec,
     frames: &Frames,
     protocol: &Protocol,
-    stop: &dyn Fn() -> bool,
+    notice: Notice,
 ) -> Result<BTreeMap<usize, f64>, Verdict> {
+    notice(Some(&spec.label), "ageing");
     let mut ages = BTreeMap::new();
     let mut moving = Moving::build(frames, spec)?;
     let last = AGES.into_iter().rfind(|age| *age <= frames.motion.frames());
     for frame in 1..=last.unwrap_or(0) {
-        if !moving.take_moves() || stop() {
+        if !moving.take_moves() {
             break;
         }
+        notice(Some(&spec.label), "ageing");
         moving.update()?;
         if moving.refused > 0 {
             break;

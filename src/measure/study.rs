@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Ask, Protocol, Schedule, Timed, TimedTask, Verdict, timed_to_end};
+use super::{Ask, Protocol, Schedule, Timed, TimedTask, Verdict, timed};
 use crate::index::StructureSpec;
 use crate::path::CameraPath;
 use crate::scene::Scene;
@@ -48,6 +48,6 @@ impl<K> StudyPlan<K> {
     ) -> Vec<Result<Timed, Verdict>> {
         let tasks = self.tasks.iter();
         let tasks = tasks.map(|(key, expected)| TimedTask::new(expected.clone(), ask(key)));
-        timed_to_end(&tasks.collect::<Vec<_>>(), &self.schedule, protocol)
+        timed(&tasks.collect::<Vec<_>>(), &self.schedule, protocol, &|_| ())
     }
 }

@@ -82,29 +82,20 @@ impl Timed {
 
 /// Makes a schedule for `count` cameras and times the tasks by it, in one process.
 ///
-/// [`Schedule::new`], then [`timed_to_end`].
+/// [`Schedule::new`], then [`timed`].
 pub fn timed_rounds(
     count: usize,
     tasks: &[TimedTask],
     protocol: &Protocol,
 ) -> Vec<Result<Timed, Verdict>> {
-    timed_to_end(tasks, &Schedule::new(count, tasks, protocol), protocol)
-}
-
-/// [`timed`] without a stop.
-pub fn timed_to_end(
-    tasks: &[TimedTask],
-    schedule: &Schedule,
-    protocol: &Protocol,
-) -> Vec<Result<Timed, Verdict>> {
-    timed(tasks, schedule, protocol, &|_| false).unwrap_or_default()
+    let schedule = Schedule::new(count, tasks, protocol);
+    timed(tasks, &schedule, protocol, &|_| ())
 }
 
 /// Times the tasks by a schedule; returns the samples or the failure of each task.
 ///
-/// `turn` gets the number of a task before each of its turns and stops the pass by
-/// returning true; the result is then `None`. A sample with another number of ids than
-/// [`TimedTask::expected`] makes its task `wrong`; a panic fails its task alone.
+/// `turn` gets the number of a task before each of its turns. A sample with another number
+/// of ids than [`TimedTask::expected`] makes its task `wrong`; a panic fails its task alone.
 ///
 /// # Panics
 /// If the schedule is of another number of tasks.
@@ -112,8 +103,8 @@ pub fn timed(
     tasks: &[TimedTask],
     schedule: &Schedule,
     protocol: &Protocol,
-    turn: &dyn Fn(usize) -> bool,
-) -> Option<Vec<Result<Timed, Verdict>>> {
+    turn: &dyn Fn(usize),
+) -> Vec<Result<Timed, Verdict>> {
     assert_eq!(tasks.len(), schedule.tasks.len(), "a plan for each task");
     let mut timer = TaskTimer {
         cameras: &schedule.cameras,
@@ -122,7 +113,7 @@ pub fn timed(
         results: tasks.iter().map(|_| Ok(Timed::default())).collect(),
     };
     if schedule.cameras.is_empty() {
-        return Some(timer.results);
+        return timer.results;
     }
     let mut cold = schedule.cold.then(|| Cold::new(protocol, tasks));
     let mut orders = Orders::new(tasks.len(), protocol.seed);
@@ -135,9 +126,7 @@ pub fn timed(
         for first in 0..cold.as_ref().map_or(1, |_| schedule.cameras.len()) {
             cold.iter_mut().for_each(Cold::sweep_over_caches);
             for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
-                if turn(task) {
-                    return None;
-                }
+                turn(task);
                 let (all_threads, batch) = (tasks[task].all_threads, batch(task));
                 let Some(cold) = &mut cold else {
                     timer.guarded(task, |timer| {
@@ -159,7 +148,7 @@ pub fn timed(
             }
         }
     }
-    Some(timer.results)
+    timer.results
 }
 
 /// Times batches of queries and keeps the samples of all tasks.
@@ -342,7 +331,7 @@ mod tests {
         let mut schedule = Schedule::new(40, &all, &protocol());
         schedule.rounds = 6;
         schedule.tasks[1].every = 3;
-        let found = timed_to_end(&all, &schedule, &protocol());
+        let found = timed(&all, &schedule, &protocol(), &|_| ());
         let rounds = |i: usize| found[i].as_ref().unwrap().rounds().count();
         assert_eq!((rounds(0), rounds(1)), (6, 2));
     }
@@ -400,12 +389,5 @@ mod tests {
         assert!((ns - 100.0).abs() < 1e-9, "{ns}");
         assert_eq!(timed.over(&timed), Some(1.0));
         assert_eq!(Timed::default().ns(), None);
-    }
-
-    #[test]
-    fn a_pass_that_is_stopped_has_no_samples() {
-        let all = [task(|_| 0, vec![0; 40])];
-        let schedule = Schedule::new(40, &all, &protocol());
-        assert!(timed(&all, &schedule, &protocol(), &|_| true).is_none());
     }
 }

@@ -95,8 +95,7 @@ impl Experiment {
                     samples_end: 0,
                 });
             };
-            let never = || false;
-            measure_scene(&self.plan, planned, &share, &mut keep, &|_, _| (), &never)?;
+            measure_scene(&self.plan, planned, &share, &mut keep, &|_, _| ())?;
         }
         stream.finished_at = Some(utc(SystemTime::now()));
         Ok(stream.report())

@@ -131,8 +131,7 @@ fn protocol() -> Protocol {
 fn statuses(workload: &Workload, subjects: &[Subject]) -> Vec<Status> {
     let info = SceneInfo::of(workload.scene);
     let plan = GroupPlan::new(workload, &info, protocol());
-    let measured = measure(workload, subjects, plan);
-    let cells = Group::of(&[measured.expect("not stopped").0]).cells;
+    let cells = Group::of(&[measure(workload, subjects, plan).0]).cells;
     for cell in &cells {
         let is_ok = cell.status == Status::Ok;
         assert_eq!(cell.rank.is_some(), is_ok, "{cell:?}");
@@ -151,8 +150,7 @@ fn part(process: u32, known: Option<&Known>) -> Part {
         known,
         ..GroupPlan::new(&workload, &info, protocol())
     };
-    let measured = measure(&workload, &subjects, plan);
-    measured.expect("not stopped").0
+    measure(&workload, &subjects, plan).0
 }
 
 fn of_parts(parts: &[Part]) -> Vec<Status> {

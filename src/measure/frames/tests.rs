@@ -40,8 +40,7 @@ fn part(specs: &[StructureSpec], motion: &str, test: CullingTest, known: Option<
         known,
         ..GroupPlan::new(&workload, &info, protocol)
     };
-    let part = measure(&workload, &subjects, plan);
-    part.unwrap().0
+    measure(&workload, &subjects, plan).0
 }
 
 /// A structure by its label, `wide@every=5`.
@@ -128,7 +127,7 @@ fn a_twin_gets_the_rounds_of_its_original() {
     let motion = Motion::load("drift:frames=3", &scene).unwrap();
     let workload = Workload::moving(&scene, &way, &Culling::default(), Some(motion), 1).unwrap();
     let motion = workload.motion.as_ref().unwrap();
-    let frames = Frames::new(&workload, motion, None, &|| false).unwrap();
+    let frames = Frames::new(&workload, motion, None, &|_, _| ());
     let test = CullingTest::SixPlane;
     let subjects = [("linear", false), ("wide", false), ("wide", true)].map(|(name, is_twin)| {
         Subject::build(StructureSpec::parse(name).unwrap(), is_twin, &scene, test)
@@ -325,7 +324,7 @@ fn recorded_frames_are_judged_by_the_boxes_as_written() {
     let motion = Motion::load(&moves, &scene).unwrap();
     let moving = Workload::moving(&scene, &way, &culling, Some(motion), 1).unwrap();
     let motion = moving.motion.as_ref().unwrap();
-    let frames = Frames::new(&moving, motion, None, &|| false).unwrap();
+    let frames = Frames::new(&moving, motion, None, &|_, _| ());
     let wanted = crate::measure::count::judge(&still, 10_000);
     let found = frames.judged.unwrap();
     assert_eq!(found.errors, wanted.errors);
