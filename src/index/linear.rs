@@ -14,7 +14,6 @@ use crate::geometry::{Aabb, BallBlocks, Balls, BoxBlock, BoxBlocks, LANES, LaneM
 use crate::kernel::{Isa, Piece, first_lanes, pairs};
 use crate::query::{
     Context, ItemId, NoRecorder, Planes, QueryContext, QueryVolume, Recorder, Sink, Tests,
-    UnpreparedPlanes,
 };
 use crate::threads::Workers;
 
@@ -157,14 +156,15 @@ impl Linear {
         volume: &Q,
         cx: &mut C,
     ) -> ControlFlow<()> {
-        let open = Q::planes_open(volume.mask());
+        let mask = volume.mask();
+        let open = Q::planes_open(mask);
         let balls = seen_by(self.balls.as_ref(), volume);
         if C::Isa::MANY_REGISTERS
             && let Some(planes) = volume.all_planes(cx.isa())
         {
             return self.scan_all(range, open, planes, balls, cx);
         }
-        self.scan_all(range, open, UnpreparedPlanes::all(volume), balls, cx)
+        self.scan_all(range, open, (volume, mask), balls, cx)
     }
 }
 

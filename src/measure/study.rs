@@ -48,6 +48,7 @@ impl<K> StudyPlan<K> {
     ) -> Vec<Result<Timed, Verdict>> {
         let tasks = self.tasks.iter();
         let tasks = tasks.map(|(key, expected)| TimedTask::new(expected.clone(), ask(key)));
-        timed(&tasks.collect::<Vec<_>>(), &self.schedule, protocol, &|_| ())
+        let tasks: Vec<_> = tasks.collect();
+        timed(&tasks, &self.schedule, protocol, &|_| ())
     }
 }

@@ -20,7 +20,7 @@ pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use sink::{Count, Ranges, Sink, Tests, runs};
 pub(crate) use volume::each_volume;
-pub use volume::{AnyVolume, QueryVolume, UnpreparedPlanes};
+pub use volume::{AnyVolume, QueryVolume};
 
 /// An item's number: its zero-based index in the scene.
 pub type ItemId = u32;

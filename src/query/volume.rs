@@ -65,17 +65,14 @@ pub trait QueryVolume: Predicate {
     /// [`QueryVolume::kept_lanes`] with this bit for a mask.
     #[inline(always)]
     fn one_plane<I: Isa>(&self, _: I, plane: u32) -> impl Planes<I> {
-        UnpreparedPlanes {
-            view: self,
-            mask: 1 << plane,
-        }
+        (self, 1 << plane)
     }
 
     /// All planes, prepared for many blocks: [`QueryVolume::kept_lanes`] with
     /// [`Predicate::mask`]. `None` if there are too many planes.
     #[inline(always)]
     fn all_planes<I: Isa>(&self, _: I) -> Option<impl Planes<I>> {
-        Some(UnpreparedPlanes::all(self))
+        Some((self, self.mask()))
     }
 
     /// [`QueryVolume::kept_lanes`] of four blocks.
@@ -118,49 +115,27 @@ pub trait QueryVolume: Predicate {
     }
 }
 
-/// Planes of a volume that prepares nothing: each block is tested by the volume.
-pub struct UnpreparedPlanes<'v, V> {
-    view: &'v V,
-    mask: PlaneMask,
-}
-
-impl<V> Clone for UnpreparedPlanes<'_, V> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<V> Copy for UnpreparedPlanes<'_, V> {}
-
-impl<'v, V: QueryVolume> UnpreparedPlanes<'v, V> {
-    /// All planes of the view.
-    #[inline(always)]
-    pub fn all(view: &'v V) -> Self {
-        let mask = view.mask();
-        UnpreparedPlanes { view, mask }
-    }
-}
-
-impl<I: Isa, V: QueryVolume> Planes<I> for UnpreparedPlanes<'_, V> {
+/// Planes of a mask, not prepared: each block is tested by the volume.
+impl<I: Isa, V: QueryVolume> Planes<I> for (&V, PlaneMask) {
     const IN_FOURS: bool = true;
     const SPHERES: bool = V::SPHERES;
 
     #[inline(always)]
     fn kept_balls(&self, isa: I, balls: &Balls, block: (usize, &BoxBlock)) -> LaneMask {
-        self.view.kept_balls(isa, balls, block, self.mask)
+        self.0.kept_balls(isa, balls, block, self.1)
     }
 
     #[inline(always)]
     fn kept_of_four(&self, isa: I, blocks: &[BoxBlock; 4]) -> [LaneMask; 4] {
-        self.view.kept_of_four(isa, blocks, self.mask)
+        self.0.kept_of_four(isa, blocks, self.1)
     }
     #[inline(always)]
     fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
-        self.view.kept_lanes(isa, block, self.mask)
+        self.0.kept_lanes(isa, block, self.1)
     }
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock) {
-        self.view.prefetch(block, self.mask);
+        self.0.prefetch(block, self.1);
     }
 }
 
