@@ -10,7 +10,7 @@ use ::bvh::bvh::{Bvh, BvhNode};
 use glam::Vec3;
 use nalgebra::Point3;
 
-use super::placed;
+use super::{place_of, placed};
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::Record;
@@ -150,7 +150,8 @@ impl BoxTested for PeerBvh {
     ///
     /// A build is faster where most shapes have moved, and needed where areas overflow.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        let placed = placed(&self.shapes, |s| s.item.id, items, moved)?;
+        let place = |id| place_of(&self.shapes, |s| s.item.id, id).ok();
+        let placed = placed(place, items, moved)?;
         let overflows = |(_, b): &(usize, Aabb)| b.reach().max_element() > LARGEST;
         let count = self.shapes.len();
         let eighths = if count > LARGE { 3 } else { 6 };

@@ -28,21 +28,20 @@ fn place_of<T>(held: &[T], id_of: impl Fn(&T) -> ItemId, id: ItemId) -> Result<u
     }
 }
 
-/// Moved items by their index in a list ascending by id, with their new bounds.
+/// Moved items by the places that a peer holds them at, with their new bounds.
 ///
-/// Empty items have none; `None` if one becomes or ceases to be empty. O(moved * log n).
-fn placed<T>(
-    held: &[T],
-    id_of: impl Fn(&T) -> ItemId,
+/// Empty items have none; `None` if one becomes or ceases to be empty.
+fn placed(
+    place_of: impl Fn(ItemId) -> Option<usize>,
     items: &[Aabb],
     moved: &[ItemId],
 ) -> Option<Vec<(usize, Aabb)>> {
     let mut placed = Vec::with_capacity(moved.len());
     for &id in moved {
         let bounds = items[id as usize];
-        match place_of(held, &id_of, id) {
-            Ok(at) if !bounds.is_empty() => placed.push((at, bounds)),
-            Err(_) if bounds.is_empty() => {}
+        match place_of(id) {
+            Some(at) if !bounds.is_empty() => placed.push((at, bounds)),
+            None if bounds.is_empty() => {}
             _ => return None,
         }
     }

@@ -9,6 +9,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use serde::{Deserialize, Serialize};
 
+use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::{Positions, Record};
@@ -109,11 +110,7 @@ impl BoxTested for PeerObvhs {
 
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
         self.positions.prepare(&self.ids, items.len());
-        let place_of = |&id: &ItemId| self.positions.of(id).map(|at| (at, items[id as usize]));
-        let is_empty = |id: &ItemId| items[*id as usize].is_empty();
-        let stays = |id: &ItemId| place_of(id).is_none() == is_empty(id);
-        moved.iter().all(stays).then_some(())?;
-        let placed: Vec<(usize, Aabb)> = moved.iter().filter_map(place_of).collect();
+        let placed = placed(|id| self.positions.of(id), items, moved)?;
         self.bvh.init_primitives_to_nodes_if_uninit();
         let all = placed.len() * ALL_SHARE >= self.ids.len();
         let moves = self.update == ObvhsUpdate::Move && self.boxes.is_empty();
