@@ -131,10 +131,7 @@ impl Entry<'_> {
         let mut answers = Vec::new();
         self.replay_ns = 0.0;
         let all_threads = self.subject.spec.is_threaded();
-        for frame in 0.. {
-            if !moving.take_moves() {
-                break;
-            }
+        while let Some(frame) = moving.take_moves() {
             notice(Some(&self.part.label), "counting");
             let watch = Stopwatch::start_for(all_threads);
             moving.update()?;

@@ -162,12 +162,13 @@ impl<'w> Moving<'w> {
         })
     }
 
-    /// Takes the moves of the next frame; false after the last one.
-    pub(super) fn take_moves(&mut self) -> bool {
+    /// Takes the moves of the next frame; its number, from 0, or `None` after the last one.
+    pub(super) fn take_moves(&mut self) -> Option<usize> {
+        let moved = advance(&mut self.replay, self.workload, &mut self.items)?;
         self.moved.clear();
+        self.moved.extend(moved);
         self.frame += 1;
-        let moved = advance(&mut self.replay, self.workload, &mut self.items);
-        moved.map(|ids| self.moved.extend(ids)).is_some()
+        Some(self.frame as usize - 1)
     }
 
     /// Brings the index up to date.
@@ -293,10 +294,7 @@ pub(super) fn replay(
     for ((_, view), out) in frames.views(0).zip(&mut outs) {
         moving.index.query(view.as_any(), out);
     }
-    for frame in 0.. {
-        if !moving.take_moves() {
-            break;
-        }
+    while let Some(frame) = moving.take_moves() {
         turn();
         outs.iter_mut().for_each(Vec::clear);
         let watch = Stopwatch::start_for(all_threads);
@@ -341,9 +339,7 @@ pub(super) fn ageing(
     let mut moving = Moving::build(frames, spec)?;
     let last = AGES.into_iter().rfind(|age| *age <= frames.motion.frames());
     for frame in 1..=last.unwrap_or(0) {
-        if !moving.take_moves() {
-            break;
-        }
+        moving.take_moves();
         notice(Some(&spec.label), "ageing");
         moving.update()?;
         if moving.refused > 0 {
