@@ -5,7 +5,7 @@
 
 use super::{Difference, scan};
 use crate::geometry::Aabb;
-use crate::index::caught;
+use crate::index::{IdSet, caught};
 use crate::query::{AnyVolume, ItemId};
 
 /// A fault of an answer.
@@ -23,22 +23,24 @@ pub enum Fault {
 /// out.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// Per item: the number of the question that marked it last, twice: +0 if
-    /// the reference wants it, +1 once a structure has returned it.
-    marks: Vec<u64>,
-    stamp: u64,
+    items: usize,
+    /// Items of the right answer, and their number.
+    right: IdSet,
     expected: usize,
     answer: Vec<ItemId>,
+    /// Items of the right answer that are in the structure's.
+    found: IdSet,
 }
 
 impl Trial {
     /// A trial for queries of `items` items.
     pub fn new(items: usize) -> Trial {
         Trial {
-            marks: vec![0; items],
-            stamp: 0,
+            items,
+            right: IdSet::none(items),
             expected: 0,
             answer: Vec::new(),
+            found: IdSet::none(items),
         }
     }
 
@@ -49,15 +51,12 @@ impl Trial {
         self.expect(scan(items, |b| view.sees(b)));
     }
 
-    /// A question whose right answer is known.
-    ///
-    /// # Panics
-    /// An id that is not below the number of items.
+    /// A question whose right answer is known: ids below the number of items.
     pub fn expect(&mut self, right: impl IntoIterator<Item = ItemId>) {
-        self.stamp += 2;
+        self.right.clear(self.items);
         self.expected = 0;
         for id in right {
-            self.marks[id as usize] = self.stamp;
+            self.right.insert(id);
             self.expected += 1;
         }
     }
@@ -68,7 +67,7 @@ impl Trial {
     }
 
     /// Puts the question to a structure, which appends its answer to an empty
-    /// list. O(answer) if it is right.
+    /// list. O(answer + items / 64) if it is right.
     ///
     /// # Errors
     /// A panic, or how the answer differs.
@@ -87,37 +86,28 @@ impl Trial {
         &self.answer
     }
 
-    /// Compares the answer, in any order, with the reference. O(items) in the worst
-    /// case, O(answer) if it is right.
+    /// Compares the answer, in any order, with the reference. O(items) in the worst case.
     fn compare(&mut self) -> Difference {
-        let found = &self.answer;
-        let mut difference = Difference::default();
-        let mut right = 0;
-        for &id in found {
-            let bad = match self.marks.get_mut(id as usize) {
-                Some(mark) if *mark == self.stamp => {
-                    *mark += 1;
-                    right += 1;
-                    continue;
-                }
-                Some(mark) if *mark == self.stamp + 1 => &mut difference.invalid,
-                Some(_) => &mut difference.extra,
-                None => &mut difference.invalid,
-            };
-            *bad += 1;
+        let mut difference = Difference {
+            missing: self.expected,
+            ..Difference::default()
+        };
+        self.found.clear(self.items);
+        for &id in &self.answer {
+            let is_known = (id as usize) < self.items;
+            if is_known && !self.right.holds(id) {
+                difference.extra += 1;
+            } else if is_known && self.found.insert(id) {
+                difference.missing -= 1;
+                continue;
+            } else {
+                difference.invalid += 1;
+            }
             difference.first.get_or_insert(id);
         }
-        difference.missing = self.expected - right;
         if difference.missing > 0 {
-            let lost = self.marks.iter().position(|mark| *mark == self.stamp);
-            difference.first = lost.map(|id| id as ItemId);
-        }
-        // Ready for the next structure.
-        for &id in found {
-            let mark = self.marks.get_mut(id as usize);
-            if let Some(mark) = mark.filter(|m| **m == self.stamp + 1) {
-                *mark = self.stamp;
-            }
+            let is_lost = |id: &ItemId| self.right.holds(*id) && !self.found.holds(*id);
+            difference.first = (0..self.items as ItemId).find(is_lost);
         }
         difference
     }
