@@ -19,18 +19,9 @@ pub struct Bound {
     pub ratio: &'static str,
     /// Makes the task of the bound, with its own copy of the data.
     ///
-    /// `None` if there is nothing to read or copy.
-    pub make: for<'a> fn(&Material<'a>) -> Option<TimedTask<'a>>,
-}
-
-/// Queries and answers that a bound is made from.
-pub struct Material<'a> {
-    /// The queries that it bounds.
-    pub workload: &'a Workload<'a>,
-    /// The kernel that the structures are queried with.
-    pub kernel: Kernel,
-    /// Number of items that each camera of the path sees.
-    pub visible: Vec<u64>,
+    /// From the queries that it bounds, the kernel that the structures are queried with, and
+    /// the number of items that each camera sees. `None` if there is nothing to read or copy.
+    pub make: fn(&Workload, Kernel, &[u64]) -> Option<TimedTask<'static>>,
 }
 
 /// All bounds, in the order in which they are shown.
@@ -53,10 +44,9 @@ impl Work for Read<'_> {
     }
 }
 
-fn read<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
-    let blocks = blocks_of(&material.workload.items);
-    let kernel = material.kernel;
-    let expected = vec![0; material.visible.len()];
+fn read(workload: &Workload, kernel: Kernel, visible: &[u64]) -> Option<TimedTask<'static>> {
+    let blocks = blocks_of(&workload.items);
+    let expected = vec![0; visible.len()];
     (!blocks.is_empty()).then(|| {
         TimedTask::new(expected, move |_, _| {
             std::hint::black_box(kernel.run(Read(&blocks)));
@@ -69,10 +59,10 @@ fn blocks_of(items: &[Aabb]) -> BoxBlocks {
     items.iter().filter(|b| !b.is_empty()).collect()
 }
 
-fn memcpy<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
-    let count = material.workload.items.len();
+fn memcpy(workload: &Workload, _: Kernel, visible: &[u64]) -> Option<TimedTask<'static>> {
+    let count = workload.items.len();
     let ids: Vec<ItemId> = (0..count as ItemId).collect();
-    let lengths: Vec<usize> = material.visible.iter().map(|&v| v as usize).collect();
+    let lengths: Vec<usize> = visible.iter().map(|&v| v as usize).collect();
     // Each query copies from another place, as answers do: always the first ids
     // would be always the same few cache lines.
     let start = |(place, &length): (usize, &usize)| match count.checked_sub(length) {
@@ -81,7 +71,7 @@ fn memcpy<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     };
     let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
     lengths.iter().any(|&length| length > 0).then(|| {
-        TimedTask::new(material.visible.clone(), move |place, out| {
+        TimedTask::new(visible.to_vec(), move |place, out| {
             let start = starts[place];
             out.extend_from_slice(&ids[start..start + lengths[place]]);
         })
@@ -107,11 +97,6 @@ mod tests {
         let path = path::load("orbit:frames=6", &scene, &LensDefaults::default()).unwrap();
         let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
         let visible: Vec<u64> = (0..6).map(|camera| 40 * camera).collect();
-        let material = Material {
-            workload: &workload,
-            kernel: Kernel::best(),
-            visible: visible.clone(),
-        };
         for bound in BOUNDS {
             assert!(
                 crate::measure::METRICS
@@ -120,7 +105,7 @@ mod tests {
                 "{}",
                 bound.name
             );
-            let task = (bound.make)(&material).unwrap();
+            let task = (bound.make)(&workload, Kernel::best(), &visible).unwrap();
             assert_eq!(task.expected.len(), visible.len());
             for (place, &expected) in task.expected.iter().enumerate() {
                 let mut out = Vec::new();
@@ -128,7 +113,7 @@ mod tests {
                 assert_eq!(out.len() as u64, expected, "{}", bound.name);
             }
         }
-        let copied = memcpy(&material).unwrap();
+        let copied = memcpy(&workload, Kernel::best(), &visible).unwrap();
         assert_eq!(copied.expected, visible);
         // Two queries of different places do not copy the same ids.
         let ids = |place| {
@@ -161,11 +146,7 @@ mod tests {
         let scene = scene::load("uniform:n=0", &Default::default()).unwrap();
         let path = path::load("orbit:frames=2", &scene, &LensDefaults::default()).unwrap();
         let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
-        let material = Material {
-            workload: &workload,
-            kernel: Kernel::best(),
-            visible: vec![0, 0],
-        };
-        assert!(BOUNDS.iter().all(|b| (b.make)(&material).is_none()));
+        let is_left_out = |b: &Bound| (b.make)(&workload, Kernel::best(), &[0, 0]).is_none();
+        assert!(BOUNDS.iter().all(is_left_out));
     }
 }

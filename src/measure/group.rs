@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::bounds::{Bound, Material};
+use super::bounds::Bound;
 use super::count::{Counted, MOST_JUDGED, count_pass, judge};
 use super::index_under_test::original;
 use super::key::{GroupKey, Pass, TaskKey};
@@ -199,22 +199,19 @@ fn tasks_of<'a>(
 }
 
 /// Adds the lower bounds that apply to the workload, and returns their names.
-fn add_bounds<'a>(
-    keyed: &mut Tasks<'a>,
-    workload: &'a Workload,
-    subjects: &'a [Subject],
+fn add_bounds(
+    keyed: &mut Tasks,
+    workload: &Workload,
+    subjects: &[Subject],
     visible: &[Answer],
     bounds: &[Bound],
 ) -> Vec<String> {
     let kernel = subjects.first().map(|s| s.spec.execution.kernel);
-    let material = Material {
-        workload,
-        kernel: kernel.unwrap_or_else(Kernel::best),
-        visible: visible.iter().map(|a| a.count).collect(),
-    };
+    let kernel = kernel.unwrap_or_else(Kernel::best);
+    let visible: Vec<u64> = visible.iter().map(|a| a.count).collect();
     let mut names = Vec::new();
     for bound in bounds.iter().filter(|_| !visible.is_empty()) {
-        if let Some(task) = (bound.make)(&material) {
+        if let Some(task) = (bound.make)(workload, kernel, &visible) {
             names.push(bound.name.to_owned());
             keyed.push((bound.name.to_owned(), TaskKind::Query), task);
         }

@@ -59,7 +59,7 @@ use crate::index::{BuildError, caught};
 use crate::query::{AnyVolume, ItemId};
 use crate::verify::{Fault, Trial, explain_visibility};
 
-pub use bounds::{BOUNDS, Bound, Material};
+pub use bounds::{BOUNDS, Bound};
 pub use cell::{CellTimes, Metric, PathInfo, ReportCell, SamplesRef, SceneInfo};
 pub use clock::{Lap, Stopwatch};
 #[cfg(feature = "cli")]
