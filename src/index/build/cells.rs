@@ -21,7 +21,7 @@ use crate::index::{Info, Input, Kind, check_range};
 /// same child are skipped, and coincident items are halved by size below the
 /// depth limit, so a leaf never exceeds its limit and the build never runs
 /// away.
-pub type Octree = Tree<OctreeBuilder>;
+pub type Octree = Tree<CellBuilder<3>>;
 
 /// A quadtree (Finkel and Bentley 1974) over the two axes in which the scene is
 /// widest, with fitted three-dimensional node bounds, so that the height still culls.
@@ -29,51 +29,63 @@ pub type Octree = Tree<OctreeBuilder>;
 /// For terrain, cities and maps, which are flat. Cells that are much higher than wide
 /// are columns of slabs with as many items each (docs/adr/0012); in a flat scene
 /// there are none. Crossing and coincident items are treated as in [`Octree`].
-pub type Quadtree = Tree<QuadtreeBuilder>;
+pub type Quadtree = Tree<CellBuilder<2>>;
 
-/// Builder of [`Octree`].
-pub struct OctreeBuilder;
+/// Builder of [`Octree`], of three axes, and of [`Quadtree`], of two.
+pub struct CellBuilder<const AXES: usize>;
 
-/// Builder of [`Quadtree`].
-pub struct QuadtreeBuilder;
-
-impl TreeBuilder for OctreeBuilder {
-    const INFO: Info = Info::ours(
-        "octree",
-        "octree with fitted nodes; loose=2 for the loose variant",
-        Kind::Tree,
-    );
+impl<const AXES: usize> TreeBuilder for CellBuilder<AXES> {
+    const INFO: Info = match AXES {
+        3 => Info::ours(
+            "octree",
+            "octree with fitted nodes; loose=2 for the loose variant",
+            Kind::Tree,
+        ),
+        _ => Info::ours(
+            "quadtree",
+            "quadtree over the two widest axes, high cells in slabs; loose=2 for the loose variant",
+            Kind::Tree,
+        ),
+    };
     type Params = CellParams;
 
     fn build(input: &Input<'_>, params: &CellParams) -> Built {
-        params.build(Self::INFO.name, input.items, &[0, 1, 2], None)
+        let (name, leaf) = (Self::INFO.name, params.leaf as usize);
+        check_range(name, "leaf", params.leaf.into(), 1.0, 4096.0)?;
+        check_range(name, "depth", params.depth.into(), 0.0, 64.0)?;
+        check_range(name, "loose", params.loose.into(), 1.0, 16.0)?;
+        let bounds = Aabb::union_of(input.items);
+        let axes = widest_axes::<AXES>(&bounds);
+        // The one that is left over.
+        let axis = 3 - axes.iter().sum::<usize>();
+        let mut splitter = CellSplitter {
+            axes: &axes,
+            columns: (AXES == 2).then_some(Columns { axis, leaf }),
+            depth: params.depth,
+            reach: match params.loose > 1.0 {
+                true => params.loose - 1.0,
+                false => f32::INFINITY,
+            },
+            sorted: Vec::new(),
+        };
+        let root = Cell {
+            centre: bounds.centre(),
+            // Halved before subtracting: bounds may span the range of f32.
+            half: bounds.half_extent().max_element(),
+            level: 0,
+        };
+        let records = Record::all(input.items)?;
+        let tree = build_top_down(records, leaf, root, &mut splitter);
+        Ok((tree, Vec::new()))
     }
 }
 
-impl TreeBuilder for QuadtreeBuilder {
-    const INFO: Info = Info::ours(
-        "quadtree",
-        "quadtree over the two widest axes, high cells in slabs; loose=2 for the loose variant",
-        Kind::Tree,
-    );
-    type Params = CellParams;
-
-    fn build(input: &Input<'_>, params: &CellParams) -> Built {
-        let axes = widest_axes(&Aabb::union_of(input.items));
-        let height = 3 - axes[0] - axes[1];
-        params.build(Self::INFO.name, input.items, &axes, Some(height))
-    }
-}
-
-/// The two axes in which the bounds are widest, ascending.
-pub fn widest_axes(bounds: &Aabb) -> [usize; 2] {
+/// Axes in which the bounds are widest, ascending: all, or not the narrowest.
+pub fn widest_axes<const AXES: usize>(bounds: &Aabb) -> [usize; AXES] {
     let width = bounds.half_extent();
     let narrowest = (0..3).rev().min_by(|&a, &b| width[a].total_cmp(&width[b]));
-    match narrowest {
-        Some(0) => [1, 2],
-        Some(1) => [0, 2],
-        _ => [0, 1],
-    }
+    let left_out = narrowest.filter(|_| AXES < 3).unwrap_or(3);
+    std::array::from_fn(|i| i + usize::from(i >= left_out))
 }
 
 /// Parameters of octree and quadtree: `octree:leaf=32,depth=20,loose=2`.
@@ -96,43 +108,6 @@ impl Default for CellParams {
             depth: 24,
             loose: 1.0,
         }
-    }
-}
-
-impl CellParams {
-    /// Builds a tree of cells that are split along `axes`; `column` is the axis along
-    /// which high cells are cut into slabs.
-    fn build(
-        &self,
-        structure: &'static str,
-        items: &[Aabb],
-        axes: &[usize],
-        column: Option<usize>,
-    ) -> Built {
-        check_range(structure, "leaf", self.leaf.into(), 1.0, 4096.0)?;
-        check_range(structure, "depth", self.depth.into(), 0.0, 64.0)?;
-        check_range(structure, "loose", self.loose.into(), 1.0, 16.0)?;
-        let leaf = self.leaf as usize;
-        let mut splitter = CellSplitter {
-            axes,
-            columns: column.map(|axis| Columns { axis, leaf }),
-            depth: self.depth,
-            reach: match self.loose > 1.0 {
-                true => self.loose - 1.0,
-                false => f32::INFINITY,
-            },
-            sorted: Vec::new(),
-        };
-        let bounds = Aabb::union_of(items);
-        let root = Cell {
-            centre: bounds.centre(),
-            // Halved before subtracting: bounds may span the range of f32.
-            half: bounds.half_extent().max_element(),
-            level: 0,
-        };
-        let records = Record::all(items)?;
-        let tree = build_top_down(records, leaf, root, &mut splitter);
-        Ok((tree, Vec::new()))
     }
 }
 
@@ -291,12 +266,13 @@ mod tests {
 
     #[test]
     fn the_narrowest_axis_is_left_alone() {
-        let of = |x, y, z| widest_axes(&Aabb::new(Vec3::ZERO, Vec3::new(x, y, z)));
+        let of = |x, y, z| widest_axes::<2>(&Aabb::new(Vec3::ZERO, Vec3::new(x, y, z)));
         assert_eq!(of(9.0, 5.0, 1.0), [0, 1]);
         assert_eq!(of(1.0, 5.0, 9.0), [1, 2]);
         assert_eq!(of(9.0, 1.0, 5.0), [0, 2]);
         assert_eq!(of(1.0, 1.0, 1.0), [0, 1]);
-        assert_eq!(widest_axes(&Aabb::EMPTY).len(), 2);
+        assert!(widest_axes::<2>(&Aabb::EMPTY) < [1, 3]);
+        assert_eq!(widest_axes(&Aabb::EMPTY), [0, 1, 2]);
     }
 
     /// Small cubes on a grid, `counts` along each axis.
@@ -334,9 +310,26 @@ mod tests {
     #[test]
     fn a_flat_world_has_no_slabs() {
         let items = grid([64, 64, 2]);
-        let (tree, params) = (built(&items), CellParams::default());
-        let plain = params.build("plain", &items, &[0, 1], None);
-        let (plain, _) = plain.expect("boxes on a grid");
+        let (tree, bounds) = (built(&items), Aabb::union_of(&items));
+        let root = Cell {
+            centre: bounds.centre(),
+            half: bounds.half_extent().max_element(),
+            level: 0,
+        };
+        let mut without = CellSplitter {
+            axes: &[0, 1],
+            columns: None,
+            depth: CellParams::default().depth,
+            reach: f32::INFINITY,
+            sorted: Vec::new(),
+        };
+        let records = Record::all(&items).expect("boxes on a grid");
+        let plain = build_top_down(
+            records,
+            CellParams::default().leaf as usize,
+            root,
+            &mut without,
+        );
         assert_eq!(tree.ids(), plain.ids());
         assert_eq!(tree.nodes().len(), plain.nodes().len());
     }

@@ -18,7 +18,7 @@ use crate::index::{Input, ploc};
 /// An item that crosses the middle of a cell stays with the cell, however small it is,
 /// and every query that reaches the cell tests it: not so in [`Octree`](crate::index::Octree),
 /// whose items all descend with their centres, nor in loose octrees (Ulrich 2000).
-pub type OctreeTextbook = Textbook<OctreeCells>;
+pub type OctreeTextbook = Textbook<Cells<3>>;
 
 /// A quadtree (Finkel and Bentley 1974, "Quad trees: a data structure for
 /// retrieval on composite keys") as the lecture on visibility means it (slides
@@ -28,32 +28,24 @@ pub type OctreeTextbook = Textbook<OctreeCells>;
 /// are columns through the whole scene, over the two axes in which it is widest. Takes
 /// O(log n + answers) per query where the scene is flat and items are small against their
 /// cells; nothing is culled by height.
-pub type QuadtreeTextbook = Textbook<QuadtreeCells>;
+pub type QuadtreeTextbook = Textbook<Cells<2>>;
 
-/// Division of [`OctreeTextbook`].
-pub struct OctreeCells;
+/// Division of [`OctreeTextbook`], of three axes, and of [`QuadtreeTextbook`].
+pub struct Cells<const AXES: usize>;
 
-/// Division of [`QuadtreeTextbook`].
-pub struct QuadtreeCells;
-
-impl Division for OctreeCells {
-    const NAME: &str = "octree-textbook";
-    const SUMMARY: &str = "lecture form: items at the smallest cell that holds them";
-
-    fn root(input: &Input<'_>, records: Vec<Record>, params: &TextbookParams) -> Node {
-        let axes = [0, 1, 2];
-        let cell = root_cell(&Aabb::union_of(input.items), &axes);
-        divided(cell, &axes, records, params, 0)
-    }
-}
-
-impl Division for QuadtreeCells {
-    const NAME: &str = "quadtree-textbook";
-    const SUMMARY: &str = "lecture form: items at the smallest column that holds them";
+impl<const AXES: usize> Division for Cells<AXES> {
+    const NAME: &str = match AXES {
+        3 => "octree-textbook",
+        _ => "quadtree-textbook",
+    };
+    const SUMMARY: &str = match AXES {
+        3 => "lecture form: items at the smallest cell that holds them",
+        _ => "lecture form: items at the smallest column that holds them",
+    };
 
     fn root(input: &Input<'_>, records: Vec<Record>, params: &TextbookParams) -> Node {
         let scene = Aabb::union_of(input.items);
-        let axes = widest_axes(&scene);
+        let axes = widest_axes::<AXES>(&scene);
         divided(root_cell(&scene, &axes), &axes, records, params, 0)
     }
 }
