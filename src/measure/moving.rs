@@ -162,7 +162,9 @@ impl<'w> Moving<'w> {
         })
     }
 
-    /// Takes the moves of the next frame; its number, from 0, or `None` after the last one.
+    /// Takes the moves of the next frame and returns its number, from 0.
+    ///
+    /// `None` after the last one.
     pub(super) fn take_moves(&mut self) -> Option<usize> {
         let moved = advance(&mut self.replay, self.workload, &mut self.items)?;
         self.moved.clear();
