@@ -261,8 +261,8 @@ ROWS.append(cones("several-cones", 28.5, "four cones per cluster"))
 HEAD = """# Published figures, reproduced
 
 Written by `scripts/external.py` on a shared {machine}. Times are CPU time per query on one
-thread, if not said otherwise. Ratios are to the newest processor's figure where theirs is a range,
-or to its middle.
+thread, if not said otherwise. Where theirs is a range, the
+ratio is to the figure of the newest processor if processors are named, otherwise to the middle.
 
 | figure | theirs | ours | ours / theirs | why it differs |
 |---|---|---|---|---|

@@ -23,6 +23,8 @@ CELL = ["scene", "path", "cache", "test", "structure"]
 def read(run):
     """The rows of summary.csv (one per cell) and of samples.csv (one per clock reading)."""
     tables = []
+    if not Path(run).is_dir():
+        sys.exit(f"read_run.py: {run}: no such folder; expected that of a run")
     for name in ("summary", "samples"):
         files = [Path(run) / f"{name}.csv", Path(run) / f"{name}.csv.gz"]
         kept = [file for file in files if file.is_file()]

@@ -12,7 +12,7 @@ use crate::shown::plain;
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct JsonError {
-    /// From 1. The reader of a file of many texts sets it to the line of the file.
+    /// Line, from 1; the reader of a file of several texts sets it to that of the file.
     pub line: usize,
     /// Bytes, from 1.
     pub column: usize,

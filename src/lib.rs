@@ -3,8 +3,8 @@
 //! The question: which index finds what a camera sees, and where the camera is, how fast,
 //! and is the answer right?
 //!
-//! cullbench puts interchangeable structures behind one trait pair, builds scenes and
-//! moves cameras through them, checks every answer, and measures. A structure by itself:
+//! cullbench puts interchangeable structures behind one trait, builds scenes and moves
+//! cameras through them, checks every answer, and measures. A structure by itself:
 //!
 //! ```
 //! use cullbench::prelude::*;
@@ -55,13 +55,13 @@
 //! - [`statistics`] turns times into figures; [`measure`]: count, verify, time
 //! - [`report`]: the files that other tools read
 //!
-//! Features: `cli` (default) is the `cullbench` program (`cli::main_with`) with the
-//! studies behind it: `visibility` (the stages before and after the object stage),
-//! `funnel`, `advise`, `precision`, `drift`, `stress` and `suite` (named sets of scenes and
-//! paths). `peers` adds structures of other crates behind the same traits.
+//! Features: `cli` (default) is the `cullbench` program (`cli::main_with`), with
+//! `visibility` (the stages before and after the object stage), `stress` and `suite` (named
+//! sets of scenes and paths); its commands `funnel`, `advise`, `precision` and `drift` have
+//! no library interface. `peers` adds structures of other crates.
 //!
-//! Conventions: everything is right-handed; z is up in scenes; bounds are
-//! closed, so touching counts as visible; plane normals point inward; angles
+//! Conventions: cameras are right-handed; z is up in a scene unless its file or its
+//! options say y; bounds are closed, so touching counts as visible; plane normals point inward; angles
 //! are degrees; items are numbered by their place in the scene.
 
 // docs.rs says of each item which feature it needs.

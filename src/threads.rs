@@ -24,7 +24,7 @@ impl Pool {
         Pool { threads, asked }
     }
 
-    /// How many there are to [`share`] work among.
+    /// Number of threads that [`share`] uses.
     pub fn threads(&self) -> usize {
         self.asked.store(true, Ordering::Relaxed);
         self.threads

@@ -93,6 +93,12 @@ impl ViewProjection {
         found.is_ok_and(|found| found.shear <= STRAIGHT && found.tilt <= STRAIGHT)
     }
 
+    /// Returns whether it has no lens: axes of unit length, and w is 1 everywhere.
+    pub fn is_bare(&self) -> bool {
+        let is_unit = |row: &[f64; 4]| (DVec3::from_slice(row).length() - 1.0).abs() < STRAIGHT;
+        self.rows[..3].iter().all(is_unit) && self.rows[3] == [0.0, 0.0, 0.0, 1.0]
+    }
+
     /// Clip-space depths of the near and the far plane.
     fn depths(&self) -> [f64; 2] {
         let lowest = if self.is_from_zero() { 0.0 } else { -1.0 };

@@ -241,7 +241,7 @@ pub struct CompareArgs {
     pub against: Option<PathBuf>,
     #[command(flatten)]
     pub what: WhatArgs,
-    /// Change that "same" rules out, and growth of work that `--gate work` allows: 5% or 0.05;
+    /// Change that "same" rules out, and growth of work that is allowed: 5% or 0.05;
     /// a time is slower or faster from 1 % on (5 % in stored runs)
     #[arg(long, value_name = "SHARE", default_value = "5%", value_parser = values::threshold)]
     #[arg(allow_hyphen_values = true)]

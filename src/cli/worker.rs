@@ -96,7 +96,7 @@ fn times(registry: &Registry, command: &Command, timing: &Timing) -> anyhow::Res
 
 /// Current step of the process.
 ///
-/// Turns of a timed pass, and steps that are told again, are too short to report each: a
+/// Turns of a timed pass, and steps that are repeated, are too short to report each: a
 /// thread reports the current one every second, as long as they come and go. Then silence
 /// means a turn that does not end, and the parent has its structure.
 #[derive(Default)]

@@ -169,7 +169,7 @@ impl BoxCorner {
 /// Planes in a tree. Nodes refer to each other by their place in the list.
 #[derive(Clone, Default, PartialEq, Debug)]
 pub struct PlaneTree {
-    /// In any order.
+    /// Nodes, in any order.
     pub nodes: Vec<PlaneTreeNode>,
     /// `None` for a space that is not divided.
     pub root: Option<u32>,

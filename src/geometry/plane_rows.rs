@@ -19,7 +19,7 @@ pub struct PlaneRows {
 }
 
 impl PlaneRows {
-    /// `None` for more than [`ROW_LANES`] planes.
+    /// Collects planes into rows; `None` for more than [`ROW_LANES`].
     pub fn collect<'p>(planes: impl Iterator<Item = &'p Plane>) -> Option<PlaneRows> {
         let mut all = PlaneRows {
             rows: [[0.0; ROW_LANES]; 4],
@@ -39,7 +39,7 @@ impl PlaneRows {
         Some(all)
     }
 
-    /// How many planes there are.
+    /// Number of planes.
     #[inline(always)]
     pub fn count(&self) -> u32 {
         self.count

@@ -219,10 +219,9 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// were built. Ids are below their number; others may panic, and
     /// [`StructureSpec::update`](super::StructureSpec::update) refuses them. `moved` may be
     /// empty, as before the first frame of a motion; it has any order and may name an item
-    /// twice. Returns false, with the structure
-    /// unchanged, if a rebuild is needed: where an item becomes or ceases to be empty, and
-    /// always from a structure that does not declare
-    /// `refits` in its [`Info`].
+    /// twice. Returns false, with the structure unchanged, if a rebuild is needed. A structure
+    /// may return false where an item becomes or ceases to be empty; one that does not declare
+    /// `refits` in its [`Info`] always does.
     fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
         false
     }

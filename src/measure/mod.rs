@@ -203,5 +203,5 @@ pub const TIMING: &str = "timing";
 /// Callback that gets each step of a process, for progress and time limits.
 ///
 /// Its arguments are the structure, `None` for steps without one, and the step. A step that
-/// goes on is told again.
+/// takes long is repeated.
 pub type Notice<'n> = &'n dyn Fn(Option<&str>, &str);

@@ -64,7 +64,7 @@ pub struct SubjectPart {
     pub build_ms: Option<f64>,
     /// Bytes of nodes and items; `None` where nothing was built.
     pub memory_bytes: Option<u64>,
-    /// In the order of [`super::UPDATE_SHARES`].
+    /// CPU time of each update, ms, in the order of [`super::UPDATE_SHARES`].
     pub update_ms: Vec<f64>,
     /// ln of (query time after many refits / on a fresh build of the same boxes).
     pub refitted_ln: Option<f64>,

@@ -59,7 +59,7 @@ pub struct Schedule {
     pub rounds: u32,
     /// True if caches are emptied before each query.
     pub cold: bool,
-    /// In the order of the tasks.
+    /// Plan of each task.
     pub tasks: Vec<TaskPlan>,
 }
 

@@ -202,7 +202,7 @@ fn frames_are_those_of_cameras_with_times() {
     assert_eq!(seen("0  1", 1).len(), 4);
 }
 
-/// Where f32 holds both alike, the truths differ and the digests with them.
+/// Boxes that f32 holds alike, written differently, are different truths.
 #[test]
 fn files_of_other_truths_have_other_digests() {
     let scene = scene("uniform:n=5");

@@ -168,7 +168,7 @@ const FAR_OUTSIDE: f64 = 3.0;
 /// One line for each kind of doubt about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
     type Doubt = fn(&Scene, &[Camera]) -> Option<String>;
-    let doubts: [Doubt; 5] = [rolled, unstraight, mirrored, far_outside, blind];
+    let doubts: [Doubt; 6] = [bare, rolled, unstraight, mirrored, far_outside, blind];
     let found = doubts.iter().filter_map(|doubt| doubt(scene, cameras));
     found.map(|doubt| format!("{path}: {doubt}")).collect()
 }
@@ -210,6 +210,18 @@ impl LensDefaults {
 /// "2 of 8 cameras".
 fn share(part: usize, cameras: &[Camera]) -> String {
     format!("{part} of {}", counted(cameras.len(), "camera"))
+}
+
+/// View matrices without a projection, which see two units of width and height.
+fn bare(_: &Scene, cameras: &[Camera]) -> Option<String> {
+    let is_bare = |camera: &&Camera| camera.lens.matrix().is_some_and(ViewProjection::is_bare);
+    let count = cameras.iter().filter(is_bare).count();
+    (count > 0).then(|| {
+        let what = share(count, cameras);
+        format!(
+            "{what} matrices without a lens (axes of length 1, w = 1); expected projection x view"
+        )
+    })
 }
 
 /// Orthographic matrices of which the near end is not certain.

@@ -32,7 +32,7 @@ pub(crate) const DEFAULT_PATH: &str = "flythrough";
 pub struct CameraPath {
     /// The file or the spec, such as `orbit:frames=512`.
     pub name: String,
-    /// In the order of the path.
+    /// Cameras, in the order of the path.
     pub cameras: Vec<Camera>,
     /// The line of each camera in the file that it was read from; empty for a spec.
     pub lines: Vec<u64>,

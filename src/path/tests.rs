@@ -1,7 +1,7 @@
 //! Paths against scenes: specs, files, what cannot be a path.
 
 use super::*;
-use crate::camera::{LensKind, PlaneOptions};
+use crate::camera::{LensKind, MatrixConvention, PlaneOptions};
 use crate::spec::tests::{keys, known, listed};
 
 fn scene(source: &str) -> Scene {
@@ -317,6 +317,24 @@ fn of_a_large_scene_some_views_are_tested_for_items() {
     let told = |cameras: &[Camera]| warnings(&scene, "p", cameras);
     assert_eq!(told(&cameras), [nothing("125 of 250 views")]);
     assert_eq!(told(&cameras[..200]), [nothing("200 views")]);
+}
+
+#[test]
+fn a_matrix_of_a_view_alone_is_doubted() {
+    let scene = scene("uniform:n=50");
+    let view = [
+        [0.0, 1.0, 0.0, -3.0],
+        [0.0, 0.0, 1.0, 2.0],
+        [1.0, 0.0, 0.0, -10.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    let told = |rows: [[f64; 4]; 4]| {
+        let camera = Camera::of_matrix(rows, MatrixConvention::ColumnGl).unwrap();
+        warnings(&scene, "p", &[camera]).join(", ")
+    };
+    assert!(told(view).contains("1 of 1 camera matrices without a lens"));
+    let wider = view.map(|row| row.map(|x| x / 8.0));
+    assert!(!told([wider[0], wider[1], wider[2], view[3]]).contains("lens"));
 }
 
 #[test]

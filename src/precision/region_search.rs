@@ -231,7 +231,7 @@ impl RegionJudged {
         let wrong: Vec<[f64; 2]> = column(0).map(|n| [n, POINTS_PER_CAMERA as f64]).collect();
         let errors = RegionErrors {
             numbers: self.numbers.name(),
-            wrong: rate(&wrong),
+            wrong: rate(&wrong).map(Rate::of_share),
             points: (self.by_camera.len() * POINTS_PER_CAMERA) as u64,
             false_region_count: falsely as u64,
             missed_region_count: missed as u64,

@@ -378,9 +378,9 @@ pub struct Setting {
     pub of: &'static str,
     /// Name of the fact.
     pub what: &'static str,
-    /// In the old report.
+    /// Value in the old report.
     pub old: String,
-    /// In the new report.
+    /// Value in the new report.
     pub new: String,
     /// True if it is another machine: absolute times do not compare.
     pub is_machine: bool,

@@ -190,7 +190,7 @@ impl Surfaces {
         self.written.extend_from_slice(points);
     }
 
-    /// How many items there are.
+    /// Number of items.
     pub fn items(&self) -> usize {
         self.of_item.len()
     }

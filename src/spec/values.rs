@@ -34,7 +34,8 @@ pub fn whole<N: FromStr + PartialOrd + Display + Clone>(
 }
 
 pub fn at_least_zero(text: &str) -> Result<f64, SpecError> {
-    number(text, "a number of at least 0", |n| n >= 0.0)
+    // -0 becomes 0.
+    number(text, "a number of at least 0", |n| n >= 0.0).map(|n| n + 0.0)
 }
 
 pub fn above_zero(text: &str) -> Result<f64, SpecError> {

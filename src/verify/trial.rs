@@ -86,7 +86,9 @@ impl Trial {
         &self.answer
     }
 
-    /// Compares the answer, in any order, with the reference. O(items) in the worst case.
+    /// Compares the answer, in any order, with the reference.
+    ///
+    /// O(items) in the worst case.
     fn compare(&mut self) -> Difference {
         let mut difference = Difference {
             missing: self.expected,

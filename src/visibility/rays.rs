@@ -25,7 +25,7 @@ impl SampleGrid {
         SampleGrid { width, height }
     }
 
-    /// How many samples there are.
+    /// Number of samples.
     pub fn samples(self) -> usize {
         self.width as usize * self.height as usize
     }

@@ -16,7 +16,7 @@ use crate::index::{DynIndex, FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::measure::Workload;
 use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryVolume, Sorted, plane_test};
-use crate::shown::{count, counted, significant};
+use crate::shown::{count, counted, significant, time};
 
 /// Share of the planes below which the saving is lost in noise.
 const LEAST_NEEDLESS: f64 = 0.01;
@@ -169,12 +169,13 @@ pub(super) fn six_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
         let worth = testing / more;
         let left_out = check.left_out_ns + drawing;
         let reason = format!(
-            "{more:.1} invisible items per query ({:.2} %; 4 (s/D)^2 predicts {:.2} %) at {draw_ns} ns each, \
+            "{} invisible items per query ({:.2} %; 4 (s/D)^2 predicts {:.2} %) at {draw_ns} ns each, \
              against the extra test time{}",
+            significant(more),
             check.left_out_excess.unwrap_or(0.0) * 100.0,
             predicted * 100.0,
             match worth.is_finite() && worth > 0.0 {
-                true => format!("; worth it above {worth:.0} ns per item"),
+                true => format!("; worth it above {} per item", time(worth)),
                 false => String::new(),
             }
         );
@@ -194,10 +195,7 @@ fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
     let (Some(predicted), Some(taken)) = (predicted, choice.name) else {
         return finding;
     };
-    let with_axes = |name: &str| {
-        let tests = [CullingTest::SixBox, CullingTest::Exact];
-        tests.iter().any(|test| test.name() == name)
-    };
+    let with_axes = |name: &str| name == CullingTest::Exact.name();
     let kept = with_axes(taken);
     // The side taken by its test, the other by its best.
     let total = |with: bool| {
@@ -205,7 +203,9 @@ fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
         let rows = rows.filter(|row| with != kept || row.test == taken);
         rows.filter_map(|row| row.total_ns).min_by(f64::total_cmp)
     };
-    finding.cost_ns = total(true).zip(total(false)).map(<[f64; 2]>::from);
+    if let Some(both) = total(true).zip(total(false)) {
+        finding = finding.costing(both.into());
+    }
     let is_tie = choice.ties.iter().any(|name| with_axes(name) != kept);
     finding.decision = Some(Decision::of(!kept));
     finding.is_tie = Some(is_tie);
