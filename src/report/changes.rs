@@ -226,20 +226,18 @@ fn by_metric(basis: Basis, pairs: &[Pair], metric: &'static str, threshold: f64)
 fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
     let centred: Vec<Logs> = timed.iter().map(|(_, logs)| centred(logs)).collect();
     let relative = (0..timed.len()).map(|own| relative(own, &timed, &centred));
-    let relative: Vec<Option<Logs>> = relative.collect();
-    let [was, is] = [0, 1].map(|side| -> Vec<Vec<f64>> {
-        let known = relative.iter().flatten();
-        known.map(|logs| logs[side].clone()).collect()
-    });
-    let with_others = timed.iter().zip(&relative);
-    let with_others = with_others.filter(|(_, relative)| relative.is_some());
-    let structures = with_others.map(|((row, _), _)| row.cell.structure.as_str());
-    let structures: Vec<&str> = structures.collect();
-    let mut judged = judge_unpaired(&was, &is, &structures, threshold).into_iter();
-    for ((row, _), relative) in timed.into_iter().zip(relative) {
-        let judgement = relative.as_ref().and_then(|_| judged.next().flatten());
-        row.reason = why_inconclusive(relative.is_some(), row.processes);
-        let ratio = relative.and_then(|[old, new]| Some((median(&new)? - median(&old)?).exp()));
+    let (was, is): (Vec<_>, Vec<_>) = relative.map(<(_, _)>::from).unzip();
+    let structures = timed.iter().map(|(row, _)| row.cell.structure.as_str());
+    let judged = judge_unpaired(&was, &is, &structures.collect::<Vec<_>>(), threshold);
+    let sides = was
+        .iter()
+        .zip(&is)
+        .map(|(old, new)| [median(old), median(new)]);
+    for (((row, _), medians), judgement) in timed.into_iter().zip(sides).zip(judged) {
+        row.reason = why_inconclusive(medians[0].is_some(), row.processes);
+        let ratio = medians[0]
+            .zip(medians[1])
+            .map(|(old, new)| (new - old).exp());
         conclude(row, judgement, ratio);
     }
 }
@@ -291,8 +289,8 @@ fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedR
 }
 
 /// ln(time) less what moved the median of the others, process by process;
-/// `None` with too few others.
-fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Option<Logs> {
+/// nothing with too few others.
+fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Logs {
     let (row, logs) = &timed[own];
     let others = timed.iter().zip(centred).filter(|((other, _), _)| {
         let (key, own) = (&other.cell, &row.cell);
@@ -300,7 +298,7 @@ fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Option<Logs> {
     });
     let others: Vec<&Logs> = others.map(|(_, centred)| centred).collect();
     if others.len() < LEAST_OTHERS {
-        return None;
+        return Logs::default();
     }
     let side = |side: usize| -> Vec<f64> {
         let relative = logs[side].iter().enumerate().filter_map(|(process, ln)| {
@@ -309,7 +307,7 @@ fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Option<Logs> {
         });
         relative.collect()
     };
-    Some([0, 1].map(side))
+    [0, 1].map(side)
 }
 
 fn why_unmeasured(old: Option<f64>, new: Option<f64>) -> String {
