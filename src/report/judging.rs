@@ -87,10 +87,7 @@ impl Outcome {
 
     /// Returns true if the statistics decided.
     pub fn is_judged(self) -> bool {
-        matches!(
-            self,
-            Outcome::Slower | Outcome::Faster | Outcome::Same | Outcome::Inconclusive
-        )
+        Change::ALL.map(Outcome::from).contains(&self)
     }
 }
 
