@@ -32,8 +32,9 @@ pub fn is_drawn(value: f64) -> bool {
 
 /// Ends of an interval that have a place on a logarithmic axis.
 pub fn ends(value: Estimate) -> Option<[f64; 2]> {
-    let ends = value.lower.zip(value.upper)?;
-    (is_drawn(ends.0) && is_drawn(ends.1)).then_some(ends.into())
+    value
+        .ends()
+        .filter(|ends| ends.iter().all(|end| is_drawn(*end)))
 }
 
 /// Note in a caption on points that are not drawn.

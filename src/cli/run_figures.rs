@@ -5,8 +5,8 @@ use super::error_figure::{Measured, against};
 use super::figure::{Axis, Figure, Look, ends, is_drawn, left_out};
 use super::run_verdict::times;
 use super::text;
-use crate::report::{Comparison, Reading, ReportCell, Speedup, Views};
-use crate::statistics::{quantile, sorted};
+use crate::report::{Comparison, Reading, ReportCell, Views};
+use crate::statistics::{Estimate, quantile, sorted};
 
 /// Least number of clock readings along a path for a line, and for quantiles.
 const LEAST_READINGS: [usize; 2] = [4, 20];
@@ -25,27 +25,28 @@ pub fn of(comparison: &Comparison) -> String {
 pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     let sound = comparison.sound();
     let all = sound.filter_map(|cell| Some((cell, comparison.speedup(base, cell)?)));
-    let all: Vec<(&ReportCell, Speedup)> = all.collect();
-    let drawn: Vec<_> = all.iter().filter(|(_, (r, _))| is_drawn(*r)).collect();
+    let all: Vec<(&ReportCell, Estimate)> = all.collect();
+    let drawn: Vec<_> = all.iter().filter(|row| is_drawn(row.1.value)).collect();
     drawn.first()?;
-    let values = drawn.iter().flat_map(|row| row.1.1.unwrap_or([row.1.0; 2]));
+    let values = drawn.iter();
+    let values = values.flat_map(|(_, found)| found.ends().unwrap_or([found.value; 2]));
     let mut axis = Axis::log("", values.chain([1.0]), 1.2, &ratio_name);
     axis.ticks = axis.powers(2.0);
-    let row = |(place, (cell, (ratio, ends))): (usize, &&(&ReportCell, Speedup))| {
-        let (time, name) = (cell.time(), &cell.structure);
+    let row = |(place, &&(cell, found)): (usize, &&(&ReportCell, Estimate))| {
+        let (time, name, ratio) = (cell.time(), &cell.structure, found.value);
         let next = drawn.get(place + 1);
         Row {
             name: name.clone(),
             is_scan: cell.is_scan(),
-            value: *ratio,
-            ends: *ends,
+            value: ratio,
+            ends: found.ends(),
             inner: None,
-            label: format!("{name} {}", times(*ratio)),
+            label: format!("{name} {}", times(ratio)),
             note: format!(
                 "{name}: {}, {}{}",
                 text::some(time, |ns| text::time_within(ns.estimate())),
-                times(*ratio),
-                text::some(*ends, |ends| text::interval(ends.map(Some), 1.0))
+                times(ratio),
+                text::interval(found.ends(), 1.0)
             ),
             data: format!(
                 " data-rank=\"{}\" data-speedup=\"{ratio}\" data-query-ns=\"{}\"",
@@ -56,7 +57,7 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
         }
     };
     let structures: Vec<Row> = drawn.iter().enumerate().map(row).collect();
-    let is_within = drawn.iter().any(|row| row.1.1.is_some());
+    let is_within = drawn.iter().any(|row| row.1.ends().is_some());
     let interval = ["", ", 95 % interval"][usize::from(is_within)];
     let caption = format!(
         "Speed-ups over {base}{interval}; a line joins structures of one rank{}",

@@ -9,9 +9,10 @@ use super::document::Block;
 use super::table::Table;
 use super::{run_verdict, scene_facts, text};
 use crate::measure::{GroupKey, Status};
-use crate::report::{Comparison, Overall, ReportCell, Speedup, grouped, times_as_fast};
+use crate::report::{Comparison, Overall, ReportCell, grouped, times_as_fast};
 use crate::shown::{shortened, without_middle};
 use crate::spec::parse_number;
+use crate::statistics::Estimate;
 
 /// Comparisons of one cache state and culling test each.
 pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>> {
@@ -194,10 +195,9 @@ pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) ->
 }
 
 /// "4.04 x", in full with its 95 % interval.
-fn ratio((ratio, ends): Speedup, is_full: bool) -> String {
-    let ends = ends.filter(|_| is_full).map(|ends| ends.map(Some));
-    let interval = text::interval(ends.unwrap_or_default(), 1.0);
-    format!("{} x{interval}", text::significant(ratio))
+fn ratio(found: Estimate, is_full: bool) -> String {
+    let interval = text::interval(found.ends().filter(|_| is_full), 1.0);
+    format!("{} x{interval}", text::significant(found.value))
 }
 
 /// Speed-ups over the base, and their geometric means.
@@ -220,7 +220,7 @@ pub fn matrix(names: Vec<String>, all: &[&Comparison], overall: &Overall) -> Tab
             let speedup = speedup.and_then(|base| comparison.speedup(base, cell));
             let shown = match (cell.rank, speedup) {
                 (None, _) => return cell.status.name().to_owned(),
-                (_, Some((ratio, _))) => text::significant(ratio),
+                (_, Some(speedup)) => text::significant(speedup.value),
                 (_, None) => text::some(cell.time(), |time| text::time(time.value)),
             };
             let mark = if cell.rank == Some(1) { "*" } else { "" };

@@ -9,7 +9,7 @@ use super::table::Table;
 use super::text::{self, some};
 use crate::report::{Comparison, Report, ReportCell, comparisons};
 use crate::shown::shortened;
-use crate::statistics::geometric_mean;
+use crate::statistics::{Estimate, geometric_mean};
 
 /// Counters of a query, and their rows.
 const COUNTERS: [(&str, &str); 4] = [
@@ -72,7 +72,7 @@ fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, St
     let other = comparison.sound().find(is_other);
     let other = other.ok_or_else(|| "No other structure has a time.".to_owned())?;
     let speedup = comparison.speedup(&other.structure, own);
-    let ends = speedup.and_then(|found| found.1);
+    let ends = speedup.and_then(Estimate::ends);
     let margin = ends.map_or(0.0, |[lower, upper]| (upper / lower).ln() / 2.0);
     // As if the whole interval of a frame were that of its queries.
     let frame = frame_ns(own).zip(queries_ns(own));

@@ -105,12 +105,12 @@ pub fn short(value: f64) -> String {
 
 /// A value with its 95 % interval: "4.04 [3.95, 4.16]".
 pub fn within(found: Estimate) -> String {
-    significant(found.value) + &interval([found.lower, found.upper], 1.0)
+    significant(found.value) + &interval(found.ends(), 1.0)
 }
 
 /// A time in ns with its 95 % interval in the same unit: "1.81 us [1.75, 1.90]".
 pub fn time_within(ns: Estimate) -> String {
-    time(ns.value) + &interval([ns.lower, ns.upper], unit(ns.value).0)
+    time(ns.value) + &interval(ns.ends(), unit(ns.value).0)
 }
 
 /// A time with its uncertainty: "1.3±0.4 us", "8.12 [0.5, 48] us".
@@ -123,12 +123,12 @@ pub fn time_plus_minus(ns: Option<Estimate>) -> String {
 
 /// A value with a margin, or with its interval where an end is far.
 fn with_ends(found: Estimate) -> String {
-    let ends = found.lower.zip(found.upper);
+    let ends = found.ends();
     let is_near = |end: f64| found.value == 0.0 || (end / found.value).ln().abs() < 0.5;
     match ends {
-        Some((lower, upper)) if !(is_near(lower) && is_near(upper)) => within(found),
+        Some(ends) if !ends.into_iter().all(is_near) => within(found),
         _ => {
-            let margin = |(lower, upper)| f64::max(found.value - lower, upper - found.value);
+            let margin = |[lower, upper]: [f64; 2]| (found.value - lower).max(upper - found.value);
             plus_minus(found.value, ends.map(margin))
         }
     }
@@ -162,15 +162,15 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
 ///
 /// Elsewhere the interval in a unit; nothing if an end is not known.
 pub fn uncertainty(metric: &Metric, unit: f64) -> String {
-    let ends = metric.lower.zip(metric.upper);
-    let logs = ends.map(|(lower, upper)| [metric.value / lower, upper / metric.value].map(f64::ln));
+    let ends = metric.estimate().ends();
+    let logs = ends.map(|[lower, upper]| [metric.value / lower, upper / metric.value].map(f64::ln));
     match logs {
         Some([below, above]) if (below - above).abs() <= 0.2 * above && above < 0.5 => {
             let percent = below.max(above).exp_m1() * 100.0;
             let digits = usize::from(percent < 1.0);
             format!(" ± {percent:.digits$} %")
         }
-        _ => interval([metric.lower, metric.upper], unit),
+        _ => interval(ends, unit),
     }
 }
 
@@ -238,15 +238,12 @@ pub fn entries(rows: &[[String; 2]], width: usize) -> String {
     all
 }
 
-/// " [lower, upper]" in a unit; nothing if an end is not known.
-pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
-    match ends {
-        [Some(lower), Some(upper)] => {
-            let [lower, upper] = [lower, upper].map(|end| significant(end / unit).replace(',', ""));
-            format!(" [{lower}, {upper}]")
-        }
-        _ => String::new(),
-    }
+/// " [lower, upper]" in a unit; nothing without ends.
+pub fn interval(ends: Option<[f64; 2]>, unit: f64) -> String {
+    some(ends, |ends| {
+        let [lower, upper] = ends.map(|end| significant(end / unit).replace(',', ""));
+        format!(" [{lower}, {upper}]")
+    })
 }
 
 /// Basis of the times of a study, with the ratio of what was measured twice.

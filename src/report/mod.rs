@@ -23,7 +23,7 @@ pub use judging::{
 };
 pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
-pub use ranking::{Comparison, Mean, Overall, Speedup, comparisons, times_as_fast};
+pub use ranking::{Comparison, Mean, Overall, comparisons, times_as_fast};
 pub use ranking::{asked_otherwise, grouped, timed_otherwise, unique};
 pub use reading::{Reading, Views, read_report, read_stream, views};
 pub use stream::{Header, KeptPart, Line, Stream, dated, digits, utc};

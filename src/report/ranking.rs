@@ -3,11 +3,11 @@
 //! Groups of cells with the same question, in the order of their ranks, which are the
 //! run's own; structures over several groups; cells of two reports with the same key.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::{Report, ReportCell};
 use crate::measure::{CellTimes, Judged, Metric, Status, YARDSTICK};
-use crate::statistics::{ALPHA, geometric_mean, is_less, speedup};
+use crate::statistics::{ALPHA, Estimate, geometric_mean, is_less, speedup};
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
@@ -60,9 +60,6 @@ fn ranked(mut cells: Vec<&ReportCell>) -> Vec<&ReportCell> {
     cells
 }
 
-/// A speed-up with the ends of its 95 % interval, where it has one.
-pub type Speedup = (f64, Option<[f64; 2]>);
-
 impl<'r> Comparison<'r> {
     /// Any of its cells: scene, path and test are the same in all.
     pub fn about(&self) -> &'r ReportCell {
@@ -87,19 +84,17 @@ impl<'r> Comparison<'r> {
 
     /// The speed-up of a cell over the structure `base` of the same comparison, process
     /// by process; the base itself has no interval.
-    pub fn speedup(&self, base: &str, cell: &ReportCell) -> Option<Speedup> {
+    pub fn speedup(&self, base: &str, cell: &ReportCell) -> Option<Estimate> {
         if base == YARDSTICK {
-            let found = cell.metrics.get("speedup")?;
-            return Some((found.value, found.lower.zip(found.upper).map(Into::into)));
+            return cell.metrics.get("speedup").map(Metric::estimate);
         }
         let base = self.sound_cell(base)?;
         let value = times_as_fast(base, cell)?;
         let [logs, own] = [base, cell].map(|cell| cell.ln_ns(cell.ranked_by()));
-        let found = speedup(&logs, &own);
         // About the ratio of the two shown values.
-        let ends = found.map(|found| found.per(found.value / value));
-        let ends = ends.and_then(|ends| ends.lower.zip(ends.upper));
-        Some((value, ends.map(Into::into)))
+        let found = speedup(&logs, &own).map(|found| found.per(found.value / value));
+        let exact = Estimate::exact(value);
+        Some(found.map_or(exact, |found| Estimate { value, ..found }))
     }
 
     /// The fastest structure that is not this crate's own and whose answers are
@@ -156,13 +151,8 @@ pub fn unique<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
 }
 
 /// Group and structure, which a report has once.
-type Named<'r> = (String, &'r str);
-
-fn keyed(cells: &[ReportCell]) -> Vec<(Named<'_>, &ReportCell)> {
-    let key = |cell: &ReportCell| cell.key().group.id();
-    let cells = cells.iter();
-    let keyed = cells.map(|cell| ((key(cell), &*cell.structure), cell));
-    keyed.collect()
+fn named(cell: &ReportCell) -> (String, &str) {
+    (cell.key().group.id(), &cell.structure)
 }
 
 /// A cell in both reports.
@@ -172,18 +162,15 @@ pub type Pair<'r> = (&'r ReportCell, &'r ReportCell);
 pub(super) type Matched<'r> = (Vec<Pair<'r>>, [Vec<&'r ReportCell>; 2]);
 
 pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Matched<'r> {
-    let (old, new) = (keyed(old), keyed(new));
-    let known: BTreeSet<Named> = old.iter().map(|(key, _)| key.clone()).collect();
-    let partners: BTreeMap<Named, &ReportCell> = new.iter().cloned().collect();
-    let (mut pairs, mut only_old) = (Vec::new(), Vec::new());
-    for (key, cell) in old {
-        match partners.get(&key) {
-            Some(partner) => pairs.push((cell, *partner)),
-            None => only_old.push(cell),
-        }
-    }
-    let only_new = new.into_iter().filter(|(key, _)| !known.contains(key));
-    (pairs, [only_old, only_new.map(|(_, cell)| cell).collect()])
+    let [in_old, in_new] = [old, new].map(|cells| -> BTreeMap<_, &ReportCell> {
+        cells.iter().map(|cell| (named(cell), cell)).collect()
+    });
+    let pair = |cell| Some((cell, *in_new.get(&named(cell))?));
+    let lacks = |other: &BTreeMap<_, _>, cell| !other.contains_key(&named(cell));
+    let only_old = old.iter().filter(|cell| lacks(&in_new, cell));
+    let only_new = new.iter().filter(|cell| lacks(&in_old, cell));
+    let alone = [only_old.collect(), only_new.collect()];
+    (old.iter().filter_map(pair).collect(), alone)
 }
 
 /// Why the two cells are not the same question, if they are not.
@@ -214,10 +201,9 @@ pub fn timed_otherwise((old, new): Pair) -> Option<String> {
         return Some(format!("{was} cameras timed and {is}"));
     }
     let has_views = |times: &CellTimes| times.by_process.contains_key("views_ns");
-    match (has_views(was), has_views(is)) {
-        (false, true) => return Some("one thread, and threads that share views".to_owned()),
-        (true, false) => return Some("threads that share views, and one thread".to_owned()),
-        _ => {}
+    let by = |times| ["one thread", "threads that share views"][usize::from(has_views(times))];
+    if by(was) != by(is) {
+        return Some(format!("{}, and {}", by(was), by(is)));
     }
     (was.batch != is.batch).then(|| format!("batches of {} and {} queries", was.batch, is.batch))
 }

@@ -36,6 +36,11 @@ impl Estimate {
         }
     }
 
+    /// Both ends of the interval, if there is one.
+    pub fn ends(self) -> Option<[f64; 2]> {
+        Some([self.lower?, self.upper?])
+    }
+
     /// Value and interval divided by a number of units.
     pub fn per(self, units: f64) -> Estimate {
         Estimate {

@@ -207,8 +207,12 @@ fn a_speedup_without_linear_has_the_interval_of_its_own_ratio() {
         cells: cells.iter().collect(),
         bounds: Vec::new(),
     };
-    let (ratio, ends) = comparison.speedup("octree", &cells[0]).unwrap();
-    let [lower, upper] = ends.expect("an interval");
-    assert!(ratio == 2.0 && 1.999 < lower && upper < 2.001, "{ends:?}");
-    assert_eq!(comparison.speedup("octree", &cells[1]), Some((1.0, None)));
+    let found = comparison.speedup("octree", &cells[0]).unwrap();
+    let [lower, upper] = found.ends().expect("an interval");
+    assert!(
+        found.value == 2.0 && 1.999 < lower && upper < 2.001,
+        "{found:?}"
+    );
+    let itself = Some(Estimate::exact(1.0));
+    assert_eq!(comparison.speedup("octree", &cells[1]), itself);
 }
