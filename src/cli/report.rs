@@ -86,8 +86,7 @@ fn page(report: &Report, folder: &Path, why: Vec<Block>) -> String {
 /// Writes the page and the pictures of a run into its folder.
 pub fn write_page(report: &Report, folder: &Path, why: Vec<Block>) -> anyhow::Result<()> {
     let pictures = surface_tables::pictures(report);
-    let named = pictures.iter().map(|p| (p.0.as_str(), p.1.as_str()));
-    Ok(save_page(folder, &page(report, folder, why), named)?)
+    Ok(save_page(folder, &page(report, folder, why), &pictures)?)
 }
 
 /// Older reports do not say what their structures are: the registry does, where

@@ -99,18 +99,12 @@ impl RunFolder {
     /// # Errors
     /// I/O errors.
     pub fn keep(&mut self, part: Part, samples: &[TaskSamples]) -> Result<KeptPart, InputError> {
-        let key = &part.key;
+        let (key, path) = (&part.key, part.key.samples_path());
         let mut rows = BTreeMap::new();
         let mut write = || -> Result<Vec<u8>, csv::Error> {
             let mut csv = csv::Writer::from_writer(Vec::new());
             for (label, task, samples) in samples {
-                let names = [
-                    &key.scene,
-                    &key.samples_path(),
-                    &key.cache,
-                    label,
-                    &key.test,
-                ];
+                let names = [&key.scene, &path, &key.cache, label, &key.test];
                 let names = names.map(|name| lines(name));
                 for s in samples {
                     let at = (part.process, s.round, s.frame, s.queries);
@@ -266,17 +260,9 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
     if reader.read_exact(&mut head).is_err() || head != *SAMPLE_COLUMNS.as_bytes() {
         return Ok(0);
     }
-    let mut length = head.len() as u64;
-    loop {
-        let bytes = reader.fill_buf()?;
-        let whole = bytes.iter().position(|b| *b == 0);
-        let (sound, read) = (whole.unwrap_or(bytes.len()), bytes.len());
-        length += sound as u64;
-        if whole.is_some() || read == 0 {
-            return Ok(length);
-        }
-        reader.consume(read);
-    }
+    // A NUL of our own ends a file without one.
+    let sound = reader.chain(&b"\0"[..]).skip_until(0)? - 1;
+    Ok((head.len() + sound) as u64)
 }
 
 /// Writes the page of a run and its pictures into its folder; replaces links.
@@ -285,10 +271,10 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
 ///
 /// # Errors
 /// Errors of the file system.
-pub fn save_page<'p>(
+pub fn save_page(
     folder: &Path,
     page: &str,
-    pictures: impl IntoIterator<Item = (&'p str, &'p str)>,
+    pictures: &[(String, String)],
 ) -> Result<(), InputError> {
     let save = |name: &str, text: &str| {
         replace_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()))
