@@ -7,7 +7,7 @@
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile, TempDir};
 
@@ -29,18 +29,23 @@ pub fn write_atomically(
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), InputError> {
     let attempt = || -> io::Result<()> {
-        let old = fs::metadata(path).ok();
-        if old.as_ref().is_some_and(is_stream) {
-            let mut stream = BufWriter::new(OpenOptions::new().write(true).open(path)?);
-            write(&mut stream)?;
-            return stream.flush();
+        if let Some(target) = target(path)? {
+            return replace(&target, write);
         }
-        match &old {
-            Some(_) => replace(&fs::canonicalize(path)?, write),
-            None => replace(path, write),
-        }
+        let mut stream = BufWriter::new(OpenOptions::new().write(true).open(path)?);
+        write(&mut stream)?;
+        stream.flush()
     };
     attempt().map_err(io(path))
+}
+
+/// The file that a path leads to; `None` for a terminal, a pipe or a device.
+fn target(path: &Path) -> io::Result<Option<PathBuf>> {
+    match fs::metadata(path) {
+        Ok(found) if !found.is_file() && !found.is_dir() => Ok(None),
+        Ok(_) => fs::canonicalize(path).map(Some),
+        Err(_) => Ok(Some(path.to_owned())),
+    }
 }
 
 /// The same of a file in a folder of the program's own. Anything of its name, a
@@ -79,26 +84,16 @@ pub fn folder_of(file: &Path) -> &Path {
     }
 }
 
-fn is_stream(found: &fs::Metadata) -> bool {
-    !found.is_file() && !found.is_dir()
-}
-
 /// Tries to write into the folder of a future file, and leaves nothing there:
 /// a folder that is read-only or full is found before the work.
 ///
 /// # Errors
 /// I/O errors, with the path.
 pub fn try_place(path: &Path) -> Result<(), InputError> {
-    let attempt = || -> io::Result<()> {
-        let target = match fs::metadata(path) {
-            // A pipe or a device has no place; opening a pipe would wait for its reader.
-            Ok(found) if is_stream(&found) => return Ok(()),
-            Ok(_) => fs::canonicalize(path)?,
-            Err(_) => path.to_owned(),
-        };
-        try_writing(folder_of(&target))
-    };
-    attempt().map_err(io(path))
+    // A pipe or a device has no place; opening a pipe would wait for its reader.
+    let target = target(path).map_err(io(path))?;
+    let tried = target.map_or(Ok(()), |target| try_writing(folder_of(&target)));
+    tried.map_err(io(path))
 }
 
 /// The same of a folder that is there or is to be made.
