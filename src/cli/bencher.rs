@@ -8,26 +8,19 @@ use super::text;
 use crate::measure::{Metric, Status};
 use crate::report::Report;
 
-/// Measures of Bencher with their metrics; it has `latency` in ns by itself.
-const MEASURES: [(&str, &str); 9] = [
-    ("latency", "query_ns"),
-    ("locate-ns", "locate_ns"),
-    ("build-ms", "build_ms"),
-    ("nodes-tested", "nodes_tested"),
-    ("items-tested", "items_tested"),
-    ("planes-tested", "planes_tested"),
-    ("memory-bytes-per-item", "memory_bytes_per_item"),
-    ("frame-ns", "frame_ns"),
-    ("worst-frame-ns", "worst_frame_ns"),
-];
+/// Metrics that are measures of Bencher.
+const METRICS: &str = "query_ns locate_ns build_ms nodes_tested items_tested planes_tested \
+                       memory_bytes_per_item frame_ns worst_frame_ns";
 
 /// One benchmark per right cell, named for structure and question.
 pub fn format(report: &Report) -> serde_json::Result<String> {
     let cells = report.cells.iter().filter(|cell| cell.status == Status::Ok);
     let benchmarks = cells.map(|cell| {
-        let measures = MEASURES.iter().filter_map(|(measure, metric)| {
-            let value = of_metric(cell.metrics.get(*metric)?);
-            Some(((*measure).to_owned(), value))
+        let measures = METRICS.split(' ').filter_map(|metric| {
+            let value = of_metric(cell.metrics.get(metric)?);
+            // Bencher has `latency` in ns by itself.
+            let name = metric.replace("query_ns", "latency").replace('_', "-");
+            Some((name, value))
         });
         let views = Some(cell.path.views_per_frame).filter(|views| *views > 1);
         let views = text::some(views, |views| format!(", {views} views"));
