@@ -1,7 +1,5 @@
 //! `cullbench merge`: the shards of a plan become one run, with the files of one.
 
-use std::path::Path;
-
 use anyhow::Context;
 
 use super::args::MergeArgs;
@@ -9,19 +7,18 @@ use super::document::show;
 use super::report::{close, shown, write_page};
 use super::run_resume::{command_line, same_recorded};
 use super::{Ending, expect_folder, interrupt, tell, text, unread_is_fine};
-use crate::report::{Stream, merge as join, read_stream};
+use crate::report::{merge as join, read_stream};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     expect_folder("--out", Some(&args.out))?;
-    let recorded =
-        |path: &Path| -> anyhow::Result<Stream> { Ok(read_stream(&path.join("stream.jsonl"))?.0) };
-    let first = recorded(&args.runs[0])?.header.args;
-    // The first as well: its own options may be none.
+    let mut first: Option<Vec<String>> = None;
     for path in &args.runs {
-        let other = recorded(path)?.header.args;
-        same_recorded(&first, &other).with_context(|| path.display().to_string())?;
+        let other = read_stream(&path.join("stream.jsonl"))?.0.header.args;
+        // The first as well: its own options may be none.
+        let first = first.get_or_insert_with(|| other.clone());
+        same_recorded(first, &other).with_context(|| path.display().to_string())?;
     }
-    let kept = without_place(&first);
+    let kept = without_place(&first.unwrap_or_default());
     let merged = join(&args.runs, (&kept, &command_line(&kept)), args.partial)?;
     interrupt::from_now_on_finish();
     if !merged.write(&args.out, &interrupt::asked)? {
