@@ -89,11 +89,8 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
 
 /// Lines before the figures.
 fn notes(old: &Report, new: &Report, settings: &[Setting], gate: Gate) -> Vec<String> {
-    let mut notes = Vec::new();
-    for setting in settings {
-        let values = format!("'{}' and '{}'", setting.old, setting.new);
-        notes.push(format!("{} differs: {} {values}", setting.of, setting.what));
-    }
+    let told = |s: &Setting| format!("{} differs: {} '{}' and '{}'", s.of, s.what, s.old, s.new);
+    let mut notes: Vec<String> = settings.iter().map(told).collect();
     if gate == Gate::Time && settings.iter().any(|setting| setting.is_machine) {
         notes.push(
             "different machines: a verdict says how a structure stands among the others there, \

@@ -173,23 +173,19 @@ impl Worker {
                 "a worker printed '{text}'; expected a message of protocol {PROTOCOL}{why}"
             )
         })?;
+        match &message {
+            Message::Ready { protocol } => ensure!(
+                *protocol == PROTOCOL,
+                "the program speaks protocol {protocol}; expected {PROTOCOL}: it is of another \
+                 version"
+            ),
+            Message::Doing { structure, step } => self.doing = (structure.clone(), step.clone()),
+            _ => {}
+        }
         Ok(Some(match message {
             Message::Failed(reason) => Err(Ended::Failed(reason)),
             Message::Done => Err(Ended::Done),
-            message => {
-                match &message {
-                    Message::Ready { protocol } => ensure!(
-                        *protocol == PROTOCOL,
-                        "the program speaks protocol {protocol}; expected {PROTOCOL}: it is of \
-                         another version"
-                    ),
-                    Message::Doing { structure, step } => {
-                        self.doing = (structure.clone(), step.clone());
-                    }
-                    _ => {}
-                }
-                Ok(message)
-            }
+            message => Ok(message),
         }))
     }
 

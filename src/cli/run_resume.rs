@@ -86,14 +86,13 @@ pub fn resume(args: &RunArgs) -> Result<(StoppedRun, Stream, RunArgs)> {
         None => newest_unfinished(Path::new("results"))?,
     };
     let (folder, stream) = StoppedRun::open(&path)?;
-    let begun = same_options(&stream.header.args).with_context(|| path.display().to_string())?;
-    same_place(&stream.header, &begun).with_context(|| path.display().to_string())?;
+    let place = || path.display().to_string();
+    let begun = same_options(&stream.header.args).with_context(place)?;
+    same_place(&stream.header, &begun).with_context(place)?;
     let suite = begun.what.suite.as_deref().unwrap_or_default();
     let before = stream.header.files.get(suite).cloned();
-    same_digest("suite", suite, before, || {
-        digest(Path::new(suite)).unwrap_or_else(|| "missing".to_owned())
-    })
-    .with_context(|| path.display().to_string())?;
+    let now = || digest(Path::new(suite)).unwrap_or_else(|| "missing".to_owned());
+    same_digest("suite", suite, before, now).with_context(place)?;
     Ok((folder, stream, begun))
 }
 
