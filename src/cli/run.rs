@@ -21,7 +21,7 @@ use super::{Ending, compare, expect_folder, interrupt, run_why, tell, text, unre
 use crate::index::Registry;
 use crate::input;
 use crate::measure::{
-    GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, Status, SubjectPart, Verdict,
+    GroupKey, Machine, Part, PathInfo, Plan, SceneInfo, Share, Status, SubjectPart, Verdict,
 };
 use crate::path::DEFAULT_PATH;
 use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_report, utc};
@@ -41,7 +41,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
         check_why(&begun, &plan)?;
         interrupt::from_now_on_finish();
         let folder = go_on(stopped, &stream)?;
-        return Run::new(&begun, plan, folder, stream)?.all();
+        return Run::new(&begun, plan.plan, folder, stream)?.all();
     }
     let plan = plan(registry, args)?;
     check_why(args, &plan)?;
@@ -54,7 +54,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
     interrupt::from_now_on_finish();
     let machine = Machine::capture().by(args.what.culling.kernel.execution()?.kernel);
     let (folder, stream) = create(args, &plan, machine)?;
-    Run::new(args, plan, folder, stream)?.all()
+    Run::new(args, plan.plan, folder, stream)?.all()
 }
 
 /// Refuses the explanation of a structure that is not measured.
@@ -84,7 +84,7 @@ fn print_plan(registry: &Registry, args: &RunArgs) -> Result<Ending> {
 /// A run on its way.
 struct Run<'a> {
     args: &'a RunArgs,
-    plan: RunPlan,
+    plan: Plan,
     folder: RunFolder,
     stream: Stream,
     workers: Workers,
@@ -95,11 +95,11 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(args: &'a RunArgs, plan: RunPlan, folder: RunFolder, stream: Stream) -> Result<Self> {
-        let groups = plan.plan.groups().len() as u64;
+    fn new(args: &'a RunArgs, plan: Plan, folder: RunFolder, stream: Stream) -> Result<Self> {
+        let groups = plan.groups().len() as u64;
         let patience = Duration::from_secs(args.what.timeout);
         Ok(Run {
-            bar: progress(groups * u64::from(plan.plan.effort.processes), ""),
+            bar: progress(groups * u64::from(plan.effort.processes), ""),
             // Files in the run's folder: what a killed run leaves is taken away by
             // the next.
             workers: Workers::new(stream.header.args.clone(), patience, folder.path())?,
@@ -114,7 +114,7 @@ impl<'a> Run<'a> {
 
     /// Measures all scenes; keeps a finished run as the baseline that the options name.
     fn all(mut self) -> Result<Ending> {
-        let mut scenes = 0..self.plan.plan.scenes.len();
+        let mut scenes = 0..self.plan.scenes.len();
         let measured = scenes.try_for_each(|scene| self.scene(scene));
         self.bar.finish_and_clear();
         let stopped = measured.is_err();
@@ -162,10 +162,10 @@ impl<'a> Run<'a> {
 
     /// All processes of a scene.
     fn scene(&mut self, scene: usize) -> Result<()> {
-        let planned = self.plan.plan.scenes[scene].clone();
-        let keys = self.plan.plan.keys_of(&planned);
+        let planned = self.plan.scenes[scene].clone();
+        let keys = self.plan.keys_of(&planned);
         let mut failed = self.failed_before(&planned.source);
-        for process in 0..self.plan.plan.effort.processes {
+        for process in 0..self.plan.effort.processes {
             loop {
                 interrupt::check()?;
                 let share = self.share(&keys, process, &failed);
@@ -181,7 +181,7 @@ impl<'a> Run<'a> {
                     }
                     // Not any structure's doing, as far as one can tell.
                     Ended::Died(_, verdict) => {
-                        self.fail_all(&planned, &failed, &keys, process, &verdict)?;
+                        self.fail_all(&planned.source, &failed, &keys, process, &verdict)?;
                         break;
                     }
                 }
@@ -221,8 +221,8 @@ impl<'a> Run<'a> {
             share,
             samples: true,
         };
-        let source = self.plan.plan.scenes[scene].source.clone();
-        let processes = self.plan.plan.effort.processes;
+        let source = self.plan.scenes[scene].source.clone();
+        let processes = self.plan.effort.processes;
         let mut keep = |said| {
             if let Message::Part(part, samples) = said {
                 self.stream.parts.push(self.folder.keep(*part, &samples)?);
@@ -240,7 +240,7 @@ impl<'a> Run<'a> {
     /// Every cell of what is still wanted gets this verdict.
     fn fail_all(
         &mut self,
-        planned: &PlannedScene,
+        scene: &str,
         failed: &BTreeMap<String, Verdict>,
         keys: &[GroupKey],
         process: u32,
@@ -252,9 +252,9 @@ impl<'a> Run<'a> {
             }
             let before = self.stream.of_group(key);
             let before = before.first().map(|kept| &kept.part);
-            let structures = self.plan.plan.structures.iter();
+            let structures = self.plan.structures.iter();
             let subjects = structures.map(|spec| SubjectPart::unknown(spec, verdict.clone()));
-            let unknown = || SceneInfo::unknown(&planned.source);
+            let unknown = || SceneInfo::unknown(scene);
             let part = Part {
                 key: key.clone(),
                 process,
