@@ -229,15 +229,11 @@ fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
     let (was, is): (Vec<_>, Vec<_>) = relative.map(<(_, _)>::from).unzip();
     let structures = timed.iter().map(|(row, _)| row.cell.structure.as_str());
     let judged = judge_unpaired(&was, &is, &structures.collect::<Vec<_>>(), threshold);
-    let sides = was
-        .iter()
-        .zip(&is)
-        .map(|(old, new)| [median(old), median(new)]);
-    for (((row, _), medians), judgement) in timed.into_iter().zip(sides).zip(judged) {
-        row.reason = why_inconclusive(medians[0].is_some(), row.processes);
-        let ratio = medians[0]
-            .zip(medians[1])
-            .map(|(old, new)| (new - old).exp());
+    let medians = was.iter().zip(&is);
+    let medians = medians.map(|(old, new)| Some([median(old)?, median(new)?]));
+    for (((row, _), medians), judgement) in timed.into_iter().zip(medians).zip(judged) {
+        row.reason = why_inconclusive(medians.is_some(), row.processes);
+        let ratio = medians.map(|[old, new]| (new - old).exp());
         conclude(row, judgement, ratio);
     }
 }
