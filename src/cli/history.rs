@@ -167,9 +167,7 @@ fn runs(reports: &[Report], names: &[String]) -> Table {
         }),
         ("version", |(_, (report, _))| report.source.version.clone()),
         (">cells", |(_, (report, _))| text::count(report.cells.len())),
-        (">processes", |(_, (report, _))| {
-            report.run.processes.to_string()
-        }),
+        (">processes", |(_, (of, _))| of.run.processes.to_string()),
         ("machine", |(_, (report, _))| {
             let cpu = report.machine.cpu.as_deref().unwrap_or("unknown");
             format!("{cpu}, {}", text::counted(report.machine.cores, "core"))

@@ -94,20 +94,16 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
             Some(format!("{share} false positives{sources}"))
         }
     };
+    let asked = text::joined([&views, &cell.test, cache.unwrap_or_default()]);
     let lens = path.lens.as_ref();
     let matrix = lens.and_then(|lens| lens.matrix.as_ref());
+    let matrices = matrix.map(scene_facts::matrices);
     let lines = [
         format!("{}: {of_scene}", scene.name),
-        format!(
-            "{}: {}",
-            path.name,
-            text::joined([&views, &cell.test, cache.unwrap_or_default()])
-        ),
+        format!("{}: {asked}", path.name),
         motion,
         text::some(lens, scene_facts::lens),
-        text::some(matrix, |matrix| {
-            format!("matrices: {}", scene_facts::matrices(matrix))
-        }),
+        text::some(matrices, |told| format!("matrices: {told}")),
         text::joined(visible.into_iter().chain(excess)),
     ];
     lines.into_iter().filter(|line| !line.is_empty()).collect()

@@ -168,12 +168,8 @@ fn of_one(pair: &Pair) -> Table {
     let [own, other] = names;
     let mut table = Table::of_numbers(["per query", &own, &other, "ratio"]);
     let mut row = |name: &str, of: &dyn Fn(&ReportCell) -> Option<f64>, show: fn(f64) -> String| {
-        table.add_row([
-            name.to_owned(),
-            some(of(pair.own), show),
-            some(of(pair.other), show),
-            some(pair.ratio(of), times),
-        ]);
+        let [own, other] = [pair.own, pair.other].map(|cell| some(of(cell), show));
+        table.add_row([name.to_owned(), own, other, some(pair.ratio(of), times)]);
     };
     if frame_ns(pair.own).is_some() {
         row("frame", &frame_ns, text::time);
