@@ -5,8 +5,7 @@ use std::io::{self, Write};
 
 use super::figure::Figure;
 use super::table::Table;
-use super::text;
-use super::text::html;
+use super::text::{self, html};
 
 pub enum Block {
     /// A heading of the first, second or third level.

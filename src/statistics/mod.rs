@@ -15,12 +15,9 @@ mod trimmed;
 mod unpaired;
 
 pub use judgement::{Change, Judgement, judge, resolved};
-pub use means::two_speeds;
-pub use means::{geometric_mean, interquartile_mean};
-pub use means::{median, quantile, sorted};
+pub use means::{geometric_mean, interquartile_mean, median, quantile, sorted, two_speeds};
 pub use one_run::{Estimate, one_run, ratio, speedup};
-pub use ranking::{ALPHA, is_less, ranks};
-pub use ranking::{Standing, dominance};
+pub use ranking::{ALPHA, Standing, dominance, is_less, ranks};
 pub use rate::{Rate, rate, rate_of, shows_less, shows_less_in_sum};
 pub use student::slope;
 pub use trimmed::{Trimmed, centre, trimmed_mean};
