@@ -59,9 +59,7 @@ pub fn blocks(advice: &Advice, all_columns: bool, width: usize) -> Vec<Block> {
         let names = text::joined(names);
         blocks.extend((!names.is_empty()).then(|| Block::Line(what.to_owned() + &names)));
     }
-    if !all_columns {
-        blocks.extend(["", "evidence: --all-columns"].map(Block::line));
-    }
+    blocks.extend(Block::more(all_columns, "evidence: --all-columns"));
     blocks
 }
 

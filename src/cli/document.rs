@@ -33,6 +33,12 @@ impl Block {
     pub fn section(heading: impl Into<String>, table: Table) -> [Block; 2] {
         [Block::heading(heading), Block::Table(table)]
     }
+
+    /// What another option shows, below a gap; nothing if `all` is shown.
+    pub fn more(all: bool, option: &str) -> impl Iterator<Item = Block> {
+        let lines = ["", option].map(Block::line).into_iter();
+        lines.filter(move |_| !all)
+    }
 }
 
 fn markdown_table(table: &Table) -> String {

@@ -85,10 +85,8 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
     let mut blocks = tables(report, all);
     blocks.push(Block::heading("Conclusions:"));
     blocks.extend(conclusions(report));
-    if !all {
-        let more = "errors by number of steps, orders, stability: --all";
-        blocks.extend(["", more].map(Block::line));
-    }
+    let more = "errors by number of steps, orders, stability: --all";
+    blocks.extend(Block::more(all, more));
     blocks
 }
 

@@ -97,10 +97,8 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     };
     let told = report.conclusions.iter().filter(is_shown).cloned();
     blocks.extend(told.map(Block::Line));
-    if !all {
-        let more = "every other back end, draw orders, picking, lower bounds: --all";
-        blocks.extend(["", more].map(Block::line));
-    }
+    let more = "every other back end, draw orders, picking, lower bounds: --all";
+    blocks.extend(Block::more(all, more));
     blocks
 }
 

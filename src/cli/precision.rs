@@ -85,10 +85,8 @@ fn blocks(outcome: &Precision, all: bool, room: usize) -> Vec<Block> {
     blocks.push(Block::heading("Conclusions:"));
     let told = precision_conclusions::conclusions(outcome).into_iter();
     blocks.extend(told.map(|sentence| Block::Line(format!("- {sentence}"))));
-    if !all {
-        let more = "every point, region search and sweeps: --all";
-        blocks.extend(["", more].map(Block::line));
-    }
+    let more = "every point, region search and sweeps: --all";
+    blocks.extend(Block::more(all, more));
     blocks
 }
 
