@@ -1,8 +1,7 @@
 //! Diagrams: series of places over two axes, with their names beside the plot.
 
 use super::figure::{Axis, CHARACTER, Figure, LINE, Look, STRONG, class, line, mark};
-use super::text;
-use super::text::html;
+use super::text::{self, html};
 use crate::shown::shortened;
 
 /// Most characters of a name beside a plot.

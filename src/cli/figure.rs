@@ -7,8 +7,7 @@
 use std::iter::successors;
 use std::ops::Range;
 
-use super::text;
-use super::text::html;
+use super::text::{self, html};
 use crate::shown::shortened;
 use crate::statistics::Estimate;
 
