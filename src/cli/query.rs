@@ -104,12 +104,9 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
         ("region_ids", &|row| json!(shown(&scene, row))),
         ("nodes_tested", &|row| json!(row.cost.nodes_tested)),
     ];
-    let (points, boxes) = match (&args.sought.points, &args.sought.boxes) {
-        (Some(file), _) => (points(&scene, file)?, Vec::new()),
-        (_, Some(file)) => (Vec::new(), boxes(&scene, file)?),
-        // The argument parser refuses that.
-        (None, None) => return Ok(Ending::Ok),
-    };
+    let (file, other) = (args.sought.points.as_ref(), args.sought.boxes.as_ref());
+    let points = file.map_or(Ok(Vec::new()), |file| points(&scene, file))?;
+    let boxes = other.map_or(Ok(Vec::new()), |file| boxes(&scene, file))?;
     let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
         if let Some(p) = points.get(n) {
             scene.search(p, out, |p, out| index.query_counted(p.into(), out, cost));
