@@ -117,20 +117,20 @@ pub fn time_within(ns: Estimate) -> String {
 pub fn time_plus_minus(ns: Option<Estimate>) -> String {
     some(ns, |ns| {
         let (size, name) = unit(ns.value);
-        format!("{} {name}", with_ends(ns.per(size)))
+        let ns = ns.per(size);
+        format!("{} {name}", with_ends(ns.value, [ns.lower, ns.upper]))
     })
 }
 
 /// A value with a margin, or with its interval where an end is far.
-fn with_ends(found: Estimate) -> String {
-    let ends = found.ends();
-    let is_near = |end: f64| found.value == 0.0 || (end / found.value).ln().abs() < 0.5;
-    match ends {
-        Some(ends) if !ends.into_iter().all(is_near) => within(found),
-        _ => {
-            let margin = |[lower, upper]: [f64; 2]| (found.value - lower).max(upper - found.value);
-            plus_minus(found.value, ends.map(margin))
+fn with_ends(value: f64, ends: [Option<f64>; 2]) -> String {
+    let is_near = |end: f64| value == 0.0 || (end / value).ln().abs() < 0.5;
+    let margin = |[lower, upper]: [f64; 2]| f64::max(value - lower, upper - value);
+    match ends[0].zip(ends[1]).map(<[f64; 2]>::from) {
+        Some(ends) if !ends.into_iter().all(is_near) => {
+            significant(value) + &interval(Some(ends), 1.0)
         }
+        ends => plus_minus(value, ends.map(margin)),
     }
 }
 
@@ -182,12 +182,7 @@ pub fn time_with(metric: &Metric) -> String {
 /// A rate per `units` with its 95 % interval; nothing if there is none.
 pub fn rate(rate: Option<Rate>, units: f64) -> String {
     some(rate.map(|rate| rate.per(units)), |rate| {
-        let (value, lower, upper) = (rate.value, rate.lower, rate.upper);
-        with_ends(Estimate {
-            value,
-            lower,
-            upper,
-        })
+        with_ends(rate.value, [rate.lower, rate.upper])
     })
 }
 
@@ -279,8 +274,9 @@ pub fn basis(comparison: &Comparison) -> String {
 
 /// False positives of the truly visible items: "0.08±0.03 %".
 pub fn false_positives(comparison: &Comparison) -> Option<String> {
-    let share = comparison.metric_of_any("excess")?;
-    Some(format!("{} %", with_ends(share.estimate().per(0.01))))
+    let share = comparison.metric_of_any("excess")?.estimate().per(0.01);
+    let percent = with_ends(share.value, [share.lower, share.upper]);
+    Some(format!("{percent} %"))
 }
 
 /// Sources of false positives, as items of all judged cameras: "12/0/80". Nothing
