@@ -9,7 +9,7 @@ use glam::Vec3;
 use indicatif::ProgressBar;
 
 use super::args::VerifyArgs;
-use super::run_resume::TypedOptions;
+use super::run_resume::{TypedOptions, command_line};
 use super::shared_args::first_seed;
 use super::verify_table::{Check, Outcome, RANDOM, show};
 use super::{Ending, interrupt, load_scene, print, program, text};
@@ -153,12 +153,8 @@ fn reproduce(scene: &str, path: &str) -> anyhow::Result<String> {
     let own = ["scene", "path", "cases", "seed", "format"];
     let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
     let others = typed.words(|name| !own.contains(&name));
-    let others = others.iter().map(|word| format!(" {}", text::quoted(word)));
-    let others: String = others.collect();
-    let (program, scene, path) = (program::name(), text::quoted(scene), text::quoted(path));
-    Ok(format!(
-        "{program} verify --scene {scene} --path {path}{others}"
-    ))
+    let words = ["verify", "--scene", scene, "--path", path].map(str::to_owned);
+    Ok(command_line(&[words.to_vec(), others].concat()))
 }
 
 /// The queries of a path for each kind of volume, and for each other culling test
