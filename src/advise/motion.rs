@@ -18,7 +18,7 @@ const POLICIES: [UpdatePolicy; 3] = [
 const RULED_OUT: f64 = 1.5;
 
 /// The policy to update the structure by.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct MotionChoice {
     /// The motion: file or spec.
     pub name: String,
@@ -76,11 +76,9 @@ impl MotionChoice {
             name: input.motion?.to_owned(),
             share_moved: motion.share(),
             views: input.views,
-            policy: None,
-            policy_ties: Vec::new(),
-            policies: Vec::new(),
             ruled_out,
             refits,
+            ..MotionChoice::default()
         };
         Some((begun, measured))
     }

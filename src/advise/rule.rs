@@ -71,7 +71,7 @@ pub struct Facts<'f> {
 
 impl Facts<'_> {
     /// Share of the time that leaving out saves in the first check.
-    pub fn saving(&self) -> Option<f64> {
+    fn saving(&self) -> Option<f64> {
         let check = self.checks.first()?;
         Some(1.0 - 1.0 / check.ratio?.value).filter(|saving: &f64| saving.is_finite())
     }
@@ -83,6 +83,7 @@ pub struct Finding {
     pub reason: String,
     /// Statistic and threshold, unless the rule does not apply.
     pub compared: Option<[f64; 2]>,
+    /// Share of the time that leaving out saves; of the first check if none is given.
     pub saving: Option<f64>,
     /// Time with and without, where more than the first check counts, ns.
     pub cost_ns: Option<[f64; 2]>,
@@ -140,10 +141,7 @@ pub struct Draft {
 impl Draft {
     /// A finding that does not depend on times.
     pub fn new(sides: Vec<Sides>, finding: Finding) -> Draft {
-        Draft::concluded(sides, move |facts| Finding {
-            saving: facts.saving(),
-            ..finding
-        })
+        Draft::concluded(sides, move |_| finding)
     }
 
     /// A finding from the facts.
@@ -183,6 +181,7 @@ impl Rule {
             ..choices
         };
         let mut finding = (draft.conclude)(&facts);
+        finding.saving = finding.saving.or(facts.saving());
         let mut checks = facts.checks;
         checks.extend(finding.check.take());
         self.omission(finding, checks)

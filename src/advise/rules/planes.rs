@@ -160,10 +160,7 @@ pub(super) fn six_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
     Ok(Draft::concluded(vec![sides], move |facts| {
         let check = &facts.checks[0];
         let Some(more) = check.more_false_positives() else {
-            return Finding {
-                saving: facts.saving(),
-                ..Finding::default()
-            };
+            return Finding::default();
         };
         let (drawing, testing) = (more * draw_ns, check.kept_ns - check.left_out_ns);
         let worth = testing / more;

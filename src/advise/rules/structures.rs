@@ -48,9 +48,8 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
             ),
         };
         let pays = facts.checks.first().and_then(|check| check.pays);
-        let saving = costs.map(|[tree, scan]| 1.0 - scan / tree);
         Finding {
-            saving: saving.or(facts.saving()),
+            saving: costs.map(|[tree, scan]| 1.0 - scan / tree),
             cost_ns: costs,
             decision: costs.map(|_| Decision::of(taken.is_scan)),
             is_tie,
@@ -97,7 +96,6 @@ pub(super) fn third_dimension(trials: &mut Trials) -> Result<Draft, Unfit> {
         let is_either = flat || taken.starts_with("octree");
         let is_either = is_either && facts.structure.ties.is_empty();
         Finding {
-            saving: facts.saving(),
             decision: is_either.then_some(Decision::of(flat)),
             note: "octree against quadtree".to_owned(),
             ..Finding::new(height, cell, reason)
