@@ -181,18 +181,8 @@ impl Spec {
         Err(self.bad(key, &found, &wanted))
     }
 
-    /// A whole number in `0..=most`, or the default.
-    pub fn whole(&mut self, key: &'static str, default: u64, most: u64) -> Result<u64, SpecError> {
-        self.whole_of(key, default, 0..=most)
-    }
-
-    /// A whole number in `1..=most`, or the default.
-    pub fn count(&mut self, key: &'static str, default: u64, most: u64) -> Result<u64, SpecError> {
-        self.whole_of(key, default, 1..=most)
-    }
-
     /// A whole number in a range, or the default.
-    pub fn whole_of(
+    pub fn whole(
         &mut self,
         key: &'static str,
         default: u64,

@@ -52,7 +52,7 @@ fn city_grid(scene: &Scene) -> Option<CityGrid> {
     // A file may have that name.
     let is_city = spec.name() == "city" && !is_readable(Path::new(&scene.name));
     // The scene may be a part of the city.
-    let n = spec.whole("n", COUNT, u64::MAX).ok()?;
+    let n = spec.whole("n", COUNT, 0..=u64::MAX).ok()?;
     let mut grid = CityGrid::of(&mut spec, n as usize).ok()?;
     grid.corner += spec.number("offset", 0.0).ok()?;
     is_city.then_some(grid)

@@ -115,8 +115,8 @@ impl Motion {
         };
         let unfit =
             |text: String| Err(SpecError::new(format_args!("motion '{source}': {text}")).into());
-        let frames = spec.count("frames", 100, MOST_FRAMES)? as usize;
-        let seed = spec.whole("seed", 1, u64::MAX)?;
+        let frames = spec.whole("frames", 100, 1..=MOST_FRAMES)? as usize;
+        let seed = spec.whole("seed", 1, 0..=u64::MAX)?;
         let share = spec.number("share", family.share)?;
         if !(share > 0.0 && share <= 1.0) {
             return unfit(format!("share={share}; expected above 0, at most 1"));

@@ -28,7 +28,7 @@ pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
 /// A closed flight through `waypoints` seeded points within the scene's middle: the
 /// coherent path of a game or a film camera.
 pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
-    let count = spec.whole_of("waypoints", 8, 4..=10_000)? as usize;
+    let count = spec.whole("waypoints", 8, 4..=10_000)? as usize;
     let mut rng = stage.rng();
     let (low, extent) = (stage.bounds.min, stage.extent());
     let points = (0..count).map(|_| {

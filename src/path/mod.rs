@@ -285,8 +285,8 @@ fn read(
         scene,
         up: scene.up,
         bounds: WorldBox::new(scene.up.to_z_up(min), scene.up.to_z_up(max)),
-        count: spec.count("frames", 256, 1_000_000)? as usize,
-        seed: spec.whole("seed", 1, u64::MAX)?,
+        count: spec.whole("frames", 256, 1..=1_000_000)? as usize,
+        seed: spec.whole("seed", 1, 0..=u64::MAX)?,
     };
     fits(source, stage.count as u64)?;
     let poses = (family.frames)(&stage, &mut spec)?;

@@ -40,7 +40,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
         _ => (Plan::new(Vec::new(), Vec::new()), 1.7),
     };
     let height = spec.number_between("height", natural, 0.0, 1e6)?;
-    let doors = spec.count("doors", 32, 100_000)? as usize;
+    let doors = spec.whole("doors", 32, 1..=100_000)? as usize;
     if plan.doors.is_empty() {
         let wanted = "expected rooms or a Doom map (the path 'street' needs none)";
         let reason = format_args!("scene '{}' has no doors; {wanted}", stage.scene.name);

@@ -40,7 +40,7 @@ fn scattered(n: usize, rng: &mut SeededRng, block: DVec3, size: f64) -> Vec<Worl
 /// Cluster k attracts items in proportion to 1/(k+1) (Zipf), so that a few clusters hold
 /// most of the scene.
 pub fn clustered(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
-    let clusters = spec.count("clusters", 64, 1_000_000)? as usize;
+    let clusters = spec.whole("clusters", 64, 1..=1_000_000)? as usize;
     let side = spec.number_between("side", 1000.0, 0.0, f64::INFINITY)?;
     let spread = spec.number_between("spread", 0.02, 0.0, 10.0)? * side;
     let centres: Vec<_> = (0..clusters).map(|_| rng.point() * side).collect();
@@ -230,7 +230,7 @@ pub fn shell(spec: &mut Spec, n: usize, _: &mut SeededRng) -> Made {
 
 /// Boxes of unit spheres on a cubic grid of spacing 2, in rows or shuffled.
 pub fn grid3(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
-    let shuffled = spec.whole("shuffled", 0, 1)? == 1;
+    let shuffled = spec.whole("shuffled", 0, 0..=1)? == 1;
     let side = side_of(n, 3);
     let half = (side / 2) as f64;
     let boxes = (0..n).map(|i| {
@@ -294,7 +294,7 @@ pub fn tiles2d(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
 
 /// Piles of coincident boxes: no plane separates the items of one.
 pub fn stack(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
-    let piles = spec.count("piles", 16, 1_000_000)? as usize;
+    let piles = spec.whole("piles", 16, 1..=1_000_000)? as usize;
     let place = |_| WorldBox::around(rng.point() * 1000.0, (rng.point() + 0.5) * 20.0);
     let places: Vec<WorldBox> = (0..piles).map(place).collect();
     Ok((0..n).map(|i| places[i % piles]).collect())

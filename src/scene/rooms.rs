@@ -73,7 +73,7 @@ const DOOR_HEIGHT: f64 = 2.1;
 const ITEMS_PER_ROOM: usize = 16;
 
 pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
-    let storeys = spec.count("storeys", 3, 1000)? as usize;
+    let storeys = spec.whole("storeys", 3, 1..=1000)? as usize;
     let edge = spec.number_between("room", 6.0, 2.0 * DOOR_WIDTH, 1e6)?;
     let wanted = n.div_ceil(ITEMS_PER_ROOM).max(1);
     let storeys = storeys.min(wanted);

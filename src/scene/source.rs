@@ -144,7 +144,7 @@ impl Family {
     ///
     /// The generator reports a count that is no number.
     fn check_fits(&self, source: &str, spec: &Spec, options: &LoadOptions) -> Result<()> {
-        let Ok(n) = spec.clone().whole("n", COUNT, MOST) else {
+        let Ok(n) = spec.clone().whole("n", COUNT, 0..=MOST) else {
             return Ok(());
         };
         match self.build {

@@ -80,7 +80,7 @@ fn unknown_words_get_the_nearest_suggestion() {
     let wanted = "unknown parameter of 'helsinki': 'n'; expected none";
     assert_eq!(error.to_string(), wanted);
     let mut spec = Spec::parse("city:sed=3").unwrap();
-    spec.whole("seed", 1, u64::MAX).unwrap();
+    spec.whole("seed", 1, 0..=u64::MAX).unwrap();
     let error = spec.finish().unwrap_err().to_string();
     assert!(error.contains("did you mean 'seed'"), "{error}");
 }
@@ -89,14 +89,14 @@ fn unknown_words_get_the_nearest_suggestion() {
 fn bad_values_say_what_was_expected() {
     let mut spec = Spec::parse("city:n=many,seed=18446744073709551615,x=3").unwrap();
     assert!(
-        spec.whole("n", 1, 10)
+        spec.whole("n", 1, 0..=10)
             .unwrap_err()
             .to_string()
             .contains("n is 'many'")
     );
-    assert_eq!(spec.whole("seed", 1, u64::MAX).unwrap(), u64::MAX);
+    assert_eq!(spec.whole("seed", 1, 0..=u64::MAX).unwrap(), u64::MAX);
     let mut percents = Spec::parse("city:n=200%").unwrap();
-    let error = percents.whole("n", 1, 10).unwrap_err().to_string();
+    let error = percents.whole("n", 1, 0..=10).unwrap_err().to_string();
     assert!(
         error.contains("n is '200%'; expected a whole number"),
         "{error}"

@@ -138,7 +138,7 @@ impl CutOuts {
             mask,
             share,
             tile: spec.number_between("tile", 1.0, 0.0, f64::INFINITY)?,
-            seed: spec.whole("seed", 1, u64::MAX)?,
+            seed: spec.whole("seed", 1, 0..=u64::MAX)?,
         };
         spec.finish()?;
         Ok(cut_outs)
