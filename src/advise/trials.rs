@@ -107,7 +107,7 @@ impl<'c> Trials<'c> {
         let [kept, left_out] = [sides.kept, sides.left_out].map(|task| &self.asks[task].0);
         let mut trial = Trial::new(self.case.scene().items.len());
         let mut first = Vec::new();
-        sides.same_answers = (0..self.case.cameras()).all(|camera| {
+        sides.check.same_answers = (0..self.case.cameras()).all(|camera| {
             first.clear();
             kept(camera, &mut first);
             trial.expect(first.iter().copied());
@@ -141,33 +141,31 @@ impl Answered {
 
 /// The two sides of a check, by their tasks.
 pub struct Sides {
-    pub on: String,
     pub kept: usize,
     pub left_out: usize,
-    /// `true` if both must answer the same.
-    same_expected: bool,
-    /// `true` if both answered the same.
-    pub same_answers: bool,
+    /// The check before its times.
+    check: Check,
 }
 
 impl Sides {
     /// Two sides that may differ.
     pub fn new(on: impl ToString, kept: usize, left_out: usize) -> Sides {
-        Sides {
+        let check = Check {
             on: on.to_string(),
+            ..Check::default()
+        };
+        Sides {
             kept,
             left_out,
-            same_expected: false,
-            same_answers: false,
+            check,
         }
     }
 
     /// Two sides that must answer the same.
     pub fn same(on: impl ToString, kept: usize, left_out: usize) -> Sides {
-        Sides {
-            same_expected: true,
-            ..Sides::new(on, kept, left_out)
-        }
+        let mut sides = Sides::new(on, kept, left_out);
+        sides.check.same_expected = true;
+        sides
     }
 
     /// The check; NaN where a task has no time, after a panic.
@@ -179,12 +177,9 @@ impl Sides {
         let excess = |errors: &Option<ErrorCount>| errors.as_ref().and_then(ErrorCount::excess);
         let missed = |errors: &Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
         Check {
-            on: self.on,
             kept_ns: ns(kept),
             left_out_ns: ns(left_out),
             ratio,
-            same_answers: self.same_answers,
-            same_expected: self.same_expected,
             kept_excess: excess(&errors[0]),
             left_out_excess: excess(&errors[1]),
             kept_false_negative_ppm: missed(&errors[0]),
@@ -192,6 +187,7 @@ impl Sides {
             errors: errors[0].zip(errors[1]).map(|(kept, left)| [kept, left]),
             judged: answered.judged,
             pays: ratio.and_then(is_longer),
+            ..self.check
         }
     }
 }
