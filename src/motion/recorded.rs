@@ -166,10 +166,7 @@ pub(super) fn read_motion_csv(
             bounds(&row, &bounds_at, scene)?,
         ));
     }
-    if recorded.times.is_empty() {
-        let expected = "at least one row after the header";
-        return Err(InputError::line(file, 2, "no motion", expected));
-    }
+    InputError::expect_rows(file, recorded.times.len(), "no motion")?;
     recorded.end_frame(&mut rows, file)?;
     Ok(recorded)
 }

@@ -166,10 +166,7 @@ fn rows<T>(
         }
         found.push(read(&row?)?);
     }
-    if found.is_empty() {
-        let expected = "at least one row after the header";
-        return Err(InputError::line(file, 2, none, expected));
-    }
+    InputError::expect_rows(file, found.len(), none)?;
     Ok(found)
 }
 

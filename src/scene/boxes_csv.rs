@@ -50,10 +50,7 @@ pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<
 pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>> {
     let mut rows = read_rows(bytes, file, f64::MAX)?;
     rows.first_bad.take().map_or(Ok(()), Err)?;
-    if rows.boxes.is_empty() {
-        let expected = "at least one row after the header";
-        return Err(InputError::line(file, 2, "no box", expected));
-    }
+    InputError::expect_rows(file, rows.boxes.len(), "no box")?;
     rows.note_near_names(file);
     Ok(rows.boxes)
 }
