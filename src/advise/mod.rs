@@ -31,7 +31,7 @@ use crate::motion::Motion;
 use crate::statistics::Estimate;
 
 use case::Case;
-use rule::{Draft, Facts, Rule, Unfit};
+use rule::{Draft, Facts, Finding, Rule, Unfit};
 use rules::RULES;
 use rules::stages::Stages;
 use trials::{Answered, BASE, Trials};
@@ -138,8 +138,8 @@ pub fn prepare(
     let mut entered = enter(&mut trials, progress)?;
     progress("answers, checked");
     let answered = trials.answered();
-    let drafts = entered.rules.iter_mut().flat_map(|(_, draft)| draft);
-    for sides in drafts.flat_map(|draft| &mut draft.sides) {
+    let drafts = entered.rules.iter_mut();
+    for sides in drafts.flat_map(|(_, draft)| &mut draft.sides) {
         trials.compare(sides);
     }
     let tasks = trials.tasks(&answered.counts);
@@ -226,10 +226,7 @@ impl Prepared {
             funnel: &funnel,
         };
         let rules = self.entered.rules.into_iter();
-        let settled = rules.map(|(rule, draft)| match draft {
-            Ok(draft) => rule.settled(draft, answered, &times, choices()),
-            Err(reason) => rule.not_applicable(reason),
-        });
+        let settled = rules.map(|(rule, draft)| rule.settled(draft, answered, &times, choices()));
         Advice {
             scene: scene.name.clone(),
             path: path.name.clone(),
@@ -253,7 +250,7 @@ impl Prepared {
 /// All tasks, in the order in which every process enters them.
 struct Entered {
     tests: Vec<(CullingTest, usize)>,
-    rules: Vec<(&'static Rule, Result<Draft, String>)>,
+    rules: Vec<(&'static Rule, Draft)>,
     twin: usize,
 }
 
@@ -261,11 +258,11 @@ fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<Entered> {
     let mut rules = Vec::with_capacity(RULES.len());
     for rule in RULES {
         progress(rule.name);
-        rules.push(match (rule.prepare)(trials) {
-            Err(Unfit::Failed(error)) => return Err(error),
-            Err(Unfit::NotApplicable(reason)) => (rule, Err(reason)),
-            Ok(draft) => (rule, Ok(draft)),
+        let draft = (rule.prepare)(trials).or_else(|error| {
+            let Unfit(reason) = error.downcast()?;
+            anyhow::Ok(Draft::new(Vec::new(), Finding::none(reason)))
         });
+        rules.push((rule, draft?));
     }
     Ok(Entered {
         tests: choice::enter_tests(trials)?,

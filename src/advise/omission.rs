@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn a_rule_without_a_statistic_does_not_apply() {
         let rule = some_rule(LeftOutIf::AtLeast, By::Time);
-        let omission = rule.not_applicable("for a reason".to_owned());
+        let omission = rule.omission(Finding::none("for a reason".to_owned()), Vec::new());
         assert_eq!(omission.decision, Decision::NotApplicable);
         assert_eq!((omission.predicted, omission.saving), (None, None));
         // An infinite threshold cannot be written, but compares.

@@ -33,24 +33,16 @@ pub struct Rule {
     pub(super) by: By,
     /// Enters both sides.
     #[serde(skip)]
-    pub(super) prepare: for<'c> fn(&mut Trials<'c>) -> Result<Draft, Unfit>,
+    pub(super) prepare: for<'c> fn(&mut Trials<'c>) -> anyhow::Result<Draft>,
 }
 
-/// A rule without a draft.
-pub enum Unfit {
-    /// It does not apply to this scene or these cameras, for a reason.
-    NotApplicable(String),
-    Failed(anyhow::Error),
-}
+/// Reason for which a rule does not apply to this scene or these cameras: no failure.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Unfit(pub String);
 
-impl<E: Into<anyhow::Error>> From<E> for Unfit {
-    fn from(error: E) -> Unfit {
-        Unfit::Failed(error.into())
-    }
-}
-
-pub fn not_applicable(reason: impl ToString) -> Unfit {
-    Unfit::NotApplicable(reason.to_string())
+pub fn not_applicable(reason: impl ToString) -> anyhow::Error {
+    Unfit(reason.to_string()).into()
 }
 
 /// The funnel of a few views, or the reason for which there is none.
@@ -158,11 +150,6 @@ impl Draft {
 }
 
 impl Rule {
-    /// The omission of a rule that does not apply.
-    pub fn not_applicable(&'static self, reason: String) -> Omission {
-        self.omission(Finding::none(reason), Vec::new())
-    }
-
     /// The omission that follows from the choices and the times.
     pub fn settled(
         &'static self,

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::super::case::{Case, part_of};
 use super::super::choice::TestChoice;
 use super::super::omission::{Decision, LeftOutIf};
-use super::super::rule::{Draft, Finding, Unfit, not_applicable};
+use super::super::rule::{Draft, Finding, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, CameraView, Culling, CullingTest};
@@ -24,7 +24,7 @@ const LEAST_NEEDLESS: f64 = 0.01;
 /// Planes that the whole scene lies within: a camera does not need them.
 ///
 /// The far plane first of all, which paths often put behind the scene.
-pub(super) fn needless_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let bounds = &case.scene().bounds;
     let (mut needless, mut far, mut all) = (0, 0, 0);
@@ -77,7 +77,7 @@ const COUNTED: usize = 64;
 ///
 /// The mask of open planes that a node passes to its children leaves them out. The side
 /// without the rule is a view whose nodes never close a plane (unless they close all).
-pub(super) fn plane_masks(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let kernel = case.spec.execution.kernel;
     let input = Input::new(&case.scene().items);
@@ -151,7 +151,7 @@ impl QueryVolume for Unmasked<'_> {
 ///
 /// The exact test adds them. They cost test time and save the drawing of what cannot be
 /// seen.
-pub(super) fn six_planes(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
     let sides = against_base(trials, &exact)?;
@@ -227,7 +227,7 @@ fn predicted_excess(case: &Case) -> f64 {
 }
 
 /// The tree with the views of a culling against the tree with the default views.
-fn against_base(trials: &mut Trials, culling: &Culling) -> Result<Sides, Unfit> {
+fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<Sides> {
     let case = trials.case;
     let views = case.views_by(culling).map_err(not_applicable)?;
     let kept = trials.index(case.tree_for(culling.test)?, views);
@@ -238,7 +238,7 @@ fn against_base(trials: &mut Trials, culling: &Culling) -> Result<Sides, Unfit> 
 ///
 /// f32 planes, moved outward for their rounding, miss nothing either, and let through a
 /// margin that is mostly far too thin to hold an item.
-pub(super) fn f64_kernel(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn f64_kernel(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let planes = PlaneOptions::default();
     let in_f64 = Culling::new(CullingTest::SixPlane, Arithmetic::F64, planes);
@@ -256,7 +256,7 @@ pub(super) fn f64_kernel(trials: &mut Trials) -> Result<Draft, Unfit> {
 ///
 /// Near the world's origin f32 has digits enough without. One side has the scene about its
 /// centre, the other about the world's origin.
-pub(super) fn rebasing(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let scene = case.scene();
     if case.workload.around != scene.surroundings() {

@@ -5,7 +5,7 @@
 
 use super::super::omission::{Check, is_longer};
 use super::super::options::{AdviseInput, AdviseOptions, planned};
-use super::super::rule::{Draft, Finding, Unfit};
+use super::super::rule::{Draft, Finding};
 use super::super::trials::Trials;
 use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE, StageKind};
 use crate::index::StructureSpec;
@@ -49,7 +49,7 @@ impl Stages {
 }
 
 /// A rule about a stage; where the funnel has none it does not apply, for a reason.
-pub(super) fn reads(trials: &Trials, stage: StageKind) -> Result<Draft, Unfit> {
+pub(super) fn reads(trials: &Trials, stage: StageKind) -> anyhow::Result<Draft> {
     let options = trials.case.options;
     Ok(Draft::concluded(Vec::new(), move |facts| {
         let funnel = facts.funnel.as_ref().map_err(String::clone);

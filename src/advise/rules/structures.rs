@@ -3,7 +3,7 @@
 use super::super::change::Axis;
 use super::super::omission::Decision;
 use super::super::options::default_of;
-use super::super::rule::{Draft, Finding, Unfit, not_applicable};
+use super::super::rule::{Draft, Finding, not_applicable};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::drift::rotations;
 use crate::measure::{Stopwatch, input_of, move_share};
@@ -14,7 +14,7 @@ use crate::statistics::Estimate;
 ///
 /// The number follows from the parts of the scene that are measured beside it
 /// ([`Axis::Items`]).
-pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
     let items = &case.scene().items;
@@ -72,7 +72,7 @@ pub(super) fn no_index(trials: &mut Trials) -> Result<Draft, Unfit> {
 ///
 /// An octree's third split separates nothing in a scene that is flatter than a quadtree's
 /// leaves are wide. Bounds stay three-dimensional either way.
-pub(super) fn third_dimension(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let (scene, by) = (case.scene(), case.spec.execution);
     let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, by));
@@ -107,7 +107,7 @@ pub(super) fn third_dimension(trials: &mut Trials) -> Result<Draft, Unfit> {
 ///
 /// A refit keeps the tree and is quicker, but leaves a tree that answers more slowly. Weighed
 /// for a share of items that move and a number of queries between two updates.
-pub(super) fn rebuild(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn rebuild(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let scene = case.scene();
     if case.workload.motion.is_some() {
@@ -168,7 +168,7 @@ const METHODS: [&str; 2] = ["f32", "f32-polar-100"];
 ///
 /// Axes in f32 that are turned and never straightened drift by some 5e-8 a step. A frame
 /// that is built for each camera, or takes few steps, does not need it. Checked by walking.
-pub(super) fn frame_correction(trials: &mut Trials) -> Result<Draft, Unfit> {
+pub(super) fn frame_correction(trials: &mut Trials) -> anyhow::Result<Draft> {
     let tolerance = trials.case.options.tolerance;
     let path = trials.case.path;
     let steps = (path.cameras.len() + path.left_out) as u64;
