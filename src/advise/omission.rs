@@ -58,10 +58,7 @@ pub enum Decision {
 
 impl Decision {
     pub(super) fn of(leave_out: bool) -> Decision {
-        match leave_out {
-            true => Decision::LeaveOut,
-            false => Decision::Keep,
-        }
+        [Decision::Keep, Decision::LeaveOut][usize::from(leave_out)]
     }
 }
 

@@ -53,12 +53,14 @@ impl<'c> Trials<'c> {
 
     /// Enters a task whose answers are items of the scene in view; its index.
     pub fn judged(&mut self, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
-        self.add(Box::new(ask), true)
+        self.asks.push((Box::new(ask), true));
+        self.asks.len() - 1
     }
 
     /// Enters a task that is not compared with the truth of the frustum; its index.
     pub fn unjudged(&mut self, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
-        self.add(Box::new(ask), false)
+        self.asks.push((Box::new(ask), false));
+        self.asks.len() - 1
     }
 
     /// Enters an index that is queried with the given views; its index among the tasks.
@@ -68,11 +70,6 @@ impl<'c> Trials<'c> {
         views: impl Deref<Target = [CameraView]> + 'c,
     ) -> usize {
         self.judged(move |camera, out| index.query(views[camera].as_any(), out))
-    }
-
-    fn add(&mut self, ask: Ask<'c>, is_judged: bool) -> usize {
-        self.asks.push((ask, is_judged));
-        self.asks.len() - 1
     }
 
     /// Runs every task for every camera, and compares with the truth.
