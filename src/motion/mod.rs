@@ -156,13 +156,10 @@ impl Motion {
     /// If both are recorded and have times: at the first camera of each frame, all moves up
     /// to its time have happened. Otherwise frame k is seen by camera k.
     pub fn seen_by(self, path: &CameraPath, views: usize) -> Motion {
-        let Source::Recorded(recorded) = &self.source else {
+        let (name, path_name, views) = (&self.name, &path.name, views.max(1));
+        let Some(recorded) = self.recorded().filter(|_| !path.times.is_empty()) else {
             return self;
         };
-        let (name, path_name, views) = (&self.name, &path.name, views.max(1));
-        if path.times.is_empty() {
-            return self;
-        }
         // Without the last frame if it lacks cameras.
         let complete = (path.times.len() / views).max(1);
         let (paced, late) = recorded.at(path.times.iter().step_by(views).take(complete));
@@ -194,7 +191,7 @@ impl Motion {
     pub(crate) fn tell_numbers(&self, path: &CameraPath, views: usize) {
         let (name, path_name, cameras) = (&self.name, &path.name, path.cameras.len());
         let (seen, lines) = (self.frames * views.max(1), path.lines.len());
-        let is_recorded = matches!(self.source, Source::Recorded(_));
+        let is_recorded = self.recorded().is_some();
         let frames = format!("{name}: its frames have {}", counted(seen, "view"));
         if is_recorded && path.times.is_empty() && ![0, seen].contains(&lines) {
             let cameras = counted(cameras, "camera");
@@ -227,9 +224,14 @@ impl Motion {
     ///
     /// Zero of a generated motion, which stays within the scene.
     pub fn reach(&self) -> Vec3 {
+        self.recorded().map_or(Vec3::ZERO, Recorded::reach)
+    }
+
+    /// The frames of a file.
+    fn recorded(&self) -> Option<&Recorded> {
         match &self.source {
-            Source::Generated(_) => Vec3::ZERO,
-            Source::Recorded(recorded) => recorded.reach(),
+            Source::Generated(_) => None,
+            Source::Recorded(recorded) => Some(recorded),
         }
     }
 
@@ -237,10 +239,8 @@ impl Motion {
     ///
     /// With another share of movers if given; `None` of a recorded motion.
     pub fn respecified(&self, share: Option<f64>, frames: usize) -> Option<String> {
-        let spec = match self.source {
-            Source::Generated(_) => Spec::parse(&self.name).ok()?,
-            Source::Recorded(_) => return None,
-        };
+        let name = self.recorded().is_none().then_some(&self.name)?;
+        let spec = Spec::parse(name).ok()?;
         let is_kept = |key: &str| key != "frames" && (share.is_none() || key != "share");
         let kept = spec.given().filter(|(key, _)| is_kept(key));
         let mut text = format!("{}:frames={}", spec.name(), self.frames.min(frames));
@@ -260,10 +260,7 @@ impl Motion {
 
     /// The motion from its first frame on.
     pub fn replay(&self) -> Replay<'_> {
-        let counted = match self.source {
-            Source::Generated(_) => self.items,
-            Source::Recorded(_) => 0,
-        };
+        let counted = self.recorded().map_or(self.items, |_| 0);
         Replay {
             motion: self,
             frame: 0,
@@ -288,10 +285,8 @@ impl Replay<'_> {
         let (motion, frame) = (self.motion, self.frame);
         let moved = self.advance(items).unwrap_or_default();
         for (n, &id) in moved.iter().enumerate() {
-            written[id as usize] = match &motion.source {
-                Source::Recorded(recorded) => recorded.frame(frame).1[n].written,
-                Source::Generated(_) => WorldBox::AS_STORED,
-            };
+            let row = motion.recorded().map(|own| own.frame(frame).1[n].written);
+            written[id as usize] = row.unwrap_or(WorldBox::AS_STORED);
         }
     }
 
