@@ -252,22 +252,18 @@ pub type Occlude = Box<dyn FnMut(&OccluderScene, &View, &mut Vec<ItemId>)>;
 /// A row of the occlusion stage: allocates a buffer of the given size.
 pub type OcclusionRow = Row<fn(SampleGrid, Kernel) -> Occlude>;
 
-const fn occlusion<B: OcclusionBuffer + 'static>(name: &'static str) -> OcclusionRow {
-    OcclusionRow {
-        name,
-        summary: B::SUMMARY,
-        guarantee: B::GUARANTEE,
-        build: |grid, kernel| {
-            let mut state = Interleaved::new(B::new(grid), kernel);
-            Box::new(move |scene, view, out| {
-                state.cull(scene, view, out);
-            })
-        },
-    }
-}
+/// Rows of the occlusion stage; a summary names the source of code after a description.
+pub const OCCLUSION_ROWS: &[OcclusionRow] = rows! { OcclusionRow { name, guarantee, build, summary }
+    MASKED_INNER, Guarantee::Conservative, occlude::<MaskedInner>,
+        "masked tiles of 8 x 4 pixels; only wholly covered pixels hide";
+    "masked", Guarantee::Unproven, occlude::<MaskedCentre>,
+        "masked tiles of 8 x 4 pixels; pixels whose centre is covered hide (stand-in for \
+         Hasselgren, Andersson, Akenine-Moeller 2016)";
+};
 
-/// Rows of the occlusion stage.
-pub static OCCLUSION_ROWS: [OcclusionRow; 2] = [
-    occlusion::<MaskedInner>(MASKED_INNER),
-    occlusion::<MaskedCentre>("masked"),
-];
+fn occlude<B: OcclusionBuffer + 'static>(grid: SampleGrid, kernel: Kernel) -> Occlude {
+    let mut state = Interleaved::new(B::new(grid), kernel);
+    Box::new(move |scene, view, out| {
+        state.cull(scene, view, out);
+    })
+}

@@ -8,14 +8,10 @@ use super::scene::OccluderScene;
 use super::view::View;
 use crate::kernel::{Isa, LaneMask};
 use crate::query::Bits;
-use crate::visibility::{Guarantee, SampleGrid};
+use crate::visibility::SampleGrid;
 
 /// A depth buffer of occluders.
 pub trait OcclusionBuffer {
-    /// One line for tables; names the source of code written after a description.
-    const SUMMARY: &'static str;
-    /// Guarantee of the items that it does not hide.
-    const GUARANTEE: Guarantee;
     /// The pixels of an occluder that are drawn.
     const COVERAGE: Coverage;
 

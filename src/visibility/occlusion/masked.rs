@@ -12,7 +12,7 @@ use super::rect::{Rect, Rects};
 use super::view::{TILE_HEIGHT, TILE_WIDTH};
 use crate::kernel::{Isa, LANES, LaneMask, each, first_lanes, pairs};
 use crate::query::Bits;
-use crate::visibility::{Guarantee, SampleGrid};
+use crate::visibility::SampleGrid;
 
 /// Pixels of a tile: bit `8 * row + column`.
 type Mask = u32;
@@ -38,13 +38,6 @@ pub type MaskedInner = Masked<true>;
 pub type MaskedCentre = Masked<false>;
 
 impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
-    const SUMMARY: &'static str = if WHOLE {
-        "masked tiles of 8 x 4 pixels; only wholly covered pixels hide"
-    } else {
-        "masked tiles of 8 x 4 pixels; pixels whose centre is covered hide (stand-in for \
-         Hasselgren, Andersson, Akenine-Moeller 2016)"
-    };
-    const GUARANTEE: Guarantee = [Guarantee::Unproven, Guarantee::Conservative][WHOLE as usize];
     const COVERAGE: Coverage = [Coverage::Centre, Coverage::Whole][WHOLE as usize];
 
     fn new(grid: SampleGrid) -> Self {

@@ -4,7 +4,7 @@ use super::super::buffer::OcclusionBuffer;
 use super::super::outline::{Coverage, Outline};
 use super::super::rect::Rect;
 use crate::kernel::Isa;
-use crate::visibility::{Guarantee, SampleGrid};
+use crate::visibility::SampleGrid;
 
 /// A buffer that hides nothing. What no ray of the image can meet is still left
 /// out, as the couplings see to that.
@@ -12,8 +12,6 @@ use crate::visibility::{Guarantee, SampleGrid};
 pub struct NoOcclusion;
 
 impl OcclusionBuffer for NoOcclusion {
-    const SUMMARY: &'static str = "hides nothing";
-    const GUARANTEE: Guarantee = Guarantee::Conservative;
     const COVERAGE: Coverage = Coverage::Whole;
 
     fn new(_: SampleGrid) -> Self {

@@ -2,13 +2,12 @@
 
 use glam::DVec3;
 
-use super::super::{MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer};
+use super::super::{Coverage, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer};
 use super::by_rays::{Ready, missing, point_between, seen_by_rays, with_view};
 use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
-use crate::visibility::Guarantee;
 use crate::visibility::SampleGrid;
 
 /// A handful of boxes of any shape, on a grid of whole numbers every other time
@@ -102,7 +101,7 @@ fn losses<B: OcclusionBuffer>(
                     "only what is in the view"
                 );
                 let lost_here = missing(&seen, &kept);
-                if !lost_here.is_empty() && B::GUARANTEE <= Guarantee::Conservative {
+                if !lost_here.is_empty() && B::COVERAGE == Coverage::Whole {
                     println!(
                         "{} seed {seed}: lost {lost_here:?} of {seen:?}",
                         std::any::type_name::<B>()

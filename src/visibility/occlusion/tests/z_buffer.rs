@@ -1,10 +1,11 @@
-//! The plain depth buffer, a reference for the masked ones.
+//! The plain depth buffer, a reference for the masked ones: one depth per pixel, at its
+//! centre; every pixel of a box is tested.
 
 use super::super::buffer::OcclusionBuffer;
 use super::super::outline::{Coverage, Outline};
 use super::super::rect::Rect;
 use crate::kernel::{Isa, LANES, first_lanes};
-use crate::visibility::{Guarantee, SampleGrid};
+use crate::visibility::SampleGrid;
 
 /// Nearness at the centre of each pixel; 0 where nothing was drawn.
 #[derive(Clone, Debug)]
@@ -14,9 +15,6 @@ pub struct ZBuffer {
 }
 
 impl OcclusionBuffer for ZBuffer {
-    const SUMMARY: &'static str =
-        "one depth per pixel, at its centre; every pixel of a box is tested";
-    const GUARANTEE: Guarantee = Guarantee::Unproven;
     const COVERAGE: Coverage = Coverage::Centre;
 
     fn new(grid: SampleGrid) -> Self {
