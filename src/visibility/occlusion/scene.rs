@@ -46,14 +46,11 @@ pub struct OccluderScene {
 impl OccluderScene {
     /// Solid boxes, which hide what is behind them. O(n log n).
     pub fn of(solids: &Solids) -> OccluderScene {
-        let bounds = WorldBox::union_of(solids.boxes.iter().copied());
-        let occluder = |(inner, b): (&Aabb, &WorldBox)| Occluder {
-            inner: *inner,
-            faces: faces_reached(b, &bounds),
-        };
-        let occluders = (0..).zip(solids.inner.iter().zip(&solids.boxes).map(occluder));
-        let occluders: Vec<_> = occluders.filter(|(_, own)| !own.inner.is_empty()).collect();
-        OccluderScene::sorted(solids.origin, &solids.outer, &occluders, bounds)
+        let written = solids.boxes.iter().copied();
+        let bounds = WorldBox::union_of(written.clone());
+        let hiding = (0..).zip(solids.inner.iter().copied().zip(written));
+        let hiding = hiding.filter(|(_, (inner, _))| !inner.is_empty());
+        OccluderScene::sorted(solids.origin, &solids.outer, hiding, bounds)
     }
 
     /// Items with boxes inside that hide, among boxes that hide and are no items.
@@ -63,28 +60,29 @@ impl OccluderScene {
     pub fn among(scene: &Scene, inner: &[(ItemId, Aabb)], blocks: &[Aabb]) -> OccluderScene {
         let bounds = WorldBox::union_of(scene.written());
         let numbered = (scene.items.len() as ItemId..).zip(blocks.iter().copied());
-        let all = inner.iter().copied().chain(numbered);
-        let occluders = all.map(|(number, inner)| {
-            // Rounded inward: what hides reaches a face only if this does.
-            let b = WorldBox::within(&inner, scene.origin);
-            let faces = faces_reached(&b, &bounds);
-            (number, Occluder { inner, faces })
-        });
-        let occluders: Vec<_> = occluders.collect();
+        let hiding = inner.iter().copied().chain(numbered);
+        // Rounded inward: what hides reaches a face only if this does.
+        let within = |inner: Aabb| (inner, WorldBox::within(&inner, scene.origin));
+        let hiding = hiding.map(|(number, inner)| (number, within(inner)));
         let outer = [&scene.items[..], blocks].concat();
-        let mut among = OccluderScene::sorted(scene.origin, &outer, &occluders, bounds);
+        let mut among = OccluderScene::sorted(scene.origin, &outer, hiding, bounds);
         among.items = scene.items.len();
         among
     }
 
-    /// Boxes by number, and what hides with the number of what it stands for, by
-    /// ascending number.
+    /// Boxes by number, and what hides, also as written, with the number of what it
+    /// stands for, by ascending number.
     fn sorted(
         origin: DVec3,
         outer: &[Aabb],
-        by_number: &[(ItemId, Occluder)],
+        hiding: impl Iterator<Item = (ItemId, (Aabb, WorldBox))>,
         bounds: WorldBox,
     ) -> OccluderScene {
+        let by_number = hiding.map(|(number, (inner, b))| {
+            let faces = faces(b.min.cmple(bounds.min), b.max.cmpge(bounds.max));
+            (number, Occluder { inner, faces })
+        });
+        let by_number: Vec<(ItemId, Occluder)> = by_number.collect();
         let mut ids: Vec<ItemId> = (0..outer.len() as ItemId).collect();
         let mut capacity = LANES;
         while capacity < ids.len() {
@@ -101,9 +99,8 @@ impl OccluderScene {
         let mut first_occluders = vec![0];
         for &id in &ids {
             let first = by_number.partition_point(|(number, _)| *number < id);
-            let own = by_number[first..].iter();
-            let own = own.take_while(|(number, _)| *number == id);
-            occluders.extend(own.map(|(_, occluder)| *occluder));
+            let end = by_number.partition_point(|(number, _)| *number <= id);
+            occluders.extend(by_number[first..end].iter().map(|(_, own)| *own));
             first_occluders.push(occluders.len() as u32);
         }
         OccluderScene {
@@ -178,8 +175,4 @@ fn sort_into(ids: &mut [ItemId], capacity: usize, centre: &impl Fn(ItemId, usize
 /// The lower faces of some axes, and the upper faces of some.
 pub fn faces(low: BVec3, high: BVec3) -> Faces {
     (low.bitmask() | high.bitmask() << 3) as Faces
-}
-
-fn faces_reached(b: &WorldBox, bounds: &WorldBox) -> Faces {
-    faces(b.min.cmple(bounds.min), b.max.cmpge(bounds.max))
 }
