@@ -2,7 +2,7 @@
 //!
 //! They are in a packed tree of blocks of sixteen, each with its occluders.
 
-use glam::{BVec3, DVec3};
+use glam::{BVec3, DVec3, Vec3};
 
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks};
 use crate::kernel::{LANES, LaneMask, first_lanes};
@@ -89,7 +89,7 @@ impl OccluderScene {
             capacity *= LANES;
         }
         let centres: Vec<_> = outer.iter().map(Aabb::centre).collect();
-        sort_into(&mut ids, capacity, &|id, axis| centres[id as usize][axis]);
+        sort_into(&mut ids, capacity, &centres);
         let mut levels: Vec<BoxBlocks> = vec![ids.iter().map(|&id| &outer[id as usize]).collect()];
         while let Some(last) = levels.last().filter(|last| last.blocks().len() > 1) {
             let unions: Vec<Aabb> = last.blocks().iter().map(BoxBlock::union).collect();
@@ -149,27 +149,23 @@ impl OccluderScene {
 
 /// Orders the items so that each run of `capacity` of them (the last may be
 /// shorter) lies close together, and each sixteenth of a run too.
-fn sort_into(ids: &mut [ItemId], capacity: usize, centre: &impl Fn(ItemId, usize) -> f32) {
+fn sort_into(ids: &mut [ItemId], capacity: usize, centres: &[Vec3]) {
     if ids.len() <= capacity {
         if capacity > LANES {
-            sort_into(ids, capacity / LANES, centre);
+            sort_into(ids, capacity / LANES, centres);
         }
         return;
     }
-    let width = |axis: usize| {
-        let along = ids.iter().map(|&id| centre(id, axis));
-        let (low, high) = along.fold((f32::MAX, f32::MIN), |(l, h), c| (l.min(c), h.max(c)));
-        high - low
-    };
-    let widths = [width(0), width(1), width(2)];
-    let axis = (0..3).fold(0, |best, k| if widths[k] > widths[best] { k } else { best });
+    let bounds = Aabb::of_points(ids.iter().map(|&id| centres[id as usize]));
+    let axis = bounds.extent().max_position();
+    let centre = |id: ItemId| centres[id as usize][axis];
     let left = ids.len().div_ceil(capacity) / 2 * capacity;
     ids.select_nth_unstable_by(left, |&a, &b| {
-        centre(a, axis).total_cmp(&centre(b, axis)).then(a.cmp(&b))
+        centre(a).total_cmp(&centre(b)).then(a.cmp(&b))
     });
     let (before, behind) = ids.split_at_mut(left);
-    sort_into(before, capacity, centre);
-    sort_into(behind, capacity, centre);
+    sort_into(before, capacity, centres);
+    sort_into(behind, capacity, centres);
 }
 
 /// The lower faces of some axes, and the upper faces of some.
