@@ -91,16 +91,13 @@ impl Cone {
 /// The direction whose largest angle to the normals is least, nearly: the centre of
 /// their smallest ball (Bădoiu and Clarkson 2003, "Smaller core-sets for balls").
 fn axis_of(normals: impl Iterator<Item = DVec3> + Clone) -> Option<DVec3> {
-    let count = normals.clone().count();
-    if count == 0 {
-        return None;
-    }
-    let mut centre = normals.clone().sum::<DVec3>() / count as f64;
+    let mut centre = normals.clone().sum::<DVec3>() / normals.clone().count() as f64;
     for step in 0..STEPS {
         let far = |a: &DVec3, b: &DVec3| {
             let distance = |n: &DVec3| n.distance_squared(centre);
             distance(a).total_cmp(&distance(b))
         };
+        // None without normals.
         let farthest = normals.clone().max_by(far)?;
         centre += (farthest - centre) / f64::from(step + 2);
     }
