@@ -102,16 +102,11 @@ fn flat(boxes: &[WorldBox], [a, b]: [RegionId; 2], hole: &WorldBox) -> Option<Op
     let axis = (0..3).find(|&axis| hole.min[axis] == hole.max[axis])?;
     let at = hole.min[axis];
     // The front is the region that extends to larger coordinates.
-    let is_front = |front: RegionId, behind: RegionId| {
+    let is_front = |&[front, behind]: &[RegionId; 2]| {
         boxes[front as usize].min[axis] == at && boxes[behind as usize].max[axis] == at
     };
-    let sides = match (is_front(a, b), is_front(b, a)) {
-        (true, _) => [a, b],
-        (_, true) => [b, a],
-        _ => return None,
-    };
     Some(Opening {
-        sides,
+        sides: [[a, b], [b, a]].into_iter().find(is_front)?,
         corners: rectangle(axis, hole.min, hole.max),
         plane: OpeningPlane::Axis { axis, at },
     })

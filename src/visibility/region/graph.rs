@@ -160,16 +160,13 @@ impl Opening {
     }
 }
 
-/// The corners of a rectangle across an axis, in turn.
+/// The corners of a flat rectangle across an axis, in turn.
 pub fn rectangle(axis: usize, min: DVec3, max: DVec3) -> [DVec3; 4] {
-    let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
-    let corner = |high_j: bool, high_k: bool| {
-        let mut p = min;
-        p[j] = if high_j { max[j] } else { min[j] };
-        p[k] = if high_k { max[k] } else { min[k] };
-        p
-    };
-    [(false, false), (true, false), (true, true), (false, true)].map(|(a, b)| corner(a, b))
+    let next = (axis + 1) % 3;
+    let mut corners = [min, min, max, max];
+    corners[1][next] = max[next];
+    corners[3][next] = min[next];
+    corners
 }
 
 #[cfg(test)]
