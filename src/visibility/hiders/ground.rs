@@ -214,11 +214,9 @@ impl Heights {
 
     /// The cells that have a point between two positions.
     fn cells(&self, axis: usize, low: f32, high: f32) -> std::ops::Range<usize> {
-        let cells = 0..CELLS;
-        let reaches = |cell| self.edge(axis, cell + 1) >= low;
-        let first = cells.clone().position(reaches);
-        let end = cells.rev().position(|cell| self.edge(axis, cell) <= high);
-        first.unwrap_or(0)..CELLS - end.unwrap_or(0)
+        let first = (0..CELLS).find(|cell| self.edge(axis, cell + 1) >= low);
+        let last = (0..CELLS).rfind(|cell| self.edge(axis, *cell) <= high);
+        first.unwrap_or(0)..last.map_or(CELLS, |last| last + 1)
     }
 
     /// Rows of the cells wholly below the ground, by z and y, a bit per cell along x.
