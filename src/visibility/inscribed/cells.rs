@@ -68,31 +68,22 @@ impl Grid {
     /// Cells that no path from the sides reaches without a touched cell.
     fn inside(&self, touched: &[u64]) -> Vec<u64> {
         let n = self.cells;
-        let row = if n == 64 { u64::MAX } else { (1 << n) - 1 };
-        let mut outside = vec![0u64; n * n];
+        let row = u64::MAX >> (64 - n);
         let ends = 1 | 1 << (n - 1);
-        for (i, out) in outside.iter_mut().enumerate() {
-            let is_side = [i / n, i % n].iter().any(|&k| k == 0 || k == n - 1);
-            *out = if is_side { row } else { ends } & !touched[i];
-        }
+        let free: Vec<u64> = touched.iter().map(|touched| row & !touched).collect();
+        let mut outside = vec![0u64; n * n];
         let mut has_grown = true;
         while has_grown {
             has_grown = false;
             for i in 0..n * n {
                 let (z, y) = (i / n, i % n);
-                let mut grown = outside[i];
-                let mut take = |ok: bool, from: usize| {
-                    if ok {
-                        grown |= outside[from];
-                    }
-                };
-                take(y > 0, i.wrapping_sub(1));
-                take(y + 1 < n, i + 1);
-                take(z > 0, i.wrapping_sub(n));
-                take(z + 1 < n, i + n);
-                grown &= !touched[i];
+                // Beyond the sides all is outside.
+                let row_at = |is_within: bool, at: usize| if is_within { outside[at] } else { row };
+                let above = row_at(z > 0, i.wrapping_sub(n)) | row_at(z + 1 < n, i + n);
+                let beside = row_at(y > 0, i.wrapping_sub(1)) | row_at(y + 1 < n, i + 1);
+                let mut grown = (outside[i] | above | beside | ends) & free[i];
                 loop {
-                    let wider = (grown | grown << 1 | grown >> 1) & row & !touched[i];
+                    let wider = (grown | grown << 1 | grown >> 1) & free[i];
                     if wider == grown {
                         break;
                     }
@@ -102,8 +93,8 @@ impl Grid {
                 outside[i] = grown;
             }
         }
-        let rest = touched.iter().zip(&outside).map(|(t, o)| row & !t & !o);
-        rest.collect()
+        let rows = free.iter().zip(&outside);
+        rows.map(|(free, outside)| free & !outside).collect()
     }
 
     /// A box of cells, scene-local.
