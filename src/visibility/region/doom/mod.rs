@@ -20,6 +20,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::graph::{Ground, Opening, OpeningPlane, RegionGraph, RegionId};
+use super::locate::BoxGrid;
 use super::row::Pvs;
 use crate::scene::{Dispute, Linedef, Regions, Scene, WadMap, WorldBox};
 
@@ -108,16 +109,12 @@ impl DoomMap {
     }
 }
 
-/// The height, seen from above, of a strip of the map that lists its linedefs.
-const STRIP: f64 = 64.0;
-
 /// The ground of a map.
 #[derive(Debug)]
 struct SectorGround {
     map: Arc<DoomMap>,
-    /// The linedefs that meet each strip, from the least y on.
-    strips: Vec<Vec<Linedef>>,
-    low: f64,
+    /// Boxes about its linedefs, at height zero.
+    lines: BoxGrid,
 }
 
 fn plan([x, y]: [i32; 2]) -> DVec2 {
@@ -125,57 +122,36 @@ fn plan([x, y]: [i32; 2]) -> DVec2 {
 }
 
 impl SectorGround {
-    /// Sorts the linedefs into strips. O(linedefs * strips that each meets).
-    pub fn new(map: Arc<DoomMap>) -> SectorGround {
-        let ends = map.lines.iter().flat_map(|line| line.ends);
-        let (low, high) = ends.fold((0.0f64, 0.0f64), |(low, high), [_, y]| {
-            (low.min(y.into()), high.max(y.into()))
-        });
-        let mut ground = SectorGround {
-            strips: vec![Vec::new(); ((high - low) / STRIP) as usize + 1],
-            map: map.clone(),
-            low,
-        };
-        for line in &map.lines {
-            let [a, b] = line.ends.map(|[_, y]| ground.strip(y.into()));
-            for strip in a.min(b)..=a.max(b) {
-                ground.strips[strip].push(*line);
-            }
-        }
-        ground
-    }
-
-    /// Monotone in y; what is beyond the map has the first or the last.
-    fn strip(&self, y: f64) -> usize {
-        (((y - self.low) / STRIP) as usize).min(self.strips.len() - 1)
+    fn new(map: Arc<DoomMap>) -> SectorGround {
+        let end = |end| WorldBox::at(plan(end).extend(0.0));
+        let about = |line: &Linedef| WorldBox::union_of(line.ends.map(end));
+        let lines = BoxGrid::new(map.lines.iter().map(about).collect());
+        SectorGround { map, lines }
     }
 
     /// The sector of a point: what the first linedef towards larger x has on this
-    /// side. O(linedefs of its strip).
+    /// side, of several the first in file order.
     fn sector_at(&self, p: DVec2) -> Option<RegionId> {
-        let (mut nearest, mut found) = (f64::INFINITY, None);
-        for line in &self.strips[self.strip(p.y)] {
+        let ahead = WorldBox::new(p.extend(0.0), DVec3::new(f64::INFINITY, p.y, 0.0));
+        let (mut nearest, mut found) = ((f64::INFINITY, 0), None);
+        self.lines.meeting(&ahead, |id| {
+            let line = &self.map.lines[id as usize];
             let [a, b] = line.ends.map(plan);
-            if (a.y <= p.y) == (b.y <= p.y) {
-                continue;
-            }
             let x = a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
-            if x >= p.x && x < nearest {
+            let is_crossed = (a.y <= p.y) != (b.y <= p.y);
+            if is_crossed && x >= p.x && (x, id) < nearest {
                 // Left of a line that goes up is the side of smaller x.
-                (nearest, found) = (x, line.sectors[usize::from(b.y > a.y)]);
+                (nearest, found) = ((x, id), line.sectors[usize::from(b.y > a.y)]);
             }
-        }
+        });
         found
     }
 }
 
-/// Tests whether a linedef may meet a closed box, seen from above.
+/// Tests whether a linedef whose box meets a closed one may meet it, seen from above.
 fn meets(line: &Linedef, b: &WorldBox) -> bool {
     let [from, to] = line.ends.map(plan);
     let (low, high) = (b.min.truncate(), b.max.truncate());
-    if !(from.min(to).cmple(high).all() && low.cmple(from.max(to)).all()) {
-        return false;
-    }
     let d = to - from;
     let side = |x: f64, y: f64| d.x * (y - from.y) - d.y * (x - from.x);
     let sides = [low.x, high.x].map(|x| [low.y, high.y].map(|y| side(x, y)));
@@ -227,11 +203,14 @@ impl Ground for SectorGround {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let mut inside = true;
         let first = out.len();
-        let strips = &self.strips[self.strip(b.min.y)..=self.strip(b.max.y)];
-        for line in strips.iter().flatten().filter(|line| meets(line, b)) {
-            inside &= line.sectors[1].is_some();
-            out.extend(line.sectors.iter().flatten());
-        }
+        let level = WorldBox::new(b.min.with_z(0.0), b.max.with_z(0.0));
+        self.lines.meeting(&level, |id| {
+            let line = &self.map.lines[id as usize];
+            if meets(line, b) {
+                inside &= line.sectors[1].is_some();
+                out.extend(line.sectors.iter().flatten());
+            }
+        });
         match self.sector_at((b.min + b.max).truncate() * 0.5) {
             Some(sector) => out.push(sector),
             None => inside = false,
