@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::occlusion::OccluderScene;
 use super::{Rays, Solids};
 use crate::geometry::Aabb;
-use crate::scene::Scene;
+use crate::scene::{Scene, WorldBox};
 use crate::visibility::inscribed::{CELLS, inner_boxes};
 use crate::visibility::region::doom::DoomMap;
 
@@ -97,9 +97,8 @@ pub struct BlocksRow {
 pub fn blocks(scene: &Scene) -> Option<(Vec<Aabb>, BlocksRow)> {
     let map = DoomMap::of_scene(scene)?;
     let begun = Instant::now();
-    let all = scene.written().map(|b| [b.min.z, b.max.z]);
-    let heights = all.reduce(|[low, high], [min, max]| [low.min(min), high.max(max)]);
-    let boxes = heights.map_or(Vec::new(), |heights| map.solid_boxes(heights));
+    let WorldBox { min, max } = WorldBox::union_of(scene.written());
+    let boxes = map.solid_boxes([min.z, max.z]);
     let row = BlocksRow {
         box_count: boxes.len(),
         unclosed_sector_count: map.unclosed().len(),
