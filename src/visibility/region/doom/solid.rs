@@ -47,14 +47,11 @@ impl DoomMap {
         // A floor hides as far as it is flat or higher, a ceiling as it is lower.
         let sides = [(0, 1.0, low), (1, -1.0, high)];
         for (side, up, end) in sides {
-            let open = plan.cells.iter().flatten();
-            let mut heights: Vec<f64> = open.map(|open| open[side]).collect();
+            let all = plan.cells.iter().flatten().map(|open| open[side]);
+            let mut heights: Vec<f64> = all.filter(|height| (height - end) * up > 0.0).collect();
             heights.sort_unstable_by(f64::total_cmp);
             heights.dedup();
             for height in heights {
-                if (height - end) * up <= 0.0 {
-                    continue;
-                }
                 let at = |cell: usize| plan.cells[cell].map(|open| open[side] * up);
                 let solid = |cell: usize| at(cell).is_none_or(|own| own >= height * up);
                 let solid: Vec<bool> = (0..plan.cells.len()).map(solid).collect();
