@@ -145,22 +145,16 @@ impl<'v> View<'v> {
             y: down[axis],
             c: corner[axis],
         });
-        let tiles = [
-            (grid.width as usize, TILE_WIDTH),
-            (grid.height as usize, TILE_HEIGHT),
-        ];
-        let padded = tiles.map(|(size, tile)| (size.div_ceil(tile) * tile) as f64);
+        let columns = (grid.width as usize).next_multiple_of(TILE_WIDTH);
+        let rows = (grid.height as usize).next_multiple_of(TILE_HEIGHT);
+        let padded = [columns, rows].map(|size| size as f64);
         let reach = |l: &Linear| l.x.abs() * padded[0] + l.y.abs() * padded[1] + l.c.abs();
         let reach: f64 = lines.iter().map(reach).sum();
         let eye = frame.eye - scene.origin;
         // Parallel rays begin at points of their own, which were rounded in world
         // coordinates; one that all rays share is exact there.
-        let in_world = if parallel {
-            frame.eye.abs().element_sum()
-        } else {
-            0.0
-        };
-        let far_from_zero = eye.abs().element_sum() + 4.0 * in_world;
+        let in_world = if parallel { frame.eye } else { DVec3::ZERO };
+        let far_from_zero = eye.abs().element_sum() + 4.0 * in_world.abs().element_sum();
         let near = camera.lens.near();
         View {
             volume,
@@ -176,7 +170,7 @@ impl<'v> View<'v> {
             far: camera.lens.far().unwrap_or(f64::INFINITY),
             before_near: before_near(rays, near, eye, far_from_zero),
             open: open_faces(frame.eye, forward, parallel, scene),
-            projection: Projection::new(rays, eye, far_from_zero, grid, parallel),
+            projection: Projection::new(rays, eye, far_from_zero, grid),
         }
     }
 
@@ -231,17 +225,11 @@ fn open_faces(eye: DVec3, forward: DVec3, parallel: bool, scene: &OccluderScene)
 }
 
 impl Projection {
-    fn new(
-        rays: &Rays,
-        eye: DVec3,
-        far_from_zero: f64,
-        grid: SampleGrid,
-        parallel: bool,
-    ) -> Projection {
-        let frame = &rays.camera.frame;
+    fn new(rays: &Rays, eye: DVec3, far_from_zero: f64, grid: SampleGrid) -> Projection {
+        let (frame, parallel) = (&rays.camera.frame, rays.camera.lens.is_orthographic());
         let [left, right, bottom, top] = rays.window;
-        let (width, height) = (f64::from(grid.width), f64::from(grid.height));
-        let (per_x, per_y) = (width / (right - left), height / (bottom - top));
+        let size = [grid.width, grid.height].map(f64::from);
+        let (per_x, per_y) = (size[0] / (right - left), size[1] / (bottom - top));
         let (u, v, f) = (frame.u(), frame.v(), frame.forward());
         let tilted = [(u - f * left) * per_x, (v - f * top) * per_y, f];
         let (rows, shift) = match parallel {
@@ -253,10 +241,8 @@ impl Projection {
         let u_f64 = f64::from(U);
         let base = rays.camera.lens.far().unwrap_or(0.0);
         // 10 u: derived in `rect`.
-        let factor = |row: DVec3, size: f64| match parallel {
-            true => (10.0 * u_f64 * row.length()) as f32,
-            false => (10.0 * u_f64 * (row.length() + 2.0 * size)) as f32,
-        };
+        let sizes = if parallel { 0.0 } else { 2.0 };
+        let factor = |row: DVec3, size: f64| (10.0 * u_f64 * (row.length() + sizes * size)) as f32;
         // Subnormal coordinates about the eye lose 2^-149 each.
         let lost = |row: DVec3| 4.0 * f64::from(f32::from_bits(1)) * row.abs().element_sum();
         let added = |row: DVec3, shift: f64, size: f64| {
@@ -273,13 +259,10 @@ impl Projection {
             rest: rest.to_array(),
             rows: rows.map(|row| row.as_vec3().to_array()),
             shift: shift.map(|s| s as f32),
-            size: [width as f32, height as f32],
+            size: size.map(|s| s as f32),
             far_from_zero: (u_f64 * far_from_zero) as f32,
-            slack: [factor(rows[0], width), factor(rows[1], height)],
-            slack_added: [
-                added(rows[0], shift[0], width),
-                added(rows[1], shift[1], height),
-            ],
+            slack: [0, 1].map(|axis| factor(rows[axis], size[axis])),
+            slack_added: [0, 1].map(|axis| added(rows[axis], shift[axis], size[axis])),
             base: base as f32,
             most_size: most_size as f32,
         }
