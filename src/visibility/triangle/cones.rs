@@ -308,7 +308,7 @@ fn rejected<I: Isa>(isa: I, block: &ConeBlock, view: &Broadcast<I>) -> LaneMask 
 }
 
 #[inline(always)]
-fn dot<I: Isa>(isa: I, [x, y, z]: [I::Floats; 3], [a, b, c]: [I::Floats; 3]) -> I::Floats {
+pub fn dot<I: Isa>(isa: I, [x, y, z]: [I::Floats; 3], [a, b, c]: [I::Floats; 3]) -> I::Floats {
     let xy = isa.add(isa.mul(x, a), isa.mul(y, b));
     isa.add(xy, isa.mul(z, c))
 }

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::clusters::Clusters;
+use super::cones::dot;
 use super::exact::{Eye, normal};
 use super::{Selection, TriangleCull, facing};
 use crate::arithmetic::rounding::round_up;
@@ -162,18 +163,12 @@ fn sides<I: Isa>(isa: I, planes: &Planes, eye: &Lanes<I>) -> [u64; 2] {
     let x = way(isa, &planes.corner[0], eye.at[0], eye);
     let y = way(isa, &planes.corner[1], eye.at[1], eye);
     let z = way(isa, &planes.corner[2], eye.at[2], eye);
-    let side = isa.add(
-        isa.add(
-            isa.mul(isa.load(&planes.normal[0]), x),
-            isa.mul(isa.load(&planes.normal[1]), y),
-        ),
-        isa.mul(isa.load(&planes.normal[2]), z),
-    );
+    let [a, b, c] = [&planes.normal[0], &planes.normal[1], &planes.normal[2]];
+    let [a, b, c] = [isa.load(a), isa.load(b), isa.load(c)];
+    let side = dot(isa, [a, b, c], [x, y, z]);
     // The negated lengths, as there is only a minimum.
-    let length = isa.add(
-        isa.add(least(isa, x, eye), least(isa, y, eye)),
-        least(isa, z, eye),
-    );
+    let [x, y, z] = [least(isa, x, eye), least(isa, y, eye), least(isa, z, eye)];
+    let length = isa.add(isa.add(x, y), z);
     let bound = isa.add(isa.mul(length, eye.minus_error), eye.margin);
     let above = isa.at_most(bound, side);
     let is_in = isa.at_most(isa.mul(bound, eye.minus_one), side) & isa.at_most(side, bound);
