@@ -157,11 +157,8 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         }
         let nearness = isa.load(&rects.nearness);
         let [left, right] = isa.pairs(&self.reference, &at);
-        let looked_at = [lanes, lanes & wide];
-        let open = [
-            isa.at_most(left, nearness) & looked_at[0],
-            isa.at_most(right, nearness) & looked_at[1],
-        ];
+        let (left, right) = (isa.at_most(left, nearness), isa.at_most(right, nearness));
+        let open = [left & lanes, right & (lanes & wide)];
         if open == [0; 2] {
             return lanes;
         }
@@ -225,7 +222,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
             return;
         }
         let lines = each([top, bottom], |line| (row * TILE_HEIGHT + line) as f32);
-        let columns = [least as f32, greatest as f32];
+        let (lowest, highest) = (least as f32, greatest as f32);
         let first = least as usize / TILE_WIDTH;
         let last = (greatest as usize).div_ceil(TILE_WIDTH);
         for column in (first..last).step_by(LANES) {
@@ -237,12 +234,8 @@ impl<const WHOLE: bool> Masked<WHOLE> {
             for i in 0..LANES {
                 let left = (column * TILE_WIDTH) as f32 + STEPS[i];
                 let right = left + TILE_WIDTH as f32;
-                let left = if left > columns[0] { left } else { columns[0] };
-                let right = if right < columns[1] {
-                    right
-                } else {
-                    columns[1]
-                };
+                let left = if left > lowest { left } else { lowest };
+                let right = if right < highest { right } else { highest };
                 near[i] = nearness.within([left, right], lines);
             }
             // Nearer ones have been drawn all over, the usual case front to back.

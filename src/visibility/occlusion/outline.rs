@@ -359,12 +359,8 @@ impl Nearness {
             let row = if f[2] < 0.0 { bottom } else { top };
             (f[0] + f[2] * row) + f[1] * column
         };
-        let least = least(each(self.faces, at));
-        if least > self.floor {
-            least
-        } else {
-            self.floor
-        }
+        let (least, floor) = (least(each(self.faces, at)), self.floor);
+        if least > floor { least } else { floor }
     }
 }
 

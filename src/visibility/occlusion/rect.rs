@@ -186,10 +186,8 @@ impl Rects {
             let above = isa.mul(boxes.minus_size, isa.splat(-slack));
             let above = isa.add(above, isa.splat(added));
             let shift = isa.splat(p.shift[axis]);
-            *extremes = [
-                isa.add(isa.add(low, shift), under),
-                isa.add(isa.add(high, shift), above),
-            ];
+            let (low, high) = (isa.add(low, shift), isa.add(high, shift));
+            *extremes = [isa.add(low, under), isa.add(high, above)];
         }
         let [least, _] = boxes.range(isa, &p.rows[2]);
         let depth = isa.add(least, isa.mul(boxes.minus_size, isa.splat(8.0 * U)));
@@ -198,10 +196,8 @@ impl Rects {
         let size = isa.min(depth, isa.mul(depth, minus));
         let slack = isa.mul(size, isa.splat(-8.0 * U));
         // Depths may be subnormal and lose their lower bits.
-        let slack = isa.add(
-            slack,
-            isa.splat(8.0 * U * p.base.abs() + f32::from_bits(16)),
-        );
+        let lost = isa.splat(8.0 * U * p.base.abs() + f32::from_bits(16));
+        let slack = isa.add(slack, lost);
         let nearness = isa.add(isa.splat(p.base), isa.mul(depth, minus));
         let raised = isa.add(nearness, slack);
         self.finish(isa, boxes, p, &extremes, [depth, raised], 0);
