@@ -58,11 +58,8 @@ impl Pvs {
     /// Other JSON, or a region that is not there.
     pub fn from_json(text: impl AsRef<[u8]>) -> Result<Pvs> {
         let written: Written = from_json(text.as_ref()).map_err(|error| {
-            let (place, expected) = (error.place(), error.expected_of(FORM));
-            InputError::new(format_args!(
-                "{place}: {}; expected {expected}",
-                error.found
-            ))
+            let (place, expected, found) = (error.place(), error.expected_of(FORM), error.found);
+            InputError::new(format_args!("{place}: {found}; expected {expected}"))
         })?;
         let regions = written.regions;
         if regions > MOST_REGIONS {

@@ -169,12 +169,10 @@ impl Polygon {
         let grow = |edge: DVec3| view.turned(edge.normalize()) * (4.0 * SLACK * reach);
         let (along, across) = (grow(along), grow(across));
         self.corners.clear();
-        self.corners.extend([
-            corners[0] - along - across,
-            corners[1] + along - across,
-            corners[2] + along + across,
-            corners[3] - along + across,
-        ]);
+        let [a, b, c, d] = corners;
+        let [a, b, c, d] = [a - along, b + along, c + along, d - along];
+        self.corners
+            .extend([a - across, b - across, c + across, d + across]);
         self.reach = reach * (1.0 + 32.0 * SLACK);
         let is_left = within.iter().all(|plane| self.cut(plane));
         is_left.then_some((corners, reach))

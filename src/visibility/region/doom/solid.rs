@@ -129,11 +129,9 @@ impl Plan {
     /// The triangle turns right, the cell is within its bounds: they do unless a side of the
     /// triangle separates them.
     fn meets(&self, [a, b, c]: [Point; 3], column: usize, row: usize) -> bool {
-        let [x, y] = [
-            [self.lines[0][column], self.lines[0][column + 1]],
-            [self.lines[1][row], self.lines[1][row + 1]],
-        ];
-        let corners = [[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]];
+        let corner = |end: usize| [self.lines[0][column + end], self.lines[1][row + end]];
+        let [[x, y], [u, v]] = [corner(0), corner(1)];
+        let corners = [[x, y], [u, y], [x, v], [u, v]];
         let parts = |from, to| corners.iter().all(|&p| turn(from, to, p) >= 0);
         !(parts(a, b) || parts(b, c) || parts(c, a))
     }
