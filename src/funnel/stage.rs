@@ -252,7 +252,9 @@ pub type Occlude = Box<dyn FnMut(&OccluderScene, &View, &mut Vec<ItemId>)>;
 /// A row of the occlusion stage: allocates a buffer of the given size.
 pub type OcclusionRow = Row<fn(SampleGrid, Kernel) -> Occlude>;
 
-/// Rows of the occlusion stage; a summary names the source of code after a description.
+/// Rows of the occlusion stage.
+///
+/// A summary names the source of code written after a description.
 pub const OCCLUSION_ROWS: &[OcclusionRow] = rows! { OcclusionRow { name, guarantee, build, summary }
     MASKED_INNER, Guarantee::Conservative, occlude::<MaskedInner>,
         "masked tiles of 8 x 4 pixels; only wholly covered pixels hide";

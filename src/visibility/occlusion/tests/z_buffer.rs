@@ -1,5 +1,6 @@
-//! The plain depth buffer, a reference for the masked ones: one depth per pixel, at its
-//! centre; every pixel of a box is tested.
+//! The plain depth buffer, a reference for the masked ones.
+//!
+//! One depth per pixel, at its centre; every pixel of a box is tested.
 
 use super::super::buffer::OcclusionBuffer;
 use super::super::outline::{Coverage, Outline};
