@@ -94,10 +94,8 @@ impl DoomMap {
 
     /// Lowest and highest height that a linedef lets through; `None` where it is solid.
     pub fn opening(&self, line: &Linedef) -> Option<[f64; 2]> {
-        let [Some(a), Some(b)] = line.sectors else {
-            return None;
-        };
-        let [a, b] = [a, b].map(|sector| self.sectors[sector as usize]);
+        let sides = [line.sectors[0]?, line.sectors[1]?];
+        let [a, b] = sides.map(|sector| self.sectors[sector as usize]);
         let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
         (low < high).then_some([low, high])
     }
@@ -148,7 +146,7 @@ impl SectorGround {
     }
 }
 
-/// Tests whether a linedef whose box meets a closed one may meet it, seen from above.
+/// Tests whether a linedef, whose box does, may meet a closed box, from above.
 fn meets(line: &Linedef, b: &WorldBox) -> bool {
     let [from, to] = line.ends.map(plan);
     let (low, high) = (b.min.truncate(), b.max.truncate());
@@ -172,11 +170,8 @@ impl DoomMap {
             return Err(*dispute);
         }
         let opening = |line: &Linedef| {
-            let ([Some(front), Some(behind)], Some([low, high])) =
-                (line.sectors, self.opening(line))
-            else {
-                return None;
-            };
+            let [low, high] = self.opening(line)?;
+            let [front, behind] = [line.sectors[0]?, line.sectors[1]?];
             let [from, to] = line.ends.map(plan);
             let corners = [(from, low), (to, low), (to, high), (from, high)];
             let corners = corners.map(|(at, z)| at.extend(z));
