@@ -12,6 +12,7 @@ use std::fmt::Display;
 use glam::DVec3;
 
 use super::face::add_triangles;
+use super::surface::own_points;
 use super::{Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory};
 use crate::input::{InputError, Result, finite, note};
 use crate::shown::{counted, first_of, shortened};
@@ -211,23 +212,10 @@ impl Obj<'_> {
         let corners = corners.map(|&corner| WorldBox::at(self.points[corner as usize]));
         let mut surfaces = Surfaces::about(choose_origin(corners));
         let mut labels = Labels::new("name");
-        // The item that a point was last needed by, from 1, and its number there.
-        let mut known = vec![(0, 0); self.points.len()];
-        let mut points = Vec::new();
-        for (item, pair) in (1u32..).zip(self.items.windows(2)) {
-            points.clear();
-            let own = self.corners[pair[0].1..pair[1].1].iter().map(|corners| {
-                corners.map(|corner| {
-                    let known = &mut known[corner as usize];
-                    if known.0 != item {
-                        *known = (item, points.len() as u32);
-                        points.push(self.points[corner as usize]);
-                    }
-                    known.1
-                })
-            });
-            let own: Vec<[u32; 3]> = own.collect();
-            surfaces.push_written(&points, &own);
+        for pair in self.items.windows(2) {
+            let triangles = &mut self.corners[pair[0].1..pair[1].1];
+            let points = own_points(&self.points, triangles);
+            surfaces.push_written(&points, triangles);
             labels.push(&pair[0].0);
         }
         Ok(Scene {

@@ -2,6 +2,7 @@
 //!
 //! It defines the form and its checks; where triangles come from is in `meshes`.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -324,6 +325,20 @@ impl Scene {
             ..Scene::about(self.name, &boxes, surfaces.origin)?
         })
     }
+}
+
+/// The points of triangles, each once, in the order in which they occur.
+///
+/// The triangles are then indices into them.
+pub(super) fn own_points(points: &[DVec3], triangles: &mut [[u32; 3]]) -> Vec<DVec3> {
+    let (mut places, mut own) = (HashMap::new(), Vec::new());
+    for corner in triangles.as_flattened_mut() {
+        *corner = *places.entry(*corner).or_insert_with(|| {
+            own.push(points[*corner as usize]);
+            own.len() as u32 - 1
+        });
+    }
+    own
 }
 
 /// Volume within a closed surface, rounded: see [`Surfaces::volume`].

@@ -10,6 +10,7 @@ use gltf::json::{Index, Value};
 use super::file::{File, component};
 use crate::input::Result;
 use crate::scene::SurfaceKind;
+use crate::scene::surface::own_points;
 use crate::shown::shortened;
 
 /// The triangles of a mesh, or why it has none that can be read.
@@ -40,23 +41,6 @@ fn has_holes(material: &Material, primitive: &Primitive) -> bool {
 
 fn extension<'m>(material: &'m Material, name: &str) -> Option<&'m Value> {
     material.extensions.as_ref()?.others.get(name)
-}
-
-impl Triangles {
-    /// Drops points without a triangle, of which each item would have a copy.
-    fn compact(mut self) -> Triangles {
-        let mut places = vec![u32::MAX; self.points.len()];
-        let mut points = Vec::new();
-        for corner in self.corners.as_flattened_mut() {
-            let place = &mut places[*corner as usize];
-            if *place == u32::MAX {
-                *place = points.len() as u32;
-                points.push(self.points[*corner as usize]);
-            }
-            *corner = *place;
-        }
-        Triangles { points, ..self }
-    }
 }
 
 impl File<'_> {
@@ -114,9 +98,11 @@ impl File<'_> {
                 _ => {}
             }
         }
-        Ok(all.and_then(|all| match all.corners.is_empty() {
-            true => Err("has no triangles".to_owned()),
-            false => Ok(all.compact()),
+        Ok(all.and_then(|mut all| {
+            // Each item would have a copy of points without a triangle.
+            all.points = own_points(&all.points, &mut all.corners);
+            let has_any = !all.corners.is_empty();
+            has_any.then_some(all).ok_or("has no triangles".to_owned())
         }))
     }
 
