@@ -36,7 +36,8 @@ pub(super) struct Margin {
     /// Largest absolute coordinates of the points that can be visible: those of
     /// the volume and of the scene, whichever are smaller.
     pub(super) reach: DVec3,
-    /// Near corners, then far ones; without a far plane near ones only.
+    /// Near corners, then far ones. What has no end has no far ones; those of a matrix then
+    /// are zero.
     near: [DVec3; 4],
     far: Option<[DVec3; 4]>,
     /// How far the near plane's and the far plane's inner sides lie apart.
@@ -51,19 +52,31 @@ pub(super) struct Margin {
 }
 
 impl Margin {
-    /// `of_scene` is the scene's reach in the coordinates of the frame, zero if
-    /// it is not known.
+    /// Coordinates are about the sum of the points `zero`, those of the frame too.
+    ///
+    /// `of_scene` is the scene's reach in them, zero if it is not known.
     pub(super) fn new(
         frame: &Frame,
         lens: &Lens,
+        zero: &[DVec3],
         of_scene: DVec3,
         c: f64,
         of_frame: bool,
     ) -> Margin {
         let at_depth = |depth| lens.corners_at(frame, depth);
-        let near = at_depth(lens.near());
-        let far = lens.far().map(at_depth);
+        let (near, far) = match lens.matrix() {
+            None => (at_depth(lens.near()), lens.far().map(at_depth)),
+            Some(matrix) => {
+                let corners = matrix.corners_about(zero);
+                let corner = |i: usize| corners.map_or(DVec3::ZERO, |corners| corners[i]);
+                let half = |of: usize| [0, 1, 2, 3].map(|i| corner(of + i));
+                (half(0), corners.map(|_| half(4)))
+            }
+        };
         let reach = reach(&near, far.as_ref(), of_scene);
+        let derived = DERIVED * (reach + frame.eye.abs()).element_sum();
+        // The planes of a matrix are rounded sums about the exact zero.
+        let of_named = lens.matrix().map_or(derived, |_| 0.0);
         Margin {
             c,
             reach,
@@ -71,32 +84,8 @@ impl Margin {
             far,
             depth: lens.far().map_or(f64::INFINITY, |far| far - lens.near()),
             rays: lens.corners_at(&frame.relative_to(frame.eye), 1.0),
-            derived: [DERIVED * (reach + frame.eye.abs()).element_sum(); 2],
+            derived: [of_named, derived],
             of_frame,
-        }
-    }
-
-    /// The same for a matrix with these corners, `None` if what is visible has no
-    /// end; the eye is in the coordinates of `of_scene`.
-    pub(super) fn of_matrix(
-        corners: Option<[DVec3; 8]>,
-        eye: DVec3,
-        of_scene: DVec3,
-        c: f64,
-    ) -> Margin {
-        let half = |of: usize| std::array::from_fn(|i| corners.map_or(DVec3::ZERO, |c| c[of + i]));
-        let (near, far) = (half(0), corners.map(|_| half(4)));
-        let reach = reach(&near, far.as_ref(), of_scene);
-        Margin {
-            c,
-            reach,
-            near,
-            far,
-            depth: f64::INFINITY,
-            rays: [DVec3::ZERO; 4],
-            // Its planes are rounded sums about the exact zero.
-            derived: [0.0, DERIVED * (reach + eye.abs()).element_sum()],
-            of_frame: false,
         }
     }
 
@@ -186,7 +175,9 @@ mod tests {
 
     #[test]
     fn a_plane_that_is_not_finite_stays_what_it_is() {
-        let margin = Margin::of_matrix(None, DVec3::ZERO, DVec3::ONE, 1.0);
+        let frame = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap();
+        let lens = Lens::perspective(60.0, 1.5, 0.1, None).unwrap();
+        let margin = Margin::new(&frame, &lens, &[], DVec3::ONE, 1.0, false);
         for d in [f32::INFINITY, f32::NEG_INFINITY] {
             let plane = Plane::new(Vec3::Y, d);
             assert_eq!(margin.moved(None, &plane, 0.0).d, d);

@@ -212,15 +212,9 @@ impl Camera {
         if let largest @ f64::INFINITY = of_scene.element_sum() {
             return Err(CameraError::Sums { largest });
         }
-        Ok(match self.lens.kind() {
-            LensKind::Matrix(matrix) => {
-                Margin::of_matrix(matrix.corners_about(zero), frame.eye, of_scene, c)
-            }
-            _ => {
-                let of_frame = by == PlaneMethod::Frame;
-                Margin::new(&frame, &self.lens, of_scene, c, of_frame)
-            }
-        })
+        let (lens, is_matrix) = (&self.lens, self.lens.matrix().is_some());
+        let of_frame = by == PlaneMethod::Frame && !is_matrix;
+        Ok(Margin::new(&frame, lens, zero, of_scene, c, of_frame))
     }
 
     fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes> {
