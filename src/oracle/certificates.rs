@@ -36,30 +36,24 @@ pub(super) enum Extent {
     Solid,
 }
 
-/// The certificates of a volume, faces first, then bounds, then shadows.
-#[derive(Default)]
-pub(super) struct Certificates {
-    pub extent: Extent,
-    pub faces: usize,
-    pub all: Vec<HalfSpace>,
-}
-
-/// All certificates of the half-spaces that can be the tightest for some box.
-/// O(m^4) steps in f64 for m of them; exact sums only for what is kept and
-/// where rounding could matter.
-pub(super) fn certificates(given: Vec<HalfSpace>, precision: Precision) -> Certificates {
+/// The faces of a volume, and its bounds and shadows: all certificates of the half-spaces
+/// that can be the tightest for some box.
+///
+/// O(m^4) steps in f64 for m of them; exact sums only for what is kept and where rounding
+/// could matter.
+pub(super) fn certificates(given: Vec<HalfSpace>, p: Precision) -> (Extent, [Vec<HalfSpace>; 2]) {
     // A zero normal is no constraint, or one that nothing satisfies.
     let mut constraints = Vec::with_capacity(given.len());
     for constraint in given {
-        let is_zero = constraint.normal.iter().all(|n| precision.sign(n) == 0);
-        match (is_zero, precision.sign(&constraint.d)) {
-            (true, -1) => return Certificates::default(),
+        let is_zero = constraint.normal.iter().all(|n| p.sign(n) == 0);
+        match (is_zero, p.sign(&constraint.d)) {
+            (true, -1) => return Default::default(),
             (true, _) => {}
             (false, _) => constraints.push(constraint),
         }
     }
     let mut search = Search {
-        precision,
+        precision: p,
         rough: RoughSpaces::new(&constraints),
         minors: vec![Default::default(); constraints.len() * constraints.len()],
         constraints,
@@ -77,16 +71,9 @@ pub(super) fn certificates(given: Vec<HalfSpace>, precision: Precision) -> Certi
         search.pairs(false);
     }
     if search.extent == Extent::Empty {
-        return Certificates::default();
+        return Default::default();
     }
-    let faces = search.constraints.len();
-    let mut all = search.constraints;
-    all.append(&mut search.found);
-    Certificates {
-        extent: search.extent,
-        faces,
-        all,
-    }
+    (search.extent, [search.constraints, search.found])
 }
 
 /// The two other axes, in the order that makes a determinant of them.

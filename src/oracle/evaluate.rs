@@ -119,10 +119,7 @@ impl Number {
     }
 
     pub fn absolute(&self) -> Number {
-        match self.value.sign() {
-            -1 => self.negated(),
-            _ => self.clone(),
-        }
+        Number::new(self.value.clone().abs(), self.size)
     }
 
     pub fn estimate(&self) -> f64 {

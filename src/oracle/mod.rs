@@ -8,7 +8,7 @@ mod certificates;
 mod evaluate;
 mod rough;
 
-use certificates::{Certificates, Extent, certificates};
+use certificates::{Extent, certificates};
 use evaluate::{Corners, Exact, Filter, HalfSpace, Precision, inner_point};
 use glam::DVec3;
 
@@ -86,7 +86,9 @@ impl Oracle {
     }
 
     fn new(constraints: Vec<HalfSpace>, precision: Precision) -> Oracle {
-        let Certificates { extent, faces, all } = certificates(constraints, precision);
+        let (extent, [mut all, others]) = certificates(constraints, precision);
+        let faces = all.len();
+        all.extend(others);
         let filter: Vec<Filter> = all.iter().map(Filter::new).collect();
         Oracle {
             extent,
