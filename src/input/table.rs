@@ -33,9 +33,7 @@ pub struct TableReader<'b> {
 
 /// One data row.
 pub struct Row<'a> {
-    file: &'a str,
-    header: &'a [String],
-    record: &'a csv::StringRecord,
+    table: &'a TableReader<'a>,
     line: u64,
 }
 
@@ -185,12 +183,7 @@ impl<'b> TableReader<'b> {
         read.ok().filter(|is_there| *is_there)?;
         let start = self.record.position().map_or(0, csv::Position::byte);
         let line = self.line_of_record_at(start as usize);
-        let row = Row {
-            file: &self.file,
-            header: &self.header,
-            line,
-            record: &self.record,
-        };
+        let row = Row { table: self, line };
         let (found, wanted) = (self.record.len(), self.header.len());
         Some(match found == wanted {
             true => Ok(row),
@@ -209,18 +202,18 @@ impl<'b> TableReader<'b> {
 impl Row<'_> {
     /// The field without blanks around it.
     pub fn text(&self, column: usize) -> &str {
-        self.record[column].trim_ascii()
+        self.label(column).trim_ascii()
     }
 
     /// The same with its blanks.
     pub fn label(&self, column: usize) -> &str {
-        &self.record[column]
+        &self.table.record[column]
     }
 
     /// A finite f64.
     pub fn finite_number(&self, column: usize) -> Result<f64> {
         finite(self.text(column)).map_err(|expected| {
-            let (name, text) = (&self.header[column], shortened(self.text(column), 60));
+            let (name, text) = (&self.table.header[column], shortened(self.text(column), 60));
             self.error(format_args!("{name} '{text}'"), expected)
         })
     }
@@ -241,7 +234,7 @@ impl Row<'_> {
 
     /// An error at this row.
     pub fn error(&self, found: impl Display, expected: impl Display) -> InputError {
-        InputError::line(self.file, self.line, found, expected)
+        InputError::line(&self.table.file, self.line, found, expected)
     }
 }
 

@@ -3,7 +3,8 @@
 //! Each of a few distinct texts is kept once. Where they are many, as names and ids are, further
 //! ones are not looked up.
 
-use std::collections::HashMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, HashMap};
 
 /// Texts that are looked up.
 const MOST_KNOWN: usize = 4096;
@@ -64,15 +65,12 @@ impl Labels {
         for &number in &self.of_item {
             counts[number as usize] += 1;
         }
-        let texts = (0..self.ends.len()).map(|number| self.text(number));
-        let mut rows: Vec<(&str, usize)> = texts.zip(counts).collect();
-        rows.sort_unstable();
-        rows.dedup_by(|next, kept| {
-            let is_same = next.0 == kept.0;
-            kept.1 += if is_same { next.1 } else { 0 };
-            is_same
-        });
-        rows.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(b.0)));
+        let mut rows: BTreeMap<&str, usize> = BTreeMap::new();
+        for (number, count) in counts.into_iter().enumerate() {
+            *rows.entry(self.text(number)).or_default() += count;
+        }
+        let mut rows: Vec<(&str, usize)> = rows.into_iter().collect();
+        rows.sort_by_key(|(_, count)| Reverse(*count));
         rows
     }
 }

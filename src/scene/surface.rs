@@ -84,12 +84,6 @@ impl Surfaces {
         all
     }
 
-    /// Every item of a scene as the smallest f32 box that holds it:
-    /// [`Surfaces::of_boxes`].
-    pub fn from_boxes(scene: &Scene) -> Surfaces {
-        Surfaces::of_boxes(scene.origin, scene.items.iter().copied())
-    }
-
     /// Boxes as they are written: [`Surfaces::of_boxes`], rounded outward about an
     /// origin, and as flat as they are. No face comes to lie on the other side of the
     /// origin.
@@ -383,6 +377,13 @@ impl Scene {
 mod tests {
     use super::super::load;
     use super::*;
+
+    impl Surfaces {
+        /// Every item of a scene as the smallest f32 box that holds it.
+        pub fn from_boxes(scene: &Scene) -> Surfaces {
+            Surfaces::of_boxes(scene.origin, scene.items.iter().copied())
+        }
+    }
 
     #[test]
     fn some_items_of_a_mesh_keep_their_triangles() {
