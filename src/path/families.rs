@@ -157,7 +157,7 @@ pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
 }
 
 pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
-    let turned = |v| stage.up.to_z_up(v);
+    let turned = |v| stage.scene.up.to_z_up(v);
     let view = place.view.map(|view| PlaceView {
         up: turned(view.up),
         ..view

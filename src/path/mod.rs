@@ -164,7 +164,6 @@ fn unfit(path: &str, reason: impl Display) -> InputError {
 /// Coordinates, also of poses, have z up: [`UpAxis::to_z_up`].
 pub(crate) struct Stage<'a> {
     scene: &'a Scene,
-    up: UpAxis,
     bounds: WorldBox,
     count: usize,
     seed: u64,
@@ -195,7 +194,7 @@ impl Stage<'_> {
     /// Corners of an item or a room.
     fn in_world(&self, b: &Aabb) -> (DVec3, DVec3) {
         let (min, max) = b.in_world(self.scene.origin);
-        (self.up.to_z_up(min), self.up.to_z_up(max))
+        (self.scene.up.to_z_up(min), self.scene.up.to_z_up(max))
     }
 
     fn centre(&self) -> DVec3 {
@@ -283,7 +282,6 @@ fn read(
     let WorldBox { min, max } = scene.world_bounds();
     let stage = Stage {
         scene,
-        up: scene.up,
         bounds: WorldBox::new(scene.up.to_z_up(min), scene.up.to_z_up(max)),
         count: spec.whole("frames", 256, 1..=1_000_000)? as usize,
         seed: spec.whole("seed", 1, 0..=u64::MAX)?,

@@ -54,7 +54,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
         }
         // Places of a map's author need no search.
         let poses = (0..stage.count).map(|_| {
-            let eye = stage.up.to_z_up(places[rng.below(places.len())].eye);
+            let eye = stage.scene.up.to_z_up(places[rng.below(places.len())].eye);
             Pose::new(eye, level(&mut rng))
         });
         return Ok(poses.collect());
@@ -166,7 +166,8 @@ fn fill(stage: &Stage, columns: &mut [Column]) {
     };
     for item in 0..mesh.items() {
         for [p, q, r] in mesh.of(item) {
-            let [u, v] = [q - p, r - p].map(|edge| stage.up.to_z_up(edge).truncate().as_dvec2());
+            let [u, v] =
+                [q - p, r - p].map(|edge| stage.scene.up.to_z_up(edge).truncate().as_dvec2());
             add(item, u.perp_dot(v) > 0.0, &Aabb::of_points([p, q, r]));
         }
     }

@@ -74,13 +74,8 @@ pub(super) struct RegionJudged {
 }
 
 fn boxes_of(scene: &Scene) -> Vec<[DVec3; 2]> {
-    let originals = match &scene.regions {
-        Regions::Tiling(tiling) => &tiling.originals,
-        _ => &scene.originals,
-    };
-    if let (Regions::Items | Regions::Tiling(_), Some(written)) =
-        (&scene.regions, originals.boxes())
-    {
+    let originals = scene.region_originals().boxes();
+    if let (Regions::Items | Regions::Tiling(_), Some(written)) = (&scene.regions, originals) {
         return written.iter().map(|b| [b.min, b.max]).collect();
     }
     let stored = scene.regions.boxes(&scene.items).iter();

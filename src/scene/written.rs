@@ -172,7 +172,8 @@ impl Scene {
         })
     }
 
-    fn region_originals(&self) -> &Originals {
+    /// The regions as they were written.
+    pub(crate) fn region_originals(&self) -> &Originals {
         match &self.regions {
             Regions::Tiling(tiling) => &tiling.originals,
             _ => &self.originals,
