@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{CameraError, Frame, Lens, Result};
 use crate::arithmetic::rounding::round_up;
-use crate::geometry::{ConvexVolume, FrustumPlane, Plane};
+use crate::geometry::{ConvexVolume, FrustumPlane, Plane, PlaneF64};
 
 /// u of f32.
 const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
@@ -28,7 +28,7 @@ const DERIVED: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// Sums of the plane test must stay below this: half the largest f32, because
 /// a node's bounds may be wider than its items'.
-pub(super) const LARGEST_SUM: f64 = (f32::MAX / 2.0) as f64;
+const LARGEST_SUM: f64 = (f32::MAX / 2.0) as f64;
 
 /// Points and bounds that the margins of one volume's planes depend on.
 pub(super) struct Margin {
@@ -89,8 +89,31 @@ impl Margin {
         }
     }
 
+    /// Named planes and further ones as one volume, moved outward if there is an epsilon.
+    ///
+    /// `reach` bounds the coordinates of the boxes that it is for.
+    pub(super) fn volume(
+        &self,
+        named: &[(FrustumPlane, Plane)],
+        more: &[PlaneF64],
+        reach: DVec3,
+        slack: f64,
+    ) -> Result<ConvexVolume> {
+        let placed = |name, plane: &Plane| match self.c > 0.0 {
+            true => (name, self.moved(name, plane, slack)),
+            false => (name, *plane),
+        };
+        let more = more.iter().map(|plane| placed(None, &plane.narrow()));
+        let more = more.filter(|(_, plane)| largest_sum(plane, reach) <= LARGEST_SUM);
+        let named = named.iter().map(|(name, plane)| placed(Some(*name), plane));
+        let planes: Vec<_> = named.chain(more).collect();
+        let volume = ConvexVolume::from_labelled_planes(&planes)?;
+        check_sums(&volume, reach)?;
+        Ok(volume)
+    }
+
     /// The plane moved outward, so that no rounding error drops a visible box.
-    pub(super) fn moved(&self, name: Option<FrustumPlane>, plane: &Plane, slack: f64) -> Plane {
+    fn moved(&self, name: Option<FrustumPlane>, plane: &Plane, slack: f64) -> Plane {
         let d = f64::from(plane.d);
         if !d.is_finite() {
             return *plane;
@@ -163,7 +186,7 @@ pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<()> {
 /// Largest sum of the magnitudes in a plane test within `reach`.
 ///
 /// NaN for a plane that holds one.
-pub(super) fn largest_sum(plane: &Plane, reach: DVec3) -> f64 {
+fn largest_sum(plane: &Plane, reach: DVec3) -> f64 {
     plane.normal.as_dvec3().abs().dot(reach) + f64::from(plane.d).abs()
 }
 

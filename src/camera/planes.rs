@@ -5,11 +5,11 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::margin::{LARGEST_SUM, Margin, TINY, check_sums, largest_sum};
+use super::margin::{Margin, TINY};
 use super::projection::{double, single};
 use super::{Camera, CameraError, ClipSpace, Frame, LensKind, Result, require};
 use crate::geometry::{
-    Aabb, ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume, VolumeError,
+    Aabb, ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume,
 };
 
 named! {
@@ -122,10 +122,7 @@ impl Camera {
         let zero = [around.origin];
         let named = self.derive(&zero, options.method)?;
         let margin = self.margin(&zero, of_scene, options.epsilon, options.method)?;
-        let moved = |name, plane: &Plane| margin.moved(name, plane, 0.0);
-        let volume = gathered(&named, more, options.epsilon, of_scene, moved)?;
-        check_sums(&volume, of_scene)?;
-        Ok(volume)
+        margin.volume(&named, more, of_scene, 0.0)
     }
 
     /// The same planes in f64, from the frame and without a margin.
@@ -181,10 +178,7 @@ impl Camera {
         let margin = self.margin(&about, of_scene, epsilon, PlaneMethod::Frame)?;
         let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
         let slack = of_eye + margin.reach.element_sum() * TINY;
-        let moved = |name, plane: &Plane| margin.moved(name, plane, slack);
-        let reach = reach + zero.abs();
-        let planes = gathered(&named, &more, epsilon, reach, moved)?;
-        check_sums(&planes, reach)?;
+        let planes = margin.volume(&named, &more, reach + zero.abs(), slack)?;
         Ok(RelativeVolume::new(eye, planes)?)
     }
 }
@@ -245,25 +239,6 @@ impl Camera {
         let named = FrustumPlane::ALL.into_iter().zip(rows);
         Ok(named.take(count).collect())
     }
-}
-
-/// Named planes and further ones as one volume, moved outward if there is an
-/// epsilon.
-fn gathered(
-    named: &[(FrustumPlane, Plane)],
-    more: &[PlaneF64],
-    epsilon: f64,
-    reach: DVec3,
-    moved: impl Fn(Option<FrustumPlane>, &Plane) -> Plane,
-) -> Result<ConvexVolume, VolumeError> {
-    let placed = |name, plane: &Plane| match epsilon > 0.0 {
-        true => (name, moved(name, plane)),
-        false => (name, *plane),
-    };
-    let more = more.iter().map(|plane| placed(None, &plane.narrow()));
-    let more = more.filter(|(_, plane)| largest_sum(plane, reach) <= LARGEST_SUM);
-    let named = named.iter().map(|(name, plane)| placed(Some(*name), plane));
-    ConvexVolume::from_labelled_planes(&named.chain(more).collect::<Vec<_>>())
 }
 
 type NamedPlanes = Vec<(FrustumPlane, Plane)>;

@@ -3,7 +3,7 @@
 //! all four.
 
 use super::verify::judge_camera_level;
-use crate::camera::{Camera, Lens, PlaneOptions, Pose, look_at};
+use crate::camera::{Camera, Lens, PlaneOptions, look_at};
 use crate::culling::Culling;
 use crate::index::Registry;
 use crate::measure::{Protocol, Setting, Subject, Workload, judge};
@@ -94,7 +94,6 @@ fn missed(camera: Camera) -> [bool; 4] {
 
     let case = Case::new(
         camera,
-        &Pose::of(&camera),
         PlaneOptions::default(),
         scene.surroundings(),
         scene.items.clone(),

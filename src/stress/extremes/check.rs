@@ -9,7 +9,7 @@ use crate::camera::{Camera, CameraError, PlaneOptions, Surroundings};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, Input, StructureSpec};
-use crate::oracle::{Oracle, Pose, Verdict};
+use crate::oracle::Verdict;
 use crate::query::{AnyVolume, ItemId};
 use crate::stress::sheet::slack;
 use crate::stress::{Level, Row, Said, Status};
@@ -156,18 +156,17 @@ impl Case {
     /// Judges every box. O(items). None if the pose makes no camera.
     pub fn new(
         camera: Camera,
-        pose: &Pose,
         planes: PlaneOptions,
         around: Surroundings,
         items: Vec<Aabb>,
     ) -> Option<Case> {
-        let oracle = Oracle::of_camera(pose, &camera.lens, around.origin)?;
+        let truth = Truth::of_camera(&camera, around.origin, &items)?;
         Some(Case {
-            truth: Truth::new(oracle, &items),
             camera,
             planes,
             around,
             items,
+            truth,
         })
     }
 

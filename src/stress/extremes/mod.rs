@@ -184,9 +184,8 @@ pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Cas
     });
     let rng = &mut SeededRng::new(words);
     let draft = family.draft(rng, variant);
-    let (lens, pose) = (draft.lens(), draft.pose());
-    let lens = lens.map_err(|error| error.to_string())?;
-    let frame = pose.frame().map_err(|error| error.to_string())?;
+    let lens = draft.lens().map_err(|error| error.to_string())?;
+    let frame = draft.pose().frame().map_err(|error| error.to_string())?;
     let camera = Camera { frame, lens };
     let mut around = Surroundings {
         origin: draft.origin,
@@ -195,7 +194,7 @@ pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Cas
     let items = adversarial(rng, &camera, &around, draft.shapes, BOXES);
     let items = items.ok_or("a lens without corners")?;
     around.reach = Aabb::union_of(&items).reach();
-    let case = Case::new(camera, &pose, draft.planes, around, items);
+    let case = Case::new(camera, draft.planes, around, items);
     case.ok_or_else(|| "the oracle has no such camera".to_owned())
 }
 
