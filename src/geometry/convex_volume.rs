@@ -128,10 +128,7 @@ impl ConvexVolume {
             true => vec![Plane::new(Vec3::ZERO, -1.0)],
             false => planes.collect(),
         };
-        match Self::from_planes(&planes) {
-            Ok(volume) => volume,
-            Err(error) => unreachable!("six finite planes: {error}"),
-        }
+        Self::from_planes(&planes).expect("six finite planes")
     }
 
     /// Planes of which some have a name.

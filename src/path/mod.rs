@@ -291,10 +291,6 @@ fn read(
     let optics = Optics::from_spec(&mut spec, defaults, &stage, &poses)?;
     spec.finish()?;
     let cameras = optics.cameras(source, scene.up, &poses)?;
-    if cameras.is_empty() {
-        let reason = "no camera in it; expected at least one";
-        return Err(unfit(source, reason));
-    }
     let path = CameraPath {
         name: source.to_owned(),
         cameras,
