@@ -101,7 +101,11 @@ impl<'w> FragmentStage<'w> {
         let world = stages.world;
         let left = match &world.shape {
             Shape::Boxes(solids) => {
-                let of = |view| Boxes::of(world, solids, view, &stages.listed(view));
+                let of = |view| {
+                    let bodies: Vec<_> = bodies(solids, &stages.listed(view)).collect();
+                    let room = Room::of(world, world.rays(view), &bodies);
+                    Boxes { bodies, room }
+                };
                 Left::Boxes(world.views().map(of).collect(), RefCell::new(None))
             }
             Shape::Triangles(surfaces) => {
@@ -130,10 +134,9 @@ impl<'w> FragmentStage<'w> {
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
                 canvas.turn_to(rays);
-                let left = &views[view];
-                left.draw(test, canvas, drawn);
-                let visible = drawn.visible(canvas).into_iter();
-                out.extend(visible.map(|index| left.items[index as usize]));
+                let surfaces = self.world.cut_outs.as_ref().filter(|_| test != Z);
+                views[view].draw(test, surfaces, canvas, drawn);
+                out.extend(drawn.visible(canvas));
                 drawn.tally
             }
             Left::Triangles(surfaces, views, image) => {
@@ -191,11 +194,9 @@ impl<'w> FragmentStage<'w> {
     }
 }
 
-/// Solid boxes of a view, renumbered.
+/// Solid boxes of a view.
 struct Boxes {
-    items: Vec<ItemId>,
     bodies: Vec<SolidBox>,
-    cut_outs: Option<Holes>,
     room: Option<Room>,
 }
 
@@ -209,23 +210,12 @@ struct Room {
 }
 
 impl Boxes {
-    fn of(world: &World, solids: &Solids, view: usize, items: &[ItemId]) -> Boxes {
-        let numbered = |(body, item)| SolidBox { item, ..body };
-        let bodies: Vec<SolidBox> = bodies(solids, items).zip(0..).map(numbered).collect();
-        Boxes {
-            items: items.to_vec(),
-            cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),
-            room: Room::of(world, world.rays(view), items, &bodies),
-            bodies,
-        }
-    }
-
-    /// Replaces the image by that of a test.
-    fn draw(&self, test: &str, canvas: &Canvas, drawn: &mut Drawn) {
+    /// Replaces the image by that of a test; `surfaces` may have holes.
+    fn draw(&self, test: &str, surfaces: Option<&Holes>, canvas: &Canvas, drawn: &mut Drawn) {
         drawn.clear();
         let tests = Tests {
-            surfaces: self.cut_outs.as_ref().filter(|_| test != Z),
-            stencil: None,
+            surfaces,
+            ..Tests::default()
         };
         match self.room.as_ref().filter(|_| test == STENCIL) {
             None => drawn.draw(canvas, self.bodies.iter().copied(), &tests),
@@ -244,7 +234,7 @@ impl Boxes {
 
 impl Room {
     /// `None` for an eye that is in no room.
-    fn of(world: &World, rays: &Rays, items: &[ItemId], bodies: &[SolidBox]) -> Option<Room> {
+    fn of(world: &World, rays: &Rays, bodies: &[SolidBox]) -> Option<Room> {
         let regions = world.regions.as_ref()?;
         let graph = &regions.graph;
         let mut homes = Vec::new();
@@ -258,7 +248,7 @@ impl Room {
         });
         let of_rooms = homes.iter().flat_map(|&home| regions.items.of_region(home));
         let of_rooms: HashSet<ItemId> = of_rooms.copied().collect();
-        let is_near = |body: &SolidBox| of_rooms.contains(&items[body.item as usize]);
+        let is_near = |body: &SolidBox| of_rooms.contains(&body.item);
         let (near, beyond) = bodies.iter().copied().partition(is_near);
         Some(Room {
             portals: portals.collect(),
