@@ -9,11 +9,10 @@ use serde::Serialize;
 
 use super::item_stages::ItemStages;
 use super::stage::{BackEnd, Chain, NONE, StageKind};
-use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, ViewCounts, count_items, visible};
 use super::world::{FunnelInput, World};
-use crate::measure::{Ask, ProcessTimes, Setting};
+use crate::measure::{Ask, ProcessTimes, Setting, StudyPlan};
 use crate::statistics::{Estimate, dominance, flat};
 use crate::visibility::SampleGrid;
 
@@ -44,14 +43,6 @@ pub struct SweepPoint {
 }
 
 impl SweepPoint {
-    fn key(&self) -> FunnelKey {
-        let BackEnd { stage, name, .. } = self.back_end;
-        match self.buffer {
-            Some([width, _]) => FunnelKey::Buffer(name.to_owned(), width),
-            None => FunnelKey::Stage(stage, name.to_owned()),
-        }
-    }
-
     /// Time, false negatives, false positives.
     fn figures(&self) -> Option<[f64; 3]> {
         let errors = &self.errors;
@@ -81,10 +72,13 @@ pub struct StageSweep {
     pub warnings: Vec<String>,
 }
 
+/// Tasks of the points, by their indices.
+pub type SweepPlan = StudyPlan<usize>;
+
 /// A compared sweep before its times.
 pub struct PreparedSweep {
     /// Tasks and schedule for all processes.
-    pub plan: FunnelPlan,
+    pub plan: SweepPlan,
     sweep: StageSweep,
 }
 
@@ -115,8 +109,8 @@ impl<'w> Swept<'w> {
         }
     }
 
-    /// Every point without errors and times, with its task.
-    fn points(&self) -> Vec<(SweepPoint, KeyedTask<'_>)> {
+    /// Every back end with every size of its buffer, and how it is asked.
+    fn points(&self) -> Vec<(BackEnd, Option<[u32; 2]>, Ask<'_>)> {
         let sized = WIDTHS.map(|width| Some([width, (width * 9).div_ceil(16)]));
         let sizes = match self.stage {
             StageKind::Occlusion => &sized[..],
@@ -125,26 +119,18 @@ impl<'w> Swept<'w> {
         let rows = self.world.rows(self.stage).into_iter();
         let rows = rows.map(|(row, _)| row).filter(|row| row.name != NONE);
         let points = rows.flat_map(|row| sizes.iter().map(move |size| (row, *size)));
-        let points = points.map(|(back_end, buffer)| SweepPoint {
-            back_end,
-            buffer,
-            errors: Errors::of(&[]),
-            time: None,
-            on_front: false,
-        });
-        match &self.triangles {
-            Some(triangles) => points.zip(triangles.tasks()).collect(),
-            None => points.map(|point| self.with_task(point)).collect(),
-        }
+        let points = points.map(|(row, size)| (row, size, self.ask(row.name, size)));
+        points.collect()
     }
 
-    fn with_task(&self, point: SweepPoint) -> (SweepPoint, KeyedTask<'_>) {
+    fn ask(&self, name: &'static str, buffer: Option<[u32; 2]>) -> Ask<'_> {
+        if let Some(triangles) = &self.triangles {
+            return triangles.ask(name);
+        }
         let sized = |[width, height]: [u32; 2]| SampleGrid::new(width, height);
-        let buffer = point.buffer.map_or(self.world.samples, sized);
-        let run = self.world.run(self.stage, point.back_end.name, buffer);
-        let ask: Ask = Box::new(move |view, out| run(view, self.items.remaining(view), out));
-        let task = (point.key(), ask);
-        (point, task)
+        let buffer = buffer.map_or(self.world.samples, sized);
+        let run = self.world.run(self.stage, name, buffer);
+        Box::new(move |view, out| run(view, self.items.remaining(view), out))
     }
 
     fn counts(&self, back_end: &BackEnd, ask: &Ask, truth: &Truth) -> Vec<ViewCounts> {
@@ -176,13 +162,18 @@ pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSw
         _ => (RAYS, visible(&world, RAYS, input.execution.threads)?),
     };
     let (mut points, mut tasks) = (Vec::new(), Vec::new());
-    for (mut point, task) in swept.points() {
-        point.errors = Errors::of(&swept.counts(&point.back_end, &task.1, &truth));
-        points.push(point);
-        tasks.push(task);
+    for (back_end, buffer, ask) in swept.points() {
+        points.push(SweepPoint {
+            back_end,
+            buffer,
+            errors: Errors::of(&swept.counts(&back_end, &ask, &truth)),
+            time: None,
+            on_front: false,
+        });
+        tasks.push((tasks.len(), ask));
     }
     Ok(PreparedSweep {
-        plan: FunnelPlan::of(tasks, world.views.len(), input),
+        plan: SweepPlan::of(tasks, world.views.len(), input),
         sweep: StageSweep {
             scene: scene.name.clone(),
             path: path.name.clone(),
@@ -200,15 +191,11 @@ pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSw
 ///
 /// # Errors
 /// The errors of [`prepare_sweep`].
-pub fn time_sweep(
-    input: &FunnelInput,
-    stage: StageKind,
-    plan: &FunnelPlan,
-) -> Result<ProcessTimes> {
+pub fn time_sweep(input: &FunnelInput, stage: StageKind, plan: &SweepPlan) -> Result<ProcessTimes> {
     let world = World::new(input, &|_| ())?;
     let swept = Swept::new(&world, input.chain, stage);
-    let tasks = swept.points().into_iter().map(|(_, task)| task);
-    Ok(plan.time(tasks.collect(), input))
+    let asks = swept.points().into_iter().map(|(.., ask)| ask);
+    Ok(plan.time(asks.enumerate().collect(), input))
 }
 
 impl PreparedSweep {
@@ -217,14 +204,13 @@ impl PreparedSweep {
         let times = self.plan.times(processes);
         let mut sweep = self.sweep;
         sweep.processes = processes.len();
-        for point in &mut sweep.points {
-            point.time = times.ns(point.key());
+        for (key, point) in sweep.points.iter_mut().enumerate() {
+            point.time = times.ns(key);
         }
         let all = sweep.points.iter().enumerate();
         let (timed, values): (Vec<usize>, Vec<[f64; 3]>) =
             all.filter_map(|(i, p)| Some((i, p.figures()?))).unzip();
-        let keys: Vec<FunnelKey> = timed.iter().map(|&i| sweep.points[i].key()).collect();
-        let is_less = |a: usize, b: usize, k: usize| k > 0 || times.is_faster(&keys[a], &keys[b]);
+        let is_less = |a: usize, b: usize, k: usize| k > 0 || times.is_faster(timed[a], timed[b]);
         for (&i, found) in timed.iter().zip(dominance(&values, &is_less)) {
             sweep.points[i].on_front = found.dominated_by.is_none();
         }

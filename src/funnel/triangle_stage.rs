@@ -130,14 +130,18 @@ impl TriangleStage {
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         let built = self.views.first().map(|faces| &faces.built.culls);
         built.into_iter().flatten().map(move |(name, _)| {
-            let ask: Ask = Box::new(move |view, out| {
-                let kept = self.kept(name, view);
-                let clusters = kept.words().iter().zip(0..);
-                let left = clusters.filter(|(word, _)| **word != 0);
-                out.extend(left.map(|(_, cluster)| cluster));
-            });
             let key = FunnelKey::Stage(StageKind::Triangle, (*name).to_owned());
-            (key, ask)
+            (key, self.ask(*name))
+        })
+    }
+
+    /// A back end by its name.
+    pub fn ask(&self, name: &'static str) -> Ask<'_> {
+        Box::new(move |view, out| {
+            let kept = self.kept(name, view);
+            let clusters = kept.words().iter().zip(0..);
+            let left = clusters.filter(|(word, _)| **word != 0);
+            out.extend(left.map(|(_, cluster)| cluster));
         })
     }
 
