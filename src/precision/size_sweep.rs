@@ -9,12 +9,11 @@ use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings
 use crate::culling::{
     Arithmetic, CameraView, Culling, CullingError, CullingTest, farthest_corner, silhouettes,
 };
-use crate::geometry::{Aabb, BoxBlocks, MAX_PLANES, sphere_cube};
-use crate::kernel::Plain;
+use crate::geometry::{Aabb, MAX_PLANES};
 use crate::oracle::{Oracle, Pose, Verdict};
-use crate::query::{QueryVolume, each_volume};
 use crate::scene::SeededRng;
-use crate::statistics::{Rate, rate};
+use crate::statistics::{Rate, rate_of};
+use crate::verify::ErrorCount;
 
 /// Edge of the cubes / depth of the frustum.
 const SIZE_RATIOS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 10.0];
@@ -93,16 +92,8 @@ pub fn size_sweep(cubes: usize, seed: u64) -> Result<Vec<SizeRow>, CullingError>
 #[derive(Default)]
 struct Tally {
     cubes: u64,
-    visible: u64,
-    tests: [TestTally; TESTS.len()],
-}
-
-#[derive(Default)]
-struct TestTally {
-    /// Returned though out, and visible, by frustum.
-    extra: Vec<[f64; 2]>,
-    /// Cubes that are in and not returned.
-    missed: u64,
+    /// Errors of each test, by frustum.
+    tests: [Vec<ErrorCount>; TESTS.len()],
 }
 
 /// A frustum in any direction, at zero, of depth 1.
@@ -177,15 +168,20 @@ impl Tally {
     fn add(&mut self, oracle: &Oracle, views: &[CameraView], cubes: &[Aabb]) {
         let verdicts: Vec<Verdict> = cubes.iter().map(|cube| oracle.verdict(cube)).collect();
         self.cubes += cubes.len() as u64;
-        self.visible += verdicts.iter().filter(|v| **v != Verdict::Out).count() as u64;
-        let balls: Vec<Aabb> = cubes.iter().map(sphere_cube).collect();
-        let [boxes, balls] = [cubes, &balls].map(|own| own.iter().collect::<BoxBlocks>());
+        let balls = CullingTest::Sphere.items(cubes);
         for (test, view) in self.tests.iter_mut().zip(views) {
-            let blocks = match view {
+            let own = match view {
                 CameraView::Spheres(_) => &balls,
-                _ => &boxes,
+                _ => cubes,
             };
-            each_volume!(view.as_any(), volume => test.add(volume, blocks, &verdicts));
+            let (view, mut errors) = (view.as_any(), ErrorCount::default());
+            for (b, verdict) in own.iter().zip(&verdicts) {
+                let seen = view.sees(b);
+                errors.visible += u64::from(*verdict != Verdict::Out);
+                errors.false_positives += u64::from(seen && *verdict == Verdict::Out);
+                errors.false_negatives += u64::from(!seen && *verdict == Verdict::In);
+            }
+            test.push(errors);
         }
     }
 
@@ -193,34 +189,16 @@ impl Tally {
         let tests = TESTS.iter().zip(&self.tests);
         let tests = tests.map(|(test, own)| SizeError {
             test,
-            excess: rate(&own.extra),
-            false_negative_count: own.missed,
+            excess: rate_of(own, |errors| [errors.false_positives, errors.visible]),
+            false_negative_count: own.iter().map(|errors| errors.false_negatives).sum(),
         });
         SizeRow {
             size_over_depth: ratio,
-            frusta: self.tests[0].extra.len(),
+            frusta: self.tests[0].len(),
             cubes: self.cubes,
-            visible: self.visible,
+            visible: self.tests[0].iter().map(|errors| errors.visible).sum(),
             tests: tests.collect(),
         }
-    }
-}
-
-impl TestTally {
-    fn add<V: QueryVolume>(&mut self, view: &V, blocks: &BoxBlocks, verdicts: &[Verdict]) {
-        let mut admitted = vec![0; verdicts.len().div_ceil(16)];
-        let mask = view.mask();
-        for ((_, lanes, block), slot) in blocks.range(0, verdicts.len()).zip(&mut admitted) {
-            *slot = view.kept_lanes(Plain, block, mask) & lanes;
-        }
-        let (mut extra, mut visible) = (0.0, 0.0);
-        for (i, verdict) in verdicts.iter().enumerate() {
-            let seen = admitted[i / 16] >> (i % 16) & 1 == 1;
-            extra += f64::from(seen && *verdict == Verdict::Out);
-            visible += f64::from(*verdict != Verdict::Out);
-            self.missed += u64::from(!seen && *verdict == Verdict::In);
-        }
-        self.extra.push([extra, visible]);
     }
 }
 
@@ -235,8 +213,8 @@ mod tests {
         tally
     }
 
-    fn extra(tally: &Tally) -> [f64; TESTS.len()] {
-        tally.tests.each_ref().map(|test| test.extra[0][0])
+    fn extra(tally: &Tally) -> [u64; TESTS.len()] {
+        tally.tests.each_ref().map(|test| test[0].false_positives)
     }
 
     /// Cubes beside the region would have to be counted if any test returned them.
@@ -245,7 +223,7 @@ mod tests {
         let mut rng = SeededRng::new(5);
         for ratio in SIZE_RATIOS {
             let [low, high] = region(ratio);
-            let mut spheres_extra = 0.0;
+            let mut spheres_extra = 0;
             for _ in 0..8 {
                 let camera = random_camera(&mut rng).unwrap();
                 let mut cubes = Vec::new();
@@ -260,20 +238,19 @@ mod tests {
                     cubes.push(cube_at(&camera, ratio, at));
                 }
                 let beside = judged(&camera, &cubes);
-                assert_eq!((beside.cubes, beside.visible), (2000, 0), "{ratio}");
-                assert_eq!(extra(&beside), [0.0; TESTS.len()], "{ratio}");
+                let visible = |tally: &Tally| tally.tests[0][0].visible;
+                assert_eq!((beside.cubes, visible(&beside)), (2000, 0), "{ratio}");
+                assert_eq!(extra(&beside), [0; TESTS.len()], "{ratio}");
                 // The other way round: cubes within are seen, and the f64 test
                 // with all planes makes no mistake.
                 let within = judged(&camera, &strewn(&mut rng, &camera, ratio));
-                assert!(within.visible > 0, "{ratio}");
+                assert!(visible(&within) > 0, "{ratio}");
                 spheres_extra += extra(&within)[0];
                 let exact = TESTS.len() - 1;
-                assert_eq!(
-                    (extra(&within)[exact], within.tests[exact].missed),
-                    (0.0, 0)
-                );
+                let missed = within.tests[exact][0].false_negatives;
+                assert_eq!((extra(&within)[exact], missed), (0, 0));
             }
-            assert!(spheres_extra > 0.0, "{ratio}");
+            assert!(spheres_extra > 0, "{ratio}");
         }
     }
 
