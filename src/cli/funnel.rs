@@ -44,11 +44,11 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     if args.mirror.is_some() && args.cut_out.is_some() {
         bail!("--mirror shows whole boxes; expected no --cut-out with it");
     }
-    let stages = Stages::of(registry, args, None)?;
+    let setting = setting(registry, args, None)?;
+    let input = input(args, &setting)?;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 1, &args.study.spread)?;
-    let input = stages.input(args)?;
-    let claimed = args.pvs.is_some() && stages.chain.of(StageKind::Region) != "stored-pvs";
+    let claimed = args.pvs.is_some() && input.chain.of(StageKind::Region) != "stored-pvs";
     for (option, is_given, to_see) in [
         ("--pvs", claimed, " or --region stored-pvs"),
         ("--no-picks", args.no_picks, ""),
@@ -68,21 +68,21 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     };
     let prepared = funnel::prepare(&input, &begin)?;
     study.advance();
-    let path = &stages.setting.path;
+    let path = &setting.path;
     let times = study.times("every stage, timed", path.lens_scale, &prepared.plan)?;
     if let Some(verdict) = funnel::failure(&times) {
         let reason = verdict.reason.as_deref().unwrap_or("no reason");
         bail!("a stage failed when it was timed: {reason}");
     }
     let report = prepared.conclude(&times);
-    note_solid(&stages.setting.scene, args.format);
+    note_solid(&setting.scene, args.format);
     let table = || show(&funnel_table::blocks(&report, args.all));
     let shown = print(args.format, &report, table);
     if let Some(folder) = &args.csv {
         write(&report, folder)?;
     }
-    write_if(&args.svg, || draw(&report, &stages.setting.scene))?;
-    write_if(&args.html, || page(&report, &stages.setting.scene))?;
+    write_if(&args.svg, || draw(&report, &setting.scene))?;
+    write_if(&args.html, || page(&report, &setting.scene))?;
     shown?;
     let (stages, orders, picks) = (&report.stages, &report.orders, &report.picks);
     let mirror = report.mirror.as_ref();
@@ -125,14 +125,13 @@ fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) 
 
 /// The back ends that were named, and those that suit the scene.
 fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Result<Chain> {
-    let object = structures.first().map_or(funnel::NONE, |spec| &spec.label);
     let typed = [
         (StageKind::Region, &args.region),
         (StageKind::Occlusion, &args.occlusion),
         (StageKind::Triangle, &args.triangle),
         (StageKind::Fragment, &args.fragment),
     ];
-    let mut chain = Chain::for_scene(scene, args.cut_out.is_some()).with(StageKind::Object, object);
+    let mut chain = Chain::for_scene(scene, structures, args.cut_out.is_some());
     for (stage, name) in typed {
         let Some(name) = name else { continue };
         let known = funnel::back_ends(stage, scene, args.cut_out.is_some());
@@ -170,47 +169,34 @@ fn claim(file: Option<&Path>) -> Result<Option<Arc<Pvs>>> {
     Ok(Some(Arc::new(pvs)))
 }
 
-/// Inputs of a funnel, loaded.
-struct Stages {
-    setting: Setting,
-    chain: Chain,
-    claim: Option<Arc<Pvs>>,
+/// Loads the scene, path and structures of the command itself, or of a worker.
+fn setting(registry: &Registry, args: &FunnelArgs, timing: Option<&Timing>) -> Result<Setting> {
+    let held = |structures| [structures as u64 + 2, funnel::BYTES_PER_TRIANGLE];
+    load(registry, &args.study, ROUNDS, timing, held)
 }
 
-impl Stages {
-    fn of(registry: &Registry, args: &FunnelArgs, timing: Option<&Timing>) -> Result<Self> {
-        let held = |structures| [structures as u64 + 2, funnel::BYTES_PER_TRIANGLE];
-        let setting = load(registry, &args.study, ROUNDS, timing, held)?;
-        Ok(Stages {
-            chain: chain(args, &setting.scene, &setting.structures)?,
-            claim: claim(args.pvs.as_deref())?,
-            setting,
-        })
-    }
-
-    fn input<'s>(&'s self, args: &'s FunnelArgs) -> Result<FunnelInput<'s>> {
-        let (study, views) = (&args.study, (args.frames as usize, args.samples));
-        let execution = study.kernel.execution()?;
-        Ok(FunnelInput {
-            cut_outs: args.cut_out.as_ref(),
-            mirror: args.mirror,
-            claim: self.claim.as_ref(),
-            inner_boxes: args.inner_boxes.map(|most| most as usize),
-            all: args.all
-                || args.html.is_some()
-                || args.csv.is_some()
-                || args.format != TableFormat::Table,
-            picks: !args.no_picks,
-            loading: study.lens.scene_args.options(0),
-            ..FunnelInput::new(&self.setting, &self.chain, views, execution)
-        })
-    }
+fn input<'s>(args: &'s FunnelArgs, setting: &'s Setting) -> Result<FunnelInput<'s>> {
+    let (study, views) = (&args.study, (args.frames as usize, args.samples));
+    let chain = chain(args, &setting.scene, &setting.structures)?;
+    Ok(FunnelInput {
+        cut_outs: args.cut_out.as_ref(),
+        mirror: args.mirror,
+        claim: claim(args.pvs.as_deref())?,
+        inner_boxes: args.inner_boxes.map(|most| most as usize),
+        all: args.all
+            || args.html.is_some()
+            || args.csv.is_some()
+            || args.format != TableFormat::Table,
+        picks: !args.no_picks,
+        loading: study.lens.scene_args.options(0),
+        ..FunnelInput::new(setting, chain, views, study.kernel.execution()?)
+    })
 }
 
 /// Times every stage in one process.
 pub fn time(registry: &Registry, args: &FunnelArgs, timing: &Timing) -> Result<ProcessTimes> {
-    let stages = Stages::of(registry, args, Some(timing))?;
-    funnel::time(&stages.input(args)?, &timing.plan()?)
+    let setting = setting(registry, args, Some(timing))?;
+    funnel::time(&input(args, &setting)?, &timing.plan()?)
 }
 
 /// Tables of the report, each a list of rows or a single row, with their fields.

@@ -99,9 +99,8 @@ fn setting(registry: &Registry, args: &PrecisionArgs, timing: Option<&Timing>) -
 /// Times all points in one process.
 pub fn time(registry: &Registry, args: &PrecisionArgs, timing: &Timing) -> Result<ProcessTimes> {
     if let Some(stage) = args.stage {
-        let (setting, chain) = stage_setting(registry, args, Some(timing))?;
-        let input = stage_input(args, &setting, &chain)?;
-        return funnel::time_sweep(&input, stage, &timing.plan()?);
+        let setting = stage_setting(registry, args, Some(timing))?;
+        return funnel::time_sweep(&stage_input(args, &setting)?, stage, &timing.plan()?);
     }
     let setting = setting(registry, args, Some(timing))?;
     let frames = args.frames as usize;
@@ -118,27 +117,22 @@ fn stage_setting(
     registry: &Registry,
     args: &PrecisionArgs,
     timing: Option<&Timing>,
-) -> Result<(Setting, Chain)> {
+) -> Result<Setting> {
     let held = |_| [3, funnel::BYTES_PER_TRIANGLE];
     let mut setting = load(registry, &args.study, STAGE_ROUNDS, timing, held)?;
     setting.structures.truncate(1);
-    let object = setting.structures.first().map_or(NONE, |spec| &spec.label);
-    let chain = Chain::for_scene(&setting.scene, false).with(StageKind::Object, object);
-    Ok((setting, chain))
+    Ok(setting)
 }
 
-fn stage_input<'s>(
-    args: &PrecisionArgs,
-    setting: &'s Setting,
-    chain: &'s Chain,
-) -> Result<FunnelInput<'s>> {
+fn stage_input<'s>(args: &PrecisionArgs, setting: &'s Setting) -> Result<FunnelInput<'s>> {
+    let chain = Chain::for_scene(&setting.scene, &setting.structures, false);
     let views = (args.frames as usize, SAMPLES);
     let execution = args.study.kernel.execution()?;
     Ok(FunnelInput::new(setting, chain, views, execution))
 }
 
 fn sweep_stage(registry: &Registry, args: &PrecisionArgs, stage: StageKind) -> Result<Ending> {
-    let (setting, chain) = stage_setting(registry, args, None)?;
+    let setting = stage_setting(registry, args, None)?;
     let scene = &setting.scene;
     let known = funnel::back_ends(stage, scene, false);
     if known.iter().all(|row| row.name == NONE) {
@@ -149,7 +143,7 @@ fn sweep_stage(registry: &Registry, args: &PrecisionArgs, stage: StageKind) -> R
     let about = format!("{}, {} stage: ", args.study.scene, stage.name());
     let study = Study::new(about, 0, &args.study.spread)?;
     study.begin("every point, judged");
-    let input = stage_input(args, &setting, &chain)?;
+    let input = stage_input(args, &setting)?;
     let prepared = funnel::prepare_sweep(&input, stage)?;
     let items = text::counted(scene.items.len(), "item");
     study.announce(&items, "less than a minute");

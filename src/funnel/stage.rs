@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::LeftOutRow;
+use crate::index::StructureSpec;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Regions, Scene};
@@ -103,10 +104,12 @@ impl Chain {
         }
     }
 
-    /// Default chain of a scene, without an object stage.
+    /// Default chain of a scene, with the first structure for its object stage.
     ///
-    /// It has the safe back end of every stage that removes the most.
-    pub fn for_scene(scene: &Scene, has_cut_outs: bool) -> Chain {
+    /// It has the safe back end of every other stage that removes the most.
+    pub fn for_scene(scene: &Scene, structures: &[StructureSpec], has_cut_outs: bool) -> Chain {
+        let object = structures.first().map_or(NONE, |spec| &spec.label);
+        let chain = Chain::empty().with(StageKind::Object, object);
         let wanted = [
             (StageKind::Region, PORTAL_CLIP),
             (StageKind::Occlusion, MASKED_INNER),
@@ -118,9 +121,7 @@ impl Chain {
             rows.any(|row| row.name == *name)
         };
         let known = wanted.into_iter().filter(is_there);
-        known.fold(Chain::empty(), |chain, (stage, name)| {
-            chain.with(stage, name)
-        })
+        known.fold(chain, |chain, (stage, name)| chain.with(stage, name))
     }
 
     /// Name of the back end of a stage.

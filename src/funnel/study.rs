@@ -51,8 +51,8 @@ struct Study<'w> {
 }
 
 impl<'w> Study<'w> {
-    fn new(world: &'w World<'w>, input: &FunnelInput<'w>) -> Result<Study<'w>> {
-        let chain = input.chain;
+    fn new(world: &'w World<'w>, input: &'w FunnelInput) -> Result<Study<'w>> {
+        let chain = &input.chain;
         let items = ItemStages::all(world, chain);
         if world.shape.boxes().is_some() {
             let left = items.mean_count(chain) * world.views.len() as f64;
@@ -191,7 +191,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         }
         rows.push(StageRow {
             fragments: FragmentCounts::of(&tallies),
-            ..StageRow::new(back_end, back_end.name, input.chain, errors)
+            ..StageRow::new(back_end, back_end.name, &input.chain, errors)
         });
     }
     let mut left_out = Vec::from_iter(left_out_of(scene));
@@ -257,7 +257,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         bounds,
         conclusions: Vec::new(),
         warnings,
-        plan_view: PlanView::of(&world, &study.items, input.chain, &truth),
+        plan_view: PlanView::of(&world, &study.items, &input.chain, &truth),
     };
     let mut tasks = study.tasks();
     tasks.extend(bound_tasks);

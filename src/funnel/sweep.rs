@@ -155,7 +155,7 @@ impl<'w> Swept<'w> {
 pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSweep> {
     let Setting { scene, path, .. } = input.setting;
     let world = World::new(input, &|_| ())?;
-    let swept = Swept::new(&world, input.chain, stage);
+    let swept = Swept::new(&world, &input.chain, stage);
     // The side of a triangle needs no rays.
     let (rays, truth) = match stage {
         StageKind::Triangle => (0, Truth::new()),
@@ -193,7 +193,7 @@ pub fn prepare_sweep(input: &FunnelInput, stage: StageKind) -> Result<PreparedSw
 /// The errors of [`prepare_sweep`].
 pub fn time_sweep(input: &FunnelInput, stage: StageKind, plan: &SweepPlan) -> Result<ProcessTimes> {
     let world = World::new(input, &|_| ())?;
-    let swept = Swept::new(&world, input.chain, stage);
+    let swept = Swept::new(&world, &input.chain, stage);
     let asks = swept.points().into_iter().map(|(.., ask)| ask);
     Ok(plan.time(asks.enumerate().collect(), input))
 }

@@ -36,7 +36,7 @@ const BYTES_PER_PAIR: u64 = 8;
 const MOST_MOVED: f64 = 1.0 / 64.0;
 
 /// Scene, path and options of a study.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct FunnelInput<'a> {
     /// Scene, cameras, rounds and times of a process.
     pub setting: &'a Setting,
@@ -49,11 +49,11 @@ pub struct FunnelInput<'a> {
     /// Data row of the item whose face is a mirror.
     pub mirror: Option<ItemId>,
     /// Back end of each stage.
-    pub chain: &'a Chain,
+    pub chain: Chain,
     /// Structures for the object stage; one of them is the chain's.
     pub structures: &'a [StructureSpec],
     /// Claimed visible regions of each region: a back end of the region stage.
-    pub claim: Option<&'a Arc<Pvs>>,
+    pub claim: Option<Arc<Pvs>>,
     /// Most boxes inside each item of a mesh, at least 1; `None` for [`BOXES`].
     pub inner_boxes: Option<usize>,
     /// How the scene was read: so are the other levels of its file.
@@ -72,7 +72,7 @@ impl<'a> FunnelInput<'a> {
     /// Everything about a chain, on `most_views` views at most.
     pub fn new(
         setting: &'a Setting,
-        chain: &'a Chain,
+        chain: Chain,
         (most_views, samples): (usize, SampleGrid),
         execution: Execution,
     ) -> FunnelInput<'a> {
@@ -369,7 +369,7 @@ fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
         _ => 0,
     };
     check_memory(name, BYTES_PER_PAIR * listed.saturating_pow(2))?;
-    match (Regions::of(scene), input.claim) {
+    match (Regions::of(scene), &input.claim) {
         (Ok(mut regions), Some(claim)) => {
             let (own, all) = (claim.len(), regions.graph.len());
             ensure!(
@@ -476,9 +476,9 @@ mod tests {
             },
         };
         let scene = &setting.scene;
-        let chain = Chain::for_scene(scene, false).with(StageKind::Object, "linear");
+        let chain = Chain::for_scene(scene, &setting.structures, false);
         let views = (3, SampleGrid::new(8, 5));
-        let input = FunnelInput::new(&setting, &chain, views, Execution::default());
+        let input = FunnelInput::new(&setting, chain, views, Execution::default());
         let world = World::new(&input, &|_| ()).expect("a world");
         let run = |stage, name| world.run(stage, name, world.samples);
         let mut found = 0;

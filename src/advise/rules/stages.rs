@@ -3,6 +3,8 @@
 //! One side removes what the other returns, so the drawing that this saves is weighed
 //! against the time that it takes.
 
+use std::slice;
+
 use super::super::omission::{Check, is_longer};
 use super::super::options::{AdviseInput, AdviseOptions, planned};
 use super::super::rule::{Draft, Finding};
@@ -20,30 +22,26 @@ const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
 const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 
 /// The stages on the fastest tree.
-pub struct Stages {
-    chain: Chain,
-    tree: StructureSpec,
-}
+pub struct Stages(StructureSpec);
 
 impl Stages {
     pub fn of(all: &AdviseInput, tree: &str) -> Stages {
-        let tree = planned(&all.setting.structures, tree);
-        let chain = Chain::for_scene(&all.setting.scene, false)
-            .with(StageKind::Object, &tree.label)
-            .with(StageKind::Triangle, "several-cones")
-            .with(StageKind::Fragment, NONE);
-        Stages { chain, tree }
+        Stages(planned(&all.setting.structures, tree))
     }
 
     pub fn input<'s>(&'s self, all: &AdviseInput<'s>) -> FunnelInput<'s> {
         let most = (ITEMS / all.setting.scene.items.len().max(1)).clamp(1, VIEWS);
-        let execution = self.tree.execution;
+        let Stages(tree) = self;
+        let structures = slice::from_ref(tree);
+        let chain = Chain::for_scene(&all.setting.scene, structures, false)
+            .with(StageKind::Triangle, "several-cones")
+            .with(StageKind::Fragment, NONE);
         FunnelInput {
-            structures: std::slice::from_ref(&self.tree),
+            structures,
             all: false,
             picks: false,
             sorted: true,
-            ..FunnelInput::new(all.setting, &self.chain, (most, SAMPLES), execution)
+            ..FunnelInput::new(all.setting, chain, (most, SAMPLES), tree.execution)
         }
     }
 }
