@@ -31,7 +31,7 @@ const REACH: f64 = 4.0;
 pub const NEAREST: usize = 8;
 
 /// A back end of picking over all views.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct PickRow {
     /// The question that it answers.
     pub question: PickQuestion,
@@ -99,25 +99,6 @@ impl<'w> Picks<'w> {
         picks
     }
 
-    fn add(
-        &mut self,
-        question: PickQuestion,
-        (name, summary, guarantee): (&str, &'static str, Guarantee),
-        answer: Answer<'w>,
-    ) {
-        let row = PickRow {
-            question,
-            name: name.to_owned(),
-            summary,
-            guarantee,
-            ray_count: 0,
-            wrong_count: 0,
-            time: None,
-            ns_per_ray: None,
-        };
-        self.pickers.push((row, answer));
-    }
-
     /// Adds back ends along rays: rows of the first item, then of the nearest.
     fn add_rays(&mut self) {
         let world = self.world;
@@ -151,7 +132,13 @@ impl<'w> Picks<'w> {
                     continue;
                 }
             };
-            let declared = (row.name, row.summary, row.guarantee);
+            let declared = |question| PickRow {
+                question,
+                name: row.name.to_owned(),
+                summary: row.summary,
+                guarantee: row.guarantee,
+                ..PickRow::default()
+            };
             let (same, hits) = (pick.clone(), RefCell::new(Vec::new()));
             let first: Answer = Box::new(move |_, cursor, out| {
                 out.extend(pick.first(&cursor.ray).map(|hit| hit.item));
@@ -161,8 +148,9 @@ impl<'w> Picks<'w> {
                 same.nearest(&cursor.ray, NEAREST, hits);
                 out.extend(hits.iter().map(|hit| hit.item));
             });
-            self.add(PickQuestion::First, declared, first);
-            self.add(PickQuestion::Nearest, declared, nearest);
+            let first = (declared(PickQuestion::First), first);
+            let nearest = (declared(PickQuestion::Nearest), nearest);
+            self.pickers.extend([first, nearest]);
         }
         self.pickers.sort_by_key(|(row, _)| row.question);
     }
@@ -183,9 +171,14 @@ impl<'w> Picks<'w> {
                     index.visible(&volume, out);
                 }
             });
-            let summary = "the six-plane test of the cursor's frustum by a structure";
-            let declared = (label.as_str(), summary, Guarantee::Conservative);
-            self.add(PickQuestion::Through, declared, through);
+            let declared = PickRow {
+                question: PickQuestion::Through,
+                name: label.clone(),
+                summary: "the six-plane test of the cursor's frustum by a structure",
+                guarantee: Guarantee::Conservative,
+                ..PickRow::default()
+            };
+            self.pickers.push((declared, through));
         }
     }
 

@@ -11,9 +11,11 @@ use crate::measure::{Ask, OverProcesses, ProcessTimes, StudyPlan, TimedTask};
 
 named! {
     /// A question about a cursor.
-    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+    #[derive(Debug, Serialize, Deserialize)]
     pub enum PickQuestion {
         /// The first item along the ray.
+        #[default]
         #[serde(rename = "first item")]
         First = "first item",
         /// The nearest few along the ray, and all that are as near as the last of them.

@@ -26,7 +26,7 @@ impl<B: Body> Pick for WideRay<B> {
     fn first(&self, ray: &Ray) -> Option<Hit> {
         let of = &self.0;
         if B::IS_BOX && !of.tree.is_passed_by(ray) {
-            return of.kernel.run(SearchFirst { of, ray });
+            return of.kernel.run(SearchFirst(of, ray));
         }
         let mut first = First::<B>::new(of.probe(ray), ray.far);
         of.walk(ray, &mut first);
@@ -57,17 +57,14 @@ impl<B: Body> Pick for WideRay<B> {
 }
 
 /// The first box.
-struct SearchFirst<'a, B> {
-    of: &'a BodyIndex<B>,
-    ray: &'a Ray,
-}
+struct SearchFirst<'a, B>(&'a BodyIndex<B>, &'a Ray);
 
 impl<B: Body> Work for SearchFirst<'_, B> {
     type Output = Option<Hit>;
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Option<Hit> {
-        let SearchFirst { of, ray } = self;
+        let SearchFirst(of, ray) = self;
         let slabs = of.tree.slabs(ray);
         let mut first = First::<B>::new(of.probe(ray), ray.far);
         match slabs {
