@@ -9,7 +9,7 @@ use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::input::InputError;
 use crate::measure::{Workload, WorkloadError, input_for, input_of};
-use crate::path::CameraPath;
+use crate::path::{CameraPath, evenly};
 use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
 
@@ -59,7 +59,7 @@ impl<'a> Case<'a> {
     /// Cameras of the path with the truth about them, evenly spread.
     pub fn truths(&self) -> Vec<(usize, Truth)> {
         let most = (MOST_JUDGED / self.scene().items.len().max(1)).clamp(1, MOST_TRUTHS);
-        let truths = some_of(self.cameras(), most).filter_map(|camera| {
+        let truths = evenly(self.cameras(), most).filter_map(|camera| {
             let truth = Truth::of_scene(&self.workload.cameras[camera], self.scene())?;
             Some((camera, truth))
         });
@@ -142,7 +142,7 @@ impl<'a> Case<'a> {
 /// Evenly spread boxes of a scene about another origin, rounded outward once more.
 pub fn part_of(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, InputError> {
     let at_home = |corner: Vec3| scene.origin + corner.as_dvec3();
-    let boxes = some_of(scene.items.len(), count).map(|id| WorldBox {
+    let boxes = evenly(scene.items.len(), count).map(|id| WorldBox {
         min: at_home(scene.items[id].min),
         max: at_home(scene.items[id].max),
     });
@@ -151,12 +151,6 @@ pub fn part_of(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, Inpu
         up: scene.up,
         ..Scene::about(scene.name.clone(), &boxes, origin)?
     })
-}
-
-/// At most `most` of `count` indices, evenly spread.
-pub fn some_of(count: usize, most: usize) -> impl Iterator<Item = usize> {
-    let chosen = count.min(most);
-    (0..chosen).map(move |n| n * count / chosen)
 }
 
 #[cfg(test)]

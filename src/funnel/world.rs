@@ -13,6 +13,7 @@ use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{Setting, WorkloadError, input_of};
+use crate::path::evenly;
 use crate::query::ItemId;
 use crate::scene::{self, Dispute, ItemShape, LoadOptions, Scene, Surfaces, WorldBox};
 use crate::shown::{counted, significant};
@@ -296,9 +297,7 @@ fn rows<'l>(
 fn views(input: &FunnelInput) -> Result<Vec<View>> {
     let Setting { scene, path, .. } = input.setting;
     let (around, all) = (scene.surroundings(), &path.cameras);
-    let count = all.len().min(input.most_views.max(1));
-    let chosen = (0..count).map(|k| k * all.len() / count);
-    let views = chosen.map(|index| {
+    let views = evenly(all.len(), input.most_views.max(1)).map(|index| {
         let refused = |error: CameraError| WorkloadError {
             place: path.place(index),
             error: error.into(),

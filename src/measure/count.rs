@@ -12,6 +12,7 @@ use super::{Built, Notice, Status, Subject, Verdict, Workload, guarded};
 use crate::culling::CullingTest;
 use crate::geometry::Aabb;
 use crate::index::Kind;
+use crate::path::evenly;
 use crate::query::{ItemId, Located, QueryCost};
 use crate::scene::mix64;
 use crate::statistics::rate;
@@ -176,8 +177,7 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
 ///
 /// Their number is from 1 to 16, as `most` verdicts allow.
 pub(super) fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item = usize> {
-    let wanted = (most / items.max(1)).clamp(1, 16).min(queries);
-    (0..wanted).map(move |n| n * queries / wanted)
+    evenly(queries, (most / items.max(1)).clamp(1, 16))
 }
 
 /// Sums over the queries that are judged.

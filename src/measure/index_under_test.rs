@@ -9,6 +9,7 @@ use super::{Verdict, Workload, compare_with_scan, guarded, input_for, input_of};
 use crate::culling::CullingTest;
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, MemoryUsage, StructureSpec};
+use crate::path::evenly;
 use crate::query::{AnyVolume, ItemId, QueryCost};
 use crate::scene::Scene;
 
@@ -187,8 +188,8 @@ pub(super) fn measure_updates(
 /// Moves evenly spread items by their own extent, within f32; returns their ids.
 pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
     let count = ((items.len() as f64 * share).round() as usize).clamp(1, items.len());
-    let spread = (0..count).map(|i| (i * items.len() / count) as ItemId);
-    let moved: Vec<ItemId> = spread.collect();
+    let moved = evenly(items.len(), count).map(|id| id as ItemId);
+    let moved: Vec<ItemId> = moved.collect();
     for &id in &moved {
         let b = &mut items[id as usize];
         let step = b.extent();

@@ -12,6 +12,7 @@ use super::guarded;
 use super::index_under_test::original;
 use super::key::TaskKey;
 use super::task::TimedTask;
+use crate::path::evenly;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
 use crate::statistics::median;
@@ -81,8 +82,8 @@ impl Protocol {
             true => self.cameras.min(COLD_CAMERAS),
             false => self.cameras,
         };
-        let wanted = most.max(LEAST_CAMERAS).min(count);
-        (0..wanted).map(|k| (k * count / wanted) as u32).collect()
+        let chosen = evenly(count, most.max(LEAST_CAMERAS));
+        chosen.map(|camera| camera as u32).collect()
     }
 }
 
@@ -149,9 +150,8 @@ impl Schedule {
 
 /// Median CPU time of a query, ns, from a few cameras.
 fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
-    let some = cameras.len().min(PILOT);
-    let spread = (0..some).map(|k| cameras[k * cameras.len() / some]);
-    let mut queried: Vec<u32> = spread.collect();
+    let some = evenly(cameras.len(), PILOT).map(|k| cameras[k]);
+    let mut queried: Vec<u32> = some.collect();
     if task.ask_many.is_some() {
         queried = cameras.to_vec();
         // The lesser of two: the first fills caches, and either may be interrupted.

@@ -78,12 +78,15 @@ impl CameraPath {
     }
 }
 
-/// Keeps `most` of more, evenly spread from the first on.
+/// At most `most` of `count` indices, evenly spread from the first on.
+pub(crate) fn evenly(count: usize, most: usize) -> impl Iterator<Item = usize> + Clone {
+    let chosen = count.min(most);
+    (0..chosen).map(move |n| n * count / chosen)
+}
+
+/// Keeps `most` of more.
 fn thin<T: Copy>(all: &mut Vec<T>, most: usize) {
-    let count = all.len();
-    if count > most {
-        *all = (0..most).map(|n| all[n * count / most]).collect();
-    }
+    *all = evenly(all.len(), most).map(|n| all[n]).collect();
 }
 
 /// SHA-256 over frames and lenses. O(n).

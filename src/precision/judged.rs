@@ -11,7 +11,7 @@ use super::point::{Dimension, Point};
 use crate::camera::Camera;
 use crate::culling::{CameraView, Culling};
 use crate::measure::{Status, blamed};
-use crate::path::CameraPath;
+use crate::path::{CameraPath, evenly};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 use crate::statistics::{Rate, rate_of};
@@ -88,8 +88,7 @@ pub(super) struct Shots {
 impl Shots {
     pub fn of(path: &CameraPath, most: usize) -> Shots {
         let count = path.cameras.len();
-        let wanted = most.max(1).min(count);
-        let chosen = (0..wanted).map(|i| i * count / wanted);
+        let chosen = evenly(count, most.max(1));
         let next = chosen.clone().map(|i| i + 1).filter(|i| *i < count);
         Shots {
             cameras: chosen.map(|i| path.cameras[i]).collect(),
