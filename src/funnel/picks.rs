@@ -17,8 +17,8 @@ use crate::measure::Ask;
 use crate::query::{ItemId, distinct};
 use crate::shown::{count, counted};
 use crate::statistics::{Estimate, flat};
-use crate::visibility::pick::{BACK_ENDS, BackEnd, CursorRectangle, Pick};
-use crate::visibility::truth::{Boxes, Facets, RayIndex, SurfaceIndex};
+use crate::visibility::pick::{BACK_ENDS, Build, Builds, CursorRectangle, Pick};
+use crate::visibility::truth::{Bodies, Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 
 /// Cursors of a view.
@@ -66,9 +66,6 @@ impl PickRow {
 /// Appends the answer at a cursor of a view.
 type Answer<'w> = Box<dyn Fn(&Rays, &Cursor, &mut Vec<ItemId>) + 'w>;
 
-/// Builds a back end over the items of a scene.
-type Build<'w> = Box<dyn Fn(&BackEnd) -> Result<Box<dyn Pick>, String> + 'w>;
-
 /// A ray and a rectangle of the image.
 struct Cursor {
     ray: Ray,
@@ -94,32 +91,27 @@ impl<'w> Picks<'w> {
             cursors: world.views().map(of_view).collect(),
             left_out: Vec::new(),
         };
-        picks.add_rays();
+        match &world.shape {
+            Shape::Boxes(solids) => picks.add_rays(&Boxes::of(solids), |of| of.boxes, "item"),
+            Shape::Triangles(surfaces) => {
+                let facets = Facets::solid(surfaces, world.items());
+                picks.add_rays(&facets, |of| of.facets, "triangle");
+            }
+        }
         picks.add_frusta();
         picks
     }
 
     /// Adds back ends along rays: rows of the first item, then of the nearest.
-    fn add_rays(&mut self) {
-        let world = self.world;
-        let ((bodies, one), build): (_, Build) = match &world.shape {
-            Shape::Boxes(solids) => {
-                let boxes = Boxes::of(solids);
-                let build: Build = Box::new(move |row| (row.build.boxes)(&boxes, world.kernel));
-                ((solids.boxes.len(), "item"), build)
-            }
-            Shape::Triangles(surfaces) => {
-                let facets = Facets::solid(surfaces, world.items());
-                let build: Build = Box::new(move |row| (row.build.facets)(&facets, world.kernel));
-                ((surfaces.triangles.len(), "triangle"), build)
-            }
-        };
+    fn add_rays<B>(&mut self, all: &Bodies<B>, of: fn(&Builds) -> Build<Bodies<B>>, one: &str) {
+        let bodies = all.all.len();
         for row in BACK_ENDS {
             if row.name == "linear" && bodies > MOST_FOR_LOOP {
                 self.left_out.push(too_many(bodies, one, "for each ray"));
                 continue;
             }
-            let pick = build(row).map(Rc::from).and_then(|pick| {
+            let built = of(&row.build)(all, self.world.kernel);
+            let pick = built.map(Rc::from).and_then(|pick| {
                 if row.guarantee == Guarantee::Unproven {
                     self.try_out(row.name, &pick)?;
                 }
