@@ -31,9 +31,10 @@ use crate::motion::Motion;
 use crate::statistics::Estimate;
 
 use case::Case;
+use options::planned;
 use rule::{Draft, Facts, Finding, Rule, Unfit};
 use rules::RULES;
-use rules::stages::Stages;
+use rules::stages;
 use trials::{Answered, BASE, Trials};
 
 /// Structure, test and features to leave out, with the evidence.
@@ -143,8 +144,9 @@ pub fn prepare(
         trials.compare(sides);
     }
     let tasks = trials.tasks(&answered.counts);
-    let stages = Stages::of(input, &structures[0]);
-    let funnel = funnel::prepare(&stages.input(input), progress).map_err(|error| error.to_string());
+    let tree = planned(&input.setting.structures, &structures[0]);
+    let funnel = funnel::prepare(&stages::input(input.setting, &tree), progress);
+    let funnel = funnel.map_err(|error| error.to_string());
     Ok(Prepared {
         plan: TrialPlan {
             structures,
@@ -173,11 +175,11 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
     let case = Case::new(input, &workload, &plan.structures)?;
     let mut trials = Trials::new(&case);
     enter(&mut trials, &|_| ())?;
-    let (found, planned) = (trials.len(), plan.expected.len());
+    let (found, ways) = (trials.len(), plan.expected.len());
     let cameras = plan.expected.iter().map(Vec::len);
     ensure!(
-        found == planned && cameras.min() == Some(path.cameras.len()),
-        "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed on \
+        found == ways && cameras.min() == Some(path.cameras.len()),
+        "{found} ways to answer; the plan has {ways}: the scene or the cameras have changed on \
          the way"
     );
     let once_ns = trials.once_ns.clone();
@@ -188,8 +190,8 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
         ..ProcessTimes::of(&timed(&tasks, &plan.schedule, protocol, &|_| ()))
     };
     if let Some(of_stages) = &plan.stages {
-        let stages = Stages::of(input, &plan.structures[0]);
-        let found = funnel::time(&stages.input(input), of_stages)?;
+        let tree = planned(&input.setting.structures, &plan.structures[0]);
+        let found = funnel::time(&stages::input(input.setting, &tree), of_stages)?;
         times.ln_ns.extend(found.ln_ns);
     }
     Ok(times)

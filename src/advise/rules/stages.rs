@@ -6,11 +6,12 @@
 use std::slice;
 
 use super::super::omission::{Check, is_longer};
-use super::super::options::{AdviseInput, AdviseOptions, planned};
+use super::super::options::AdviseOptions;
 use super::super::rule::{Draft, Finding};
 use super::super::trials::Trials;
 use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE, StageKind};
 use crate::index::StructureSpec;
+use crate::measure::Setting;
 use crate::shown::significant;
 use crate::visibility::SampleGrid;
 
@@ -21,28 +22,19 @@ const ITEMS: usize = 100_000;
 const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
 const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 
-/// The stages on the fastest tree.
-pub struct Stages(StructureSpec);
-
-impl Stages {
-    pub fn of(all: &AdviseInput, tree: &str) -> Stages {
-        Stages(planned(&all.setting.structures, tree))
-    }
-
-    pub fn input<'s>(&'s self, all: &AdviseInput<'s>) -> FunnelInput<'s> {
-        let most = (ITEMS / all.setting.scene.items.len().max(1)).clamp(1, VIEWS);
-        let Stages(tree) = self;
-        let structures = slice::from_ref(tree);
-        let chain = Chain::for_scene(&all.setting.scene, structures, false)
-            .with(StageKind::Triangle, "several-cones")
-            .with(StageKind::Fragment, NONE);
-        FunnelInput {
-            structures,
-            all: false,
-            picks: false,
-            sorted: true,
-            ..FunnelInput::new(all.setting, chain, (most, SAMPLES), tree.execution)
-        }
+/// The stages on a tree.
+pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'s> {
+    let most = (ITEMS / setting.scene.items.len().max(1)).clamp(1, VIEWS);
+    let structures = slice::from_ref(tree);
+    let chain = Chain::for_scene(&setting.scene, structures, false)
+        .with(StageKind::Triangle, "several-cones")
+        .with(StageKind::Fragment, NONE);
+    FunnelInput {
+        structures,
+        all: false,
+        picks: false,
+        sorted: true,
+        ..FunnelInput::new(setting, chain, (most, SAMPLES), tree.execution)
     }
 }
 
