@@ -82,10 +82,9 @@ impl<E> Point<E> {
         }
     }
 
-    /// Takes over the outcome of a check; true if it passed.
-    pub(super) fn accepts(&mut self, checked: Result<(), Verdict>) -> bool {
-        let wrong = checked.err();
-        if let Some(wrong) = &wrong {
+    /// Takes over what is wrong; true if nothing is.
+    pub(super) fn accepts(&mut self, wrong: Option<&Verdict>) -> bool {
+        if let Some(wrong) = wrong {
             (self.status, self.reason) = (wrong.status, wrong.reason.clone());
         }
         wrong.is_none()
@@ -93,9 +92,7 @@ impl<E> Point<E> {
 
     /// Takes over the time of a task, divided by `per`, or why it has none.
     pub(super) fn time(&mut self, times: &OverProcesses, task: usize, per: f64) {
-        if let Some(wrong) = times.failure(task) {
-            (self.status, self.reason) = (wrong.status, wrong.reason.clone());
-        }
+        self.accepts(times.failure(task));
         self.time = times.ns(task).map(|ns| ns.per(per));
         self.task = self.time.map(|_| task);
     }

@@ -213,14 +213,13 @@ impl<'a> Built<'a> {
         for (n, answer) in judged.answers.iter().enumerate() {
             trial.expect(answer.iter().copied());
             if let Err(fault) = trial.ask(|out| self.answer(way, n, out)) {
-                // Not a point that misses items by its numbers: the structure is at fault.
-                let status = match Status::of(&fault) {
-                    Status::Unsafe => Status::Wrong,
-                    status => status,
-                };
-                let why = fault.explained(|_| None);
-                let reason = format!("not the scan of its own planes: {why}");
-                return Err(Verdict::new(status, reason));
+                let place = "not the scan of its own planes: ";
+                let mut verdict = Verdict::of(&fault, place, |_| None);
+                if verdict.status == Status::Unsafe {
+                    // Not a point that misses items by its numbers: the structure is at fault.
+                    verdict.status = Status::Wrong;
+                }
+                return Err(verdict);
             }
         }
         Ok(())
@@ -253,7 +252,8 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
                 let memory = indexes.of(test).memory().total() as f64 / items as f64;
                 let mut point = judged.point(indexes.structure, memory);
                 let is_made = judged.refused.is_none();
-                let is_sound = is_made && point.accepts(built.check(way, judged, items));
+                let is_sound =
+                    is_made && point.accepts(built.check(way, judged, items).err().as_ref());
                 points.push(point);
                 (is_sound, &judged.answers)
             }
@@ -262,7 +262,7 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
                 let mut point = judged.point(indexes.map_or("scan", |own| own.structure));
                 let agrees = built.queries.agree(judged, indexes.map(Indexes::regions));
                 let other = || Verdict::new(Status::Wrong, "other regions");
-                let is_sound = point.accepts(agrees.then_some(()).ok_or_else(other));
+                let is_sound = point.accepts((!agrees).then(other).as_ref());
                 region_points.push(point);
                 (is_sound, &judged.answers)
             }
