@@ -84,7 +84,6 @@ pub struct PreparedSweep {
 
 /// A stage on the items that it gets in each view.
 struct Swept<'w> {
-    world: &'w World<'w>,
     stage: StageKind,
     /// Items that the frustum meets.
     items: ItemStages<'w>,
@@ -103,7 +102,6 @@ impl<'w> Swept<'w> {
         let is_of_triangles = stage == StageKind::Triangle;
         Swept {
             triangles: is_of_triangles.then(|| TriangleStage::new(&items)),
-            world,
             stage,
             items,
         }
@@ -116,7 +114,7 @@ impl<'w> Swept<'w> {
             StageKind::Occlusion => &sized[..],
             _ => &[None],
         };
-        let rows = self.world.rows(self.stage).into_iter();
+        let rows = self.items.world.rows(self.stage).into_iter();
         let rows = rows.map(|(row, _)| row).filter(|row| row.name != NONE);
         let points = rows.flat_map(|row| sizes.iter().map(move |size| (row, *size)));
         let points = points.map(|(row, size)| (row, size, self.ask(row.name, size)));
@@ -128,8 +126,8 @@ impl<'w> Swept<'w> {
             return triangles.ask(name);
         }
         let sized = |[width, height]: [u32; 2]| SampleGrid::new(width, height);
-        let buffer = buffer.map_or(self.world.samples, sized);
-        let run = self.world.run(self.stage, name, buffer);
+        let buffer = buffer.map_or(self.items.world.samples, sized);
+        let run = self.items.world.run(self.stage, name, buffer);
         Box::new(move |view, out| run(view, self.items.remaining(view), out))
     }
 
@@ -142,9 +140,9 @@ impl<'w> Swept<'w> {
             ask(view, &mut out);
             out.sort_unstable();
             let given = self.items.remaining(view);
-            count_items(given, self.world.items(), &out, &truth[view])
+            count_items(given, self.items.world.items(), &out, &truth[view])
         };
-        self.world.views().map(count).collect()
+        self.items.world.views().map(count).collect()
     }
 }
 
