@@ -3,9 +3,9 @@
 
 use super::document::Block;
 use super::table::{Column, Table};
-use super::text::{self, significant, some, time, time_plus_minus};
+use super::text::{self, significant, some, time_plus_minus};
 use crate::precision::{
-    CullingErrors, Names, Point, Precision, RegionErrors, SWEEPS, SizeRow, StableAfter, SweepRow,
+    CullingErrors, Names, Point, Precision, RegionErrors, SWEEPS, SizeRow, SweepRow,
 };
 use crate::report::grouped;
 use crate::statistics::Rate;
@@ -52,8 +52,6 @@ pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     if all {
         let title = "Region search, the fastest structure for each";
         add(title, regions_table(p), "");
-        let title = "Cameras after which the order of the points by time is final";
-        add(title, stability_table(p), "");
     }
     if all && !p.size_sweep.is_empty() {
         let title = "False positives / visible, %, by cube edge s / depth D of the frustum";
@@ -191,15 +189,6 @@ fn regions_table(p: &Precision) -> Table {
         (">per point", |r| time_plus_minus(r.time)),
     ];
     Table::with(all.iter().map(|(_, own)| own[0]), columns)
-}
-
-fn stability_table(p: &Precision) -> Table {
-    let columns: &[Column<&StableAfter>] = &[
-        (">cameras", |r| r.cameras.to_string()),
-        (">pairs in final order", |r| text::percent(r.pairs_in_order)),
-        (">CPU time", |r| time(r.seconds * 1e9)),
-    ];
-    Table::with(&p.stability, columns)
 }
 
 /// Percent, with how far another seed may come out.

@@ -17,8 +17,6 @@ pub struct ProcessTimes {
     pub ln_ns: Vec<Result<Option<f64>, Verdict>>,
     /// CPU ns of what is done once and not in rounds, where there is such.
     pub once_ns: Vec<f64>,
-    /// Per task and camera: median CPU ns over the rounds; empty unless requested.
-    pub by_camera: Vec<Vec<f64>>,
     /// Groups of cells that are measured beside the tasks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,

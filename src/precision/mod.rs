@@ -11,7 +11,7 @@ mod size_sweep;
 mod sweeps;
 
 pub use judged::{CullingErrors, Names};
-pub use point::{Point, StableAfter};
+pub use point::Point;
 pub use points::{Precision, prepare, time};
 pub use region_search::RegionErrors;
 pub use size_sweep::{SizeRow, size_sweep};

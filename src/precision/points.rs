@@ -5,7 +5,7 @@
 use serde::Serialize;
 
 use super::judged::{CullingErrors, Judged, Shots, Truths};
-use super::point::{Point, StableAfter, by_camera, sort_and_mark, stability};
+use super::point::{Point, sort_and_mark};
 use super::region_search::{POINTS_PER_CAMERA, RegionErrors, RegionNumbers, RegionQueries};
 use super::size_sweep::SizeRow;
 use super::sweeps::SweepRow;
@@ -45,8 +45,6 @@ pub struct Precision {
     pub front: Vec<usize>,
     /// The other diagram: where is the camera. Fastest first.
     pub region_points: Vec<Point<RegionErrors>>,
-    /// How the order by time settles with more cameras.
-    pub stability: Vec<StableAfter>,
     /// Items left out on request (`--skip-bad-items`).
     pub skipped_items: usize,
     /// Warnings about the cameras in the scene.
@@ -314,21 +312,13 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
 /// If the scene is not the one that was planned for.
 pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessTimes, BuildError> {
     let shots = Shots::of(&setting.path, most);
-    let cameras = shots.cameras.len();
     let built = Built::new(setting, &shots, None)?;
     let (built, ways) = (&built, built.ways());
     let timed = plan.timed(&setting.protocol, |&(way, _)| {
         let way = ways[way];
         Box::new(move |n, out| built.answer(way, n, out))
     });
-    let laps = timed.iter().map(|timed| match timed {
-        Ok(timed) => by_camera(timed, cameras),
-        Err(_) => Vec::new(),
-    });
-    Ok(ProcessTimes {
-        by_camera: laps.collect(),
-        ..ProcessTimes::of(&timed)
-    })
+    Ok(ProcessTimes::of(&timed))
 }
 
 impl Prepared {
@@ -338,13 +328,11 @@ impl Prepared {
         let times = OverProcesses::of(processes);
         // The twin comes last: the first task of its way is the original.
         let original = |way| plan.tasks.iter().position(|(own, _)| own.0 == way);
-        let mut culled = Vec::new();
         let keys = plan.tasks.iter().map(|(key, _)| *key);
         for (task, (way, is_twin)) in keys.enumerate() {
             if is_twin {
                 precision.twin = original(way).and_then(|own| times.ratio(task, own));
             } else if let Some(point) = precision.points.get_mut(way) {
-                culled.push(task);
                 point.time(&times, task, 1.0);
                 let ns = point.query_ns();
                 point.errors.ns_per_item = ns.map(|ns| ns / precision.items as f64);
@@ -353,8 +341,6 @@ impl Prepared {
                 point.time(&times, task, POINTS_PER_CAMERA as f64);
             }
         }
-        culled.retain(|&task| times.failure(task).is_none());
-        precision.stability = stability(&culled, processes, precision.cameras, precision.rounds);
         let is_faster = |a: usize, b: usize| times.is_faster(a, b);
         let points = &mut precision.points;
         sort_and_mark(points, &is_faster);

@@ -47,8 +47,8 @@ fn culling(point: &Value) -> String {
 #[test]
 fn json_has_the_documented_fields() {
     let outcome = small();
-    let top = "scene path items skipped_items cameras processes rounds twin points front region_points stability seed \
-               size_sweep sweeps warnings";
+    let top = "scene path items skipped_items cameras processes rounds twin points front region_points \
+               seed size_sweep sweeps warnings";
     assert_eq!(keys(outcome), set(top));
     assert_eq!(
         (&outcome["scene"], &outcome["path"]),
@@ -79,7 +79,6 @@ fn json_has_the_documented_fields() {
     let rate = "value lower upper elsewhere";
     for (name, fields) in [
         ("points", point.as_str()),
-        ("stability", "cameras pairs_in_order seconds"),
         ("region_points", region),
         ("size_sweep", size),
         ("sweeps", swept.as_str()),
@@ -98,8 +97,7 @@ fn json_has_the_documented_fields() {
     }
     // Every field has a line in the documentation.
     let told = include_str!("../../docs/METHODOLOGY.md");
-    let fields =
-        format!("{top} {point} {region} {size} {size_error} {swept} {rate} pairs_in_order seconds");
+    let fields = format!("{top} {point} {region} {size} {size_error} {swept} {rate}");
     for field in set(&fields) {
         assert!(told.contains(&format!("`{field}`")), "{field}");
     }
@@ -259,11 +257,6 @@ fn rows_are_sorted_and_dominance_is_what_it_says() {
             "{point}"
         );
     }
-    let cameras = array(small(), "stability")
-        .iter()
-        .map(|row| number(row, "cameras"));
-    assert_eq!(cameras.collect::<Vec<_>>(), [1.0, 2.0, 4.0]);
-    assert_eq!(array(small(), "stability")[2]["pairs_in_order"], 1.0);
 }
 
 #[test]
