@@ -113,7 +113,7 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
 pub type Figure = (&'static str, &'static str, fn(f64) -> String);
 
 /// Figures of queries by priority; a summary has the first two.
-pub const OF_QUERIES: [Figure; 11] = [
+pub const OF_QUERIES: [Figure; 10] = [
     ("build", "build_ms", |ms| text::time(ms * 1e6)),
     ("bytes/item", "memory_bytes_per_item", |b| format!("{b:.1}")),
     ("p95", "query_ns_p95", text::time),
@@ -123,7 +123,6 @@ pub const OF_QUERIES: [Figure; 11] = [
     ("/ copy", "times_memcpy", text::significant),
     ("locate", "locate_ns", text::time),
     ("update of 1 %", "update_ms", |ms| text::time(ms * 1e6)),
-    ("query after 32", "refitted_over_rebuilt", text::significant),
     ("repaid after", "break_even_queries", |n| {
         text::count(n as usize)
     }),

@@ -10,12 +10,9 @@ use super::bounds::BOUNDS;
 use super::frames::measure;
 use super::group::GroupPlan;
 use super::key::{CellKey, GroupKey};
-use super::moving::refitted_ln;
 use super::process_result::{Known, Part, TaskSamples};
 use super::schedule::cameras_within;
-use super::{
-    Machine, Notice, Protocol, SceneInfo, Subject, Verdict, Workload, WorkloadError, guarded,
-};
+use super::{Machine, Notice, Protocol, SceneInfo, Subject, Verdict, Workload, WorkloadError};
 use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
 use crate::input::InputError;
@@ -309,7 +306,6 @@ pub fn measure_scene(
     let info = SceneInfo::of(&scene);
     let sweep = Machine::capture().cache_sweep_bytes();
     let mut built: Option<(bool, Vec<Subject>)> = None;
-    let mut first = true;
     for (n, group) in plan.groups_of(planned).into_iter().enumerate() {
         if !share.wanted[n] {
             continue;
@@ -348,21 +344,6 @@ pub fn measure_scene(
             ..GroupPlan::new(&workload, &info, protocol)
         };
         let (mut part, samples) = measure(&workload, subjects, settings);
-        // In the first group of each scene only.
-        if first && plan.has_updates(share) {
-            for subject in &mut part.subjects {
-                let spec = plan.structures.iter().find(|s| s.label == subject.label);
-                if let Some(spec) = spec.filter(|_| subject.verdict.is_ok()) {
-                    notice(Some(&spec.label), "refitting");
-                    let found = guarded(|| refitted_ln(spec, &workload, &protocol));
-                    match found.unwrap_or_else(Err) {
-                        Ok(found) => subject.refitted_ln = found,
-                        Err(verdict) => subject.verdict = verdict,
-                    }
-                }
-            }
-        }
-        first = false;
         part.failed.clone_from(&share.failed);
         keep(part, samples);
     }

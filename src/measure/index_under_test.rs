@@ -150,7 +150,7 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
 /// Shares of the items that move in the updates that are measured.
 pub const UPDATE_SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
 /// Share of the items that move in an untimed update.
-pub(super) const USUAL_SHARE: f64 = 0.01;
+const USUAL_SHARE: f64 = 0.01;
 /// Largest scene whose updates are measured: they need a second copy of it.
 pub(super) const MOST_UPDATED: usize = 2_000_000;
 

@@ -92,7 +92,6 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "update_ms", "ms", Of::Process(|s| s.update_ms.get(1).copied()), "CPU time of an update after 1 % of the items, at least one, have moved (scenes of up to 2 million)";
     "update_ms_10_percent", "ms", Of::Process(|s| s.update_ms.get(2).copied()), "as update_ms, after 10 % have moved";
     "update_ms_100_percent", "ms", Of::Process(|s| s.update_ms.get(3).copied()), "as update_ms, after all have moved";
-    "refitted_over_rebuilt", "1", Of::Log(|s| s.refitted_ln), "time per query after 32 refits, each after 1 % of the items have moved / time per query on a fresh build of the same boxes (query after 32 in tables); only structures that refit";
     "memory_bytes_per_item", "bytes", Of::Bytes(|s| s.memory_bytes), "nodes, item bounds and ids / items";
     "break_even_queries", "queries", Of::BreakEven, "queries after which the build is repaid against linear; 0: at once; empty: never";
     "growth_exponent", "1", Of::Report, "slope of ln query_ns over ln items: 0 does not grow, 1 as a scan does; least squares over three or more sizes of a world with about as many visible items on the same kind of path; absent below three";

@@ -6,11 +6,10 @@ use std::collections::BTreeMap;
 
 use super::clock::{Lap, Stopwatch};
 use super::count::{Judging, MOST_JUDGED, spread};
-use super::index_under_test::{MOST_UPDATED, USUAL_SHARE};
 use super::process_result::Known;
 use super::{
     Answer, Judged, Notice, Protocol, Status, TaskKind, TimedTask, Verdict, Workload,
-    compare_with_scan, guarded, move_share, timed_rounds,
+    compare_with_scan, guarded, timed_rounds,
 };
 use crate::culling::CameraView;
 use crate::geometry::Aabb;
@@ -20,8 +19,6 @@ use crate::query::ItemId;
 use crate::scene::Originals;
 use crate::verify::{Truth, scan};
 
-/// Number of updates before queries are timed.
-const REFITS: usize = 32;
 /// Most timed cameras.
 const CAMERAS: usize = 24;
 /// Number of rounds.
@@ -356,31 +353,6 @@ pub(super) fn ageing(
     Ok(ages)
 }
 
-/// ln of (query time after many refits / query time on a fresh build).
-///
-/// Frustum queries over the same boxes, timed side by side in one process. `None` for a
-/// structure that does not refit, or a scene too large.
-///
-/// # Errors
-/// An answer that differs from the reference scan's.
-pub(super) fn refitted_ln(
-    spec: &StructureSpec,
-    workload: &Workload,
-    protocol: &Protocol,
-) -> Result<Option<f64>, Verdict> {
-    let (refits, count) = (spec.info().refits, workload.items.len());
-    if !refits || protocol.cold || count == 0 || count > MOST_UPDATED {
-        return Ok(None);
-    }
-    let mut items = workload.items.to_vec();
-    let mut refitted = spec.build(workload.input(&items))?;
-    for _ in 0..REFITS {
-        let moved = move_share(&mut items, USUAL_SHARE);
-        spec.update(&mut refitted, workload.input(&items), &moved)?;
-    }
-    over_fresh(refitted.as_ref(), spec, workload, &items, protocol)
-}
-
 /// ln of (query time / query time on a fresh build of the same boxes).
 ///
 /// All views of the path, timed side by side.
@@ -474,23 +446,6 @@ mod tests {
             cold: false,
             seed: 1,
             cache_bytes: 0,
-        }
-    }
-
-    #[test]
-    fn a_structure_that_refits_is_timed_again_and_no_other() {
-        let scene = scene::load("uniform:n=2000", &Default::default()).unwrap();
-        let way = path::load("orbit:frames=8", &scene, &LensDefaults::default()).unwrap();
-        let workload = Workload::new(&scene, &way, &Culling::default()).unwrap();
-        let protocol = protocol();
-        for name in ["bvh", "wide", "linear-scalar", "bsp"] {
-            let spec = StructureSpec::parse(name).unwrap();
-            let found = refitted_ln(&spec, &workload, &protocol).unwrap();
-            assert_eq!(
-                found.is_some_and(f64::is_finite),
-                spec.row.info.refits,
-                "{name}: {found:?}"
-            );
         }
     }
 }

@@ -66,8 +66,6 @@ pub struct SubjectPart {
     pub memory_bytes: Option<u64>,
     /// CPU time of each update, ms, in the order of [`super::UPDATE_SHARES`].
     pub update_ms: Vec<f64>,
-    /// ln of (query time after many refits / on a fresh build of the same boxes).
-    pub refitted_ln: Option<f64>,
     /// Bytes after the last frame of a motion; the first process only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory_after_bytes: Option<u64>,
@@ -162,7 +160,6 @@ impl SubjectPart {
             build_ms: None,
             memory_bytes: None,
             update_ms: Vec::new(),
-            refitted_ln: None,
             memory_after_bytes: None,
             ageing_ln: BTreeMap::new(),
             counts: BTreeMap::new(),

@@ -24,7 +24,6 @@ fn subject(label: &str, build_ms: f64) -> SubjectPart {
         build_ms: Some(build_ms),
         memory_bytes: Some(4000),
         update_ms: Vec::new(),
-        refitted_ln: None,
         memory_after_bytes: None,
         ageing_ln: BTreeMap::new(),
         counts: BTreeMap::new(),
