@@ -74,7 +74,7 @@ pub fn expected_by(error: &io::Error, what: &str) -> String {
 }
 
 /// The kind of an error that `csv` may have wrapped.
-fn kind_of(error: &io::Error) -> io::ErrorKind {
+pub(crate) fn kind_of(error: &io::Error) -> io::ErrorKind {
     let inner = error.get_ref().and_then(|inner| inner.downcast_ref());
     match inner.map(csv::Error::kind) {
         Some(csv::ErrorKind::Io(inner)) => kind_of(inner),

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
-use crate::shown::{expected_by, plain};
+use crate::shown::{expected_by, kind_of, plain};
 use crate::spec::SpecError;
 
 /// A result of reading a user's input.
@@ -81,7 +81,7 @@ impl From<SpecError> for InputError {
 pub fn bare(error: io::Error) -> io::Error {
     // `tempfile` wraps it so, and passes no more of it than its kind and text.
     match error.to_string().split_once(" at path \"") {
-        Some((said, _)) if error.get_ref().is_some() => io::Error::new(error.kind(), said),
+        Some((said, _)) if error.get_ref().is_some() => io::Error::new(kind_of(&error), said),
         _ => error,
     }
 }

@@ -59,7 +59,7 @@ pub(super) fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
                 _ if costs.is_none() => String::new(),
                 _ if ties => "a scan and a tree tie".to_owned(),
                 0.0 => format!("no scan wins from {} items on", count(least as usize)),
-                _ => format!("a scan wins up to {} items", count(crossing as usize)),
+                _ => format!("a scan wins up to {}", counted(crossing as usize, "item")),
             },
             compared: costs.map(|_| [all, crossing]),
             reason,
