@@ -36,7 +36,9 @@ pub struct Rule {
     pub(super) prepare: for<'c> fn(&mut Trials<'c>) -> anyhow::Result<Draft>,
 }
 
-/// Reason for which a rule does not apply to this scene or these cameras: no failure.
+/// Reason for which a rule does not apply to this scene or these cameras.
+///
+/// It is no failure.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Unfit(pub String);

@@ -36,8 +36,9 @@ pub(super) struct Margin {
     /// Largest absolute coordinates of the points that can be visible: those of
     /// the volume and of the scene, whichever are smaller.
     pub(super) reach: DVec3,
-    /// Near corners, then far ones. What has no end has no far ones; those of a matrix then
-    /// are zero.
+    /// Near corners, then far ones.
+    ///
+    /// A view without an end has no far ones; those of a matrix then are zero.
     near: [DVec3; 4],
     far: Option<[DVec3; 4]>,
     /// How far the near plane's and the far plane's inner sides lie apart.
@@ -89,9 +90,9 @@ impl Margin {
         }
     }
 
-    /// Named planes and further ones as one volume, moved outward if there is an epsilon.
+    /// Named planes and further ones as one volume.
     ///
-    /// `reach` bounds the coordinates of the boxes that it is for.
+    /// They are moved outward if there is an epsilon. `reach` bounds the coordinates of the boxes that it is for.
     pub(super) fn volume(
         &self,
         named: &[(FrustumPlane, Plane)],

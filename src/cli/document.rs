@@ -34,7 +34,7 @@ impl Block {
         [Block::heading(heading), Block::Table(table)]
     }
 
-    /// What another option shows, below a gap; nothing if `all` is shown.
+    /// Sentence on what another option shows, below a gap; nothing if `all` is shown.
     pub fn more(all: bool, option: &str) -> impl Iterator<Item = Block> {
         let lines = ["", option].map(Block::line).into_iter();
         lines.filter(move |_| !all)

@@ -107,7 +107,7 @@ impl<'w> Swept<'w> {
         }
     }
 
-    /// Every back end with every size of its buffer, and how it is asked.
+    /// Every back end with every size of its buffer, and its question.
     fn points(&self) -> Vec<(BackEnd, Option<[u32; 2]>, Ask<'_>)> {
         let sized = WIDTHS.map(|width| Some([width, (width * 9).div_ceil(16)]));
         let sizes = match self.stage {

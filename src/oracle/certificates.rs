@@ -36,8 +36,9 @@ pub(super) enum Extent {
     Solid,
 }
 
-/// The faces of a volume, and its bounds and shadows: all certificates of the half-spaces
-/// that can be the tightest for some box.
+/// The faces of a volume, and its bounds and shadows.
+///
+/// All certificates of the half-spaces that can be the tightest for some box.
 ///
 /// O(m^4) steps in f64 for m of them; exact sums only for what is kept and where rounding
 /// could matter.
