@@ -29,7 +29,7 @@ TESTS = ["sphere", "six-plane", "six-box", "exact"]
 KERNELS = ["portable", "avx2", "avx512"]
 FUNNELS = [
     ["--scene", "city:n=1500", "--path", "street:frames=4", "--cut-out", "fence:share=0.2"],
-    ["--scene", "rooms:n=1500", "--path", "street:frames=4", "--mirror", "3"],
+    ["--scene", "rooms:n=1500", "--path", "street:frames=4"],
     ["--scene", "mesh:forest:n=4000", "--path", "street:frames=3"],
     ["--scene", "freedm-map12", "--path", "places:frames=3"],
 ]
@@ -118,7 +118,7 @@ def answers():
                                ("picks", ("question", "name")), ("gains", ("stage", "back_end"))):
             for name, rows in rows_by(found.pop(section), *names).items():
                 yield f"funnel {' '.join(arguments)} {section} {name}", rows
-        for section in ("level", "inner_boxes", "ground", "mirror", "chain"):
+        for section in ("level", "inner_boxes", "ground", "chain"):
             yield f"funnel {' '.join(arguments)} {section}", [json.dumps(untimed(found[section]), sort_keys=True)]
     for scene in ("city:n=300", "freedm-map12"):
         found = json.loads(output("precision", "--scene", scene, "--cubes", "4000", "--processes", "1",

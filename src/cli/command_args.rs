@@ -8,7 +8,6 @@ use serde::Serialize;
 use super::program;
 use super::shared_args::{CullingArgs, LensArgs, SceneArgs, StudyArgs, TableFormat, WhatArgs};
 use crate::path::DEFAULT_PATH;
-use crate::query::ItemId;
 use crate::report::JUDGED_METRICS;
 use crate::spec::{SpecError, values};
 use crate::visibility::SampleGrid;
@@ -74,10 +73,6 @@ pub struct FunnelArgs {
     /// fence:share=0.2,tile=1,seed=1
     #[arg(long, value_name = "MASK", value_parser = CutOuts::parse)]
     pub cut_out: Option<CutOuts>,
-    /// Treat a face of this item (across its shortest edge) as a mirror, and draw its
-    /// reflection with and without a stencil
-    #[arg(long, value_name = "ITEM", value_parser = values::whole(0..=ItemId::MAX))]
-    pub mirror: Option<ItemId>,
     /// Back end of the region stage [default: the safe one that removes the most]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,

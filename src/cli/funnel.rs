@@ -41,9 +41,6 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     inputs.extend(args.pvs.as_deref());
     expect_places(&outputs, &inputs)?;
     expect_folder("--csv", args.csv.as_deref())?;
-    if args.mirror.is_some() && args.cut_out.is_some() {
-        bail!("--mirror shows whole boxes; expected no --cut-out with it");
-    }
     let setting = setting(registry, args, None)?;
     let input = input(args, &setting)?;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
@@ -85,10 +82,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     write_if(&args.html, || page(&report, &setting.scene))?;
     shown?;
     let (stages, orders, picks) = (&report.stages, &report.orders, &report.picks);
-    let mirror = report.mirror.as_ref();
-    let is_mirrored = mirror.is_none_or(|row| row.wrong_sample_count == 0);
-    let is_right = is_mirrored && keep_their_word(stages, orders, picks);
-    Ok(Ending::of(is_right))
+    Ok(Ending::of(keep_their_word(stages, orders, picks)))
 }
 
 /// Amount of work.
@@ -180,7 +174,6 @@ fn input<'s>(args: &'s FunnelArgs, setting: &'s Setting) -> Result<FunnelInput<'
     let chain = chain(args, &setting.scene, &setting.structures)?;
     Ok(FunnelInput {
         cut_outs: args.cut_out.as_ref(),
-        mirror: args.mirror,
         claim: claim(args.pvs.as_deref())?,
         inner_boxes: args.inner_boxes.map(|most| most as usize),
         all: args.all

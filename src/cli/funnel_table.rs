@@ -4,9 +4,7 @@
 use super::document::Block;
 use super::table::{Column, Table};
 use super::text::{self, some};
-use crate::funnel::{
-    BoundRow, FragmentCounts, FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow,
-};
+use crate::funnel::{BoundRow, FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow};
 use crate::shown::shortened;
 use crate::visibility::{Guarantee, Level};
 
@@ -64,7 +62,6 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
             "Samples and fragments of the remaining items",
             fragments(report),
         ),
-        ("Items seen in the mirror", mirror(report)),
         ("Draw orders of the remaining items", orders(report)),
         ("Picking: items under a cursor", picks(report)),
         (
@@ -73,7 +70,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         ),
         ("With and without each stage of the chain", gains(report)),
     ] {
-        if !table.rows.is_empty() && (all || heading.contains("mirror")) {
+        if all && !table.rows.is_empty() {
             blocks.extend(Block::section(heading, table));
         }
     }
@@ -85,7 +82,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     }
     blocks.extend(saved_load(&report.level).map(Block::Line));
     let left_out = report.left_out.iter();
-    let left_out = left_out.filter(|row| all || ["stages", "mirror"].contains(&row.section));
+    let left_out = left_out.filter(|row| all || row.section == "stages");
     blocks.extend(left_out.map(|row| {
         let (section, name, reason) = (row.section, row.name, &row.reason);
         Block::Line(format!("Left out ({section}, {name}): {reason}."))
@@ -220,29 +217,18 @@ pub fn count(mean: f64) -> String {
     }
 }
 
-/// Counts of fragments, by the name of a test.
-fn fragment_table<'c>(tests: impl Iterator<Item = (&'c str, &'c FragmentCounts)>) -> Table {
-    let mut table =
-        Table::of("test | >samples tested | >kept out | >fragments | >clear | >shaded | >covered");
-    for (name, counts) in tests {
-        let counts = counts.in_order().into_iter().map(count);
-        table.add_row([name.to_owned()].into_iter().chain(counts));
-    }
-    table
-}
-
-/// The reflected scene on the samples of a mirror, and on all.
-fn mirror(report: &FunnelReport) -> Table {
-    let mirror = report.mirror.iter();
-    let without = mirror.clone().map(|row| ("z-test", &row.without_stencil));
-    fragment_table(without.chain(mirror.map(|row| ("stencil-test", &row.with_stencil))))
-}
-
 /// The tests of the fragment stage, if there are several to compare.
 fn fragments(report: &FunnelReport) -> Table {
-    let rows = report.stages.iter();
-    let tests = rows.filter_map(|row| Some((row.back_end.name, row.fragments.as_ref()?)));
-    let mut table = fragment_table(tests);
+    let mut table =
+        Table::of("test | >samples tested | >kept out | >fragments | >clear | >shaded | >covered");
+    for row in &report.stages {
+        let Some(counts) = row.fragments else {
+            continue;
+        };
+        let counts = counts.in_order().into_iter().map(count);
+        let name = row.back_end.name.to_owned();
+        table.add_row([name].into_iter().chain(counts));
+    }
     if table.rows.len() < 2 {
         table.rows.clear();
     }

@@ -1,12 +1,9 @@
 //! Fragment stage: tests of which remaining item is in front at each sample.
 //!
-//! Each test counts the samples and fragments that it takes. An item as a mirror is drawn by
-//! the reflected camera at the samples that see the mirror (the stencil), and at all.
+//! Each test counts the samples and fragments that it takes.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
-
-use serde::Serialize;
 
 use super::error::fits_drawing;
 use super::item_stages::ItemStages;
@@ -15,11 +12,10 @@ use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, count_items};
 use super::world::{Shape, World};
-use crate::camera::Camera;
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
-use crate::visibility::fragment::{Canvas, Drawn, Holes, Screen, Tally, Tests, draw};
+use crate::visibility::fragment::{Canvas, Drawn, Holes, Screen, Tally, Tests};
 use crate::visibility::truth::{Facet, SolidBox};
 use crate::visibility::{Rays, Solids};
 
@@ -258,112 +254,10 @@ impl Room {
     }
 }
 
-/// Items in a mirror. Counts are means per view.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct MirrorRow {
-    /// Data row of the item whose face it is.
-    pub item: ItemId,
-    /// The axis that the face is across: that of the item's shortest edge.
-    pub axis: char,
-    /// Views in which it is in front at a sample.
-    pub view_count: usize,
-    /// Samples at which it is in front.
-    pub marked_count: f64,
-    /// Items that are in front in it at one of them.
-    pub shown_count: f64,
-    /// Counts of these samples only, with those that find them.
-    pub with_stencil: FragmentCounts,
-    /// Counts of the whole image.
-    pub without_stencil: FragmentCounts,
-    /// Samples of the mirror that the two show differently: none.
-    pub wrong_sample_count: u64,
-}
-
-/// The mirror in every view, behind the remaining items.
-///
-/// It is the item of this data row, and shows every other. `None` without views or for
-/// triangles.
-///
-/// # Errors
-/// Items that cover too many samples.
-pub fn mirrored(row: ItemId, stages: &ItemStages) -> Result<Option<MirrorRow>, String> {
-    let world = stages.world;
-    let (Some(solids), Some(item)) = (world.shape.boxes(), world.scene.item_of(row)) else {
-        return Ok(None);
-    };
-    let own = &solids.boxes[item as usize];
-    let axis = (own.max - own.min).min_position();
-    let others = (0..solids.boxes.len() as ItemId).filter(|&other| other != item);
-    let others: Vec<ItemId> = others.collect();
-    let (mut with, mut without) = (Vec::new(), Vec::new());
-    let (mut views, mut marked, mut shown, mut wrong) = (0, 0, 0, 0);
-    for view in world.views() {
-        let rays = world.rays(view);
-        let Some(face) = face_towards(&rays.camera, own, axis) else {
-            with.push(Default::default());
-            without.push(Default::default());
-            continue;
-        };
-        let canvas = Canvas::of(rays, world.samples);
-        let left = stages.listed(view);
-        let direct = draw(&canvas, bodies(solids, &left), &Tests::default());
-        let stencil = direct.stencil(&canvas, &[face]);
-        let reflected = canvas.mirrored(axis, face.min[axis]);
-        let screen = &reflected.screen;
-        let rectangles = solids.boxes.iter().filter_map(|b| screen.rectangle(b));
-        fits_drawing(world.samples, rectangles)?;
-        let tests = Tests {
-            stencil: Some(&stencil),
-            surfaces: None,
-        };
-        let mut seen = draw(&reflected, bodies(solids, &others), &tests);
-        let all = draw(&reflected, bodies(solids, &others), &Tests::default());
-        seen.tally.asked_count += stencil.tested;
-        let [own, other] = [&seen, &all].map(|drawn| drawn.ids());
-        let marks = (0..own.len()).filter(|&sample| stencil.marked[sample]);
-        wrong += marks.filter(|&sample| own[sample] != other[sample]).count() as u64;
-        let count = stencil.marked.iter().filter(|marked| **marked).count();
-        views += usize::from(count > 0);
-        marked += count;
-        shown += seen.visible(&reflected).len();
-        with.push(seen.tally);
-        without.push(all.tally);
-    }
-    let mean = |sum: usize| sum as f64 / world.views.len() as f64;
-    let counts = FragmentCounts::of(&with).zip(FragmentCounts::of(&without));
-    Ok(counts.map(|(with_stencil, without_stencil)| MirrorRow {
-        item: row,
-        axis: ['x', 'y', 'z'][axis],
-        view_count: views,
-        marked_count: mean(marked),
-        shown_count: mean(shown),
-        with_stencil,
-        without_stencil,
-        wrong_sample_count: wrong,
-    }))
-}
-
 /// Some of the items as bodies.
 fn bodies<'a>(solids: &'a Solids, items: &'a [ItemId]) -> impl Iterator<Item = SolidBox> + 'a {
     items.iter().map(|&item| SolidBox {
         b: solids.boxes[item as usize],
         item,
     })
-}
-
-/// The face of a box across an axis whose front a camera sees.
-fn face_towards(camera: &Camera, b: &WorldBox, axis: usize) -> Option<WorldBox> {
-    let (eye, forward) = (camera.frame.eye[axis], camera.frame.forward()[axis]);
-    let [is_low, is_high] = match camera.lens.is_orthographic() {
-        true => [forward > 0.0, forward < 0.0],
-        false => [eye < b.min[axis], eye > b.max[axis]],
-    };
-    let at = match (is_low, is_high) {
-        (true, _) => b.min[axis],
-        (_, true) => b.max[axis],
-        _ => return None,
-    };
-    let mut face = *b;
-    (face.min[axis], face.max[axis]) = (at, at);
-    Some(face)
 }

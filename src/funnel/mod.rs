@@ -23,7 +23,6 @@ mod world;
 
 pub use bounds::BoundRow;
 pub(crate) use error::check_memory;
-pub use fragment_stage::FragmentCounts;
 pub use item_stages::Fate;
 pub use orders::OrderRow;
 pub use picks::PickRow;

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::bounds::BoundRow;
 use super::error::LeftOutRow;
-use super::fragment_stage::{FragmentCounts, MirrorRow};
+use super::fragment_stage::FragmentCounts;
 use super::item_stages::PlanView;
 use super::orders::OrderRow;
 use super::picks::PickRow;
@@ -51,8 +51,6 @@ pub struct FunnelReport {
     pub solid_blocks: Option<BlocksRow>,
     /// Occluding boxes below the ground of a mesh; null for a scene without ground.
     pub ground: Option<GroundRow>,
-    /// Items in a mirror; null unless requested.
-    pub mirror: Option<MirrorRow>,
     /// Every depth order of the remaining items.
     pub orders: Vec<OrderRow>,
     /// Items under a cursor, by every back end of picking and every structure.
@@ -256,7 +254,7 @@ fn sums(times: &OverProcesses<FunnelKey>, tasks: &[FunnelKey]) -> Vec<f64> {
 
 /// Remaining items and the worth of each stage in a paragraph, then sentences.
 ///
-/// The sentences are on back ends that lost items, the stencil, a mirror and orders.
+/// The sentences are on back ends that lost items, the stencil and orders.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
     let last = report.stages.iter().find(is_last).map(|last| {
@@ -273,7 +271,6 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences = vec![told.join(" ")];
     sentences.extend(report.stages.iter().filter_map(StageRow::loss));
     sentences.extend(of_stencil(report));
-    sentences.extend(report.mirror.as_ref().map(MirrorRow::sentence));
     sentences.extend(report.orders.iter().flat_map(of_order));
     sentences
 }
@@ -336,24 +333,6 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
         },
         other.back_end.name,
     ))
-}
-
-impl MirrorRow {
-    /// A sentence on the reflected items and what the stencil saves.
-    pub fn sentence(&self) -> String {
-        format!(
-            "In item {} as a mirror across {} (in front in {}, at {} samples per view) {} items are \
-         seen; with the stencil, {} samples per view are tested instead of {}, and {} differ.",
-            self.item,
-            self.axis,
-            counted(self.view_count, "view"),
-            significant(self.marked_count),
-            significant(self.shown_count),
-            significant(self.with_stencil.asked_count),
-            significant(self.without_stencil.asked_count),
-            counted(self.wrong_sample_count as usize, "sample")
-        )
-    }
 }
 
 /// Exceptions of an order that is declared exact.

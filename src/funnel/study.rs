@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::bounds::{bounds, covered_key};
 use super::error::{LeftOutRow, check_memory};
-use super::fragment_stage::{FragmentCounts, FragmentStage, mirrored};
+use super::fragment_stage::{FragmentCounts, FragmentStage};
 use super::item_stages::{ItemStages, PlanView};
 use super::orders::{OrderRow, Orders, SORTED};
 use super::picks::Picks;
@@ -23,8 +23,7 @@ use crate::visibility::{Level, SampleGrid};
 
 /// Bytes per sample of a view: rays, depths and ties of two images.
 ///
-/// Measured: 230 for meshes, 290 to 350 for boxes, 440 with a mirror, and 660 without
-/// culling.
+/// Measured: 230 for meshes, 290 to 350 for boxes, and 660 without culling.
 const BYTES_PER_SAMPLE: u64 = 450;
 
 /// Bytes per solid box that the chain leaves of a view; 1,480 were measured.
@@ -200,12 +199,6 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         let orders = (input.all || input.sorted).then_some("orders");
         left_out.extend(orders.map(|orders| LeftOutRow::new([orders, "all"], reason)));
     }
-    let mirror = input.mirror;
-    let mirror = mirror.map_or(Ok(None), |item| mirrored(item, &study.items));
-    let mirror = mirror.unwrap_or_else(|reason| {
-        left_out.push(LeftOutRow::new(["mirror", "all"], reason));
-        None
-    });
     let mut orders = Vec::new();
     if let Some(all) = &study.orders {
         begin("every order, drawn");
@@ -250,7 +243,6 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         inner_boxes: world.hiders.inner.clone(),
         ground: ground.map(|ground| ground.row.clone()),
         solid_blocks: world.hiders.blocks.clone(),
-        mirror,
         orders,
         picks,
         left_out,

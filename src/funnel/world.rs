@@ -47,8 +47,6 @@ pub struct FunnelInput<'a> {
     pub samples: SampleGrid,
     /// Items that have holes.
     pub cut_outs: Option<&'a CutOuts>,
-    /// Data row of the item whose face is a mirror.
-    pub mirror: Option<ItemId>,
     /// Back end of each stage.
     pub chain: Chain,
     /// Structures for the object stage; one of them is the chain's.
@@ -82,7 +80,6 @@ impl<'a> FunnelInput<'a> {
             most_views,
             samples,
             cut_outs: None,
-            mirror: None,
             chain,
             structures: &setting.structures,
             claim: None,
@@ -337,12 +334,11 @@ fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<()> {
 
 /// Refuses options that the items of the scene cannot have.
 fn check_options(input: &FunnelInput) -> Result<()> {
-    let (scene, mirror) = (&input.setting.scene, input.mirror);
+    let scene = &input.setting.scene;
     let (name, shape) = (&scene.name, scene.item_shape());
     let inner_boxes = input.inner_boxes.is_some();
     for (option, is_given, expected) in [
         ("--cut-out", input.cut_outs.is_some(), ItemShape::Box),
-        ("--mirror", mirror.is_some(), ItemShape::Box),
         ("--inner-boxes", inner_boxes, ItemShape::Mesh),
     ] {
         ensure!(
@@ -351,10 +347,6 @@ fn check_options(input: &FunnelInput) -> Result<()> {
             shape.name(),
             expected.name()
         );
-    }
-    if let Some(row) = mirror.filter(|&row| scene.item_of(row).is_none()) {
-        let (items, ids) = (scene.items.len(), scene.ids());
-        bail!("--mirror {row}: '{name}' has {items} items; expected one from {ids}");
     }
     Ok(())
 }

@@ -170,7 +170,6 @@ fn csv_has_every_field_of_every_table_of_the_json() {
     let lines = [
         format!("funnel --scene rooms:n=500 {more}"),
         format!("funnel --scene city:n=500 {more} --cut-out fence"),
-        format!("funnel --scene city:n=500 {more} --mirror 7"),
         format!("funnel --scene freedm-map12 {more}"),
         format!("funnel --scene mesh:forest:n=2k {more}"),
     ];
@@ -180,7 +179,6 @@ fn csv_has_every_field_of_every_table_of_the_json() {
         "inner_boxes",
         "ground",
         "solid_blocks",
-        "mirror",
         "stages",
         "orders",
         "picks",

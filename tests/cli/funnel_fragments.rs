@@ -1,86 +1,11 @@
-//! The fragment stage of `funnel`: mirrors, items with holes, stencils of portals.
+//! The fragment stage of `funnel`: items with holes, stencils of portals.
 
-use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
 
-use super::BOXES;
 use super::funnel::{LINE, counted, folder, plain_report, row, rows};
 use super::process::*;
-
-/// The wall as a mirror shows items behind the camera, but none behind the wall.
-#[test]
-fn a_mirror_shows_what_is_before_it_on_its_own_samples() {
-    let folder = folder();
-    // A wall, a box behind it, one before it whose image is beside it, one behind the camera.
-    let scene = "10,-5,-1,11,5,10\n20,-1,0,21,1,2\n5,12,0,6,13,2\n-9,-1,0,-8,1,2\n";
-    fs::write(folder.path().join("scene.csv"), format!("{BOXES}\n{scene}")).expect("written");
-    let report = json(&works(folder.path(), &format!("{LINE} --mirror 0")));
-    let mirror = &report["mirror"];
-    assert_eq!(
-        (&mirror["axis"], &mirror["view_count"]),
-        (&"x".into(), &1.into())
-    );
-    assert_eq!(number(mirror, "shown_count"), 1.0, "{mirror}");
-    assert_eq!(number(mirror, "wrong_sample_count"), 0.0);
-    let [with, without] = ["with_stencil", "without_stencil"].map(|name| &mirror[name]);
-    let marked = number(mirror, "marked_count");
-    assert!(marked > 1000.0 && marked < 320.0 * 180.0, "{mirror}");
-    // Two high and wide at a distance of 10 + 18, where a pixel is 0.18: the centres of 12
-    // columns and of 11 rows.
-    for count in ["fragment_count", "covered_count"] {
-        assert_eq!(number(with, count), 132.0, "{mirror}");
-        assert!(number(with, count) <= number(without, count), "{mirror}");
-    }
-    // On the whole image the box before the plane is drawn too, beside the wall.
-    assert!(number(with, "kept_out_count") > 0.0, "{mirror}");
-    assert_eq!(number(without, "kept_out_count"), 0.0);
-    // Ids are the rows of the file, whatever is left out of it.
-    fs::write(
-        folder.path().join("scene.csv"),
-        format!("{BOXES}\n1,nan,1,2,2,2\n{scene}"),
-    )
-    .expect("written");
-    let line = format!("{LINE} --skip-bad-items --mirror");
-    let other = json(&cullbench(folder.path(), &format!("{line} 1")).out);
-    assert_eq!(number(&other["mirror"], "item"), 1.0);
-    assert_eq!(other["mirror"]["with_stencil"], mirror["with_stencil"]);
-    let refused = cullbench(folder.path(), &format!("{line} 0"));
-    let wanted = "expected one from 0 to 4 without the rows left out";
-    assert!(
-        refused.code == Some(2) && refused.err.contains(wanted),
-        "{refused:?}"
-    );
-    fs::write(folder.path().join("scene.csv"), format!("{BOXES}\n{scene}")).expect("written");
-    // From behind the wall nothing of what is before it: the camera is at the other side.
-    let behind = json(&works(folder.path(), &format!("{LINE} --mirror 3")));
-    assert_eq!(number(&behind["mirror"], "view_count"), 0.0);
-    assert!(plain_report()["mirror"].is_null());
-    let table = works(folder.path(), &LINE.replace("--format json", "--mirror 0"));
-    assert!(table.contains("Items seen in the mirror"), "{table}");
-    assert!(
-        unwrapped(&table).contains("and no samples differ"),
-        "{table}"
-    );
-    for (line, wanted) in [
-        (
-            format!("{LINE} --mirror 5"),
-            "--mirror 5 | 4 items | from 0 to 3",
-        ),
-        (format!("{LINE} --mirror wall"), "--mirror | wall"),
-        (
-            format!("{LINE} --mirror 0 --cut-out fence"),
-            "--mirror | --cut-out",
-        ),
-        (
-            "funnel --scene freedm-map12 --mirror 0".to_owned(),
-            "freedm-map12 | walls | --mirror",
-        ),
-    ] {
-        assert_refused(&cullbench(folder.path(), &line), wanted, &line);
-    }
-}
 
 #[test]
 fn through_the_holes_of_a_wall_is_seen_what_is_behind_it() {

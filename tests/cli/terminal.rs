@@ -158,7 +158,6 @@ fn studies_fit() {
         format!("precision --scene city:n=100 {few} --frames 2 --stage occlusion"),
         format!("{funnel} --scene rooms:n=300"),
         format!("{funnel} --scene freedm-map12 --all"),
-        format!("{funnel} --scene city:n=300 --mirror 7"),
         format!("{funnel} --scene city:n=300 --all --no-picks --cut-out fence"),
         format!("advise --scene city:n=300 --path orbit:frames=4 {few}"),
         format!("advise --scene rooms:n=300 --path street:frames=4 {few} --all-columns"),

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use crate::kernel::each;
 use crate::scene::WorldBox;
-use crate::visibility::truth::{Along, Body, Probe, SolidBox};
+use crate::visibility::truth::{Body, SolidBox};
 use crate::visibility::{Rays, SampleGrid};
 
 /// Columns and rows of samples.
@@ -53,8 +53,6 @@ pub struct Screen {
     near: f64,
     far: f64,
     parallel: bool,
-    /// Error of the eye, world units.
-    eye_off: f64,
 }
 
 impl Screen {
@@ -71,18 +69,7 @@ impl Screen {
             near: near - near.abs() * 1e-9,
             far: far + far.abs() * 1e-9,
             parallel: lens.is_orthographic(),
-            eye_off: 0.0,
         }
-    }
-
-    /// The image of the same camera seen in a mirror, the plane across an axis.
-    pub(super) fn mirrored(&self, axis: usize, at: f64) -> Screen {
-        let mut screen = *self;
-        screen.eye[axis] = 2.0 * at - self.eye[axis];
-        screen.axes.iter_mut().for_each(|of| of[axis] = -of[axis]);
-        // One rounding of the reflected eye.
-        screen.eye_off = self.eye_off + screen.eye[axis].abs() * f64::EPSILON;
-        screen
     }
 
     /// A rectangle that holds every sample whose ray meets the box; `None` if there
@@ -115,7 +102,7 @@ impl Screen {
     fn place(&self, at: DVec3, off: f64) -> [f64; 4] {
         let [x, y, w] = each(self.axes, |axis| at.dot(axis));
         // The depth of a point too far to be resolved is off too.
-        let size = at.abs().element_sum() + (self.eye_off + off) / ROUNDED;
+        let size = at.abs().element_sum() + off / ROUNDED;
         [x, y, w, size]
     }
 
@@ -274,27 +261,5 @@ impl Canvas {
     /// The rays of a camera through the samples of a grid, for boxes.
     pub fn of(rays: &Rays, grid: SampleGrid) -> Canvas {
         Canvas::about(rays, grid, DVec3::ZERO)
-    }
-
-    /// The same samples seen in a mirror that is a plane across an axis: the rays
-    /// from where they cross the plane on, reflected. (A ray that is reflected keeps
-    /// its depths.) Rays that do not reach the plane meet nothing.
-    pub fn mirrored(&self, axis: usize, at: f64) -> Canvas {
-        let reflected = |probe: &Probe| {
-            let mut ray = *probe.ray();
-            let depth = (at - ray.origin[axis]) / ray.direction[axis];
-            ray.near = match depth >= 0.0 && depth.is_finite() {
-                true => depth.max(ray.near),
-                false => f64::INFINITY,
-            };
-            ray.origin[axis] = 2.0 * at - ray.origin[axis];
-            ray.direction[axis] = -ray.direction[axis];
-            Probe::new(ray)
-        };
-        Canvas {
-            screen: self.screen.mirrored(axis, at),
-            origin: self.origin,
-            probes: self.probes.iter().map(reflected).collect(),
-        }
     }
 }

@@ -11,7 +11,7 @@ use crate::kernel::each;
 use crate::query::{ItemId, distinct};
 use crate::scene::{Surfaces, WorldBox};
 use crate::visibility::truth::{
-    Along, Body, Crossing, Facet, Meeting, NO_ITEM, Probe, SolidBox, TriangleProbe,
+    Along, Body, Crossing, Facet, Meeting, Probe, SolidBox, TriangleProbe,
 };
 
 /// The fragment tests beside the z-test.
@@ -110,17 +110,6 @@ pub struct Drawn<B: Body = SolidBox> {
     before: Vec<ItemId>,
 }
 
-/// Draws bodies in this order on an empty image.
-pub fn draw<B: Drawable>(
-    canvas: &Canvas<B>,
-    bodies: impl IntoIterator<Item = B>,
-    tests: &Tests<'_>,
-) -> Drawn<B> {
-    let mut drawn = Drawn::new(canvas.grid().samples());
-    drawn.draw(canvas, bodies, tests);
-    drawn
-}
-
 impl<B: Drawable> Drawn<B> {
     /// An empty image of this many samples.
     pub fn new(samples: usize) -> Drawn<B> {
@@ -215,12 +204,6 @@ impl<B: Drawable> Drawn<B> {
         self.front[sample]
     }
 
-    /// The id buffer: the item in front at each sample, [`NO_ITEM`] for none.
-    pub fn ids(&self) -> Vec<ItemId> {
-        let id = |front: &Option<(B::At, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
-        self.front.iter().map(id).collect()
-    }
-
     /// The exact visible set of the samples, ascending.
     ///
     /// All items that are in front anywhere, every item of a tie, and the items before them
@@ -287,8 +270,16 @@ mod tests {
     use super::*;
     use crate::scene::{self, SeededRng};
     use crate::visibility::fragment::tests::cameras;
-    use crate::visibility::truth::{SampleTruth, SurfaceIndex, judge};
+    use crate::visibility::truth::{NO_ITEM, SampleTruth, SurfaceIndex, judge};
     use crate::visibility::{Rays, SampleGrid, Solids, surfaces_of};
+
+    impl<B: Body> Drawn<B> {
+        /// The item in front at each sample, [`NO_ITEM`] for none.
+        pub fn ids(&self) -> Vec<ItemId> {
+            let id = |front: &Option<(B::At, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
+            self.front.iter().map(id).collect()
+        }
+    }
 
     /// Number of items that rays see, all of which are drawn.
     fn drawn_as_seen(

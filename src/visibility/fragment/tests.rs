@@ -28,6 +28,13 @@ fn bodies(solids: &Solids, pieces: &[Piece]) -> Vec<SolidBox> {
     pieces.iter().map(body).collect()
 }
 
+/// Draws bodies in this order on an empty image.
+fn draw(canvas: &Canvas, bodies: impl IntoIterator<Item = SolidBox>, tests: &Tests<'_>) -> Drawn {
+    let mut drawn = Drawn::new(canvas.grid().samples());
+    drawn.draw(canvas, bodies, tests);
+    drawn
+}
+
 /// Samples at which an item is entered through a piece of it.
 fn entered(canvas: &Canvas, solids: &Solids, piece: &Piece) -> Vec<usize> {
     let is_in = |sample: &usize| {

@@ -1,7 +1,6 @@
-//! Images through holes, stencils and mirrors, and the rectangles that hold them.
+//! Images through holes and stencils, and the rectangles that hold them.
 
 use super::*;
-use crate::visibility::Ray;
 
 #[test]
 fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
@@ -107,58 +106,6 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     let (with, without) = (masked.tally, open.tally);
     assert_eq!(with.asked_count + with.kept_out_count, without.asked_count);
     assert!(with.fragment_count > 0 && with.fragment_count * 4 < without.fragment_count);
-}
-
-/// A mirror shows the same as reflected boxes behind it.
-#[test]
-fn a_mirror_shows_reflected_boxes_behind_its_plane() {
-    let mut rng = SeededRng::new(14);
-    let mut reflected_hits = 0;
-    for axis in 0..3 {
-        let boxes = apart(&mut rng, 30);
-        let (solids, at) = (judge::solids(&boxes), 14.0);
-        let reflect = |b: &WorldBox| {
-            let mut reflected = *b;
-            reflected.min[axis] = 2.0 * at - b.max[axis];
-            reflected.max[axis] = 2.0 * at - b.min[axis];
-            reflected
-        };
-        let reflected = judge::solids(&boxes.iter().map(reflect).collect::<Vec<_>>());
-        let mut eye = DVec3::new(1.5, -2.5, 3.5);
-        eye[axis] = -20.0;
-        let mut forward = DVec3::new(0.1, 0.2, -0.1);
-        forward[axis] = 1.0;
-        let up = if axis == 2 { DVec3::X } else { DVec3::Z };
-        let frame = Frame::looking_along(eye, forward, up).unwrap();
-        let lens = Lens::perspective(60.0, 1.5, 0.5, None).unwrap();
-        let canvas = Canvas::of(&Rays::of(&Camera { frame, lens }).unwrap(), GRID);
-        let mut mirror = WorldBox::new(DVec3::splat(-9.0), DVec3::splat(9.0));
-        (mirror.min[axis], mirror.max[axis]) = (at, at);
-        let nothing = Drawn::new(GRID.samples());
-        let stencil = nothing.stencil(&canvas, &[mirror]);
-        let tests = Tests {
-            stencil: Some(&stencil),
-            surfaces: None,
-        };
-        let drawn = draw(&canvas.mirrored(axis, at), all(&solids), &tests);
-        for (sample, &id) in drawn.ids().iter().enumerate() {
-            let probe = canvas.probe(sample);
-            let plane = (at - eye[axis]) / probe.ray().direction[axis];
-            let beyond = Ray {
-                near: plane,
-                ..*probe.ray()
-            };
-            let wanted = judge::front(&beyond, &reflected.boxes);
-            let wanted = wanted.first().copied().filter(|_| stencil.marked[sample]);
-            assert_eq!(
-                id,
-                wanted.unwrap_or(NO_ITEM),
-                "axis {axis}, sample {sample}"
-            );
-            reflected_hits += usize::from(id != NO_ITEM);
-        }
-    }
-    assert!(reflected_hits > 100, "the premise: {reflected_hits}");
 }
 
 #[test]
