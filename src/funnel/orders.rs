@@ -76,11 +76,9 @@ pub struct Orders<'w> {
 impl Left {
     fn of(world: &World, all: &Solids, items: &[ItemId], is_all: bool) -> Left {
         let boxes = all.some(items);
-        let triangles = world.shape.triangles().map(|surfaces| surfaces.some(items));
         let to_order = ToOrder {
             boxes: &boxes,
-            planes: triangles.as_ref().and(world.scene.own_tree.as_ref()),
-            surfaces: triangles.as_ref(),
+            are_solid: world.shape.boxes().is_some(),
         };
         let wanted = ORDERS.iter();
         let wanted = wanted.filter(|row| is_all || SORTED.contains(&row.name));
@@ -165,9 +163,9 @@ impl<'w> Orders<'w> {
         let sorted = left.orders.iter().map(|(_, order)| {
             let mut pieces = Vec::new();
             order.order(&rays.camera, &mut pieces);
-            (&**order, pieces)
+            pieces
         });
-        let sorted: Vec<(&dyn DepthOrder, Vec<Piece>)> = sorted.collect();
+        let sorted: Vec<Vec<Piece>> = sorted.collect();
         if let Some(index) = index {
             return draw_orders(rays, samples, index, items, &|_, _, _| true, &sorted);
         }

@@ -67,7 +67,7 @@ fn a_map_has_regions_and_the_faces_of_its_walls() {
         let row = row(&outside, "occlusion", name);
         assert_eq!(number(row, "output_count"), number(row, "input_count"));
     }
-    orders_of_triangles(&report, &["map-bsp"]);
+    orders_of_triangles(&report);
     picked_exactly(&report);
 }
 

@@ -6,8 +6,6 @@ use serde::Serialize;
 
 use super::canvas::{Canvas, Rectangle, Stencil};
 use super::cut_outs::Holes;
-use super::order::{DepthOrder, Part};
-use crate::kernel::each;
 use crate::query::{ItemId, distinct};
 use crate::scene::{Surfaces, WorldBox};
 use crate::visibility::truth::{
@@ -31,8 +29,8 @@ pub trait Drawable: Body {
     /// Tests whether the body is opaque where a ray meets it.
     fn is_opaque(&self, holes: &Holes, probe: &Self::Probe, at: &Self::At) -> bool;
 
-    /// Test of parts of an item for the point where a ray meets the item.
-    fn is_in(order: &dyn DepthOrder, probe: &Self::Probe, at: &Self::At) -> impl Fn(Part) -> bool;
+    /// Tests whether a ray meets the item of a part where it enters the part.
+    fn is_in(part: &WorldBox, probe: &Self::Probe, at: &Self::At) -> bool;
 }
 
 impl Drawable for SolidBox {
@@ -44,15 +42,9 @@ impl Drawable for SolidBox {
         holes.opaque(self.item, &self.b, probe, at)
     }
 
-    /// The part is entered where the item is.
-    fn is_in(_: &dyn DepthOrder, probe: &Probe, at: &Crossing) -> impl Fn(Part) -> bool {
-        move |part| {
-            let Part::Within(b) = part else {
-                return false;
-            };
-            let entered = probe.enter(&b, probe.ray().far);
-            entered.is_some_and(|of_part| probe.compare(at, &of_part).is_eq())
-        }
+    fn is_in(part: &WorldBox, probe: &Probe, at: &Crossing) -> bool {
+        let entered = probe.enter(part, probe.ray().far);
+        entered.is_some_and(|of_part| probe.compare(at, &of_part).is_eq())
     }
 }
 
@@ -65,10 +57,9 @@ impl Drawable for Facet {
         true
     }
 
-    fn is_in(order: &dyn DepthOrder, probe: &TriangleProbe, at: &Meeting) -> impl Fn(Part) -> bool {
-        let [a, b, c] = each(at.corners, |p| p.as_dvec3());
-        let leaf = order.leaf(probe.local(at.depth), (b - a).cross(c - a));
-        move |part| leaf.map(Part::InLeaf) == Some(part)
+    /// Triangles are not cut.
+    fn is_in(_: &WorldBox, _: &TriangleProbe, _: &Meeting) -> bool {
+        true
     }
 }
 

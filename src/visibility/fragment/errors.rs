@@ -8,8 +8,9 @@ use std::collections::HashSet;
 
 use super::canvas::{Rectangle, Screen};
 use super::draw::{Drawable, Tally};
-use super::order::{DepthOrder, Part, Piece};
+use super::order::Piece;
 use crate::query::{ItemId, distinct};
+use crate::scene::WorldBox;
 use crate::visibility::truth::{Along, BodyIndex};
 use crate::visibility::{Rays, SampleGrid};
 
@@ -119,7 +120,7 @@ impl ErrorCount {
 }
 
 /// A part of an item, the samples that it may be met at, and its place in the list.
-type Placed = (Option<Part>, Rectangle, u32);
+type Placed = (Option<WorldBox>, Rectangle, u32);
 
 /// The parts of an item, and those that may be met in a row of samples.
 #[derive(Clone, Default)]
@@ -131,13 +132,9 @@ struct Parts {
 
 impl Parts {
     /// Place in the list of the first part that holds a point at a sample.
-    ///
-    /// A point that rounding has put into a leaf without a part of the item counts with the
-    /// first part.
     fn when<B: Drawable>(
         &mut self,
         (row, column): (u32, u32),
-        order: &dyn DepthOrder,
         (probe, at): (&B::Probe, &B::At),
     ) -> Option<u32> {
         let first = self.all.first()?.2;
@@ -149,10 +146,11 @@ impl Parts {
             self.in_row.clear();
             self.in_row.extend(in_row.cloned());
         }
-        let is_in = B::is_in(order, probe, at);
-        let holds =
-            |(part, of, _): &&Placed| of.columns.contains(&column) && part.is_none_or(&is_in);
-        Some(self.in_row.iter().find(holds).map_or(first, |part| part.2))
+        let is_in = |part: &WorldBox| B::is_in(part, probe, at);
+        let holds = |(part, of, _): &&Placed| {
+            of.columns.contains(&column) && part.as_ref().is_none_or(is_in)
+        };
+        self.in_row.iter().find(holds).map(|part| part.2)
     }
 }
 
@@ -168,15 +166,15 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
     index: &BodyIndex<B>,
     left: &[ItemId],
     is_opaque: &F,
-    orders: &[(&dyn DepthOrder, Vec<Piece>)],
+    orders: &[Vec<Piece>],
 ) -> Vec<(Tally, Result<OrderErrors, String>)> {
     let screen = Screen::of(rays, grid);
     let parts_of = |pieces: &[Piece]| {
         let mut parts = vec![Parts::default(); left.len()];
         for (Piece { item, part }, when) in pieces.iter().zip(0..) {
             let place = match part {
-                Some(Part::Within(b)) => screen.rectangle(b).unwrap_or_default(),
-                _ => Rectangle {
+                Some(b) => screen.rectangle(b).unwrap_or_default(),
+                None => Rectangle {
                     columns: 0..grid.width,
                     rows: 0..grid.height,
                 },
@@ -185,7 +183,7 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
         }
         parts
     };
-    let parts = orders.iter().map(|(_, pieces)| parts_of(pieces));
+    let parts = orders.iter().map(|pieces| parts_of(pieces));
     let mut parts: Vec<Vec<Parts>> = parts.collect();
     let mut counts: Vec<(Tally, ErrorCount)> = orders.iter().map(|_| Default::default()).collect();
     let mut layers: Vec<Layer<B::At>> = Vec::new();
@@ -202,12 +200,11 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
         met.dedup_by_key(|(item, _)| *item);
         let fragments = met.len() as u64;
         met.retain(|(item, at)| is_opaque(*item, &probe, at));
-        let drawn = orders.iter().zip(&mut parts).zip(&mut counts);
-        for (((order, _), parts), (tally, errors)) in drawn {
+        for (parts, (tally, errors)) in parts.iter_mut().zip(&mut counts) {
             layers.clear();
             layers.extend(met.iter().filter_map(|&(item, at)| {
                 let parts = &mut parts[item as usize];
-                let when = parts.when::<B>(sample, *order, (&probe, &at))?;
+                let when = parts.when::<B>(sample, (&probe, &at))?;
                 Some(Layer { when, item, at })
             }));
             errors.sample(&mut layers, |a, b| probe.compare(a, b));

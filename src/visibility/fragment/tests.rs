@@ -8,10 +8,7 @@ use super::*;
 use crate::camera::{Camera, Frame, Lens};
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, load};
-use crate::visibility::region::doom::DoomMap;
-use crate::visibility::truth::{
-    Along, Boxes, NO_ITEM, RayIndex, SampleTruth, SolidBox, SurfaceIndex, judge,
-};
+use crate::visibility::truth::{Along, Boxes, NO_ITEM, RayIndex, SampleTruth, SolidBox, judge};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 use order::{ORDERS, OrderRow, Partition, parted, parted_within};
 
@@ -43,7 +40,7 @@ fn entered(canvas: &Canvas, solids: &Solids, piece: &Piece) -> Vec<usize> {
         let Some(at) = enters(&solids.boxes[piece.item as usize]) else {
             return false;
         };
-        let Some(Part::Within(part)) = &piece.part else {
+        let Some(part) = &piece.part else {
             return true;
         };
         enters(part).is_some_and(|of_part| probe.compare(&at, &of_part).is_eq())
@@ -56,12 +53,11 @@ fn drawn_in(
     solids: &Solids,
     rays: &Rays,
     grid: SampleGrid,
-    order: &dyn DepthOrder,
     pieces: &[Piece],
 ) -> (Tally, OrderErrors) {
     let left: Vec<ItemId> = (0..solids.boxes.len() as ItemId).collect();
     let index = RayIndex::build(solids);
-    let orders = [(order, pieces.to_vec())];
+    let orders = [pieces.to_vec()];
     let mut drawn = draw_orders(rays, grid, &index, &left, &|_, _, _| true, &orders);
     let (tally, errors) = drawn.remove(0);
     (tally, errors.unwrap())
@@ -70,8 +66,7 @@ fn drawn_in(
 fn to_order(boxes: &Solids) -> ToOrder<'_> {
     ToOrder {
         boxes,
-        surfaces: None,
-        planes: None,
+        are_solid: true,
     }
 }
 
@@ -227,7 +222,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
             let mut pieces = Vec::new();
             for (i, (row, order)) in orders(&solids).into_iter().enumerate() {
                 order.order(&camera, &mut pieces);
-                let (tally, errors) = drawn_in(&solids, &rays, grid, &*order, &pieces);
+                let (tally, errors) = drawn_in(&solids, &rays, grid, &pieces);
                 wrong[i] += errors.wrong;
                 pairs += errors.pairs;
                 // The painter's picture, drawn, is wrong where it was said to be.
@@ -297,7 +292,7 @@ fn overlaps_in_a_cycle_are_found_and_only_cutting_undoes_them() {
         let errors = |name: &str| {
             let (order, mut pieces) = (of_boxes(name, &solids), Vec::new());
             order.order(&camera, &mut pieces);
-            drawn_in(&solids, &rays, SampleGrid::new(80, 80), &*order, &pieces).1
+            drawn_in(&solids, &rays, SampleGrid::new(80, 80), &pieces).1
         };
         let (sorted, cut) = (errors("box-distance"), errors("bsp"));
         assert_eq!((cut.wrong, cut.wrong_samples), (0, 0));
@@ -338,7 +333,7 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
     let (rays, grid) = (Rays::of(&camera).unwrap(), SampleGrid::new(32, 18));
     let mut pieces = Vec::new();
     tree.order(&camera, &mut pieces);
-    let (_, errors) = drawn_in(&solids, &rays, grid, &tree, &pieces);
+    let (_, errors) = drawn_in(&solids, &rays, grid, &pieces);
     assert_eq!((errors.wrong_samples, tree.exception(&camera)), (0, None));
     assert!(errors.pairs > 6, "the premise: they overlap in the image");
     // What is within a box is never drawn.
@@ -361,81 +356,4 @@ fn of_boxes(name: &str, solids: &Solids) -> Box<dyn DepthOrder> {
 
 fn row(name: &str) -> &'static order::OrderRow {
     ORDERS.iter().find(|row| row.name == name).unwrap()
-}
-
-/// The front item of a sample is the first along its ray that is opaque there.
-/// Overlapping pairs, wrongly ordered pairs and overdraw of three draw orders.
-///
-/// The orders are the BSP of the map, distances, and the BSP back to front. The counts
-/// are sums over two maps.
-fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
-    let mut counted = [[0; 3]; 3];
-    for name in ["freedm-map12", "freedm-map20"] {
-        let scene = load(name, &Default::default()).unwrap();
-        let map = DoomMap::of_scene(&scene).unwrap();
-        let items: Vec<ItemId> = (0..scene.items.len() as ItemId)
-            .filter(|&item| is_meant(scene.labels[0].get(item as usize)))
-            .collect();
-        let surfaces = map.surfaces(&scene);
-        let (index, own) = (SurfaceIndex::build(&surfaces), surfaces.some(&items));
-        let boxes = Solids::of(&scene).some(&items);
-        let of = ToOrder {
-            boxes: &boxes,
-            surfaces: Some(&own),
-            planes: scene.own_tree.as_ref(),
-        };
-        let orders =
-            ["map-bsp", "box-distance", "map-bsp"].map(|name| (row(name).build)(&of).unwrap());
-        let mut rng = SeededRng::new(7);
-        for place in scene.places.iter().step_by(5) {
-            // No eye in a plane of the map.
-            let eye = place.eye + rng.point() * 0.3;
-            for lens in [
-                Lens::perspective(75.0, 1.6, 0.5, None),
-                Lens::orthographic(600.0, 1.6, 0.0, 4000.0),
-            ] {
-                let frame = Frame::looking_along(eye, rng.normal3().with_z(0.1), DVec3::Z);
-                let (frame, lens) = (frame.unwrap(), lens.unwrap());
-                let camera = Camera { frame, lens };
-                let rays = Rays::of(&camera).unwrap();
-                let mut sorted = orders.each_ref().map(|order| {
-                    let mut pieces = Vec::new();
-                    order.order(&camera, &mut pieces);
-                    (&**order, pieces)
-                });
-                sorted[2].1.reverse();
-                let counts = draw_orders(&rays, GRID, &index, &items, &|_, _, _| true, &sorted);
-                for ((tally, errors), counted) in counts.iter().zip(&mut counted) {
-                    let errors = errors.as_ref().unwrap();
-                    let again = tally.shaded_count - tally.covered_count;
-                    for (sum, count) in counted.iter_mut().zip([errors.pairs, errors.wrong, again])
-                    {
-                        *sum += count;
-                    }
-                    assert_eq!(tally.covered_count, counts[0].0.covered_count);
-                }
-            }
-        }
-    }
-    counted
-}
-
-/// The BSP of a map orders every pair of walls correctly.
-///
-/// Distances get some pairs wrong; the BSP back to front gets all wrong. With things, of
-/// which a leaf may have several, the BSP gets few pairs wrong.
-#[test]
-fn a_maps_own_bsp_orders_its_walls_exactly() {
-    let [own, distances, back] = pairs_of_maps(|kind| kind == "linedef");
-    assert!(
-        own[0] > 1000 && own[0] == distances[0],
-        "{own:?} {distances:?}"
-    );
-    assert!(
-        own[1..] == [0, 0] && distances[1] > 20,
-        "{own:?} {distances:?}"
-    );
-    assert_eq!(back[..2], [own[0]; 2]);
-    let [own, distances, _] = pairs_of_maps(|_| true);
-    assert!(3 * own[1] < distances[1], "{own:?} {distances:?}");
 }

@@ -120,11 +120,6 @@ impl TriangleProbe {
         }
     }
 
-    /// The point at a depth in the triangles' coordinates, rounded.
-    pub fn local(&self, depth: f64) -> DVec3 {
-        self.ray.direction * depth - self.shift
-    }
-
     /// Meeting of the ray and a triangle, if that is from near to far.
     ///
     /// A one-sided triangle is met from its front, where its corners turn counter-clockwise.

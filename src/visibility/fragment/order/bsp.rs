@@ -11,10 +11,9 @@
 //! are too many parts or planes, and for a ray within a plane both sides are on the eye's
 //! side.
 
-use glam::DVec3;
-
-use super::partition::{Held, Node, Partition};
-use super::{DepthOrder, Part, ToOrder};
+use super::{DepthOrder, Piece, ToOrder, nearest};
+use crate::camera::Camera;
+use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
 
@@ -33,7 +32,81 @@ const COST_OF_CUT: usize = 8;
 /// Cuts boxes by planes; no order of triangles.
 pub fn order(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
     let order = || Box::new(parted(of.boxes)) as Box<dyn DepthOrder>;
-    of.surfaces.is_none().then(order)
+    of.are_solid.then(order)
+}
+
+/// A plane across an axis, and the nodes above and below it.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    axis: usize,
+    at: f64,
+    children: [Option<u32>; 2],
+}
+
+/// An item in a leaf, or a part of it.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    item: ItemId,
+    bounds: WorldBox,
+    is_cut: bool,
+}
+
+/// A partition with the items in its leaves, which are drawn from front to back.
+#[derive(Default)]
+pub struct Partition {
+    nodes: Vec<Node>,
+    root: Option<u32>,
+    /// Index: twice the node above, plus its side. An undivided space is leaf 0.
+    leaves: Vec<Vec<Held>>,
+    /// `true` if cutting ended early.
+    is_cut_short: bool,
+}
+
+impl DepthOrder for Partition {
+    fn order(&self, camera: &Camera, pieces: &mut Vec<Piece>) {
+        pieces.clear();
+        let parallel = camera.lens.is_orthographic();
+        let (eye, forward) = (camera.frame.eye, camera.frame.forward());
+        let mut sorted = Vec::new();
+        let mut open = vec![(self.root, 0)];
+        while let Some((node, leaf)) = open.pop() {
+            if let Some(place) = node {
+                let Node { axis, at, children } = self.nodes[place as usize];
+                let is_above = match parallel {
+                    true => forward[axis] <= 0.0,
+                    false => eye[axis] >= at,
+                };
+                let near = usize::from(!is_above);
+                for side in [1 - near, near] {
+                    open.push((children[side], 2 * place as usize + side));
+                }
+                continue;
+            }
+            sorted.clear();
+            let held = self.leaves[leaf].iter();
+            sorted.extend(held.map(|held| (nearest(camera, &held.bounds), held)));
+            sorted.sort_by(|(near_a, a): &(f64, &Held), (near_b, b)| {
+                near_a.total_cmp(near_b).then(a.item.cmp(&b.item))
+            });
+            pieces.extend(sorted.iter().map(|(_, held)| Piece {
+                item: held.item,
+                part: held.is_cut.then_some(held.bounds),
+            }));
+        }
+    }
+
+    fn exception(&self, camera: &Camera) -> Option<&'static str> {
+        if self.is_cut_short {
+            return Some("the limit on cuts was reached before all items were separated");
+        }
+        let Camera { frame, lens } = camera;
+        let is_within = |node: &Node| match lens.is_orthographic() {
+            true => frame.forward()[node.axis] == 0.0,
+            false => frame.eye[node.axis] == node.at,
+        };
+        let within = self.nodes.iter().any(is_within);
+        within.then_some("rays may run within the plane of a face")
+    }
 }
 
 /// Builds the tree. O(n log^2 n) where few boxes are cut.
@@ -46,11 +119,10 @@ pub fn parted_within(solids: &Solids, most: usize) -> Partition {
     let part = |(b, item): (&WorldBox, u32)| Held {
         item,
         bounds: *b,
-        part: None,
-        is_behind_all: false,
+        is_cut: false,
     };
     let all: Vec<Held> = solids.boxes.iter().zip(0..).map(part).collect();
-    let (mut tree, mut count, mut is_cut_short) = (Partition::default(), all.len(), false);
+    let (mut tree, mut count) = (Partition::default(), all.len());
     tree.leaves.push(Vec::new());
     // Parts, and the leaf that they are if no plane divides them.
     let mut open = vec![(0, all)];
@@ -60,7 +132,7 @@ pub fn parted_within(solids: &Solids, most: usize) -> Partition {
         let room = most.saturating_sub(count);
         let found = (left > 0).then(|| plane(&parts, room)).flatten();
         let Some((axis, at)) = found else {
-            is_cut_short |= plane(&parts, usize::MAX).is_some();
+            tree.is_cut_short |= plane(&parts, usize::MAX).is_some();
             tree.leaves[leaf] = parts;
             continue;
         };
@@ -71,8 +143,8 @@ pub fn parted_within(solids: &Solids, most: usize) -> Partition {
             Some(above) => above.children[leaf % 2] = Some(node),
         }
         tree.nodes.push(Node {
-            normal: DVec3::AXES[axis],
-            d: -at,
+            axis,
+            at,
             children: [None; 2],
         });
         tree.leaves.resize_with(2 * tree.nodes.len(), Vec::new);
@@ -82,7 +154,6 @@ pub fn parted_within(solids: &Solids, most: usize) -> Partition {
             open.push((2 * node as usize + side, parts));
         }
     }
-    tree.is_cut_short = Some(is_cut_short);
     tree
 }
 
@@ -90,11 +161,11 @@ pub fn parted_within(solids: &Solids, most: usize) -> Partition {
 fn sides(parts: Vec<Held>, axis: usize, at: f64) -> [Vec<Held>; 2] {
     let (mut below, mut above) = (Vec::new(), Vec::new());
     for part in parts {
-        let [mut low, mut high] = [part; 2];
+        let [mut low, mut high] = [Held {
+            is_cut: true,
+            ..part
+        }; 2];
         (low.bounds.max[axis], high.bounds.min[axis]) = (at, at);
-        for half in [&mut low, &mut high] {
-            half.part = Some(Part::Within(half.bounds));
-        }
         match (part.bounds.max[axis] <= at, part.bounds.min[axis] >= at) {
             (true, _) => below.push(part),
             (_, true) => above.push(part),
@@ -112,7 +183,7 @@ fn entered(mut parts: Vec<Held>, boxes: &[WorldBox]) -> Vec<Held> {
     parts.retain(|held| {
         let (b, whole) = (&held.bounds, &boxes[held.item as usize]);
         let ends = b.min.cmpeq(whole.min) | b.max.cmpeq(whole.max);
-        held.part.is_none() || ends.any()
+        !held.is_cut || ends.any()
     });
     parts
 }
@@ -160,6 +231,8 @@ fn plane(parts: &[Held], room: usize) -> Option<(usize, f64)> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::visibility::truth::judge;
 
@@ -174,7 +247,7 @@ mod tests {
             let tree = parted_within(&judge::solids(&boxes), 8 * count);
             let parts: usize = tree.leaves.iter().map(Vec::len).sum();
             assert!(parts < 8 * count);
-            assert_eq!(tree.is_cut_short, Some(!is_whole), "{count}");
+            assert_eq!(tree.is_cut_short, !is_whole, "{count}");
         }
     }
 }

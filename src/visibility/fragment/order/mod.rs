@@ -1,19 +1,16 @@
 //! Depth orders: lists of items from front to back, as well as each can.
 
 mod bsp;
-mod partition;
 
 use glam::DVec3;
 
 use crate::camera::Camera;
-use crate::geometry::PlaneTree;
 use crate::index::{Input, RegionIndex, Wide};
 use crate::query::ItemId;
-use crate::scene::{Surfaces, WorldBox};
+use crate::scene::WorldBox;
 use crate::visibility::{Guarantee, Row, Solids};
 
-pub use bsp::{parted, parted_within};
-pub use partition::Partition;
+pub use bsp::{Partition, parted, parted_within};
 
 /// A row of the table of orders: prepares one for items, if it can order them.
 pub type OrderRow = Row<fn(&ToOrder) -> Option<Box<dyn DepthOrder>>>;
@@ -34,9 +31,6 @@ pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, bui
         Guarantee::Unproven, |of| Some(sorted(of, nearest));
     "bsp", "planes through faces of boxes, which are cut where they cross: exact",
         Guarantee::Exact, bsp::order;
-    // In a leaf of walls that surround it nothing hides a wall but what is no wall.
-    "map-bsp", "the map's own BSP leaf by leaf, items of one leaf by distance",
-        Guarantee::Unproven, partition::order;
 };
 
 /// Input of an order.
@@ -44,19 +38,8 @@ pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, bui
 pub struct ToOrder<'a> {
     /// The items as solid boxes, or the boxes about them.
     pub boxes: &'a Solids,
-    /// Their triangles, if they are no solid boxes.
-    pub surfaces: Option<&'a Surfaces>,
-    /// Planes of the scene's own partition.
-    pub planes: Option<&'a PlaneTree>,
-}
-
-/// A part of an item.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Part {
-    /// The part that is entered through this box.
-    Within(WorldBox),
-    /// The part in a leaf ([`DepthOrder::leaf`]).
-    InLeaf(u32),
+    /// `true` for solid boxes, which can be cut.
+    pub are_solid: bool,
 }
 
 /// An item to be drawn, or a part of it.
@@ -64,8 +47,8 @@ pub enum Part {
 pub struct Piece {
     /// The item.
     pub item: ItemId,
-    /// `None` is all of it.
-    pub part: Option<Part>,
+    /// The box that the part is entered through; `None` is all of the item.
+    pub part: Option<WorldBox>,
 }
 
 impl Piece {
@@ -80,13 +63,6 @@ pub trait DepthOrder: Send + Sync {
     /// Replaces `pieces` by all items, from front to back as well as it can.
     /// Deterministic.
     fn order(&self, camera: &Camera, pieces: &mut Vec<Piece>);
-
-    /// Leaf of a point of a triangle; `None` if parts are no leaves.
-    ///
-    /// The point is relative to the zero of the surfaces.
-    fn leaf(&self, _at: DVec3, _normal: DVec3) -> Option<u32> {
-        None
-    }
 
     /// Reason why an order that is declared exact may be wrong for a camera.
     fn exception(&self, _: &Camera) -> Option<&'static str> {
@@ -145,7 +121,7 @@ fn distance(camera: &Camera, point: DVec3) -> f64 {
 /// Distance of the nearest point of a box.
 ///
 /// Squared from the eye; the depth for an orthographic lens.
-pub fn nearest(camera: &Camera, b: &WorldBox) -> f64 {
+fn nearest(camera: &Camera, b: &WorldBox) -> f64 {
     let point = match camera.lens.is_orthographic() {
         true => DVec3::select(camera.frame.forward().cmpgt(DVec3::ZERO), b.min, b.max),
         false => camera.frame.eye.max(b.min).min(b.max),
