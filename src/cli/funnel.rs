@@ -399,7 +399,6 @@ mod tests {
                 pair_count: 1.0,
                 wrong_pair_count: 1.0,
                 wrong_sample_count: 0.5,
-                cyclic_count: 0.0,
                 guarantee,
                 exceptions: reasons.iter().map(|reason| (*reason, 1)).collect(),
                 time: None,

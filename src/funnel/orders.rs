@@ -47,8 +47,6 @@ pub struct OrderRow {
     pub wrong_pair_count: f64,
     /// Samples that show a wrong item without a z-test, back to front.
     pub wrong_sample_count: f64,
-    /// Items on cycles of overlaps, for which no order is right.
-    pub cyclic_count: f64,
     /// Declared guarantee of the order.
     pub guarantee: Guarantee,
     /// Reasons for which the guarantee does not hold, with the number of views.
@@ -199,7 +197,6 @@ impl OrderRow {
             (&mut self.pair_count, errors.pairs),
             (&mut self.wrong_pair_count, errors.wrong),
             (&mut self.wrong_sample_count, errors.wrong_samples),
-            (&mut self.cyclic_count, errors.cyclic as u64),
         ] {
             *mean += count as f64 / views;
         }

@@ -9,7 +9,7 @@ use std::collections::HashSet;
 use super::canvas::{Rectangle, Screen};
 use super::draw::{Drawable, Tally};
 use super::order::Piece;
-use crate::query::{ItemId, distinct};
+use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::truth::{Along, BodyIndex};
 use crate::visibility::{Rays, SampleGrid};
@@ -25,8 +25,6 @@ pub struct OrderErrors {
     /// Samples that show a wrong item if the list is drawn back to front without a
     /// z-test (painter's algorithm).
     pub wrong_samples: u64,
-    /// Items on cycles of overlaps, for which no order is right.
-    pub cyclic: usize,
 }
 
 /// Most pairs of layers that are compared in an image.
@@ -108,13 +106,12 @@ impl ErrorCount {
                  expected fewer samples or fewer items behind each other"
             ));
         }
-        let all: Vec<(ItemId, ItemId)> = self.right.union(&self.wrong).copied().collect();
-        let unordered = all.iter().map(|&(a, b)| (a.min(b), a.max(b)));
+        let all = self.right.union(&self.wrong);
+        let unordered = all.map(|&(a, b)| (a.min(b), a.max(b)));
         Ok(OrderErrors {
             pairs: unordered.collect::<HashSet<_>>().len() as u64,
             wrong: self.wrong.len() as u64,
             wrong_samples: self.wrong_samples,
-            cyclic: items_in_cycles(&all),
         })
     }
 }
@@ -228,51 +225,6 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
     all.map(|(tally, errors)| (tally, errors.all())).collect()
 }
 
-/// Number of items on cycles of `before` pairs.
-///
-/// Those of strongly connected components of more than one item (Kosaraju; Sharir 1981). O(pairs log pairs).
-pub(super) fn items_in_cycles(before: &[(ItemId, ItemId)]) -> usize {
-    let items = distinct(before.iter().flat_map(|&(a, b)| [a, b]).collect());
-    let node = |item| items.binary_search(&item).expect("an item of a pair");
-    let (mut next, mut previous) = (vec![Vec::new(); items.len()], vec![Vec::new(); items.len()]);
-    for &(a, b) in before {
-        let (a, b) = (node(a), node(b));
-        next[a].push(b);
-        previous[b].push(a);
-    }
-    let (mut seen, mut finished) = (vec![false; items.len()], Vec::new());
-    for root in 0..items.len() {
-        finish(&next, root, &mut seen, &mut finished);
-    }
-    seen.fill(false);
-    let components = finished.iter().rev().map(|&root| {
-        let mut component = Vec::new();
-        finish(&previous, root, &mut seen, &mut component);
-        component.len()
-    });
-    components.filter(|&nodes| nodes > 1).sum()
-}
-
-/// Appends the unseen nodes that are reached from a root, successors first.
-fn finish(next: &[Vec<usize>], root: usize, seen: &mut [bool], finished: &mut Vec<usize>) {
-    if std::mem::replace(&mut seen[root], true) {
-        return;
-    }
-    // Nodes, each with the number of its successors that are done.
-    let mut calls = vec![(root, 0)];
-    while let Some((at, done)) = calls.last_mut() {
-        match next[*at].get(*done) {
-            Some(&to) => {
-                *done += 1;
-                if !std::mem::replace(&mut seen[to], true) {
-                    calls.push((to, 0));
-                }
-            }
-            None => finished.extend(calls.pop().map(|(node, _)| node)),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
@@ -337,21 +289,5 @@ mod tests {
         assert_eq!(count.looked_at, 499_500);
         count.sample(&mut (0..9000).map(|i| layer(i, i, i)).collect(), u32::cmp);
         assert!(count.all().is_err());
-    }
-
-    #[test]
-    fn items_of_cycles_are_counted_and_others_are_not() {
-        assert_eq!(items_in_cycles(&[]), 0);
-        assert_eq!(items_in_cycles(&[(1, 2), (2, 3), (1, 3)]), 0);
-        assert_eq!(
-            items_in_cycles(&[(1, 2), (2, 3), (3, 1), (3, 4), (0, 1)]),
-            3
-        );
-        assert_eq!(
-            items_in_cycles(&[(1, 2), (2, 1), (5, 6), (6, 7), (7, 5)]),
-            5
-        );
-        let long: Vec<_> = (0..100_000).map(|i| (i, (i + 1) % 100_000)).collect();
-        assert_eq!(items_in_cycles(&long), 100_000);
     }
 }
