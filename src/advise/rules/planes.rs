@@ -363,10 +363,16 @@ mod tests {
             for (taken, ties, decision, confirmed) in [
                 (tests[0], vec![], Decision::LeaveOut, Some(predicted)),
                 (tests[3], vec![], Decision::LeaveOut, Some(predicted)),
-                (tests[1], vec![], Decision::Keep, Some(!predicted)),
-                (tests[2], vec![tests[1]], Decision::Keep, Some(!predicted)),
+                (tests[1], vec![], Decision::LeaveOut, Some(predicted)),
+                (tests[2], vec![], Decision::Keep, Some(!predicted)),
+                (tests[2], vec![tests[1]], Decision::Keep, None),
                 (tests[0], vec![tests[2]], Decision::LeaveOut, None),
-                (tests[1], vec![tests[3]], Decision::Keep, None),
+                (
+                    tests[1],
+                    vec![tests[3]],
+                    Decision::LeaveOut,
+                    Some(predicted),
+                ),
             ] {
                 let statistic = if predicted { 0.5 } else { 2.0 };
                 let finding = Finding::new(statistic, 1.0, "");
