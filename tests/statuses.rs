@@ -26,6 +26,8 @@ trait Mishap: Send + Sync + 'static {
     const NAME: &'static str;
     /// True for a refit that does nothing.
     const KEEPS_BOXES: bool = false;
+    /// True for an answer with one more id, of no item.
+    const NAMES_ONE_MORE: bool = false;
     fn at_build() {}
     fn at_query() {}
     fn at_chose() {}
@@ -83,6 +85,9 @@ impl<M: Mishap> RegionIndex for Broken<M> {
             if !item.is_empty() && volume.admits(item, volume.mask(), cx.recorder()) {
                 cx.accept(&[id as ItemId])?;
             }
+        }
+        if M::NAMES_ONE_MORE {
+            cx.accept(&[self.boxes.len() as ItemId])?;
         }
         ControlFlow::Continue(())
     }
@@ -142,6 +147,12 @@ impl Mishap for Stale {
     const KEEPS_BOXES: bool = true;
 }
 
+struct Beyond;
+impl Mishap for Beyond {
+    const NAME: &'static str = "beyond";
+    const NAMES_ONE_MORE: bool = true;
+}
+
 const RUN: &str = "run --scene city:n=300 --path orbit:frames=4 --path spin:frames=4 \
     --processes 2 --no-bounds --timeout 60 --structure linear,bvh,";
 
@@ -198,6 +209,7 @@ fn each_mishap_fails_its_own_rows() {
         ("aborts", "panicked", "ended by signal 6 while", 1),
         ("panics", "panicked", "no such luck in two lines", 1),
         ("panics-chose", "panicked", "no choice", 1),
+        ("beyond", "wrong", "1 repeated or unknown", 1),
         ("stale", "unsafe", "a search after updates: ", 1),
     ] {
         let folder = tempfile::tempdir().expect("a folder");
@@ -403,7 +415,8 @@ fn main() -> ExitCode {
         return cullbench::cli::main_with(
             registry()
                 .with::<Broken<HangsLate>>()
-                .with::<Broken<Stale>>(),
+                .with::<Broken<Stale>>()
+                .with::<Broken<Beyond>>(),
         );
     }
     a_scene_without_items_is_left_out();

@@ -90,9 +90,9 @@ impl Plan<'_> {
             }
             let distance = eye.clamp(min, max).distance(eye);
             let rect = [min.truncate(), max.truncate()];
-            all.push((if is_key { -1.0 } else { distance }, rect, class));
+            all.push(((!is_key, distance), rect, class));
         }
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.sort_by(|(a, ..), (b, ..)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let far = all.len().saturating_sub(MOST_DRAWN);
         all.truncate(MOST_DRAWN);
         let notes = [(apart, "on other storeys"), (far, "farther from the eye")].into_iter();
@@ -258,7 +258,36 @@ fn draw_camera(camera: &Camera, up: UpAxis, sheet: &Sheet, body: &mut String) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::path;
     use crate::scene::WorldBox;
+
+    #[test]
+    fn of_many_items_the_nearest_are_drawn() {
+        let at = |i: usize| WorldBox::at(DVec3::new(0.0, (12_000 - i) as f64, 0.0));
+        let boxes: Vec<WorldBox> = (0..12_000).map(at).collect();
+        let scene = Scene::from_boxes("a", &boxes).expect("boxes");
+        let camera = path::load("orbit:frames=1", &scene, &Default::default());
+        let mut camera = camera.expect("a path").cameras[0];
+        camera.frame.eye = DVec3::ZERO;
+        for is_key in [true, false] {
+            let classes = [Class {
+                colour: "#111",
+                words: "of it",
+                is_key,
+            }];
+            let plan = Plan {
+                caption: scene.name.clone(),
+                scene: &scene,
+                camera: Some(&camera),
+                classes: &classes,
+                class_of: &|_| 0,
+                cells: None,
+            };
+            let (drawn, _) = plan.items();
+            let farthest = drawn.iter().map(|item| item.rect[1].y);
+            assert_eq!(farthest.fold(0.0, f64::max), 10_000.0);
+        }
+    }
 
     #[test]
     fn a_floor_is_an_outline_and_small_items_lie_over_large_ones() {

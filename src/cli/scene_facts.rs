@@ -113,7 +113,8 @@ impl SceneFacts {
         }
         let of_sample = |count: usize| (sampled > 0).then(|| count as f64 / sampled as f64);
         Ok(SceneFacts {
-            bounds_min: bounds.min.to_array(),
+            // -0 is 0.
+            bounds_min: (bounds.min + 0.0).to_array(),
             bounds_max: bounds.max.to_array(),
             extent: (bounds.max - bounds.min).to_array(),
             size_min,

@@ -42,7 +42,7 @@ fn winner(place: &Place) -> String {
     let ratio = ratio.filter(|_| !place.scan_wins());
     told += &text::some(ratio, |ratio| format!(": {}", text::significant(ratio)));
     if place.is_off_class() {
-        told += &format!(" (at {})", text::percent(place.share));
+        told += &format!(" (at {})", text::short_percent(place.share));
     }
     told
 }
@@ -88,7 +88,7 @@ fn break_even(surface: &Surface) -> Option<Table> {
     };
     let mut table = Table::of_numbers(["items, visible"].iter().chain(&structures).copied());
     for place in &surface.places {
-        let (items, visible) = (text::count(place.items), text::percent(place.share));
+        let (items, visible) = (text::count(place.items), text::short_percent(place.share));
         let name = [format!("{items}, {visible}")].into_iter();
         table.add_row(name.chain(structures.iter().map(|structure| told(place, structure))));
     }

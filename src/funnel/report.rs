@@ -319,6 +319,9 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     };
     let (stencil, with) = test(STENCIL)?;
     let (other, without) = test(default_test(report.cut_outs.is_some()))?;
+    if without == 0.0 {
+        return None;
+    }
     Some(format!(
         "fragment {} tests {} samples per view instead of {} ({:.1} % {}) and leaves {} items as {} \
          does.",

@@ -241,7 +241,9 @@ impl<'a> World<'a> {
             let moved = (b.min - own.min).max(own.max - b.max);
             let share = moved.max_element() / (b.max - b.min).max_element();
             let is_seen = |view: &View| view.volume.sees(&self.scene.items[item]);
-            (share > MOST_MOVED && self.views.iter().any(is_seen)).then_some(share)
+            // A point has no edge.
+            let share = Some(share).filter(|share| share.is_finite() && *share > MOST_MOVED);
+            share.filter(|_| self.views.iter().any(is_seen))
         };
         let shares: Vec<f64> = self.scene.written().enumerate().filter_map(share).collect();
         let most = shares.iter().copied().reduce(f64::max)?;

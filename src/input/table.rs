@@ -313,11 +313,17 @@ fn check_quotes(bytes: &[u8], delimiter: u8, file: &str) -> Result<()> {
                 }
                 end += 1;
             }
-            let behind = bytes[end + 1..].iter().find(|byte| !b" \t".contains(byte));
+            let mut behind = bytes[end + 1..].iter();
+            let behind = behind.find(|byte| separates(byte) || !b" \t".contains(byte));
             let has_text = behind.is_some_and(|byte| !separates(byte));
-            if has_text && bytes[begin..end].iter().any(is_end) {
-                let line = lines(&bytes[..end]) + 1;
-                let found = format!("a quote that is not closed before line {line}");
+            if has_text {
+                let found = match bytes[begin..end].iter().any(is_end) {
+                    true => {
+                        let line = lines(&bytes[..end]) + 1;
+                        format!("a quote that is not closed before line {line}")
+                    }
+                    false => "text behind a closing quote".to_owned(),
+                };
                 return Err(fault(begin, found));
             }
         }

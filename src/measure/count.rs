@@ -109,9 +109,10 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 let question = format!("{} {n}", pass.question());
                 counted.verdict = verdict(answered, spent[i], &question, |id| match pass {
                     Pass::Queries => {
-                        explain_visibility(&workload.items[id], workload.views[n].as_any())
+                        let item = workload.items.get(id)?;
+                        Some(explain_visibility(item, workload.views[n].as_any()))
                     }
-                    Pass::Searches => explain_containment(&boxes[id], workload.points[n]),
+                    Pass::Searches => Some(explain_containment(boxes.get(id)?, workload.points[n])),
                 });
                 counted.answers[pass as usize].push(Answer::of(trial.answer()));
             }
@@ -248,11 +249,11 @@ fn verdict(
     answered: Result<(), Fault>,
     spent: Duration,
     question: &str,
-    explain: impl FnOnce(usize) -> String,
+    explain: impl FnOnce(usize) -> Option<String>,
 ) -> Verdict {
     match answered {
         Err(fault @ Fault::Panicked(_)) => Verdict::of(&fault, "", |_| None),
-        Err(fault) => Verdict::of(&fault, &format!("{question}: "), |id| Some(explain(id))),
+        Err(fault) => Verdict::of(&fault, &format!("{question}: "), explain),
         Ok(()) if spent > PATIENCE => {
             let reason = format!("the count pass took longer than {} s", PATIENCE.as_secs());
             Verdict::new(Status::TimedOut, reason)

@@ -192,7 +192,7 @@ fn compare_with_scan(
     let mut trial = Trial::new(items.len());
     trial.see(items, volume);
     trial.ask(answer).map(drop).map_err(|fault| {
-        let why = |id: usize| Some(explain_visibility(&items[id], volume));
+        let why = |id: usize| Some(explain_visibility(items.get(id)?, volume));
         Verdict::of(&fault, &format!("{place}: "), why)
     })
 }

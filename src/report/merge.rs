@@ -117,9 +117,10 @@ impl Merged {
         first_of(&pairs(&self.missing), NAMED)
     }
 
-    /// Writes the four files of a run into a folder that is new or empty: beside its
-    /// place, then renamed as a whole, so that nothing that ends it leaves half a run.
-    /// False if stopped.
+    /// Writes the four files of a run into a folder that is new or empty.
+    ///
+    /// They are written beside it and renamed, into an empty folder the stream last, so that
+    /// nothing that ends it leaves half a run. False if stopped.
     ///
     /// # Errors
     /// A folder that holds a run or other files; errors of the file system.
@@ -150,8 +151,19 @@ impl Merged {
         if stop() {
             return Ok(false);
         }
-        fs::rename(beside.path(), &out).map_err(io)?;
-        let _ = beside.keep();
+        if out.exists() {
+            // Of a folder that a shell may be in, which stays; the stream makes it a run.
+            let listed = fs::read_dir(beside.path()).map_err(io)?;
+            let listed: io::Result<Vec<_>> = listed.map(|file| Ok(file?.file_name())).collect();
+            let mut names = listed.map_err(io)?;
+            names.sort_by_key(|name| name == STREAM);
+            for name in names {
+                fs::rename(beside.path().join(&name), out.join(&name)).map_err(io)?;
+            }
+        } else {
+            fs::rename(beside.path(), &out).map_err(io)?;
+            let _ = beside.keep();
+        }
         drop(lock);
         Ok(true)
     }

@@ -58,10 +58,12 @@ pub fn world_of(scene: &str) -> String {
 
 /// The nearest of ..., 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1 by its logarithm.
 fn class_of(share: f64) -> f64 {
-    let decade = 10f64.powi(share.log10().floor() as i32);
-    let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0].map(|step| step * decade);
+    let decade = share.log10().floor() as i32;
+    let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0].map(|step| step * 10f64.powi(decade));
+    // Not ten times the first: a class has one number.
+    let steps = steps.into_iter().chain([10f64.powi(decade + 1)]);
     let far = |step: f64| (step / share).ln().abs();
-    let nearest = steps.into_iter().min_by(|a, b| far(*a).total_cmp(&far(*b)));
+    let nearest = steps.min_by(|a, b| far(*a).total_cmp(&far(*b)));
     nearest.unwrap_or(share).min(1.0)
 }
 
@@ -289,6 +291,15 @@ mod tests {
     use super::super::ranking::tests::cell;
     use super::*;
     use crate::index::Kind;
+
+    #[test]
+    fn shares_about_a_power_of_ten_have_one_class() {
+        for power in -12..0 {
+            let at = 10f64.powi(power);
+            assert_eq!(class_of(0.96 * at), at);
+            assert_eq!(class_of(1.04 * at), at);
+        }
+    }
 
     /// Structures with their times where `visible` of `items` items are visible.
     fn comparison(items: usize, share: f64, times: &[(&str, f64)]) -> Comparison<'static> {

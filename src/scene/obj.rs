@@ -164,7 +164,10 @@ impl Obj<'_> {
             }
             b"o" | b"g" => {
                 let start = line.iter().position(|byte| *byte == word[0]).unwrap_or(0) + 1;
-                let name = String::from_utf8_lossy(&line[start..]);
+                let is_comment =
+                    |at: &usize| line[*at] == b'#' && line[at - 1].is_ascii_whitespace();
+                let end = (start..line.len()).find(is_comment);
+                let name = String::from_utf8_lossy(&line[start..end.unwrap_or(line.len())]);
                 let plain = |line: &str| line.trim().trim_end_matches('\\').trim().to_owned();
                 let lines: Vec<String> = name.lines().map(plain).collect();
                 let name = lines.join(" ").trim().to_owned();
@@ -250,7 +253,7 @@ f -3 -2 -1
 f 1 4 \\
   3
 l 1 2 3 4 # a line \\
-g last
+g last # of all
 f 1 2 3 4";
 
     fn read(text: &[u8]) -> Result<Scene> {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use crate::input::{InputError, is_readable, read_file};
-use crate::scene::{LoadOptions, Sample, Scene, part_names, read_bytes, split_part};
+use crate::scene::{ItemKind, LoadOptions, Sample, Scene, part_names, read_bytes, split_part};
 use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
 
 /// Rounds of decoding the other maps of a file, so that the time has an interval.
@@ -55,7 +55,10 @@ impl Level {
         };
         let decode = |name: &str| {
             let begun = Instant::now();
-            let map = read_bytes(&bytes, [file, name], Some(name), options).ok()?;
+            let mut map = read_bytes(&bytes, [file, name], Some(name), options).ok()?;
+            if options.items == ItemKind::Triangles {
+                map = map.by_triangle(options).ok()?;
+            }
             Some((map.items.len(), begun.elapsed().as_nanos() as f64))
         };
         let begun = Instant::now();
@@ -125,6 +128,24 @@ mod tests {
         let file = folder.join("several.wad");
         std::fs::write(&file, joined(samples)).expect("written");
         file.display().to_string()
+    }
+
+    #[test]
+    fn items_of_triangles_are_counted_as_such() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let square = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+        let packed = scene::packed(&[("a.obj", square, 0), ("b.obj", square, 0)]);
+        let file = folder.path().join("two.zip");
+        std::fs::write(&file, packed).expect("written");
+        let options = LoadOptions {
+            items: ItemKind::Triangles,
+            ..LoadOptions::default()
+        };
+        let source = format!("{}#a.obj", file.display());
+        let scene = scene::load(&source, &options).expect("a scene");
+        let level = Level::of(&source, &scene, &options).expect("a level");
+        let counts = (level.input_count, level.output_count);
+        assert_eq!((scene.items.len(), counts), (2, (4, 2)));
     }
 
     #[test]

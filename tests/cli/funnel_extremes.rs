@@ -91,3 +91,48 @@ fn an_order_that_cuts_much_is_drawn_as_the_others_are() {
         assert!(number(order, "stage_ns") > 0.0);
     }
 }
+
+/// Rays of an orthographic camera begin at places of their own: far from zero those are rounded,
+/// behind the eye they are far from it, and triangles on edge are met as the rays meet them.
+#[test]
+fn rows_with_a_guarantee_keep_it_under_orthographic_cameras() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lens = format!("{FORWARD},ortho_height,near,far,aspect");
+    let kept = |scene: &str, text: &str, camera: &str, samples: &str| {
+        write(folder.path(), scene, text);
+        write(folder.path(), "camera.csv", &format!("{lens}\n{camera}\n"));
+        let line = format!("funnel --scene {scene} --path camera.csv --processes 1 --no-picks");
+        works(folder.path(), &format!("{line} --up z --samples {samples}"));
+    };
+    let far = 1e13;
+    let bar = |i: usize| {
+        let (y, z) = (5.0 - 10.0 * ((i as f64 + 0.5) / 180.0), i as f64 / 8.0);
+        let [x, y, z] = [4.0, y, z].map(|v| far + v);
+        format!("{:?},{y:?},{z:?},{x:?},{y:?},{z:?}\n", far - 4.0)
+    };
+    let bars: String = (0..180).map(bar).collect();
+    let camera = format!(
+        "{far:?},{far:?},{:?},0,0,-1,0,1,0,10,1,100,1.7777777777777777",
+        far + 60.0
+    );
+    kept("bars.csv", &format!("{BOXES}\n{bars}"), &camera, "320x180");
+
+    let square = "v 5 7 -7\nv 15 21 -13\nv 15 21 -5\nv 5 7 1\n";
+    let edge = format!("{square}o front\nf 1 2 3 4\no back\nf 4 3 2 1\n");
+    let camera = "0,0,0,5,7,-3,0,0,1,6,0,1000,1.5";
+    kept("edge.obj", &edge, camera, "321x181");
+
+    let height = |x: usize| if (45..=55).contains(&x) { 10 } else { 0 };
+    let mut hill = String::new();
+    for (y, x) in (0..=20).flat_map(|y| (0..=20).map(move |x| (5 * y, 5 * x))) {
+        hill += &format!("v {x} {y} {}\n", height(x));
+    }
+    hill += "o ground\n";
+    for (j, i) in (0..20).flat_map(|j| (0..20).map(move |i| (j, i))) {
+        let [a, b] = [21 * j + i + 1, 21 * j + i + 22];
+        hill += &format!("f {a} {} {}\nf {a} {} {b}\n", a + 1, b + 1, b + 1);
+    }
+    hill += "o under\nv 90 45 -1\nv 90 45 0\nv 90 55 0\nv 90 55 -1\nf -4 -3 -2 -1\n";
+    let camera = "1000010.0,50,-0.004,1,0,0,0,0,1,0.01,-1000000.0,-999850.0,1";
+    kept("hill.obj", &hill, camera, "320x180");
+}

@@ -69,6 +69,11 @@ fn shards_together_are_the_run_of_the_whole_plan() {
     }
     // In any order.
     let told = works(folder.path(), "merge part3 part1 part2 --out merged");
+    // The folder that one stands in, which keeps being it.
+    fs::create_dir(at("here")).expect("a folder");
+    works(&at("here"), "merge ../part3 ../part1 ../part2 --out .");
+    assert_eq!(answers(&at("here")), answers(&at("merged")));
+    assert!(at("here/report.html").is_file());
     assert!(told.contains("8 cells of 3 shards"), "{told}");
     assert_eq!(answers(&at("merged")), answers(&at("whole")));
     assert_eq!(streamed(&at("merged")), streamed(&at("whole")));

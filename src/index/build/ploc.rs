@@ -57,7 +57,9 @@ const MOST_AROUND: usize = 150;
 /// The search for a better position visits all nodes that contain the reinserted one.
 fn is_nested(tree: &Bvh2, share: f32) -> bool {
     let nodes = &tree.nodes;
+    // As obvhs rounds it, which above 2^24 nodes may be up.
     let candidates = (nodes.len() as f32 * (2.0 * share).min(1.0)) as usize;
+    let candidates = candidates.min(nodes.len());
     let step = candidates.div_ceil(SAMPLE).max(16);
     let mut left = candidates.div_ceil(step) * MOST_AROUND;
     let mut open = Vec::new();

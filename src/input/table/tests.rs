@@ -133,9 +133,10 @@ fn a_quote_that_takes_in_other_lines_is_named_where_it_opens() {
             "line 2: a quote that is not closed before line 3",
         ),
         ("\u{feff}\"x,y,z\n", "line 1: a quote that is never closed"),
-        // Fields of several lines, doubled quotes, and quotes within a word.
+        ("x,y,z\n1,2,\"1\"5\n", "line 2: text behind a closing quote"),
+        // Fields of several lines, doubled quotes, and a quote within a word.
         (
-            "x,y,z\n1,2,\"a\n\"\"b\"\"\"\n1,2,\"\" \n1,2,3\"\n\"1\"b,2,3",
+            "x,y,z\n1,2,\"a\n\"\"b\"\"\"\n1,2,\"\" \n1,2,3\"\n1b,2,3",
             "",
         ),
         ("\u{feff}\"x\",y,z\r\n1,2,\"3\"\r\n", ""),

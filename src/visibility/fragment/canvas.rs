@@ -53,6 +53,8 @@ pub struct Screen {
     near: f64,
     far: f64,
     parallel: bool,
+    /// Rounding of the origins of parallel rays, which are in world coordinates.
+    off: f64,
 }
 
 impl Screen {
@@ -69,6 +71,10 @@ impl Screen {
             near: near - near.abs() * 1e-9,
             far: far + far.abs() * 1e-9,
             parallel: lens.is_orthographic(),
+            off: match lens.is_orthographic() {
+                true => f64::EPSILON * frame.eye.abs().element_sum(),
+                false => 0.0,
+            },
         }
     }
 
@@ -102,7 +108,7 @@ impl Screen {
     fn place(&self, at: DVec3, off: f64) -> [f64; 4] {
         let [x, y, w] = each(self.axes, |axis| at.dot(axis));
         // The depth of a point too far to be resolved is off too.
-        let size = at.abs().element_sum() + off / ROUNDED;
+        let size = at.abs().element_sum() + (off + self.off) / ROUNDED;
         [x, y, w, size]
     }
 

@@ -120,7 +120,8 @@ impl Ground {
         let WorldBox { min, max } = WorldBox::union_of(corners);
         // More than rounding of the corners, and of what begins at them, can be.
         let size = min.abs().max(max.abs()).max(self.origin.abs());
-        let slack = 1e-9 * size.max_element() + 1e-6 * (max - min).max_element() + 1e-8 * near;
+        let slack =
+            1e-9 * size.max_element() + 1e-6 * (max - min).max_element() + 1e-8 * near.abs();
         let (low, high) = (min - slack, max + slack);
         let [least, most] = [self.bounds.min, self.bounds.max].map(Vec3::as_dvec3);
         let is_over = low.x >= least.x && high.x <= most.x && low.y >= least.y && high.y <= most.y;

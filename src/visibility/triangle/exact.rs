@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::arithmetic::exact::{self, ExactVector};
 use crate::arithmetic::{Expansion, cross, cross_sizes, two_sum};
-use crate::camera::{Camera, Pose};
+use crate::camera::Camera;
 use crate::kernel::each;
 
 /// An eye in scene-local coordinates, as an exact sum of two f64 per axis, beside
@@ -33,16 +33,8 @@ impl Eye {
         if !camera.lens.is_orthographic() {
             return Eye::at(camera.frame.eye, origin);
         }
-        // As written: a direction, or a difference of two points, which has two terms.
-        match Pose::of(camera).direction() {
-            Some(exact) => {
-                let term = |k: usize, n| exact[k].terms().iter().nth_back(n).copied();
-                let vector = |n| [0, 1, 2].map(|k| term(k, n).unwrap_or_default());
-                let [high, low] = [0, 1].map(|n| DVec3::from(vector(n)));
-                Eye::new(-high, -low, 0.0)
-            }
-            None => Eye::along(camera.frame.forward()),
-        }
+        // The direction of the rays, rounded once.
+        Eye::along(camera.frame.forward())
     }
 
     /// A point of the world as seen from a scene's origin. Exact.
