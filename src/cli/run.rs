@@ -96,10 +96,11 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn new(args: &'a RunArgs, plan: Plan, folder: RunFolder, stream: Stream) -> Result<Self> {
-        let groups = plan.groups().len() as u64;
+        let parts = plan.groups().len() as u64 * u64::from(plan.effort.processes);
+        let left = parts.saturating_sub(stream.parts.len() as u64);
         let patience = Duration::from_secs(args.what.timeout);
         Ok(Run {
-            bar: progress(groups * u64::from(plan.effort.processes), ""),
+            bar: progress(left, ""),
             // Files in the run's folder: what a killed run leaves is taken away by
             // the next.
             workers: Workers::new(stream.header.args.clone(), patience, folder.path())?,
@@ -170,7 +171,6 @@ impl<'a> Run<'a> {
                 interrupt::check()?;
                 let share = self.share(&keys, process, &failed);
                 if !share.wanted.contains(&true) {
-                    self.bar.inc(0);
                     break;
                 }
                 match self.worker(scene, share)? {

@@ -78,7 +78,6 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
         ..Counted::default()
     };
     let mut all: Vec<Counted> = subjects.iter().map(fresh).collect();
-    let labels: Vec<String> = subjects.iter().map(Subject::label).collect();
     let mut spent = vec![Duration::ZERO; subjects.len()];
     let scene = workload.scene;
     let boxes = scene.regions.boxes(&scene.items);
@@ -97,7 +96,8 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 let (true, Ok(built)) = (counted.verdict.is_ok(), &subject.built) else {
                     continue;
                 };
-                notice(Some(&labels[i]), "counting");
+                // Of a twin too: whichever ends the process is not tried again.
+                notice(Some(&subjects[i].spec.label), "counting");
                 let start = Instant::now();
                 let cost = &mut counted.costs[pass as usize];
                 let counting = trial.ask(|out| built.count(workload, pass, n, out, cost));

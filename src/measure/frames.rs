@@ -125,14 +125,14 @@ fn ages(spec: &StructureSpec) -> bool {
 impl Entry<'_> {
     /// Counts and verifies all queries, and measures the time of one replay.
     fn count(&mut self, frames: &Frames, notice: Notice) -> Result<(), Verdict> {
-        notice(Some(&self.part.label), "counting");
+        notice(Some(&self.subject.spec.label), "counting");
         let mut moving = Moving::build(frames, &self.subject.spec)?;
         let (mut out, mut cost) = (Vec::new(), QueryCost::default());
         let mut answers = Vec::new();
         self.replay_ns = 0.0;
         let all_threads = self.subject.spec.is_threaded();
         while let Some(frame) = moving.take_moves() {
-            notice(Some(&self.part.label), "counting");
+            notice(Some(&self.subject.spec.label), "counting");
             let watch = Stopwatch::start_for(all_threads);
             moving.update()?;
             self.replay_ns += watch.lap().cpu_ns;

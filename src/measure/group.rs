@@ -305,7 +305,7 @@ fn compare_digests(
     notice: Notice,
 ) -> Result<(), Verdict> {
     let built = subject.built.as_ref().map_err(Verdict::clone)?;
-    notice(Some(&subject.label()), "comparing answers");
+    notice(Some(&subject.spec.label), "comparing answers");
     let (cameras, points) = (workload.views.len(), workload.points.len());
     if (known.visible.len(), known.located.len()) != (cameras, points) {
         let reason = format!(

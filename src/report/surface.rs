@@ -233,9 +233,7 @@ pub fn growths(report: &Report) -> Vec<Growth<'_>> {
     let points = ok.filter_map(|(at, cell)| {
         let (visible, ns) = (cell.value("visible_count")?, cell.value("query_ns")?);
         let point = (cell.scene.total_count, visible, ns, at);
-        // A NaN stays, and has no slope.
-        let nothing = visible <= 0.0 || ns <= 0.0;
-        (!nothing).then(|| (key(cell), point))
+        (visible > 0.0 && ns > 0.0).then(|| (key(cell), point))
     });
     grouped(points).into_iter().flat_map(of_series).collect()
 }

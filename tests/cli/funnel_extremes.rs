@@ -92,8 +92,10 @@ fn an_order_that_cuts_much_is_drawn_as_the_others_are() {
     }
 }
 
-/// Rays of an orthographic camera begin at places of their own: far from zero those are rounded,
-/// behind the eye they are far from it, and triangles on edge are met as the rays meet them.
+/// Rays of orthographic cameras have origins of their own.
+///
+/// Far from zero those are rounded, behind the eye they are far from it, and triangles on edge are
+/// met as the rays meet them.
 #[test]
 fn rows_with_a_guarantee_keep_it_under_orthographic_cameras() {
     let folder = tempfile::tempdir().expect("a folder");
