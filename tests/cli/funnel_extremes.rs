@@ -103,8 +103,9 @@ fn rows_with_a_guarantee_keep_it_under_orthographic_cameras() {
     let kept = |scene: &str, text: &str, camera: &str, samples: &str| {
         write(folder.path(), scene, text);
         write(folder.path(), "camera.csv", &format!("{lens}\n{camera}\n"));
-        let line = format!("funnel --scene {scene} --path camera.csv --processes 1 --no-picks");
-        works(folder.path(), &format!("{line} --up z --samples {samples}"));
+        let line = format!("funnel --scene {scene} --path camera.csv --processes 1 --up z");
+        let done = cullbench(folder.path(), &format!("{line} --samples {samples}"));
+        assert_eq!(done.code, Some(0), "{scene}: {done:?}");
     };
     let far = 1e13;
     let bar = |i: usize| {
