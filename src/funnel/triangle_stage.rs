@@ -131,7 +131,7 @@ impl TriangleStage {
         let built = self.views.first().map(|faces| &faces.built.culls);
         built.into_iter().flatten().map(move |(name, _)| {
             let key = FunnelKey::Stage(StageKind::Triangle, (*name).to_owned());
-            (key, self.ask(*name))
+            (key, self.ask(name))
         })
     }
 
