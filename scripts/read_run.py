@@ -109,6 +109,8 @@ if __name__ == "__main__":
         sys.exit(__doc__)
     summary, samples = read(sys.argv[1])
     task = task_of(summary)
+    if not (samples.task == task).any():
+        sys.exit(f"read_run.py: {sys.argv[1]}: nothing was timed; expected a run with times")
     times = [f"{task}_ns", f"{task}_ns_lower", f"{task}_ns_upper"]
     table = summary.set_index(CELL).reindex(columns=times)
     table["from samples"] = over_processes(times_of(samples, task))

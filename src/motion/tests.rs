@@ -78,19 +78,27 @@ fn the_same_items_of_a_part_of_a_city_move() {
 #[test]
 fn a_step_is_as_long_as_it_says() {
     let scene = scene("uniform:n=300");
-    let motion = Motion::load("drift:share=1,step=0.1,frames=1", &scene).unwrap();
-    for (b, start) in frames(&motion, &scene)[0].1.iter().zip(&scene.items) {
-        let step = (b.centre() - start.centre()).length();
-        let wanted = 0.1 * start.extent().max_element();
-        // A reflection makes it shorter.
-        assert!(step <= wanted * 1.001, "{step} {wanted}");
-    }
-    let cars = scene_of_cars();
-    let motion = Motion::load("traffic:share=1,frames=1", &cars).unwrap();
-    for (id, b) in frames(&motion, &cars)[0].1.iter().enumerate() {
-        let step = b.centre() - cars.items[id].centre();
-        assert!(step.x == 0.0 || step.y == 0.0, "{step}");
-    }
+    // A reflection makes it shorter, of few.
+    let whole = |of: &str, scene: &Scene| {
+        let motion = Motion::load(&format!("{of}:share=1,step=0.1,frames=1"), scene).unwrap();
+        let (moved, boxes) = &frames(&motion, scene)[0];
+        let mut whole = 0;
+        for &id in moved {
+            let [start, end] = [scene.items[id as usize], boxes[id as usize]];
+            let step = end.centre() - start.centre();
+            let wanted = 0.1 * start.extent().max_element();
+            assert!(step.length() <= wanted * 1.001, "{of}: {step} {wanted}");
+            whole += usize::from(step.length() > wanted * 0.999);
+            assert!(of == "drift" || step.x == 0.0 || step.y == 0.0, "{step}");
+        }
+        assert!(
+            10 * whole > 9 * moved.len(),
+            "{of}: {whole} of {}",
+            moved.len()
+        );
+    };
+    whole("drift", &scene);
+    whole("traffic", &scene_of_cars());
 }
 
 #[test]

@@ -95,7 +95,7 @@ fn an_order_that_cuts_much_is_drawn_as_the_others_are() {
 /// Rays of orthographic cameras have origins of their own.
 ///
 /// Far from zero those are rounded, behind the eye they are far from it, and triangles on edge are
-/// met as the rays meet them.
+/// met as the rays meet them. Quotients may overflow f32.
 #[test]
 fn rows_with_a_guarantee_keep_it_under_orthographic_cameras() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -119,6 +119,19 @@ fn rows_with_a_guarantee_keep_it_under_orthographic_cameras() {
         far + 60.0
     );
     kept("bars.csv", &format!("{BOXES}\n{bars}"), &camera, "320x180");
+
+    // A direction and a bound whose quotients overflow f32.
+    let row = "20,-3,-3,30,3,3\n5,-0.5,-0.5,6,0.5,0.5\n40,-2,-2,41,2,2\n";
+    let camera = "0,0,0,1,1e-60,0,0,0,1,10,1,100,1.7777777777777777";
+    kept("row.csv", &format!("{BOXES}\n{row}"), camera, "320x180");
+    let beside = "20,1e-42,-8,30,12,8\n5,0.5,-0.5,6,1.5,0.5\n-1,-1,-9,-0.5,-0.5,9\n";
+    let camera = "0,0,0,1,0,0,0,0,1,60,1,100,1.7777777777777777";
+    report(
+        beside,
+        "fovy_deg,near,far,aspect",
+        camera,
+        "--samples 320x180",
+    );
 
     let square = "v 5 7 -7\nv 15 21 -13\nv 15 21 -5\nv 5 7 1\n";
     let edge = format!("{square}o front\nf 1 2 3 4\no back\nf 4 3 2 1\n");

@@ -142,9 +142,10 @@ fn values_ratios_and_ranks_are_the_same_everywhere() {
     }
     let mut wanted: Vec<(u64, String)> = Vec::new();
     for (_, rows) in &mut ranked {
-        rows.sort_by(|a, b| a.1.total_cmp(&b.1));
-        // The order of the ranks is the order of the values.
-        assert!(rows.is_sorted_by_key(|row| row.0), "{rows:?}");
+        // A slower one with more noise can rank before a faster one, but not before the fastest.
+        let fastest = rows.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        assert_eq!(fastest.map(|row| row.0), Some(1), "{rows:?}");
+        rows.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         wanted.extend(rows.iter().map(|row| (row.0, row.2.clone())));
     }
     let parsed = |rank: &str, name: &str| Some((rank.parse().ok()?, name.to_owned()));
@@ -271,7 +272,7 @@ fn shares_stand_where_they_belong() {
     assert_eq!(head, " 30 % |", "{text}");
     let rows: Vec<&str> = rows.lines().skip(1).take(3).collect();
     assert!(
-        rows.iter().all(|row| row.contains("(at 34.70 %)")),
+        rows.iter().all(|row| row.contains("(at 34.7 %)")),
         "{rows:?}"
     );
     works(folder.path(), "report run --svg charts");

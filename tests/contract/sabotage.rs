@@ -56,6 +56,7 @@ const CELLS_PANICS: Fault = 35;
 const REFIT_KEEPS_SIZES: Fault = 36;
 const LOSES_ONE_IF_ITEMS_COME: Fault = 37;
 const ACCEPTS_TOO_MANY: Fault = 38;
+const KEEPS_ABSENT_IF_ITEMS_COME: Fault = 39;
 
 const CLAIMS_TO_REFIT: Fault = 21;
 const REFITS_UNDECLARED: Fault = 22;
@@ -244,6 +245,9 @@ impl<const CLAIMS: Claims> RegionIndex for Toy<CLAIMS> {
                 return Err(BuildError::NonFiniteItem { item, bounds });
             }
             (INVERTED_BOXES_ARE_SOUND, Ok(_)) => (0..items.len() as ItemId).collect(),
+            (KEEPS_ABSENT_IF_ITEMS_COME, Ok(_)) if input.come_and_go => {
+                (0..items.len() as ItemId).collect()
+            }
             (_, ids) => ids?,
         };
         let is_less = fault == LOSES_ONE_IF_ITEMS_COME && input.come_and_go;
@@ -448,6 +452,7 @@ fn every_fault_is_caught_and_every_property_catches_one() {
         CELLS_PANICS: "declared_capabilities_are_true";
         REFIT_KEEPS_SIZES: "refit_equals_a_fresh_build";
         LOSES_ONE_IF_ITEMS_COME: "declared_capabilities_are_true";
+        KEEPS_ABSENT_IF_ITEMS_COME: "items_that_come_and_go_are_followed";
         ACCEPTS_TOO_MANY: "every_view_sees_what_the_scan_sees";
         ITEMS_ARE_TESTED_LIKE_NODES: "every_view_sees_what_the_scan_sees";
     };

@@ -306,7 +306,11 @@ impl Outline {
             // product, two sums.
             let size = face.c.abs() + face.x.abs() * self.columns + face.y.abs() * self.height;
             let constant = face.c - 6.0 * f64::from(U) * size;
-            faces[i] = [constant as f32, face.x as f32, face.y as f32];
+            // What overflows f32 says nothing: the floor counts.
+            faces[i] = match size < 1e38 {
+                true => [constant as f32, face.x as f32, face.y as f32],
+                false => [f32::NEG_INFINITY, 0.0, 0.0],
+            };
         }
         Nearness {
             faces,
